@@ -1,0 +1,60 @@
+//! Physical constants and the few conversions the whole workbench shares.
+//!
+//! Inside, every `f64` is in SI base units. Absolute time is an integer number of femtoseconds
+//! since the first scan began (`i64`, good for ±2.5 h); 1 fs is 0.15 µm of range.
+
+/// Speed of light in vacuum, m/s (exact, SI 2019).
+pub const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
+/// Planck constant, J·s (exact, SI 2019).
+pub const PLANCK: f64 = 6.626_070_15e-34;
+
+/// Femtoseconds in a second.
+pub const FS_PER_S: i64 = 1_000_000_000_000_000;
+
+/// One-way range in metres of an echo whose light was `tof` seconds under way, there and back.
+///
+/// `R = c·t/2` \[KP16 eq. 1\]; with [`tof_from_range`] the only place of this factor 2.
+pub fn range_from_tof(tof: f64) -> f64 {
+    SPEED_OF_LIGHT * tof / 2.0
+}
+
+/// Two-way time of flight in seconds to a target at `range` metres. Inverse of [`range_from_tof`].
+pub fn tof_from_range(range: f64) -> f64 {
+    2.0 * range / SPEED_OF_LIGHT
+}
+
+/// Seconds to whole femtoseconds, rounded to the nearest.
+pub fn fs_from_s(seconds: f64) -> i64 {
+    (seconds * FS_PER_S as f64).round() as i64
+}
+
+/// Femtoseconds to seconds.
+pub fn s_from_fs(fs: i64) -> f64 {
+    fs as f64 / FS_PER_S as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_microsecond_is_150_metres() {
+        approx::assert_relative_eq!(range_from_tof(1e-6), 149.896_229, max_relative = 1e-12);
+        approx::assert_relative_eq!(tof_from_range(150.0), 1.000_692e-6, max_relative = 1e-6);
+    }
+
+    #[test]
+    fn range_and_tof_are_inverse() {
+        for range in [0.0, 0.375e-3, 30.0, 150.0, 5e3] {
+            approx::assert_relative_eq!(range_from_tof(tof_from_range(range)), range);
+        }
+    }
+
+    #[test]
+    fn femtoseconds_round_to_nearest() {
+        assert_eq!(fs_from_s(2.5e-12), 2500);
+        assert_eq!(fs_from_s(-0.6e-15), -1);
+        approx::assert_relative_eq!(s_from_fs(40_946_000), 40.946e-9);
+    }
+}
