@@ -1,3 +1,14 @@
 //! The language both ends of the link speak: code words, payload, and the marks they make.
 //!
 //! This stage counts chips. It knows nothing of seconds, metres or light.
+
+mod codebook;
+pub mod correlation;
+mod error;
+mod family;
+mod payload;
+
+pub use codebook::Codebook;
+pub use error::Error;
+pub use family::{CodeWord, Family, prime_sequence};
+pub use payload::{Crc, Payload, PayloadFault, ShiftAlias};

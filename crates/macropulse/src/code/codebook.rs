@@ -1,0 +1,219 @@
+//! The codebook: the marks of every macropulse a sensor can send.
+
+use super::{CodeWord, Error, Family, Payload};
+
+/// Most marks a codebook may hold: half a gigabyte of them.
+const MOST_MARKS: u64 = 1 << 28;
+
+/// A family's words times a payload's labels: one template of marks for each pair.
+///
+/// Bit b of the payload, counted from the one sent first, takes the chips b·length …
+/// (b+1)·length − 1 of the macropulse: a 1 bit is the code word, a 0 bit is dark (NRZ-OOK,
+/// \[KP16 §2.2\]). Both ends of the link own the same codebook.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Codebook {
+    family: Family,
+    payload: Option<Payload>,
+    labels: u32,
+    words: Vec<CodeWord>,
+    /// Templates one behind the other: all words of label 0, all words of label 1, …
+    marks: Vec<u16>,
+    /// Where each template begins in `marks`, and where the last one ends.
+    starts: Vec<u32>,
+}
+
+impl Codebook {
+    /// The macropulses of labels 0 to `labels` − 1 in every word of `family`. Without a payload
+    /// a macropulse is one bare code word, and there is one label, 0.
+    ///
+    /// # Errors
+    /// Where the payload cannot carry that many labels, or none is asked for; where a macropulse
+    /// is longer than 65535 chips; where all templates together have more than 2²⁸ marks.
+    pub fn new(family: Family, payload: Option<Payload>, labels: u32) -> Result<Self, Error> {
+        let possible = payload.map_or(1, |payload| payload.possible_labels());
+        if !(1..=possible).contains(&labels) {
+            return Err(Error::Labels { labels, possible });
+        }
+        let (bits, length) = (payload.map_or(1, |payload| payload.bits()), family.length());
+        let chips = bits * length;
+        if chips > u32::from(u16::MAX) {
+            return Err(Error::MacropulseTooLong { bits, length, chips });
+        }
+        let lit_bits = |label: u32| -> Vec<u32> {
+            payload.map_or(vec![0], |payload| payload.lit_bits(label as u16).collect())
+        };
+        let lit_in_all: u64 = (0..labels).map(|label| lit_bits(label).len() as u64).sum();
+        let words = family.words();
+        let total = lit_in_all * words.iter().map(|word| word.weight() as u64).sum::<u64>();
+        if total > MOST_MARKS {
+            let (words, possible) = (words.len(), MOST_MARKS);
+            return Err(Error::CodebookTooLarge { labels, words, marks: total, possible });
+        }
+
+        let mut marks = Vec::with_capacity(total as usize);
+        let mut starts = vec![0];
+        for label in 0..labels {
+            let lit = lit_bits(label);
+            for word in &words {
+                for bit in &lit {
+                    let first = (bit * length) as u16;
+                    marks.extend(word.marks.iter().map(|mark| first + mark));
+                }
+                starts.push(marks.len() as u32);
+            }
+        }
+        Ok(Self { family, payload, labels, words, marks, starts })
+    }
+
+    /// The codebook of a sensor that is not coded: a macropulse is one lit chip.
+    pub fn single() -> Self {
+        Self {
+            family: Family::Single,
+            payload: None,
+            labels: 1,
+            words: Family::Single.words(),
+            marks: vec![0],
+            starts: vec![0, 1],
+        }
+    }
+
+    /// The lit chips of the macropulse that carries `label` in `word`, ascending, counted from
+    /// its first chip.
+    ///
+    /// # Panics
+    /// Like a slice, where `label` or `word` is not in the book.
+    pub fn marks(&self, label: u16, word: u16) -> &[u16] {
+        let of_label = &self.starts[usize::from(label) * self.words.len()..][..=self.words.len()];
+        let word = usize::from(word);
+        &self.marks[of_label[word] as usize..of_label[word + 1] as usize]
+    }
+
+    /// Chips of a macropulse, at most 65535.
+    pub fn chips(&self) -> u32 {
+        self.payload.map_or(1, |payload| payload.bits()) * self.family.length()
+    }
+
+    /// The code word with index `w`.
+    ///
+    /// # Panics
+    /// Like a slice, where `w` is not in the book.
+    pub fn word(&self, w: u16) -> &CodeWord {
+        &self.words[usize::from(w)]
+    }
+
+    /// Number of code words.
+    pub fn words(&self) -> usize {
+        self.words.len()
+    }
+
+    /// Number of labels.
+    pub fn labels(&self) -> u32 {
+        self.labels
+    }
+
+    /// How labels are written; `None` where a macropulse is one bare code word.
+    pub fn payload(&self) -> Option<&Payload> {
+        self.payload.as_ref()
+    }
+
+    /// The family of the code words.
+    pub fn family(&self) -> Family {
+        self.family
+    }
+
+    /// Marks of a macropulse, label by label; the same in whichever word.
+    pub fn weights(&self) -> impl Iterator<Item = usize> {
+        (0..self.labels).map(|label| self.marks(label as u16, 0).len())
+    }
+
+    /// Marks of the macropulse that has the fewest.
+    pub fn min_weight(&self) -> usize {
+        self.weights().min().unwrap_or(0)
+    }
+
+    /// Mean marks of a macropulse, all labels being sent equally often.
+    pub fn mean_weight(&self) -> f64 {
+        self.marks.len() as f64 / (self.starts.len() - 1) as f64
+    }
+
+    /// Marks of the macropulse that has the most.
+    pub fn max_weight(&self) -> usize {
+        self.weights().max().unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Crc;
+    use super::*;
+
+    fn of_order(p: u32, labels: u32) -> Result<Codebook, Error> {
+        let payload = Payload::new(10, Crc::default(), false)?;
+        Codebook::new(Family::prime(p)?, Some(payload), labels)
+    }
+
+    #[test]
+    fn a_macropulse_is_the_word_at_every_lit_bit() {
+        let book = of_order(3, 848).unwrap();
+        // Label 1 is 0000000001011: bits 9, 11 and 12; word 2 over GF(3) is 0, 5, 7.
+        assert_eq!(book.marks(1, 2), [81, 86, 88, 99, 104, 106, 108, 113, 115]);
+        assert_eq!(book.chips(), 13 * 9);
+    }
+
+    #[test]
+    fn every_template_is_the_word_written_out_bit_by_bit() {
+        let book = of_order(29, 848).unwrap();
+        let payload = *book.payload().unwrap();
+        for label in 0..848 {
+            let text = payload.text(label);
+            for word in 0..29 {
+                let chips =
+                    text.chars().enumerate().filter(|&(_, bit)| bit == '1').flat_map(|(bit, _)| {
+                        book.word(word).marks.iter().map(move |m| 841 * bit as u16 + m)
+                    });
+                assert!(chips.eq(book.marks(label, word).iter().copied()), "{label}, {word}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_paper_lights_0_to_319_marks_of_10933_chips() {
+        let book = of_order(29, 848).unwrap();
+        assert_eq!((book.chips(), book.words(), book.labels()), (10_933, 29, 848));
+        assert_eq!((book.min_weight(), book.max_weight()), (0, 319));
+        approx::assert_relative_eq!(book.mean_weight(), 5256.0 * 29.0 / 848.0);
+        assert_eq!(book.weights().nth(1), Some(3 * 29));
+    }
+
+    #[test]
+    fn an_uncoded_sensor_lights_its_only_chip() {
+        let book = Codebook::single();
+        assert_eq!((book.marks(0, 0), book.chips()), (&[0_u16][..], 1));
+        assert_eq!(Ok(book), Codebook::new(Family::Single, None, 1));
+    }
+
+    #[test]
+    fn a_bare_word_is_its_own_macropulse() {
+        let book = Codebook::new(Family::prime(7).unwrap(), None, 1).unwrap();
+        assert_eq!(book.chips(), 49);
+        assert_eq!(book.marks(0, 3), book.word(3).marks);
+    }
+
+    #[test]
+    fn refusals_name_the_way_out() {
+        let refusal = |p, labels| of_order(p, labels).unwrap_err().to_string();
+        assert_eq!(
+            refusal(29, 1025),
+            "1025 labels are not possible; this payload carries 1 to 1024"
+        );
+        assert!(refusal(29, 0).starts_with("0 labels are not possible"));
+        assert_eq!(
+            refusal(73, 848),
+            "a macropulse of 13 bits × 5329 chips has 69277 chips; at most 65535 are possible: \
+             use a shorter code word or fewer payload bits"
+        );
+        let payload = Payload::new(16, Crc::default(), false).unwrap();
+        let large = Codebook::new(Family::prime(53).unwrap(), Some(payload), 65_536).unwrap_err();
+        assert!(large.to_string().starts_with("the macropulses of 65536 labels with 53 words"));
+    }
+}

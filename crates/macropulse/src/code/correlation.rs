@@ -1,0 +1,207 @@
+//! How alike code words are: correlation of lit chips.
+//!
+//! With a(n) = 1 where chip n of word a is lit and 0 elsewhere, N the length, and l the lag of b
+//! against a in chips:
+//!
+//! * aperiodic: `C_ab(l) = Σ_n a(n)·b(n+l)` over the n for which both chips exist, for every
+//!   −N < l < N \[KP16 eq. 3\]. Negative lags are part of it, and C_ab(−l) = C_ba(l);
+//! * periodic: `Θ_ab(l) = Σ_n a(n)·b((n+l) mod N) = C_ab(l) + C_ab(l−N)`, 0 ≤ l < N
+//!   \[KP16 eq. 4\].
+//!
+//! The first is what an isolated word meets, the second an endless row of the same word. Both are
+//! counted from mark to mark: w² steps for words of weight w, however long they are. The shorter
+//! of two words of different length is taken to end in dark chips.
+
+use super::CodeWord;
+
+/// Periodic correlation Θ_ab(l) for l = 0 … N−1.
+pub fn periodic(a: &CodeWord, b: &CodeWord) -> Vec<u16> {
+    let length = a.length.max(b.length);
+    let mut coincidences = vec![0; length as usize];
+    for &from in &a.marks {
+        for &to in &b.marks {
+            let lag = i32::from(to) - i32::from(from);
+            let lag = if lag < 0 { lag + length as i32 } else { lag };
+            coincidences[lag as usize] += 1;
+        }
+    }
+    coincidences
+}
+
+/// Aperiodic correlation C_ab(l).
+pub fn aperiodic(a: &CodeWord, b: &CodeWord) -> Aperiodic {
+    let length = a.length.max(b.length) as i32;
+    let mut coincidences = vec![0; (2 * length).max(1) as usize - 1];
+    for &from in &a.marks {
+        for &to in &b.marks {
+            let lag = i32::from(to) - i32::from(from);
+            coincidences[(lag + length - 1) as usize] += 1;
+        }
+    }
+    Aperiodic { length, coincidences }
+}
+
+/// An aperiodic correlation, over lags of either sign.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Aperiodic {
+    length: i32,
+    /// Entry k belongs to lag k − (length − 1).
+    coincidences: Vec<u16>,
+}
+
+impl Aperiodic {
+    /// C(`lag`); 0 where the words do not overlap.
+    pub fn at(&self, lag: i32) -> u16 {
+        let place = usize::try_from(i64::from(lag) + i64::from(self.length) - 1);
+        place.ok().and_then(|place| self.coincidences.get(place)).copied().unwrap_or(0)
+    }
+
+    /// Lag and value, from the most negative lag to the greatest.
+    pub fn iter(&self) -> impl Iterator<Item = (i32, u16)> {
+        (1 - self.length..).zip(self.coincidences.iter().copied())
+    }
+
+    /// The greatest value at any lag.
+    pub fn max(&self) -> u16 {
+        self.coincidences.iter().copied().max().unwrap_or(0)
+    }
+}
+
+/// The greatest autocorrelation off the peak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sidelobe {
+    /// Smallest positive lag that has it, in chips: how far wrong the time may be.
+    pub lag: u32,
+    /// Marks that coincide there; the peak has all.
+    pub height: u16,
+}
+
+/// The greatest sidelobe of a word that repeats without end; `None` for a word of one chip.
+pub fn periodic_sidelobe(word: &CodeWord) -> Option<Sidelobe> {
+    highest((0..).zip(periodic(word, word)).skip(1))
+}
+
+/// The greatest sidelobe of a word on its own; `None` for a word of one chip.
+pub fn aperiodic_sidelobe(word: &CodeWord) -> Option<Sidelobe> {
+    let autocorrelation = aperiodic(word, word);
+    let positive = autocorrelation.iter().filter(|&(lag, _)| lag > 0);
+    highest(positive.map(|(lag, height)| (lag as u32, height)))
+}
+
+fn highest(lobes: impl Iterator<Item = (u32, u16)>) -> Option<Sidelobe> {
+    lobes
+        .map(|(lag, height)| Sidelobe { lag, height })
+        .reduce(|best, next| if next.height > best.height { next } else { best })
+}
+
+/// How the words of a set disturb each other, over all ordered pairs of different words.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CrossCorrelation {
+    /// Greatest Θ_ij(l), i ≠ j, over all lags.
+    pub periodic_max: u16,
+    /// Greatest C_ij(l), i ≠ j, over all lags.
+    pub aperiodic_max: u16,
+    /// Spread of Θ_ij(l), i ≠ j, all lags alike.
+    pub periodic: Moments,
+}
+
+impl CrossCorrelation {
+    /// Compares every word with every other one at every lag: n²·(w² + N) steps for n words.
+    pub fn of(words: &[CodeWord]) -> Self {
+        let mut all = Self::default();
+        for (i, a) in words.iter().enumerate() {
+            for (_, b) in words.iter().enumerate().filter(|&(j, _)| j != i) {
+                all.aperiodic_max = all.aperiodic_max.max(aperiodic(a, b).max());
+                for coincidences in periodic(a, b) {
+                    all.periodic_max = all.periodic_max.max(coincidences);
+                    all.periodic.add(coincidences);
+                }
+            }
+        }
+        all
+    }
+}
+
+/// Exact sums over many correlation values.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Moments {
+    /// Number of values.
+    pub count: u64,
+    /// Their sum.
+    pub sum: u64,
+    /// The sum of their squares.
+    pub sum_of_squares: u64,
+}
+
+impl Moments {
+    fn add(&mut self, value: u16) {
+        let value = u64::from(value);
+        self.count += 1;
+        self.sum += value;
+        self.sum_of_squares += value * value;
+    }
+
+    /// Mean; NaN without any value.
+    pub fn mean(&self) -> f64 {
+        self.sum as f64 / self.count as f64
+    }
+
+    /// Variance of the values as a whole population; NaN without any value.
+    pub fn variance(&self) -> f64 {
+        self.sum_of_squares as f64 / self.count as f64 - self.mean().powi(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Family;
+    use super::*;
+
+    fn chip(word: &CodeWord, n: i32) -> u16 {
+        u16::from(word.marks.iter().any(|&mark| i32::from(mark) == n))
+    }
+
+    #[test]
+    fn counting_from_mark_to_mark_is_the_sum_over_chips() {
+        let words = Family::prime(5).unwrap().words();
+        let (a, b, length) = (&words[2], &words[4], 25);
+        let counted = aperiodic(a, b);
+        for lag in 1 - length..length {
+            let by_definition = (0..length).map(|n| chip(a, n) * chip(b, n + lag)).sum();
+            assert_eq!(counted.at(lag), by_definition, "aperiodic, lag {lag}");
+        }
+        let counted = periodic(a, b);
+        for lag in 0..length {
+            let by_definition =
+                (0..length).map(|n| chip(a, n) * chip(b, (n + lag) % length)).sum::<u16>();
+            assert_eq!(counted[lag as usize], by_definition, "periodic, lag {lag}");
+        }
+    }
+
+    #[test]
+    fn c1_of_the_paper_is_mistaken_by_30_chips() {
+        let words = Family::prime(29).unwrap().words();
+        assert_eq!(periodic_sidelobe(&words[1]), Some(Sidelobe { lag: 30, height: 28 }));
+        assert_eq!(aperiodic_sidelobe(&words[1]), Some(Sidelobe { lag: 30, height: 28 }));
+        assert_eq!(periodic_sidelobe(&words[0]), Some(Sidelobe { lag: 29, height: 29 }));
+    }
+
+    #[test]
+    fn one_chip_has_neither_sidelobe_nor_rival() {
+        let words = Family::Single.words();
+        assert_eq!(periodic(&words[0], &words[0]), [1]);
+        assert_eq!(periodic_sidelobe(&words[0]), None);
+        assert_eq!(aperiodic_sidelobe(&words[0]), None);
+        let cross = CrossCorrelation::of(&words);
+        assert_eq!(cross, CrossCorrelation::default());
+        assert!(cross.periodic.mean().is_nan());
+    }
+
+    #[test]
+    fn words_far_apart_do_not_overlap() {
+        let words = Family::prime(5).unwrap().words();
+        let correlation = aperiodic(&words[1], &words[1]);
+        assert_eq!((correlation.at(0), correlation.max()), (5, 5));
+        assert_eq!((correlation.at(25), correlation.at(-25), correlation.at(i32::MIN)), (0, 0, 0));
+    }
+}

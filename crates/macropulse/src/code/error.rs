@@ -1,0 +1,85 @@
+//! Why a code cannot be built.
+
+/// A code that cannot be built: one sentence with what was asked for and what is possible.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The order of a prime code is composite, or below 3.
+    #[error("{p} is not an odd prime; {nearest}")]
+    NotOddPrime {
+        /// What was asked for.
+        p: u32,
+        /// The odd primes next to it, as the end of the sentence.
+        nearest: String,
+    },
+    /// The order of a prime code is so large that a chip of one word has no 16-bit index.
+    #[error("a prime code of order {p} is too long; the largest possible prime is 251")]
+    PrimeTooLarge {
+        /// What was asked for.
+        p: u32,
+    },
+    /// A label must have between 1 and 16 bits.
+    #[error("a label of {bits} bits is not possible; use 1 to 16 bits")]
+    LabelBits {
+        /// What was asked for.
+        bits: u32,
+    },
+    /// A checksum must have between 1 and 8 bits.
+    #[error("a CRC of {width} bits is not possible; use 1 to 8 bits")]
+    CrcWidth {
+        /// What was asked for.
+        width: u8,
+    },
+    /// The polynomial or the initial value does not fit the width of the checksum.
+    #[error("the CRC {part} {value:#b} does not fit {width} bits; the leading term is implied")]
+    CrcTooWide {
+        /// `polynomial` or `init`.
+        part: &'static str,
+        /// What was asked for.
+        value: u8,
+        /// Bits of the checksum.
+        width: u8,
+    },
+    /// A polynomial without the term 1 overlooks errors of a single bit.
+    #[error("the CRC polynomial {polynomial:#b} must end in +1: set its lowest bit")]
+    CrcWithoutOne {
+        /// What was asked for.
+        polynomial: u8,
+    },
+    /// A codebook needs at least one label, and no more than the payload can tell apart.
+    #[error("{labels} labels are not possible; this payload carries 1 to {possible}")]
+    Labels {
+        /// What was asked for.
+        labels: u32,
+        /// Labels that have a payload of their own.
+        possible: u32,
+    },
+    /// A chip of the macropulse has no 16-bit index.
+    #[error(
+        "a macropulse of {bits} bits × {length} chips has {chips} chips; \
+         at most 65535 are possible: use a shorter code word or fewer payload bits"
+    )]
+    MacropulseTooLong {
+        /// Bits of the payload.
+        bits: u32,
+        /// Chips of a code word.
+        length: u32,
+        /// Chips of the macropulse.
+        chips: u32,
+    },
+    /// The templates would fill the memory.
+    #[error(
+        "the macropulses of {labels} labels with {words} words have {marks} marks; \
+         at most {possible} are possible: use fewer labels or a smaller family"
+    )]
+    CodebookTooLarge {
+        /// Labels asked for.
+        labels: u32,
+        /// Words of the family.
+        words: usize,
+        /// Marks of all templates together.
+        marks: u64,
+        /// Most marks a codebook may hold.
+        possible: u64,
+    },
+}
