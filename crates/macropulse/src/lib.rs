@@ -13,5 +13,6 @@ pub mod points;
 pub mod score;
 pub mod formats;
 pub mod view;
+pub mod predict;
 pub mod random;
 pub mod units;
