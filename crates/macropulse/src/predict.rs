@@ -10,7 +10,8 @@
 //! of words. Real pairs differ: C0 meets any other word exactly once at every lag, and the others
 //! are not all alike either. So the truth lies a little beside. The soft formula, with all words
 //! sending, says 1.2 % too much for p = 5 and 1.5 % too little for p = 7; with all words but C0
-//! it is exact for p = 5 and says 0.5 % too much for p = 7.
+//! it is exact for p = 5 and says 0.5 % too much for p = 7. The hard formula says 5 % and
+//! 13 % too much for p = 5, because real hits do not fall on random marks.
 
 use crate::code::{Error, Family};
 use crate::units::{range_from_tof, tof_from_range};
