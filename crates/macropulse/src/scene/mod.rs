@@ -1,5 +1,211 @@
-//! What the beam meets.
+//! What the beam meets: meshes, materials, transforms, ray casting.
 
+mod assemble;
+mod builtin;
+mod car;
+mod car_parts;
+mod closed_form;
+mod error;
+mod file;
 mod hits;
+pub mod material;
+mod mesh;
+mod pose;
+mod raycast;
+mod readers;
 
+use std::fmt;
+use std::path::Path;
+
+pub use builtin::builtin_names;
+pub use car::SIZE as CAR_SIZE;
+pub use closed_form::{Shape, Solid};
+pub use error::Error;
 pub use hits::{CastRays, Hit, Hits, Ray};
+pub use material::Material;
+pub use mesh::Mesh;
+pub use pose::{Pose, Transform};
+
+use file::Source;
+use raycast::Facets;
+
+/// Everything the light can meet, and where the sensor stands.
+///
+/// World frame: x forward, y left, z up, metres.
+pub struct Scene {
+    /// Name, for reports.
+    pub name: String,
+    /// What surfaces are made of; [`Hit::material`] counts in this list.
+    pub materials: Vec<Material>,
+    /// What surfaces belong to; [`Hit::object`] counts in this list.
+    pub objects: Vec<Object>,
+    /// Where the sensor stands and looks.
+    pub sensor: Pose,
+    /// Every assumption made while reading: units, axes, materials. To be shown to the user.
+    pub notes: Vec<String>,
+    world: World,
+}
+
+/// A thing in the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// Name, as the scene file has it.
+    pub name: String,
+    /// Whether points on it are counted on their own.
+    pub is_target: bool,
+}
+
+/// All surfaces: triangles and closed-form shapes. The nearest wins.
+struct World {
+    facets: Facets,
+    solids: Vec<Solid>,
+}
+
+impl CastRays for World {
+    fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
+        let mut best = None;
+        let mut farthest = farthest;
+        for solid in &self.solids {
+            if let Some(hit) = solid.cast(ray, nearest, farthest) {
+                farthest = hit.range;
+                best = Some(hit);
+            }
+        }
+        self.facets.cast(ray, nearest, farthest).or(best)
+    }
+}
+
+impl Scene {
+    /// The built-in scene of this name, or else the scene file at this path.
+    ///
+    /// # Errors
+    /// If it is neither, or the file is wrong; the message says what to do.
+    pub fn open(name_or_file: &str) -> Result<Self, Error> {
+        if let Some(text) = Self::builtin(name_or_file) {
+            return Self::from_toml(text, name_or_file, Path::new(""));
+        }
+        let path = Path::new(name_or_file);
+        // What looks like a path is meant as one.
+        if path.is_file() || path.extension().is_some() || path.components().count() > 1 {
+            return Self::from_file(path);
+        }
+        Err(Error::UnknownScene {
+            asked: name_or_file.to_owned(),
+            nearest: material::nearest(name_or_file, builtin_names()).map(str::to_owned),
+            known: builtin_names().collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// The scene file at `path`; meshes are looked for in its folder.
+    ///
+    /// # Errors
+    /// If the file or one of its meshes cannot be read or is wrong.
+    pub fn from_file(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        Self::from_toml(&text, &path.display().to_string(), base)
+    }
+
+    /// The scene that `text` describes. `origin` is its name in messages; meshes are looked for
+    /// in `base`.
+    ///
+    /// # Errors
+    /// If the text or one of the meshes is wrong.
+    pub fn from_toml(text: &str, origin: &str, base: &Path) -> Result<Self, Error> {
+        assemble::scene(Source { text, origin }, base)
+    }
+
+    /// The TOML text of a built-in scene.
+    pub fn builtin(name: &str) -> Option<&'static str> {
+        builtin::text(name)
+    }
+
+    /// The names of the built-in scenes.
+    pub fn builtin_names() -> impl Iterator<Item = &'static str> {
+        builtin_names()
+    }
+
+    /// The nearest surface on `ray`, given in the world, with a range in (`nearest`, `farthest`).
+    pub fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
+        self.world.cast(ray, nearest, farthest)
+    }
+
+    /// Number of triangles; closed-form shapes have none.
+    pub fn triangles(&self) -> usize {
+        self.world.facets.len()
+    }
+
+    /// A hash of everything that decides what light meets: surfaces, materials, sensor pose.
+    /// The same on every machine and run.
+    pub fn digest(&self) -> String {
+        let mut hash = Fnv::new();
+        for facet in self.world.facets.facets() {
+            facet.corners.iter().flatten().for_each(|value| hash.number(*value));
+            hash.bytes(&facet.material.to_le_bytes());
+            hash.bytes(&facet.object.to_le_bytes());
+        }
+        for solid in &self.world.solids {
+            match solid.shape() {
+                Shape::Plane { normal } => normal.iter().for_each(|value| hash.number(*value)),
+                Shape::Sphere { radius } => hash.number(radius),
+                Shape::Box { half } => half.iter().for_each(|value| hash.number(*value)),
+            }
+            hash.pose(&solid.pose());
+            hash.bytes(&solid.material().to_le_bytes());
+            hash.bytes(&solid.object().to_le_bytes());
+        }
+        for material in &self.materials {
+            hash.bytes(material.name.as_bytes());
+            let Material { diffuse, specular, gloss, retro, transmission, .. } = *material;
+            for value in [diffuse, specular, gloss, retro, transmission] {
+                hash.number(value);
+            }
+        }
+        for object in &self.objects {
+            hash.bytes(object.name.as_bytes());
+            hash.bytes(&[u8::from(object.is_target)]);
+        }
+        hash.pose(&self.sensor);
+        format!("{:016x}", hash.0)
+    }
+}
+
+impl fmt::Debug for Scene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scene")
+            .field("name", &self.name)
+            .field("materials", &self.materials)
+            .field("objects", &self.objects)
+            .field("sensor", &self.sensor)
+            .field("notes", &self.notes)
+            .field("triangles", &self.triangles())
+            .finish_non_exhaustive()
+    }
+}
+
+/// The 64-bit FNV-1a hash \[FNV\].
+struct Fnv(u64);
+
+impl Fnv {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+
+    fn number(&mut self, value: f64) {
+        self.bytes(&value.to_bits().to_le_bytes());
+    }
+
+    fn pose(&mut self, pose: &Pose) {
+        let Pose { position: [x, y, z], yaw, pitch, roll } = *pose;
+        for value in [x, y, z, yaw, pitch, roll] {
+            self.number(value);
+        }
+    }
+}

@@ -1,0 +1,392 @@
+//! From a scene file as typed to a scene that can be hit by rays.
+
+use std::ops::Range;
+use std::path::Path;
+
+use glam::DVec3;
+use toml::Spanned;
+
+use super::car;
+use super::closed_form::{Shape, Solid};
+use super::error::Error;
+use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
+use super::material::{self, Material, nearest, plain};
+use super::mesh::Mesh;
+use super::pose::Pose;
+use super::raycast::{Facet, Facets};
+use super::readers::{self, WithoutMaterials};
+use super::{Object, Scene, World};
+
+/// What has been put together so far.
+struct Assembly<'a> {
+    source: Source<'a>,
+    base: &'a Path,
+    /// Materials the file defines; they go before the library.
+    defined: Vec<Material>,
+    materials: Vec<Material>,
+    objects: Vec<Object>,
+    solids: Vec<Solid>,
+    facets: Vec<Facet>,
+    notes: Vec<String>,
+}
+
+/// Makes the scene that `source` describes; meshes are looked for in `base`.
+pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
+    let file = source.parse()?;
+    if *file.version.get_ref() != 1 {
+        let message = format!("version {} is not known; write version = 1", file.version.get_ref());
+        return Err(source.fault(file.version.span(), message));
+    }
+    let mut assembly = Assembly {
+        source,
+        base,
+        defined: vec![],
+        materials: vec![],
+        objects: vec![],
+        solids: vec![],
+        facets: vec![],
+        notes: vec![],
+    };
+    assembly.define(&file)?;
+    let sensor = assembly.pose(&file.sensor)?;
+    if file.sensor.position_m.is_none() {
+        assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
+    }
+    if let Some(ground) = &file.ground {
+        assembly.ground(ground)?;
+    }
+    for (index, thing) in file.objects.iter().enumerate() {
+        assembly.thing(index, thing)?;
+    }
+    if assembly.solids.is_empty() && assembly.facets.is_empty() {
+        assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
+    }
+    let Assembly { materials, objects, solids, facets, notes, .. } = assembly;
+    let name = file.name.unwrap_or_else(|| source.origin.to_owned());
+    let world = World { facets: Facets::new(facets, sensor.position), solids };
+    Ok(Scene { name, materials, objects, sensor, notes, world })
+}
+
+impl Assembly<'_> {
+    fn define(&mut self, file: &SceneFile) -> Result<(), Error> {
+        for typed in &file.materials {
+            let defined = typed.get_ref();
+            // A name of the library overrides that entry and keeps what is not typed.
+            let mut made =
+                material::named(&defined.name).unwrap_or_else(|| Material::matt("", 0.0));
+            if made.name.is_empty() && defined.diffuse.is_none() {
+                let message = format!(
+                    "material {:?} is not in the library, so it needs at least `diffuse`",
+                    defined.name
+                );
+                return Err(self.source.fault(typed.span(), message));
+            }
+            made.name = plain(&defined.name);
+            let fields = [
+                (&defined.diffuse, &mut made.diffuse, "diffuse", 1.0),
+                (&defined.specular, &mut made.specular, "specular", 1e4),
+                (&defined.gloss, &mut made.gloss, "gloss", 1e6),
+                (&defined.retro, &mut made.retro, "retro", 1e5),
+                (&defined.transmission, &mut made.transmission, "transmission", 1.0),
+            ];
+            for (typed, field, key, most) in fields {
+                let Some(typed) = typed else { continue };
+                let value = *typed.get_ref();
+                if !(0.0..=most).contains(&value) {
+                    let message = format!("{key} is {value}; it must be from 0 to {most}");
+                    return Err(self.source.fault(typed.span(), message));
+                }
+                *field = value;
+            }
+            self.defined.retain(|known| known.name != made.name);
+            self.defined.push(made);
+        }
+        Ok(())
+    }
+
+    fn ground(&mut self, ground: &Ground) -> Result<(), Error> {
+        let material = self.material_typed(&ground.material)?;
+        let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.finite(z, "z_m"))?;
+        let object = self.object("ground".to_owned(), false, 0..0)?;
+        let shape = Shape::Plane { normal: [0.0, 0.0, 1.0] };
+        self.solids.push(Solid::new(shape, Pose::at([0.0, 0.0, height]), material, object));
+        Ok(())
+    }
+
+    fn thing(&mut self, index: usize, spanned: &Spanned<Thing>) -> Result<(), Error> {
+        let thing = spanned.get_ref();
+        let kinds = [thing.mesh.is_some(), thing.car.is_some(), thing.shape.is_some()];
+        if kinds.iter().filter(|given| **given).count() != 1 {
+            let message = "an object needs exactly one of `mesh`, `car` and `shape`";
+            return Err(self.source.fault(spanned.span(), message));
+        }
+        let name = thing.name.clone().unwrap_or_else(|| format!("object-{}", index + 1));
+        let mut stands = vec![thing.stand()];
+        stands.extend(thing.copies.iter().cloned());
+        let poses = stands.iter().map(|stand| self.pose(stand)).collect::<Result<Vec<_>, _>>()?;
+        let object = self.object(name.clone(), thing.target, spanned.span())?;
+        if let Some(shape) = &thing.shape {
+            self.refuse_mesh_keys(thing)?;
+            let material = match &thing.material {
+                Some(typed) => self.material_typed(typed)?,
+                None => self.unnamed(&name),
+            };
+            for mut pose in poses {
+                let shape = self.shape(shape)?;
+                if thing.rest_on_ground {
+                    pose.position[2] += shape.depth_below(&pose);
+                }
+                self.solids.push(Solid::new(shape, pose, material, object));
+            }
+            return Ok(());
+        }
+        let mesh = self.mesh(&name, thing)?;
+        let paints = self.paints(&name, thing, &mesh)?;
+        for pose in poses {
+            self.place(&mesh, &paints, pose, (thing.rest_on_ground, object));
+        }
+        Ok(())
+    }
+
+    /// Adds the triangles of `mesh`, carried to `pose`.
+    fn place(&mut self, mesh: &Mesh, paints: &[u16], pose: Pose, (rest, object): (bool, u16)) {
+        let turned = Pose { position: [0.0; 3], ..pose }.world_from_sensor();
+        let mut vertices: Vec<[f64; 3]> = mesh.vertices.iter().map(|v| turned.point(*v)).collect();
+        let used = mesh.triangles.iter().flatten().map(|corner| vertices[*corner as usize][2]);
+        let lowest = if rest { used.fold(f64::INFINITY, f64::min) } else { 0.0 };
+        for vertex in &mut vertices {
+            for axis in 0..3 {
+                vertex[axis] += pose.position[axis];
+            }
+            vertex[2] -= lowest;
+        }
+        for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
+            self.facets.push(Facet {
+                corners: triangle.map(|corner| vertices[corner as usize]),
+                material: paints[*material as usize],
+                object,
+            });
+        }
+    }
+
+    /// The mesh of an object in metres, x forward, z up.
+    fn mesh(&mut self, name: &str, thing: &Thing) -> Result<Mesh, Error> {
+        let Some(path) = &thing.mesh else {
+            self.refuse_mesh_keys(thing)?;
+            return Ok(car::mesh());
+        };
+        let without = match thing.material {
+            Some(_) => WithoutMaterials::Fine,
+            None => WithoutMaterials::Refused,
+        };
+        let path = self.base.join(path.get_ref());
+        let mut mesh = readers::read(&path, without)?;
+        let gltf = readers::is_gltf(&path);
+        let metres = self.metres_per_unit(name, thing)?;
+        let (up, forward) = self.axes(name, thing, gltf)?;
+        let left = up.cross(forward);
+        for vertex in &mut mesh.vertices {
+            let place = DVec3::from(*vertex) * metres;
+            *vertex = [place.dot(forward), place.dot(left), place.dot(up)];
+        }
+        if let Some((low, high)) = mesh.bounds() {
+            let [x, y, z] = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+            let count = mesh.triangles.len();
+            self.notes.push(format!(
+                "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
+            ));
+        }
+        Ok(mesh)
+    }
+
+    fn metres_per_unit(&mut self, name: &str, thing: &Thing) -> Result<f64, Error> {
+        let scale = match &thing.scale {
+            Some(scale) => self.positive(scale, "scale")?,
+            None => 1.0,
+        };
+        if thing.unit.is_none() && thing.scale.is_none() {
+            self.notes.push(format!("{name}: no unit given, its lengths are read as metres"));
+        }
+        Ok(scale * thing.unit.unwrap_or(Unit::M).metres())
+    }
+
+    /// Up and forward of a mesh, as unit vectors in its own axes.
+    fn axes(&mut self, name: &str, thing: &Thing, gltf: bool) -> Result<(DVec3, DVec3), Error> {
+        // glTF 2.0 declares y up and z forward; the other formats declare nothing.
+        let usual = if gltf { (Axis::Y, Axis::Z) } else { (Axis::Z, Axis::X) };
+        let up = thing.up.as_ref().map_or(usual.0, |axis| *axis.get_ref());
+        let across = |axis: Axis| DVec3::from(axis.vector()).dot(DVec3::from(up.vector())) == 0.0;
+        let fallback = [usual.1, Axis::X, Axis::Z].into_iter().find(|axis| across(*axis));
+        let forward = match &thing.forward {
+            Some(typed) if !across(*typed.get_ref()) => {
+                let message = "`forward` and `up` lie on the same axis; name two different ones";
+                return Err(self.source.fault(typed.span(), message));
+            }
+            Some(typed) => *typed.get_ref(),
+            None => fallback.unwrap_or(Axis::X),
+        };
+        let why = if gltf { "as glTF has it" } else { "assumed" };
+        for (given, key, axis) in
+            [(thing.up.is_some(), "up", up), (thing.forward.is_some(), "forward", forward)]
+        {
+            if !given {
+                self.notes.push(format!("{name}: {key} is its {} axis, {why}", axis.word()));
+            }
+        }
+        Ok((DVec3::from(up.vector()), DVec3::from(forward.vector())))
+    }
+
+    /// The scene's material for each material of the mesh.
+    fn paints(&mut self, name: &str, thing: &Thing, mesh: &Mesh) -> Result<Vec<u16>, Error> {
+        for (wanted, typed) in &thing.materials {
+            if !mesh.material_names.contains(wanted) {
+                let message = format!(
+                    "the mesh of {name} has no material {wanted:?}; it has {}",
+                    mesh.material_names.join(", ")
+                );
+                return Err(self.source.fault(typed.span(), message));
+            }
+        }
+        let mut paints = Vec::with_capacity(mesh.material_names.len());
+        for (own, guess) in mesh.material_names.iter().zip(&mesh.diffuse_guesses) {
+            let known = self.known(own);
+            paints.push(match (thing.materials.get(own), &thing.material, known, guess) {
+                (Some(typed), ..) | (None, Some(typed), ..) => self.material_typed(typed)?,
+                (None, None, Some(known), _) => self.enlist(known),
+                (None, None, None, Some(diffuse)) => {
+                    self.notes.push(format!(
+                        "{name}: material {own:?} is not in the library, its visible colour is \
+                         taken as a diffuse reflectance of {diffuse:.2}"
+                    ));
+                    self.enlist(Material::matt(&format!("{name}/{}", plain(own)), *diffuse))
+                }
+                (None, None, None, None) => self.unnamed(&format!("{name}, {own:?}")),
+            });
+        }
+        Ok(paints)
+    }
+
+    fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Shape, Error> {
+        let fault = |message: &str| Err(self.source.fault(typed.span(), message));
+        match *typed.get_ref() {
+            ShapeTyped::Plane { normal } => match DVec3::from(normal).try_normalize() {
+                Some(normal) => Ok(Shape::Plane { normal: normal.to_array() }),
+                None => fault("`normal` must be a finite direction, not zero"),
+            },
+            ShapeTyped::Sphere { radius_m: radius } => match radius > 0.0 && radius.is_finite() {
+                true => Ok(Shape::Sphere { radius }),
+                false => fault("`radius_m` must be finite and above zero"),
+            },
+            ShapeTyped::Box { size_m } => match size_m.iter().all(|s| *s > 0.0 && s.is_finite()) {
+                true => Ok(Shape::Box { half: size_m.map(|side| side / 2.0) }),
+                false => fault("each of `size_m` must be finite and above zero"),
+            },
+        }
+    }
+
+    /// Keys that mean something only for the mesh of a file.
+    fn refuse_mesh_keys(&self, thing: &Thing) -> Result<(), Error> {
+        let spans: [(Option<Range<usize>>, &str); 3] = [
+            (thing.scale.as_ref().map(Spanned::span), "scale"),
+            (thing.up.as_ref().map(Spanned::span), "up"),
+            (thing.forward.as_ref().map(Spanned::span), "forward"),
+        ];
+        for (span, key) in spans {
+            if let Some(span) = span {
+                let message = format!("`{key}` belongs to objects with a `mesh`; remove it here");
+                return Err(self.source.fault(span, message));
+            }
+        }
+        Ok(())
+    }
+
+    fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
+        let mut pose = Pose::default();
+        if let Some(position) = &stand.position_m {
+            if position.get_ref().iter().any(|value| !value.is_finite()) {
+                let message = "position_m must be three finite numbers";
+                return Err(self.source.fault(position.span(), message));
+            }
+            pose.position = *position.get_ref();
+        }
+        let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
+            Some(typed) => Ok(self.finite(typed, key)?.to_radians()),
+            None => Ok(0.0),
+        };
+        pose.yaw = angle(&stand.yaw_deg, "yaw_deg")?;
+        pose.pitch = angle(&stand.pitch_deg, "pitch_deg")?;
+        pose.roll = angle(&stand.roll_deg, "roll_deg")?;
+        Ok(pose)
+    }
+
+    fn finite(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
+        let value = *typed.get_ref();
+        match value.is_finite() {
+            true => Ok(value),
+            false => Err(self.source.fault(typed.span(), format!("{key} must be a finite number"))),
+        }
+    }
+
+    fn positive(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
+        let value = self.finite(typed, key)?;
+        match value > 0.0 {
+            true => Ok(value),
+            false => {
+                let message = format!("{key} is {value}; it must be above zero");
+                Err(self.source.fault(typed.span(), message))
+            }
+        }
+    }
+
+    fn object(&mut self, name: String, is_target: bool, at: Range<usize>) -> Result<u16, Error> {
+        let index = u16::try_from(self.objects.len())
+            .map_err(|_| self.source.fault(at, "a scene holds at most 65 536 objects"))?;
+        self.objects.push(Object { name, is_target });
+        Ok(index)
+    }
+
+    /// The material of this name: as the file defines it, else from the library.
+    fn known(&self, name: &str) -> Option<Material> {
+        let wanted = plain(name);
+        let defined = self.defined.iter().find(|known| known.name == wanted).cloned();
+        defined.or_else(|| material::named(name))
+    }
+
+    fn material_typed(&mut self, typed: &Spanned<String>) -> Result<u16, Error> {
+        let name = typed.get_ref();
+        if let Some(known) = self.known(name) {
+            return Ok(self.enlist(known));
+        }
+        let library: Vec<Material> =
+            self.defined.iter().cloned().chain(material::library()).collect();
+        let names = || library.iter().map(|known| known.name.as_str());
+        let message = match nearest(name, names()) {
+            Some(near) => format!("there is no material {name:?}; did you mean {near:?}?"),
+            None => format!(
+                "there is no material {name:?}; define it as [[material]] or use one of {}",
+                names().collect::<Vec<_>>().join(", ")
+            ),
+        };
+        Err(self.source.fault(typed.span(), message))
+    }
+
+    fn unnamed(&mut self, whose: &str) -> u16 {
+        let material =
+            self.known(material::UNNAMED).unwrap_or_else(|| Material::matt(material::UNNAMED, 0.3));
+        self.notes.push(format!(
+            "{whose}: no known material, diffuse reflectance {} is assumed",
+            material.diffuse
+        ));
+        self.enlist(material)
+    }
+
+    /// The index of `material` in the scene, which it enters if it is new there.
+    fn enlist(&mut self, material: Material) -> u16 {
+        let index = self.materials.iter().position(|known| known.name == material.name);
+        let index = index.unwrap_or_else(|| {
+            self.materials.push(material);
+            self.materials.len() - 1
+        });
+        u16::try_from(index).unwrap_or(u16::MAX)
+    }
+}

@@ -1,0 +1,54 @@
+//! What can be wrong with a scene, told to the person who wrote it.
+
+use std::path::{Path, PathBuf};
+
+/// Why a scene could not be made. Every message says where and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file is not there or may not be read.
+    #[error("{}: cannot be read ({source}); check the path, which counts from the folder of the scene file", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A mesh file was read but holds no usable mesh.
+    #[error("{}: {problem}; {remedy}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// A scene file says something that cannot be.
+    #[error("{origin}:{line}:{column}: {message}")]
+    Typed {
+        /// The scene file.
+        origin: String,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// Neither a built-in scene nor a file.
+    #[error("there is no scene {asked:?}: it is neither a file nor built in{}; built in are {known}", nearest.as_ref().map(|name| format!("; did you mean {name:?}?")).unwrap_or_default())]
+    UnknownScene {
+        /// What was asked for.
+        asked: String,
+        /// The built-in scene of the most similar name.
+        nearest: Option<String>,
+        /// All built-in scenes.
+        known: String,
+    },
+}
+
+impl Error {
+    pub(super) fn mesh(path: &Path, problem: impl Into<String>, remedy: &str) -> Self {
+        Self::Mesh { path: path.to_owned(), problem: problem.into(), remedy: remedy.to_owned() }
+    }
+}

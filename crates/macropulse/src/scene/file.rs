@@ -1,0 +1,244 @@
+//! The scene file as it is typed: TOML with unit-suffixed keys.
+//!
+//! This file knows the words and their places; [`super::assemble`] knows what they mean.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::error::Error;
+use super::material::nearest;
+
+/// A whole scene file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    pub version: Spanned<i64>,
+    pub name: Option<String>,
+    #[serde(default)]
+    pub sensor: Stand,
+    pub ground: Option<Ground>,
+    #[serde(default, rename = "material")]
+    pub materials: Vec<Spanned<Defined>>,
+    #[serde(default, rename = "object")]
+    pub objects: Vec<Spanned<Thing>>,
+}
+
+/// `[sensor]`, and each entry of `copies`.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Stand {
+    pub position_m: Option<Spanned<[f64; 3]>>,
+    pub yaw_deg: Option<Spanned<f64>>,
+    pub pitch_deg: Option<Spanned<f64>>,
+    pub roll_deg: Option<Spanned<f64>>,
+}
+
+/// `ground = { … }`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Ground {
+    pub material: Spanned<String>,
+    pub z_m: Option<Spanned<f64>>,
+}
+
+/// `[[material]]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Defined {
+    pub name: String,
+    pub diffuse: Option<Spanned<f64>>,
+    pub specular: Option<Spanned<f64>>,
+    pub gloss: Option<Spanned<f64>>,
+    pub retro: Option<Spanned<f64>>,
+    pub transmission: Option<Spanned<f64>>,
+}
+
+/// `[[object]]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Thing {
+    pub name: Option<String>,
+    pub mesh: Option<Spanned<String>>,
+    pub car: Option<Car>,
+    pub shape: Option<Spanned<ShapeTyped>>,
+    pub unit: Option<Unit>,
+    pub scale: Option<Spanned<f64>>,
+    pub up: Option<Spanned<Axis>>,
+    pub forward: Option<Spanned<Axis>>,
+    pub position_m: Option<Spanned<[f64; 3]>>,
+    pub yaw_deg: Option<Spanned<f64>>,
+    pub pitch_deg: Option<Spanned<f64>>,
+    pub roll_deg: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub rest_on_ground: bool,
+    pub material: Option<Spanned<String>>,
+    #[serde(default)]
+    pub materials: BTreeMap<String, Spanned<String>>,
+    #[serde(default)]
+    pub target: bool,
+    #[serde(default)]
+    pub copies: Vec<Stand>,
+}
+
+impl Thing {
+    /// Where the object itself stands.
+    pub(super) fn stand(&self) -> Stand {
+        Stand {
+            position_m: self.position_m.clone(),
+            yaw_deg: self.yaw_deg.clone(),
+            pitch_deg: self.pitch_deg.clone(),
+            roll_deg: self.roll_deg.clone(),
+        }
+    }
+}
+
+/// `car = {}`: it has no options yet.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Car {}
+
+/// `shape = { … }`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum ShapeTyped {
+    /// `normal` is a direction in the frame of the object.
+    Plane { normal: [f64; 3] },
+    /// About the object's position.
+    Sphere { radius_m: f64 },
+    /// About the object's position; length, width, height.
+    Box { size_m: [f64; 3] },
+}
+
+/// The unit of length of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Unit {
+    M,
+    Cm,
+    Mm,
+    In,
+    Ft,
+}
+
+impl Unit {
+    /// Length of the unit, m.
+    pub(super) fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Cm => 0.01,
+            Self::Mm => 0.001,
+            Self::In => 0.0254,
+            Self::Ft => 0.3048,
+        }
+    }
+}
+
+/// A signed axis of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub(super) enum Axis {
+    #[serde(rename = "x", alias = "+x")]
+    X,
+    #[serde(rename = "y", alias = "+y")]
+    Y,
+    #[serde(rename = "z", alias = "+z")]
+    Z,
+    #[serde(rename = "-x")]
+    MinusX,
+    #[serde(rename = "-y")]
+    MinusY,
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+impl Axis {
+    /// The axis as a unit vector.
+    pub(super) fn vector(self) -> [f64; 3] {
+        match self {
+            Self::X => [1.0, 0.0, 0.0],
+            Self::Y => [0.0, 1.0, 0.0],
+            Self::Z => [0.0, 0.0, 1.0],
+            Self::MinusX => [-1.0, 0.0, 0.0],
+            Self::MinusY => [0.0, -1.0, 0.0],
+            Self::MinusZ => [0.0, 0.0, -1.0],
+        }
+    }
+
+    /// The axis as it is typed.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::MinusX => "-x",
+            Self::MinusY => "-y",
+            Self::MinusZ => "-z",
+        }
+    }
+}
+
+/// The text of a scene file and its name: turns spans into places.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub text: &'a str,
+    pub origin: &'a str,
+}
+
+impl Source<'_> {
+    /// Reads the file.
+    pub(super) fn parse(&self) -> Result<SceneFile, Error> {
+        toml::from_str(self.text)
+            .map_err(|fault| self.fault(fault.span().unwrap_or(0..0), with_advice(fault.message())))
+    }
+
+    /// An error at a place in the text.
+    pub(super) fn fault(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        Error::Typed { origin: self.origin.to_owned(), line, column, message: message.into() }
+    }
+}
+
+/// Adds the nearest known word to a complaint about an unknown one. The parser quotes words in
+/// backticks: first the unknown one, then those it knows.
+fn with_advice(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let unknown = message.starts_with("unknown");
+    match quoted.next().filter(|_| unknown).and_then(|word| nearest(word, quoted)) {
+        Some(known) => format!("{message}; did you mean `{known}`?"),
+        None => message.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(text: &str) -> String {
+        Source { text, origin: "a.toml" }.parse().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_small_scene_is_read() {
+        let text = "version = 1\n[[object]]\nshape.sphere.radius_m = 2\nposition_m = [10, 0, 0]\n";
+        let scene = Source { text, origin: "a.toml" }.parse().unwrap();
+        assert_eq!(scene.objects[0].get_ref().position_m.as_ref().unwrap().get_ref()[0], 10.0);
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_place_and_the_nearest_known_one() {
+        let message = told("version = 1\n[[object]]\n  positon_m = [1, 0, 0]\n");
+        assert!(message.starts_with("a.toml:3:3: unknown field `positon_m`"), "{message}");
+        assert!(message.ends_with("did you mean `position_m`?"), "{message}");
+    }
+
+    #[test]
+    fn wrong_types_and_missing_keys_are_refused() {
+        assert!(told("version = 1\nname = 3\n").starts_with("a.toml:2:8: invalid type"));
+        assert!(told("name = \"a\"\n").contains("missing field `version`"));
+        assert!(told("version = 1\n[[object]]\nunit = \"km\"\n").contains("unknown variant `km`"));
+    }
+}
