@@ -1,6 +1,10 @@
-//! Macropulse, the workbench for pulse-coded lidar.
+//! Macropulse, the workbench for pulse-coded lidar: design a code, fire it into a 3-D scene,
+//! detect it, decode it, get a point cloud.
 //!
 //! The modules in the order in which light travels:
+
+#![cfg_attr(test, allow(missing_docs))]
+
 pub mod design;
 pub mod code;
 pub mod emit;
@@ -13,6 +17,8 @@ pub mod points;
 pub mod score;
 pub mod formats;
 pub mod view;
+
 pub mod predict;
 pub mod random;
 pub mod units;
+mod names;

@@ -7,7 +7,7 @@ use macropulse::code::correlation::{
     CrossCorrelation, Sidelobe, aperiodic, aperiodic_sidelobe, periodic, periodic_sidelobe,
 };
 use macropulse::code::{CodeWord, Codebook, Crc, Family, Payload, prime_sequence};
-use macropulse::predict::{
+use macropulse::predict::multiple_access::{
     MultipleAccess, Words, bit_error_gaussian, bit_error_hard, bit_error_soft,
 };
 

@@ -1,4 +1,19 @@
-//! What reaches the aperture.
+//! What reaches the aperture: surfaces become echoes.
+//!
+//! For an extended Lambertian target that the beam does not overfill, the energy received is
+//!
+//! E_r = E_t · ρ · cos i · A_r · η · T² / (π · R²), T = exp(−σ·R)   \[physics: link equation\]
+//!
+//! A sensor declared by its sensitivity knows the product E_t · A_r · η / π through the photons n₀
+//! it detects per mark from a reference target (ρ₀, R₀), so that
+//!
+//! n = n₀ · (ρ_eff / ρ₀) · (R₀ / R)² · T² · w
+//!
+//! with ρ_eff the material's backscatter towards the sensor and w the share of the beam.
+
+use crate::design::{Design, Detector};
+use crate::scene::{Hits, Material};
+use crate::units::{fs_from_s, tof_from_range};
 
 /// Echoes of a band of shots, as columns, ordered by shot. Truth: the light itself, before any
 /// detector.
@@ -6,8 +21,104 @@
 pub struct Echoes {
     /// Index of the shot in the band's log.
     pub shot: Vec<u32>,
-    /// Absolute time at which the first chip of the macropulse arrives, fs.
-    pub arrival_fs: Vec<i64>,
-    /// Mean number of photons detected per mark.
-    pub photons: Vec<f32>,
+    /// Time from firing to the arrival of the same chip, fs.
+    pub delay_fs: Vec<i64>,
+    /// Mean number of photons detected per mark; infinite for a detector that never misses.
+    pub photons: Vec<f64>,
+}
+
+/// The echoes of `hits` at the sensor `design`, whose scene has `materials`.
+pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
+    let link = Link::of(design);
+    let mut echoes = Echoes::default();
+    for i in 0..hits.shot.len() {
+        let reflectance =
+            materials[usize::from(hits.material[i])].backscatter(f64::from(hits.cosine[i]));
+        let photons = link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i]);
+        if photons > 0.0 {
+            echoes.shot.push(hits.shot[i]);
+            echoes.delay_fs.push(fs_from_s(tof_from_range(hits.range[i])));
+            echoes.photons.push(photons);
+        }
+    }
+    echoes
+}
+
+/// The link equation with everything that does not depend on the target multiplied out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    photons_at_one_metre: f64,
+    extinction: f64,
+}
+
+impl Link {
+    /// The link of a sensor through its air.
+    pub fn of(design: &Design) -> Self {
+        let sensitivity = match design.detector {
+            Detector::PhotonCounting(counting) => counting.sensitivity,
+            Detector::FirstFiring(firing) => firing.sensitivity,
+        };
+        let extinction = design.visibility.map_or(0.0, |v| extinction(v, design.light.wavelength));
+        Self {
+            photons_at_one_metre: sensitivity.photons * sensitivity.range.powi(2)
+                / sensitivity.reflectance,
+            extinction,
+        }
+    }
+
+    /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which
+    /// includes the cosine) at `range` metres.
+    pub fn photons(&self, reflectance: f64, range: f64) -> f64 {
+        if reflectance <= 0.0 || range <= 0.0 {
+            return 0.0;
+        }
+        let transmission = libm::exp(-self.extinction * range);
+        self.photons_at_one_metre * reflectance * transmission.powi(2) / range.powi(2)
+    }
+}
+
+/// Extinction of air in 1/m for a meteorological `visibility` V in m at a `wavelength` λ in m.
+///
+/// σ = 3.912/V · (λ/550 nm)^−q, natural units, with q after Kim: 1.6 (V > 50 km), 1.3 (6–50 km),
+/// 0.16·V + 0.34 (1–6 km), V − 0.5 (0.5–1 km), 0 below \[Kim01\].
+pub fn extinction(visibility: f64, wavelength: f64) -> f64 {
+    let km = visibility * 1e-3;
+    let q = match km {
+        _ if km > 50.0 => 1.6,
+        _ if km > 6.0 => 1.3,
+        _ if km > 1.0 => 0.16 * km + 0.34,
+        _ if km > 0.5 => km - 0.5,
+        _ => 0.0,
+    };
+    3.912 / visibility * libm::pow(wavelength / 550e-9, -q)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extinction_has_the_published_values() {
+        approx::assert_relative_eq!(extinction(23e3, 550e-9), 0.170e-3, max_relative = 1e-3);
+        approx::assert_relative_eq!(extinction(23e3, 905e-9), 0.0890e-3, max_relative = 2e-3);
+        // In dense fog the wavelength does not matter.
+        assert_eq!(extinction(400.0, 905e-9), extinction(400.0, 1550e-9));
+    }
+
+    #[test]
+    fn the_reference_target_gives_the_reference_photons() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        let link = Link::of(&design);
+        // Pd = 0.99 per mark means −ln 0.01 photons.
+        approx::assert_relative_eq!(link.photons(1.0, 150.0), 4.605_170, max_relative = 1e-6);
+        approx::assert_relative_eq!(link.photons(0.5, 75.0), 2.0 * 4.605_170, max_relative = 1e-6);
+    }
+
+    #[test]
+    fn black_gives_nothing_even_to_a_perfect_detector() {
+        let perfect = [("detector.photon-counting.sensitivity.pd".into(), "1.0".into())];
+        let design = Design::open("kim-park-2016", &perfect).unwrap();
+        assert_eq!(Link::of(&design).photons(0.0, 10.0), 0.0);
+        assert_eq!(Link::of(&design).photons(1e-3, 10.0), f64::INFINITY);
+    }
 }

@@ -167,7 +167,7 @@ mod tests {
         let (a, b, length) = (&words[2], &words[4], 25);
         let counted = aperiodic(a, b);
         for lag in 1 - length..length {
-            let by_definition = (0..length).map(|n| chip(a, n) * chip(b, n + lag)).sum();
+            let by_definition: u16 = (0..length).map(|n| chip(a, n) * chip(b, n + lag)).sum();
             assert_eq!(counted.at(lag), by_definition, "aperiodic, lag {lag}");
         }
         let counted = periodic(a, b);

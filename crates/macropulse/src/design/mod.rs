@@ -1,1 +1,287 @@
-//! To come.
+//! What the sensor is: from a TOML file to a checked [`Design`].
+//!
+//! 1. [`document`]: the text, what it extends, and the defaults become one table, and every value
+//!    remembers its line and column.
+//! 2. [`file`]: the table is read as typed keys.
+//! 3. [`check`]: every limit is tested once; what is left is SI units and integers.
+//!
+//! A `Design` that exists is valid, and nobody downstream checks it again.
+
+mod check;
+mod derived;
+mod document;
+mod effect;
+mod file;
+mod presets;
+pub mod safety;
+
+use std::path::Path;
+
+pub use derived::Derived;
+pub use effect::Effect;
+pub use file::{Firing, Label, Mirror};
+pub use presets::{names as preset_names, text as preset_text};
+
+use crate::code::Codebook;
+use crate::decode::Receiver;
+
+/// A sensor, checked, in SI units.
+#[derive(Debug, Clone)]
+pub struct Design {
+    /// Short name, as in the file.
+    pub name: String,
+    /// One sentence.
+    pub summary: String,
+    /// Where and when the sensor looks.
+    pub scan: Scan,
+    /// The light it sends.
+    pub light: Light,
+    /// The language its shots speak; a single mark where they are not coded.
+    pub coding: Coding,
+    /// From light to edges.
+    pub detector: Detector,
+    /// Meteorological visibility, m; `None` where the air is idealised away.
+    pub visibility: Option<f64>,
+    /// From edges to ticks.
+    pub tdc: Tdc,
+    /// From ticks to returns.
+    pub receiver: Receiver,
+    /// Range error up to which a return counts as right, m.
+    pub right_within: f64,
+    /// Effects that are left out.
+    pub idealised: Vec<Effect>,
+    /// Values nobody wrote: dotted key and value.
+    pub defaults: Vec<(String, String)>,
+    /// What a user should know although it is no error.
+    pub warnings: Vec<String>,
+    /// The whole sensor as TOML, defaults included: the same design without the files it came from.
+    pub text: String,
+}
+
+/// Where and when the sensor looks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// Rows of the range image.
+    pub rows: u32,
+    /// Columns of the range image.
+    pub columns: u32,
+    /// Scans in 1000 s: an integer, so that shot times are exact fractions.
+    pub rate_millihertz: u64,
+    /// Nearest range accepted, m.
+    pub min_range: f64,
+    /// Farthest range accepted, m.
+    pub max_range: f64,
+    /// How directions follow each other.
+    pub pattern: Pattern,
+}
+
+/// How directions follow each other.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Pattern {
+    /// One beam, line by line.
+    Raster {
+        /// Full horizontal field, rad.
+        horizontal: f64,
+        /// Full vertical field, rad.
+        vertical: f64,
+        /// Motion of the fast axis.
+        mirror: Mirror,
+        /// Fraction of the line time in which shots are fired.
+        duty: f64,
+    },
+    /// Fixed elevations on a turning head.
+    Spinning {
+        /// Elevation of each row, rad, from the top.
+        elevations: Vec<f64>,
+        /// Rows in the order in which they fire.
+        order: Vec<u16>,
+        /// When they fire.
+        firing: Firing,
+    },
+    /// Every direction at once.
+    Flash {
+        /// Full horizontal field, rad.
+        horizontal: f64,
+        /// Full vertical field, rad.
+        vertical: f64,
+    },
+}
+
+/// The light a sensor sends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Light {
+    /// Wavelength, m.
+    pub wavelength: f64,
+    /// Beam diameter at the sensor (1/e²), m.
+    pub beam_diameter: f64,
+    /// Full divergence (1/e²), rad; zero where the footprint is idealised away.
+    pub divergence: f64,
+    /// Rays that sample the footprint: 1, 7 or 19.
+    pub footprint_rays: u32,
+    /// Length of one micropulse (full width at half maximum), s.
+    pub pulse: f64,
+}
+
+/// How shots are told apart.
+#[derive(Debug, Clone)]
+pub struct Coding {
+    /// Marks of every label and word.
+    pub codebook: Codebook,
+    /// Length of a chip, fs; of the whole shot where it is not coded.
+    pub chip_fs: i64,
+    /// Which number a macropulse carries; `None` where shots are not coded.
+    pub label: Option<Label>,
+    /// The word of pixel `n` of a scan is `first_word + n mod word_modulus`.
+    pub first_word: u32,
+    /// See `first_word`.
+    pub word_modulus: u32,
+}
+
+/// Light to edges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Detector {
+    /// Every mark is a Bernoulli trial of its own.
+    PhotonCounting(PhotonCounting),
+    /// One firing per shot \[KP16 Fig. 7\].
+    FirstFiring(FirstFiring),
+}
+
+/// A detector that counts photons, fast enough for every chip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhotonCounting {
+    /// Mean photons detected per mark at the reference target.
+    pub sensitivity: Sensitivity,
+    /// Marks lost for another reason than lack of light, as a fraction.
+    pub missed_marks: f64,
+    /// Dark and background counts together, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing, s.
+    pub jitter: f64,
+}
+
+/// A detector that fires once, when enough photons of one shot have come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstFiring {
+    /// Mean photons detected per shot at the reference target.
+    pub sensitivity: Sensitivity,
+    /// Photons needed to fire; 1 is a Geiger detector.
+    pub firing_photons: u32,
+    /// White noise integrated over one pulse, photons rms.
+    pub noise_photons: f64,
+    /// Firings without a target, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing, s.
+    pub jitter: f64,
+}
+
+/// How much light a detector gets, declared by what it can see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// Mean photons detected per mark from a target of `reflectance` at `range`, square on.
+    /// Infinite for a detector that never misses.
+    pub photons: f64,
+    /// Range of the reference target, m.
+    pub range: f64,
+    /// Reflectance of the reference target.
+    pub reflectance: f64,
+}
+
+/// The bank of time-to-digital converters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tdc {
+    /// Converters in the bank (for all detectors together).
+    pub converters: u32,
+    /// Length of a tick, fs.
+    pub tick_fs: i64,
+    /// Period of the counter of whole clock ticks, fs.
+    pub clock_fs: i64,
+    /// Time for which a converter is busy with one edge, fs.
+    pub dead_fs: i64,
+}
+
+impl Design {
+    /// The sensor called `name_or_file`: a ready one, or a TOML file.
+    ///
+    /// # Errors
+    /// Says in one sentence what is wrong with the name or the file, and where.
+    pub fn open(name_or_file: &str, overrides: &[(String, String)]) -> Result<Self, Error> {
+        let (text, origin, folder) = document::open(name_or_file, Path::new(""))?;
+        Self::from_toml(&text, &origin, &folder, overrides)
+    }
+
+    /// The sensor written in `text`. `origin` stands in error messages for the file name,
+    /// `folder` is where files named in `extends` are looked for.
+    ///
+    /// # Errors
+    /// As [`Design::open`].
+    pub fn from_toml(
+        text: &str,
+        origin: &str,
+        folder: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Error> {
+        check::design(&document::Chain::read(text, origin, folder, overrides)?)
+    }
+
+    /// Whether shots carry a code.
+    pub fn is_coded(&self) -> bool {
+        self.coding.label.is_some()
+    }
+
+    /// Number of separate detectors.
+    pub fn channels(&self) -> u32 {
+        match &self.scan.pattern {
+            Pattern::Raster { .. } => 1,
+            Pattern::Spinning { elevations, .. } => elevations.len() as u32,
+            Pattern::Flash { .. } => self.scan.rows * self.scan.columns,
+        }
+    }
+
+    /// Shots in one scan.
+    pub fn shots_per_scan(&self) -> u64 {
+        u64::from(self.scan.rows) * u64::from(self.scan.columns)
+    }
+
+    /// Duration of one scan, s.
+    pub fn scan_period(&self) -> f64 {
+        1000.0 / self.scan.rate_millihertz as f64
+    }
+
+    /// What follows from the file, for people to read.
+    pub fn derived(&self) -> Derived {
+        Derived::of(self)
+    }
+}
+
+/// Somebody wrote a wrong sensor file: where, and what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{}{}{message}", self.place(), self.key())]
+pub struct Error {
+    origin: String,
+    line_column: Option<(usize, usize)>,
+    path: String,
+    message: String,
+}
+
+impl Error {
+    /// An error about a file as a whole.
+    fn whole(origin: &str, message: impl Into<String>) -> Self {
+        Self {
+            origin: origin.to_owned(),
+            line_column: None,
+            path: String::new(),
+            message: message.into(),
+        }
+    }
+
+    fn place(&self) -> String {
+        match self.line_column {
+            Some((line, column)) => format!("{}:{line}:{column}: ", self.origin),
+            None => format!("{}: ", self.origin),
+        }
+    }
+
+    fn key(&self) -> String {
+        if self.path.is_empty() { String::new() } else { format!("{}: ", self.path) }
+    }
+}

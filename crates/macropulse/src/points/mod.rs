@@ -1,4 +1,10 @@
-//! Returns to points.
+//! Returns to points: the organised cloud of one scan.
+
+use crate::channel::Link;
+use crate::decode::Returns;
+use crate::design::Design;
+use crate::emit::{ShotLog, direction};
+use crate::units::range_from_tof;
 
 /// How a pixel came out, measured against truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -16,6 +22,17 @@ pub enum Outcome {
     Missed = 4,
     /// An answer where no surface is.
     False = 5,
+}
+
+impl Outcome {
+    /// All outcomes, in the order of their numbers.
+    pub const ALL: [Self; 6] =
+        [Self::Empty, Self::Right, Self::Near, Self::Wrong, Self::Missed, Self::False];
+
+    /// Name used in files and reports.
+    pub fn name(self) -> &'static str {
+        ["empty", "right", "near", "wrong", "missed", "false"][self as usize]
+    }
 }
 
 /// One scan as an organised cloud: `rows` × `columns` entries, row-major, row 0 at the top and
@@ -64,9 +81,78 @@ pub struct Truth {
     pub material: Vec<u16>,
     /// Cosine of the incidence angle; NaN where there is none.
     pub cosine: Vec<f32>,
+    /// Object whose surface the return came from; `NO_OBJECT` where there is no return or no
+    /// surface near it. Behind glass this is another object than the first one met.
+    pub source: Vec<u16>,
     /// How the pixel came out.
     pub outcome: Vec<Outcome>,
 }
 
 /// Object and material index of a pixel that met nothing.
 pub const NO_OBJECT: u16 = u16::MAX;
+
+impl PointCloud {
+    /// A cloud of scan number `scan` without any return yet.
+    pub fn empty(design: &Design, scan: u64) -> Self {
+        let (rows, columns) = (design.scan.rows as usize, design.scan.columns as usize);
+        let none = vec![f32::NAN; rows * columns];
+        let zero = vec![0; rows * columns];
+        Self {
+            scan,
+            rows,
+            columns,
+            x: none.clone(),
+            y: none.clone(),
+            z: none.clone(),
+            intensity: none.clone(),
+            range: none,
+            time_ns: vec![f64::NAN; rows * columns],
+            peak: zero.clone(),
+            marks: zero.clone(),
+            margin: zero,
+            truth: Truth::default(),
+        }
+    }
+
+    /// Index of the pixel of shot `shot`.
+    pub fn pixel(&self, log: &ShotLog, shot: usize) -> usize {
+        usize::from(log.row[shot]) * self.columns + usize::from(log.column[shot])
+    }
+
+    /// Writes the returns of one band, and the firing times of its home shots, into the cloud.
+    ///
+    /// Intensity is the photons a mark brought over the photons a white surface seen square on
+    /// would have brought from the same range; 1 for a detector without a photon scale.
+    pub fn add(&mut self, design: &Design, log: &ShotLog, returns: &Returns) {
+        let scan_start = self.scan as f64 * design.scan_period() * 1e9;
+        for shot in log.home.clone() {
+            let pixel = self.pixel(log, shot);
+            self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
+        }
+        let link = Link::of(design);
+        for (i, &shot) in returns.shot.iter().enumerate() {
+            let shot = shot as usize;
+            let pixel = self.pixel(log, shot);
+            let range = range_from_tof(returns.tof[i]);
+            let [x, y, z] = direction(design, log.row[shot], log.column[shot]);
+            self.x[pixel] = (x * range) as f32;
+            self.y[pixel] = (y * range) as f32;
+            self.z[pixel] = (z * range) as f32;
+            self.range[pixel] = range as f32;
+            let white = link.photons(1.0, range);
+            self.intensity[pixel] = if white.is_finite() {
+                (f64::from(returns.photons[i]) / white) as f32
+            } else {
+                1.0
+            };
+            self.peak[pixel] = returns.peak[i];
+            self.marks[pixel] = returns.marks[i];
+            self.margin[pixel] = returns.margin[i];
+        }
+    }
+
+    /// Number of pixels that have a return.
+    pub fn returns(&self) -> usize {
+        self.range.iter().filter(|range| !range.is_nan()).count()
+    }
+}

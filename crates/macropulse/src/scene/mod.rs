@@ -13,6 +13,7 @@ mod mesh;
 mod pose;
 mod raycast;
 mod readers;
+mod trace;
 
 use std::fmt;
 use std::path::Path;

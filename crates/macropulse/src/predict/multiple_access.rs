@@ -1,4 +1,4 @@
-//! Closed form: what theory says a simulation will measure.
+//! Errors of overlapping users in closed form.
 //!
 //! Multiple access: `K` users of a prime code send at once, each its own word, each bit lit or
 //! dark with equal chance, chips aligned. A receiver correlates with one word and calls the bit

@@ -1,0 +1,91 @@
+//! Quantities that follow from a sensor file, for people to read.
+
+use super::{Design, Mirror, Pattern};
+use crate::units::{SPEED_OF_LIGHT, range_from_tof, s_from_fs, tof_from_range};
+
+/// What follows from a design. SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derived {
+    /// Mean time between shots, s.
+    pub pixel_period: f64,
+    /// Shortest time the beam spends on a pixel, s (\[KP16\] §2.2 gives the mean only).
+    pub shortest_dwell: f64,
+    /// Range gate, s.
+    pub gate: f64,
+    /// Shots fired during one range gate: \[KP16\] says 25.
+    pub shots_in_flight: f64,
+    /// Chips of a macropulse.
+    pub chips: u32,
+    /// Length of a macropulse, s.
+    pub macropulse: f64,
+    /// Fewest, mean and most marks of a label that can be sent.
+    pub marks: (usize, f64, usize),
+    /// Marks sent in one scan.
+    pub marks_per_scan: u64,
+    /// Macropulses in the air on average at a point of the receiver's time line, if all return.
+    pub mean_overlap: f64,
+    /// Range at which another shot has the same code word, m; `None` for uncoded shots.
+    pub unambiguous_range: Option<f64>,
+    /// Range covered by one tick, m.
+    pub tick_range: f64,
+    /// Light under way and back while one idle-listening shot could be sent: the highest refresh
+    /// rate of a sensor with as many directions that waits for each echo, 1/s.
+    pub idle_listening_rate: f64,
+    /// Mean photons per mark from the reference target.
+    pub reference_photons: f64,
+}
+
+impl Derived {
+    pub(super) fn of(design: &Design) -> Self {
+        let shots = design.shots_per_scan();
+        let pixel_period = design.scan_period() / shots as f64;
+        let gate = tof_from_range(design.scan.max_range);
+        let codebook = &design.coding.codebook;
+        let weight_of = |label: u32| codebook.marks(label as u16, design.coding.first_word as u16);
+        let labels = if design.is_coded() { design.scan.columns } else { 1 };
+        let weights: Vec<usize> = (0..labels).map(|label| weight_of(label).len()).collect();
+        let sum: usize = weights.iter().sum();
+        let mean = sum as f64 / weights.len() as f64;
+        let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
+        let at_once = f64::from(design.channels());
+        let sensitivity = match design.detector {
+            super::Detector::PhotonCounting(counting) => counting.sensitivity,
+            super::Detector::FirstFiring(firing) => firing.sensitivity,
+        };
+        Self {
+            pixel_period,
+            shortest_dwell: shortest_dwell(design, pixel_period),
+            gate,
+            shots_in_flight: gate / pixel_period,
+            chips: codebook.chips(),
+            macropulse,
+            marks: (
+                weights.iter().copied().filter(|&w| w > 0).min().unwrap_or(0),
+                mean,
+                weights.iter().copied().max().unwrap_or(0),
+            ),
+            marks_per_scan: (mean * shots as f64).round() as u64,
+            mean_overlap: macropulse / pixel_period,
+            unambiguous_range: design
+                .is_coded()
+                .then(|| range_from_tof(f64::from(design.coding.word_modulus) * pixel_period)),
+            tick_range: s_from_fs(design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0,
+            idle_listening_rate: at_once / (gate * shots as f64),
+            reference_photons: sensitivity.photons,
+        }
+    }
+}
+
+fn shortest_dwell(design: &Design, pixel_period: f64) -> f64 {
+    let columns = f64::from(design.scan.columns);
+    match design.scan.pattern {
+        Pattern::Raster { mirror: Mirror::Sinusoidal, duty, .. } => {
+            // Position sin(π·s) for s in ±duty/2 of the line time, scaled to ±1 at the edges.
+            let line = pixel_period * columns;
+            let edge = (std::f64::consts::FRAC_PI_2 * duty).sin();
+            line * 2.0 / std::f64::consts::PI * (edge / columns).asin()
+        }
+        Pattern::Raster { duty, .. } => pixel_period * duty,
+        _ => pixel_period * f64::from(design.channels()),
+    }
+}

@@ -1,0 +1,328 @@
+//! Sensor files as typed: a chain of TOML documents, each one filling in what those before it
+//! left open, and the place in the text where every value came from.
+
+use std::path::{Path, PathBuf};
+
+use toml::Table;
+use toml::de::DeTable;
+
+use super::Error;
+use super::presets;
+
+/// A sensor file may extend another, but not without end.
+const LONGEST_CHAIN: usize = 16;
+
+/// Where exactly one of several tables may stand: naming another kind than the parent's replaces
+/// the parent's table instead of adding to it.
+const ALTERNATIVES: [(&str, &[&str]); 2] = [
+    ("scan", &["raster", "spinning", "flash"]),
+    ("detector", &["photon-counting", "first-firing"]),
+];
+
+/// One TOML text with its origin.
+#[derive(Debug, Clone)]
+struct Document {
+    /// File name, preset name or `--set`, as shown in errors.
+    origin: String,
+    text: String,
+    table: Table,
+}
+
+/// The documents behind a sensor, the strongest first: `--set`, the file, what it extends, and
+/// the defaults last.
+#[derive(Debug, Clone)]
+pub(super) struct Chain {
+    documents: Vec<Document>,
+    /// What the chain says when read as one.
+    pub merged: Table,
+}
+
+impl Chain {
+    /// Reads `text` and everything it extends. `folder` is where relative names start.
+    pub fn read(
+        text: &str,
+        origin: &str,
+        folder: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Error> {
+        let mut documents = Vec::new();
+        if !overrides.is_empty() {
+            documents.push(document_of_overrides(overrides)?);
+        }
+        let mut folder = folder.to_path_buf();
+        documents.push(Document::parse(text, origin)?);
+        while let Some(parent) = documents.last().and_then(|d| d.table.get("extends")) {
+            let path = "extends";
+            let Some(parent) = parent.as_str().map(str::to_owned) else {
+                return Err(place(&documents, path).error("must be the name of a sensor or file"));
+            };
+            if documents.len() > LONGEST_CHAIN {
+                return Err(place(&documents, path).error("goes round in a circle"));
+            }
+            let (text, origin, next_folder) = open(&parent, &folder)
+                .map_err(|error| place(&documents, path).error(error.message))?;
+            folder = next_folder;
+            documents.push(Document::parse(&text, &origin)?);
+        }
+        let mut merged = Table::new();
+        for document in &documents {
+            fill_in(&mut merged, &document.table);
+        }
+        let defaults = Document::parse(presets::DEFAULTS, "built-in defaults")?;
+        let fitting = only_for_what_is_there(&defaults.table, &merged);
+        fill_in(&mut merged, &fitting);
+        merged.remove("extends");
+        documents.push(defaults);
+        Ok(Self { documents, merged })
+    }
+
+    /// An error about the value at the dotted `path`, pointing at the document that gave it.
+    pub fn error(&self, path: &str, message: impl Into<String>) -> Error {
+        place(&self.documents, path).error(message)
+    }
+
+    /// Dotted paths of the values nobody wrote, with the value taken.
+    pub fn defaults_used(&self) -> Vec<(String, String)> {
+        let written = &self.documents[..self.documents.len() - 1];
+        let mut used = Vec::new();
+        leaves(&self.merged, String::new(), &mut |path, value| {
+            if !written.iter().any(|d| value_at(&d.table, path).is_some()) {
+                used.push((path.to_owned(), value.to_string()));
+            }
+        });
+        used
+    }
+
+    /// The merged document as TOML, from which the same sensor can be built without the chain.
+    pub fn text(&self) -> String {
+        toml::to_string(&self.merged).unwrap_or_default()
+    }
+}
+
+impl Document {
+    fn parse(text: &str, origin: &str) -> Result<Self, Error> {
+        let table: Table = text.parse().map_err(|error: toml::de::Error| Error {
+            origin: origin.to_owned(),
+            line_column: error.span().map(|span| line_column(text, span.start)),
+            path: String::new(),
+            message: error.message().to_owned(),
+        })?;
+        Ok(Self { origin: origin.to_owned(), text: text.to_owned(), table })
+    }
+}
+
+/// Text, origin and folder of a sensor named in `extends` or on the command line.
+pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String, PathBuf), Error> {
+    if let Some(text) = presets::text(name_or_file) {
+        return Ok((text.to_owned(), name_or_file.to_owned(), PathBuf::new()));
+    }
+    let path = folder.join(name_or_file);
+    if !name_or_file.ends_with(".toml") && !path.exists() {
+        return Err(Error::whole(name_or_file, presets::unknown(name_or_file)));
+    }
+    let text = std::fs::read_to_string(&path)
+        .map_err(|error| Error::whole(name_or_file, format!("cannot be read: {error}")))?;
+    let next = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    Ok((text, path.display().to_string(), next))
+}
+
+/// `--set a.b=1` as a document. A value that is not TOML is taken as text.
+fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Error> {
+    let mut table = Table::new();
+    for (path, typed) in overrides {
+        let value = format!("v = {typed}")
+            .parse::<Table>()
+            .ok()
+            .and_then(|mut parsed| parsed.remove("v"))
+            .unwrap_or_else(|| toml::Value::String(typed.clone()));
+        let mut at = &mut table;
+        let mut keys = path.split('.').peekable();
+        while let Some(key) = keys.next() {
+            if keys.peek().is_none() {
+                at.insert(key.to_owned(), value.clone());
+                break;
+            }
+            let below = at.entry(key).or_insert_with(|| toml::Value::Table(Table::new()));
+            let Some(next) = below.as_table_mut() else {
+                return Err(Error::whole("--set", format!("`{path}`: `{key}` is set twice")));
+            };
+            at = next;
+        }
+    }
+    Ok(Document { origin: "--set".to_owned(), text: String::new(), table })
+}
+
+/// Adds to `strong` what only `weak` has.
+fn fill_in(strong: &mut Table, weak: &Table) {
+    for (key, value) in weak {
+        match strong.get_mut(key) {
+            None => {
+                strong.insert(key.clone(), value.clone());
+            }
+            Some(toml::Value::Table(inner)) => {
+                if let toml::Value::Table(below) = value {
+                    let chosen = alternatives(key).any(|kind| inner.contains_key(kind));
+                    let mut below = below.clone();
+                    if chosen {
+                        below.retain(|kind, _| {
+                            inner.contains_key(kind) || !alternatives(key).any(|k| k == kind)
+                        });
+                    }
+                    fill_in(inner, &below);
+                }
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+fn alternatives(group: &str) -> impl Iterator<Item = &'static str> {
+    let kinds = ALTERNATIVES.iter().find(|(name, _)| *name == group).map_or(&[][..], |(_, k)| k);
+    kinds.iter().copied()
+}
+
+/// The defaults without the tables that the sensor does not have: no code, another kind of scan.
+fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
+    let mut kept = defaults.clone();
+    kept.retain(|key, _| key != "code" || sensor.contains_key("code"));
+    for (group, kinds) in ALTERNATIVES {
+        if let Some(toml::Value::Table(inner)) = kept.get_mut(group) {
+            let chosen = sensor.get(group).and_then(toml::Value::as_table);
+            inner.retain(|key, _| {
+                !kinds.iter().any(|kind| *kind == key)
+                    || chosen.is_some_and(|c| c.contains_key(key))
+            });
+        }
+    }
+    kept
+}
+
+fn value_at<'a>(table: &'a Table, path: &str) -> Option<&'a toml::Value> {
+    let mut keys = path.split('.');
+    let mut value = table.get(keys.next()?)?;
+    for key in keys {
+        value = value.get(key)?;
+    }
+    Some(value)
+}
+
+fn leaves(table: &Table, path: String, visit: &mut impl FnMut(&str, &toml::Value)) {
+    for (key, value) in table {
+        let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match value {
+            toml::Value::Table(inner) => leaves(inner, path, visit),
+            value => visit(&path, value),
+        }
+    }
+}
+
+struct Place {
+    origin: String,
+    line_column: Option<(usize, usize)>,
+    path: String,
+}
+
+impl Place {
+    fn error(self, message: impl Into<String>) -> Error {
+        Error {
+            origin: self.origin,
+            line_column: self.line_column,
+            path: self.path,
+            message: message.into(),
+        }
+    }
+}
+
+/// The place of `path` in the strongest document that mentions it; of its nearest ancestor when
+/// none does, because what is missing has no place of its own.
+fn place(documents: &[Document], path: &str) -> Place {
+    let mut wanted = path;
+    loop {
+        for document in documents {
+            if value_at(&document.table, wanted).is_some() {
+                return Place {
+                    origin: document.origin.clone(),
+                    line_column: offset_of(&document.text, wanted)
+                        .map(|at| line_column(&document.text, at)),
+                    path: path.to_owned(),
+                };
+            }
+        }
+        match wanted.rsplit_once('.') {
+            Some((ancestor, _)) => wanted = ancestor,
+            None => break,
+        }
+    }
+    let first = documents.iter().find(|d| d.origin != "--set");
+    Place {
+        origin: first.map(|d| d.origin.clone()).unwrap_or_default(),
+        line_column: None,
+        path: path.to_owned(),
+    }
+}
+
+/// Byte offset of the key at the dotted `path`.
+fn offset_of(text: &str, path: &str) -> Option<usize> {
+    let root = DeTable::parse(text).ok()?;
+    let mut table = root.get_ref();
+    let mut keys = path.split('.').peekable();
+    while let Some(key) = keys.next() {
+        let (name, value) = table.iter().find(|(name, _)| name.get_ref().as_ref() == key)?;
+        if keys.peek().is_none() {
+            return Some(name.span().start);
+        }
+        table = value.get_ref().as_table()?;
+    }
+    None
+}
+
+/// Line and column, both from 1, of a byte offset.
+fn line_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text[..offset.min(text.len())];
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+    (line, column)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain(text: &str) -> Chain {
+        Chain::read(text, "mine.toml", Path::new(""), &[]).unwrap()
+    }
+
+    #[test]
+    fn the_child_wins_and_the_parent_fills_in() {
+        let chain = chain("extends = \"kim-park-2016\"\n[scan]\nmax_range_m = 90.0\n");
+        assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_float(), Some(90.0));
+        assert_eq!(value_at(&chain.merged, "scan.raster.rows").unwrap().as_integer(), Some(480));
+    }
+
+    #[test]
+    fn another_kind_of_scan_replaces_the_parents() {
+        let chain = chain("extends = \"kim-park-2016\"\n[scan.flash]\nrows = 2\n");
+        assert!(value_at(&chain.merged, "scan.raster").is_none());
+    }
+
+    #[test]
+    fn errors_point_at_the_document_that_said_it() {
+        let chain = chain("extends = \"kim-park-2016\"\n[scan]\nmax_range_m = 90.0\n");
+        let error = chain.error("scan.max_range_m", "too far");
+        assert_eq!(error.to_string(), "mine.toml:3:1: scan.max_range_m: too far");
+        assert!(chain.error("tdc.bits", "x").to_string().starts_with("kim-park-2016:"));
+    }
+
+    #[test]
+    fn overrides_are_strongest() {
+        let set = [("scan.max_range_m".to_owned(), "12".to_owned())];
+        let chain = Chain::read("extends = \"hdl-64e\"", "mine.toml", Path::new(""), &set).unwrap();
+        assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_integer(), Some(12));
+    }
+
+    #[test]
+    fn circles_and_unknown_parents_are_refused() {
+        let unknown = Chain::read("extends = \"kim-prak-2016\"", "m.toml", Path::new(""), &[]);
+        assert!(unknown.unwrap_err().to_string().contains("did you mean `kim-park-2016`"));
+    }
+}

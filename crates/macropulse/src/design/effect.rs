@@ -1,0 +1,74 @@
+//! Effects that a sensor file may leave out.
+
+/// A physical effect that can be idealised away. Its name stands under `idealised` in the sensor
+/// file, and every report prints it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    /// The beam has a width: several rays, several delays.
+    Footprint,
+    /// The air absorbs and scatters.
+    Atmosphere,
+    /// Sunlight makes edges.
+    Background,
+    /// Photons follow from energy, aperture and optics.
+    LinkBudget,
+    /// The energy is held to a laser class.
+    EyeSafety,
+    /// The detector has a finite bandwidth and a finite area.
+    DetectorBandwidth,
+    /// A micropulse reaches into neighbouring chips.
+    InterChip,
+    /// The mirror moves during a macropulse.
+    MirrorMotion,
+}
+
+impl Effect {
+    /// All effects.
+    pub const ALL: [Self; 8] = [
+        Self::Footprint,
+        Self::Atmosphere,
+        Self::Background,
+        Self::LinkBudget,
+        Self::EyeSafety,
+        Self::DetectorBandwidth,
+        Self::InterChip,
+        Self::MirrorMotion,
+    ];
+
+    /// Name in the sensor file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Footprint => "footprint",
+            Self::Atmosphere => "atmosphere",
+            Self::Background => "background",
+            Self::LinkBudget => "link-budget",
+            Self::EyeSafety => "eye-safety",
+            Self::DetectorBandwidth => "detector-bandwidth",
+            Self::InterChip => "inter-chip",
+            Self::MirrorMotion => "mirror-motion",
+        }
+    }
+
+    /// What is assumed when it is left out.
+    pub fn assumption(self) -> &'static str {
+        match self {
+            Self::Footprint => "the beam is a line without width",
+            Self::Atmosphere => "the air is perfectly clear",
+            Self::Background => "no sunlight reaches the detector",
+            Self::LinkBudget => {
+                "the receiver is declared by what it can see, not by energy, aperture and optics"
+            }
+            Self::EyeSafety => "the shot may carry whatever energy its sensitivity needs",
+            Self::DetectorBandwidth => {
+                "a detector fast enough for every chip exists in the size needed"
+            }
+            Self::InterChip => "a micropulse does not reach into neighbouring chips",
+            Self::MirrorMotion => "the beam stands still during a macropulse",
+        }
+    }
+
+    /// Whether it can also be switched on. The others must be declared as idealised.
+    pub fn is_modelled(self) -> bool {
+        matches!(self, Self::Footprint | Self::Atmosphere | Self::Background)
+    }
+}

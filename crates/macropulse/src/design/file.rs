@@ -1,0 +1,208 @@
+//! A sensor file as typed: unit-suffixed keys, nothing checked yet but names and types.
+
+use serde::Deserialize;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SensorFile {
+    pub version: u32,
+    pub name: String,
+    #[serde(default)]
+    pub summary: String,
+    pub idealised: Vec<String>,
+    pub scan: ScanFile,
+    pub light: LightFile,
+    pub code: Option<CodeFile>,
+    pub detector: DetectorFile,
+    pub atmosphere: AtmosphereFile,
+    pub tdc: TdcFile,
+    pub receiver: ReceiverFile,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ScanFile {
+    pub scans_per_s: f64,
+    pub min_range_m: f64,
+    pub max_range_m: f64,
+    pub raster: Option<RasterFile>,
+    pub spinning: Option<SpinningFile>,
+    pub flash: Option<FlashFile>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RasterFile {
+    pub rows: u32,
+    pub columns: u32,
+    pub horizontal_deg: f64,
+    pub vertical_deg: f64,
+    pub mirror: Mirror,
+    pub duty: f64,
+}
+
+/// How the fast axis of a raster moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mirror {
+    /// Constant angular speed, every line in the same direction.
+    Uniform,
+    /// Resonant: sinusoidal, lines to and fro.
+    Sinusoidal,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SpinningFile {
+    pub azimuth_step_deg: f64,
+    pub blocks: Vec<LaserBlockFile>,
+    pub firing: Firing,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LaserBlockFile {
+    pub lasers: u32,
+    pub first_deg: f64,
+    pub step_deg: f64,
+}
+
+/// In which order the lasers of a spinning sensor fire while it turns by one azimuth step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Firing {
+    /// Evenly spaced in time, one laser of each block in turn.
+    BlocksInTurn,
+    /// All at once.
+    Together,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FlashFile {
+    pub rows: u32,
+    pub columns: u32,
+    pub horizontal_deg: f64,
+    pub vertical_deg: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LightFile {
+    pub wavelength_nm: f64,
+    pub beam_diameter_mm: f64,
+    pub divergence_mrad: f64,
+    pub footprint_rays: u32,
+    pub pulse_ps: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CodeFile {
+    pub family: FamilyFile,
+    pub chip_ps: f64,
+    pub label: Label,
+    pub label_bits: u32,
+    pub crc: CrcFile,
+    pub sync_bit: bool,
+    pub allow_dark: bool,
+    pub word: WordFile,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum FamilyFile {
+    Prime(u32),
+}
+
+/// Which number a macropulse carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Label {
+    /// The column of its pixel.
+    Column,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CrcFile {
+    pub width: u8,
+    pub polynomial: u8,
+    pub init: u8,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WordFile {
+    pub first: u32,
+    pub modulus: u32,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct DetectorFile {
+    pub photon_counting: Option<PhotonCountingFile>,
+    pub first_firing: Option<FirstFiringFile>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SensitivityFile {
+    pub range_m: f64,
+    pub reflectance: f64,
+    pub pd: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PhotonCountingFile {
+    pub sensitivity: SensitivityFile,
+    pub missed_marks: f64,
+    pub dark_counts_hz: f64,
+    pub background_hz: f64,
+    pub jitter_ps: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FirstFiringFile {
+    pub sensitivity: SensitivityFile,
+    pub firing_photons: u32,
+    pub noise_photons: f64,
+    pub false_firing_hz: f64,
+    pub jitter_ps: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AtmosphereFile {
+    pub visibility_km: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TdcFile {
+    pub converters: u32,
+    pub resolution_ps: f64,
+    pub clock_ps: f64,
+    pub bits: u32,
+    pub dead_time_ns: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReceiverFile {
+    pub kind: ReceiverKindFile,
+    pub false_alarm: f64,
+    pub bit_threshold: u32,
+    pub right_within_m: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum ReceiverKindFile {
+    Literal,
+    Blind,
+    Matched,
+    Direct,
+}

@@ -1,0 +1,31 @@
+//! The sensors that come with the program.
+
+/// What a sensor file may leave unsaid.
+pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
+
+const PRESETS: [(&str, &str); 5] = [
+    ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
+    ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
+    ("hdl-64e", include_str!("../../../../sensors/hdl-64e.toml")),
+    ("hdl-64e-equal-spacing", include_str!("../../../../sensors/hdl-64e-equal-spacing.toml")),
+    ("peregrine", include_str!("../../../../sensors/peregrine.toml")),
+];
+
+/// Names of the ready sensors.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    PRESETS.iter().map(|(name, _)| *name)
+}
+
+/// The TOML of a ready sensor, to start from.
+pub fn text(name: &str) -> Option<&'static str> {
+    PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
+/// The sentence for a name that is neither a ready sensor nor a file.
+pub(super) fn unknown(name: &str) -> String {
+    let known: Vec<&str> = names().collect();
+    let hint = crate::names::nearest(name, known.iter().copied())
+        .map(|near| format!("did you mean `{near}`? "))
+        .unwrap_or_default();
+    format!("no such sensor; {hint}ready ones: {}; or give a .toml file", known.join(", "))
+}

@@ -1,0 +1,5 @@
+//! Closed form: what theory says a simulation will measure.
+
+pub mod link;
+pub mod multiple_access;
+pub mod ranging;
