@@ -1,8 +1,22 @@
 //! Ticks to returns: the receiver. It sees ticks and the shot log, never the scene.
 
+mod bitwise;
+mod correlator;
+mod direct;
+mod matched;
 mod returns;
+mod search;
+mod threshold;
+mod timeline;
 
 pub use returns::{Reject, Returns};
+
+use crate::code::Codebook;
+use crate::emit::ShotLog;
+use crate::tdc::Ticks;
+use crate::units;
+use returns::Return;
+use timeline::Timeline;
 
 /// Which receiver decodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,4 +49,75 @@ pub struct Receiver {
     pub false_alarm: f64,
     /// Marks of a code word that make a 1 bit, for the literal and the blind receiver.
     pub bit_threshold: u16,
+}
+
+impl Receiver {
+    /// The returns of the home shots of `log`, out of all the `ticks` of its band.
+    ///
+    /// `ticks` must cover the whole time in which light of a home shot can arrive. The shots of
+    /// the halo are decoded too, as their light overlaps, and dropped. The ticks of a coded
+    /// sensor must be those of one detector; labels and words must be in the `codebook`.
+    ///
+    /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
+    /// does not bring everything nearer.
+    pub fn decode(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+        match self.kind {
+            ReceiverKind::Direct => direct::decode(self, log, ticks),
+            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
+            ReceiverKind::Literal => {
+                bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
+            }
+            ReceiverKind::Blind => {
+                bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::AnyBit))
+            }
+        }
+    }
+
+    /// The absolute tick in which `shot` was fired.
+    fn fired(&self, log: &ShotLog, shot: usize) -> i64 {
+        log.fired_at_fs[shot].div_euclid(self.tick_fs)
+    }
+
+    /// The ticks in which light of shots that were `fired` can arrive.
+    fn timeline(&self, codebook: &Codebook, fired: &[i64], ticks: &Ticks) -> Timeline {
+        let absolute = |tick: Option<&u32>| ticks.epoch + i64::from(tick.copied().unwrap_or(0));
+        let (nearest, farthest) = self.gate_ticks;
+        let length = codebook.chips() * self.ticks_per_chip;
+        let (first, last) = (fired.first().unwrap_or(&0), fired.last().unwrap_or(&0));
+        let open = first + i64::from(nearest);
+        let closed = last + i64::from(farthest) + i64::from(length) + 1;
+        let span = open.max(absolute(ticks.tick.first()))
+            ..closed.min(absolute(ticks.tick.last()) + 1);
+        Timeline::new(span, ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick)))
+    }
+
+    /// Two-way time of flight, s, of light that left at `fired_at_fs` and came in tick `tick`.
+    fn tof(&self, fired_at_fs: i64, tick: i64) -> f64 {
+        units::s_from_fs(tick * self.tick_fs - fired_at_fs)
+            + 0.5 * units::s_from_fs(self.tick_fs)
+    }
+}
+
+/// Mean number of photons detected per mark, μ = −ln(1 − p), of which the share p of the marks
+/// shows at least one (Poisson); p = (k/N − d)/(1 − d) for k of N marks found where a share d of
+/// all places is lit anyway. All marks found is taken for N − ½: nobody can tell more.
+fn photons_per_mark(peak: u16, marks: u16, density: f64) -> f32 {
+    let (found, all) = (f64::from(peak), f64::from(marks));
+    let lit = found.min(all - 0.5) / all;
+    let share = ((lit - density) / (1.0 - density)).max(0.0);
+    -(-share).ln_1p() as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photons_follow_from_the_share_of_marks_seen() {
+        approx::assert_relative_eq!(photons_per_mark(63, 100, 0.0), 0.994, max_relative = 1e-3);
+        // Half of the places are lit anyway: 75 of 100 lit are 50 of 100 seen.
+        approx::assert_relative_eq!(photons_per_mark(75, 100, 0.5), 0.6931, max_relative = 1e-3);
+        assert!(photons_per_mark(100, 100, 0.0).is_finite());
+        assert_eq!(photons_per_mark(1, 100, 0.2), 0.0);
+    }
 }

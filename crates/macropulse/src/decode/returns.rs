@@ -51,3 +51,60 @@ pub struct Returns {
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
 }
+
+/// One decoded measurement: a line of [`Returns`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Return {
+    pub shot: usize,
+    pub tof: f64,
+    pub peak: u16,
+    pub marks: u16,
+    pub margin: u16,
+    pub photons: f32,
+}
+
+impl Returns {
+    /// Number of returns.
+    pub fn len(&self) -> usize {
+        self.shot.len()
+    }
+
+    /// Whether there is no return at all.
+    pub fn is_empty(&self) -> bool {
+        self.shot.is_empty()
+    }
+
+    /// How often `reject` happened.
+    pub fn rejected(&self, reject: Reject) -> u64 {
+        self.rejects[reject as usize]
+    }
+
+    pub(super) fn push(&mut self, found: Return) {
+        self.shot.push(found.shot as u32);
+        self.tof.push(found.tof);
+        self.peak.push(found.peak);
+        self.marks.push(found.marks);
+        self.margin.push(found.margin);
+        self.photons.push(found.photons);
+    }
+
+    pub(super) fn reject(&mut self, reject: Reject) {
+        self.rejects[reject as usize] += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rejects_are_counted_in_the_order_of_their_list() {
+        for (place, kind) in Reject::ALL.into_iter().enumerate() {
+            let mut returns = Returns::default();
+            returns.reject(kind);
+            assert_eq!(returns.rejects[place], 1, "{}", kind.name());
+            assert_eq!(returns.rejected(kind), 1);
+            assert!(returns.is_empty());
+        }
+    }
+}

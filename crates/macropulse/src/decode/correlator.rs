@@ -1,0 +1,183 @@
+//! How many marks fit, for many lags at once.
+//!
+//! Every mark gives one bit for each lag. The bits are added the way hardware would: 64 lags
+//! side by side in a machine word, the count of each spread over bit planes, carries saved for
+//! the next plane.
+
+use std::ops::Range;
+
+use super::timeline::Timeline;
+
+/// Machine words of one block.
+const LANES: usize = 8;
+
+/// Lags that are counted at once.
+pub(super) const BLOCK: i64 = 64 * LANES as i64;
+
+/// Planes of a count; a macropulse has at most 65535 marks.
+const PLANES: usize = 16;
+
+type Lanes = [u64; LANES];
+
+/// Where most marks fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Peak {
+    /// The place, in ticks from where the search began.
+    pub at: i64,
+    /// Marks that fit there.
+    pub count: u16,
+    /// Marks that fit at the best other place, the peak's own plateau apart.
+    pub next: u16,
+}
+
+/// The counts of a block of lags, in bit planes.
+#[derive(Debug)]
+pub(super) struct Counts {
+    planes: [Lanes; PLANES],
+    /// Planes that can be lit at all.
+    used: usize,
+}
+
+impl Counts {
+    /// For each of [`BLOCK`] places from `first` on: how many of the `marks`, counted in ticks
+    /// from that place, are lit in `timeline`.
+    pub fn new(timeline: &Timeline, first: i64, marks: impl ExactSizeIterator<Item = i64>) -> Self {
+        let used = (usize::BITS - marks.len().leading_zeros()) as usize;
+        let mut counts = Self { planes: [[0; LANES]; PLANES], used: used.min(PLANES) };
+        let mut places = marks.map(|mark| lanes_from(timeline, first + mark));
+        let [mut ones, mut twos, mut fours] = [[0; LANES]; 3];
+        // Seven adders take eight bits in and give one bit of weight eight: most of the work
+        // stays in the three lowest planes.
+        while places.len() >= 8 {
+            let mut next = || places.next().unwrap_or([0; LANES]);
+            let a = add(&mut ones, next(), next());
+            let b = add(&mut ones, next(), next());
+            let c = add(&mut twos, a, b);
+            let a = add(&mut ones, next(), next());
+            let b = add(&mut ones, next(), next());
+            let d = add(&mut twos, a, b);
+            let eights = add(&mut fours, c, d);
+            counts.carry(3, eights);
+        }
+        counts.planes[..3].copy_from_slice(&[ones, twos, fours]);
+        for place in places {
+            counts.carry(0, place);
+        }
+        counts
+    }
+
+    /// Adds one bit to the planes from `plane` on.
+    fn carry(&mut self, plane: usize, mut bits: Lanes) {
+        for plane in &mut self.planes[plane..self.used.max(plane)] {
+            for lane in 0..LANES {
+                let carried = plane[lane] & bits[lane];
+                plane[lane] ^= bits[lane];
+                bits[lane] = carried;
+            }
+        }
+    }
+
+    /// The highest count among the places of `allowed`, as offsets into the block, and the first
+    /// place that has it; and the best one farther than `plateau` ticks from it.
+    pub fn peak(&self, allowed: Range<i64>, plateau: i64) -> Option<Peak> {
+        let allowed = between(allowed);
+        let (at, count) = self.highest(allowed)?;
+        let own = between(at - plateau..at + plateau + 1);
+        let others = std::array::from_fn(|lane| allowed[lane] & !own[lane]);
+        let next = self.highest(others).map_or(0, |(_, count)| count);
+        Some(Peak { at, count, next })
+    }
+
+    fn highest(&self, mut places: Lanes) -> Option<(i64, u16)> {
+        if places == [0; LANES] {
+            return None;
+        }
+        let mut count = 0;
+        for (weight, plane) in self.planes[..self.used].iter().enumerate().rev() {
+            let lit: Lanes = std::array::from_fn(|lane| places[lane] & plane[lane]);
+            if lit != [0; LANES] {
+                places = lit;
+                count |= 1 << weight;
+            }
+        }
+        let lane = places.iter().position(|&lane| lane != 0)?;
+        Some((64 * lane as i64 + i64::from(places[lane].trailing_zeros()), count))
+    }
+}
+
+/// Adds two bits to `sum`; what is carried to the next plane.
+#[inline(always)]
+fn add(sum: &mut Lanes, a: Lanes, b: Lanes) -> Lanes {
+    let mut carried = [0; LANES];
+    for lane in 0..LANES {
+        let half = sum[lane] ^ a[lane];
+        carried[lane] = (sum[lane] & a[lane]) | (half & b[lane]);
+        sum[lane] = half ^ b[lane];
+    }
+    carried
+}
+
+/// [`BLOCK`] ticks from `tick` on.
+#[inline(always)]
+fn lanes_from(timeline: &Timeline, tick: i64) -> Lanes {
+    match timeline.block::<{ LANES + 1 }>(tick) {
+        Some((words, shift)) => std::array::from_fn(|lane| {
+            words[lane] >> shift | words[lane + 1] << 1 << (63 - shift)
+        }),
+        None => std::array::from_fn(|lane| timeline.from(tick + 64 * lane as i64)),
+    }
+}
+
+/// The offsets of `range` that lie in a block, one bit each.
+fn between(range: Range<i64>) -> Lanes {
+    std::array::from_fn(|lane| {
+        let below = |end: i64| match (end - 64 * lane as i64).clamp(0, 64) {
+            64 => u64::MAX,
+            bits => (1 << bits) - 1,
+        };
+        below(range.end) & !below(range.start)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    /// Every count by itself.
+    fn counted(timeline: &Timeline, first: i64, marks: &[i64]) -> Vec<u16> {
+        let at = |place| marks.iter().filter(|&&mark| timeline.has(place + mark)).count() as u16;
+        (first..first + BLOCK).map(at).collect()
+    }
+
+    #[test]
+    fn the_peak_is_the_highest_of_all_counts() {
+        let mut chance = ChaCha8Rng::seed_from_u64(1);
+        for marks in [0, 1, 7, 8, 9, 63, 64, 180, 319] {
+            let lit = (0..3000).map(|_| (chance.next_u32() % 12_000) as i64);
+            let timeline = Timeline::new(0..12_000, lit);
+            let marks: Vec<i64> = (0..marks).map(|_| (chance.next_u32() % 10_000) as i64).collect();
+            for first in [-700, -3, 0, 41, 11_900, 20_000] {
+                let counts = counted(&timeline, first, &marks);
+                let highest = counts.iter().copied().max().unwrap();
+                let at = counts.iter().position(|&count| count == highest).unwrap();
+                let others = counts.iter().enumerate().filter(|(other, _)| other.abs_diff(at) > 3);
+                let next = others.map(|(_, &count)| count).max().unwrap();
+                let found = Counts::new(&timeline, first, marks.iter().copied());
+                let expected = Peak { at: at as i64, count: highest, next };
+                assert_eq!(found.peak(0..BLOCK, 3), Some(expected));
+            }
+        }
+    }
+
+    #[test]
+    fn places_that_are_not_allowed_are_not_found() {
+        let timeline = Timeline::new(0..600, [100, 300]);
+        let counts = Counts::new(&timeline, 0, [0].into_iter());
+        let expected = Peak { at: 300, count: 1, next: 0 };
+        assert_eq!(counts.peak(101..BLOCK, 0), Some(expected));
+        assert_eq!(counts.peak(7..7, 0), None);
+        assert_eq!(counts.peak(600..700, 0), None);
+    }
+}

@@ -1,0 +1,166 @@
+//! The lag of a shot when nothing is known of it: every tick votes.
+//!
+//! A tick that is a mark of the code word says where the word began. Places with many votes are
+//! code words; the code words at the lit bits of the payload make the macropulse. A macropulse of
+//! B lit bits with k marks found has k/B or more of them in one of its code words, so that no lag
+//! with `least` marks is overlooked if every place with `least`/B votes is looked at.
+
+use super::timeline::Timeline;
+
+/// What is looked for: a macropulse, taken apart.
+#[derive(Debug)]
+pub(super) struct Sought {
+    /// Ticks from the start of the code word to each mark.
+    pub word: Vec<usize>,
+    /// Ticks from the start of the macropulse to each lit bit.
+    pub bits: Vec<usize>,
+    /// Number of lags tried.
+    pub lags: usize,
+    /// Fewest marks that are of interest.
+    pub least: u16,
+}
+
+/// A lag and how many marks were found at it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Candidate {
+    pub lag: usize,
+    pub count: u16,
+}
+
+/// The ballot, kept from shot to shot.
+#[derive(Debug, Default)]
+pub(super) struct Search {
+    /// Votes for each place at which a code word may begin, from one word before the first tick.
+    votes: Vec<u8>,
+    /// Places that have as many votes as the best code word must have.
+    elected: Vec<usize>,
+}
+
+impl Search {
+    /// The lag, in ticks from `first`, at which most marks of `sought` are lit in `timeline`; the
+    /// earliest of several. A mark also counts if one of the `width` − 1 next ticks is lit.
+    /// `None` where no lag has `least` of them.
+    pub fn best(&mut self, timeline: &Timeline, at: (i64, u32), sought: &Sought) -> Option<Candidate> {
+        let (first, width) = at;
+        let reach = sought.word.last()? + 1;
+        let places = sought.lags + sought.bits.last()?;
+        self.votes.resize(self.votes.len().max(places + 2 * reach), 0);
+        let needed = usize::from(sought.least).div_ceil(sought.bits.len()).clamp(1, 255) as u8;
+
+        let mut ticks = 0;
+        self.elected.clear();
+        for_each_tick(timeline, (first, places + reach), width, |tick| {
+            ticks += 1;
+            for mark in &sought.word {
+                let vote = &mut self.votes[tick + reach - mark];
+                *vote = vote.saturating_add(1);
+                if *vote == needed {
+                    self.elected.push(tick + reach - mark);
+                }
+            }
+        });
+        let best = self.tally(reach, needed, sought);
+        // Few ticks: taking every vote back is less work than wiping the whole ballot.
+        if ticks * sought.word.len() * 16 < places {
+            for_each_tick(timeline, (first, places + reach), width, |tick| {
+                for mark in &sought.word {
+                    self.votes[tick + reach - mark] = 0;
+                }
+            });
+        } else {
+            self.votes.fill(0);
+        }
+        best.filter(|best| best.count >= sought.least)
+    }
+
+    fn tally(&self, reach: usize, needed: u8, sought: &Sought) -> Option<Candidate> {
+        let mut best: Option<Candidate> = None;
+        for &place in &self.elected {
+            for bit in &sought.bits {
+                let Some(lag) = place.checked_sub(reach + bit) else { break };
+                if lag >= sought.lags {
+                    continue;
+                }
+                let words = sought.bits.iter().map(|other| (other, self.votes[reach + lag + other]));
+                let mut count = 0;
+                let mut seen_before = false;
+                for (other, votes) in words {
+                    seen_before |= other < bit && votes >= needed;
+                    count += u16::from(votes);
+                }
+                let better = |best: Candidate| {
+                    count > best.count || (count == best.count && lag < best.lag)
+                };
+                if !seen_before && best.is_none_or(better) {
+                    best = Some(Candidate { lag, count });
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Calls `on_tick` with every place, counted from `stretch.0`, at which a mark would count as lit.
+fn for_each_tick(timeline: &Timeline, stretch: (i64, usize), width: u32, mut on_tick: impl FnMut(usize)) {
+    let (first, length) = stretch;
+    for start in (0..length).step_by(64) {
+        let tick = first + start as i64;
+        let mut lit = (0..width).fold(0, |lit, late| lit | timeline.from(tick + i64::from(late)));
+        if length - start < 64 {
+            lit &= (1 << (length - start)) - 1;
+        }
+        while lit != 0 {
+            on_tick(start + lit.trailing_zeros() as usize);
+            lit &= lit - 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    fn sought(least: u16) -> Sought {
+        Sought { word: vec![0, 6, 12, 18, 19], bits: vec![0, 50, 75], lags: 900, least }
+    }
+
+    /// Every lag by itself.
+    fn exhaustive(timeline: &Timeline, first: i64, width: i64) -> Candidate {
+        let Sought { word, bits, lags, .. } = sought(1);
+        let count = |lag: usize| {
+            let starts = bits.iter().map(|bit| first + (lag + bit) as i64);
+            let places = starts.flat_map(|start| word.iter().map(move |&mark| start + mark as i64));
+            places.filter(|&place| (place..place + width).any(|tick| timeline.has(tick))).count()
+        };
+        let lag = (0..lags).rev().max_by_key(|&lag| count(lag)).unwrap();
+        Candidate { lag, count: count(lag) as u16 }
+    }
+
+    #[test]
+    fn the_best_lag_is_that_of_an_exhaustive_search() {
+        let mut chance = ChaCha8Rng::seed_from_u64(2);
+        let mut search = Search::default();
+        for lit in [0, 3, 30, 300] {
+            for width in [1, 2, 4] {
+                let lit = (0..lit).map(|_| i64::from(chance.next_u32() % 1100) - 50);
+                let timeline = Timeline::new(-50..1100, lit);
+                let expected = exhaustive(&timeline, -7, i64::from(width));
+                for least in 1..=15 {
+                    let found = search.best(&timeline, (-7, width), &sought(least));
+                    let expected = Some(expected).filter(|expected| expected.count >= least);
+                    assert_eq!(found, expected, "{least} of 15, width {width}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_shot_without_light_is_not_found() {
+        let timeline = Timeline::new(0..1000, []);
+        let dark = Sought { word: vec![0], bits: vec![], lags: 900, least: 1 };
+        assert_eq!(Search::default().best(&timeline, (0, 1), &dark), None);
+        assert_eq!(Search::default().best(&timeline, (0, 1), &sought(1)), None);
+    }
+}

@@ -1,0 +1,127 @@
+//! How many marks must be found together before a return is believed.
+
+use std::collections::HashMap;
+
+use libm::lgamma;
+
+/// P(X ≥ k) of X ~ Bin(n, p): the chance that `least` or more of `marks` places are lit where
+/// each is lit with probability `density`.
+pub(super) fn binomial_tail(marks: u16, density: f64, least: u16) -> f64 {
+    if least == 0 || density >= 1.0 {
+        return if least <= marks { 1.0 } else { 0.0 };
+    }
+    if least > marks || density <= 0.0 {
+        return 0.0;
+    }
+    let (n, k) = (f64::from(marks), f64::from(least));
+    let log_choose = lgamma(n + 1.0) - lgamma(k + 1.0) - lgamma(n - k + 1.0);
+    let mut term = (log_choose + k * density.ln() + (n - k) * (-density).ln_1p()).exp();
+    let odds = density / (1.0 - density);
+    let mut tail = 0.0;
+    for found in least..=marks {
+        tail += term;
+        // Past the mean the terms only fall: what is too small to count ends the sum.
+        if term < tail * 1e-17 && f64::from(found) > n * density {
+            break;
+        }
+        term *= odds * f64::from(marks - found) / (f64::from(found) + 1.0);
+    }
+    tail.min(1.0)
+}
+
+/// The fewest marks that chance does not reach: the smallest k with
+/// L · P(Bin(N, d) ≥ k) ≤ α, where L is the number of `lags` tried, N the number of `marks`,
+/// d the `density` of lit places and α the false alarms accepted. N + 1 where no k will do.
+pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64) -> u16 {
+    let enough = |least: u16| lags * binomial_tail(marks, density, least) <= false_alarm;
+    let (mut low, mut high) = (1, marks + 1);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if enough(middle) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
+}
+
+/// [`least_marks`] for fixed lags and false alarms, remembered.
+#[derive(Debug)]
+pub(super) struct Thresholds {
+    lags: f64,
+    false_alarm: f64,
+    known: HashMap<(u16, i32), u16>,
+}
+
+impl Thresholds {
+    /// For `lags` tried places and `false_alarm` false answers accepted among them.
+    pub fn new(lags: f64, false_alarm: f64) -> Self {
+        Self { lags, false_alarm, known: HashMap::new() }
+    }
+
+    /// The fewest of `marks` to believe at `density`, which is rounded up by less than a tenth.
+    pub fn least(&mut self, marks: u16, density: f64) -> u16 {
+        const PER_OCTAVE: f64 = 8.0;
+        if density <= 0.0 {
+            return 1;
+        }
+        let step = (density.log2() * PER_OCTAVE).ceil() as i32;
+        *self.known.entry((marks, step)).or_insert_with(|| {
+            let density = (f64::from(step) / PER_OCTAVE).exp2().min(1.0);
+            least_marks(self.lags, marks, density, self.false_alarm)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tail_is_that_of_the_binomial() {
+        // Ten fair coins: 176 of 1024 outcomes have seven heads or more.
+        approx::assert_relative_eq!(binomial_tail(10, 0.5, 7), 176.0 / 1024.0, epsilon = 1e-12);
+        approx::assert_relative_eq!(binomial_tail(10, 0.5, 1), 1023.0 / 1024.0, epsilon = 1e-12);
+        assert_eq!(binomial_tail(10, 0.5, 0), 1.0);
+        assert_eq!(binomial_tail(10, 0.5, 11), 0.0);
+        assert_eq!(binomial_tail(10, 0.0, 1), 0.0);
+    }
+
+    #[test]
+    fn a_denser_sky_asks_for_more_marks() {
+        // Share of marks asked for at 400 000 lags and one false alarm in 1000 gates.
+        let table = [
+            (0.0025, [0.12, 0.05, 0.04]),
+            (0.011, [0.17, 0.09, 0.07]),
+            (0.036, [0.26, 0.15, 0.13]),
+            (0.11, [0.43, 0.28, 0.25]),
+            (0.24, [0.62, 0.45, 0.42]),
+            (0.58, [0.93, 0.79, 0.77]),
+        ];
+        for (density, shares) in table {
+            for (marks, share) in [58_u16, 174, 232].into_iter().zip(shares) {
+                let least = least_marks(4e5, marks, density, 1e-3);
+                let found = f64::from(least) / f64::from(marks);
+                assert!((found - share).abs() < 0.012, "{density} {marks}: {found} not {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_chance_always_reaches_is_never_believed() {
+        assert_eq!(least_marks(4e5, 58, 1.0, 1e-3), 59);
+        assert_eq!(least_marks(4e5, 58, 0.99, 1e-3), 59);
+        assert_eq!(Thresholds::new(4e5, 1e-3).least(58, 0.0), 1);
+    }
+
+    #[test]
+    fn a_remembered_threshold_is_never_too_low() {
+        let mut thresholds = Thresholds::new(4e5, 1e-3);
+        for density in [1e-4, 0.003, 0.011, 0.2, 0.7] {
+            let exact = least_marks(4e5, 174, density, 1e-3);
+            let remembered = thresholds.least(174, density);
+            assert!((exact..=exact + exact / 8 + 1).contains(&remembered));
+        }
+    }
+}
