@@ -31,7 +31,14 @@ impl Outcome {
 
     /// Name used in files and reports.
     pub fn name(self) -> &'static str {
-        ["empty", "right", "near", "wrong", "missed", "false"][self as usize]
+        match self {
+            Self::Empty => "empty",
+            Self::Right => "right",
+            Self::Near => "near",
+            Self::Wrong => "wrong",
+            Self::Missed => "missed",
+            Self::False => "false",
+        }
     }
 }
 

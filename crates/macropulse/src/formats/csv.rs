@@ -1,0 +1,100 @@
+//! Comma-separated text: the returns, one per line, for spreadsheets and for eyes.
+
+use super::Names;
+use super::attributes::{Attribute, Value, outcome_from_code, valid_pixels};
+use crate::points::{NO_OBJECT, PointCloud};
+use std::io::{self, Write};
+
+/// Writes the returns of a cloud whose columns are even. Numbers have as many digits as it takes
+/// to read the same number back.
+pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+    let attributes = Attribute::of(cloud);
+    let header: Vec<_> = attributes.iter().map(|attribute| attribute.name_with_unit()).collect();
+    writeln!(out, "{}", header.join(","))?;
+    let mut line = String::new();
+    for pixel in valid_pixels(cloud) {
+        line.clear();
+        for attribute in &attributes {
+            if !line.is_empty() {
+                line.push(',');
+            }
+            line.push_str(&cell(*attribute, attribute.value(cloud, pixel), names));
+        }
+        writeln!(out, "{line}")?;
+    }
+    Ok(())
+}
+
+fn cell(attribute: Attribute, value: Value, names: &Names) -> String {
+    match (attribute, value) {
+        (Attribute::Object, Value::U2(at)) => name(names.objects, at),
+        (Attribute::Material, Value::U2(at)) => name(names.materials, at),
+        (_, Value::U1(code)) => {
+            outcome_from_code(code).map_or_else(String::new, |outcome| outcome.name().to_owned())
+        }
+        (_, Value::U2(value)) => value.to_string(),
+        // An empty cell is what spreadsheets take for "no value".
+        (_, Value::F4(value)) if value.is_nan() => String::new(),
+        (_, Value::F4(value)) => value.to_string(),
+        (_, Value::F8(value)) => value.to_string(),
+    }
+}
+
+fn name(names: &[String], at: u16) -> String {
+    match names.get(usize::from(at)) {
+        _ if at == NO_OBJECT => String::new(),
+        Some(name) => quoted(name),
+        None => at.to_string(),
+    }
+}
+
+/// A name in quotes if it would otherwise end its cell \[RFC4180\].
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample_cloud;
+    use super::*;
+    use crate::points::Truth;
+
+    fn lines(cloud: &PointCloud, names: &Names) -> Vec<String> {
+        let mut bytes = Vec::new();
+        write(cloud, names, &mut bytes).unwrap();
+        String::from_utf8(bytes).unwrap().lines().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_line_reads_as_expected() {
+        let objects = ["car, red".to_owned()];
+        let materials = ["paint".to_owned(), "glass".to_owned()];
+        let lines = lines(&sample_cloud(), &Names { objects: &objects, materials: &materials });
+        assert_eq!(
+            lines[0],
+            "x_m,y_m,z_m,intensity,range_m,time_ns,row,column,ring,peak,marks,margin,\
+             true_range_m,object,material,incidence_rad,outcome"
+        );
+        assert_eq!(
+            lines[1],
+            "30,1,0.5,0.8,30.02,0,0,0,0,174,174,80,30.02,\"car, red\",glass,0,right"
+        );
+        assert_eq!(lines.len(), 1 + 5);
+    }
+
+    #[test]
+    fn a_false_return_has_empty_truth() {
+        let lines = lines(&sample_cloud(), &Names::default());
+        assert!(lines[5].ends_with(",58,58,20,,,,,false"), "{}", lines[5]);
+    }
+
+    #[test]
+    fn without_truth_the_line_is_shorter() {
+        let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
+        assert_eq!(lines(&cloud, &Names::default())[0].split(',').count(), 12);
+    }
+}

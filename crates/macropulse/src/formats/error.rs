@@ -1,0 +1,113 @@
+//! What can go wrong with a file, and whose fault it is.
+
+use super::Format;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a file was not written or read. Each message is one whole sentence; the cause is part of
+/// it, so that printing a chain of errors does not say it twice.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The world would not take the file.
+    #[error("cannot write {}: {}", path.display(), reason(cause))]
+    Write {
+        /// The file that was wanted.
+        path: PathBuf,
+        /// What the operating system said.
+        cause: io::Error,
+    },
+    /// The world would not give the file.
+    #[error("cannot read {}: {}", path.display(), reason(cause))]
+    Read {
+        /// The file that was wanted.
+        path: PathBuf,
+        /// What the operating system said.
+        cause: io::Error,
+    },
+    /// The file is not what its name promises.
+    #[error("{} is not a {format} file that can be read: {fault}", path.display())]
+    Invalid {
+        /// The faulty file.
+        path: PathBuf,
+        /// Name of the format it was read as.
+        format: &'static str,
+        /// What is wrong, where, and what would be right.
+        fault: String,
+    },
+    /// The caller's cloud is not rectangular.
+    #[error(
+        "the point cloud cannot be written: column `{column}` has {found} entries, its {rows} × {columns} pixels need {}",
+        rows * columns
+    )]
+    Uneven {
+        /// Name of the column.
+        column: &'static str,
+        /// Its entries.
+        found: usize,
+        /// Rows of the cloud.
+        rows: usize,
+        /// Columns of the cloud.
+        columns: usize,
+    },
+    /// No format is called so.
+    #[error("unknown format `{name}`;{suggestion} known: {}", Format::ALL.map(Format::name).join(", "))]
+    UnknownFormat {
+        /// The name as given.
+        name: String,
+        /// The nearest known name as a question, or nothing.
+        suggestion: String,
+    },
+}
+
+impl Error {
+    pub(super) fn write(path: &Path, cause: io::Error) -> Self {
+        Self::Write { path: path.to_owned(), cause }
+    }
+
+    pub(super) fn read(path: &Path, cause: io::Error) -> Self {
+        Self::Read { path: path.to_owned(), cause }
+    }
+
+    pub(super) fn invalid(path: &Path, format: Format, fault: impl Into<String>) -> Self {
+        Self::Invalid { path: path.to_owned(), format: format.name(), fault: fault.into() }
+    }
+
+    pub(super) fn unknown_format(name: &str, lower: &str) -> Self {
+        let nearest = Format::ALL
+            .into_iter()
+            .map(|format| (strsim::damerau_levenshtein(lower, format.name()), format.name()))
+            .min()
+            .filter(|(edits, _)| *edits <= 2);
+        let suggestion =
+            nearest.map(|(_, known)| format!(" did you mean `{known}`?")).unwrap_or_default();
+        Self::UnknownFormat { name: name.to_owned(), suggestion }
+    }
+}
+
+/// The cause in words that also say what to do, where we know.
+fn reason(cause: &io::Error) -> String {
+    match cause.kind() {
+        io::ErrorKind::NotFound => "there is no such file or folder".into(),
+        io::ErrorKind::PermissionDenied => {
+            "permission denied; choose a place that is open to you".into()
+        }
+        io::ErrorKind::StorageFull => "the disk is full".into(),
+        _ => cause.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error as _;
+
+    #[test]
+    fn the_cause_is_said_once() {
+        let error = Error::write(Path::new("a/b.pcd"), io::ErrorKind::PermissionDenied.into());
+        assert_eq!(
+            error.to_string(),
+            "cannot write a/b.pcd: permission denied; choose a place that is open to you"
+        );
+        assert!(error.source().is_none());
+    }
+}

@@ -1,0 +1,109 @@
+//! PCD 0.7, binary, organised: every pixel, also those without a return.
+
+use super::Names;
+use super::attributes::{Attribute, Value, comment_lines};
+use crate::points::PointCloud;
+use std::io::{self, Write};
+
+/// Comment that carries the number of the scan through the file.
+pub(super) const SCAN_COMMENT: &str = "# macropulse scan ";
+
+/// Writes every pixel of a cloud whose columns are even. `WIDTH` are the columns, `HEIGHT` the
+/// rows; a pixel without a return is NaN, never 0.
+pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+    let attributes = Attribute::of(cloud);
+    write_header(cloud, &attributes, names, out)?;
+    let mut bytes = Vec::new();
+    for pixel in 0..cloud.range.len() {
+        bytes.clear();
+        for attribute in &attributes {
+            attribute.value(cloud, pixel).append_to(&mut bytes);
+        }
+        out.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+fn write_header(
+    cloud: &PointCloud,
+    attributes: &[Attribute],
+    names: &Names,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let row = |each: &dyn Fn(&Attribute) -> String| {
+        attributes.iter().map(each).collect::<Vec<_>>().join(" ")
+    };
+    writeln!(out, "# .PCD v0.7 - Point Cloud Data file format")?;
+    writeln!(out, "{SCAN_COMMENT}{}", cloud.scan)?;
+    for (what, list) in [("object", names.objects), ("material", names.materials)] {
+        for line in comment_lines(what, list) {
+            writeln!(out, "# {line}")?;
+        }
+    }
+    writeln!(out, "VERSION 0.7")?;
+    writeln!(out, "FIELDS {}", row(&|attribute| attribute.name().to_owned()))?;
+    writeln!(out, "SIZE {}", row(&|attribute| attribute.blank().size().to_string()))?;
+    writeln!(out, "TYPE {}", row(&|attribute| type_letter(attribute.blank()).to_owned()))?;
+    writeln!(out, "COUNT {}", row(&|_| "1".to_owned()))?;
+    writeln!(out, "WIDTH {}\nHEIGHT {}", cloud.columns, cloud.rows)?;
+    writeln!(out, "VIEWPOINT 0 0 0 1 0 0 0")?;
+    writeln!(out, "POINTS {}", cloud.range.len())?;
+    writeln!(out, "DATA binary")
+}
+
+pub(super) fn type_letter(value: Value) -> &'static str {
+    match value {
+        Value::U1(_) | Value::U2(_) => "U",
+        Value::F4(_) | Value::F8(_) => "F",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample_cloud;
+    use super::*;
+    use crate::points::Truth;
+
+    fn header(cloud: &PointCloud, names: &Names) -> String {
+        let mut bytes = Vec::new();
+        write_header(cloud, &Attribute::of(cloud), names, &mut bytes).unwrap();
+        String::from_utf8(bytes).unwrap()
+    }
+
+    #[test]
+    fn the_header_of_a_measurement_is_as_documented() {
+        let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
+        assert_eq!(
+            header(&cloud, &Names::default()),
+            "# .PCD v0.7 - Point Cloud Data file format\n\
+             # macropulse scan 3\n\
+             VERSION 0.7\n\
+             FIELDS x y z intensity range time_ns row column ring peak marks margin\n\
+             SIZE 4 4 4 4 4 8 2 2 2 2 2 2\n\
+             TYPE F F F F F F U U U U U U\n\
+             COUNT 1 1 1 1 1 1 1 1 1 1 1 1\n\
+             WIDTH 3\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 6\nDATA binary\n"
+        );
+    }
+
+    #[test]
+    fn truth_adds_five_fields_and_the_names() {
+        let objects = ["car".to_owned()];
+        let header = header(&sample_cloud(), &Names { objects: &objects, materials: &[] });
+        assert!(header.contains(" margin true_range object material incidence outcome\n"));
+        assert!(header.contains(" 4 2 2 4 1\n"));
+        assert!(header.contains("# object 0 car\n"));
+    }
+
+    #[test]
+    fn every_pixel_is_written_the_empty_one_as_nan() {
+        let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
+        let mut bytes = Vec::new();
+        write(&cloud, &Names::default(), &mut bytes).unwrap();
+        let body = &bytes[header(&cloud, &Names::default()).len()..];
+        let stride = 5 * 4 + 8 + 6 * 2;
+        assert_eq!(body.len(), 6 * stride);
+        let x = f32::from_le_bytes(body[2 * stride..2 * stride + 4].try_into().unwrap());
+        assert!(x.is_nan());
+    }
+}

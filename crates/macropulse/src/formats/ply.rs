@@ -1,0 +1,77 @@
+//! PLY, binary little endian: the returns as vertices.
+
+use super::Names;
+use super::attributes::{Attribute, Value, comment_lines, valid_pixels};
+use crate::points::PointCloud;
+use std::io::{self, Write};
+
+/// Writes the returns of a cloud whose columns are even.
+pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+    let attributes = Attribute::of(cloud);
+    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+    writeln!(out, "comment macropulse scan {}", cloud.scan)?;
+    writeln!(out, "comment metres, radians; x forward, y left, z up")?;
+    for (what, list) in [("object", names.objects), ("material", names.materials)] {
+        for line in comment_lines(what, list) {
+            writeln!(out, "comment {line}")?;
+        }
+    }
+    writeln!(out, "element vertex {}", valid_pixels(cloud).count())?;
+    for attribute in &attributes {
+        let kind = match attribute.blank() {
+            Value::U1(_) => "uchar",
+            Value::U2(_) => "ushort",
+            Value::F4(_) => "float",
+            Value::F8(_) => "double",
+        };
+        writeln!(out, "property {kind} {}", attribute.name())?;
+    }
+    writeln!(out, "end_header")?;
+    let mut bytes = Vec::new();
+    for pixel in valid_pixels(cloud) {
+        bytes.clear();
+        for attribute in &attributes {
+            attribute.value(cloud, pixel).append_to(&mut bytes);
+        }
+        out.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample_cloud;
+    use super::*;
+    use crate::points::Truth;
+
+    fn written(cloud: &PointCloud, names: &Names) -> (String, Vec<u8>) {
+        let mut bytes = Vec::new();
+        write(cloud, names, &mut bytes).unwrap();
+        let end = b"end_header\n";
+        let at = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
+        (String::from_utf8(bytes[..at].to_vec()).unwrap(), bytes[at..].to_vec())
+    }
+
+    #[test]
+    fn only_returns_are_vertices() {
+        let (header, body) = written(&sample_cloud(), &Names::default());
+        assert!(header.contains("element vertex 5\n"));
+        assert_eq!(body.len(), 5 * (5 * 4 + 8 + 6 * 2 + 4 + 2 + 2 + 4 + 1));
+        assert_eq!(body[..4], 30f32.to_le_bytes());
+    }
+
+    #[test]
+    fn a_cloud_without_returns_is_a_valid_empty_file() {
+        let nothing = PointCloud { truth: Truth::default(), ..PointCloud::default() };
+        let (header, body) = written(&nothing, &Names::default());
+        assert!(header.contains("element vertex 0\n"));
+        assert!(body.is_empty());
+    }
+
+    #[test]
+    fn a_name_cannot_break_out_of_its_comment() {
+        let objects = ["car\nelement vertex 9".to_owned()];
+        let (header, _) = written(&sample_cloud(), &Names { objects: &objects, materials: &[] });
+        assert!(header.contains("comment object 0 car element vertex 9\n"));
+    }
+}
