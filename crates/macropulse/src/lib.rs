@@ -18,6 +18,8 @@ pub mod score;
 pub mod formats;
 pub mod view;
 
+pub mod sim;
+
 pub mod predict;
 pub mod random;
 pub mod units;

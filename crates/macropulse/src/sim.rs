@@ -1,0 +1,164 @@
+//! The whole flow, as function calls.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::decode::{Reject, Returns};
+use crate::design::Design;
+use crate::emit::{Band, ShotLog, bands};
+use crate::points::PointCloud;
+use crate::random::Chance;
+use crate::scene::{Hits, Scene};
+use crate::score::{self, Score};
+use crate::{channel, detect, tdc};
+
+/// One scan, measured.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// The points, with the truth beside them.
+    pub cloud: PointCloud,
+    /// How the pixels came out.
+    pub score: Score,
+    /// What was counted on the way.
+    pub tally: Tally,
+}
+
+/// Scan number `number` of the sensor `design` in `scene`, with the chance of `seed`.
+///
+/// The bands of the scan are computed side by side on the threads of the current rayon pool; the
+/// result does not depend on how many there are. `done` is told the shots of each finished band.
+pub fn scan(
+    design: &Design,
+    scene: &Scene,
+    seed: u64,
+    number: u64,
+    done: &(dyn Fn(u64) + Sync),
+) -> Scan {
+    let chance = Chance::new(seed);
+    let bands: Vec<Band> = bands(design, number).collect();
+    let measured: Vec<Measured> = bands
+        .par_iter()
+        .map(|band| {
+            let measured = measure(design, scene, &chance, band.shot_log(design));
+            done(band.shots);
+            measured
+        })
+        .collect();
+    let mut cloud = PointCloud::empty(design, number);
+    cloud.truth = score::empty_truth(&cloud);
+    let mut scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
+    for band in &measured {
+        scan.cloud.add(design, &band.log, &band.returns);
+        scan.score.add(&score::judge(&mut scan.cloud, design, scene, &band.log, &band.hits));
+        scan.tally.add(&band.tally);
+    }
+    scan
+}
+
+/// What is kept of a band: the receiver's side, and the truth to judge it by.
+struct Measured {
+    log: ShotLog,
+    hits: Hits,
+    returns: Returns,
+    tally: Tally,
+}
+
+fn measure(design: &Design, scene: &Scene, chance: &Chance, log: ShotLog) -> Measured {
+    let mut tally = Tally::default();
+    let mut clock = Instant::now();
+    let mut lap = |stage: usize, tally: &mut Tally| {
+        tally.seconds[stage] += clock.elapsed().as_secs_f64();
+        clock = Instant::now();
+    };
+    let hits = scene.trace(design, &log);
+    lap(0, &mut tally);
+    let echoes = channel::echoes(design, &scene.materials, &hits);
+    lap(1, &mut tally);
+    let edges = detect::edges(design, &log, &echoes, chance);
+    lap(2, &mut tally);
+    let ticks = tdc::ticks(design, &log, &edges);
+    lap(3, &mut tally);
+    let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
+    lap(4, &mut tally);
+    let home = |shot: &u32| log.home.contains(&(*shot as usize));
+    tally.shots = log.home.len() as u64;
+    tally.surfaces = hits.shot.iter().filter(|s| home(s)).count() as u64;
+    tally.echoes = echoes.shot.iter().filter(|s| home(s)).count() as u64;
+    tally.edges = edges.time_fs.len() as u64;
+    tally.ticks = ticks.tick.len() as u64;
+    tally.merged = ticks.merged;
+    tally.lost = ticks.lost;
+    tally.peak_busy = ticks.peak_busy;
+    tally.returns = returns.shot.len() as u64;
+    tally.rejects = returns.rejects;
+    Measured { log, hits, returns, tally }
+}
+
+/// Counts of a run, stage by stage. Edges and ticks include the halos of the bands; the other
+/// counts are of home shots alone.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tally {
+    /// Shots fired.
+    pub shots: u64,
+    /// Surfaces met.
+    pub surfaces: u64,
+    /// Echoes with any light.
+    pub echoes: u64,
+    /// Detector edges.
+    pub edges: u64,
+    /// Ticks that reached the decoder.
+    pub ticks: u64,
+    /// Edges that fell into the tick of another one.
+    pub merged: u64,
+    /// Edges that found every converter busy.
+    pub lost: u64,
+    /// Most converters busy at once.
+    pub peak_busy: u32,
+    /// Returns decoded.
+    pub returns: u64,
+    /// Rejects by kind, in the order of [`Reject::ALL`].
+    pub rejects: [u64; Reject::ALL.len()],
+    /// Seconds spent in each of [`Tally::STAGES`], summed over threads.
+    pub seconds: [f64; 5],
+}
+
+impl Tally {
+    /// The stages whose time is taken.
+    pub const STAGES: [&str; 5] = ["scene", "channel", "detect", "tdc", "decode"];
+
+    /// The sum over several bands or scans; of the busiest moment the maximum.
+    pub fn add(&mut self, other: &Self) {
+        let sums = [
+            (&mut self.shots, other.shots),
+            (&mut self.surfaces, other.surfaces),
+            (&mut self.echoes, other.echoes),
+            (&mut self.edges, other.edges),
+            (&mut self.ticks, other.ticks),
+            (&mut self.merged, other.merged),
+            (&mut self.lost, other.lost),
+            (&mut self.returns, other.returns),
+        ];
+        sums.into_iter().for_each(|(sum, more)| *sum += more);
+        self.peak_busy = self.peak_busy.max(other.peak_busy);
+        self.rejects.iter_mut().zip(other.rejects).for_each(|(sum, more)| *sum += more);
+        self.seconds.iter_mut().zip(other.seconds).for_each(|(sum, more)| *sum += more);
+    }
+
+    /// The first stage after which nothing was left, said as a sentence; `None` if there are
+    /// returns.
+    pub fn where_all_was_lost(&self) -> Option<&'static str> {
+        match self {
+            _ if self.returns > 0 => None,
+            _ if self.surfaces == 0 => Some(
+                "no ray met a surface within the range gate: check where the sensor stands, which way it looks, and its max_range_m",
+            ),
+            _ if self.echoes == 0 => Some("every surface met is black at this wavelength"),
+            _ if self.edges == 0 => {
+                Some("the detector saw none of the echoes: too little light for its sensitivity")
+            }
+            _ if self.ticks == 0 => Some("every edge found all converters busy"),
+            _ => Some("the receiver decoded none of the macropulses; the rejects say why"),
+        }
+    }
+}
