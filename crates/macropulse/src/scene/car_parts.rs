@@ -129,7 +129,7 @@ pub(super) fn cabin(mesh: &mut Mesh) {
     block(mesh, [3.42, -0.62, 0.45], [3.56, 0.62, 1.02], SEAT);
     // What closes the arches towards the middle.
     for axle in AXLES {
-        block(mesh, [axle - 0.45, -0.62, 0.20], [axle + 0.45, 0.62, 0.60], TRIM);
+        block(mesh, [axle - 0.45, -0.62, 0.20], [axle + 0.45, 0.62, 0.73], TRIM);
     }
 }
 
@@ -171,7 +171,7 @@ pub(super) fn fittings(mesh: &mut Mesh) {
             mesh,
             &body,
             Face::Front,
-            side([(0.50, 0.575), (0.80, 0.625), (0.83, 0.715), (0.50, 0.655)]),
+            side([(0.50, 0.575), (0.78, 0.620), (0.80, 0.695), (0.50, 0.650)]),
             "headlamp",
         );
         lay(
@@ -185,7 +185,7 @@ pub(super) fn fittings(mesh: &mut Mesh) {
             mesh,
             &body,
             Face::Rear,
-            side([(0.44, 0.80), (0.80, 0.80), (0.80, 0.93), (0.44, 0.90)]),
+            side([(0.44, 0.80), (0.775, 0.80), (0.765, 0.92), (0.44, 0.90)]),
             "tail-lamp",
         );
     }
@@ -222,22 +222,25 @@ fn solid(mesh: &Mesh) -> Facets {
     Facets::new(mesh.triangles.iter().map(facet).collect(), [0.0; 3])
 }
 
-/// Lays a patch of the given outline on the body, 4 mm proud of it.
+/// Lays a patch of the given outline on the body, a few millimetres proud of it.
 fn lay(mesh: &mut Mesh, body: &Facets, face: Face, outline: Outline, material: &str) {
-    const STEPS: usize = 8;
+    const PROUD: f64 = 0.006;
+    // Finer across than up: the corners of the car bend away across.
+    const STEPS: [u32; 2] = [18, 5];
     let (start, toward) = if face == Face::Front { (-1.0, 1.0) } else { (5.7, -1.0) };
-    let point = |u: f64, v: f64| -> Option<[f64; 3]> {
-        let [a, b, c, d] = outline.map(|(y, z)| DVec3::new(0.0, y, z));
+    let [a, b, c, d] = outline.map(|(y, z)| DVec3::new(0.0, y, z));
+    let point = |i: u32, j: u32| -> Option<[f64; 3]> {
+        let [u, v] = [f64::from(i) / f64::from(STEPS[0]), f64::from(j) / f64::from(STEPS[1])];
         let place = a.lerp(b, u).lerp(d.lerp(c, u), v);
         let ray = Ray { origin: [start, place.y, place.z], direction: [toward, 0.0, 0.0] };
         let hit = body.cast(&ray, 0.0, 3.0)?;
-        Some([start + toward * (hit.range - 0.004), place.y, place.z])
+        let outward = DVec3::from(hit.normal) * (-toward * hit.normal[0]).signum();
+        Some((DVec3::from(ray.origin) + DVec3::X * toward * hit.range + outward * PROUD).to_array())
     };
-    let share = |step: usize| step as f64 / STEPS as f64;
-    let lines: Option<Vec<Vec<[f64; 3]>>> =
-        (0..=STEPS).map(|i| (0..=STEPS).map(|j| point(share(i), share(j))).collect()).collect();
-    // An outline that reaches beyond the body would be a mistake in the drawing; a test looks for it.
-    if let Some(lines) = lines {
+    let line = |i: u32| (0..=STEPS[1]).map(|j| point(i, j)).collect::<Option<Vec<_>>>();
+    // An outline that misses the body is a mistake in the drawing: the car then lacks the part,
+    // which a test notices.
+    if let Some(lines) = (0..=STEPS[0]).map(line).collect::<Option<Vec<_>>>() {
         Sheet { points: &lines }.add(mesh, |_, _| Some(material));
     }
 }
