@@ -149,7 +149,9 @@ impl Check<'_> {
 
     fn scan(&self, file: &ScanFile) -> Result<Scan, Error> {
         let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
-        let max_range = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
+        let reach = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
+        let beyond = self.within("scan.gate_beyond_m", file.gate_beyond_m, 0.0, 1e5)?;
+        let max_range = reach + beyond;
         let min_range = self.within("scan.min_range_m", file.min_range_m, 0.0, max_range)?;
         let pixels = |kind: &str, rows, columns| -> Result<(u32, u32), Error> {
             Ok((
@@ -192,7 +194,7 @@ impl Check<'_> {
             }
         };
         let rate_millihertz = (rate * 1e3).round() as u64;
-        Ok(Scan { rows, columns, rate_millihertz, min_range, max_range, pattern })
+        Ok(Scan { rows, columns, rate_millihertz, min_range, reach, max_range, pattern })
     }
 
     fn spinning(&self, file: &SpinningFile) -> Result<(u32, u32, Pattern), Error> {

@@ -25,6 +25,7 @@ pub(super) struct ScanFile {
     pub scans_per_s: f64,
     pub min_range_m: f64,
     pub max_range_m: f64,
+    pub gate_beyond_m: f64,
     pub raster: Option<RasterFile>,
     pub spinning: Option<SpinningFile>,
     pub flash: Option<FlashFile>,

@@ -69,7 +69,9 @@ pub struct Scan {
     pub rate_millihertz: u64,
     /// Nearest range accepted, m.
     pub min_range: f64,
-    /// Farthest range accepted, m.
+    /// Range the sensor is declared to reach, m.
+    pub reach: f64,
+    /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
     pub max_range: f64,
     /// How directions follow each other.
     pub pattern: Pattern,

@@ -27,6 +27,10 @@ use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 /// rms length of a Gaussian pulse over its full width at half maximum.
 const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
 
+/// The walk is calibrated up to this fraction of the pulse: an echo that only just fires does so
+/// on the falling flank.
+const LATEST: f64 = 0.99;
+
 /// A detector that never misses is given this much light.
 const PLENTY: f64 = 1e9;
 
@@ -59,7 +63,7 @@ pub(super) fn edges(
             let photons = (echoes.photons[i].min(PLENTY) + firing.noise_photons * noise).max(0.0);
             let draw: f64 = gamma.sample(&mut stream);
             if draw < photons {
-                let early = quantile(draw / photons) - quantile((needed / photons).min(0.5));
+                let early = quantile(draw / photons) - quantile((needed / photons).min(LATEST));
                 let delay = echoes.delay_fs[i] as f64 + rms_fs * early;
                 if earliest.is_none_or(|(before, _)| delay < before) {
                     earliest = Some((delay, photons));

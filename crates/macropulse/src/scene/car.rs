@@ -10,7 +10,7 @@ use super::mesh::Mesh;
 /// Length, width and height of the car, m. The mesh has exactly this bounding box.
 pub const SIZE: [f64; 3] = [4.70, 1.82, 1.42];
 
-pub(super) const PAINT: &str = "paint-silver";
+pub(super) const PAINT: &str = "paint-white";
 pub(super) const GLASS: &str = "glass";
 pub(super) const TRIM: &str = "plastic-black";
 

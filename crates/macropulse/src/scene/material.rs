@@ -83,7 +83,7 @@ const LIBRARY: &[Row] = &[
     ("skin", 0.5, 0.0, 1.0, 0.0, 0.0),
     ("fabric", 0.4, 0.0, 1.0, 0.0, 0.0),
     // Vehicles. Paint is a pigment under clear coat of index 1.5, which mirrors 4 %.
-    ("paint-white", 0.75, 0.04, 200.0, 0.0, 0.0),
+    ("paint-white", 0.8, 0.04, 200.0, 0.0, 0.0),
     ("paint-silver", 0.45, 0.08, 60.0, 0.0, 0.0),
     ("paint-red", 0.55, 0.04, 200.0, 0.0, 0.0),
     ("paint-blue", 0.25, 0.04, 200.0, 0.0, 0.0),

@@ -14,6 +14,9 @@ pub const NEAR: f64 = 0.35;
 pub struct Score {
     /// Pixels by outcome, in the order of [`Outcome::ALL`].
     pub pixels: [u64; 6],
+    /// Pixels with a surface whose shot carried no light, because its payload has no 1 bit. They
+    /// come out as missed, but there was no echo to decode.
+    pub dark: u64,
     /// Pixels whose ray meets the target object within the range gate.
     pub samples_on_target: u64,
     /// Returns that come from a surface of the target object.
@@ -26,22 +29,21 @@ impl Score {
         self.pixels[outcome as usize]
     }
 
-    /// Pixels that have a surface within the range gate.
-    pub fn with_surface(&self) -> u64 {
-        [Outcome::Right, Outcome::Near, Outcome::Wrong, Outcome::Missed]
-            .map(|outcome| self.count(outcome))
-            .iter()
-            .sum()
+    /// Pixels that have an echo: a surface within the range gate, and a shot with light.
+    pub fn with_echo(&self) -> u64 {
+        let with_surface = [Outcome::Right, Outcome::Near, Outcome::Wrong, Outcome::Missed];
+        with_surface.map(|outcome| self.count(outcome)).iter().sum::<u64>() - self.dark
     }
 
-    /// Right pixels as a fraction of those that have a surface; NaN if none has.
+    /// Right pixels as a fraction of those that have an echo; NaN if none has.
     pub fn right_fraction(&self) -> f64 {
-        self.count(Outcome::Right) as f64 / self.with_surface() as f64
+        self.count(Outcome::Right) as f64 / self.with_echo() as f64
     }
 
     /// The sum over several scans.
     pub fn add(&mut self, other: &Self) {
         self.pixels.iter_mut().zip(other.pixels).for_each(|(sum, more)| *sum += more);
+        self.dark += other.dark;
         self.samples_on_target += other.samples_on_target;
         self.points_on_target += other.points_on_target;
     }
@@ -107,6 +109,8 @@ pub fn judge(
             cloud.truth.source[pixel] = hits.object[i];
             score.points_on_target += u64::from(on_target(i));
         }
+        let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+        score.dark += u64::from(outcome == Outcome::Missed && marks.is_empty());
         cloud.truth.outcome[pixel] = outcome;
         score.pixels[outcome as usize] += 1;
     }
