@@ -88,9 +88,6 @@ pub struct Truth {
     pub material: Vec<u16>,
     /// Cosine of the incidence angle; NaN where there is none.
     pub cosine: Vec<f32>,
-    /// Object whose surface the return came from; `NO_OBJECT` where there is no return or no
-    /// surface near it. Behind glass this is another object than the first one met.
-    pub source: Vec<u16>,
     /// How the pixel came out.
     pub outcome: Vec<Outcome>,
 }

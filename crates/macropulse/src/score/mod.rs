@@ -57,7 +57,6 @@ pub fn empty_truth(cloud: &PointCloud) -> Truth {
         object: vec![NO_OBJECT; pixels],
         material: vec![NO_OBJECT; pixels],
         cosine: vec![f32::NAN; pixels],
-        source: vec![NO_OBJECT; pixels],
         outcome: vec![Outcome::Empty; pixels],
     }
 }
@@ -106,7 +105,6 @@ pub fn judge(
             Some(_) => Outcome::Wrong,
         };
         if let (Some(i), Outcome::Right | Outcome::Near) = (nearest, outcome) {
-            cloud.truth.source[pixel] = hits.object[i];
             score.points_on_target += u64::from(on_target(i));
         }
         let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
