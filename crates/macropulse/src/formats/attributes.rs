@@ -3,6 +3,9 @@
 use super::Error;
 use crate::points::{Outcome, PointCloud};
 
+/// Rows or columns that 16 bits can number.
+const MOST_ROWS: usize = 1 << 16;
+
 /// One attribute of a point, in the order of the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Attribute {
@@ -184,7 +187,8 @@ pub(super) fn comment_lines(what: &str, names: &[String]) -> Vec<String> {
     names.iter().enumerate().map(|(at, name)| format!("{what} {at} {}", clean(name))).collect()
 }
 
-/// Refuses a cloud whose columns have not one entry per pixel each: after this, indexing is safe.
+/// Refuses a cloud whose columns have not one entry per pixel each, or too many pixels to number:
+/// after this, indexing is safe.
 pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
     let measured = [
         ("x", cloud.x.len()),
@@ -206,6 +210,9 @@ pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
     ];
     let with_truth = truth.iter().any(|(_, entries)| *entries > 0);
     let (rows, columns) = (cloud.rows, cloud.columns);
+    if rows.max(columns) > MOST_ROWS {
+        return Err(Error::TooLarge { rows, columns });
+    }
     let pixels = rows.saturating_mul(columns);
     measured
         .into_iter()
@@ -244,6 +251,12 @@ mod tests {
         cloud.truth.outcome.clear();
         let error = check_even(&cloud).unwrap_err();
         assert!(matches!(error, Error::Uneven { column: "truth.outcome", found: 0, .. }));
+    }
+
+    #[test]
+    fn rows_beyond_16_bits_are_refused() {
+        let wide = PointCloud { rows: 0, columns: MOST_ROWS + 1, ..PointCloud::default() };
+        assert!(matches!(check_even(&wide), Err(Error::TooLarge { .. })));
     }
 
     #[test]

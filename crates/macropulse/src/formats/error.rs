@@ -49,6 +49,16 @@ pub enum Error {
         /// Columns of the cloud.
         columns: usize,
     },
+    /// The caller's cloud has more rows or columns than files can number.
+    #[error(
+        "the point cloud cannot be written: it has {rows} × {columns} pixels, but rows and columns are numbered in 16 bits, 65536 at most"
+    )]
+    TooLarge {
+        /// Rows of the cloud.
+        rows: usize,
+        /// Columns of the cloud.
+        columns: usize,
+    },
     /// No format is called so.
     #[error("unknown format `{name}`;{suggestion} known: {}", Format::ALL.map(Format::name).join(", "))]
     UnknownFormat {

@@ -75,8 +75,8 @@ pub struct Names<'a> {
 /// Writes `cloud` to `path`. Truth is written when the cloud has it.
 ///
 /// # Errors
-/// [`Error::Uneven`] if a column of the cloud has not one entry per pixel, [`Error::Write`] if the
-/// file cannot be written; then an older file of that name is untouched.
+/// [`Error::Uneven`] if a column of the cloud has not one entry per pixel, [`Error::TooLarge`] if it
+/// has too many pixels to number, [`Error::Write`] if the file cannot be written; then an older file of that name is untouched.
 pub fn write_cloud(
     format: Format,
     cloud: &PointCloud,

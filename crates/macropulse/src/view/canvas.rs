@@ -11,7 +11,6 @@ const LONGEST_SIDE: usize = 16_384;
 pub(super) enum Anchor {
     Start,
     Middle,
-    End,
 }
 
 /// A picture in the making. What falls outside is cut off.
@@ -56,13 +55,12 @@ impl Canvas {
     }
 
     /// Draws `text` with its top at `place[1]` and gives its width. Letters have 5 × 7 dots of
-    /// `size` pixels each.
+    /// `size` pixels each, and tails below.
     pub fn text(&mut self, place: [usize; 2], text: &str, pen: Pen) -> usize {
         let width = text_width(text, pen.size);
         let mut x = match pen.anchor {
             Anchor::Start => place[0],
             Anchor::Middle => place[0].saturating_sub(width / 2),
-            Anchor::End => place[0].saturating_sub(width),
         };
         for letter in text.chars() {
             for (row, dots) in glyph(letter).iter().enumerate() {

@@ -1,7 +1,9 @@
 //! Charts as SVG: lines, steps, dots, bars, shaded bands, notes.
 
+use super::curves::{band_path, curve_class, draw_curve, draw_dots, draw_line, draw_note};
 use super::plot::{Plane, Ruler, room_for_ticks};
-use super::svg::{Anchor, Hue, Svg, number, text_width};
+use super::svg::{Anchor, Hue, Svg, text_width};
+use super::ticks::label;
 
 /// How values are spread along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,12 +130,14 @@ pub struct Chart {
     pub lines: Vec<Line>,
     /// Remarks.
     pub notes: Vec<Note>,
+    /// Names in a legend, also where the lines could carry them.
+    pub legend: bool,
     /// Width and height, px.
     pub size: [f64; 2],
 }
 
 impl Chart {
-    /// A chart without content, 720 × 360.
+    /// A chart without content, 704 × 360.
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
         Self {
             title: title.to_owned(),
@@ -143,7 +147,8 @@ impl Chart {
             bands: Vec::new(),
             lines: Vec::new(),
             notes: Vec::new(),
-            size: [720.0, 360.0],
+            legend: false,
+            size: [704.0, 360.0],
         }
     }
 
@@ -164,11 +169,12 @@ impl Chart {
         for band in &self.bands {
             svg.path(&band_path(band, &plane), &format!("band {}", band.hue.class()));
         }
-        self.draw_bars(&mut svg, &plane);
+        self.draw_bars(&mut svg, &plane, BarPart::Body);
         for series in &self.series {
             draw_curve(&mut svg, series, &plane);
         }
         svg.close_window();
+        self.draw_bars(&mut svg, &plane, BarPart::Value);
         for series in &self.series {
             draw_dots(&mut svg, series, &plane);
         }
@@ -191,8 +197,15 @@ impl Chart {
         let labels = self.series.iter().map(|series| text_width(&series.label)).fold(0.0, f64::max);
         let at_ends = self.labels_at_ends();
         let right = self.size[0] - if at_ends && named { labels.min(220.0) + 22.0 } else { 16.0 };
-        let legend = if at_ends || !named { 0.0 } else { 24.0 };
-        let ends = [self.size[1] - 52.0, 30.0 + legend];
+        let legend = if at_ends || !named { 0.0 } else { 26.0 };
+        let y = self.upright_ruler(30.0 + legend);
+        let xs = self.series.iter().flat_map(|series| series.points.iter().map(|point| point[0]));
+        let x = Ruler::new(&self.x, xs, [room_for_ticks(&y), right]);
+        Plane { x, y }
+    }
+
+    /// The vertical axis, from `top` down to the room of the horizontal one.
+    fn upright_ruler(&self, top: f64) -> Ruler {
         let ys = self.series.iter().flat_map(|series| {
             let zero = (series.style == Style::Bars).then_some(0.0);
             series.points.iter().map(|point| point[1]).chain(zero)
@@ -200,28 +213,40 @@ impl Chart {
         let ys = ys.chain(
             self.bands.iter().flat_map(|band| band.points.iter().flat_map(|p| [p[1], p[2]])),
         );
-        let y = Ruler::new(&self.y, ys, ends);
-        let xs = self.series.iter().flat_map(|series| series.points.iter().map(|point| point[0]));
-        let x = Ruler::new(&self.x, xs, [room_for_ticks(&y), right]);
-        Plane { x, y }
+        Ruler::new(&self.y, ys, [self.size[1] - 52.0, top])
     }
 
-    /// Lines end somewhere, and that is where their name belongs. Dots and bars need a legend.
+    /// Lines end somewhere, and that is where their names belong, unless they all end in one
+    /// place. Dots and bars need a legend.
     fn labels_at_ends(&self) -> bool {
-        !self.series.iter().any(|series| matches!(series.style, Style::Bars | Style::Points))
+        const FARTHEST: f64 = 26.0;
+        let no_end = |series: &Series| matches!(series.style, Style::Bars | Style::Points);
+        if self.legend || self.series.iter().any(no_end) {
+            return false;
+        }
+        let ruler = self.upright_ruler(30.0);
+        let named = self.series.iter().filter(|series| !series.label.is_empty());
+        let mut ends: Vec<f64> = named
+            .filter_map(|series| series.points.iter().rev().find_map(|point| ruler.place(point[1])))
+            .map(|end| end.clamp(ruler.ends[1], ruler.ends[0]))
+            .collect();
+        ends.sort_by(f64::total_cmp);
+        let spread = spread(&ends, ruler.ends[0]);
+        ends.iter().zip(spread).all(|(end, height)| (end - height).abs() < FARTHEST)
     }
 
     fn draw_end_labels(&self, svg: &mut Svg, plane: &Plane) {
         let last = |series: &Series| {
             let places = series.points.iter().filter_map(|point| plane.place(*point));
-            let [x, y] = places.filter(|[x, _]| *x <= plane.right() + 0.5).last()?;
+            let [x, y] = places.filter(|[x, _]| *x <= plane.right() + 0.5).next_back()?;
             Some([x, y.clamp(plane.top(), plane.bottom())])
         };
         let named = self.series.iter().filter(|series| !series.label.is_empty());
         let mut labels: Vec<_> =
             named.filter_map(|series| last(series).map(|place| (place, series))).collect();
         labels.sort_by(|(a, _), (b, _)| a[1].total_cmp(&b[1]));
-        for (y, (_, series)) in spread(&labels, plane).into_iter().zip(&labels) {
+        let ends: Vec<f64> = labels.iter().map(|(place, _)| place[1]).collect();
+        for (y, (_, series)) in spread(&ends, plane.bottom()).into_iter().zip(&labels) {
             let place = [plane.right() + 8.0, y + 4.0];
             svg.text(
                 place,
@@ -233,8 +258,8 @@ impl Chart {
     }
 
     fn draw_legend(&self, svg: &mut Svg, plane: &Plane) {
-        let y = plane.top() - 34.0;
-        let mut x = plane.left() - 8.0;
+        let y = plane.top() - 38.0;
+        let mut x = 0.0;
         for series in self.series.iter().filter(|series| !series.label.is_empty()) {
             let hue = series.hue.class();
             match series.style {
@@ -247,7 +272,8 @@ impl Chart {
         }
     }
 
-    fn draw_bars(&self, svg: &mut Svg, plane: &Plane) {
+    /// Draws the bars, or what they say on top.
+    fn draw_bars(&self, svg: &mut Svg, plane: &Plane, part: BarPart) {
         let groups: Vec<_> =
             self.series.iter().filter(|series| series.style == Style::Bars).collect();
         let mut xs: Vec<f64> = groups
@@ -259,24 +285,37 @@ impl Chart {
         let group = gaps.fold(plane.right() - plane.left(), f64::min).min(160.0) * 0.72;
         let width = group / groups.len().max(1) as f64;
         for (at, series) in groups.iter().enumerate() {
-            for [x, y] in series.points.iter().filter_map(|point| plane.place(*point)) {
-                let base = plane.y.base();
-                let corner = [x - group / 2.0 + at as f64 * width + 0.5, y.min(base)];
-                let size = [(width - 1.0).max(0.5), (y - base).abs()];
-                svg.rect(corner, size, &format!("area {}", series.hue.class()));
+            for point in &series.points {
+                let Some([x, y]) = plane.place(*point) else { continue };
+                let (base, left) = (plane.y.base(), x - group / 2.0 + at as f64 * width);
+                let text = label(point[1], if point[1].fract() == 0.0 { 1.0 } else { 0.01 });
+                if part == BarPart::Body {
+                    let size = [(width - 1.0).max(0.5), (y - base).abs()];
+                    let class = format!("area {}", series.hue.class());
+                    svg.rect([left + 0.5, y.min(base)], size, &class);
+                } else if text_width(&text) < width + 8.0 && y <= base && y >= plane.top() {
+                    svg.text([left + width / 2.0, y - 5.0], Anchor::Middle, "soft halo", &text);
+                }
             }
         }
     }
 }
 
-/// Heights for the labels, from the top, that keep a line's distance from each other.
-fn spread(labels: &[([f64; 2], &Series)], plane: &Plane) -> Vec<f64> {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum BarPart {
+    Body,
+    Value,
+}
+
+/// Heights for labels that belong at `ends`, sorted from the top: a line apart from each other and
+/// not below `bottom`.
+fn spread(ends: &[f64], bottom: f64) -> Vec<f64> {
     const LINE: f64 = 15.0;
-    let mut heights: Vec<f64> = labels.iter().map(|(place, _)| place[1]).collect();
+    let mut heights = ends.to_vec();
     for at in 1..heights.len() {
         heights[at] = heights[at].max(heights[at - 1] + LINE);
     }
-    let mut limit = plane.bottom();
+    let mut limit = bottom;
     for height in heights.iter_mut().rev() {
         *height = height.min(limit);
         limit = *height - LINE;
@@ -284,97 +323,9 @@ fn spread(labels: &[([f64; 2], &Series)], plane: &Plane) -> Vec<f64> {
     heights
 }
 
-fn curve_class(series: &Series) -> String {
-    let kind = match series.style {
-        Style::Dashed => "line dashed",
-        Style::Joined => "line thin",
-        _ => "line",
-    };
-    format!("{kind} {}", series.hue.class())
-}
-
-fn draw_curve(svg: &mut Svg, series: &Series, plane: &Plane) {
-    if matches!(series.style, Style::Points | Style::Bars) {
-        return;
-    }
-    let mut path = String::new();
-    let mut pen_down = false;
-    for point in &series.points {
-        let Some([x, y]) = plane.place(*point) else {
-            pen_down = false;
-            continue;
-        };
-        let [x, y] = [x, y].map(number);
-        path += &match (pen_down, series.style) {
-            (false, _) => format!("M{x} {y}"),
-            (true, Style::Step) => format!("H{x}V{y}"),
-            (true, _) => format!("L{x} {y}"),
-        };
-        pen_down = true;
-    }
-    svg.path(&path, &curve_class(series));
-}
-
-fn draw_dots(svg: &mut Svg, series: &Series, plane: &Plane) {
-    if !matches!(series.style, Style::Points | Style::Joined) {
-        return;
-    }
-    let radius = if series.points.len() > 200 { 2.0 } else { 4.0 };
-    let inside = |[x, y]: &[f64; 2]| {
-        (plane.left() - 1.0..=plane.right() + 1.0).contains(x)
-            && (plane.top() - 1.0..=plane.bottom() + 1.0).contains(y)
-    };
-    for place in series.points.iter().filter_map(|point| plane.place(*point)).filter(inside) {
-        svg.dot(place, radius, &format!("dot {}", series.hue.class()));
-    }
-}
-
-fn band_path(band: &Band, plane: &Plane) -> String {
-    let edge = |side: usize| {
-        band.points.iter().filter_map(move |point| plane.place([point[0], point[side]]))
-    };
-    let outline: Vec<_> = edge(1).chain(edge(2).collect::<Vec<_>>().into_iter().rev()).collect();
-    let corners: Vec<_> =
-        outline.iter().map(|[x, y]| format!("{} {}", number(*x), number(*y))).collect();
-    if corners.len() < 3 { String::new() } else { format!("M{}Z", corners.join("L")) }
-}
-
-fn draw_line(svg: &mut Svg, line: &Line, plane: &Plane) {
-    const CLASS: &str = "line thin dashed h-grey";
-    match line {
-        Line::AtX(value, label) => {
-            let Some(x) = plane.x.place(*value) else { return };
-            svg.line([x, plane.top()], [x, plane.bottom()], CLASS);
-            let (shift, anchor) = away_from_edge(x, plane);
-            svg.text([x + shift, plane.top() + 10.0], anchor, "soft halo", label);
-        }
-        Line::AtY(value, label) => {
-            let Some(y) = plane.y.place(*value) else { return };
-            svg.line([plane.left(), y], [plane.right(), y], CLASS);
-            svg.text([plane.right() - 6.0, y - 5.0], Anchor::End, "soft halo", label);
-        }
-    }
-}
-
-fn draw_note(svg: &mut Svg, note: &Note, plane: &Plane) {
-    let Some([x, y]) = plane.place(note.at) else { return };
-    svg.dot([x, y], 3.5, "outline h-grey");
-    let (shift, anchor) = away_from_edge(x, plane);
-    svg.text([x + 1.5 * shift, y - 8.0], anchor, "halo", &note.text);
-}
-
-/// Text beside x goes where there is more room.
-fn away_from_edge(x: f64, plane: &Plane) -> (f64, Anchor) {
-    if x > plane.left() + 0.6 * (plane.right() - plane.left()) {
-        (-6.0, Anchor::End)
-    } else {
-        (6.0, Anchor::Start)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::svg::is_balanced;
+    use super::super::svg::{is_balanced, number};
     use super::*;
 
     fn chart() -> Chart {
@@ -412,8 +363,8 @@ mod tests {
     #[test]
     fn labels_that_end_together_stand_apart() {
         let mut crowd = chart();
-        for _ in 0..5 {
-            crowd = crowd.series("same", Style::Line, vec![[0.0, 0.1], [10.0, 0.1]]);
+        for _ in 0..2 {
+            crowd = crowd.series("same", Style::Line, vec![[0.0, 5.0], [10.0, 5.0]]);
         }
         let svg = crowd.svg();
         let heights: Vec<f64> = svg
@@ -423,8 +374,28 @@ mod tests {
                 line.split("y=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
             })
             .collect();
-        assert_eq!(heights.len(), 5);
-        assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= 14.9), "{heights:?}");
+        assert_eq!(heights.len(), 2);
+        assert!(heights[1] - heights[0] >= 14.9, "{heights:?}");
+    }
+
+    #[test]
+    fn labels_that_would_stray_go_into_a_legend() {
+        let falling =
+            |chart: Chart| chart.series("same", Style::Line, vec![[0.0, 9.0], [9.0, 0.0]]);
+        assert!(falling(chart()).labels_at_ends());
+        assert!(!falling(falling(falling(chart()))).labels_at_ends());
+    }
+
+    #[test]
+    fn bars_say_their_value_where_there_is_room() {
+        let bars = |count: usize| {
+            let points = (0..count).map(|at| [at as f64 / count as f64, 3658.0]).collect();
+            Chart::new("t", Axis::linear("x"), Axis::linear("y"))
+                .series("", Style::Bars, points)
+                .svg()
+        };
+        assert!(bars(3).contains(">3658</text>"));
+        assert!(!bars(60).contains(">3658</text>"));
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod bits;
 mod canvas;
 mod chart;
 mod colour;
+mod curves;
 mod font;
 mod page;
 mod page_style;

@@ -33,9 +33,10 @@ impl Figure {
 
     fn html(&self) -> String {
         let picture = match &self.picture {
-            Picture::Svg(svg) => svg.clone(),
+            Picture::Svg(svg) => format!("<div class=\"chart\">{svg}</div>"),
             Picture::Png { bytes, alt } => format!(
-                "<img alt=\"{}\" src=\"data:image/png;base64,{}\">",
+                "<img{} alt=\"{}\" src=\"data:image/png;base64,{}\">",
+                size_of_png(bytes),
                 escape(alt),
                 BASE64.encode(bytes)
             ),
@@ -266,6 +267,20 @@ impl Page {
     }
 }
 
+/// Width and height for the browser, so that nothing moves while it decodes the picture. One that
+/// nearly fills the page may fill it.
+fn size_of_png(bytes: &[u8]) -> String {
+    const NEARLY: u32 = 800;
+    let side = |at: usize| {
+        let field = bytes.get(at..at + 4).and_then(|field| <[u8; 4]>::try_from(field).ok());
+        field.map(u32::from_be_bytes)
+    };
+    // The header chunk is always first: 8 bytes of magic, length, name, then both sides.
+    let Some((width, height)) = side(16).zip(side(20)) else { return String::new() };
+    let class = if width >= NEARLY { " class=\"wide\"" } else { "" };
+    format!("{class} width=\"{width}\" height=\"{height}\"")
+}
+
 /// Escaped text in which `` `code` `` and `**strong**` are set so. A mark without its partner is
 /// shown as it is.
 pub(super) fn inline(text: &str) -> String {
@@ -314,6 +329,14 @@ mod tests {
         assert_eq!(inline("a ` b"), "a ` b");
         assert_eq!(inline("2 ** 3"), "2 ** 3");
         assert_eq!(inline("`a` ` **b** **"), "<code>a</code> ` <strong>b</strong> **");
+    }
+
+    #[test]
+    fn a_picture_brings_its_size() {
+        let mut bytes = vec![0; 16];
+        bytes.extend([0, 0, 3, 112, 0, 0, 2, 0]);
+        assert_eq!(size_of_png(&bytes), " class=\"wide\" width=\"880\" height=\"512\"");
+        assert_eq!(size_of_png(&[1, 2]), "");
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub(super) const STYLE: &str = r#":root{
   --holds:#6fdca6;--holds-bg:#14301f;--partly:#f3bd6b;--partly-bg:#352610;--fails:#f79a96;--fails-bg:#3b191b}}
 *{box-sizing:border-box}
 html{scroll-behavior:smooth;-webkit-text-size-adjust:100%}
-body{margin:0 auto;padding:0 1.25rem 4rem;max-width:66rem;background:var(--paper);color:var(--ink);
+body{margin:0 auto;padding:0 1.25rem 4rem;max-width:62.5rem;background:var(--paper);color:var(--ink);
   font:1.0625rem/1.62 var(--serif);text-rendering:optimizeLegibility}
 header,section>p,section>ul,section>h2,section>h3,section>aside,section>pre,footer{max-width:44rem}
 header{padding:4.5rem 0 1.5rem}
@@ -24,7 +24,8 @@ h1{margin:0;font-size:clamp(2rem,5.2vw,3.1rem);line-height:1.1;letter-spacing:-.
 h2{margin:0 0 1rem;padding-top:2.6rem;font-size:1.65rem;line-height:1.2;font-weight:700}
 h3{margin:2.2rem 0 .6rem;font-size:1.14rem;line-height:1.3;font-weight:650}
 section+section{margin-top:2.2rem;border-top:1px solid var(--rule)}
-section{scroll-margin-top:.5rem}
+main{counter-reset:s}section{scroll-margin-top:.5rem;counter-increment:s}
+h2::before{content:counter(s);margin-right:.8rem;font-weight:400;color:var(--soft)}
 p{margin:0 0 1.05rem;hyphens:manual;text-wrap:pretty}
 ul{margin:0 0 1.05rem;padding-left:1.3rem}li{margin:.25rem 0}li::marker{color:var(--soft)}
 code{font:.86em var(--mono);background:var(--panel);padding:.1em .32em;border-radius:.25rem}
@@ -36,8 +37,9 @@ nav a{display:block;padding:.22rem 0;color:var(--ink);text-decoration:none}
 nav a::before{content:counter(n);display:inline-block;width:1.7rem;color:var(--soft);font-variant-numeric:tabular-nums}
 nav a:hover,nav a:focus-visible{color:var(--accent);text-decoration:underline;text-underline-offset:.2em}
 figure{margin:1.9rem 0}
-figure>svg,figure>img{display:block;max-width:100%;height:auto}
-figure>img{border-radius:.4rem}
+figure>img,.chart>svg{display:block;max-width:100%;height:auto}
+figure>img{border-radius:.4rem}img.wide{width:100%}
+@media (max-width:40rem){.chart{overflow-x:auto}.chart>svg{max-width:none;width:auto;height:auto;min-width:38rem}}
 figcaption{margin-top:.65rem;max-width:44rem;font:.88rem/1.5 var(--sans);color:var(--soft)}
 figcaption strong{color:var(--ink)}
 .gallery{display:grid;gap:1.3rem;margin:1.9rem 0;align-items:start}

@@ -46,19 +46,20 @@ impl Ruler {
         match self.scale {
             Scale::Linear => {
                 let free = axis.limits.is_none() && axis.upright;
-                if let [a, b, ..] = linear_ticks(self.low, self.high, wanted)[..] {
-                    if free {
-                        let step = b - a;
-                        self.low = (self.low / step + 1e-9).floor() * step;
-                        self.high = (self.high / step - 1e-9).ceil() * step;
-                    }
+                if let [a, b, ..] = linear_ticks(self.low, self.high, wanted)[..]
+                    && free
+                {
+                    let step = b - a;
+                    self.low = (self.low / step + 1e-9).floor() * step;
+                    self.high = (self.high / step - 1e-9).ceil() * step;
                 }
                 let ticks = linear_ticks(self.low, self.high, wanted);
                 let step = if let [a, b, ..] = ticks[..] { b - a } else { 1.0 };
                 self.ticks = ticks.into_iter().map(|tick| (tick, label(tick, step))).collect();
             }
             Scale::Log => {
-                let ticks = log_ticks(self.low, self.high, wanted);
+                // Powers of ten may stand closer than numbers.
+                let ticks = log_ticks(self.low, self.high, wanted * 3 / 2);
                 self.ticks = if ticks.len() >= 2 {
                     ticks.into_iter().map(|tick| (tick, power_label(tick))).collect()
                 } else {
@@ -134,7 +135,7 @@ impl Plane {
         let middle = (self.left() + self.right()) / 2.0;
         svg.text([middle, self.bottom() + 39.0], Anchor::Middle, "", titles[0]);
         // Written across the top, where it needs no turned head.
-        svg.text([self.left() - 8.0, self.top() - 12.0], Anchor::Start, "", titles[1]);
+        svg.text([0.0, self.top() - 14.0], Anchor::Start, "", titles[1]);
     }
 }
 

@@ -54,7 +54,7 @@ pub struct Layout {
     pub zoom: [usize; 2],
     /// A line above the picture; may be empty.
     pub title: String,
-    /// A length below the picture.
+    /// A length below the picture; left out where it does not fit.
     pub scale_bar: Option<ScaleBar>,
 }
 
@@ -62,6 +62,16 @@ impl Layout {
     /// The whole grid, one picture pixel each, no title, no bar.
     pub fn new(rows: usize, columns: usize) -> Self {
         Self { rows, columns, crop: None, zoom: [1, 1], title: String::new(), scale_bar: None }
+    }
+
+    /// Sets the zoom so that the part shown is at most about `width` pixels wide and angles are in
+    /// proportion, as far as whole pixels allow. `pitch` are the angles between columns and rows.
+    pub fn fit(mut self, pitch: [f64; 2], width: usize) -> Self {
+        let wide = (width / self.shown().columns.len().max(1)).max(1);
+        let high = (wide as f64 * pitch[1] / pitch[0]).round();
+        // A float beyond the integers becomes the nearest one, NaN becomes 0.
+        self.zoom = [wide, (high as usize).max(1)];
+        self
     }
 
     fn shown(&self) -> Crop {
@@ -194,7 +204,7 @@ fn draw(layout: &Layout, colour: impl Fn(usize) -> Rgb, key: &Key) -> Result<Vec
     }
     let bar_room = scale_bar(&mut canvas, layout, key_top, width);
     match key {
-        Key::Bar { .. } => colour_bar(&mut canvas, key, key_top, inner - bar_room),
+        Key::Bar { .. } => colour_bar(&mut canvas, key, key_top, inner.saturating_sub(bar_room)),
         Key::Legend(entries) => {
             let under_bar = if bar_room > 0 { BAR_HEIGHT + LINE + 16 } else { 0 };
             legend(&mut canvas, entries, key_top + under_bar, inner);
@@ -253,6 +263,10 @@ fn scale_bar(canvas: &mut Canvas, layout: &Layout, top: usize, width: usize) -> 
     let right = canvas.width - MARGIN;
     let length = length as usize;
     let text = text_width(&bar.label, LETTER);
+    let taken = text.max(length) + 2 * MARGIN;
+    if taken + NARROWEST / 3 > right {
+        return 0;
+    }
     let [left, centre] = match text.saturating_sub(length) {
         0 => [right - length, right - length / 2],
         over => [right - length - over / 2, right - text / 2],
@@ -263,7 +277,7 @@ fn scale_bar(canvas: &mut Canvas, layout: &Layout, top: usize, width: usize) -> 
         canvas.fill([end, top], [2, BAR_HEIGHT], INK);
     }
     canvas.text([centre, top + BAR_HEIGHT + 8], &bar.label, pen(INK, Anchor::Middle));
-    text.max(length) + 2 * MARGIN
+    taken
 }
 
 /// Places of the legend's entries, relative to its corner; a new line where the width is used up.
@@ -339,6 +353,25 @@ mod tests {
         let row = MARGIN + 3 + 12 + BAR_HEIGHT / 2;
         let right_half = &pixels[row * width + width / 2..(row + 1) * width];
         assert_eq!(right_half.iter().filter(|pixel| **pixel == INK).count(), 100);
+    }
+
+    #[test]
+    fn a_scale_bar_without_room_is_left_out() {
+        for bar in [("x".repeat(99), 5.0), ("1 m".into(), 9e9), ("1 m".into(), f64::NAN)] {
+            let scale_bar = Some(ScaleBar { label: bar.0, columns: bar.1 });
+            let plain = Layout::new(1, 500);
+            let with_bar = Layout { scale_bar, ..plain.clone() };
+            let png =
+                |layout| RangePicture { layout, range: &[1.0; 500], near: 0.0, far: 1.0 }.png();
+            assert_eq!(png(with_bar).unwrap(), png(plain).unwrap());
+        }
+    }
+
+    #[test]
+    fn angles_stay_in_proportion() {
+        let hdl = Layout::new(64, 540).fit([0.08, 0.33], 1100);
+        assert_eq!(hdl.zoom, [2, 8]);
+        assert_eq!(Layout::new(9, 4000).fit([1.0, f64::NAN], 960).zoom, [1, 1]);
     }
 
     #[test]

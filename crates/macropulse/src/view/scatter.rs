@@ -4,6 +4,9 @@ use super::Error;
 use super::canvas::Canvas;
 use super::colour::{NIGHT, mix, place, range_colour};
 
+/// Larger dots would hide the cloud.
+const LARGEST_DOT: usize = 64;
+
 /// Where a picture is taken from. Metres, in the frame of the cloud, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewpoint {
@@ -63,8 +66,9 @@ impl CloudPicture<'_> {
 
     /// A round dot; pixels whose centre lies outside the circle stay.
     fn stamp(&self, canvas: &mut Canvas, dot: Dot, colour: [u8; 3]) {
-        let reach = self.dot as i64 / 2;
-        let radius = self.dot as f64 / 2.0;
+        let diameter = self.dot.min(LARGEST_DOT);
+        let reach = diameter as i64 / 2;
+        let radius = diameter as f64 / 2.0;
         for dy in -reach..=reach {
             for dx in -reach..=reach {
                 let inside = ((dx * dx + dy * dy) as f64) < radius * radius + 0.25;

@@ -56,7 +56,7 @@ font-variant-numeric:tabular-nums}\
 .mp .h-grey{--hue:var(--grey)}\
 .mp .line{fill:none;stroke:var(--hue);stroke-width:2;stroke-linejoin:round;stroke-linecap:round}\
 .mp .thin{stroke-width:1}.mp .dashed{stroke-dasharray:5 5}\
-.mp .area{fill:var(--hue)}.mp .band{fill:var(--hue);opacity:.16}.mp .faint{opacity:.35}\
+.mp .area{fill:var(--hue)}.mp .band{fill:var(--hue);opacity:.16}.mp .faint{opacity:.55}\
 .mp .outline{fill:var(--paper);stroke:var(--hue);stroke-width:1.5}\
 .mp .dot{fill:var(--hue);stroke:var(--paper);stroke-width:1}.mp text.hued{fill:var(--hue)}\
 .mp text.on{fill:var(--paper);font-weight:600}";

@@ -1,5 +1,8 @@
 //! Where an axis has its ticks, and what they say.
 
+/// No axis has more ticks than this, whatever rounding does to its ends.
+const MOST: usize = 200;
+
 /// At most about `wanted` round values between `low` and `high`, their step 1, 2 or 5 times a power
 /// of ten. Empty if there is no span.
 pub(super) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
@@ -14,6 +17,9 @@ pub(super) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
         .map(|factor| factor * decade)
         .find(|step| *step >= rough * 0.999)
         .unwrap_or(10.0 * decade);
+    if !step.is_normal() {
+        return Vec::new();
+    }
     // Half a millionth of a step keeps an end that rounding would lose.
     let slack = 5e-7;
     let first = (low / step - slack).ceil() as i64;
@@ -21,7 +27,7 @@ pub(super) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     // Dividing by the whole inverse gives 0.3 where multiplying by 0.1 gives 0.30000000000000004.
     let inverse = (1.0 / step).round();
     let value = |at: i64| if step < 1.0 { at as f64 / inverse } else { at as f64 * step };
-    (first..=last).map(value).collect()
+    (first..=last).take(MOST).map(value).collect()
 }
 
 /// Powers of ten between `low` and `high`, thinned to about `wanted`. Empty unless both are
@@ -105,7 +111,7 @@ fn thousands(digits: &str) -> String {
     }
     let mut text = String::new();
     for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at) % 3 == 0 {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
             text.push('\u{202f}');
         }
         text.push(digit);
@@ -130,6 +136,8 @@ mod tests {
     fn an_axis_without_span_has_no_ticks() {
         assert!(linear_ticks(1.0, 1.0, 5).is_empty());
         assert!(linear_ticks(0.0, f64::NAN, 5).is_empty());
+        assert!(linear_ticks(0.0, 1e-320, 5).is_empty());
+        assert!(linear_ticks(1e300, 1.1e300, 5).len() <= MOST);
         assert!(log_ticks(0.0, 10.0, 5).is_empty());
     }
 

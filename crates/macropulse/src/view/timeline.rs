@@ -10,7 +10,7 @@ pub struct Span {
     pub start: f64,
     /// End, ns.
     pub end: f64,
-    /// Written on it if it fits, else beside it.
+    /// Written on it if it fits, else beside it; left out if that is taken too.
     pub label: String,
     /// Its colour.
     pub hue: Hue,
@@ -53,7 +53,7 @@ pub struct Timeline {
     pub width: f64,
 }
 
-const LANE: f64 = 34.0;
+const LANE: f64 = 46.0;
 const BAR: f64 = 20.0;
 const TOP: f64 = 10.0;
 
@@ -90,7 +90,10 @@ impl Timeline {
         }
         for (at, lane) in self.lanes.iter().enumerate() {
             for span in &lane.spans {
-                draw_span(&mut svg, span, [x(span.start), x(span.end)], middle(at));
+                let later =
+                    lane.spans.iter().map(|other| x(other.start)).filter(|s| *s > x(span.start));
+                let room = later.fold(right, f64::min);
+                draw_span(&mut svg, span, [x(span.start), x(span.end), room], middle(at));
             }
         }
         svg.close_window();
@@ -102,7 +105,8 @@ fn middle(lane: usize) -> f64 {
     TOP + LANE * (lane as f64 + 0.5)
 }
 
-fn draw_span(svg: &mut Svg, span: &Span, [start, end]: [f64; 2], middle: f64) {
+/// Draws a span from `start` to `end`; its label may reach up to `room`.
+fn draw_span(svg: &mut Svg, span: &Span, [start, end, room]: [f64; 3], middle: f64) {
     let width = (end - start).max(1.5);
     let kind = if span.hollow { "outline" } else { "area" };
     let class = format!("{kind} {}", span.hue.class());
@@ -114,7 +118,7 @@ fn draw_span(svg: &mut Svg, span: &Span, [start, end]: [f64; 2], middle: f64) {
     if text_width(&span.label) + 4.0 < width {
         let class = if span.hollow { format!("hued bold {hue}") } else { "on".into() };
         svg.text([start + width / 2.0, middle + 4.0], Anchor::Middle, &class, &span.label);
-    } else {
+    } else if start + width + 4.0 + text_width(&span.label) < room {
         let class = format!("hued halo {hue}");
         svg.text([start + width + 4.0, middle + 4.0], Anchor::Start, &class, &span.label);
     }
@@ -149,6 +153,8 @@ mod tests {
     fn a_label_stands_on_its_span_or_beside_it() {
         assert!(timeline(vec![span(0.0, 90.0, "one")]).contains("class=\"on\""));
         assert!(timeline(vec![span(0.0, 1.0, "one")]).contains("class=\"hued halo h-blue\""));
+        let crowded = timeline(vec![span(0.0, 1.0, "one"), span(2.0, 3.0, "")]);
+        assert!(!crowded.contains(">one<"));
     }
 
     #[test]
