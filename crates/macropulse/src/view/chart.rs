@@ -237,8 +237,8 @@ impl Chart {
 
     fn draw_end_labels(&self, svg: &mut Svg, plane: &Plane) {
         let last = |series: &Series| {
-            let places = series.points.iter().filter_map(|point| plane.place(*point));
-            let [x, y] = places.filter(|[x, _]| *x <= plane.right() + 0.5).next_back()?;
+            let mut places = series.points.iter().filter_map(|point| plane.place(*point));
+            let [x, y] = places.rfind(|[x, _]| *x <= plane.right() + 0.5)?;
             Some([x, y.clamp(plane.top(), plane.bottom())])
         };
         let named = self.series.iter().filter(|series| !series.label.is_empty());

@@ -24,7 +24,7 @@ impl Ruler {
             let fold = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
             values.filter(usable).fold([f64::INFINITY, f64::NEG_INFINITY], fold)
         });
-        let wanted = ((ends[1] - ends[0]).abs() / if axis.upright { 52.0 } else { 84.0 }).max(3.0);
+        let wanted = ((ends[1] - ends[0]).abs() / if axis.upright { 46.0 } else { 84.0 }).max(3.0);
         let mut ruler = Self { scale: axis.scale, low, high, ends, ticks: Vec::new() };
         ruler.mend(axis, wanted as usize);
         if !axis.categories.is_empty() {

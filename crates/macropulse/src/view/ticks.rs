@@ -3,7 +3,7 @@
 /// No axis has more ticks than this, whatever rounding does to its ends.
 const MOST: usize = 200;
 
-/// At most about `wanted` round values between `low` and `high`, their step 1, 2 or 5 times a power
+/// About `wanted` round values between `low` and `high`, their step 1, 2 or 5 times a power
 /// of ten. Empty if there is no span.
 pub(super) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     let span = high - low;
@@ -15,7 +15,7 @@ pub(super) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     let step = [1.0, 2.0, 5.0, 10.0]
         .into_iter()
         .map(|factor| factor * decade)
-        .find(|step| *step >= rough * 0.999)
+        .find(|step| *step >= rough * 0.8)
         .unwrap_or(10.0 * decade);
     if !step.is_normal() {
         return Vec::new();
