@@ -18,7 +18,7 @@ pub(super) const PALE: Rgb = [146, 152, 166];
 const TURBO_PART: [f64; 2] = [0.07, 0.88];
 
 /// Colour of a place on a scale from 0 (near, warm) to 1 (far, cool); places outside take the
-/// colour of the end. NaN is [`NOTHING`].
+/// colour of the end. NaN is the dark of a pixel without a return.
 pub fn range_colour(place: f64) -> Rgb {
     if place.is_nan() {
         return NOTHING;
