@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use super::car;
 use super::closed_form::{Shape, Solid};
+use super::digest::Fnv;
 use super::error::Error;
 use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
 use super::material::{self, Material, nearest, plain};
@@ -63,8 +64,11 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     }
     let Assembly { materials, objects, solids, facets, notes, .. } = assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
+    let mut surfaces = Fnv::new();
+    facets.iter().for_each(|facet| surfaces.facet(facet));
+    solids.iter().for_each(|solid| surfaces.solid(solid));
     let world = World { facets: Facets::new(facets, sensor.position), solids };
-    Ok(Scene { name, materials, objects, sensor, notes, world })
+    Ok(Scene { name, materials, objects, sensor, notes, world, surfaces })
 }
 
 impl Assembly<'_> {

@@ -5,6 +5,7 @@ mod builtin;
 mod car;
 mod car_parts;
 mod closed_form;
+mod digest;
 mod error;
 mod file;
 mod hits;
@@ -27,6 +28,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use pose::{Pose, Transform};
 
+use digest::Fnv;
 use file::Source;
 use raycast::Facets;
 
@@ -45,6 +47,8 @@ pub struct Scene {
     /// Every assumption made while reading: units, axes, materials. To be shown to the user.
     pub notes: Vec<String>,
     world: World,
+    /// Of the triangles and shapes, in the order of the file.
+    surfaces: Fnv,
 }
 
 /// A thing in the scene.
@@ -140,22 +144,7 @@ impl Scene {
     /// A hash of everything that decides what light meets: surfaces, materials, sensor pose.
     /// The same on every machine and run.
     pub fn digest(&self) -> String {
-        let mut hash = Fnv::new();
-        for facet in self.world.facets.facets() {
-            facet.corners.iter().flatten().for_each(|value| hash.number(*value));
-            hash.bytes(&facet.material.to_le_bytes());
-            hash.bytes(&facet.object.to_le_bytes());
-        }
-        for solid in &self.world.solids {
-            match solid.shape() {
-                Shape::Plane { normal } => normal.iter().for_each(|value| hash.number(*value)),
-                Shape::Sphere { radius } => hash.number(radius),
-                Shape::Box { half } => half.iter().for_each(|value| hash.number(*value)),
-            }
-            hash.pose(&solid.pose());
-            hash.bytes(&solid.material().to_le_bytes());
-            hash.bytes(&solid.object().to_le_bytes());
-        }
+        let mut hash = self.surfaces;
         for material in &self.materials {
             hash.bytes(material.name.as_bytes());
             let Material { diffuse, specular, gloss, retro, transmission, .. } = *material;
@@ -168,7 +157,7 @@ impl Scene {
             hash.bytes(&[u8::from(object.is_target)]);
         }
         hash.pose(&self.sensor);
-        format!("{:016x}", hash.0)
+        hash.text()
     }
 }
 
@@ -182,31 +171,5 @@ impl fmt::Debug for Scene {
             .field("notes", &self.notes)
             .field("triangles", &self.triangles())
             .finish_non_exhaustive()
-    }
-}
-
-/// The 64-bit FNV-1a hash \[FNV\].
-struct Fnv(u64);
-
-impl Fnv {
-    fn new() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
-    }
-
-    fn bytes(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
-
-    fn number(&mut self, value: f64) {
-        self.bytes(&value.to_bits().to_le_bytes());
-    }
-
-    fn pose(&mut self, pose: &Pose) {
-        let Pose { position: [x, y, z], yaw, pitch, roll } = *pose;
-        for value in [x, y, z, yaw, pitch, roll] {
-            self.number(value);
-        }
     }
 }

@@ -81,11 +81,6 @@ impl Facets {
         self.facets.len()
     }
 
-    /// The triangles, in an order that depends only on them.
-    pub(super) fn facets(&self) -> &[Facet] {
-        &self.facets
-    }
-
     /// Walks the hierarchy, the nearer child first. `stack` holds the children put off.
     fn descend(&self, ray: &Ray, limits: (f64, f64), stack: &mut [u32]) -> Option<Hit> {
         let local = LocalRay::new(ray, self.centre)?;
