@@ -1,4 +1,5 @@
 //! Scenes from files: what each mesh format and each wrong file leads to.
+#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -386,4 +387,40 @@ fn meshes_of_others_are_read() {
         }
         assert_eq!(count, 23);
     }
+}
+
+/// Whatever happens to a file, it is read or refused; it never takes the program down.
+#[test]
+fn damaged_files_never_panic() {
+    let inline = ",\"uri\":\"a b.bin\"";
+    let sound: Vec<(&str, Vec<u8>)> = vec![
+        ("a.obj", OBJ.as_bytes().to_vec()),
+        ("ascii.stl", ascii_stl().into_bytes()),
+        ("binary.stl", binary_stl()),
+        ("ascii.ply", ascii_ply()),
+        ("binary.ply", binary_ply()),
+        ("a.glb", glb()),
+        ("a.gltf", gltf(inline).into_bytes()),
+    ];
+    let files = folder(&[("a b.bin", &gltf_buffer())]);
+    let (mut read, mut refused) = (0, 0);
+    for (name, bytes) in &sound {
+        let mut attempt = |bytes: &[u8]| {
+            fs::write(files.path().join(name), bytes).unwrap();
+            match object(files.path(), &format!("mesh = {name:?}\nmaterial = \"white\"")) {
+                Ok(_) => read += 1,
+                Err(told) => {
+                    assert!(told.contains(';'), "no remedy in: {told}");
+                    refused += 1;
+                }
+            }
+        };
+        for index in (0..bytes.len()).step_by(3) {
+            attempt(&bytes[..index]);
+            let mut changed = bytes.clone();
+            changed[index] ^= 0x06;
+            attempt(&changed);
+        }
+    }
+    assert!(read > 100 && refused > 500, "{read} read, {refused} refused");
 }

@@ -159,10 +159,8 @@ impl Assembly<'_> {
         let used = mesh.triangles.iter().flatten().map(|corner| vertices[*corner as usize][2]);
         let lowest = if rest { used.fold(f64::INFINITY, f64::min) } else { 0.0 };
         for vertex in &mut vertices {
-            for axis in 0..3 {
-                vertex[axis] += pose.position[axis];
-            }
-            vertex[2] -= lowest;
+            let [x, y, z] = pose.position;
+            *vertex = [vertex[0] + x, vertex[1] + y, vertex[2] + z - lowest];
         }
         for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
             self.facets.push(Facet {

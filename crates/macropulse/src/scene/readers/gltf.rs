@@ -1,4 +1,9 @@
 //! glTF 2.0: `.glb`, and `.gltf` with buffers beside it or in `data:` URIs.
+//!
+//! Only what makes a mesh is read: nodes, triangles, positions, material names and colours. Each
+//! index in the file is looked up, never trusted.
+
+mod document;
 
 use std::io::Read;
 use std::path::Path;
@@ -6,152 +11,213 @@ use std::path::Path;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DMat4, DVec3};
-use gltf::buffer::Source;
-use gltf::mesh::Mode;
-use gltf::{Document, Gltf, Node};
 
 use super::{DAMAGED, luminance, open};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
+use document::{Accessor, Document, Node, Primitive, container};
 
 /// Deeper nesting than this is a cycle or a mistake.
-const DEEPEST: usize = 256;
+const DEEPEST: usize = 64;
 
 pub(super) fn read(path: &Path) -> Result<Mesh, Error> {
     let mut bytes = Vec::new();
     open(path)?
         .read_to_end(&mut bytes)
         .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
-    let Gltf { document, blob } = Gltf::from_slice(&bytes)
-        .map_err(|fault| Error::mesh(path, format!("is no readable glTF ({fault})"), DAMAGED))?;
-    if let Some(extension) = document.extensions_required().next() {
+    let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
+    let (text, binary) = container(&bytes)
+        .ok_or_else(|| damaged("is a glTF container that does not add up".to_owned()))?;
+    let document: Document = serde_json::from_slice(text)
+        .map_err(|fault| damaged(format!("is no readable glTF ({fault})")))?;
+    if let Some(extension) = document.extensions_required.first() {
         return Err(Error::mesh(
             path,
             format!("requires the glTF extension {extension}, which is not read here"),
             "export it without compression and extensions",
         ));
     }
-    let buffers = buffers(path, &document, blob)?;
-    let mut nest = Nest { path, buffers, mesh: Mesh::default() };
-    let scene = document.default_scene().or_else(|| document.scenes().next());
-    for node in scene.iter().flat_map(|scene| scene.nodes()) {
-        nest.node(&node, DMat4::IDENTITY, 0)?;
+    let buffers = buffers(path, &document, binary)?;
+    let mut walk = Walk { document: &document, buffers, mesh: Mesh::default(), budget: 1 << 20 };
+    let scene = document.scenes.get(document.scene.unwrap_or(0));
+    let roots = scene.map_or(&[][..], |scene| &scene.nodes);
+    for root in roots {
+        walk.node(*root, DMat4::IDENTITY, 0).map_err(|problem| damaged(problem.to_owned()))?;
     }
-    Ok(nest.mesh)
+    Ok(walk.mesh)
 }
 
-fn buffers(
-    path: &Path,
-    document: &Document,
-    mut blob: Option<Vec<u8>>,
-) -> Result<Vec<Vec<u8>>, Error> {
+fn buffers(path: &Path, document: &Document, binary: &[u8]) -> Result<Vec<Vec<u8>>, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut buffers = Vec::new();
-    for buffer in document.buffers() {
-        let bytes = match buffer.source() {
-            Source::Bin => blob.take(),
-            Source::Uri(uri) => match uri.strip_prefix("data:") {
-                Some(inline) => {
-                    inline.split_once(";base64,").and_then(|(_, text)| STANDARD.decode(text).ok())
-                }
+    for (index, buffer) in document.buffers.iter().enumerate() {
+        let bytes = match buffer.uri.as_deref() {
+            None => binary.to_vec(),
+            Some(uri) => match uri.strip_prefix("data:") {
+                Some(inline) => inline
+                    .split_once(";base64,")
+                    .and_then(|(_, text)| STANDARD.decode(text).ok())
+                    .unwrap_or_default(),
                 None => {
                     let beside = folder.join(uri.replace("%20", " "));
-                    let bytes = std::fs::read(&beside);
-                    Some(bytes.map_err(|source| Error::Unreadable { path: beside, source })?)
+                    std::fs::read(&beside)
+                        .map_err(|source| Error::Unreadable { path: beside, source })?
                 }
             },
         };
-        match bytes {
-            Some(bytes) if bytes.len() >= buffer.length() => buffers.push(bytes),
-            _ => {
-                let problem = format!("its buffer {} is incomplete", buffer.index());
-                return Err(Error::mesh(path, problem, DAMAGED));
-            }
+        if bytes.len() < buffer.byte_length {
+            return Err(Error::mesh(path, format!("its buffer {index} is incomplete"), DAMAGED));
         }
+        buffers.push(bytes);
     }
     Ok(buffers)
 }
 
+/// What is wrong, where something is.
+type Checked<T> = Result<T, &'static str>;
+
 /// The walk down the nodes.
-struct Nest<'a> {
-    path: &'a Path,
+struct Walk<'a> {
+    document: &'a Document,
     buffers: Vec<Vec<u8>>,
     mesh: Mesh,
+    /// Nodes that may still be visited: a graph that is no tree would never end.
+    budget: usize,
 }
 
-impl Nest<'_> {
-    fn node(&mut self, node: &Node<'_>, parent: DMat4, depth: usize) -> Result<(), Error> {
-        if depth > DEEPEST {
-            let problem = format!("its nodes nest deeper than {DEEPEST}");
-            return Err(Error::mesh(self.path, problem, DAMAGED));
+impl Walk<'_> {
+    fn node(&mut self, index: usize, parent: DMat4, depth: usize) -> Checked<()> {
+        let node = self.document.nodes.get(index).ok_or("names a node that is not there")?;
+        self.budget = self.budget.saturating_sub(1);
+        if depth > DEEPEST || self.budget == 0 {
+            return Err("has nodes that contain each other");
         }
-        let own = node.transform().matrix().map(|column| column.map(f64::from));
-        let place = parent * DMat4::from_cols_array_2d(&own);
-        for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
-            self.primitive(&primitive, place)?;
+        let place = parent * placement(node);
+        if let Some(mesh) = node.mesh {
+            let mesh = self.document.meshes.get(mesh).ok_or("names a mesh that is not there")?;
+            for primitive in &mesh.primitives {
+                self.primitive(primitive, place)?;
+            }
         }
-        for child in node.children() {
-            self.node(&child, place, depth + 1)?;
+        for child in &node.children {
+            self.node(*child, place, depth + 1)?;
         }
         Ok(())
     }
 
-    fn primitive(&mut self, primitive: &gltf::Primitive<'_>, place: DMat4) -> Result<(), Error> {
-        if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+    fn primitive(&mut self, primitive: &Primitive, place: DMat4) -> Checked<()> {
+        const TRIANGLES: u32 = 4;
+        const STRIP: u32 = 5;
+        const FAN: u32 = 6;
+        if !(TRIANGLES..=FAN).contains(&primitive.mode) {
             return Ok(());
         }
-        let damaged = |problem: &str| Err(Error::mesh(self.path, problem, DAMAGED));
-        // The accessors are checked first: their iterators index the buffers unasked.
-        for accessor in primitive.indices().into_iter().chain(primitive.attributes().map(|a| a.1)) {
-            let fits = accessor.view().is_none_or(|view| {
-                let stride = view.stride().unwrap_or(accessor.size());
-                let span = accessor.count().saturating_sub(1).saturating_mul(stride);
-                let end = accessor.offset().saturating_add(span).saturating_add(accessor.size());
-                let buffer = self.buffers.get(view.buffer().index());
-                end <= view.length()
-                    && buffer
-                        .is_some_and(|b| view.offset().saturating_add(view.length()) <= b.len())
-            });
-            if !fits {
-                return damaged("an accessor reaches beyond its buffer");
-            }
-            if accessor.sparse().is_some() {
-                return Err(Error::mesh(
-                    self.path,
-                    "uses sparse accessors, which are not read here",
-                    "export it without morph targets",
-                ));
-            }
-        }
-        let reader = primitive.reader(|buffer| self.buffers.get(buffer.index()).map(Vec::as_slice));
-        let Some(positions) = reader.read_positions() else {
-            return damaged("a primitive has no positions");
-        };
-        let positions: Vec<[f32; 3]> = positions.collect();
-        let indices: Vec<u32> = match reader.read_indices() {
-            Some(indices) => indices.into_u32().collect(),
+        let positions =
+            primitive.attributes.get("POSITION").ok_or("has a surface without positions")?;
+        let positions = self.positions(*positions)?;
+        let shift = u32::try_from(self.mesh.vertices.len()).map_err(|_| "has too many vertices")?;
+        let corners: Vec<u32> = match primitive.indices {
+            Some(accessor) => self.indices(accessor)?,
             None => (0..positions.len() as u32).collect(),
         };
-        let shift = self.mesh.vertices.len() as u32;
-        self.mesh.vertices.extend(positions.iter().map(|position| {
-            place.transform_point3(DVec3::from(position.map(f64::from))).to_array()
-        }));
-        let own = primitive.material();
-        let material = self.mesh.material(own.name().unwrap_or(""));
-        let [red, green, blue, _] = own.pbr_metallic_roughness().base_color_factor().map(f64::from);
-        // A texture hides the colour factor; without one the factor is the colour.
-        let textured = own.pbr_metallic_roughness().base_color_texture().is_some();
-        if own.index().is_some() && !textured {
-            self.mesh.diffuse_guesses[material as usize] = Some(luminance([red, green, blue]));
+        // A corner beyond the positions of its own surface must not reach into another's.
+        if corners.iter().any(|corner| *corner as usize >= positions.len()) {
+            return Err("has a triangle with a corner that is not there");
         }
-        let corners: Vec<u32> = indices.iter().map(|index| shift.saturating_add(*index)).collect();
-        match primitive.mode() {
-            Mode::TriangleStrip => {
-                corners.windows(3).for_each(|three| self.mesh.polygon(three, material));
-            }
-            Mode::TriangleFan => self.mesh.polygon(&corners, material),
+        let corners: Vec<u32> =
+            corners.into_iter().map(|corner| corner.saturating_add(shift)).collect();
+        let place = |position: [f64; 3]| place.transform_point3(DVec3::from(position)).to_array();
+        self.mesh.vertices.extend(positions.into_iter().map(place));
+        let material = self.material(primitive.material)?;
+        match primitive.mode {
+            STRIP => corners.windows(3).for_each(|three| self.mesh.polygon(three, material)),
+            FAN => self.mesh.polygon(&corners, material),
             _ => corners.chunks_exact(3).for_each(|three| self.mesh.polygon(three, material)),
         }
         Ok(())
+    }
+
+    fn material(&mut self, index: Option<usize>) -> Checked<u16> {
+        let Some(index) = index else { return Ok(self.mesh.material("")) };
+        let own = self.document.materials.get(index).ok_or("names a material that is not there")?;
+        let material = self.mesh.material(&own.name);
+        // A texture hides the colour factor; without one the factor is the colour.
+        if own.colour.texture.is_none() {
+            let [red, green, blue, _] = own.colour.factor;
+            self.mesh.diffuse_guesses[material as usize] = Some(luminance([red, green, blue]));
+        }
+        Ok(material)
+    }
+
+    fn positions(&self, index: usize) -> Checked<Vec<[f64; 3]>> {
+        let accessor = self.accessor(index)?;
+        const FLOAT: u32 = 5126;
+        if (accessor.component_type, accessor.shape.as_str()) != (FLOAT, "VEC3") {
+            return Err("has positions that are not three floats");
+        }
+        let position = |bytes: &[u8]| {
+            let (numbers, _) = bytes.as_chunks::<4>();
+            [0, 1, 2].map(|axis| {
+                numbers.get(axis).map_or(f64::NAN, |n| f64::from(f32::from_le_bytes(*n)))
+            })
+        };
+        Ok(self.elements(accessor, 12)?.map(position).collect())
+    }
+
+    fn indices(&self, index: usize) -> Checked<Vec<u32>> {
+        let accessor = self.accessor(index)?;
+        let size = match (accessor.component_type, accessor.shape.as_str()) {
+            (5121, "SCALAR") => 1,
+            (5123, "SCALAR") => 2,
+            (5125, "SCALAR") => 4,
+            _ => return Err("has indices that are not unsigned integers"),
+        };
+        let number =
+            |bytes: &[u8]| bytes.iter().rev().fold(0, |sum: u32, byte| sum << 8 | u32::from(*byte));
+        Ok(self.elements(accessor, size)?.map(number).collect())
+    }
+
+    fn accessor(&self, index: usize) -> Checked<&Accessor> {
+        let accessor =
+            self.document.accessors.get(index).ok_or("names an accessor that is not there")?;
+        match accessor.sparse {
+            Some(_) => Err("uses sparse accessors, which are not read here"),
+            None => Ok(accessor),
+        }
+    }
+
+    /// The bytes of each element of an accessor, `size` at a time.
+    fn elements(&self, accessor: &Accessor, size: usize) -> Checked<impl Iterator<Item = &[u8]>> {
+        const BEYOND: &str = "has an accessor that reaches beyond its buffer";
+        let view = accessor.buffer_view.and_then(|view| self.document.buffer_views.get(view));
+        let view = view.ok_or("has an accessor without a buffer")?;
+        let buffer = self.buffers.get(view.buffer).ok_or(BEYOND)?;
+        let end = view.byte_offset.checked_add(view.byte_length).ok_or(BEYOND)?;
+        let bytes = buffer.get(view.byte_offset..end).ok_or(BEYOND)?;
+        let bytes = bytes.get(accessor.byte_offset..).ok_or(BEYOND)?;
+        let stride = view.byte_stride.unwrap_or(size).max(size);
+        let fits = match accessor.count.checked_sub(1) {
+            None => true,
+            Some(steps) => steps
+                .checked_mul(stride)
+                .and_then(|span| span.checked_add(size))
+                .is_some_and(|span| span <= bytes.len()),
+        };
+        if !fits {
+            return Err(BEYOND);
+        }
+        Ok(bytes.chunks(stride).take(accessor.count).map(move |element| &element[..size]))
+    }
+}
+
+/// The transform of a node: a matrix by columns, or scale, then rotation, then translation.
+fn placement(node: &Node) -> DMat4 {
+    match &node.matrix {
+        Some(columns) => DMat4::from_cols_array(columns),
+        None => DMat4::from_scale_rotation_translation(
+            DVec3::from(node.scale),
+            glam::DQuat::from_array(node.rotation),
+            DVec3::from(node.translation),
+        ),
     }
 }
