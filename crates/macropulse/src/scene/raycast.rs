@@ -109,8 +109,8 @@ impl Facets {
                     if right < left { (first + 1, first) } else { (first, first + 1) };
                 // Written always and kept only if both are entered: no branch to mispredict.
                 stack[waiting] = far as u32;
-                waiting += usize::from(left.max(right) < f32::INFINITY);
-                if left < f32::INFINITY || right < f32::INFINITY {
+                waiting += usize::from((left < f32::INFINITY) & (right < f32::INFINITY));
+                if (left < f32::INFINITY) | (right < f32::INFINITY) {
                     index = near;
                     continue;
                 }
