@@ -307,7 +307,7 @@ fn canopy(mesh: &mut Mesh) {
     });
 }
 
-/// A monotone cubic through `knots` (abscissa ascending) \[FC80\]; constant beyond its ends.
+/// A monotone cubic through `knots` (abscissa ascending) \[FB84\]; constant beyond its ends.
 pub(super) fn smooth(knots: &[(f64, f64)], x: f64) -> f64 {
     let last = knots.len() - 1;
     let index = knots.partition_point(|knot| knot.0 <= x);

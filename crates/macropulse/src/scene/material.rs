@@ -5,8 +5,6 @@
 //! gains are engineering estimates. They set how bright things are relative to each other, not a
 //! calibrated reflectance. Each can be overridden in a scene file.
 
-use std::f64::consts::PI;
-
 /// A surface as a monostatic lidar sees it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
@@ -48,10 +46,10 @@ impl Material {
     }
 
     /// Height of the lobe of a surface that mirrors the fraction `mirrored` of the light into a
-    /// lobe of exponent `gloss`: `ρ_s = F·(g+2)/8`, the half-vector lobe that keeps the energy,
-    /// relative to `1/π`.
+    /// lobe of exponent `gloss`: `ρ_s = F·(g+2)/8`, that is `π·F·D/4` for the normal distribution
+    /// `D = (g+2)/2π · cosᵍ` that keeps the energy \[WMLT07\].
     pub fn lobe_height(mirrored: f64, gloss: f64) -> f64 {
-        mirrored * (gloss + 2.0) / (8.0 * PI) * PI
+        mirrored * (gloss + 2.0) / 8.0
     }
 }
 
