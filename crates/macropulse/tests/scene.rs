@@ -424,3 +424,82 @@ fn damaged_files_never_panic() {
     }
     assert!(read > 100 && refused > 500, "{read} read, {refused} refused");
 }
+
+/// A box of 2 × 3 × 1 m, as quadrilaterals, about its middle.
+fn box_obj() -> String {
+    let corner = |index: u32| {
+        let side = |bit: u32, half: f64| if index >> bit & 1 == 1 { half } else { -half };
+        format!("v {} {} {}\n", side(0, 1.0), side(1, 1.5), side(2, 0.5))
+    };
+    let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    (0..8).map(corner).collect::<String>() + faces
+}
+
+/// A sphere of radius 2 m, finely tessellated.
+fn sphere_obj(rows: u32) -> String {
+    use std::f64::consts::PI;
+    let mut text = String::new();
+    for index in 0..(rows + 1) * 2 * rows {
+        let (row, column) = (f64::from(index / (2 * rows)), f64::from(index % (2 * rows)));
+        let (polar, around) = (PI * row / f64::from(rows), PI * column / f64::from(rows));
+        let (x, y) = (polar.sin() * around.cos(), polar.sin() * around.sin());
+        text += &format!("v {} {} {}\n", 2.0 * x, 2.0 * y, 2.0 * polar.cos());
+    }
+    for index in 0..rows * 2 * rows {
+        let (row, column) = (index / (2 * rows), index % (2 * rows));
+        let at = |row: u32, column: u32| row * 2 * rows + column % (2 * rows) + 1;
+        let [a, b] = [at(row, column), at(row + 1, column)];
+        let [c, d] = [at(row + 1, column + 1), at(row, column + 1)];
+        text += &format!("f {a} {b} {c} {d}\n");
+    }
+    text
+}
+
+/// 20 000 rays of seed 5 from all sides, at a body about (10, 0, 0) with a reach of 3 m.
+fn rays_from_all_sides() -> impl Iterator<Item = Ray> {
+    use rand::{RngExt, SeedableRng};
+    let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    (0..20_000).map(move |_| {
+        let mut around = |reach: f64| [0; 3].map(|_| chance.random_range(-reach..reach));
+        let (from, aim) = (around(40.0), around(2.5));
+        let way = [aim[0] + 10.0 - from[0], aim[1] - from[1], aim[2] - from[2]];
+        let length = way.iter().map(|part| part * part).sum::<f64>().sqrt();
+        Ray { origin: from, direction: way.map(|part| part / length) }
+    })
+}
+
+#[test]
+fn meshes_and_formulas_agree() {
+    let files =
+        folder(&[("box.obj", box_obj().as_bytes()), ("ball.obj", sphere_obj(200).as_bytes())]);
+    let pose = "position_m = [10, 0, 0]\nyaw_deg = 30\npitch_deg = 20\nroll_deg = -50\nmaterial = \"white\"";
+    let pair = |mesh: &str, shape: &str| {
+        [mesh, shape].map(|kind| object(files.path(), &format!("{kind}\n{pose}")).unwrap())
+    };
+    // The chord of a step of π/200 lies at most this far within the sphere, along its normal.
+    let sagitta = 2.0 * (1.0 - (std::f64::consts::PI / 400.0).cos()) * 2.0;
+    for (mesh, shape, tolerance, grazing) in [
+        ("mesh = \"box.obj\"", "shape = { box = { size_m = [2, 3, 1] } }", 1e-6, 0),
+        ("mesh = \"ball.obj\"", "shape = { sphere = { radius_m = 2 } }", sagitta, 10),
+    ] {
+        let [meshed, exact] = pair(mesh, shape);
+        let (mut hits, mut disagreements) = (0, 0);
+        for ray in rays_from_all_sides() {
+            match (meshed.cast(&ray, 0.0, 1e3), exact.cast(&ray, 0.0, 1e3)) {
+                (Some(meshed), Some(exact)) => {
+                    hits += 1;
+                    let along = |normal: [f64; 3]| {
+                        (0..3).map(|axis| normal[axis] * ray.direction[axis]).sum::<f64>()
+                    };
+                    // Along the normal, not along the ray: a grazing ray stretches any gap.
+                    let gap = (meshed.range - exact.range) * along(exact.normal);
+                    assert!(gap.abs() < tolerance, "{ray:?} {meshed:?} {exact:?}");
+                }
+                (None, None) => {}
+                _ => disagreements += 1,
+            }
+        }
+        assert!(hits > 3000, "{hits}");
+        assert!(disagreements <= grazing, "{mesh}: {disagreements} of {hits}");
+    }
+}
