@@ -37,7 +37,9 @@ pub(super) fn decode(
     let mut band = Band::new(receiver, sent, ticks);
     for tick in &ticks.tick {
         let tick = ticks.epoch + i64::from(*tick);
-        if band.queue.has(tick) && let Some(macropulse) = band.recognise(tick) {
+        if band.queue.has(tick)
+            && let Some(macropulse) = band.recognise(tick)
+        {
             band.settle(&macropulse, opening);
         }
     }
@@ -172,9 +174,7 @@ impl<'a> Band<'a> {
         let is_lit = |found: u16| found >= self.receiver.bit_threshold;
         let payload = found.iter().fold(0, |bits, &found| bits << 1 | u32::from(is_lit(found)));
         let label = match self.codebook.payload() {
-            Some(payload_format) => {
-                Some(payload_format.check(payload).map_err(|_| Reject::Crc)?)
-            }
+            Some(payload_format) => Some(payload_format.check(payload).map_err(|_| Reject::Crc)?),
             None => None,
         };
         let start = macropulse.start - i64::from(dark) * self.bit_length;
@@ -210,8 +210,7 @@ impl<'a> Band<'a> {
     fn dequeue(&mut self, macropulse: &Macropulse, dark: u32) {
         let slack = i64::from(self.slack);
         let own = macropulse.found.iter().take((self.bits - dark) as usize);
-        for (bit, _) in
-            own.enumerate().filter(|&(_, &found)| found >= self.receiver.bit_threshold)
+        for (bit, _) in own.enumerate().filter(|&(_, &found)| found >= self.receiver.bit_threshold)
         {
             let start = macropulse.start + bit as i64 * self.bit_length;
             for mark in &self.words[usize::from(macropulse.word)] {
@@ -248,8 +247,7 @@ impl<'a> Band<'a> {
         for shot in self.log.home.clone() {
             let Some(claim) = self.claims[shot] else { continue };
             let start = self.fired[shot] + claim.lag;
-            let marks =
-                self.codebook.marks(self.log.label[shot], self.log.word[shot]).len() as u16;
+            let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]).len() as u16;
             self.returns.push(Return {
                 shot,
                 tof: self.receiver.tof(self.log.fired_at_fs[shot], start),

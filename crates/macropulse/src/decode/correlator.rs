@@ -44,24 +44,18 @@ impl Counts {
     pub fn new(timeline: &Timeline, first: i64, marks: impl ExactSizeIterator<Item = i64>) -> Self {
         let used = (usize::BITS - marks.len().leading_zeros()) as usize;
         let mut counts = Self { planes: [[0; LANES]; PLANES], used: used.min(PLANES) };
-        let mut places = marks.map(|mark| lanes_from(timeline, first + mark));
-        let [mut ones, mut twos, mut fours] = [[0; LANES]; 3];
-        // Seven adders take eight bits in and give one bit of weight eight: most of the work
-        // stays in the three lowest planes.
-        while places.len() >= 8 {
-            let mut next = || places.next().unwrap_or([0; LANES]);
-            let a = add(&mut ones, next(), next());
-            let b = add(&mut ones, next(), next());
-            let c = add(&mut twos, a, b);
-            let a = add(&mut ones, next(), next());
-            let b = add(&mut ones, next(), next());
-            let d = add(&mut twos, a, b);
-            let eights = add(&mut fours, c, d);
+        let mut low = [[0; LANES]; 3];
+        let mut places = marks.map(|mark| first + mark);
+        while places.len() >= EIGHT {
+            let ticks = std::array::from_fn(|_| places.next().unwrap_or(first));
+            let eights = add_eight(&mut low, timeline, ticks);
             counts.carry(3, eights);
         }
-        counts.planes[..3].copy_from_slice(&[ones, twos, fours]);
-        for place in places {
-            counts.carry(0, place);
+        counts.planes[..3].copy_from_slice(&low);
+        for tick in places {
+            let mut bits = [0; LANES];
+            read(timeline, tick, &mut bits);
+            counts.carry(0, bits);
         }
         counts
     }
@@ -89,13 +83,13 @@ impl Counts {
     }
 
     fn highest(&self, mut places: Lanes) -> Option<(i64, u16)> {
-        if places == [0; LANES] {
+        if is_dark(&places) {
             return None;
         }
         let mut count = 0;
         for (weight, plane) in self.planes[..self.used].iter().enumerate().rev() {
             let lit: Lanes = std::array::from_fn(|lane| places[lane] & plane[lane]);
-            if lit != [0; LANES] {
+            if !is_dark(&lit) {
                 places = lit;
                 count |= 1 << weight;
             }
@@ -105,27 +99,64 @@ impl Counts {
     }
 }
 
-/// Adds two bits to `sum`; what is carried to the next plane.
-#[inline(always)]
-fn add(sum: &mut Lanes, a: Lanes, b: Lanes) -> Lanes {
-    let mut carried = [0; LANES];
-    for lane in 0..LANES {
-        let half = sum[lane] ^ a[lane];
-        carried[lane] = (sum[lane] & a[lane]) | (half & b[lane]);
-        sum[lane] = half ^ b[lane];
+/// Marks that are added in one go.
+const EIGHT: usize = 8;
+
+/// Adds the blocks at eight `ticks` to the planes of weight one, two and four; what is carried to
+/// the plane of weight eight. Seven adders take eight bits in and give one bit out, so that most
+/// of the work stays in the three lowest planes.
+fn add_eight(low: &mut [Lanes; 3], timeline: &Timeline, ticks: [i64; EIGHT]) -> Lanes {
+    // Plain loops over the lanes, one thing at a time: compilers turn these into vectors.
+    let mut bits = [[0; LANES]; EIGHT];
+    for (bits, tick) in bits.iter_mut().zip(ticks) {
+        read(timeline, tick, bits);
     }
+    let [ones, twos, fours] = low;
+    let mut eights = [0; LANES];
+    for lane in 0..LANES {
+        let a = add(&mut ones[lane], bits[0][lane], bits[1][lane]);
+        let b = add(&mut ones[lane], bits[2][lane], bits[3][lane]);
+        let c = add(&mut twos[lane], a, b);
+        let a = add(&mut ones[lane], bits[4][lane], bits[5][lane]);
+        let b = add(&mut ones[lane], bits[6][lane], bits[7][lane]);
+        let d = add(&mut twos[lane], a, b);
+        eights[lane] = add(&mut fours[lane], c, d);
+    }
+    eights
+}
+
+/// Reads [`BLOCK`] ticks from `tick` on.
+#[inline(always)]
+fn read(timeline: &Timeline, tick: i64, lanes: &mut Lanes) {
+    match timeline.block::<{ LANES + 1 }>(tick) {
+        Some((words, shift)) => {
+            for lane in 0..LANES {
+                // Two shifts, because a shift by 64 does not give 0.
+                lanes[lane] = words[lane] >> shift | words[lane + 1] << 1 << (63 - shift);
+            }
+        }
+        None => read_at_edge(timeline, tick, lanes),
+    }
+}
+
+#[cold]
+fn read_at_edge(timeline: &Timeline, tick: i64, lanes: &mut Lanes) {
+    for (lane, bits) in lanes.iter_mut().enumerate() {
+        *bits = timeline.from(tick + 64 * lane as i64);
+    }
+}
+
+/// Adds two bits to `sum`, in each of 64 lags; what is carried to the next plane.
+#[inline(always)]
+fn add(sum: &mut u64, a: u64, b: u64) -> u64 {
+    let half = *sum ^ a;
+    let carried = (*sum & a) | (half & b);
+    *sum = half ^ b;
     carried
 }
 
-/// [`BLOCK`] ticks from `tick` on.
-#[inline(always)]
-fn lanes_from(timeline: &Timeline, tick: i64) -> Lanes {
-    match timeline.block::<{ LANES + 1 }>(tick) {
-        Some((words, shift)) => std::array::from_fn(|lane| {
-            words[lane] >> shift | words[lane + 1] << 1 << (63 - shift)
-        }),
-        None => std::array::from_fn(|lane| timeline.from(tick + 64 * lane as i64)),
-    }
+fn is_dark(lanes: &Lanes) -> bool {
+    lanes.iter().fold(0, |any, lane| any | lane) == 0
 }
 
 /// The offsets of `range` that lie in a block, one bit each.

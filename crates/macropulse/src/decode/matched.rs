@@ -33,14 +33,8 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
             band.lock(shot, lock);
         }
     }
-    let faint = band.search_bright();
-    for shot in faint {
-        if let Some(lock) = band.searched(shot)
-            && band.is_believed(shot, lock)
-        {
-            band.lock(shot, lock);
-        }
-    }
+    band.search(Brightness::HalfTheMarks);
+    band.search(Brightness::AsChanceAllows);
     band.contest();
     band.returns()
 }
@@ -51,6 +45,13 @@ struct Lock {
     lag: i64,
     count: u16,
     margin: u16,
+}
+
+/// How bright a shot must be to be searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Brightness {
+    HalfTheMarks,
+    AsChanceAllows,
 }
 
 struct Band<'a> {
@@ -64,8 +65,8 @@ struct Band<'a> {
     /// Length of the stretch in which a mark may be found, in ticks.
     width: u32,
     ticks: Timeline,
-    /// Lit where a mark counts as found.
-    seen: Timeline,
+    /// Lit where a mark counts as found, unless that is where the ticks are.
+    dilated: Option<Timeline>,
     density: Density,
     unexplained: Unexplained,
     thresholds: Thresholds,
@@ -81,7 +82,7 @@ impl<'a> Band<'a> {
         let fired: Vec<i64> = (0..log.len()).map(|shot| receiver.fired(log, shot)).collect();
         let ticks = receiver.timeline(codebook, &fired, ticks);
         let width = window(receiver.jitter_ticks);
-        let seen = ticks.dilated(0, width - 1);
+        let dilated = (width > 1).then(|| ticks.dilated(0, width - 1));
         let (nearest, farthest) = receiver.gate_ticks;
         let lags = f64::from(farthest.saturating_sub(nearest)) + 1.0;
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
@@ -91,7 +92,7 @@ impl<'a> Band<'a> {
             log,
             above: above(log),
             width,
-            density: Density::new(&seen),
+            density: Density::new(dilated.as_ref().unwrap_or(&ticks)),
             unexplained: Unexplained::new(ticks.clone()),
             thresholds: Thresholds::new(lags, receiver.false_alarm),
             bit_thresholds: Thresholds::new(f64::from(bits), receiver.false_alarm),
@@ -99,8 +100,13 @@ impl<'a> Band<'a> {
             locks: vec![None; fired.len()],
             fired,
             ticks,
-            seen,
+            dilated,
         }
+    }
+
+    /// Lit where a mark counts as found.
+    fn seen(&self) -> &Timeline {
+        self.dilated.as_ref().unwrap_or(&self.ticks)
     }
 
     /// The marks of `shot`, in ticks from its start.
@@ -123,8 +129,7 @@ impl<'a> Band<'a> {
             None => (1, 1),
         };
         let length = self.codebook.word(word).length * self.receiver.ticks_per_chip;
-        (0..bits)
-            .map(move |bit| (payload >> (bits - 1 - bit) & 1 == 1, i64::from(bit * length)))
+        (0..bits).map(move |bit| (payload >> (bits - 1 - bit) & 1 == 1, i64::from(bit * length)))
     }
 
     /// Length of a macropulse, in ticks.
@@ -170,27 +175,44 @@ impl<'a> Band<'a> {
     }
 
     /// The highest peak that can be climbed to from `lag`.
+    ///
+    /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
+    /// not have all its marks may be one of them: then the blocks to both sides are seen, too.
     fn best_near(&self, shot: usize, lag: i64) -> Option<Lock> {
         const STEPS: usize = 64;
-        let (nearest, farthest) = self.gate();
-        let mut first = lag - BLOCK / 2;
-        let mut best = None;
+        let weight = self.weight(shot);
+        let mut best = self.best_in_block(shot, lag)?;
+        let mut middle = lag;
         for _ in 0..STEPS {
-            let counts = Counts::new(&self.seen, self.fired[shot] + first, self.marks(shot));
-            let allowed = nearest - first..farthest + 1 - first;
-            let peak = counts.peak(allowed, i64::from(self.width))?;
-            best = Some(Lock {
-                lag: first + peak.at,
-                count: peak.count,
-                margin: peak.count - peak.next,
-            });
-            // A peak far from the middle may be the flank of a higher one outside.
-            if (peak.at - BLOCK / 2).abs() <= BLOCK / 8 {
+            if best.lag.abs_diff(middle) > BLOCK as u64 / 8 {
+                middle = best.lag;
+                best = self.best_in_block(shot, middle)?;
+                continue;
+            }
+            if best.count == weight {
                 break;
             }
-            first += peak.at - BLOCK / 2;
+            let sides = [middle - BLOCK, middle + BLOCK];
+            let sides = sides.map(|side| self.best_in_block(shot, side));
+            let higher = sides.into_iter().flatten().find(|side| {
+                side.count > best.count || (side.count == best.count && side.lag < best.lag)
+            });
+            match higher {
+                Some(side) => best = side,
+                None => break,
+            }
         }
-        best
+        Some(best)
+    }
+
+    /// The highest peak in the [`BLOCK`] around `middle`.
+    fn best_in_block(&self, shot: usize, middle: i64) -> Option<Lock> {
+        let (nearest, farthest) = self.gate();
+        let first = middle - BLOCK / 2;
+        let counts = Counts::new(self.seen(), self.fired[shot] + first, self.marks(shot));
+        let peak = counts.peak(nearest - first..farthest + 1 - first, self.width.into())?;
+        let margin = peak.count - peak.next;
+        Some(Lock { lag: first + peak.at, count: peak.count, margin })
     }
 
     /// Whether half of the marks were found and no lit bit is much darker than the others.
@@ -202,7 +224,7 @@ impl<'a> Band<'a> {
         let lit = self.bits(shot).filter(|(lit, _)| *lit);
         2 * lock.count >= weight
             && lit.clone().all(|(_, bit)| {
-                let found = self.found_in_bit(shot, lock.lag + bit, &self.seen);
+                let found = self.found_in_bit(shot, lock.lag + bit, self.seen());
                 2 * u32::from(found) * lit.clone().count() as u32 >= u32::from(lock.count)
             })
             && self.is_believed(shot, lock)
@@ -219,19 +241,23 @@ impl<'a> Band<'a> {
 
     /// Share of lit places around a shot found at `lock`, its own marks apart.
     fn density_around(&self, shot: usize, lock: Lock) -> f64 {
+        let own = [lock.count, self.weight(shot)].map(|marks| u32::from(marks) * self.width);
         let start = self.fired[shot] + lock.lag;
-        self.density.over(start..start + self.length(), u32::from(lock.count) * self.width)
+        self.density.without(start..start + self.length(), own.into())
     }
 
     /// Share of lit places in the gate of `shot`.
     fn density_in_gate(&self, shot: usize) -> f64 {
         let (nearest, farthest) = self.gate();
-        self.density.over(self.fired[shot] + nearest..self.fired[shot] + farthest + 1, 0)
+        self.density.over(self.fired[shot] + nearest..self.fired[shot] + farthest + 1)
     }
 
     /// Whether chance reaches `lock` at no lag of the gate, be it as dense as around the lock.
+    /// The marks found count among the light around: chance finds most where there is most.
     fn is_believed(&mut self, shot: usize, lock: Lock) -> bool {
-        let density = self.density_in_gate(shot).max(self.density_around(shot, lock));
+        let start = self.fired[shot] + lock.lag;
+        let around = self.density.over(start..start + self.length());
+        let density = self.density_in_gate(shot).max(around);
         lock.count >= self.thresholds.least(self.weight(shot), density)
     }
 
@@ -244,25 +270,27 @@ impl<'a> Band<'a> {
         self.locks[shot] = Some(lock);
     }
 
-    /// Searches all unexplained light for the shots that have no lag yet. Those with half of
-    /// their marks are kept at once, the fainter ones are handed back.
-    fn search_bright(&mut self) -> Vec<usize> {
-        let mut faint = Vec::new();
+    /// Searches the unexplained light for the shots that have no lag yet.
+    fn search(&mut self, brightness: Brightness) {
         for shot in 0..self.log.len() {
             if self.locks[shot].is_some() {
                 continue;
             }
-            if let Some(lock) = self.predicted(shot) {
+            let least = match brightness {
+                Brightness::HalfTheMarks => self.weight(shot).div_ceil(2),
+                Brightness::AsChanceAllows => 1,
+            };
+            let lock = match self.predicted(shot) {
+                Some(lock) => Some(lock),
+                None => self.searched(shot, least),
+            };
+            if let Some(lock) = lock
+                && lock.count >= least
+                && self.is_believed(shot, lock)
+            {
                 self.lock(shot, lock);
-            } else if let Some(lock) = self.searched(shot) {
-                if 2 * lock.count >= self.weight(shot) && self.is_believed(shot, lock) {
-                    self.lock(shot, lock);
-                } else {
-                    faint.push(shot);
-                }
             }
         }
-        faint
     }
 
     /// Gives a shot the lag that unexplained light speaks for, where it fits better.
@@ -274,7 +302,7 @@ impl<'a> Band<'a> {
             if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
                 continue;
             }
-            if let Some(rival) = self.searched(shot)
+            if let Some(rival) = self.searched(shot, lock.count / 2)
                 && rival.count > lock.count
                 && self.is_believed(shot, rival)
             {
@@ -305,8 +333,9 @@ impl<'a> Band<'a> {
     }
 
     /// The lag at which most marks of `shot` are found, out of all that unexplained ticks speak
-    /// for. `None` where chance could as well have put them there.
-    fn searched(&mut self, shot: usize) -> Option<Lock> {
+    /// for. `None` where these are fewer than `at_least` or chance could as well have put them
+    /// there.
+    fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
         let (nearest, farthest) = self.gate();
         let weight = self.weight(shot);
         if weight == 0 || farthest < nearest {
@@ -319,7 +348,7 @@ impl<'a> Band<'a> {
         // visible.
         let density = self.density_in_gate(shot);
         let visible = self.thresholds.least(weight, density).div_ceil(2);
-        let least = self.thresholds.least(weight, left_over).max(visible);
+        let least = self.thresholds.least(weight, left_over).max(visible).max(at_least);
         if !self.is_crowded(shot, least) {
             return None;
         }
@@ -380,7 +409,7 @@ impl<'a> Band<'a> {
             if lit && lock.count == self.weight(shot) {
                 continue;
             }
-            let timeline = if lit { &self.seen } else { left_over };
+            let timeline = if lit { self.seen() } else { left_over };
             let found = self.found_in_bit(shot, lock.lag + bit, timeline);
             let half = 2.0 * f64::from(found) >= mean;
             let wrong = if lit {

@@ -86,15 +86,14 @@ impl Receiver {
         let (first, last) = (fired.first().unwrap_or(&0), fired.last().unwrap_or(&0));
         let open = first + i64::from(nearest);
         let closed = last + i64::from(farthest) + i64::from(length) + 1;
-        let span = open.max(absolute(ticks.tick.first()))
-            ..closed.min(absolute(ticks.tick.last()) + 1);
+        let span =
+            open.max(absolute(ticks.tick.first()))..closed.min(absolute(ticks.tick.last()) + 1);
         Timeline::new(span, ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick)))
     }
 
     /// Two-way time of flight, s, of light that left at `fired_at_fs` and came in tick `tick`.
     fn tof(&self, fired_at_fs: i64, tick: i64) -> f64 {
-        units::s_from_fs(tick * self.tick_fs - fired_at_fs)
-            + 0.5 * units::s_from_fs(self.tick_fs)
+        units::s_from_fs(tick * self.tick_fs - fired_at_fs) + 0.5 * units::s_from_fs(self.tick_fs)
     }
 }
 

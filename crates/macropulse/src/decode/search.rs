@@ -40,7 +40,12 @@ impl Search {
     /// The lag, in ticks from `first`, at which most marks of `sought` are lit in `timeline`; the
     /// earliest of several. A mark also counts if one of the `width` − 1 next ticks is lit.
     /// `None` where no lag has `least` of them.
-    pub fn best(&mut self, timeline: &Timeline, at: (i64, u32), sought: &Sought) -> Option<Candidate> {
+    pub fn best(
+        &mut self,
+        timeline: &Timeline,
+        at: (i64, u32),
+        sought: &Sought,
+    ) -> Option<Candidate> {
         let (first, width) = at;
         let reach = sought.word.last()? + 1;
         let places = sought.lags + sought.bits.last()?;
@@ -81,16 +86,16 @@ impl Search {
                 if lag >= sought.lags {
                     continue;
                 }
-                let words = sought.bits.iter().map(|other| (other, self.votes[reach + lag + other]));
+                let words =
+                    sought.bits.iter().map(|other| (other, self.votes[reach + lag + other]));
                 let mut count = 0;
                 let mut seen_before = false;
                 for (other, votes) in words {
                     seen_before |= other < bit && votes >= needed;
                     count += u16::from(votes);
                 }
-                let better = |best: Candidate| {
-                    count > best.count || (count == best.count && lag < best.lag)
-                };
+                let better =
+                    |best: Candidate| count > best.count || (count == best.count && lag < best.lag);
                 if !seen_before && best.is_none_or(better) {
                     best = Some(Candidate { lag, count });
                 }
@@ -101,7 +106,12 @@ impl Search {
 }
 
 /// Calls `on_tick` with every place, counted from `stretch.0`, at which a mark would count as lit.
-fn for_each_tick(timeline: &Timeline, stretch: (i64, usize), width: u32, mut on_tick: impl FnMut(usize)) {
+fn for_each_tick(
+    timeline: &Timeline,
+    stretch: (i64, usize),
+    width: u32,
+    mut on_tick: impl FnMut(usize),
+) {
     let (first, length) = stretch;
     for start in (0..length).step_by(64) {
         let tick = first + start as i64;
