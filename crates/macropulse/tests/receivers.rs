@@ -4,6 +4,8 @@
 //! Every percentage is over the N shots named in its test, of one fixed seed
 //! (`street::Sensor::ticks`), so that a test either always passes or never does.
 
+#![allow(clippy::unwrap_used)]
+
 #[path = "receivers/street.rs"]
 mod street;
 

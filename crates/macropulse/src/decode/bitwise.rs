@@ -13,7 +13,7 @@
 //! before.
 
 use super::timeline::Timeline;
-use super::{Receiver, Reject, Return, Returns, photons_per_mark};
+use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns, photons_per_mark};
 use crate::code::Codebook;
 use crate::emit::ShotLog;
 use crate::tdc::Ticks;
@@ -95,7 +95,7 @@ impl<'a> Band<'a> {
         };
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
         // Both the opening tick and the mark jitter: √2 σ between them, of which 2 σ are allowed.
-        let slack = (8_f64.sqrt() * receiver.jitter_ticks).min(1023.0);
+        let slack = (8_f64.sqrt() * receiver.jitter_ticks).min(FARTHEST_JITTER);
         let slack = if receiver.jitter_ticks > 0.05 { slack.ceil() as u32 } else { 0 };
         Self {
             receiver,

@@ -13,17 +13,19 @@
 //! A return is believed if chance would not reach its count of marks at any lag of the gate, see
 //! [`super::threshold`].
 
-use std::ops::Range;
+mod leftover;
+mod verdict;
 
 use super::correlator::{BLOCK, Counts};
-use super::search::{Search, Sought};
-use super::threshold::{Thresholds, binomial_tail};
+use super::search::Search;
+use leftover::Brightness;
+
+use super::threshold::Thresholds;
 use super::timeline::{Density, Timeline, Unexplained};
-use super::{Receiver, Reject, Return, Returns, photons_per_mark};
+use super::{FARTHEST_JITTER, Receiver, Returns};
 use crate::code::Codebook;
 use crate::emit::ShotLog;
 use crate::tdc::Ticks;
-use crate::units;
 
 /// Decodes one band.
 pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
@@ -45,13 +47,6 @@ struct Lock {
     lag: i64,
     count: u16,
     margin: u16,
-}
-
-/// How bright a shot must be to be searched for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Brightness {
-    HalfTheMarks,
-    AsChanceAllows,
 }
 
 struct Band<'a> {
@@ -269,199 +264,12 @@ impl<'a> Band<'a> {
         }
         self.locks[shot] = Some(lock);
     }
-
-    /// Searches the unexplained light for the shots that have no lag yet.
-    fn search(&mut self, brightness: Brightness) {
-        for shot in 0..self.log.len() {
-            if self.locks[shot].is_some() {
-                continue;
-            }
-            let least = match brightness {
-                Brightness::HalfTheMarks => self.weight(shot).div_ceil(2),
-                Brightness::AsChanceAllows => 1,
-            };
-            let lock = match self.predicted(shot) {
-                Some(lock) => Some(lock),
-                None => self.searched(shot, least),
-            };
-            if let Some(lock) = lock
-                && lock.count >= least
-                && self.is_believed(shot, lock)
-            {
-                self.lock(shot, lock);
-            }
-        }
-    }
-
-    /// Gives a shot the lag that unexplained light speaks for, where it fits better.
-    fn contest(&mut self) {
-        for shot in 0..self.log.len() {
-            let Some(lock) = self.locks[shot] else { continue };
-            let density = self.density_in_gate(shot);
-            let by_chance = self.thresholds.least(self.weight(shot), density);
-            if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
-                continue;
-            }
-            if let Some(rival) = self.searched(shot, lock.count / 2)
-                && rival.count > lock.count
-                && self.is_believed(shot, rival)
-            {
-                self.lock(shot, rival);
-            }
-        }
-    }
-
-    /// Whether there are so many unexplained ticks within one macropulse somewhere in the gate
-    /// of `shot` that they could be `marks` of its marks.
-    fn is_crowded(&self, shot: usize, marks: u16) -> bool {
-        let needed = u32::from(marks) / self.marks_per_tick();
-        let gate = self.gate_and_macropulse(shot);
-        self.unexplained.at_most(gate.clone()) >= needed
-            && self.unexplained.densest(gate, self.length() as u32) >= needed
-    }
-
-    /// Marks that a single tick may count for, where the window is longer than a chip.
-    fn marks_per_tick(&self) -> u32 {
-        if self.width <= self.receiver.ticks_per_chip { 1 } else { self.width }
-    }
-
-    /// The time in which light of `shot` can arrive.
-    fn gate_and_macropulse(&self, shot: usize) -> Range<i64> {
-        let (nearest, farthest) = self.gate();
-        let end = farthest + self.length() + i64::from(self.width);
-        self.fired[shot] + nearest..self.fired[shot] + end
-    }
-
-    /// The lag at which most marks of `shot` are found, out of all that unexplained ticks speak
-    /// for. `None` where these are fewer than `at_least` or chance could as well have put them
-    /// there.
-    fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
-        let (nearest, farthest) = self.gate();
-        let weight = self.weight(shot);
-        if weight == 0 || farthest < nearest {
-            return None;
-        }
-        let gate = self.gate_and_macropulse(shot);
-        let ticks = self.unexplained.at_most(gate.clone()) * self.width;
-        let left_over = f64::from(ticks) / (gate.end - gate.start) as f64;
-        // Marks under ticks that are explained already are missing here: half are taken to be
-        // visible.
-        let density = self.density_in_gate(shot);
-        let visible = self.thresholds.least(weight, density).div_ceil(2);
-        let least = self.thresholds.least(weight, left_over).max(visible).max(at_least);
-        if !self.is_crowded(shot, least) {
-            return None;
-        }
-        let scale = self.receiver.ticks_per_chip as usize;
-        let word = self.codebook.word(self.log.word[shot]);
-        let sought = Sought {
-            word: word.marks.iter().map(|&mark| scale * usize::from(mark)).collect(),
-            bits: self.bits(shot).filter(|(lit, _)| *lit).map(|(_, bit)| bit as usize).collect(),
-            lags: (farthest - nearest + 1) as usize,
-            least,
-        };
-        let at = (self.fired[shot] + nearest, self.width);
-        let found = self.search.best(self.unexplained.timeline(), at, &sought)?;
-        self.best_near(shot, nearest + found.lag as i64)
-    }
-
-    /// What was found of the home shots.
-    fn returns(mut self) -> Returns {
-        let left_over = self.unexplained.timeline().dilated(0, self.width - 1);
-        let mut returns = Returns::default();
-        for shot in self.log.home.clone() {
-            let Some(lock) = self.locks[shot] else {
-                returns.reject(Reject::NoPeak);
-                continue;
-            };
-            let density = self.density_around(shot, lock);
-            if !self.carries_its_label(shot, lock, (&left_over, density)) {
-                returns.reject(Reject::LabelMismatch);
-                continue;
-            }
-            let marks = self.weight(shot);
-            returns.push(Return {
-                shot,
-                tof: self.tof(shot, lock),
-                peak: lock.count,
-                marks,
-                margin: lock.margin,
-                photons: photons_per_mark(lock.count, marks, density),
-            });
-        }
-        returns
-    }
-
-    /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
-    ///
-    /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it;
-    /// unexplained light only, as other shots may well shine there. A lit bit is dark if it has
-    /// less than half the marks of the others and chance would not take away so many.
-    fn carries_its_label(&mut self, shot: usize, lock: Lock, around: (&Timeline, f64)) -> bool {
-        let (left_over, density) = around;
-        let bits = self.bits(shot);
-        let lit = bits.clone().filter(|(lit, _)| *lit).count() as u32;
-        let mean = f64::from(lock.count) / f64::from(lit);
-        let in_word = self.codebook.word(self.log.word[shot]).marks.len() as u16;
-        let by_chance = self.bit_thresholds.least(in_word, density);
-        let seen_share = mean / f64::from(in_word);
-        for (lit, bit) in bits {
-            if lit && lock.count == self.weight(shot) {
-                continue;
-            }
-            let timeline = if lit { self.seen() } else { left_over };
-            let found = self.found_in_bit(shot, lock.lag + bit, timeline);
-            let half = 2.0 * f64::from(found) >= mean;
-            let wrong = if lit {
-                let missing = binomial_tail(in_word, 1.0 - seen_share, in_word - found);
-                !half && missing <= self.receiver.false_alarm
-            } else {
-                half && found >= by_chance
-            };
-            if wrong {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Two-way time of flight, s. Where edges jitter, the mean over all marks that were found.
-    fn tof(&self, shot: usize, lock: Lock) -> f64 {
-        let start = self.fired[shot] + lock.lag;
-        let tof = self.receiver.tof(self.log.fired_at_fs[shot], start);
-        tof + self.mean_offset(shot, start) * units::s_from_fs(self.receiver.tick_fs)
-    }
-
-    /// By how many ticks the marks of `shot` are late on average if it begins at `start`. A
-    /// window that is not centred on them would cut one side off, so it is centred again.
-    fn mean_offset(&self, shot: usize, start: i64) -> f64 {
-        const ROUNDS: usize = 3;
-        let reach = i64::from(self.width / 2);
-        if reach == 0 {
-            return 0.0;
-        }
-        let mut mean = f64::from(self.width - 1) / 2.0;
-        for _ in 0..ROUNDS {
-            let middle = mean.round() as i64;
-            let (mut sum, mut count) = (0, 0);
-            for mark in self.marks(shot) {
-                let late = (middle - reach..=middle + reach)
-                    .filter(|late| self.ticks.has(start + mark + late));
-                for late in late {
-                    sum += late;
-                    count += 1;
-                }
-            }
-            mean = f64::from(sum as i32) / f64::from(count.max(1));
-        }
-        mean
-    }
 }
 
 /// For how many ticks from its earliest place on a mark is looked for: ±2 σ of the jitter and the
 /// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
 fn window(jitter: f64) -> u32 {
-    if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(1023.0) as u32 } else { 1 }
+    if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(FARTHEST_JITTER) as u32 } else { 1 }
 }
 
 /// For each shot, the last one before it at the same column of another row.
@@ -475,4 +283,113 @@ fn above(log: &ShotLog) -> Vec<Option<usize>> {
         *at_column = Some(shot);
     }
     above
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ReceiverKind;
+    use super::*;
+    use crate::code::{Crc, Family, Payload};
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    /// Chips from shot to shot: about five are in flight.
+    const PERIOD: i64 = 1100;
+
+    fn receiver(jitter_ticks: f64) -> Receiver {
+        Receiver {
+            kind: ReceiverKind::Matched,
+            gate_ticks: (50, 5000),
+            ticks_per_chip: 1,
+            tick_fs: 2500,
+            jitter_ticks,
+            false_alarm: 1e-2,
+            bit_threshold: 6,
+        }
+    }
+
+    fn codebook() -> Codebook {
+        let payload = Payload::new(4, Crc::default(), false).unwrap();
+        Codebook::new(Family::prime(11).unwrap(), Some(payload), 16).unwrap()
+    }
+
+    fn log(shots: u16) -> ShotLog {
+        ShotLog {
+            first: 0,
+            fired_at_fs: (0..shots).map(|shot| i64::from(shot) * PERIOD * 2500).collect(),
+            row: vec![0; shots.into()],
+            column: (0..shots).collect(),
+            label: (0..shots).map(|shot| 1 + shot % 15).collect(),
+            word: (0..shots).map(|shot| 1 + shot % 10).collect(),
+            channel: vec![0; shots.into()],
+            home: 0..shots.into(),
+        }
+    }
+
+    /// The earliest lag of the whole gate with most marks, every lag by itself.
+    fn exhaustive(band: &Band, shot: usize) -> (i64, u16) {
+        let (nearest, farthest) = band.gate();
+        let count = |lag: i64| {
+            let start = band.fired[shot] + lag;
+            band.marks(shot).filter(|mark| band.seen().has(start + mark)).count() as u16
+        };
+        let best = (nearest..=farthest).rev().max_by_key(|&lag| count(lag)).unwrap();
+        (best, count(best))
+    }
+
+    #[test]
+    fn a_search_finds_the_maximum_over_the_gate() {
+        let mut chance = ChaCha8Rng::seed_from_u64(3);
+        let (codebook, log) = (codebook(), log(1));
+        let mut found = 0;
+        for ticks in [0, 5, 60, 200, 600] {
+            for jitter in [0.0, 0.2, 0.5] {
+                let mut tick: Vec<u32> = (0..ticks).map(|_| chance.next_u32() % 5900).collect();
+                tick.sort_unstable();
+                tick.dedup();
+                let ticks = Ticks { tick, ..Ticks::default() };
+                let receiver = Receiver { false_alarm: 1e4, ..receiver(jitter) };
+                let mut band = Band::new(&receiver, (&codebook, &log), &ticks);
+                let (lag, count) = exhaustive(&band, 0);
+                if let Some(lock) = band.searched(0, 1) {
+                    found += 1;
+                    assert_eq!((lock.lag, lock.count), (lag, count));
+                }
+            }
+        }
+        assert!(found >= 9, "{found}");
+    }
+
+    #[test]
+    fn shots_in_flight_do_not_hide_each_others_maximum() {
+        // N = 400 shots at random lags, one mark in ten missed.
+        let mut chance = ChaCha8Rng::seed_from_u64(4);
+        let (codebook, log, receiver) = (codebook(), log(400), receiver(0.0));
+        let mut tick = Vec::new();
+        for shot in 0..400 {
+            let start = shot as u32 * PERIOD as u32 + 50 + chance.next_u32() % 4951;
+            for &mark in codebook.marks(log.label[shot], log.word[shot]) {
+                if !chance.next_u32().is_multiple_of(10) {
+                    tick.push(start + u32::from(mark));
+                }
+            }
+        }
+        tick.sort_unstable();
+        tick.dedup();
+        let ticks = Ticks { tick, ..Ticks::default() };
+        let returns = decode(&receiver, (&codebook, &log), &ticks);
+        let band = Band::new(&receiver, (&codebook, &log), &ticks);
+        for (&shot, (&tof, &peak)) in returns.shot.iter().zip(returns.tof.iter().zip(&returns.peak))
+        {
+            let (lag, count) = exhaustive(&band, shot as usize);
+            assert_eq!(peak, count, "shot {shot}");
+            approx::assert_relative_eq!(tof, (lag as f64 + 0.5) * 2.5e-12, max_relative = 1e-9);
+        }
+        assert!(returns.len() > 380, "{:?}", returns.rejects);
+    }
+
+    #[test]
+    fn the_window_grows_with_the_jitter() {
+        assert_eq!([0.0, 0.05, 0.1, 0.4, 1.0, 2.0].map(window), [1, 1, 2, 3, 5, 9]);
+    }
 }

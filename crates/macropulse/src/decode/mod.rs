@@ -51,6 +51,12 @@ pub struct Receiver {
     pub bit_threshold: u16,
 }
 
+/// Dark ticks at both ends of a timeline, so that a mark may jitter off its end.
+const MARGIN: i64 = 2048;
+
+/// How far from its place a mark is looked for at most, in ticks.
+const FARTHEST_JITTER: f64 = 1023.0;
+
 impl Receiver {
     /// The returns of the home shots of `log`, out of all the `ticks` of its band.
     ///
@@ -86,8 +92,8 @@ impl Receiver {
         let (first, last) = (fired.first().unwrap_or(&0), fired.last().unwrap_or(&0));
         let open = first + i64::from(nearest);
         let closed = last + i64::from(farthest) + i64::from(length) + 1;
-        let span =
-            open.max(absolute(ticks.tick.first()))..closed.min(absolute(ticks.tick.last()) + 1);
+        let span = open.max(absolute(ticks.tick.first())) - MARGIN
+            ..closed.min(absolute(ticks.tick.last()) + 1) + MARGIN;
         Timeline::new(span, ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick)))
     }
 

@@ -78,6 +78,7 @@ impl Search {
         best.filter(|best| best.count >= sought.least)
     }
 
+    #[inline(never)]
     fn tally(&self, reach: usize, needed: u8, sought: &Sought) -> Option<Candidate> {
         let mut best: Option<Candidate> = None;
         for &place in &self.elected {

@@ -1,0 +1,110 @@
+//! The light nobody has explained yet: who else could have sent it?
+
+use std::ops::Range;
+
+use super::{Band, Lock};
+use crate::decode::search::Sought;
+
+/// How bright a shot must be to be searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Brightness {
+    HalfTheMarks,
+    AsChanceAllows,
+}
+
+impl Band<'_> {
+    /// Searches the unexplained light for the shots that have no lag yet.
+    pub(super) fn search(&mut self, brightness: Brightness) {
+        for shot in 0..self.log.len() {
+            if self.locks[shot].is_some() {
+                continue;
+            }
+            let least = match brightness {
+                Brightness::HalfTheMarks => self.weight(shot).div_ceil(2),
+                Brightness::AsChanceAllows => 1,
+            };
+            let lock = match self.predicted(shot) {
+                Some(lock) => Some(lock),
+                None => self.searched(shot, least),
+            };
+            if let Some(lock) = lock
+                && lock.count >= least
+                && self.is_believed(shot, lock)
+            {
+                self.lock(shot, lock);
+            }
+        }
+    }
+
+    /// Gives a shot the lag that unexplained light speaks for, where it fits better.
+    pub(super) fn contest(&mut self) {
+        for shot in 0..self.log.len() {
+            let Some(lock) = self.locks[shot] else { continue };
+            let density = self.density_in_gate(shot);
+            let by_chance = self.thresholds.least(self.weight(shot), density);
+            if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
+                continue;
+            }
+            if let Some(rival) = self.searched(shot, lock.count / 2)
+                && rival.count > lock.count
+                && self.is_believed(shot, rival)
+            {
+                self.lock(shot, rival);
+            }
+        }
+    }
+
+    /// Whether there are so many unexplained ticks within one macropulse somewhere in the gate
+    /// of `shot` that they could be `marks` of its marks.
+    fn is_crowded(&self, shot: usize, marks: u16) -> bool {
+        let needed = u32::from(marks) / self.marks_per_tick();
+        let gate = self.gate_and_macropulse(shot);
+        self.unexplained.at_most(gate.clone()) >= needed
+            && self.unexplained.densest(gate, self.length() as u32) >= needed
+    }
+
+    /// Marks that a single tick may count for, where the window is longer than a chip.
+    fn marks_per_tick(&self) -> u32 {
+        if self.width <= self.receiver.ticks_per_chip { 1 } else { self.width }
+    }
+
+    /// The time in which light of `shot` can arrive.
+    fn gate_and_macropulse(&self, shot: usize) -> Range<i64> {
+        let (nearest, farthest) = self.gate();
+        let end = farthest + self.length() + i64::from(self.width);
+        self.fired[shot] + nearest..self.fired[shot] + end
+    }
+
+    /// The lag at which most marks of `shot` are found, out of all that unexplained ticks speak
+    /// for. `None` where these are fewer than `at_least` or chance could as well have put them
+    /// there.
+    pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
+        let (nearest, farthest) = self.gate();
+        let weight = self.weight(shot);
+        if weight == 0 || farthest < nearest {
+            return None;
+        }
+        let gate = self.gate_and_macropulse(shot);
+        let ticks = self.unexplained.at_most(gate.clone()) * self.width;
+        let left_over = f64::from(ticks) / (gate.end - gate.start) as f64;
+        // Marks under ticks that are explained already are missing here: half are taken to be
+        // visible.
+        let density = self.density_in_gate(shot);
+        let visible = self.thresholds.least(weight, density).div_ceil(2);
+        let least = self.thresholds.least(weight, left_over).max(visible).max(at_least);
+        if !self.is_crowded(shot, least) {
+            return None;
+        }
+        let scale = self.receiver.ticks_per_chip as usize;
+        let word = self.codebook.word(self.log.word[shot]);
+        let sought = Sought {
+            word: word.marks.iter().map(|&mark| scale * usize::from(mark)).collect(),
+            bits: self.bits(shot).filter(|(lit, _)| *lit).map(|(_, bit)| bit as usize).collect(),
+            lags: (farthest - nearest + 1) as usize,
+            least,
+        };
+        let at = (self.fired[shot] + nearest, self.width);
+        let found = self.search.best(self.unexplained.timeline(), at, &sought)?;
+        self.best_near(shot, nearest + found.lag as i64)
+    }
+}
