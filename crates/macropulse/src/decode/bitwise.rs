@@ -271,3 +271,103 @@ fn rank(reject: Reject) -> u8 {
         Reject::LabelMismatch => 4,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::ReceiverKind;
+    use super::*;
+    use crate::code::{Crc, Family, Payload};
+
+    fn codebook() -> Codebook {
+        let payload = Payload::new(4, Crc::default(), false).unwrap();
+        Codebook::new(Family::prime(11).unwrap(), Some(payload), 16).unwrap()
+    }
+
+    /// Eight shots with the labels 8 to 15, which begin with a lit bit, or 0 to 7, which do not.
+    fn log(first_label: u16) -> ShotLog {
+        ShotLog {
+            first: 0,
+            fired_at_fs: (0..8).map(|shot| shot * 1100 * 2500).collect(),
+            row: vec![0; 8],
+            column: (0..8).collect(),
+            label: (first_label..first_label + 8).collect(),
+            word: (1..9).collect(),
+            channel: vec![0; 8],
+            home: 0..8,
+        }
+    }
+
+    /// All shots of `log` as they come back after `lag` ticks.
+    fn ticks(log: &ShotLog, lag: u32) -> Ticks {
+        let book = codebook();
+        let marks = |shot: usize| book.marks(log.label[shot], log.word[shot]).to_vec();
+        let at = |shot: usize| {
+            marks(shot).into_iter().map(move |mark| shot as u32 * 1100 + lag + u32::from(mark))
+        };
+        let mut tick: Vec<u32> = (0..log.len()).flat_map(at).collect();
+        tick.sort_unstable();
+        Ticks { tick, ..Ticks::default() }
+    }
+
+    fn decode(kind: ReceiverKind, log: &ShotLog, ticks: &Ticks) -> Returns {
+        let receiver = Receiver {
+            kind,
+            gate_ticks: (0, 3000),
+            ticks_per_chip: 1,
+            tick_fs: 2500,
+            jitter_ticks: 0.0,
+            false_alarm: 1e-3,
+            bit_threshold: 6,
+        };
+        receiver.decode(&codebook(), log, ticks)
+    }
+
+    #[test]
+    fn a_lit_first_bit_is_read_by_both() {
+        let log = log(8);
+        for kind in [ReceiverKind::Literal, ReceiverKind::Blind] {
+            let returns = decode(kind, &log, &ticks(&log, 700));
+            assert_eq!(returns.shot, [0, 1, 2, 3, 4, 5, 6, 7], "{kind:?}");
+            assert!(returns.tof.iter().all(|tof| (tof - 700.5 * 2.5e-12).abs() < 1e-18));
+            assert_eq!(returns.peak, returns.marks);
+        }
+    }
+
+    #[test]
+    fn a_dark_first_bit_is_read_by_the_blind_receiver_only() {
+        let log = log(0);
+        let ticks = ticks(&log, 700);
+        let literal = decode(ReceiverKind::Literal, &log, &ticks);
+        assert!(literal.is_empty());
+        // Label 0 makes no light; each of the others is read shifted to the front.
+        assert_eq!(literal.rejects.iter().sum::<u64>(), 7);
+        let blind = decode(ReceiverKind::Blind, &log, &ticks);
+        assert_eq!(blind.shot, [1, 2, 3, 4, 5, 6, 7]);
+        assert!(blind.tof.iter().all(|tof| (tof - 700.5 * 2.5e-12).abs() < 1e-18));
+    }
+
+    #[test]
+    fn what_comes_too_late_or_from_elsewhere_is_counted() {
+        let log = log(8);
+        let late = decode(ReceiverKind::Literal, &log, &ticks(&log, 3001));
+        assert!(late.is_empty());
+        assert_eq!(late.rejected(Reject::OutsideGate), 8);
+        let mut other = log.clone();
+        other.word.rotate_left(1);
+        let foreign = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
+        assert!(foreign.is_empty());
+        assert_eq!(foreign.rejected(Reject::LabelMismatch), 8);
+        other.label = vec![0; 8];
+        let unknown = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
+        assert_eq!(unknown.rejected(Reject::UnknownShot), 8);
+    }
+
+    #[test]
+    fn a_macropulse_of_the_halo_is_not_counted() {
+        let mut log = log(0);
+        let ticks = ticks(&log, 5);
+        log.home = 3..6;
+        assert_eq!(decode(ReceiverKind::Literal, &log, &ticks).rejects.iter().sum::<u64>(), 3);
+        assert_eq!(decode(ReceiverKind::Blind, &log, &ticks).shot, [3, 4, 5]);
+    }
+}

@@ -138,30 +138,33 @@ impl<'a> Band<'a> {
     }
 
     /// The lags at which `shot` is to be expected, after its neighbours: on the plane through
-    /// three of them, on the line through two, and at the lag of one.
-    fn expected(&self, shot: usize) -> impl Iterator<Item = i64> + use<> {
+    /// three of them, on the lines through two, and at the lag of one.
+    fn expected(&self, shot: usize) -> [Option<i64>; 6] {
         let at = |shot: Option<usize>| Some(self.locks.get(shot?)?.as_ref()?.lag);
+        let over = |shot: Option<usize>| self.above.get(shot?).copied().flatten();
         let before = shot.checked_sub(1);
-        let left = at(before);
-        let above = at(self.above[shot]);
-        let above_left = at(before.and_then(|before| self.above[before]));
-        let plane = || Some(left? + above? - above_left?);
-        let line = || Some(2 * left? - at(shot.checked_sub(2))?);
-        [plane(), line(), left, above, at(Some(shot + 1))].into_iter().flatten()
+        let (left, above) = (at(before), at(over(Some(shot))));
+        let plane = || Some(left? + above? - at(over(before))?);
+        let across = || Some(2 * left? - at(shot.checked_sub(2))?);
+        let down = || Some(2 * above? - at(over(over(Some(shot))))?);
+        [plane(), across(), down(), left, above, at(Some(shot + 1))]
     }
 
     /// The lag of `shot` if it lies where its neighbours say and can be no other.
     fn predicted(&mut self, shot: usize) -> Option<Lock> {
-        if self.weight(shot) == 0 {
+        let weight = self.weight(shot);
+        if weight == 0 {
             return None;
         }
-        let mut tried = [i64::MIN; 5];
-        for (index, lag) in self.expected(shot).enumerate() {
-            if tried.iter().any(|&other| lag.abs_diff(other) < BLOCK as u64 / 4) {
+        let expected = self.expected(shot);
+        for (index, lag) in expected.iter().enumerate() {
+            let Some(lag) = *lag else { continue };
+            let mut tried = expected[..index].iter().flatten();
+            if tried.any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
                 continue;
             }
-            tried[index] = lag;
-            let lock = self.best_near(shot, lag);
+            // The flank of a peak just outside would show a quarter of the marks.
+            let lock = self.best_near(shot, lag, weight.div_ceil(4));
             if lock.is_some_and(|lock| self.is_bright(shot, lock)) {
                 return lock;
             }
@@ -169,14 +172,15 @@ impl<'a> Band<'a> {
         None
     }
 
-    /// The highest peak that can be climbed to from `lag`.
+    /// The highest peak that can be climbed to from `lag`. `None` where fewer than `at_least`
+    /// marks fit anywhere around.
     ///
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too.
-    fn best_near(&self, shot: usize, lag: i64) -> Option<Lock> {
+    fn best_near(&self, shot: usize, lag: i64, at_least: u16) -> Option<Lock> {
         const STEPS: usize = 64;
         let weight = self.weight(shot);
-        let mut best = self.best_in_block(shot, lag)?;
+        let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
             if best.lag.abs_diff(middle) > BLOCK as u64 / 8 {

@@ -56,8 +56,9 @@ impl Search {
         self.elected.clear();
         for_each_tick(timeline, (first, places + reach), width, |tick| {
             ticks += 1;
+            let ballot = &mut self.votes[tick..=tick + reach];
             for mark in &sought.word {
-                let vote = &mut self.votes[tick + reach - mark];
+                let vote = &mut ballot[reach - mark];
                 *vote = vote.saturating_add(1);
                 if *vote == needed {
                     self.elected.push(tick + reach - mark);
@@ -78,7 +79,6 @@ impl Search {
         best.filter(|best| best.count >= sought.least)
     }
 
-    #[inline(never)]
     fn tally(&self, reach: usize, needed: u8, sought: &Sought) -> Option<Candidate> {
         let mut best: Option<Candidate> = None;
         for &place in &self.elected {

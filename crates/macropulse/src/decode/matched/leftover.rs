@@ -105,6 +105,6 @@ impl Band<'_> {
         };
         let at = (self.fired[shot] + nearest, self.width);
         let found = self.search.best(self.unexplained.timeline(), at, &sought)?;
-        self.best_near(shot, nearest + found.lag as i64)
+        self.best_near(shot, nearest + found.lag as i64, least)
     }
 }
