@@ -19,6 +19,8 @@ pub mod formats;
 pub mod view;
 
 pub mod sim;
+pub mod record;
+pub mod paper;
 
 pub mod predict;
 pub mod random;

@@ -1,4 +1,4 @@
-//! Help with misspelt names.
+//! Names and texts: help with misspelt ones, and their digests.
 
 /// The one of `known` that `typed` was probably meant to be, if any is near enough.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -10,9 +10,23 @@ pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, name)| name)
 }
 
+/// The 64-bit FNV-1a hash of a text \[FNV\], in hexadecimal.
+pub fn digest(text: &str) -> String {
+    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    format!("{hash:016x}")
+}
+
 #[cfg(test)]
 mod tests {
-    use super::nearest;
+    use super::{digest, nearest};
+
+    #[test]
+    fn the_digest_has_the_published_values() {
+        assert_eq!(digest(""), "cbf29ce484222325");
+        assert_eq!(digest("foobar"), "85944171f73967e8");
+    }
 
     #[test]
     fn a_slip_is_understood_and_nonsense_is_not() {

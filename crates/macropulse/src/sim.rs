@@ -35,8 +35,20 @@ pub fn scan(
     number: u64,
     done: &(dyn Fn(u64) + Sync),
 ) -> Scan {
-    let chance = Chance::new(seed);
     let bands: Vec<Band> = bands(design, number).collect();
+    scan_part(design, scene, seed, &bands, done)
+}
+
+/// As [`scan`], but only the `bands` given, all of one scan; the rest of the cloud stays empty.
+pub fn scan_part(
+    design: &Design,
+    scene: &Scene,
+    seed: u64,
+    bands: &[Band],
+    done: &(dyn Fn(u64) + Sync),
+) -> Scan {
+    let chance = Chance::new(seed);
+    let number = bands.first().map_or(0, |band| band.scan);
     let measured: Vec<Measured> = bands
         .par_iter()
         .map(|band| {

@@ -1,0 +1,130 @@
+//! The experiment of \[KP16\], from presets to report: every table and figure made again from data,
+//! every claim confirmed or refuted.
+
+mod claim;
+mod claims_code;
+mod claims_experiment;
+mod claims_system;
+mod experiment;
+mod geometry;
+mod pictures;
+mod receivers;
+mod report;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+pub use claim::{Claim, Verdict};
+pub use experiment::{DISTANCES, SENSORS, Trial};
+pub use geometry::{Prediction, predict};
+pub use receivers::{Comparison, PERFECT};
+
+use crate::design::Design;
+use crate::formats::write_atomically;
+
+/// Why the experiment could not be run or written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A folder could not be made.
+    #[error("cannot make the folder {}: {source}; choose another one with -o", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A ready sensor was refused.
+    #[error(transparent)]
+    Design(#[from] crate::design::Error),
+    /// A ready scene was refused.
+    #[error(transparent)]
+    Scene(#[from] crate::scene::Error),
+    /// A code was refused.
+    #[error(transparent)]
+    Code(crate::code::Error),
+    /// A result could not be written.
+    #[error(transparent)]
+    Record(#[from] crate::record::Error),
+    /// A file could not be written.
+    #[error(transparent)]
+    Formats(#[from] crate::formats::Error),
+    /// A picture could not be drawn.
+    #[error(transparent)]
+    View(#[from] crate::view::Error),
+}
+
+/// Everything that was measured.
+#[derive(Debug)]
+pub struct Findings {
+    /// The sensors, in the order of [`SENSORS`].
+    pub designs: Vec<Design>,
+    /// Every sensor at every distance.
+    pub trials: Vec<Trial>,
+    /// The receivers compared.
+    pub comparisons: Vec<Comparison>,
+    /// What the paper says, and whether it holds.
+    pub claims: Vec<Claim>,
+}
+
+/// Shots that [`run`] reports as done in the end, receivers' comparison left out.
+pub fn shots(designs: &[Design]) -> u64 {
+    designs.iter().map(Design::shots_per_scan).sum::<u64>() * DISTANCES.len() as u64
+}
+
+/// The sensors compared, in the order of [`SENSORS`].
+///
+/// # Errors
+/// None of the ready sensors is refused, unless the program is broken.
+pub fn designs() -> Result<Vec<Design>, Error> {
+    SENSORS.iter().map(|name| Ok(Design::open(name, &[])?)).collect()
+}
+
+/// Runs the whole experiment and writes into `folder`: one folder per sensor and distance,
+/// `points.csv`, `claims.json`, and `index.html` last. `done` is told the shots finished.
+///
+/// # Errors
+/// If something cannot be written.
+pub fn run(folder: &Path, seed: u64, done: &(dyn Fn(u64) + Sync)) -> Result<Findings, Error> {
+    let designs = designs()?;
+    let mut trials = Vec::new();
+    for (design, sensor) in designs.iter().zip(SENSORS) {
+        for distance in DISTANCES {
+            trials.push(experiment::trial(design, (sensor, distance), seed, folder, done)?);
+        }
+    }
+    let comparisons = receivers::compare(seed)?;
+    let claims = claims(&designs[0], &trials, &comparisons)?;
+    let findings = Findings { designs, trials, comparisons, claims };
+    write_atomically(&folder.join("points.csv"), |out| {
+        out.write_all(tables::points_csv(&findings.trials).as_bytes())
+    })?;
+    write_atomically(&folder.join("claims.json"), |out| {
+        serde_json::to_writer_pretty(&mut *out, &findings.claims)?;
+        out.write_all(b"\n")
+    })?;
+    let html = report::page(&findings, seed)?.html();
+    write_atomically(&folder.join("index.html"), |out| out.write_all(html.as_bytes()))?;
+    Ok(findings)
+}
+
+/// The claims that need no experiment, on the sensor of the paper.
+///
+/// # Errors
+/// If the sensor's code has no closed form.
+pub fn claims_on_paper(design: &Design) -> Result<Vec<Claim>, Error> {
+    let mut claims = claims_code::words(design)?;
+    claims.extend(claims_code::payload(design));
+    claims.extend(claims_system::timing(design));
+    claims.extend(claims_system::light(design));
+    Ok(claims)
+}
+
+fn claims(
+    design: &Design,
+    trials: &[Trial],
+    comparisons: &[Comparison],
+) -> Result<Vec<Claim>, Error> {
+    let mut claims = claims_on_paper(design)?;
+    claims.extend(claims_experiment::claims(trials, comparisons));
+    Ok(claims)
+}

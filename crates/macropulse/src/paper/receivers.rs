@@ -1,0 +1,80 @@
+//! The three receivers side by side, with and without missed marks.
+
+use std::path::Path;
+
+use super::Error;
+use crate::design::Design;
+use crate::emit::bands;
+use crate::points::Outcome;
+use crate::scene::Scene;
+use crate::score::Score;
+use crate::sim;
+
+/// The receivers compared.
+const RECEIVERS: [&str; 3] = ["literal", "blind", "matched"];
+
+/// Detectors under which they are compared: a name, and the keys that make it.
+const DETECTORS: [(&str, &[(&str, &str)]); 3] = [
+    ("perfect detector", PERFECT),
+    (
+        "20 % of the marks missed",
+        &[PERFECT[0], PERFECT[1], PERFECT[2], ("detector.photon-counting.missed_marks", "0.2")],
+    ),
+    ("detector as declared", &[]),
+];
+
+/// The keys of a detector that sees every mark of every echo, and nothing else.
+pub const PERFECT: &[(&str, &str)] = &[
+    ("detector.photon-counting.sensitivity.pd", "1.0"),
+    ("detector.photon-counting.dark_counts_hz", "0.0"),
+    ("detector.photon-counting.jitter_ps", "0.0"),
+];
+
+/// Bands compared: the rows from the horizon down, with the car and the road.
+const BANDS: std::ops::Range<usize> = 28..36;
+
+/// One receiver under one condition.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// The sensor.
+    pub sensor: &'static str,
+    /// What the detector loses.
+    pub detector: &'static str,
+    /// The receiver.
+    pub receiver: &'static str,
+    /// How the pixels came out.
+    pub score: Score,
+}
+
+impl Comparison {
+    /// Share of the pixels with an echo that came out as `outcome`; of missed ones those that
+    /// had any light.
+    pub fn share(&self, outcome: Outcome) -> f64 {
+        let count = self.score.count(outcome);
+        let count = if outcome == Outcome::Missed { count - self.score.dark } else { count };
+        count as f64 / self.score.with_echo() as f64
+    }
+}
+
+/// All receivers under all conditions, on the road and the car at 50 m.
+pub(super) fn compare(seed: u64) -> Result<Vec<Comparison>, Error> {
+    let scene = Scene::open("car-50m")?;
+    let mut rows = Vec::new();
+    for sensor in ["kim-park-2016", "kim-park-2016-fixed"] {
+        for (detector, keys) in DETECTORS {
+            for receiver in RECEIVERS {
+                let set: Vec<(String, String)> = keys
+                    .iter()
+                    .chain(&[("receiver.kind", receiver)])
+                    .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+                    .collect();
+                let text = format!("extends = \"{sensor}\"");
+                let design = Design::from_toml(&text, sensor, Path::new(""), &set)?;
+                let bands: Vec<_> = bands(&design, 0).skip(BANDS.start).take(BANDS.len()).collect();
+                let score = sim::scan_part(&design, &scene, seed, &bands, &|_| {}).score;
+                rows.push(Comparison { sensor, detector, receiver, score });
+            }
+        }
+    }
+    Ok(rows)
+}
