@@ -120,6 +120,16 @@ fn jitter_is_averaged_over_the_marks() {
 }
 
 #[test]
+fn bright_shots_on_top_of_each_other_are_no_return_of_an_empty_pixel() {
+    // N = 1696, one in four empty. At a jitter of a tick a mark has five places.
+    let mut sensor = Sensor::printed(Matched);
+    sensor.receiver.jitter_ticks = 1.0;
+    let score = sensor.score(0..2, random, Weather { jitter: 1.0, ..CLEAR });
+    assert_right(&score, 99.9, "random");
+    assert_eq!(score.false_returns, 0, "{score:?}");
+}
+
+#[test]
 fn false_edges_alone_are_no_return() {
     // N = 848, one false answer in a million accepted per shot.
     let weather = Weather { false_edges: 3e9, ..CLEAR };

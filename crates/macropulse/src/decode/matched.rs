@@ -4,9 +4,9 @@
 //!    the exact maximum is taken. More than half of the marks, with none of the lit bits missing,
 //!    cannot be a sidelobe (an own lobe that far off leaves a bit dark) nor another shot.
 //! 2. *Explain.* The ticks of a shot that is found need no other explanation; what is left over
-//!    is searched for the shots that no neighbour predicted, the bright ones first, as their
-//!    light could pass for a faint one.
-//! 3. *Contest.* A shot keeps its lag unless unexplained ticks crowd somewhere in its gate: then
+//!    is searched for the shots that no neighbour predicted, the bright ones first: where many
+//!    bright ones overlap, their light could pass for a faint one.
+//! 3. *Contest.* A predicted shot keeps its lag unless unexplained ticks crowd somewhere in its gate: then
 //!    these are searched for a better one.
 //! 4. *Check.* A bit that should be dark must not be lit, nor a lit one dark.
 //!
@@ -18,14 +18,13 @@ mod verdict;
 
 use super::correlator::{BLOCK, Counts};
 use super::search::Search;
-use leftover::Brightness;
-
 use super::threshold::Thresholds;
 use super::timeline::{Density, Timeline, Unexplained};
 use super::{FARTHEST_JITTER, Receiver, Returns};
-use crate::code::Codebook;
+use crate::code::{CodeWord, Codebook};
 use crate::emit::ShotLog;
 use crate::tdc::Ticks;
+use leftover::Evidence;
 
 /// Decodes one band.
 pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
@@ -35,8 +34,9 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
             band.lock(shot, lock);
         }
     }
-    band.search(Brightness::HalfTheMarks);
-    band.search(Brightness::AsChanceAllows);
+    band.search(Evidence::Overwhelming);
+    band.search(Evidence::Bright);
+    band.search(Evidence::MoreThanChance);
     band.contest();
     band.returns()
 }
@@ -47,6 +47,8 @@ struct Lock {
     lag: i64,
     count: u16,
     margin: u16,
+    /// Whether the whole gate was searched, not only around a prediction.
+    searched: bool,
 }
 
 struct Band<'a> {
@@ -67,6 +69,8 @@ struct Band<'a> {
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
     bit_thresholds: Thresholds,
+    /// For each word, the marks that one tick may count for.
+    marks_per_tick: Vec<u32>,
     search: Search,
     locks: Vec<Option<Lock>>,
 }
@@ -91,6 +95,12 @@ impl<'a> Band<'a> {
             unexplained: Unexplained::new(ticks.clone()),
             thresholds: Thresholds::new(lags, receiver.false_alarm),
             bit_thresholds: Thresholds::new(f64::from(bits), receiver.false_alarm),
+            marks_per_tick: (0..codebook.words())
+                .map(|word| {
+                    let word = codebook.word(word as u16);
+                    crowding(word, width.div_ceil(receiver.ticks_per_chip.max(1)))
+                })
+                .collect(),
             search: Search::default(),
             locks: vec![None; fired.len()],
             fired,
@@ -211,7 +221,7 @@ impl<'a> Band<'a> {
         let counts = Counts::new(self.seen(), self.fired[shot] + first, self.marks(shot));
         let peak = counts.peak(nearest - first..farthest + 1 - first, self.width.into())?;
         let margin = peak.count - peak.next;
-        Some(Lock { lag: first + peak.at, count: peak.count, margin })
+        Some(Lock { lag: first + peak.at, count: peak.count, margin, searched: false })
     }
 
     /// Whether half of the marks were found and no lit bit is much darker than the others.
@@ -254,10 +264,15 @@ impl<'a> Band<'a> {
     /// Whether chance reaches `lock` at no lag of the gate, be it as dense as around the lock.
     /// The marks found count among the light around: chance finds most where there is most.
     fn is_believed(&mut self, shot: usize, lock: Lock) -> bool {
+        lock.count >= self.by_chance(shot, lock)
+    }
+
+    /// The marks that chance does not reach, be it as dense in all the gate as around `lock`.
+    fn by_chance(&mut self, shot: usize, lock: Lock) -> u16 {
         let start = self.fired[shot] + lock.lag;
         let around = self.density.over(start..start + self.length());
         let density = self.density_in_gate(shot).max(around);
-        lock.count >= self.thresholds.least(self.weight(shot), density)
+        self.thresholds.least(self.weight(shot), density)
     }
 
     /// Keeps `lock` and explains its ticks.
@@ -274,6 +289,16 @@ impl<'a> Band<'a> {
 /// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
 fn window(jitter: f64) -> u32 {
     if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(FARTHEST_JITTER) as u32 } else { 1 }
+}
+
+/// Most marks in any `chips` chips of `word`, or of two in a row.
+fn crowding(word: &CodeWord, chips: u32) -> u32 {
+    let once = word.marks.iter().map(|&mark| u32::from(mark));
+    let marks: Vec<u32> = once.clone().chain(once.map(|mark| mark + word.length)).collect();
+    let within = |first: usize| {
+        marks[first..].iter().take_while(|&&mark| mark < marks[first] + chips).count() as u32
+    };
+    (0..word.marks.len()).map(within).max().unwrap_or(1)
 }
 
 /// For each shot, the last one before it at the same column of another row.
@@ -390,6 +415,13 @@ mod tests {
             approx::assert_relative_eq!(tof, (lag as f64 + 0.5) * 2.5e-12, max_relative = 1e-9);
         }
         assert!(returns.len() > 380, "{:?}", returns.rejects);
+    }
+
+    #[test]
+    fn a_tick_counts_for_all_marks_it_may_be() {
+        let word = CodeWord { length: 20, marks: vec![0, 5, 6, 8, 19] };
+        assert_eq!([1, 2, 3, 4, 8, 9].map(|chips| crowding(&word, chips)), [1, 2, 2, 3, 4, 4]);
+        assert_eq!(crowding(&CodeWord { length: 20, marks: vec![] }, 5), 1);
     }
 
     #[test]

@@ -5,41 +5,49 @@ use std::ops::Range;
 use super::{Band, Lock};
 use crate::decode::search::Sought;
 
-/// How bright a shot must be to be searched for.
+/// How much must speak for a lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Brightness {
-    HalfTheMarks,
-    AsChanceAllows,
+pub(super) enum Evidence {
+    /// Half of the marks, and twice what chance can give: many bright shots on top of each other
+    /// are a worse impostor than chance is.
+    Overwhelming,
+    /// Half of the marks.
+    Bright,
+    /// As few marks as chance does not give.
+    MoreThanChance,
 }
 
 impl Band<'_> {
     /// Searches the unexplained light for the shots that have no lag yet.
-    pub(super) fn search(&mut self, brightness: Brightness) {
+    pub(super) fn search(&mut self, evidence: Evidence) {
         for shot in 0..self.log.len() {
             if self.locks[shot].is_some() {
                 continue;
             }
-            let least = match brightness {
-                Brightness::HalfTheMarks => self.weight(shot).div_ceil(2),
-                Brightness::AsChanceAllows => 1,
+            let least = match evidence {
+                Evidence::Overwhelming | Evidence::Bright => self.weight(shot).div_ceil(2),
+                Evidence::MoreThanChance => 1,
             };
             let lock = match self.predicted(shot) {
                 Some(lock) => Some(lock),
                 None => self.searched(shot, least),
             };
-            if let Some(lock) = lock
-                && lock.count >= least
-                && self.is_believed(shot, lock)
-            {
+            let Some(lock) = lock.filter(|lock| lock.count >= least) else { continue };
+            let by_chance = self.by_chance(shot, lock);
+            let needed = match evidence {
+                Evidence::Overwhelming => by_chance.max(self.weight(shot).min(2 * by_chance)),
+                Evidence::Bright | Evidence::MoreThanChance => by_chance,
+            };
+            if lock.count >= needed {
                 self.lock(shot, lock);
             }
         }
     }
 
-    /// Gives a shot the lag that unexplained light speaks for, where it fits better.
+    /// Gives a predicted shot the lag that unexplained light speaks for, where it fits better.
     pub(super) fn contest(&mut self) {
         for shot in 0..self.log.len() {
-            let Some(lock) = self.locks[shot] else { continue };
+            let Some(lock) = self.locks[shot].filter(|lock| !lock.searched) else { continue };
             let density = self.density_in_gate(shot);
             let by_chance = self.thresholds.least(self.weight(shot), density);
             if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
@@ -57,15 +65,11 @@ impl Band<'_> {
     /// Whether there are so many unexplained ticks within one macropulse somewhere in the gate
     /// of `shot` that they could be `marks` of its marks.
     fn is_crowded(&self, shot: usize, marks: u16) -> bool {
-        let needed = u32::from(marks) / self.marks_per_tick();
+        let per_tick = self.marks_per_tick[usize::from(self.log.word[shot])];
+        let needed = u32::from(marks).div_ceil(per_tick).max(1);
         let gate = self.gate_and_macropulse(shot);
         self.unexplained.at_most(gate.clone()) >= needed
             && self.unexplained.densest(gate, self.length() as u32) >= needed
-    }
-
-    /// Marks that a single tick may count for, where the window is longer than a chip.
-    fn marks_per_tick(&self) -> u32 {
-        if self.width <= self.receiver.ticks_per_chip { 1 } else { self.width }
     }
 
     /// The time in which light of `shot` can arrive.
@@ -105,6 +109,7 @@ impl Band<'_> {
         };
         let at = (self.fired[shot] + nearest, self.width);
         let found = self.search.best(self.unexplained.timeline(), at, &sought)?;
-        self.best_near(shot, nearest + found.lag as i64, least)
+        let best = self.best_near(shot, nearest + found.lag as i64, least)?;
+        Some(Lock { searched: true, ..best })
     }
 }
