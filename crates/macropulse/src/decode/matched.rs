@@ -6,8 +6,8 @@
 //! 2. *Explain.* The ticks of a shot that is found need no other explanation; what is left over
 //!    is searched for the shots that no neighbour predicted, the bright ones first: where many
 //!    bright ones overlap, their light could pass for a faint one.
-//! 3. *Contest.* A predicted shot keeps its lag unless unexplained ticks crowd somewhere in its gate: then
-//!    these are searched for a better one.
+//! 3. *Contest.* A predicted shot keeps its lag unless unexplained ticks crowd somewhere in its
+//!    gate: then these are searched for a better one.
 //! 4. *Check.* A bit that should be dark must not be lit, nor a lit one dark.
 //!
 //! A return is believed if chance would not reach its count of marks at any lag of the gate, see

@@ -110,7 +110,7 @@ fn photons_per_mark(peak: u16, marks: u16, density: f64) -> f32 {
     let (found, all) = (f64::from(peak), f64::from(marks));
     let lit = found.min(all - 0.5) / all;
     let share = ((lit - density) / (1.0 - density)).max(0.0);
-    -(-share).ln_1p() as f32
+    -libm::log1p(-share) as f32
 }
 
 #[cfg(test)]

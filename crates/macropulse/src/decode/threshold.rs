@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use libm::lgamma;
+use libm::{exp, exp2, lgamma, log, log1p, log2};
 
 /// P(X ≥ k) of X ~ Bin(n, p): the chance that `least` or more of `marks` places are lit where
 /// each is lit with probability `density`.
@@ -15,7 +15,7 @@ pub(super) fn binomial_tail(marks: u16, density: f64, least: u16) -> f64 {
     }
     let (n, k) = (f64::from(marks), f64::from(least));
     let log_choose = lgamma(n + 1.0) - lgamma(k + 1.0) - lgamma(n - k + 1.0);
-    let mut term = (log_choose + k * density.ln() + (n - k) * (-density).ln_1p()).exp();
+    let mut term = exp(log_choose + k * log(density) + (n - k) * log1p(-density));
     let odds = density / (1.0 - density);
     let mut tail = 0.0;
     for found in least..=marks {
@@ -66,9 +66,9 @@ impl Thresholds {
         if density <= 0.0 {
             return 1;
         }
-        let step = (density.log2() * PER_OCTAVE).ceil() as i32;
+        let step = (log2(density) * PER_OCTAVE).ceil() as i32;
         *self.known.entry((marks, step)).or_insert_with(|| {
-            let density = (f64::from(step) / PER_OCTAVE).exp2().min(1.0);
+            let density = exp2(f64::from(step) / PER_OCTAVE).min(1.0);
             least_marks(self.lags, marks, density, self.false_alarm)
         })
     }
