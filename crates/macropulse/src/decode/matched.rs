@@ -1,8 +1,9 @@
 //! The matched receiver: the lag at which the whole known macropulse of a shot fits best.
 //!
 //! 1. *Predict.* Neighbouring pixels see neighbouring ranges: around the lags of the neighbours
-//!    the exact maximum is taken. More than half of the marks, with none of the lit bits missing,
-//!    cannot be a sidelobe (an own lobe that far off leaves a bit dark) nor another shot.
+//!    the exact maximum is taken. Half of the marks, or twice what chance can give, with none of
+//!    the lit bits missing, cannot be a sidelobe (an own lobe that far off leaves a bit dark) nor
+//!    another shot.
 //! 2. *Explain.* The ticks of a shot that is found need no other explanation; what is left over
 //!    is searched for the shots that no neighbour predicted, the bright ones first: where many
 //!    bright ones overlap, their light could pass for a faint one.
@@ -166,6 +167,8 @@ impl<'a> Band<'a> {
         if weight == 0 {
             return None;
         }
+        let density = self.density_in_gate(shot);
+        let least = weight.div_ceil(2).min(2 * self.thresholds.least(weight, density));
         let expected = self.expected(shot);
         for (index, lag) in expected.iter().enumerate() {
             let Some(lag) = *lag else { continue };
@@ -173,9 +176,9 @@ impl<'a> Band<'a> {
             if tried.any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
                 continue;
             }
-            // The flank of a peak just outside would show a quarter of the marks.
-            let lock = self.best_near(shot, lag, weight.div_ceil(4));
-            if lock.is_some_and(|lock| self.is_bright(shot, lock)) {
+            // The flank of a peak just outside would show half as many marks as the peak.
+            let lock = self.best_near(shot, lag, least.div_ceil(2));
+            if lock.is_some_and(|lock| self.is_certain(shot, lock)) {
                 return lock;
             }
         }
@@ -224,19 +227,21 @@ impl<'a> Band<'a> {
         Some(Lock { lag: first + peak.at, count: peak.count, margin, searched: false })
     }
 
-    /// Whether half of the marks were found and no lit bit is much darker than the others.
-    fn is_bright(&mut self, shot: usize, lock: Lock) -> bool {
+    /// Whether `lock` can be no sidelobe and no other shot: half of the marks were found, or twice
+    /// what chance can give, and no lit bit is much darker than the others.
+    fn is_certain(&mut self, shot: usize, lock: Lock) -> bool {
         let weight = self.weight(shot);
         if lock.count == weight {
             return true;
         }
+        let by_chance = self.by_chance(shot, lock);
         let lit = self.bits(shot).filter(|(lit, _)| *lit);
-        2 * lock.count >= weight
+        lock.count >= by_chance
+            && (2 * lock.count >= weight || lock.count >= 2 * by_chance)
             && lit.clone().all(|(_, bit)| {
                 let found = self.found_in_bit(shot, lock.lag + bit, self.seen());
-                2 * u32::from(found) * lit.clone().count() as u32 >= u32::from(lock.count)
+                3 * u32::from(found) * lit.clone().count() as u32 >= u32::from(lock.count)
             })
-            && self.is_believed(shot, lock)
     }
 
     /// Marks of the code word of `shot` that are lit in `timeline` if it begins at `lag`.
