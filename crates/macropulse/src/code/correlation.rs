@@ -172,7 +172,7 @@ mod tests {
         }
         let counted = periodic(a, b);
         for lag in 0..length {
-            let by_definition =
+            let by_definition: u16 =
                 (0..length).map(|n| chip(a, n) * chip(b, (n + lag) % length)).sum::<u16>();
             assert_eq!(counted[lag as usize], by_definition, "periodic, lag {lag}");
         }
