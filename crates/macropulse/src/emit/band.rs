@@ -77,7 +77,7 @@ impl Band {
 }
 
 /// `first_word + pixel mod word_modulus`, the pixel counted row by row.
-fn word(design: &Design, row: u16, column: u16) -> u16 {
+pub(super) fn word(design: &Design, row: u16, column: u16) -> u16 {
     let pixel = u32::from(row) * design.scan.columns + u32::from(column);
     (design.coding.first_word + pixel % design.coding.word_modulus) as u16
 }

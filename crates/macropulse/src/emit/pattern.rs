@@ -25,6 +25,22 @@ pub(super) fn pixel(design: &Design, order: u64) -> (u16, u16) {
     }
 }
 
+/// The place of a pixel of the image in the order of its scan: the inverse of [`pixel`].
+pub(super) fn order_of_pixel(design: &Design, row: u16, column: u16) -> u64 {
+    let columns = u64::from(design.scan.columns);
+    let (line, across) = (u64::from(row), u64::from(column));
+    match &design.scan.pattern {
+        Pattern::Raster { mirror: Mirror::Sinusoidal, .. } if line % 2 == 1 => {
+            line * columns + columns - 1 - across
+        }
+        Pattern::Raster { .. } | Pattern::Flash { .. } => line * columns + across,
+        Pattern::Spinning { order: rows, .. } => {
+            let turn = rows.iter().position(|&fired| fired == row).unwrap_or(0);
+            across * rows.len() as u64 + turn as u64
+        }
+    }
+}
+
 /// Absolute time at which shot number `order` of scan `scan` is fired, fs.
 pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
     let shots = design.shots_per_scan();

@@ -1,0 +1,81 @@
+//! One shot on its own, asked for by pixel.
+
+use super::band::word;
+use super::pattern::{fired_at_fs, order_of_pixel};
+use crate::design::Design;
+
+/// Longest run in s: absolute time is an `i64` of femtoseconds, which ends after 9223 s.
+const LONGEST_RUN: f64 = 9000.0;
+
+/// What the sensor sends to one pixel, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shot {
+    /// Absolute time at which the first chip leaves, fs.
+    pub fired_at_fs: i64,
+    /// The number the macropulse carries; 0 where shots carry none.
+    pub label: u16,
+    /// Index of the code word in its family; 0 where shots are not coded.
+    pub word: u16,
+}
+
+/// The shot of scan number `scan` to the pixel at `row` and `column`; `None` if the pixel is not in
+/// the image or the scan not within [`most_scans`].
+pub fn shot_of_pixel(design: &Design, scan: u64, row: u32, column: u32) -> Option<Shot> {
+    if row >= design.scan.rows || column >= design.scan.columns || scan >= most_scans(design) {
+        return None;
+    }
+    let (row, column) = (row as u16, column as u16);
+    Some(Shot {
+        fired_at_fs: fired_at_fs(design, scan, order_of_pixel(design, row, column)),
+        label: if design.is_coded() { column } else { 0 },
+        word: word(design, row, column),
+    })
+}
+
+/// Scans a run may have before its clock ends: those of two and a half hours.
+pub fn most_scans(design: &Design) -> u64 {
+    (LONGEST_RUN / design.scan_period()) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emit::bands;
+
+    #[test]
+    fn the_second_pixel_of_the_paper_is_sent_with_the_second_word() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        let shot = shot_of_pixel(&design, 0, 0, 1).unwrap();
+        assert_eq!(shot, Shot { fired_at_fs: 40_945_000, label: 1, word: 1 });
+    }
+
+    #[test]
+    fn it_is_the_shot_the_log_has() {
+        let resonant = [("scan.raster.mirror".to_owned(), "sinusoidal".to_owned())];
+        for (name, set) in
+            [("kim-park-2016", &[][..]), ("kim-park-2016", &resonant), ("hdl-64e", &[])]
+        {
+            let design = Design::open(name, set).unwrap();
+            let log = bands(&design, 1).nth(1).unwrap().shot_log(&design);
+            for i in log.home.clone() {
+                let (row, column) = (u32::from(log.row[i]), u32::from(log.column[i]));
+                let shot = shot_of_pixel(&design, 1, row, column).unwrap();
+                assert_eq!(
+                    (shot.fired_at_fs, shot.label, shot.word),
+                    (log.fired_at_fs[i], log.label[i], log.word[i]),
+                    "{name}: {row}, {column}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn outside_the_image_and_after_the_clock_there_is_none() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        assert_eq!(shot_of_pixel(&design, 0, 480, 0), None);
+        assert_eq!(shot_of_pixel(&design, 0, 0, 848), None);
+        assert_eq!(most_scans(&design), 540_000);
+        assert!(shot_of_pixel(&design, 539_999, 479, 847).unwrap().fired_at_fs > 0);
+        assert_eq!(shot_of_pixel(&design, 540_000, 0, 0), None);
+    }
+}
