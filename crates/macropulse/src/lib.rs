@@ -25,4 +25,4 @@ pub mod paper;
 pub mod predict;
 pub mod random;
 pub mod units;
-mod names;
+pub mod names;
