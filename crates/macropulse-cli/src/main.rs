@@ -1,1 +1,43 @@
-fn main() {}
+//! The command line of Macropulse: one file per subcommand.
+
+mod check;
+mod completions;
+mod encode;
+mod fault;
+mod interrupt;
+mod kind;
+mod options;
+mod paper;
+mod progress;
+mod scenes;
+mod sensors;
+mod simulate;
+mod text;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use fault::Fault;
+use options::{Command, Options};
+
+fn main() -> ExitCode {
+    let done = match Options::try_parse() {
+        Ok(options) => options.common.use_threads().and_then(|()| run(&options)),
+        Err(usage) => fault::usage(&usage),
+    };
+    done.map_or_else(|fault| fault.report(), |()| ExitCode::SUCCESS)
+}
+
+fn run(options: &Options) -> Result<(), Fault> {
+    let common = &options.common;
+    match &options.command {
+        Command::Simulate(simulate) => simulate::run(simulate, common),
+        Command::Paper(paper) => paper::run(paper, common),
+        Command::Sensors(sensors) => sensors::run(sensors),
+        Command::Scenes(scenes) => scenes::run(scenes),
+        Command::Check(check) => check::run(check, common),
+        Command::Encode(encode) => encode::run(encode),
+        Command::Completions(completions) => completions::run(completions),
+    }
+}

@@ -1,0 +1,116 @@
+//! `macropulse check`: is it right, and what follows from it?
+
+mod scene;
+mod sensor;
+
+use std::path::Path;
+
+use clap::Args;
+use macropulse::design::Design;
+use macropulse::scene::Scene;
+use serde_json::{Value, json};
+
+use crate::fault::Fault;
+use crate::kind::Kind;
+use crate::options::{Changes, Common};
+use crate::simulate::scenario::Scenario;
+use crate::text::{Columns, counted, print, print_json};
+
+/// Check sensors, scenes and scenarios, and print what follows from them
+///
+/// Prints derived quantities, every default used, every idealisation with what it assumes, and
+/// warnings. Which of the three a file is, is told by its content.
+#[derive(Args)]
+#[command(after_help = "Example:
+  macropulse check kim-park-2016 mine.toml")]
+pub struct Check {
+    /// Ready sensors or scenes, or TOML files
+    #[arg(required = true, value_name = "NAME-or-FILE")]
+    files: Vec<String>,
+
+    #[command(flatten)]
+    changes: Changes,
+
+    /// Print as JSON: an object, or an array of them for several files
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
+    let mut reports = Vec::new();
+    let mut wrong = false;
+    for file in &options.files {
+        match Report::of(file, &options.changes.set) {
+            Ok(report) => reports.push(report),
+            Err(fault) => {
+                fault.report();
+                wrong = true;
+            }
+        }
+    }
+    if options.json {
+        // A file that is wrong is missing from the array, but an array it stays.
+        let values = reports.into_iter().map(|report| report.json).collect::<Vec<Value>>();
+        if options.files.len() > 1 {
+            print(&format!("{:#}\n", Value::from(values)))?;
+        } else if !values.is_empty() {
+            print_json(values)?;
+        }
+    } else if !common.quiet && !reports.is_empty() {
+        let texts: Vec<String> = reports.into_iter().map(|report| report.text).collect();
+        print(&texts.join("\n"))?;
+    }
+    if wrong { Err(Fault::Told) } else { Ok(()) }
+}
+
+/// What there is to say of a file that is right.
+struct Report {
+    text: String,
+    json: Value,
+}
+
+impl Report {
+    fn of(name: &str, set: &[(String, String)]) -> Result<Self, Fault> {
+        match Kind::of(name)? {
+            Kind::Sensor => Ok(sensor::report(&Design::open(name, set)?)),
+            Kind::Scene => Ok(scene::report(&Scene::open(name)?)),
+            Kind::Scenario => Ok(scenario(name, &Scenario::open(Path::new(name), set)?)),
+        }
+    }
+}
+
+/// A scenario with what it names, in short.
+fn scenario(name: &str, scenario: &Scenario) -> Report {
+    let sensors: Vec<&str> = scenario.designs.iter().map(|design| design.name.as_str()).collect();
+    let formats: Vec<&str> = scenario.formats.iter().map(|format| format.name()).collect();
+    let mut columns = Columns::default();
+    columns.push("sensors", sensors.join(", "));
+    columns.push("scene", scenario.scene.name.clone());
+    columns.push("length", counted(scenario.scans, "scan"));
+    columns.push("seed", scenario.seed.to_string());
+    columns
+        .push("formats", if formats.is_empty() { "none".to_owned() } else { formats.join(", ") });
+    columns.push("truth", if scenario.truth { "written" } else { "not written" });
+    let warnings: Vec<String> = scenario
+        .designs
+        .iter()
+        .flat_map(|design| design.warnings.iter().map(|w| format!("{}: {w}", design.name)))
+        .collect();
+    columns.push_list("warnings", warnings.iter().cloned());
+    columns.push_list("assumed", scenario.scene.notes.iter().cloned());
+    Report {
+        text: format!("{name}: a scenario\n\n{}", columns.text()),
+        json: json!({
+            "kind": "scenario",
+            "name": name,
+            "sensors": sensors,
+            "scene": scenario.scene.name,
+            "scans": scenario.scans,
+            "seed": scenario.seed,
+            "formats": formats,
+            "truth": scenario.truth,
+            "warnings": warnings,
+            "assumed": scenario.scene.notes,
+        }),
+    }
+}

@@ -1,0 +1,140 @@
+//! The report on a sensor.
+
+use macropulse::design::{Derived, Design};
+use serde_json::{Map, Value, json};
+
+use super::Report;
+use crate::text::{Columns, counted, grouped, short};
+
+/// What follows from a sensor, and what it takes for granted.
+pub fn report(design: &Design) -> Report {
+    let derived = design.derived();
+    let mut text = format!("{}: a sensor\n{}\n", design.name, design.summary);
+    text += &section("Time", &times(design, &derived));
+    text += &section("Range", &ranges(design, &derived));
+    text += &section("Light", &light(design, &derived));
+    let mut idealised = Columns::default();
+    for effect in &design.idealised {
+        idealised.push(effect.name(), effect.assumption());
+    }
+    text += &section("Idealised", &idealised);
+    let mut defaults = Columns::default();
+    for (key, value) in &design.defaults {
+        defaults.push(key, value);
+    }
+    text += &section("Defaults used", &defaults);
+    let mut warnings = Columns::default();
+    warnings.push_list("!", design.warnings.iter().cloned());
+    text += &section("Warnings", &warnings);
+    Report { text, json: json(design, &derived) }
+}
+
+/// Lines under a heading; nothing where there are none.
+fn section(heading: &str, columns: &Columns) -> String {
+    let lines = columns.text();
+    if lines.is_empty() { lines } else { format!("\n{heading}\n{lines}") }
+}
+
+fn times(design: &Design, derived: &Derived) -> Columns {
+    let mut columns = Columns::default();
+    let scan = &design.scan;
+    let rate = scan.rate_millihertz as f64 * 1e-3;
+    columns.push(
+        "scan",
+        format!(
+            "{} rows x {} columns = {} shots, {} times a second",
+            scan.rows,
+            scan.columns,
+            grouped(design.shots_per_scan()),
+            short(rate)
+        ),
+    );
+    columns.push("pixel period", format!("{} ns", short(derived.pixel_period * 1e9)));
+    columns.push("shortest dwell", format!("{} ns", short(derived.shortest_dwell * 1e9)));
+    columns.push("range gate", format!("{} ns", short(derived.gate * 1e9)));
+    columns.push("shots in flight", short(derived.shots_in_flight));
+    columns.push(
+        "idle listening",
+        format!(
+            "{} scans a second, if each shot waited for the echo of the one before",
+            short(derived.idle_listening_rate)
+        ),
+    );
+    columns
+}
+
+fn ranges(design: &Design, derived: &Derived) -> Columns {
+    let mut columns = Columns::default();
+    let (near, far) = (design.scan.min_range, design.scan.max_range);
+    columns.push("accepted", format!("{} to {} m", short(near), short(far)));
+    columns.push(
+        "unambiguous",
+        match derived.unambiguous_range {
+            Some(range) => format!("{} m, where a code word comes again", short(range)),
+            None => "by the detector alone: shots carry no code".to_owned(),
+        },
+    );
+    columns.push("one tick", format!("{} mm", short(derived.tick_range * 1e3)));
+    columns.push("called right", format!("to within {} mm", short(design.right_within * 1e3)));
+    columns
+}
+
+fn light(design: &Design, derived: &Derived) -> Columns {
+    let mut columns = Columns::default();
+    if design.is_coded() {
+        let (fewest, mean, most) = derived.marks;
+        let chips = counted(u64::from(derived.chips), "chip");
+        let chip = short(design.coding.chip_fs as f64 * 1e-3);
+        let length = short(derived.macropulse * 1e9);
+        columns.push("macropulse", format!("{chips} of {chip} ps = {length} ns"));
+        columns
+            .push("mean overlap", format!("{} macropulses at once", short(derived.mean_overlap)));
+        let lit = format!("{fewest} to {most} per label that is lit, {} on average", short(mean));
+        columns.push("marks", lit);
+        columns.push("", format!("{} in a scan", grouped(derived.marks_per_scan)));
+    } else {
+        let pulse = short(design.light.pulse * 1e12);
+        columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));
+    }
+    let photons = short(derived.reference_photons);
+    columns.push("sensitivity", format!("{photons} photons per mark from the reference target"));
+    columns
+}
+
+fn json(design: &Design, derived: &Derived) -> Value {
+    let (fewest, mean, most) = derived.marks;
+    let named = |pairs: &mut dyn Iterator<Item = (&str, &str)>| -> Map<String, Value> {
+        pairs.map(|(key, value)| (key.to_owned(), value.into())).collect()
+    };
+    json!({
+        "kind": "sensor",
+        "name": design.name,
+        "summary": design.summary,
+        "rows": design.scan.rows,
+        "columns": design.scan.columns,
+        "shots_per_scan": design.shots_per_scan(),
+        "scan_rate_hz": design.scan.rate_millihertz as f64 * 1e-3,
+        "pixel_period_ns": derived.pixel_period * 1e9,
+        "shortest_dwell_ns": derived.shortest_dwell * 1e9,
+        "range_gate_ns": derived.gate * 1e9,
+        "shots_in_flight": derived.shots_in_flight,
+        "idle_listening_hz": derived.idle_listening_rate,
+        "min_range_m": design.scan.min_range,
+        "max_range_m": design.scan.max_range,
+        "unambiguous_range_m": derived.unambiguous_range,
+        "tick_mm": derived.tick_range * 1e3,
+        "right_within_mm": design.right_within * 1e3,
+        "chip_ps": design.coding.chip_fs as f64 * 1e-3,
+        "macropulse_chips": derived.chips,
+        "macropulse_ns": derived.macropulse * 1e9,
+        "marks_min": fewest,
+        "marks_mean": mean,
+        "marks_max": most,
+        "marks_per_scan": derived.marks_per_scan,
+        "mean_overlap": derived.mean_overlap,
+        "reference_photons": derived.reference_photons,
+        "idealised": named(&mut design.idealised.iter().map(|e| (e.name(), e.assumption()))),
+        "defaults": named(&mut design.defaults.iter().map(|(k, v)| (k.as_str(), v.as_str()))),
+        "warnings": design.warnings,
+    })
+}

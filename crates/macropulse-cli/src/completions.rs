@@ -1,0 +1,22 @@
+//! `macropulse completions`: what the shell needs to complete commands and options.
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use crate::fault::Fault;
+use crate::options::Options;
+
+/// Print the completions for a shell
+#[derive(Args)]
+#[command(after_help = "Example:
+  macropulse completions bash > ~/.local/share/bash-completion/completions/macropulse")]
+pub struct Completions {
+    /// The shell
+    shell: Shell,
+}
+
+pub fn run(options: &Completions) -> Result<(), Fault> {
+    let mut script = Vec::new();
+    clap_complete::generate(options.shell, &mut Options::command(), "macropulse", &mut script);
+    crate::text::print(&String::from_utf8_lossy(&script))
+}

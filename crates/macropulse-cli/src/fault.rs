@@ -1,0 +1,137 @@
+//! What can go wrong, whose fault it is, and the exit code that says so.
+
+use std::io;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use macropulse::{design, formats, scene};
+
+/// Why a command did not do what was asked.
+#[derive(Debug)]
+pub enum Fault {
+    /// Somebody wrote a wrong file, name or option.
+    Wrong(String),
+    /// As `Wrong`, and said already.
+    Told,
+    /// The program, or the machine under it.
+    Ours(String),
+    /// Ctrl-C.
+    Interrupted,
+}
+
+impl Fault {
+    /// A file that cannot be read, in words of ours.
+    pub fn unreadable(name: &str, error: &io::Error) -> Self {
+        let reason = match error.kind() {
+            io::ErrorKind::NotFound => "there is no such file".to_owned(),
+            io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+            io::ErrorKind::InvalidData => "it is not text".to_owned(),
+            io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+            _ => error.to_string(),
+        };
+        Self::Wrong(format!("{name}: cannot be read: {reason}"))
+    }
+
+    /// Says on stderr, in one sentence, what is to be said, and gives the exit code.
+    pub fn report(&self) -> ExitCode {
+        match self {
+            Self::Wrong(sentence) | Self::Ours(sentence) => complain(sentence),
+            Self::Told | Self::Interrupted => {}
+        }
+        match self {
+            Self::Wrong(_) | Self::Told => ExitCode::from(2),
+            Self::Ours(_) => ExitCode::from(1),
+            Self::Interrupted => ExitCode::from(crate::interrupt::EXIT_CODE),
+        }
+    }
+}
+
+/// One line on stderr, with the name of the program before it.
+pub fn complain(sentence: &str) {
+    eprintln!("macropulse: {}", one_line(sentence));
+}
+
+fn one_line(text: &str) -> String {
+    text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// What clap could not make sense of, as one sentence; help and version are no faults.
+pub fn usage(error: &clap::Error) -> Result<(), Fault> {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            // Clap knows whether colours are wanted; a reader who has seen enough is no fault.
+            let _ = error.print();
+            Ok(())
+        }
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            eprint!("{}", error.render());
+            Err(Fault::Told)
+        }
+        _ => Err(Fault::Wrong(sentence_of(&error.render().to_string()))),
+    }
+}
+
+/// Clap writes a paragraph of what is wrong, tips, the usage, and where to find more.
+fn sentence_of(rendered: &str) -> String {
+    let mut paragraphs = rendered.split("\n\n");
+    let wrong = one_line(paragraphs.next().unwrap_or_default());
+    let wrong = wrong.strip_prefix("error: ").unwrap_or(&wrong).to_owned();
+    let rest: Vec<&str> = paragraphs.flat_map(str::lines).map(str::trim).collect();
+    let tips = rest.iter().filter_map(|line| line.strip_prefix("tip: "));
+    let usage = rest.iter().find_map(|line| line.strip_prefix("Usage: "));
+    let command = usage.map(|usage| {
+        let words = usage.split(' ').take_while(|word| word.starts_with(char::is_lowercase));
+        format!("see `{} --help`", words.collect::<Vec<_>>().join(" "))
+    });
+    let parts = std::iter::once(wrong).chain(tips.map(|tip| (*tip).to_owned())).chain(command);
+    parts.collect::<Vec<_>>().join("; ")
+}
+
+impl From<design::Error> for Fault {
+    fn from(error: design::Error) -> Self {
+        Self::Wrong(error.to_string())
+    }
+}
+
+impl From<scene::Error> for Fault {
+    fn from(error: scene::Error) -> Self {
+        Self::Wrong(error.to_string())
+    }
+}
+
+impl From<formats::Error> for Fault {
+    fn from(error: formats::Error) -> Self {
+        match error {
+            formats::Error::Uneven { .. } => Self::Ours(error.to_string()),
+            _ => Self::Wrong(error.to_string()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_paragraph_of_clap_becomes_a_sentence() {
+        let rendered = "error: unexpected argument '--sead' found\n\n  tip: a similar argument \
+                        exists: '--seed'\n\nUsage: macropulse simulate --seed <SEED>\n\nFor more \
+                        information, try '--help'.\n";
+        assert_eq!(
+            sentence_of(rendered),
+            "unexpected argument '--sead' found; a similar argument exists: '--seed'; \
+             see `macropulse simulate --help`"
+        );
+    }
+
+    #[test]
+    fn what_is_missing_is_named_in_the_sentence() {
+        let rendered = "error: the following required arguments were not provided:\n  --sensor \
+                        <NAME>\n\nUsage: macropulse encode --sensor <NAME>\n";
+        assert_eq!(
+            sentence_of(rendered),
+            "the following required arguments were not provided: --sensor <NAME>; \
+             see `macropulse encode --help`"
+        );
+    }
+}

@@ -1,0 +1,115 @@
+//! What a file is: its content tells, not its name.
+
+use std::path::Path;
+
+use macropulse::design::{preset_names, preset_text};
+use macropulse::names::nearest;
+use macropulse::scene::Scene;
+use toml::{Table, Value};
+
+use crate::fault::Fault;
+
+/// What can be checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Sensor,
+    Scene,
+    Scenario,
+}
+
+/// Keys only a sensor file has.
+const OF_SENSORS: [&str; 8] =
+    ["extends", "scan", "light", "code", "detector", "tdc", "receiver", "idealised"];
+
+/// Keys only a scene file has.
+const OF_SCENES: [&str; 3] = ["object", "ground", "material"];
+
+/// Keys only a scenario has.
+const OF_SCENARIOS: [&str; 4] = ["scene", "scans", "seed", "formats"];
+
+impl Kind {
+    /// What the ready sensor or scene, or the file, called `name` is.
+    pub fn of(name: &str) -> Result<Self, Fault> {
+        if preset_text(name).is_some() {
+            return Ok(Self::Sensor);
+        }
+        if Scene::builtin(name).is_some() {
+            return Ok(Self::Scene);
+        }
+        let path = Path::new(name);
+        if !path.exists() && path.extension().is_none() && path.components().count() == 1 {
+            return Err(Fault::Wrong(unknown(name)));
+        }
+        let text =
+            std::fs::read_to_string(path).map_err(|error| Fault::unreadable(name, &error))?;
+        match text.parse::<Table>() {
+            Ok(table) => Self::of_table(&table).ok_or_else(|| {
+                Fault::Wrong(format!(
+                    "{name}: is neither a sensor ([scan], extends …), nor a scene ([[object]], \
+                     ground …), nor a scenario (sensor = \"…\", scene = \"…\"); start from \
+                     `macropulse sensors NAME` or `macropulse scenes NAME`"
+                ))
+            }),
+            Err(error) => Err(Fault::Wrong(not_toml(name, &text, &error))),
+        }
+    }
+
+    fn of_table(table: &Table) -> Option<Self> {
+        let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+        match table.get("sensor") {
+            // What a scenario names, and where in a scene the sensor stands.
+            Some(Value::String(_)) => Some(Self::Scenario),
+            _ if table.contains_key("sensors") => Some(Self::Scenario),
+            _ if has(&OF_SENSORS) => Some(Self::Sensor),
+            _ if has(&OF_SCENES) => Some(Self::Scene),
+            _ if has(&OF_SCENARIOS) => Some(Self::Scenario),
+            Some(Value::Table(_)) => Some(Self::Scene),
+            _ => None,
+        }
+    }
+}
+
+fn unknown(name: &str) -> String {
+    let known = || preset_names().chain(Scene::builtin_names());
+    let hint =
+        nearest(name, known()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+    let known: Vec<&str> = known().collect();
+    format!("{name}: no such sensor, scene or file; {hint}ready ones: {}", known.join(", "))
+}
+
+fn not_toml(name: &str, text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    format!("{name}:{line}:{column}: is not TOML: {}", error.message())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kind(text: &str) -> Option<Kind> {
+        Kind::of_table(&text.parse().unwrap())
+    }
+
+    #[test]
+    fn the_content_tells_what_it_is() {
+        for name in preset_names() {
+            assert_eq!(kind(preset_text(name).unwrap()), Some(Kind::Sensor), "{name}");
+        }
+        for name in Scene::builtin_names() {
+            assert_eq!(kind(Scene::builtin(name).unwrap()), Some(Kind::Scene), "{name}");
+        }
+        assert_eq!(kind("sensor = \"a\"\nscene = \"b\""), Some(Kind::Scenario));
+        // A slip of the pen makes no sensor of it.
+        assert_eq!(kind("sensors = []\nscan = 3"), Some(Kind::Scenario));
+        assert_eq!(kind("[sensor]\nyaw_deg = 3"), Some(Kind::Scene));
+        assert_eq!(kind("version = 1"), None);
+    }
+
+    #[test]
+    fn a_name_is_looked_for_among_sensors_and_scenes() {
+        assert!(unknown("car-3m").contains("did you mean `car-30m`?"));
+        assert!(unknown("hdl64e").contains("did you mean `hdl-64e`?"));
+    }
+}

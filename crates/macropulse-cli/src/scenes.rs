@@ -1,0 +1,83 @@
+//! `macropulse scenes`: the scenes that come with the program.
+
+use clap::Args;
+use macropulse::names::nearest;
+use macropulse::scene::Scene;
+use serde_json::json;
+
+use crate::fault::Fault;
+use crate::text::{Columns, first_sentence, print};
+
+/// List the ready scenes, or print one as TOML to start from
+#[derive(Args)]
+#[command(after_help = "Example:
+  macropulse scenes street > mine.toml")]
+pub struct Scenes {
+    /// Scene to print
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(options: &Scenes) -> Result<(), Fault> {
+    match &options.name {
+        Some(name) => one(name, options.json),
+        None => all(options.json),
+    }
+}
+
+fn one(name: &str, as_json: bool) -> Result<(), Fault> {
+    let Some(toml) = Scene::builtin(name) else {
+        let hint = nearest(name, Scene::builtin_names())
+            .map(|near| format!("did you mean `{near}`? "))
+            .unwrap_or_default();
+        let known: Vec<&str> = Scene::builtin_names().collect();
+        return Err(Fault::Wrong(format!(
+            "{name}: no such ready scene; {hint}ready ones: {}",
+            known.join(", ")
+        )));
+    };
+    if as_json {
+        let scene = json!({ "name": name, "summary": summary(toml), "toml": toml });
+        return print(&format!("{scene:#}\n"));
+    }
+    print(toml)
+}
+
+fn all(as_json: bool) -> Result<(), Fault> {
+    let scenes = || {
+        Scene::builtin_names().map(|name| (name, summary(Scene::builtin(name).unwrap_or_default())))
+    };
+    if as_json {
+        let list: Vec<_> =
+            scenes().map(|(name, summary)| json!({ "name": name, "summary": summary })).collect();
+        return print(&format!("{:#}\n", serde_json::Value::from(list)));
+    }
+    let mut columns = Columns::default();
+    scenes().for_each(|(name, summary)| columns.push(name, summary));
+    print(&columns.text())
+}
+
+/// A scene file begins with a comment; its first sentence says what the scene is.
+fn summary(toml: &str) -> String {
+    let comment: Vec<&str> =
+        toml.lines().map_while(|line| line.strip_prefix('#')).map(str::trim).collect();
+    first_sentence(&comment.join(" ")).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::summary;
+
+    #[test]
+    fn the_summary_is_the_first_sentence_of_the_comment() {
+        assert_eq!(
+            summary("# A wall,\n# 50 m ahead. White.\n#\n# More.\na = 1\n"),
+            "A wall, 50 m ahead"
+        );
+        assert_eq!(summary("version = 1\n"), "");
+    }
+}

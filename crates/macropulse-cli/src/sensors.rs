@@ -1,0 +1,53 @@
+//! `macropulse sensors`: the sensors that come with the program.
+
+use clap::Args;
+use macropulse::design::{Design, preset_names, preset_text};
+use serde_json::json;
+
+use crate::fault::Fault;
+use crate::text::{Columns, print};
+
+/// List the ready sensors, or print one as TOML to start from
+#[derive(Args)]
+#[command(after_help = "Example:
+  macropulse sensors kim-park-2016 > mine.toml")]
+pub struct Sensors {
+    /// Sensor to print; of a file, everything it leaves unsaid is printed too
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(options: &Sensors) -> Result<(), Fault> {
+    match &options.name {
+        Some(name) => one(name, options.json),
+        None => all(options.json),
+    }
+}
+
+fn one(name: &str, as_json: bool) -> Result<(), Fault> {
+    let design = Design::open(name, &[])?;
+    let toml = preset_text(name).unwrap_or(&design.text);
+    if as_json {
+        let sensor = json!({ "name": design.name, "summary": design.summary, "toml": toml });
+        return print(&format!("{sensor:#}\n"));
+    }
+    print(toml)
+}
+
+fn all(as_json: bool) -> Result<(), Fault> {
+    let mut columns = Columns::default();
+    let mut list = Vec::new();
+    for name in preset_names() {
+        let summary = Design::open(name, &[])?.summary;
+        list.push(json!({ "name": name, "summary": summary }));
+        columns.push(name, summary);
+    }
+    if as_json {
+        return print(&format!("{:#}\n", serde_json::Value::from(list)));
+    }
+    print(&columns.text())
+}

@@ -1,0 +1,192 @@
+//! `macropulse simulate`: sensors in a scene, scan by scan.
+
+mod files;
+mod manifest;
+mod run;
+pub mod scenario;
+mod summary;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+
+use crate::fault::Fault;
+use crate::interrupt::Interrupt;
+use crate::kind::Kind;
+use crate::options::{Changes, Common};
+use crate::text::{print, print_json};
+use files::{Folder, Formats};
+use run::Run;
+use scenario::Scenario;
+
+/// Scan a scene and write point clouds, range images and a manifest
+///
+/// Which sensor, in which scene, and how long, is said by a scenario file or by options; options
+/// win over the file.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  macropulse simulate --sensor kim-park-2016-fixed --scene car-30m -o out
+  macropulse simulate --sensor hdl-64e --scene street --scans 5 --format ply,csv --truth -o out
+  macropulse simulate crossing.toml -o out
+
+A scenario file:
+  version = 1
+  sensors = [\"kim-park-2016-fixed\", \"hdl-64e\"]   # or sensor = \"mine.toml\"
+  scene = \"street\"
+  scans = 5
+  seed = 7
+  formats = [\"pcd\", \"png\"]
+  truth = true")]
+pub struct Simulate {
+    /// Scenario file
+    #[arg(value_name = "SCENARIO.toml", conflicts_with_all = ["sensors", "scene"])]
+    #[arg(required_unless_present_any = ["sensors", "scene"])]
+    scenario: Option<PathBuf>,
+
+    /// Ready sensor or TOML file; repeatable, each gets a folder of its own
+    #[arg(long = "sensor", value_name = "NAME-or-FILE", requires = "scene")]
+    sensors: Vec<String>,
+
+    /// Ready scene or TOML file
+    #[arg(long, value_name = "NAME-or-FILE", requires = "sensors")]
+    scene: Option<String>,
+
+    #[command(flatten)]
+    changes: Changes,
+
+    /// Receiver that decodes the macropulses: short for --set receiver.kind=…
+    #[arg(long, value_name = "KIND")]
+    receiver: Option<ReceiverName>,
+
+    /// Folder for the results, made if need be; files of the same name are replaced
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    /// Number of scans [default: 1]
+    #[arg(long, value_name = "N")]
+    scans: Option<u64>,
+
+    /// Seed of all chance; the same seed gives the same bytes [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// Formats to write: pcd, ply, csv, png, with commas between them, or none [default: pcd,png]
+    #[arg(long, value_name = "LIST")]
+    format: Option<Formats>,
+
+    /// Write the truth beside each point: range, object, material, incidence, outcome
+    #[arg(long)]
+    truth: bool,
+
+    /// Print what was counted as JSON: an object, or an array of them for several sensors
+    #[arg(long)]
+    json: bool,
+}
+
+/// The receivers that can be chosen for coded shots.
+#[derive(Clone, Copy, ValueEnum)]
+enum ReceiverName {
+    /// As printed in the paper: the first mark opens a macropulse
+    Literal,
+    /// Bit by bit, trying how many leading bits were dark
+    Blind,
+    /// Correlates the whole macropulse of every shot in flight
+    Matched,
+}
+
+impl Simulate {
+    /// What is to be done, all of it checked.
+    fn scenario(&self) -> Result<Scenario, Fault> {
+        let mut set = self.changes.set.clone();
+        if let Some(kind) = self.receiver.and_then(|receiver| receiver.to_possible_value()) {
+            set.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
+        }
+        let mut scenario = match (&self.scenario, &self.scene) {
+            (Some(path), _) => open(path, &set)?,
+            (None, scene) => Scenario::of(&self.sensors, scene.as_deref().unwrap_or(""), &set)?,
+        };
+        if let Some(formats) = &self.format {
+            scenario.formats.clone_from(&formats.0);
+        }
+        scenario.scans = self.scans.unwrap_or(scenario.scans);
+        scenario::check_scans(scenario.scans, &scenario.designs)
+            .map_err(|sentence| Fault::Wrong(format!("--scans: {sentence}")))?;
+        scenario.seed = self.seed.unwrap_or(scenario.seed);
+        scenario.truth |= self.truth;
+        Ok(scenario)
+    }
+
+    /// A folder for each sensor, proven to be writable; none where nothing is to be written.
+    fn folders(&self, scenario: &Scenario) -> Result<Vec<Option<Folder>>, Fault> {
+        let Some(output) = &self.output else {
+            if scenario.formats.is_empty() {
+                return Ok(scenario.designs.iter().map(|_| None).collect());
+            }
+            let remedy = "say where the results go with -o DIR, or write none with --format none";
+            return Err(Fault::Wrong(remedy.to_owned()));
+        };
+        let paths = match scenario.designs.as_slice() {
+            [_] => vec![output.clone()],
+            several => subfolders(output, several.iter().map(|design| design.name.as_str())),
+        };
+        paths.iter().map(|path| Folder::claim(path).map(Some)).collect()
+    }
+}
+
+pub fn run(options: &Simulate, common: &Common) -> Result<(), Fault> {
+    let scenario = options.scenario()?;
+    let folders = options.folders(&scenario)?;
+    let interrupt = Interrupt::listen()?;
+    let mut runs = Vec::new();
+    for (design, folder) in scenario.designs.iter().zip(folders) {
+        runs.push(Run::of(design, &scenario, folder, (common, &interrupt))?);
+        if interrupt.is_raised() {
+            break;
+        }
+    }
+    if options.json {
+        print_json(runs.iter().map(Run::json).collect())?;
+    } else if !common.quiet {
+        let texts: Vec<String> = runs.iter().map(|run| run.text(common.verbose)).collect();
+        print(&texts.join("\n"))?;
+    }
+    if interrupt.is_raised() { Err(Fault::Interrupted) } else { Ok(()) }
+}
+
+/// The scenario in the file at `path`; a sensor or a scene in its place is a slip worth a hint.
+fn open(path: &Path, set: &[(String, String)]) -> Result<Scenario, Fault> {
+    let (what, option, other) = match Kind::of(&path.display().to_string()) {
+        Ok(Kind::Sensor) => ("sensor", "--sensor", "--scene"),
+        Ok(Kind::Scene) => ("scene", "--scene", "--sensor"),
+        _ => return Scenario::open(path, set),
+    };
+    let path = path.display();
+    Err(Fault::Wrong(format!(
+        "{path}: is a {what}, not a scenario; use {option} {path} and {other}"
+    )))
+}
+
+/// A folder below `output` for each name; characters that mean something in a path are replaced,
+/// and names that come twice are numbered.
+fn subfolders<'a>(output: &Path, names: impl Iterator<Item = &'a str>) -> Vec<PathBuf> {
+    let mut taken: Vec<String> = Vec::new();
+    for name in names {
+        let plain = name.replace(|c: char| !c.is_alphanumeric() && !"-_".contains(c), "-");
+        let numbered = (2..).map(|n| format!("{plain}-{n}"));
+        let free = std::iter::once(plain.clone()).chain(numbered).find(|n| !taken.contains(n));
+        taken.extend(free);
+    }
+    taken.iter().map(|name| output.join(name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sensors_of_one_name_do_not_share_a_folder() {
+        let folders = subfolders(Path::new("out"), ["a", "../b", "a", "a"].into_iter());
+        let wanted = ["out/a", "out/---b", "out/a-2", "out/a-3"].map(PathBuf::from);
+        assert_eq!(folders, wanted);
+    }
+}

@@ -1,0 +1,133 @@
+//! One sensor's run through its scans.
+
+use std::time::Instant;
+
+use macropulse::design::Design;
+use macropulse::formats::Format;
+use macropulse::points::Truth;
+use macropulse::scene::Scene;
+use macropulse::score::Score;
+use macropulse::sim::{self, Tally};
+
+use super::files::{COLOUR, Folder, write_scan};
+use super::manifest;
+use super::scenario::Scenario;
+use crate::fault::{Fault, complain};
+use crate::interrupt::Interrupt;
+use crate::options::Common;
+use crate::progress::Progress;
+
+/// A run that is over, with all that was counted.
+pub struct Run<'a> {
+    pub design: &'a Design,
+    pub scene: &'a Scene,
+    pub seed: u64,
+    /// Scans done; fewer than wanted after Ctrl-C.
+    pub scans: u64,
+    pub score: Score,
+    pub tally: Tally,
+    /// Wall-clock time, s.
+    pub elapsed: f64,
+    /// Of which writing files, s.
+    pub writing: f64,
+    /// Where the files are, and their names; empty where none were wanted.
+    pub folder: String,
+    pub files: Vec<String>,
+    /// What its user should know.
+    pub warnings: Vec<String>,
+}
+
+impl<'a> Run<'a> {
+    /// Simulates and writes scan after scan, and the manifest at the end.
+    pub fn of(
+        design: &'a Design,
+        scenario: &'a Scenario,
+        mut folder: Option<Folder>,
+        (common, interrupt): (&Common, &Interrupt),
+    ) -> Result<Self, Fault> {
+        let mut run = Self::new(design, scenario);
+        let shots = scenario.scans * design.shots_per_scan();
+        let progress = Progress::of(common, &design.name, shots);
+        let began = Instant::now();
+        while run.scans < scenario.scans && !interrupt.is_raised() {
+            let done = |shots| progress.add(shots);
+            let mut scan = sim::scan(design, &scenario.scene, scenario.seed, run.scans, &done);
+            run.score.add(&scan.score);
+            run.tally.add(&scan.tally);
+            if !scenario.truth {
+                scan.cloud.truth = Truth::default();
+            }
+            if let Some(folder) = &mut folder {
+                let writing = Instant::now();
+                let files = interrupt.undisturbed(|| {
+                    if run.scans == 0 {
+                        folder.make()?;
+                    }
+                    let stage = (design, &scenario.scene);
+                    let files = write_scan(folder.path(), &scenario.formats, &scan.cloud, stage)?;
+                    folder.keep();
+                    Ok::<_, Fault>(files)
+                })?;
+                run.files.extend(files);
+                run.writing += writing.elapsed().as_secs_f64();
+            }
+            run.scans += 1;
+        }
+        run.elapsed = began.elapsed().as_secs_f64();
+        progress.finish();
+        run.find_warnings(scenario);
+        if let (Some(folder), 1..) = (&folder, run.scans) {
+            run.folder = folder.path().display().to_string();
+            interrupt.undisturbed(|| manifest::of(&run).write(folder.path()))?;
+        }
+        Ok(run)
+    }
+
+    fn new(design: &'a Design, scenario: &'a Scenario) -> Self {
+        Self {
+            design,
+            scene: &scenario.scene,
+            seed: scenario.seed,
+            scans: 0,
+            score: Score::default(),
+            tally: Tally::default(),
+            elapsed: 0.0,
+            writing: 0.0,
+            folder: String::new(),
+            files: Vec::new(),
+            warnings: design.warnings.clone(),
+        }
+    }
+
+    /// Adds what came to light during the run, and says it at once: it must not go under.
+    fn find_warnings(&mut self, scenario: &Scenario) {
+        let wanted = scenario.scans;
+        let mut found = Vec::new();
+        if self.scans < wanted {
+            found.push(format!("stopped by Ctrl-C after {} of {wanted} scans", self.scans));
+        }
+        if self.scans > 0
+            && let Some(reason) = self.tally.where_all_was_lost()
+        {
+            found.push(format!("not a single point: {reason}"));
+        }
+        let painted = self.files.iter().any(|file| file.ends_with(COLOUR));
+        if scenario.formats.contains(&Format::Png) && !self.files.is_empty() && !painted {
+            found.push(
+                "too many pixels for a picture in colour; there is the 16-bit one".to_owned(),
+            );
+        }
+        found.iter().for_each(|warning| complain(&format!("{}: {warning}", self.design.name)));
+        self.warnings.extend(found);
+    }
+
+    /// Stages with the seconds they took, summed over threads; writing on one.
+    pub fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        Tally::STAGES.into_iter().zip(self.tally.seconds).chain([("write", self.writing)])
+    }
+
+    /// Seconds of the sensor's time simulated per second.
+    pub fn speed(&self) -> f64 {
+        self.scans as f64 * self.design.scan_period() / self.elapsed.max(1e-9)
+    }
+}

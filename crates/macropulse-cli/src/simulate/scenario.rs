@@ -1,0 +1,237 @@
+//! What is to be simulated: a scenario file, or what the options say in its place.
+
+use std::ops::Range;
+use std::path::Path;
+
+use macropulse::design::{Design, preset_text};
+use macropulse::emit::most_scans;
+use macropulse::formats::Format;
+use macropulse::names::nearest;
+use macropulse::scene::Scene;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::files::Formats;
+use crate::fault::Fault;
+
+/// The format this program reads.
+const VERSION: i64 = 1;
+
+/// More scans than this in one run are taken for a slip.
+const MOST_SCANS: u64 = 1_000_000;
+
+/// Sensors, a scene, and how long. Everything in it is valid.
+pub struct Scenario {
+    pub designs: Vec<Design>,
+    pub scene: Scene,
+    pub scans: u64,
+    pub seed: u64,
+    pub formats: Vec<Format>,
+    pub truth: bool,
+}
+
+/// A scenario file as typed.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScenarioFile {
+    version: Spanned<i64>,
+    sensor: Option<Spanned<String>>,
+    #[serde(default)]
+    sensors: Vec<Spanned<String>>,
+    scene: Spanned<String>,
+    scans: Option<Spanned<u64>>,
+    seed: Option<u64>,
+    formats: Option<Vec<Spanned<String>>>,
+    #[serde(default)]
+    truth: bool,
+}
+
+impl Scenario {
+    /// One scan of the sensors in the scene, each a ready one or a file.
+    pub fn of(sensors: &[String], scene: &str, set: &[(String, String)]) -> Result<Self, Fault> {
+        let designs: Result<Vec<_>, _> =
+            sensors.iter().map(|sensor| Design::open(sensor, set)).collect();
+        Ok(Self {
+            designs: designs?,
+            scene: Scene::open(scene)?,
+            scans: 1,
+            seed: 1,
+            formats: Formats::default().0,
+            truth: false,
+        })
+    }
+
+    /// The scenario in the file at `path`; names of files count from its folder.
+    pub fn open(path: &Path, set: &[(String, String)]) -> Result<Self, Fault> {
+        let origin = path.display().to_string();
+        let text =
+            std::fs::read_to_string(path).map_err(|error| Fault::unreadable(&origin, &error))?;
+        let source = Source { text: &text, origin: &origin };
+        let file: ScenarioFile =
+            toml::from_str(&text).map_err(|error| source.typed_wrongly(&error))?;
+        if *file.version.get_ref() != VERSION {
+            let message = format!(
+                "version is {}, but this program reads version {VERSION}",
+                file.version.get_ref()
+            );
+            return Err(source.fault(file.version.span(), &message));
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let named: Vec<&Spanned<String>> = file.sensor.iter().chain(&file.sensors).collect();
+        if named.is_empty() {
+            return Err(source.fault(0..0, "names no sensor: add sensor = \"…\" or sensors = […]"));
+        }
+        let mut designs = Vec::new();
+        for sensor in named {
+            let name = sensor.get_ref();
+            let ready = preset_text(name).is_some() || !looks_like_a_path(name);
+            let place = if ready { name.clone() } else { beside(folder, name) };
+            let design = Design::open(&place, set)
+                .map_err(|error| source.fault(sensor.span(), &error.to_string()))?;
+            designs.push(design);
+        }
+        let name = file.scene.get_ref();
+        let ready = Scene::builtin(name).is_some() || !looks_like_a_path(name);
+        let scene = Scene::open(&if ready { name.clone() } else { beside(folder, name) })
+            .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
+        let formats = match file.formats {
+            Some(names) => formats(&source, &names)?,
+            None => Formats::default().0,
+        };
+        let scans = file.scans.as_ref().map_or(1, |scans| *scans.get_ref());
+        if let (Some(typed), Err(sentence)) = (&file.scans, check_scans(scans, &designs)) {
+            return Err(source.fault(typed.span(), &format!("scans: {sentence}")));
+        }
+        let (seed, truth) = (file.seed.unwrap_or(1), file.truth);
+        Ok(Self { designs, scene, scans, seed, formats, truth })
+    }
+}
+
+/// Whether so many scans can be had of the sensors: the sentence that says why not.
+pub fn check_scans(scans: u64, designs: &[Design]) -> Result<(), String> {
+    if scans == 0 {
+        return Err("0 scans are none; ask for at least 1".to_owned());
+    }
+    if scans > MOST_SCANS {
+        return Err(format!(
+            "{scans} scans are too many for one run; ask for at most {MOST_SCANS}, and for more \
+             start several runs with a seed each"
+        ));
+    }
+    for design in designs {
+        let most = most_scans(design);
+        if scans > most {
+            return Err(format!(
+                "{scans} scans of {} last longer than the 2.5 h its clock counts; ask for at most \
+                 {most}, and for more start several runs with a seed each",
+                design.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn formats(source: &Source, names: &[Spanned<String>]) -> Result<Vec<Format>, Fault> {
+    let mut formats = Vec::new();
+    for name in names {
+        match Format::parse(name.get_ref()) {
+            Ok(format) if formats.contains(&format) => {}
+            Ok(format) => formats.push(format),
+            Err(error) => return Err(source.fault(name.span(), &error.to_string())),
+        }
+    }
+    Ok(formats)
+}
+
+fn looks_like_a_path(name: &str) -> bool {
+    let path = Path::new(name);
+    path.extension().is_some() || path.components().count() > 1
+}
+
+fn beside(folder: &Path, name: &str) -> String {
+    folder.join(name).display().to_string()
+}
+
+/// The text of a file and its name: turns spans into places.
+struct Source<'a> {
+    text: &'a str,
+    origin: &'a str,
+}
+
+impl Source<'_> {
+    fn fault(&self, span: Range<usize>, message: &str) -> Fault {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        Fault::Wrong(format!("{}:{line}:{column}: {message}", self.origin))
+    }
+
+    /// The parser quotes an unknown key in backticks, and those it knows behind it.
+    fn typed_wrongly(&self, error: &toml::de::Error) -> Fault {
+        let said = error.message();
+        let mut quoted = said.split('`').skip(1).step_by(2);
+        let message = match (said.starts_with("unknown field"), quoted.next()) {
+            (true, Some(wrong)) => {
+                let known: Vec<&str> = quoted.collect();
+                let hint = nearest(wrong, known.iter().copied())
+                    .map(|near| format!("did you mean `{near}`?"))
+                    .unwrap_or_else(|| format!("known are {}", known.join(", ")));
+                format!("unknown key `{wrong}`; {hint}")
+            }
+            (false, Some(key)) if said.starts_with("missing field") => {
+                format!("the key `{key}` is missing")
+            }
+            _ => said.to_owned(),
+        };
+        self.fault(error.span().unwrap_or(0..0), &message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, text).unwrap();
+        match Scenario::open(&path, &[]) {
+            Err(Fault::Wrong(sentence)) => sentence.rsplit_once("s.toml").unwrap().1.to_owned(),
+            _ => "accepted".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_scenario_is_read() {
+        let text =
+            "version = 1\nsensors = [\"hdl-64e\", \"peregrine\"]\nscene = \"wall\"\nscans = 3\n";
+        assert_eq!(told(text), "accepted");
+    }
+
+    #[test]
+    fn what_is_wrong_has_a_place_and_a_remedy() {
+        let start = "version = 1\nsensor = \"peregrine\"\nscene = \"wall\"\n";
+        assert_eq!(
+            told(&format!("{start}scnas = 3\n")),
+            ":4:1: unknown key `scnas`; did you mean `scans`?"
+        );
+        assert!(told(&format!("{start}scans = 0\n")).starts_with(":4:9: scans: 0 scans are none"));
+        assert!(
+            told(&format!("{start}formats = [\"pcd\", \"pyl\"]\n")).contains("did you mean `ply`?")
+        );
+        assert!(told("version = 2\nsensor = \"x\"\nscene = \"y\"\n").contains("reads version 1"));
+        assert!(told("version = 1\nscene = \"wall\"\n").contains("names no sensor"));
+        assert!(told("version = 1\nsensor = \"wall\"\n").ends_with("the key `scene` is missing"));
+        assert!(
+            told("version = 1\nsensor = \"perigrine\"\nscene = \"wall\"\n").starts_with(":2:10: ")
+        );
+    }
+
+    #[test]
+    fn no_run_outlasts_its_clock() {
+        let designs = [Design::open("kim-park-2016", &[]).unwrap()];
+        assert!(check_scans(540_000, &designs).is_ok());
+        assert!(check_scans(540_001, &designs).unwrap_err().contains("at most 540000"));
+        assert!(check_scans(1_000_001, &[]).unwrap_err().contains("at most 1000000"));
+    }
+}

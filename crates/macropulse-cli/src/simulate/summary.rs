@@ -1,0 +1,165 @@
+//! What is printed of a run.
+
+use macropulse::decode::Reject;
+use macropulse::points::Outcome;
+use serde_json::{Map, Value, json};
+
+use super::run::Run;
+use crate::text::{Columns, NO_BREAK, counted, grouped, lasted, short};
+
+impl Run<'_> {
+    /// A report for people.
+    pub fn text(&self, verbose: bool) -> String {
+        let (tally, score, design) = (&self.tally, &self.score, self.design);
+        let mut columns = Columns::default();
+        columns.push("shots", grouped(tally.shots));
+        columns.push("light", self.light());
+        columns.push("returns", grouped(tally.returns));
+        columns.push("pixels", self.outcomes());
+        if score.with_surface() > 0 {
+            // Rounded down: 100 % is said only of all.
+            let percent = (1e4 * score.right_fraction()).floor() / 100.0;
+            let within = short(design.right_within * 1e3);
+            let surfaces = grouped(score.with_surface());
+            columns.push(
+                "right",
+                format!(
+                    "{percent:.2} % of {surfaces} pixels with a surface, to within {within} mm"
+                ),
+            );
+        }
+        if score.samples_on_target > 0 {
+            let (points, samples) = (score.points_on_target, score.samples_on_target);
+            columns
+                .push("on target", format!("{} of {}", counted(points, "point"), grouped(samples)));
+        }
+        columns.push("rejects", self.rejects());
+        columns.push("converters", self.converters());
+        let stages = self.stages().map(|(stage, s)| format!("{stage}{NO_BREAK}{}", lasted(s)));
+        columns.push("time", format!("{}; summed over threads", listed(stages)));
+        columns.push("idealised", listed(design.idealised.iter().map(|e| e.name().to_owned())));
+        if verbose {
+            columns.push_list("assumed", self.scene.notes.iter().cloned());
+            let defaults = design.defaults.iter().map(|(key, value)| format!("{key} = {value}"));
+            columns.push_list("defaults", defaults);
+        }
+        columns.push_list("warnings", self.warnings.iter().cloned());
+        if !self.folder.is_empty() {
+            columns.push("written", self.written());
+        }
+        format!("{}\n\n{}", self.headline(), columns.text())
+    }
+
+    fn headline(&self) -> String {
+        format!(
+            "{} in {}: {}, seed {}, {:.2} s ({} x real time)",
+            self.design.name,
+            self.scene.name,
+            if self.scans == 1 { "1 scan".to_owned() } else { format!("{} scans", self.scans) },
+            self.seed,
+            self.elapsed,
+            short((self.speed() * 1e4).round() / 1e4),
+        )
+    }
+
+    fn light(&self) -> String {
+        format!(
+            "{} met, {}, {}, {}",
+            counted(self.tally.surfaces, "surface"),
+            counted(self.tally.echoes, "echo"),
+            counted(self.tally.edges, "edge"),
+            counted(self.tally.ticks, "tick"),
+        )
+    }
+
+    fn outcomes(&self) -> String {
+        let count = |outcome| (self.score.count(outcome), outcome);
+        let met = Outcome::ALL.map(count).into_iter().filter(|(count, _)| *count > 0);
+        listed(met.map(|(count, outcome)| format!("{} {}", grouped(count), outcome.name())))
+    }
+
+    fn rejects(&self) -> String {
+        let kinds = Reject::ALL.into_iter().zip(self.tally.rejects);
+        let met = kinds.filter(|(_, count)| *count > 0);
+        let words = |kind: Reject| kind.name().replace('_', " ");
+        listed(met.map(|(kind, count)| format!("{} {}", grouped(count), words(kind))))
+    }
+
+    fn converters(&self) -> String {
+        let per_channel = (self.design.tdc.converters / self.design.channels()).max(1);
+        let of = if self.design.channels() == 1 { "" } else { " per detector" };
+        format!(
+            "at most {} of {}{of} busy; {} lost, {} merged",
+            self.tally.peak_busy,
+            grouped(u64::from(per_channel)),
+            counted(self.tally.lost, "edge"),
+            grouped(self.tally.merged),
+        )
+    }
+
+    fn written(&self) -> String {
+        let files = counted(self.files.len() as u64, "file");
+        match self.files.is_empty() {
+            true => format!("manifest.json to {}", self.folder),
+            false => format!("{files} and manifest.json to {}", self.folder),
+        }
+    }
+
+    /// The same for programs; keys carry their units.
+    pub fn json(&self) -> Value {
+        let tally = &self.tally;
+        let outcomes: Map<String, Value> = Outcome::ALL
+            .into_iter()
+            .map(|outcome| (outcome.name().to_owned(), self.score.count(outcome).into()))
+            .collect();
+        let rejects: Map<String, Value> = Reject::ALL
+            .into_iter()
+            .zip(tally.rejects)
+            .map(|(kind, count)| (kind.name().to_owned(), count.into()))
+            .collect();
+        let stages: Map<String, Value> =
+            self.stages().map(|(stage, seconds)| (stage.to_owned(), seconds.into())).collect();
+        let idealised: Vec<&str> = self.design.idealised.iter().map(|e| e.name()).collect();
+        let defaults: Map<String, Value> = self
+            .design
+            .defaults
+            .iter()
+            .map(|(key, value)| (key.clone(), value.as_str().into()))
+            .collect();
+        json!({
+            "sensor": self.design.name,
+            "scene": self.scene.name,
+            "seed": self.seed,
+            "scans": self.scans,
+            "shots": tally.shots,
+            "surfaces": tally.surfaces,
+            "echoes": tally.echoes,
+            "edges": tally.edges,
+            "ticks": tally.ticks,
+            "returns": tally.returns,
+            "outcomes": outcomes,
+            "right_fraction": self.score.right_fraction(),
+            "right_within_m": self.design.right_within,
+            "samples_on_target": self.score.samples_on_target,
+            "points_on_target": self.score.points_on_target,
+            "rejects": rejects,
+            "converters_peak_busy": tally.peak_busy,
+            "edges_lost": tally.lost,
+            "edges_merged": tally.merged,
+            "elapsed_s": self.elapsed,
+            "sensor_time_per_elapsed": self.speed(),
+            "stages_s": stages,
+            "idealised": idealised,
+            "defaults": defaults,
+            "assumed": self.scene.notes,
+            "warnings": self.warnings,
+            "folder": (!self.folder.is_empty()).then_some(&self.folder),
+            "files": self.files,
+        })
+    }
+}
+
+fn listed(parts: impl Iterator<Item = String>) -> String {
+    let parts: Vec<String> = parts.collect();
+    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
+}

@@ -1,0 +1,161 @@
+//! Text for people: aligned columns, numbers one can read.
+
+use std::io::{ErrorKind, Write};
+
+use crate::fault::Fault;
+
+/// Columns at which long values are broken.
+const WIDTH: usize = 96;
+
+/// A blank at which [`Columns`] breaks no line.
+pub const NO_BREAK: char = '\u{a0}';
+
+/// Writes to stdout. A reader who has seen enough (`| head`) is no fault.
+pub fn print(text: &str) -> Result<(), Fault> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Fault::Ours(format!("cannot write to stdout: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes JSON to stdout: the only value as itself, several as an array.
+pub fn print_json(mut values: Vec<serde_json::Value>) -> Result<(), Fault> {
+    let value = if values.len() == 1 { values.remove(0) } else { values.into() };
+    print(&format!("{value:#}\n"))
+}
+
+/// Names with values beside them, aligned; long values go on below themselves.
+#[derive(Default)]
+pub struct Columns(Vec<(String, String)>);
+
+impl Columns {
+    /// Adds a line.
+    pub fn push(&mut self, name: impl Into<String>, value: impl Into<String>) {
+        self.0.push((name.into(), value.into()));
+    }
+
+    /// Adds a line for each of `values`, with the name before the first.
+    pub fn push_list(&mut self, name: &str, values: impl IntoIterator<Item = String>) {
+        for (i, value) in values.into_iter().enumerate() {
+            self.push(if i == 0 { name } else { "" }, value);
+        }
+    }
+
+    /// All lines, indented by two, with plain blanks.
+    pub fn text(&self) -> String {
+        let width = self.0.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0) + 2;
+        let mut text = String::new();
+        for (name, value) in &self.0 {
+            let mut name = name.as_str();
+            for line in broken(value, WIDTH - 2 - width) {
+                text += format!("  {name:<width$}{line}").trim_end();
+                text.push('\n');
+                name = "";
+            }
+        }
+        text.replace(NO_BREAK, " ")
+    }
+}
+
+/// `text` as lines of at most `width` characters where its blanks allow.
+fn broken(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.len() - 1;
+        let full = lines[last].chars().count() + 1 + word.chars().count() > width;
+        if lines[last].is_empty() {
+            lines[last].push_str(word);
+        } else if full {
+            lines.push(word.to_owned());
+        } else {
+            lines[last].push(' ');
+            lines[last].push_str(word);
+        }
+    }
+    lines
+}
+
+/// 1234567 as `1 234 567`, with blanks that keep it on its line.
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(NO_BREAK);
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A number with five digits that count, without trailing zeros.
+pub fn short(number: f64) -> String {
+    if number == 0.0 || !number.is_finite() {
+        return number.to_string();
+    }
+    let before_point = number.abs().log10().floor() as i32 + 1;
+    let decimals = (5 - before_point).clamp(0, 12) as usize;
+    let text = format!("{number:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// A duration in the unit that suits it.
+pub fn lasted(seconds: f64) -> String {
+    match seconds {
+        s if s >= 1.0 => format!("{s:.2}{NO_BREAK}s"),
+        s if s >= 1e-3 => format!("{:.0}{NO_BREAK}ms", s * 1e3),
+        s => format!("{:.0}{NO_BREAK}us", s * 1e6),
+    }
+}
+
+/// The first sentence of a text.
+pub fn first_sentence(text: &str) -> &str {
+    text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.')
+}
+
+/// `1 file`, `2 files`.
+pub fn counted(number: u64, one: &str) -> String {
+    let ending = match one {
+        _ if number == 1 => "",
+        "echo" => "es",
+        _ => "s",
+    };
+    format!("{} {one}{ending}", grouped(number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_grouped() {
+        assert_eq!(grouped(407_040).replace(NO_BREAK, " "), "407 040");
+        assert_eq!(grouped(99), "99");
+        assert_eq!(short(40.946_540), "40.947");
+        assert_eq!(short(24.0), "24");
+        assert_eq!(short(0.000_374_740), "0.00037474");
+        assert_eq!(short(f64::INFINITY), "inf");
+        assert_eq!(short(1_234_567.8), "1234568");
+        let durations = [1.5, 0.0123, 4.2e-5].map(|s| lasted(s).replace(NO_BREAK, " "));
+        assert_eq!(durations, ["1.50 s", "12 ms", "42 us"]);
+    }
+
+    #[test]
+    fn columns_are_aligned_and_long_values_stay_in_theirs() {
+        let mut columns = Columns::default();
+        columns.push("a", "1");
+        columns.push("long name", "x ".repeat(60).trim_end());
+        let text = columns.text();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "  a          1");
+        assert_eq!(lines.len(), 3);
+        assert!(lines[2].starts_with("             x x"));
+    }
+}
