@@ -1,0 +1,73 @@
+//! What is derived of the paper's sensor, and the lists.
+
+#![allow(missing_docs)]
+
+mod common;
+
+use common::Desk;
+
+#[test]
+fn the_numbers_of_the_paper() {
+    let report = Desk::new().json("check kim-park-2016 --json");
+    let close = |key: &str, wanted: f64, tolerance: f64| {
+        let found = report[key].as_f64().unwrap_or(f64::NAN);
+        assert!((found - wanted).abs() <= tolerance, "{key}: {found}, not {wanted}");
+    };
+    close("pixel_period_ns", 1e9 / (60.0 * 848.0 * 480.0), 1e-9);
+    close("shots_in_flight", 24.44, 0.005);
+    close("macropulse_ns", 27.3325, 1e-9);
+    close("range_gate_ns", 1000.69, 0.01);
+    close("unambiguous_range_m", 178.0, 0.1);
+    close("marks_mean", 179.75, 0.01);
+    close("mean_overlap", 0.6675, 1e-4);
+    close("tick_mm", 0.374_74, 1e-5);
+    assert_eq!(report["macropulse_chips"], 10_933);
+    assert_eq!((&report["marks_min"], &report["marks_max"]), (&58.into(), &319.into()));
+    assert_eq!(report["idealised"]["footprint"], "the beam is a line without width");
+    assert_eq!(report["defaults"]["scan.min_range_m"], "0.5");
+}
+
+#[test]
+fn what_is_changed_counts() {
+    let report = Desk::new().json("check hdl-64e --set scan.max_range_m=60 --json");
+    assert_eq!(report["max_range_m"], 60.0);
+    assert_eq!(report["unambiguous_range_m"], serde_json::Value::Null);
+}
+
+#[test]
+fn every_ready_sensor_and_scene_is_right() {
+    let desk = Desk::new();
+    for list in ["sensors", "scenes"] {
+        for entry in desk.json(&format!("{list} --json")).as_array().unwrap() {
+            let name = entry["name"].as_str().unwrap();
+            assert_ne!(entry["summary"], "", "{name}");
+            assert_eq!(desk.run(&format!("check {name}")).code, Some(0), "{name}");
+            // What is printed to start from is right too, wherever it is put.
+            let ran = desk.run(&format!("{list} {name}"));
+            desk.put("mine.toml", &ran.out);
+            assert_eq!(desk.run("check mine.toml").code, Some(0), "{name}");
+        }
+    }
+}
+
+#[test]
+fn all_files_are_checked_though_one_is_wrong() {
+    let desk = Desk::new();
+    desk.put("a.toml", "version = 1\n[[object]]\nnmae = \"a\"\n").put("b.toml", "rows = 3\n");
+    let ran = desk.run("check a.toml peregrine b.toml wall");
+    assert_eq!(ran.code, Some(2));
+    let told: Vec<&str> = ran.err.lines().collect();
+    assert_eq!(told.len(), 2, "{}", ran.err);
+    assert!(told[0].contains("a.toml:3:1:") && told[0].contains("name"), "{}", told[0]);
+    assert!(told[1].contains("b.toml: is neither a sensor"), "{}", told[1]);
+    assert!(ran.out.contains("peregrine: a sensor") && ran.out.contains("wall: a scene"));
+}
+
+#[test]
+fn completions_know_the_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let ran = Desk::new().run(&format!("completions {shell}"));
+        assert_eq!(ran.code, Some(0));
+        assert!(ran.out.contains("simulate"), "{shell}");
+    }
+}

@@ -1,0 +1,147 @@
+//! Runs of the whole flow.
+
+#![allow(missing_docs)]
+
+mod common;
+
+use std::fs;
+
+use common::Desk;
+
+const START: &str = "simulate --sensor peregrine --scene wall";
+
+#[test]
+fn a_run_leaves_its_scans_and_a_manifest() {
+    let desk = Desk::new();
+    let ran = desk.run(&format!("{START} --scans 2 --format pcd,png -o a/b"));
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+    assert!(ran.out.starts_with("peregrine in wall: 2 scans, seed 1, "), "{}", ran.out);
+    let wanted = [
+        "a",
+        "a/b",
+        "a/b/manifest.json",
+        "a/b/range-000000-colour.png",
+        "a/b/range-000000.png",
+        "a/b/range-000001-colour.png",
+        "a/b/range-000001.png",
+        "a/b/scan-000000.pcd",
+        "a/b/scan-000001.pcd",
+    ];
+    assert_eq!(desk.files(), wanted);
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(desk.path().join("a/b/manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["counts"]["shots"], 2 * 32 * 128);
+    assert_eq!(manifest["files"].as_array().unwrap().len(), 6);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let desk = Desk::new();
+    let points = |line: &str| {
+        let line = format!("simulate --sensor hdl-64e --scene car-30m --format csv --truth {line}");
+        assert_eq!(desk.run(&line).code, Some(0));
+        fs::read(desk.path().join("out/scan-000000.csv")).unwrap()
+    };
+    let one = points("--seed 7 -j 1 -o out");
+    assert!(one.len() > 100_000);
+    assert!(one == points("--seed 7 -j 3 -o out"), "threads change the points");
+    assert!(one != points("--seed 8 -j 3 -o out"), "the seed does not change the points");
+}
+
+#[test]
+fn truth_is_written_only_when_asked_for() {
+    let desk = Desk::new();
+    let header = |line: &str| {
+        assert_eq!(desk.run(&format!("{START} --format csv -o out {line}")).code, Some(0));
+        let text = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+        text.lines().next().unwrap_or_default().to_owned()
+    };
+    assert!(!header("").contains("outcome"));
+    assert!(header("--truth").contains("outcome"));
+}
+
+#[test]
+fn nothing_is_written_when_nothing_is_wanted() {
+    let desk = Desk::new();
+    let run = desk.json(&format!("{START} --format none --json"));
+    assert_eq!(desk.files(), [""; 0]);
+    assert_eq!(run["shots"], 4096);
+    assert_eq!(run["folder"], serde_json::Value::Null);
+}
+
+#[test]
+fn a_scenario_with_several_sensors_gives_each_a_folder() {
+    let desk = Desk::new();
+    fs::create_dir(desk.path().join("in")).unwrap();
+    desk.put("in/mine.toml", "version = 1\nname = \"mine\"\nextends = \"peregrine\"\n");
+    let text = "version = 1\nsensors = [\"peregrine\", \"mine.toml\"]\nscene = \"wall\"\n\
+                scans = 2\nseed = 5\nformats = [\"ply\"]\n";
+    desk.put("in/s.toml", text);
+    let runs = desk.json("simulate in/s.toml -o out --scans 1 --json");
+    assert_eq!((&runs[0]["scans"], &runs[1]["seed"]), (&1.into(), &5.into()));
+    assert_eq!(runs[1]["sensor"], "mine");
+    for file in ["out/mine/scan-000000.ply", "out/peregrine/manifest.json"] {
+        assert!(desk.path().join(file).is_file(), "{file}");
+    }
+    assert!(desk.run("check in/s.toml").out.contains("peregrine, mine"));
+}
+
+#[test]
+fn an_empty_cloud_says_where_the_points_went() {
+    let desk = Desk::new();
+    let near = "--set scan.max_range_m=20";
+    let ran = desk.run(&format!("{START} {near} -o out"));
+    assert_eq!(ran.code, Some(0));
+    let sentence = "peregrine: not a single point: no ray met a surface within the range gate";
+    assert!(ran.err.contains(sentence), "{}", ran.err);
+    assert!(
+        fs::read_to_string(desk.path().join("out/manifest.json")).unwrap().contains("no ray met")
+    );
+}
+
+#[test]
+fn a_range_image_too_large_for_a_picture_is_written_all_the_same() {
+    let desk = Desk::new();
+    let long = "--set scan.flash.rows=1 --set scan.flash.columns=30000";
+    let ran = desk.run(&format!("{START} {long} --format png -o out"));
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.err.contains("too many pixels for a picture in colour"), "{}", ran.err);
+    assert_eq!(desk.files(), ["out", "out/manifest.json", "out/range-000000.png"]);
+}
+
+#[test]
+fn progress_is_one_json_object_per_line() {
+    let ran = Desk::new().run(&format!("{START} --format none --scans 3 --progress json -q"));
+    let lines: Vec<serde_json::Value> =
+        ran.err.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let last = lines.last().unwrap();
+    assert_eq!((&last["event"], &last["shots"]), (&"done".into(), &(3 * 4096).into()));
+    assert_eq!(ran.out, "");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_after_the_scan_with_whole_files() {
+    use std::io::{BufRead, BufReader, Read};
+    use std::process::{Command, Stdio};
+
+    let desk = Desk::new();
+    let line = format!("{START} --scans 100000 --format pcd --progress json -o out");
+    let mut program =
+        desk.command(&line).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let mut told = BufReader::new(program.stderr.take().unwrap());
+    // The first line of progress: the run is under way.
+    told.read_line(&mut String::new()).unwrap();
+    let id = program.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    let mut rest = String::new();
+    told.read_to_string(&mut rest).unwrap();
+    assert_eq!(program.wait().unwrap().code(), Some(130), "{rest}");
+    assert!(rest.contains("stopped by Ctrl-C after"), "{rest}");
+    let text = fs::read_to_string(desk.path().join("out/manifest.json")).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let scans = manifest["counts"]["scans"].as_u64().unwrap() as usize;
+    assert!((1..100_000).contains(&scans));
+    // The folder, the manifest, and one file for each scan: nothing half done.
+    assert_eq!(desk.files().len(), 2 + scans);
+}
