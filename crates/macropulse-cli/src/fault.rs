@@ -4,7 +4,7 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use macropulse::{design, formats, scene};
+use macropulse::{design, formats, paper, record, scene};
 
 /// Why a command did not do what was asked.
 #[derive(Debug)]
@@ -104,6 +104,27 @@ impl From<formats::Error> for Fault {
         match error {
             formats::Error::Uneven { .. } => Self::Ours(error.to_string()),
             _ => Self::Wrong(error.to_string()),
+        }
+    }
+}
+
+impl From<record::Error> for Fault {
+    fn from(error: record::Error) -> Self {
+        match error {
+            record::Error::Formats(error) => error.into(),
+            record::Error::View(error) => Self::Ours(error.to_string()),
+        }
+    }
+}
+
+impl From<paper::Error> for Fault {
+    fn from(error: paper::Error) -> Self {
+        match error {
+            paper::Error::Stopped => Self::Interrupted,
+            paper::Error::Folder { .. } => Self::Wrong(error.to_string()),
+            paper::Error::Record(error) => error.into(),
+            paper::Error::Formats(error) => error.into(),
+            ours => Self::Ours(ours.to_string()),
         }
     }
 }

@@ -4,6 +4,7 @@ mod check;
 mod completions;
 mod encode;
 mod fault;
+mod folder;
 mod interrupt;
 mod kind;
 mod options;

@@ -1,16 +1,23 @@
 //! `macropulse paper`: the whole experiment of \[KP16\].
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
+use macropulse::paper::{self, Findings, Verdict, Watch};
+use serde_json::json;
 
 use crate::fault::Fault;
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
 use crate::options::Common;
+use crate::progress::Progress;
+use crate::text::{Columns, print, print_json};
 
 /// Repeat the experiment of Kim & Park (2016): three lidars, four distances, every claim checked
 #[derive(Args)]
 #[command(after_help = "Example:
-  macropulse paper -o paper")]
+  macropulse paper -o paper
+and open paper/index.html")]
 pub struct Paper {
     /// Folder for clouds, images, tables and the report
     #[arg(short, long, value_name = "DIR", default_value = "paper")]
@@ -19,12 +26,70 @@ pub struct Paper {
     /// Seed of all chance
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+
+    /// Print counts and claims as JSON
+    #[arg(long)]
+    json: bool,
 }
 
-pub fn run(options: &Paper, _common: &Common) -> Result<(), Fault> {
-    experiment(&options.output, options.seed)
+pub fn run(options: &Paper, common: &Common) -> Result<(), Fault> {
+    let mut folder = Folder::claim(&options.output)?;
+    let interrupt = Interrupt::listen()?;
+    folder.make()?;
+    let progress = Progress::of(common, "paper", paper::shots()?);
+    let watch = Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
+    let findings = paper::run(folder.path(), options.seed, &watch)?;
+    folder.keep();
+    progress.finish();
+    if options.json {
+        print_json(vec![json(&findings)])?;
+    } else if !common.quiet {
+        print(&text(&findings))?;
+        print(&format!("\nopen {}\n", folder.path().join("index.html").display()))?;
+    }
+    Ok(())
 }
 
-fn experiment(_output: &Path, _seed: u64) -> Result<(), Fault> {
-    Err(Fault::Ours("this build does not contain the experiment of the paper".to_owned()))
+fn json(findings: &Findings) -> serde_json::Value {
+    let points: Vec<_> = findings
+        .trials
+        .iter()
+        .map(|trial| {
+            json!({
+                "sensor": trial.sensor,
+                "distance_m": trial.distance,
+                "samples": trial.score.samples_on_target,
+                "points": trial.score.points_on_target,
+                "predicted": trial.predicted.samples,
+                "low": trial.predicted.low,
+                "high": trial.predicted.high,
+            })
+        })
+        .collect();
+    json!({ "points": points, "claims": findings.claims })
+}
+
+fn text(findings: &Findings) -> String {
+    let mut counts = Columns::default();
+    for trial in &findings.trials {
+        counts.push(
+            format!("{} at {} m", trial.sensor, trial.distance),
+            format!(
+                "{} points of {} samples on the car; geometry says {:.0} to {:.0}",
+                trial.score.points_on_target,
+                trial.score.samples_on_target,
+                trial.predicted.low,
+                trial.predicted.high
+            ),
+        );
+    }
+    let mut verdicts = Columns::default();
+    for verdict in
+        [Verdict::Holds, Verdict::Partly, Verdict::Fails, Verdict::Unsaid, Verdict::Assumed]
+    {
+        let ids: Vec<&str> =
+            findings.claims.iter().filter(|c| c.verdict == verdict).map(|c| c.id).collect();
+        verdicts.push(format!("{} {}", ids.len(), verdict.name()), ids.join(", "));
+    }
+    format!("{}\nclaims of the paper\n{}", counts.text(), verdicts.text())
 }

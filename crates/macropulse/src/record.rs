@@ -13,6 +13,9 @@ use crate::score::Score;
 use crate::sim::Tally;
 use crate::view::{Layout, RangePicture};
 
+/// How the names of range images in colour end.
+pub const COLOUR: &str = "-colour.png";
+
 /// Why a result could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -20,7 +23,7 @@ pub enum Error {
     #[error(transparent)]
     Formats(#[from] formats::Error),
     /// A picture could not be drawn.
-    #[error("{0}; leave the pictures out with --format pcd")]
+    #[error(transparent)]
     View(#[from] crate::view::Error),
 }
 
@@ -44,8 +47,12 @@ pub fn write_scan(
         write_cloud(format, cloud, &names, &folder.join(&file))?;
         files.push(file);
         if format == Format::Png {
-            let file = format!("range-{:06}-colour.png", cloud.scan);
-            let picture = colour_picture(cloud, design)?;
+            // Some grids are too large for a picture in colour; the 16-bit one is there.
+            let picture = match colour_picture(cloud, design) {
+                Err(crate::view::Error::Size { .. }) => continue,
+                picture => picture?,
+            };
+            let file = format!("range-{:06}{COLOUR}", cloud.scan);
             write_atomically(&folder.join(&file), |out| out.write_all(&picture))?;
             files.push(file);
         }
@@ -87,6 +94,8 @@ pub struct Run<'a> {
     pub files: &'a [String],
     /// Remarks beyond those of the scene.
     pub warnings: &'a [String],
+    /// Time spent writing files, s.
+    pub writing: f64,
     /// Wall-clock time, s.
     pub elapsed: f64,
 }
@@ -128,6 +137,7 @@ pub fn manifest(run: &Run) -> Manifest {
     for (stage, seconds) in Tally::STAGES.into_iter().zip(tally.seconds) {
         manifest.stage_times_s.push(stage, seconds);
     }
+    manifest.stage_times_s.push("write", run.writing);
     manifest.stage_times_s.push("elapsed", run.elapsed);
     manifest
 }

@@ -1,7 +1,6 @@
 //! `macropulse simulate`: sensors in a scene, scan by scan.
 
-mod files;
-mod manifest;
+mod formats;
 mod run;
 pub mod scenario;
 mod summary;
@@ -11,11 +10,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use crate::fault::Fault;
+use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::kind::Kind;
 use crate::options::{Changes, Common};
 use crate::text::{print, print_json};
-use files::{Folder, Formats};
+use formats::Formats;
 use run::Run;
 use scenario::Scenario;
 

@@ -3,16 +3,16 @@
 use std::time::Instant;
 
 use macropulse::design::Design;
-use macropulse::formats::Format;
+use macropulse::formats::{Format, Manifest};
 use macropulse::points::Truth;
+use macropulse::record::{self, COLOUR};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::{self, Tally};
 
-use super::files::{COLOUR, Folder, write_scan};
-use super::manifest;
 use super::scenario::Scenario;
 use crate::fault::{Fault, complain};
+use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
@@ -64,7 +64,8 @@ impl<'a> Run<'a> {
                         folder.make()?;
                     }
                     let stage = (design, &scenario.scene);
-                    let files = write_scan(folder.path(), &scenario.formats, &scan.cloud, stage)?;
+                    let files =
+                        record::write_scan(folder.path(), &scenario.formats, &scan.cloud, stage)?;
                     folder.keep();
                     Ok::<_, Fault>(files)
                 })?;
@@ -78,7 +79,7 @@ impl<'a> Run<'a> {
         run.find_warnings(scenario);
         if let (Some(folder), 1..) = (&folder, run.scans) {
             run.folder = folder.path().display().to_string();
-            interrupt.undisturbed(|| manifest::of(&run).write(folder.path()))?;
+            interrupt.undisturbed(|| run.manifest().write(folder.path()))?;
         }
         Ok(run)
     }
@@ -119,6 +120,21 @@ impl<'a> Run<'a> {
         }
         found.iter().for_each(|warning| complain(&format!("{}: {warning}", self.design.name)));
         self.warnings.extend(found);
+    }
+
+    fn manifest(&self) -> Manifest {
+        record::manifest(&record::Run {
+            design: self.design,
+            scene: self.scene,
+            seed: self.seed,
+            scans: self.scans,
+            tally: &self.tally,
+            score: &self.score,
+            files: &self.files,
+            warnings: &self.warnings,
+            writing: self.writing,
+            elapsed: self.elapsed,
+        })
     }
 
     /// Stages with the seconds they took, summed over threads; writing on one.

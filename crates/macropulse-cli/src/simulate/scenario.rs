@@ -11,7 +11,7 @@ use macropulse::scene::Scene;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::files::Formats;
+use super::formats::Formats;
 use crate::fault::Fault;
 
 /// The format this program reads.

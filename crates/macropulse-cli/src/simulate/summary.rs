@@ -16,16 +16,14 @@ impl Run<'_> {
         columns.push("light", self.light());
         columns.push("returns", grouped(tally.returns));
         columns.push("pixels", self.outcomes());
-        if score.with_surface() > 0 {
+        if score.with_echo() > 0 {
             // Rounded down: 100 % is said only of all.
             let percent = (1e4 * score.right_fraction()).floor() / 100.0;
             let within = short(design.right_within * 1e3);
-            let surfaces = grouped(score.with_surface());
+            let echoes = grouped(score.with_echo());
             columns.push(
                 "right",
-                format!(
-                    "{percent:.2} % of {surfaces} pixels with a surface, to within {within} mm"
-                ),
+                format!("{percent:.2} % of {echoes} pixels with an echo, to within {within} mm"),
             );
         }
         if score.samples_on_target > 0 {

@@ -58,7 +58,9 @@ pub(super) fn trial(
     std::fs::create_dir_all(&folder)
         .map_err(|source| Error::Folder { path: folder.clone(), source })?;
     let formats = [Format::Pcd, Format::Png];
+    let writing = Instant::now();
     let files = record::write_scan(&folder, &formats, &scan.cloud, (design, &scene))?;
+    let writing = writing.elapsed().as_secs_f64();
     let warnings: Vec<String> =
         scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
     let run = record::Run {
@@ -70,6 +72,7 @@ pub(super) fn trial(
         score: &scan.score,
         files: &files,
         warnings: &warnings,
+        writing,
         elapsed,
     };
     record::manifest(&run).write(&folder)?;

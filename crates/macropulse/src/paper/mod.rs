@@ -33,6 +33,9 @@ pub enum Error {
         /// What the system says.
         source: std::io::Error,
     },
+    /// It was asked to stop.
+    #[error("stopped before the end")]
+    Stopped,
     /// A ready sensor was refused.
     #[error(transparent)]
     Design(#[from] crate::design::Error),
@@ -66,33 +69,44 @@ pub struct Findings {
     pub claims: Vec<Claim>,
 }
 
-/// Shots that [`run`] reports as done in the end, receivers' comparison left out.
-pub fn shots(designs: &[Design]) -> u64 {
-    designs.iter().map(Design::shots_per_scan).sum::<u64>() * DISTANCES.len() as u64
+/// Who looks on while the experiment runs.
+pub struct Watch<'a> {
+    /// Is told how many more shots are done, from many threads.
+    pub done: &'a (dyn Fn(u64) + Sync),
+    /// Is asked between trials whether to stop.
+    pub stop: &'a dyn Fn() -> bool,
 }
 
-/// The sensors compared, in the order of [`SENSORS`].
+/// Shots that [`run`] tells its watch of.
 ///
 /// # Errors
 /// None of the ready sensors is refused, unless the program is broken.
-pub fn designs() -> Result<Vec<Design>, Error> {
+pub fn shots() -> Result<u64, Error> {
+    let trials: u64 = designs()?.iter().map(Design::shots_per_scan).sum();
+    Ok(trials * DISTANCES.len() as u64 + receivers::shots()?)
+}
+
+fn designs() -> Result<Vec<Design>, Error> {
     SENSORS.iter().map(|name| Ok(Design::open(name, &[])?)).collect()
 }
 
 /// Runs the whole experiment and writes into `folder`: one folder per sensor and distance,
-/// `points.csv`, `claims.json`, and `index.html` last. `done` is told the shots finished.
+/// `points.csv`, `claims.json`, and `index.html` last.
 ///
 /// # Errors
-/// If something cannot be written.
-pub fn run(folder: &Path, seed: u64, done: &(dyn Fn(u64) + Sync)) -> Result<Findings, Error> {
+/// If something cannot be written, or the watch says stop.
+pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let designs = designs()?;
     let mut trials = Vec::new();
     for (design, sensor) in designs.iter().zip(SENSORS) {
         for distance in DISTANCES {
-            trials.push(experiment::trial(design, (sensor, distance), seed, folder, done)?);
+            if (watch.stop)() {
+                return Err(Error::Stopped);
+            }
+            trials.push(experiment::trial(design, (sensor, distance), seed, folder, watch.done)?);
         }
     }
-    let comparisons = receivers::compare(seed)?;
+    let comparisons = receivers::compare(seed, watch)?;
     let claims = claims(&designs[0], &trials, &comparisons)?;
     let findings = Findings { designs, trials, comparisons, claims };
     write_atomically(&folder.join("points.csv"), |out| {

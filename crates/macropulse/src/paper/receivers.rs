@@ -1,10 +1,8 @@
 //! The three receivers side by side, with and without missed marks.
 
-use std::path::Path;
-
-use super::Error;
+use super::{Error, Watch};
 use crate::design::Design;
-use crate::emit::bands;
+use crate::emit::{Band, bands};
 use crate::points::Outcome;
 use crate::scene::Scene;
 use crate::score::Score;
@@ -56,22 +54,41 @@ impl Comparison {
     }
 }
 
+const COMPARED: [&str; 2] = ["kim-park-2016", "kim-park-2016-fixed"];
+
+fn part(design: &Design) -> Vec<Band> {
+    bands(design, 0).skip(BANDS.start).take(BANDS.len()).collect()
+}
+
+/// Shots of the whole comparison.
+pub(super) fn shots() -> Result<u64, Error> {
+    let runs = (DETECTORS.len() * RECEIVERS.len()) as u64;
+    let mut shots = 0;
+    for sensor in COMPARED {
+        let design = Design::open(sensor, &[])?;
+        shots += runs * part(&design).iter().map(|band| band.shots).sum::<u64>();
+    }
+    Ok(shots)
+}
+
 /// All receivers under all conditions, on the road and the car at 50 m.
-pub(super) fn compare(seed: u64) -> Result<Vec<Comparison>, Error> {
+pub(super) fn compare(seed: u64, watch: &Watch) -> Result<Vec<Comparison>, Error> {
     let scene = Scene::open("car-50m")?;
     let mut rows = Vec::new();
-    for sensor in ["kim-park-2016", "kim-park-2016-fixed"] {
+    for sensor in COMPARED {
         for (detector, keys) in DETECTORS {
             for receiver in RECEIVERS {
+                if (watch.stop)() {
+                    return Err(Error::Stopped);
+                }
                 let set: Vec<(String, String)> = keys
                     .iter()
                     .chain(&[("receiver.kind", receiver)])
                     .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
                     .collect();
-                let text = format!("extends = \"{sensor}\"");
-                let design = Design::from_toml(&text, sensor, Path::new(""), &set)?;
-                let bands: Vec<_> = bands(&design, 0).skip(BANDS.start).take(BANDS.len()).collect();
-                let score = sim::scan_part(&design, &scene, seed, &bands, &|_| {}).score;
+                let design = Design::open(sensor, &set)?;
+                let part = part(&design);
+                let score = sim::scan_part(&design, &scene, seed, &part, watch.done).score;
                 rows.push(Comparison { sensor, detector, receiver, score });
             }
         }
