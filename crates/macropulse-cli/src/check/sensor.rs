@@ -120,7 +120,7 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "shots_in_flight": derived.shots_in_flight,
         "idle_listening_hz": derived.idle_listening_rate,
         "min_range_m": design.scan.min_range,
-        "max_range_m": design.scan.max_range,
+        "max_range_m": design.scan.reach,
         "unambiguous_range_m": derived.unambiguous_range,
         "tick_mm": derived.tick_range * 1e3,
         "right_within_mm": design.right_within * 1e3,

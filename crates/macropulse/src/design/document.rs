@@ -189,8 +189,7 @@ fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
         if let Some(toml::Value::Table(inner)) = kept.get_mut(group) {
             let chosen = sensor.get(group).and_then(toml::Value::as_table);
             inner.retain(|key, _| {
-                !kinds.contains(&key)
-                    || chosen.is_some_and(|c| c.contains_key(key))
+                !kinds.contains(&key) || chosen.is_some_and(|c| c.contains_key(key))
             });
         }
     }

@@ -112,24 +112,27 @@ fn geometry(trials: &[Trial]) -> Claim {
 }
 
 fn tyres(trials: &[Trial]) -> Claim {
-    let lowest = |distance| at(trials, "peregrine", distance).map_or(f64::NAN, |t| t.lowest_sample);
-    let pitch = (7.5_f64 / 32.0).to_radians();
-    let cut = lowest(30) > 1.0 * pitch * 30.0;
-    let whole = lowest(50) < 1.5 * pitch * 50.0;
+    let seen = |distance| {
+        let trial = at(trials, "peregrine", distance);
+        trial.map_or((f64::NAN, f64::NAN), |t| {
+            (t.predicted.cut_off * f64::from(distance), t.lowest_sample)
+        })
+    };
+    let ((cut_30, low_30), (cut_50, low_50)) = (seen(30), seen(50));
     Claim {
         id: "tyres",
         section: "Fig. 8, Fig. 9",
         claim: "Peregrine's field cuts off part of the tyres at 30 m and nothing at 50 m",
         paper: "partially invisible at 30 m".into(),
         measured: format!(
-            "lowest sample on the car {:.2} m above ground at 30 m, {:.2} m at 50 m (rows {:.2} \
-             and {:.2} m apart), seen from 2.2 m",
-            lowest(30),
-            lowest(50),
-            pitch * 30.0,
-            pitch * 50.0
+            "the field ends {:.0} cm above the lowest visible part of the car at 30 m and {:.0} cm \
+             at 50 m; the lowest samples lie {:.0} cm and {:.0} cm above the ground",
+            cut_30 * 1e2,
+            cut_50 * 1e2,
+            low_30 * 1e2,
+            low_50 * 1e2
         ),
-        verdict: holds(cut && whole),
+        verdict: holds(cut_30 > 0.01 && cut_50 == 0.0),
     }
 }
 

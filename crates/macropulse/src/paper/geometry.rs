@@ -25,6 +25,8 @@ pub struct Prediction {
     pub rows: f64,
     /// Columns the target spans.
     pub columns: f64,
+    /// How far the target goes on below the field, rad.
+    pub cut_off: f64,
 }
 
 /// A rectangle of directions, rad: azimuth to the left, elevation up.
@@ -34,14 +36,23 @@ struct Window {
     elevation: (f64, f64),
 }
 
+/// Where a target is looked for.
+const AHEAD: Window = Window { azimuth: (-0.3, 0.3), elevation: (-0.3, 0.3) };
+
 /// The prediction for the target objects of `scene`.
 pub fn predict(design: &Design, scene: &Scene) -> Prediction {
     let field = field(design);
+    let Some((whole, _)) = silhouette(design, scene, AHEAD) else { return Prediction::default() };
+    let within =
+        |(from, to): (f64, f64), (least, most): (f64, f64)| (from.max(least), to.min(most));
     let coarse = Window {
-        azimuth: (field.azimuth.0.max(-0.3), field.azimuth.1.min(0.3)),
-        elevation: (field.elevation.0.max(-0.3), field.elevation.1.min(0.3)),
+        azimuth: within(AHEAD.azimuth, field.azimuth),
+        elevation: within(AHEAD.elevation, field.elevation),
     };
-    let Some((rough, _)) = silhouette(design, scene, coarse) else { return Prediction::default() };
+    let rough = Window {
+        azimuth: within(whole.azimuth, field.azimuth),
+        elevation: within(whole.elevation, field.elevation),
+    };
     let step = |(from, to): (f64, f64)| (to - from) / GRID as f64;
     let wider = |(from, to): (f64, f64), by: f64, (least, most): (f64, f64)| {
         ((from - by).max(least), (to + by).min(most))
@@ -59,7 +70,8 @@ pub fn predict(design: &Design, scene: &Scene) -> Prediction {
     let rows = (around.elevation.1 - around.elevation.0) / down;
     let samples = filled as f64 * cell / (across * down);
     let off_by = |by: f64| samples * (1.0 + by / rows).max(0.0) * (1.0 + by / columns).max(0.0);
-    Prediction { samples, low: off_by(-1.0), high: off_by(1.0), rows, columns }
+    let cut_off = (field.elevation.0 - whole.elevation.0).max(0.0);
+    Prediction { samples, low: off_by(-1.0), high: off_by(1.0), rows, columns, cut_off }
 }
 
 /// The smallest window around the target, and the number of grid directions that meet it first.

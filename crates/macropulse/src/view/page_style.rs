@@ -52,6 +52,8 @@ caption{padding-bottom:.6rem;text-align:left;font-weight:600}
 th{padding:.45rem .9rem;text-align:left;vertical-align:bottom;font-weight:600;font-size:.84rem;color:var(--soft);border-bottom:1.5px solid var(--soft)}
 td{padding:.5rem .9rem;vertical-align:top;border-bottom:1px solid var(--rule)}
 th:first-child,td:first-child{padding-left:0}
+.dense table{font-size:.76rem}
+.dense th,.dense td{padding:.16rem .3rem;font-size:.76rem}
 tbody tr:hover td{background:var(--panel)}
 .number{text-align:right;white-space:nowrap}
 .verdict span{display:inline-block;padding:.06rem .6rem;border-radius:1rem;font-weight:600;font-size:.84rem;white-space:nowrap}

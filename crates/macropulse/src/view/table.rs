@@ -2,6 +2,9 @@
 
 use super::page::inline;
 
+/// Tables with more columns than this are set close, so that they fit the page.
+const DENSE: usize = 12;
+
 /// How a column stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Align {
@@ -69,7 +72,8 @@ impl Table {
     }
 
     pub(super) fn html(&self) -> String {
-        let mut html = String::from("<div class=\"table\"><table>\n");
+        let dense = if self.header.len() > DENSE { " dense" } else { "" };
+        let mut html = format!("<div class=\"table{dense}\"><table>\n");
         if !self.caption.is_empty() {
             html += &format!("<caption>{}</caption>\n", inline(&self.caption));
         }
