@@ -1,4 +1,4 @@
-//! Ctrl-C: the scan under way is finished and written, then the program ends.
+//! Ctrl-C: the bands under way are finished, files are closed, then the program ends.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,7 +26,7 @@ impl Interrupt {
                 let _whole = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
                 std::process::exit(i32::from(EXIT_CODE));
             }
-            complain("finishing this scan; Ctrl-C again stops at once");
+            complain("stopping; Ctrl-C again stops at once");
         })
         .map_err(|error| Fault::Ours(format!("cannot listen for Ctrl-C: {error}")))?;
         Ok(seen)

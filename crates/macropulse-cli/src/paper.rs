@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use macropulse::paper::{self, Findings, Verdict, Watch};
+use macropulse::paper::{self, Findings, Verdict};
+use macropulse::sim::Watch;
 use serde_json::json;
 
 use crate::fault::Fault;

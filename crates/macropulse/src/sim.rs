@@ -27,45 +27,79 @@ pub struct Scan {
 /// Scan number `number` of the sensor `design` in `scene`, with the chance of `seed`.
 ///
 /// The bands of the scan are computed side by side on the threads of the current rayon pool; the
-/// result does not depend on how many there are. `done` is told the shots of each finished band.
-pub fn scan(
+/// result does not depend on how many there are.
+pub fn scan(design: &Design, scene: &Scene, seed: u64, number: u64) -> Scan {
+    let bands: Vec<Band> = bands(design, number).collect();
+    scan_part(design, scene, seed, &bands)
+}
+
+/// As [`scan`], but only the `bands` given, all of one scan; the rest of the cloud stays empty.
+pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> Scan {
+    let number = bands.first().map_or(0, |band| band.scan);
+    let mut scan = Scan::empty(design, number);
+    // A watch that never says stop lets every band through.
+    let nobody = Watch { done: &|_| {}, stop: &|| false };
+    for band in measure_all((design, scene), seed, bands, &nobody).iter().flatten() {
+        scan.add(design, scene, band);
+    }
+    scan
+}
+
+/// As [`scan`], with somebody looking on; `None` if the watch said stop before the end.
+pub fn scan_watched(
     design: &Design,
     scene: &Scene,
     seed: u64,
     number: u64,
-    done: &(dyn Fn(u64) + Sync),
-) -> Scan {
+    watch: &Watch,
+) -> Option<Scan> {
     let bands: Vec<Band> = bands(design, number).collect();
-    scan_part(design, scene, seed, &bands, done)
+    let measured = measure_all((design, scene), seed, &bands, watch);
+    let mut scan = Scan::empty(design, number);
+    for band in &measured {
+        scan.add(design, scene, band.as_ref()?);
+    }
+    Some(scan)
 }
 
-/// As [`scan`], but only the `bands` given, all of one scan; the rest of the cloud stays empty.
-pub fn scan_part(
-    design: &Design,
-    scene: &Scene,
+/// Who looks on while scans are computed. Asked and told from many threads.
+pub struct Watch<'a> {
+    /// Is told the shots of each finished band.
+    pub done: &'a (dyn Fn(u64) + Sync),
+    /// Is asked before each band whether to stop; bands that are under way are finished.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Scan {
+    fn empty(design: &Design, number: u64) -> Self {
+        let mut cloud = PointCloud::empty(design, number);
+        cloud.truth = score::empty_truth(&cloud);
+        Self { cloud, score: Score::default(), tally: Tally::default() }
+    }
+
+    fn add(&mut self, design: &Design, scene: &Scene, band: &Measured) {
+        self.cloud.add(design, &band.log, &band.returns);
+        self.score.add(&score::judge(&mut self.cloud, design, scene, &band.log, &band.hits));
+        self.tally.add(&band.tally);
+    }
+}
+
+fn measure_all(
+    (design, scene): (&Design, &Scene),
     seed: u64,
     bands: &[Band],
-    done: &(dyn Fn(u64) + Sync),
-) -> Scan {
+    watch: &Watch,
+) -> Vec<Option<Measured>> {
     let chance = Chance::new(seed);
-    let number = bands.first().map_or(0, |band| band.scan);
-    let measured: Vec<Measured> = bands
-        .par_iter()
-        .map(|band| {
-            let measured = measure(design, scene, &chance, band.shot_log(design));
-            done(band.shots);
-            measured
-        })
-        .collect();
-    let mut cloud = PointCloud::empty(design, number);
-    cloud.truth = score::empty_truth(&cloud);
-    let mut scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
-    for band in &measured {
-        scan.cloud.add(design, &band.log, &band.returns);
-        scan.score.add(&score::judge(&mut scan.cloud, design, scene, &band.log, &band.hits));
-        scan.tally.add(&band.tally);
-    }
-    scan
+    let measured = |band: &Band| {
+        if (watch.stop)() {
+            return None;
+        }
+        let measured = measure(design, scene, &chance, band.shot_log(design));
+        (watch.done)(band.shots);
+        Some(measured)
+    };
+    bands.par_iter().map(measured).collect()
 }
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.

@@ -8,7 +8,7 @@ use macropulse::points::Truth;
 use macropulse::record::{self, COLOUR};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
-use macropulse::sim::{self, Tally};
+use macropulse::sim::{self, Tally, Watch};
 
 use super::scenario::Scenario;
 use crate::fault::{Fault, complain};
@@ -50,8 +50,12 @@ impl<'a> Run<'a> {
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
         while run.scans < scenario.scans && !interrupt.is_raised() {
-            let done = |shots| progress.add(shots);
-            let mut scan = sim::scan(design, &scenario.scene, scenario.seed, run.scans, &done);
+            let watch =
+                Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
+            let (scene, seed) = (&scenario.scene, scenario.seed);
+            let Some(mut scan) = sim::scan_watched(design, scene, seed, run.scans, &watch) else {
+                break;
+            };
             run.score.add(&scan.score);
             run.tally.add(&scan.tally);
             if !scenario.truth {

@@ -13,6 +13,9 @@ use crate::code::{Codebook, Crc, Family, Payload};
 use crate::decode::{Receiver, ReceiverKind};
 use crate::units::{fs_from_s, tof_from_range};
 
+/// Pixels of the largest range image: a scan of it takes some 4 GB.
+const MOST_PIXELS: u64 = 1 << 25;
+
 /// The format this program reads.
 const VERSION: u32 = 1;
 
@@ -193,6 +196,10 @@ impl Check<'_> {
                 );
             }
         };
+        if u64::from(rows) * u64::from(columns) > MOST_PIXELS {
+            let message = format!("{rows} x {columns} pixels are more than {MOST_PIXELS}");
+            return self.refuse("scan", message);
+        }
         let rate_millihertz = (rate * 1e3).round() as u64;
         Ok(Scan { rows, columns, rate_millihertz, min_range, reach, max_range, pattern })
     }

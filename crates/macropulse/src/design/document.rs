@@ -121,7 +121,7 @@ pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String,
         return Err(Error::whole(name_or_file, presets::unknown(name_or_file)));
     }
     let text = std::fs::read_to_string(&path)
-        .map_err(|error| Error::whole(name_or_file, format!("cannot be read: {error}")))?;
+        .map_err(|error| Error::whole(name_or_file, format!("cannot be read: {}", error.kind())))?;
     let next = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok((text, path.display().to_string(), next))
 }

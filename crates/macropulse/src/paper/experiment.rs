@@ -11,7 +11,7 @@ use crate::points::{NO_OBJECT, Outcome, PointCloud};
 use crate::record;
 use crate::scene::Scene;
 use crate::score::Score;
-use crate::sim::{self, Tally};
+use crate::sim::{self, Tally, Watch};
 
 /// The sensors compared.
 pub const SENSORS: [&str; 3] = ["kim-park-2016", "hdl-64e", "peregrine"];
@@ -48,11 +48,11 @@ pub(super) fn trial(
     (sensor, distance): (&'static str, u32),
     seed: u64,
     folder: &Path,
-    done: &(dyn Fn(u64) + Sync),
+    watch: &Watch,
 ) -> Result<Trial, Error> {
     let scene = Scene::open(&format!("car-{distance}m"))?;
     let began = Instant::now();
-    let scan = sim::scan(design, &scene, seed, 0, done);
+    let scan = sim::scan_watched(design, &scene, seed, 0, watch).ok_or(Error::Stopped)?;
     let elapsed = began.elapsed().as_secs_f64();
     let folder = folder.join(format!("{sensor}-{distance}m"));
     std::fs::create_dir_all(&folder)

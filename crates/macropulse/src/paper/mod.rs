@@ -21,6 +21,7 @@ pub use receivers::{Comparison, PERFECT};
 
 use crate::design::Design;
 use crate::formats::write_atomically;
+use crate::sim::Watch;
 
 /// Why the experiment could not be run or written.
 #[derive(Debug, thiserror::Error)]
@@ -69,14 +70,6 @@ pub struct Findings {
     pub claims: Vec<Claim>,
 }
 
-/// Who looks on while the experiment runs.
-pub struct Watch<'a> {
-    /// Is told how many more shots are done, from many threads.
-    pub done: &'a (dyn Fn(u64) + Sync),
-    /// Is asked between trials whether to stop.
-    pub stop: &'a dyn Fn() -> bool,
-}
-
 /// Shots that [`run`] tells its watch of.
 ///
 /// # Errors
@@ -100,10 +93,7 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let mut trials = Vec::new();
     for (design, sensor) in designs.iter().zip(SENSORS) {
         for distance in DISTANCES {
-            if (watch.stop)() {
-                return Err(Error::Stopped);
-            }
-            trials.push(experiment::trial(design, (sensor, distance), seed, folder, watch.done)?);
+            trials.push(experiment::trial(design, (sensor, distance), seed, folder, watch)?);
         }
     }
     let comparisons = receivers::compare(seed, watch)?;

@@ -1,12 +1,12 @@
 //! The three receivers side by side, with and without missed marks.
 
-use super::{Error, Watch};
+use super::Error;
 use crate::design::Design;
 use crate::emit::{Band, bands};
 use crate::points::Outcome;
 use crate::scene::Scene;
 use crate::score::Score;
-use crate::sim;
+use crate::sim::{self, Watch};
 
 /// The receivers compared.
 const RECEIVERS: [&str; 3] = ["literal", "blind", "matched"];
@@ -88,7 +88,8 @@ pub(super) fn compare(seed: u64, watch: &Watch) -> Result<Vec<Comparison>, Error
                     .collect();
                 let design = Design::open(sensor, &set)?;
                 let part = part(&design);
-                let score = sim::scan_part(&design, &scene, seed, &part, watch.done).score;
+                let score = sim::scan_part(&design, &scene, seed, &part).score;
+                (watch.done)(part.iter().map(|band| band.shots).sum());
                 rows.push(Comparison { sensor, detector, receiver, score });
             }
         }
