@@ -26,3 +26,4 @@ pub mod predict;
 pub mod random;
 pub mod units;
 pub mod names;
+mod digest;

@@ -1,4 +1,4 @@
-//! Names and texts: help with misspelt ones, and their digests.
+//! Help with misspelt names and with places in texts.
 
 /// The one of `known` that `typed` was probably meant to be, if any is near enough.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -6,26 +6,27 @@ pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(typed, name), name))
         .min()
-        .filter(|(distance, name)| *distance <= 1 + name.len() / 4)
+        .filter(|(distance, name)| *distance <= 1 + name.chars().count().max(3) / 3)
         .map(|(_, name)| name)
 }
 
-/// The 64-bit FNV-1a hash of a text \[FNV\], in hexadecimal.
-pub fn digest(text: &str) -> String {
-    let hash = text.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
-    format!("{hash:016x}")
+/// Line and column, both from 1, of the byte at `offset` of `text`.
+pub(crate) fn line_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    (line, column)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{digest, nearest};
+    use super::{line_column, nearest};
 
     #[test]
-    fn the_digest_has_the_published_values() {
-        assert_eq!(digest(""), "cbf29ce484222325");
-        assert_eq!(digest("foobar"), "85944171f73967e8");
+    fn lines_and_columns_count_from_one() {
+        assert_eq!(line_column("a\nbcd", 0), (1, 1));
+        assert_eq!(line_column("a\nbcd", 4), (2, 3));
+        assert_eq!(line_column("a\n", 99), (2, 1));
     }
 
     #[test]

@@ -106,7 +106,7 @@ pub fn manifest(run: &Run) -> Manifest {
     let mut manifest = Manifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: run.seed,
-        sensor: Named { name: design.name.clone(), digest: crate::names::digest(&design.text) },
+        sensor: Named { name: design.name.clone(), digest: design.digest() },
         scene: Named { name: scene.name.clone(), digest: scene.digest() },
         defaults: Entries(design.defaults.clone()),
         idealisations: design.idealised.iter().map(|effect| effect.name().to_owned()).collect(),

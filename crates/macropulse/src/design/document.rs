@@ -8,6 +8,7 @@ use toml::de::DeTable;
 
 use super::Error;
 use super::presets;
+use crate::names::line_column;
 
 /// A sensor file may extend another, but not without end.
 const LONGEST_CHAIN: usize = 16;
@@ -273,14 +274,6 @@ fn offset_of(text: &str, path: &str) -> Option<usize> {
         table = value.get_ref().as_table()?;
     }
     None
-}
-
-/// Line and column, both from 1, of a byte offset.
-fn line_column(text: &str, offset: usize) -> (usize, usize) {
-    let before = &text[..offset.min(text.len())];
-    let line = before.matches('\n').count() + 1;
-    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
-    (line, column)
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@ pub use presets::{names as preset_names, text as preset_text};
 
 use crate::code::Codebook;
 use crate::decode::Receiver;
+use crate::digest::Fnv;
 
 /// A sensor, checked, in SI units.
 #[derive(Debug, Clone)]
@@ -247,6 +248,13 @@ impl Design {
     /// Duration of one scan, s.
     pub fn scan_period(&self) -> f64 {
         1000.0 / self.scan.rate_millihertz as f64
+    }
+
+    /// A hash of everything the sensor file says, defaults included.
+    pub fn digest(&self) -> String {
+        let mut hash = Fnv::new();
+        hash.bytes(self.text.as_bytes());
+        hash.text()
     }
 
     /// What follows from the file, for people to read.

@@ -83,13 +83,9 @@ impl Error {
     }
 
     pub(super) fn unknown_format(name: &str, lower: &str) -> Self {
-        let nearest = Format::ALL
-            .into_iter()
-            .map(|format| (strsim::damerau_levenshtein(lower, format.name()), format.name()))
-            .min()
-            .filter(|(edits, _)| *edits <= 2);
+        let nearest = crate::names::nearest(lower, Format::ALL.map(Format::name));
         let suggestion =
-            nearest.map(|(_, known)| format!(" did you mean `{known}`?")).unwrap_or_default();
+            nearest.map(|known| format!(" did you mean `{known}`?")).unwrap_or_default();
         Self::UnknownFormat { name: name.to_owned(), suggestion }
     }
 }

@@ -8,15 +8,15 @@ use toml::Spanned;
 
 use super::car;
 use super::closed_form::{Shape, Solid};
-use super::digest::Fnv;
 use super::error::Error;
 use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
-use super::material::{self, Material, nearest, plain};
+use super::material::{self, Material, plain};
 use super::mesh::Mesh;
 use super::pose::Pose;
 use super::raycast::{Facet, Facets};
 use super::readers::{self, WithoutMaterials};
 use super::{Object, Scene, World};
+use crate::digest::Fnv;
 
 /// What has been put together so far.
 struct Assembly<'a> {
@@ -362,7 +362,7 @@ impl Assembly<'_> {
         let library: Vec<Material> =
             self.defined.iter().cloned().chain(material::library()).collect();
         let names = || library.iter().map(|known| known.name.as_str());
-        let message = match nearest(name, names()) {
+        let message = match crate::names::nearest(&plain(name), names()) {
             Some(near) => format!("there is no material {name:?}; did you mean {near:?}?"),
             None => format!(
                 "there is no material {name:?}; define it as [[material]] or use one of {}",

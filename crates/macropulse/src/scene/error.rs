@@ -36,7 +36,7 @@ pub enum Error {
         message: String,
     },
     /// Neither a built-in scene nor a file.
-    #[error("there is no scene {asked:?}: it is neither a file nor built in{}; built in are {known}", nearest.as_ref().map(|name| format!("; did you mean {name:?}?")).unwrap_or_default())]
+    #[error("there is no scene {asked:?}: it is neither a file nor built in; {}built in are {known}", nearest.as_ref().map(|name| format!("did you mean {name:?}? ")).unwrap_or_default())]
     UnknownScene {
         /// What was asked for.
         asked: String,

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::Error;
-use super::material::nearest;
+use crate::names::{line_column, nearest};
 
 /// A whole scene file.
 #[derive(Debug, Deserialize)]
@@ -195,9 +195,7 @@ impl Source<'_> {
 
     /// An error at a place in the text.
     pub(super) fn fault(&self, span: Range<usize>, message: impl Into<String>) -> Error {
-        let before = self.text.get(..span.start).unwrap_or(self.text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        let (line, column) = line_column(self.text, span.start);
         Error::Typed { origin: self.origin.to_owned(), line, column, message: message.into() }
     }
 }

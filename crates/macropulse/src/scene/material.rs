@@ -120,16 +120,6 @@ pub fn plain(name: &str) -> String {
     name.trim().to_lowercase().replace([' ', '_'], "-")
 }
 
-/// The entry of `known` most like `name`, if one is like it at all.
-pub(super) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let wanted = plain(name);
-    known
-        .map(|known| (strsim::jaro_winkler(&wanted, &plain(known)), known))
-        .filter(|(likeness, _)| *likeness > 0.75)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, known)| known)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,7 +155,5 @@ mod tests {
     fn names_are_forgiving_and_typing_errors_are_seen_through() {
         assert_eq!(named("Number Plate").unwrap().name, "number-plate");
         assert_eq!(named("asphlat"), None);
-        assert_eq!(nearest("asphlat", LIBRARY.iter().map(|row| row.0)), Some("asphalt"));
-        assert_eq!(nearest("qqq", LIBRARY.iter().map(|row| row.0)), None);
     }
 }

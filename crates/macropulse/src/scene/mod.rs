@@ -28,7 +28,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use pose::{Pose, Transform};
 
-use digest::Fnv;
+use crate::digest::Fnv;
 use file::Source;
 use raycast::Facets;
 
@@ -96,7 +96,7 @@ impl Scene {
         }
         Err(Error::UnknownScene {
             asked: name_or_file.to_owned(),
-            nearest: material::nearest(name_or_file, builtin_names()).map(str::to_owned),
+            nearest: crate::names::nearest(name_or_file, builtin_names()).map(str::to_owned),
             known: builtin_names().collect::<Vec<_>>().join(", "),
         })
     }

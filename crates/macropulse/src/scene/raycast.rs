@@ -397,22 +397,4 @@ mod tests {
         assert!(world.cast(&ray, 0.0, 1e3).is_some());
         assert_eq!(world.cast(&ray, 0.0, f64::NAN), None);
     }
-
-    /// Rays per second on the car in the view of a sensor; run by hand.
-    #[test]
-    #[ignore = "a measurement, not a test"]
-    fn rays_per_second_on_the_car() {
-        let scene = crate::scene::Scene::open("car-30m").unwrap();
-        let rays: Vec<Ray> = (0..480 * 848)
-            .map(|index| {
-                let (row, column) = (f64::from(index / 848), f64::from(index % 848));
-                let along = DVec3::new(1.0, (424.0 - column) * 9.3e-4, (240.0 - row) * 9.3e-4);
-                Ray { origin: [0.0, 0.0, 2.0], direction: along.normalize().to_array() }
-            })
-            .collect();
-        let start = std::time::Instant::now();
-        let hits = rays.iter().filter(|ray| scene.cast(ray, 0.0, 1e3).is_some()).count();
-        let rate = rays.len() as f64 / start.elapsed().as_secs_f64();
-        println!("{:.1} million rays per second, {hits} hits", rate * 1e-6);
-    }
 }
