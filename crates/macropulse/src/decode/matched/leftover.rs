@@ -48,6 +48,11 @@ impl Band<'_> {
     pub(super) fn contest(&mut self) {
         for shot in 0..self.log.len() {
             let Some(lock) = self.locks[shot].filter(|lock| !lock.searched) else { continue };
+            // With so many marks in every lit bit nothing else can be meant: what is left over is
+            // another surface in the same footprint.
+            if 8 * lock.count >= 7 * self.weight(shot) {
+                continue;
+            }
             let density = self.density_in_gate(shot);
             let by_chance = self.thresholds.least(self.weight(shot), density);
             if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
