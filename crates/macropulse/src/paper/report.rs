@@ -5,8 +5,8 @@ use super::{Error, Findings, pictures, tables};
 use crate::points::Outcome;
 use crate::view::{Block, Page, Section, Tone};
 
-/// Row and column of the pixel shown as an example: on the car at 30 m.
-const EXAMPLE: (u16, u16) = (300, 423);
+/// Row and column of the pixel shown as an example: on the car at 30 m, sent with C7.
+const EXAMPLE: (u16, u16) = (300, 430);
 
 pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     let page = Page::new(
