@@ -1,6 +1,21 @@
 //! Macropulse, the workbench for pulse-coded lidar: design a code, fire it into a 3-D scene,
 //! detect it, decode it, get a point cloud.
 //!
+//! ```
+//! use macropulse::{design::Design, points::Outcome, scene::Scene, sim};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let fewer = [("scan.raster.rows".to_owned(), "24".to_owned())];
+//!     let design = Design::open("kim-park-2016-fixed", &fewer)?;
+//!     let scene = Scene::open("street")?;
+//!     let scan = sim::scan(&design, &scene, 1, 0);
+//!     let right = scan.score.count(Outcome::Right);
+//!     println!("{} points, {right} of them right", scan.cloud.returns());
+//!     assert!(scan.score.right_fraction() > 0.99);
+//!     Ok(())
+//! }
+//! ```
+//!
 //! The modules in the order in which light travels:
 
 #![cfg_attr(test, allow(missing_docs))]

@@ -6,7 +6,11 @@ pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(typed, name), name))
         .min()
-        .filter(|(distance, name)| *distance <= 1 + name.chars().count().max(3) / 3)
+        .filter(|(distance, name)| {
+            // Words written out, as `yaw_degrees`, are far from what they mean but begin with it.
+            *distance <= 1 + name.chars().count().max(3) / 3
+                || (name.len() > 3 && typed.starts_with(name))
+        })
         .map(|(_, name)| name)
 }
 
@@ -35,5 +39,6 @@ mod tests {
         assert_eq!(nearest("hdl64e", known), Some("hdl-64e"));
         assert_eq!(nearest("perigrine", known), Some("peregrine"));
         assert_eq!(nearest("banana", known), None);
+        assert_eq!(nearest("yaw_degrees", ["scale", "yaw_deg"]), Some("yaw_deg"));
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! For an extended Lambertian target that the beam does not overfill, the energy received is
 //!
-//! E_r = E_t · ρ · cos i · A_r · η · T² / (π · R²), T = exp(−σ·R)   \[physics: link equation\]
+//! E_r = E_t · ρ · cos i · A_r · η · T² / (π · R²), T = exp(−σ·R)   (docs/physics.md#link-equation)
 //!
 //! A sensor declared by its sensitivity knows the product E_t · A_r · η / π through the photons n₀
 //! it detects per mark from a reference target (ρ₀, R₀), so that

@@ -1,9 +1,9 @@
 //! What the sensor is: from a TOML file to a checked [`Design`].
 //!
-//! 1. [`document`]: the text, what it extends, and the defaults become one table, and every value
+//! 1. `document`: the text, what it extends, and the defaults become one table, and every value
 //!    remembers its line and column.
-//! 2. [`file`]: the table is read as typed keys.
-//! 3. [`check`]: every limit is tested once; what is left is SI units and integers.
+//! 2. `file`: the table is read as typed keys.
+//! 3. `check`: every limit is tested once; what is left is SI units and integers.
 //!
 //! A `Design` that exists is valid, and nobody downstream checks it again.
 

@@ -1,7 +1,7 @@
 //! A detector that counts photons chip by chip.
 //!
 //! 1. Every mark of every echo is seen with probability (1 − m)·(1 − exp(−n)), n the mean photons
-//!    detected per mark and m the fraction lost for other reasons \[physics: photon counting\].
+//!    detected per mark and m the fraction lost for other reasons (docs/physics.md#photon-counting).
 //! 2. A mark that is seen makes one edge at its arrival, displaced by Gaussian jitter.
 //! 3. Dark and background counts are Poisson in time.
 //!

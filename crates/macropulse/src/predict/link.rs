@@ -19,7 +19,7 @@ pub struct Receiver {
 
 impl Receiver {
     /// Photons at the detector for `energy` joules sent at a target of `reflectance` at `range`
-    /// metres, square on: E·ρ·A·η·T²/(π·R²) over h·c/λ \[physics: link equation\].
+    /// metres, square on: E·ρ·A·η·T²/(π·R²) over h·c/λ (docs/physics.md#link-equation).
     pub fn photons(&self, energy: f64, reflectance: f64, range: f64) -> f64 {
         let transmission = libm::exp(-self.extinction * range);
         let received = energy * reflectance * self.area() * self.optics * transmission.powi(2)
@@ -28,7 +28,7 @@ impl Receiver {
     }
 
     /// Photons per second of sunlight reflected by the scene, P = E_λ·Δλ·ρ/π·A·Ω·η over h·c/λ
-    /// \[physics: background\].
+    /// (docs/physics.md#background).
     pub fn background(&self, sun: &Sunlight) -> f64 {
         let power = sun.irradiance * sun.bandwidth * sun.albedo / PI
             * self.area()

@@ -1,7 +1,7 @@
 //! The beam meets the scene: every shot becomes one or more rays, every ray its surfaces.
 //!
 //! 1. A beam without width is one ray. A beam with a width is a hexagonal set of rays, weighted
-//!    by the Gaussian irradiance at their place \[physics: footprint\].
+//!    by the Gaussian irradiance at their place (docs/physics.md#footprint).
 //! 2. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
 
