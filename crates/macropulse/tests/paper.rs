@@ -3,7 +3,7 @@
 //!
 //! Correlations, error curves and payloads have laws of their own in `laws.rs`; the experiment
 //! of Table 4 is repeated in `clean_scan.rs`.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::f64::consts::PI;
 use std::path::Path;
