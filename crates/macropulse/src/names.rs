@@ -1,12 +1,15 @@
 //! Help with misspelt names and with places in texts.
 
-/// The one of `known` that `typed` was probably meant to be, if any is near enough.
+/// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
+/// apart, or the beginning of it, as `yaw_deg` is of `yaw_degrees`.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(typed, name), name))
         .min()
-        .filter(|(distance, name)| *distance <= 1 + name.chars().count().max(3) / 3)
+        .filter(|(distance, name)| {
+            *distance <= 1 + name.chars().count().max(3) / 3 || typed.starts_with(name)
+        })
         .map(|(_, name)| name)
 }
 
@@ -35,5 +38,6 @@ mod tests {
         assert_eq!(nearest("hdl64e", known), Some("hdl-64e"));
         assert_eq!(nearest("perigrine", known), Some("peregrine"));
         assert_eq!(nearest("banana", known), None);
+        assert_eq!(nearest("yaw_degrees", ["pitch_deg", "yaw_deg"]), Some("yaw_deg"));
     }
 }
