@@ -1,6 +1,7 @@
 //! Help with misspelt names and with places in texts.
 
-/// The one of `known` that `typed` was probably meant to be, if any is near enough.
+/// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
+/// apart, or the beginning of it, as `yaw_deg` is of `yaw_degrees`.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()

@@ -119,6 +119,30 @@ pub(super) fn timing(design: &Design) -> Vec<Claim> {
     ]
 }
 
+/// The claim on the elevations of the HDL-64E, whose `design` this is.
+pub(super) fn elevations(design: &Design) -> Option<Claim> {
+    let Pattern::Spinning { elevations, .. } = &design.scan.pattern else { return None };
+    let degrees: Vec<f64> = elevations.iter().map(|elevation| elevation.to_degrees()).collect();
+    let (top, bottom) = (degrees.first()?, degrees.last()?);
+    let step = |at: &[f64]| at.windows(2).next().map(|pair| pair[0] - pair[1]);
+    let (upper, lower) = degrees.split_at(degrees.len() / 2);
+    Some(Claim {
+        id: "elevations",
+        section: "Table 3",
+        claim: "The 64 lasers of the HDL-64E divide 26.8\u{b0} evenly",
+        paper: "26.8\u{b0}, 64".into(),
+        measured: format!(
+            "no unit is built so: {} steps of {:.2}\u{b0} from {top:+.1}\u{b0} down, then {} of \
+             {:.2}\u{b0} to {bottom:+.1}\u{b0} (preset hdl-64e-equal-spacing has equal steps)",
+            upper.len() - 1,
+            step(upper)?,
+            lower.len() - 1,
+            step(lower)?,
+        ),
+        verdict: Verdict::Fails,
+    })
+}
+
 fn mirror(design: &Design) -> Claim {
     let derived = design.derived();
     let resonant = derived.pixel_period * 2.0 / PI;

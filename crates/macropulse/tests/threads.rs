@@ -1,0 +1,116 @@
+//! Same seed, same bytes, whatever the number of threads.
+#![allow(clippy::unwrap_used)]
+
+use macropulse::design::Design;
+use macropulse::emit::{Band, bands};
+use macropulse::formats::{Format, Names, write_cloud};
+use macropulse::points::{PointCloud, Truth};
+use macropulse::scene::Scene;
+use macropulse::sim::{self, Scan, Tally};
+
+const SEED: u64 = 20_160_913;
+
+/// The bands measured: all of them, or so many of the road close by.
+#[derive(Clone, Copy)]
+enum Part {
+    Whole,
+    Road(usize),
+}
+
+/// One scan of the car at 50 m on a pool of `threads` threads.
+fn scan(sensor: &str, part: Part, (seed, threads): (u64, usize)) -> Scan {
+    let design = Design::open(sensor, &[]).unwrap();
+    let scene = Scene::open("car-50m").unwrap();
+    let chosen: Vec<Band> = match part {
+        Part::Whole => bands(&design, 0).collect(),
+        Part::Road(count) => bands(&design, 0).skip(40).take(count).collect(),
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| sim::scan_part(&design, &scene, seed, &chosen))
+}
+
+fn pcd(cloud: &PointCloud) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.pcd");
+    write_cloud(Format::Pcd, cloud, &Names { objects: &[], materials: &[] }, &path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+/// Every column of the cloud, as bits: NaN equals itself, and 0 is not −0.
+fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
+    let PointCloud {
+        scan,
+        rows,
+        columns,
+        x,
+        y,
+        z,
+        intensity,
+        range,
+        time_ns,
+        peak,
+        marks,
+        margin,
+        truth,
+    } = cloud;
+    let Truth { range: true_range, object, material, cosine, outcome } = truth;
+    let reals = [x, y, z, intensity, range, true_range, cosine]
+        .map(|column| column.iter().map(|value| u64::from(value.to_bits())).collect());
+    let counts = [peak, marks, margin, object, material]
+        .map(|column| column.iter().map(|&value| u64::from(value)).collect());
+    let rest = [
+        vec![*scan, *rows as u64, *columns as u64],
+        time_ns.iter().map(|value| value.to_bits()).collect(),
+        outcome.iter().map(|&outcome| outcome as u64).collect(),
+    ];
+    reals.into_iter().chain(counts).chain(rest).collect()
+}
+
+/// Everything counted; only the seconds may differ.
+fn counted(scan: &Scan) -> Tally {
+    Tally { seconds: [0.0; 5], ..scan.tally }
+}
+
+fn assert_same_on_any_pool(sensor: &str, part: Part) {
+    let alone = scan(sensor, part, (SEED, 1));
+    assert!(alone.tally.returns > 30, "{sensor}: {:?}", alone.tally);
+    for threads in [2, 3] {
+        let shared = scan(sensor, part, (SEED, threads));
+        assert_eq!(bits(&alone.cloud), bits(&shared.cloud), "{sensor}, {threads} threads");
+        assert_eq!(alone.score, shared.score, "{sensor}, {threads} threads");
+        assert_eq!(counted(&alone), counted(&shared), "{sensor}, {threads} threads");
+        assert!(pcd(&alone.cloud) == pcd(&shared.cloud), "{sensor}, {threads} threads: PCD");
+    }
+    let other = scan(sensor, part, (SEED + 1, 2));
+    assert_ne!(bits(&alone.cloud), bits(&other.cloud), "{sensor}: the seed has no effect");
+    assert!(pcd(&alone.cloud) != pcd(&other.cloud), "{sensor}: the seed has no effect on PCD");
+}
+
+#[test]
+fn bands_of_the_coded_sensor() {
+    assert_same_on_any_pool("kim-park-2016", Part::Road(2));
+}
+
+#[test]
+fn the_spinning_sensor() {
+    assert_same_on_any_pool("hdl-64e", Part::Whole);
+}
+
+#[test]
+fn the_flash() {
+    assert_same_on_any_pool("peregrine", Part::Whole);
+}
+
+/// A band comes out the same alone as among others: halos draw what their neighbours draw.
+#[test]
+fn a_band_alone_and_among_its_neighbours() {
+    let both = scan("kim-park-2016", Part::Road(2), (SEED, 2)).cloud;
+    let one = scan("kim-park-2016", Part::Road(1), (SEED, 1)).cloud;
+    let returns = (0..one.range.len()).filter(|&pixel| !one.range[pixel].is_nan());
+    let mut compared = 0;
+    for pixel in returns {
+        assert_eq!(one.range[pixel].to_bits(), both.range[pixel].to_bits(), "pixel {pixel}");
+        compared += 1;
+    }
+    assert!(compared > 5000, "{compared}");
+}
