@@ -6,10 +6,11 @@ use std::time::Instant;
 use super::Error;
 use super::geometry::{self, Prediction};
 use crate::design::Design;
+use crate::emit::direction;
 use crate::formats::Format;
-use crate::points::{NO_OBJECT, Outcome, PointCloud};
+use crate::points::{Outcome, PointCloud};
 use crate::record;
-use crate::scene::Scene;
+use crate::scene::{Ray, Scene};
 use crate::score::Score;
 use crate::sim::{self, Tally, Watch};
 
@@ -76,24 +77,22 @@ pub(super) fn trial(
         elapsed,
     };
     record::manifest(&run).write(&folder)?;
-    let on_car = |pixel: usize| {
-        let object = scan.cloud.truth.object[pixel];
-        object != NO_OBJECT && scene.objects[usize::from(object)].is_target
+    let samples = samples_on_car(design, &scene);
+    let found = |sample: &Sample| {
+        let truth = &scan.cloud.truth;
+        matches!(truth.outcome[sample.pixel], Outcome::Right | Outcome::Near)
+            && is_target(&scene, truth.object[sample.pixel])
     };
-    let found =
-        |pixel: usize| matches!(scan.cloud.truth.outcome[pixel], Outcome::Right | Outcome::Near);
-    let pixels = || (0..scan.cloud.range.len()).filter(|&pixel| on_car(pixel));
     let mut rows: Vec<usize> =
-        pixels().filter(|&p| found(p)).map(|p| p / scan.cloud.columns).collect();
+        samples.iter().filter(|s| found(s)).map(|s| s.pixel / scan.cloud.columns).collect();
     rows.dedup();
-    let lowest_sample =
-        pixels().map(|p| height(design, &scene, &scan.cloud, p)).fold(f64::NAN, f64::min);
+    let lost = samples.iter().filter(|sample| !found(sample));
     Ok(Trial {
         sensor,
         distance,
-        lost: lost_by_material(&scene, &scan.cloud, pixels().filter(|&p| !found(p))),
+        lost: by_material(&scene, lost),
         rows_on_car: rows.len(),
-        lowest_sample,
+        lowest_sample: samples.iter().map(|sample| sample.height).fold(f64::NAN, f64::min),
         predicted: geometry::predict(design, &scene),
         score: scan.score,
         tally: scan.tally,
@@ -101,30 +100,40 @@ pub(super) fn trial(
     })
 }
 
-/// Height above ground of the surface that the pixel's ray meets, m.
-fn height(design: &Design, scene: &Scene, cloud: &PointCloud, pixel: usize) -> f64 {
-    let (row, column) = ((pixel / cloud.columns) as u16, (pixel % cloud.columns) as u16);
-    let [_, _, up] =
-        scene.sensor.world_from_sensor().direction(crate::emit::direction(design, row, column));
-    scene.sensor.position[2] + up * f64::from(cloud.truth.range[pixel])
+/// A ray that meets the car first.
+struct Sample {
+    pixel: usize,
+    material: u16,
+    /// Height of the surface above the ground, m.
+    height: f64,
 }
 
-fn lost_by_material(
-    scene: &Scene,
-    cloud: &PointCloud,
-    pixels: impl Iterator<Item = usize>,
-) -> Vec<(String, u64)> {
+fn is_target(scene: &Scene, object: u16) -> bool {
+    scene.objects.get(usize::from(object)).is_some_and(|object| object.is_target)
+}
+
+/// The rays of the sensor that meet the car first, in the order of the cloud.
+fn samples_on_car(design: &Design, scene: &Scene) -> Vec<Sample> {
+    let world_from_sensor = scene.sensor.world_from_sensor();
+    let columns = design.scan.columns as usize;
+    let sample = |pixel: usize| {
+        let aim = direction(design, (pixel / columns) as u16, (pixel % columns) as u16);
+        let ray =
+            Ray { origin: scene.sensor.position, direction: world_from_sensor.direction(aim) };
+        let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range)?;
+        let height = ray.origin[2] + ray.direction[2] * hit.range;
+        is_target(scene, hit.object).then_some(Sample { pixel, material: hit.material, height })
+    };
+    (0..design.shots_per_scan() as usize).filter_map(sample).collect()
+}
+
+/// Samples counted by material, most first.
+fn by_material<'a>(scene: &Scene, samples: impl Iterator<Item = &'a Sample>) -> Vec<(String, u64)> {
     let mut counts = vec![0_u64; scene.materials.len()];
-    for pixel in pixels {
-        counts[usize::from(cloud.truth.material[pixel])] += 1;
-    }
-    let mut lost: Vec<(String, u64)> = scene
-        .materials
-        .iter()
-        .zip(counts)
-        .filter(|(_, count)| *count > 0)
-        .map(|(material, count)| (material.name.clone(), count))
-        .collect();
-    lost.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-    lost
+    samples.for_each(|sample| counts[usize::from(sample.material)] += 1);
+    let named = scene.materials.iter().zip(counts).filter(|(_, count)| *count > 0);
+    let mut counted: Vec<(String, u64)> =
+        named.map(|(material, count)| (material.name.clone(), count)).collect();
+    counted.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    counted
 }

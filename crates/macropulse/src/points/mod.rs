@@ -80,7 +80,8 @@ pub struct PointCloud {
 /// The truth beside a point cloud, one entry per pixel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Truth {
-    /// Range of the first surface within the range gate, m; NaN where there is none.
+    /// Range of the surface the return came from, or else of the first one within the range gate,
+    /// m; NaN where there is none.
     pub range: Vec<f32>,
     /// Index into the scene's objects; `NO_OBJECT` where there is none.
     pub object: Vec<u16>,

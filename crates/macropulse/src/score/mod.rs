@@ -65,7 +65,8 @@ pub fn empty_truth(cloud: &PointCloud) -> Truth {
 /// truth beside them.
 ///
 /// A return is right if any surface along its beam lies within the sensor's tolerance: behind
-/// glass there are several. The truth written is that of the first one met by the beam's centre.
+/// glass there are several. The truth written is that of the surface the return came from; of the
+/// first one met where there is no return, or none that fits.
 pub fn judge(
     cloud: &mut PointCloud,
     design: &Design,
@@ -86,12 +87,6 @@ pub fn judge(
         let measured = f64::from(cloud.range[pixel]);
         let error = |i: usize| (hits.range[i] - measured).abs();
         let nearest = met.clone().min_by(|&a, &b| error(a).total_cmp(&error(b)));
-        if let Some(i) = met.clone().next() {
-            cloud.truth.range[pixel] = hits.range[i] as f32;
-            cloud.truth.object[pixel] = hits.object[i];
-            cloud.truth.material[pixel] = hits.material[i];
-            cloud.truth.cosine[pixel] = hits.cosine[i];
-        }
         let on_target = |i: usize| scene.objects[usize::from(hits.object[i])].is_target;
         if met.clone().any(on_target) {
             score.samples_on_target += 1;
@@ -104,8 +99,14 @@ pub fn judge(
             Some(i) if error(i) <= NEAR => Outcome::Near,
             Some(_) => Outcome::Wrong,
         };
-        if let (Some(i), Outcome::Right | Outcome::Near) = (nearest, outcome) {
-            score.points_on_target += u64::from(on_target(i));
+        let answered = matches!(outcome, Outcome::Right | Outcome::Near);
+        let source = if answered { nearest } else { met.clone().next() };
+        if let Some(i) = source {
+            score.points_on_target += u64::from(answered && on_target(i));
+            cloud.truth.range[pixel] = hits.range[i] as f32;
+            cloud.truth.object[pixel] = hits.object[i];
+            cloud.truth.material[pixel] = hits.material[i];
+            cloud.truth.cosine[pixel] = hits.cosine[i];
         }
         let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
         score.dark += u64::from(outcome == Outcome::Missed && marks.is_empty());
