@@ -359,7 +359,7 @@ mod others {
         assert!(real[32..].iter().all(|step| (step - 0.5).abs() < 1e-6));
         let bottom = 2.0 - real.iter().sum::<f64>();
         assert!((-24.9..-24.2).contains(&bottom), "{bottom}");
-        reported("elevations", Fails, &["31 steps of 0.33", "31 of 0.50", "-24.3"]);
+        reported("elevations", Unsaid, &["31 steps of 0.33", "31 of 0.50", "-24.3"]);
         let equal = steps("hdl-64e-equal-spacing");
         assert!(equal.iter().all(|step| (step - 26.8 / 64.0).abs() < 1e-9));
     }
