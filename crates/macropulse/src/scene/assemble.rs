@@ -242,10 +242,22 @@ impl Assembly<'_> {
     fn paints(&mut self, name: &str, thing: &Thing, mesh: &Mesh) -> Result<Vec<u16>, Error> {
         for (wanted, typed) in &thing.materials {
             if !mesh.material_names.contains(wanted) {
-                let message = format!(
-                    "the mesh of {name} has no material {wanted:?}; it has {}",
-                    mesh.material_names.join(", ")
-                );
+                let own: Vec<&str> = mesh
+                    .material_names
+                    .iter()
+                    .map(String::as_str)
+                    .filter(|n| !n.is_empty())
+                    .collect();
+                let message = if own.is_empty() {
+                    format!(
+                        "the mesh of {name} names no materials; give all of it `material = \"…\"`"
+                    )
+                } else {
+                    format!(
+                        "the mesh of {name} has no material {wanted:?}; it has {}",
+                        own.join(", ")
+                    )
+                };
                 return Err(self.source.fault(typed.span(), message));
             }
         }
