@@ -134,7 +134,8 @@ fn csv_holds_the_returns_to_the_last_digit() {
     let mut lines = text.lines();
     assert_eq!(
         lines.next().unwrap(),
-        "x_m,y_m,z_m,intensity,range_m,time_ns,row,column,ring,peak,marks,margin"
+        "x_m,y_m,z_m,intensity,range_m,time_ns,row,column,ring,peak,marks,margin,\
+         return_number,number_of_returns,flags"
     );
     for line in lines {
         let cells: Vec<&str> = line.split(',').collect();

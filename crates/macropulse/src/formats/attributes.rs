@@ -21,6 +21,9 @@ pub(super) enum Attribute {
     Peak,
     Marks,
     Margin,
+    ReturnNumber,
+    NumberOfReturns,
+    Flags,
     TrueRange,
     Object,
     Material,
@@ -37,7 +40,7 @@ pub(super) enum Value {
     U2(u16),
 }
 
-const MEASURED: [Attribute; 12] = [
+const MEASURED: [Attribute; 15] = [
     Attribute::X,
     Attribute::Y,
     Attribute::Z,
@@ -50,6 +53,9 @@ const MEASURED: [Attribute; 12] = [
     Attribute::Peak,
     Attribute::Marks,
     Attribute::Margin,
+    Attribute::ReturnNumber,
+    Attribute::NumberOfReturns,
+    Attribute::Flags,
 ];
 
 const TRUE: [Attribute; 5] = [
@@ -85,6 +91,9 @@ impl Attribute {
             Self::Peak => "peak",
             Self::Marks => "marks",
             Self::Margin => "margin",
+            Self::ReturnNumber => "return_number",
+            Self::NumberOfReturns => "number_of_returns",
+            Self::Flags => "flags",
             Self::TrueRange => "true_range",
             Self::Object => "object",
             Self::Material => "material",
@@ -107,7 +116,8 @@ impl Attribute {
     pub fn blank(self) -> Value {
         match self {
             Self::TimeNs => Value::F8(0.0),
-            Self::Outcome => Value::U1(0),
+            Self::Outcome | Self::Flags => Value::U1(0),
+            Self::ReturnNumber | Self::NumberOfReturns => Value::U1(0),
             Self::X | Self::Y | Self::Z | Self::Intensity | Self::Range => Value::F4(f32::NAN),
             Self::TrueRange | Self::Incidence => Value::F4(f32::NAN),
             _ => Value::U2(0),
@@ -132,6 +142,11 @@ impl Attribute {
             Self::Peak => Value::U2(cloud.peak[at]),
             Self::Marks => Value::U2(cloud.marks[at]),
             Self::Margin => Value::U2(cloud.margin[at]),
+            // A shot has one return or none.
+            Self::ReturnNumber | Self::NumberOfReturns => {
+                Value::U1(u8::from(!cloud.range[at].is_nan()))
+            }
+            Self::Flags => Value::U1(cloud.flags(at)),
             Self::TrueRange => Value::F4(truth.range[at]),
             Self::Object => Value::U2(truth.object[at]),
             Self::Material => Value::U2(truth.material[at]),
@@ -237,12 +252,27 @@ mod tests {
     }
 
     #[test]
+    fn flags_tell_faint_and_ambiguous_returns() {
+        let mut cloud = sample_cloud();
+        let flags = |cloud: &PointCloud, at| Attribute::Flags.value(cloud, at);
+        assert_eq!(flags(&cloud, 0), Value::U1(0));
+        // 60 of 174 marks.
+        assert_eq!(flags(&cloud, 3), Value::U1(1));
+        cloud.margin[3] = 0;
+        assert_eq!(flags(&cloud, 3), Value::U1(3));
+        // No return: no flag, no number.
+        cloud.margin[2] = 0;
+        assert_eq!(flags(&cloud, 2), Value::U1(0));
+        assert_eq!(Attribute::ReturnNumber.value(&cloud, 2), Value::U1(0));
+    }
+
+    #[test]
     fn without_truth_there_are_no_truth_attributes() {
         let mut cloud = sample_cloud();
-        assert_eq!(Attribute::of(&cloud).len(), 17);
+        assert_eq!(Attribute::of(&cloud).len(), 20);
         cloud.truth = Truth::default();
         check_even(&cloud).unwrap();
-        assert_eq!(Attribute::of(&cloud).len(), 12);
+        assert_eq!(Attribute::of(&cloud).len(), 15);
     }
 
     #[test]

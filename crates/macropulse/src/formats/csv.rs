@@ -29,9 +29,10 @@ fn cell(attribute: Attribute, value: Value, names: &Names) -> String {
     match (attribute, value) {
         (Attribute::Object, Value::U2(at)) => name(names.objects, at),
         (Attribute::Material, Value::U2(at)) => name(names.materials, at),
-        (_, Value::U1(code)) => {
+        (Attribute::Outcome, Value::U1(code)) => {
             outcome_from_code(code).map_or_else(String::new, |outcome| outcome.name().to_owned())
         }
+        (_, Value::U1(value)) => value.to_string(),
         (_, Value::U2(value)) => value.to_string(),
         // An empty cell is what spreadsheets take for "no value".
         (_, Value::F4(value)) if value.is_nan() => String::new(),
@@ -77,11 +78,11 @@ mod tests {
         assert_eq!(
             lines[0],
             "x_m,y_m,z_m,intensity,range_m,time_ns,row,column,ring,peak,marks,margin,\
-             true_range_m,object,material,incidence_rad,outcome"
+             return_number,number_of_returns,flags,true_range_m,object,material,incidence_rad,outcome"
         );
         assert_eq!(
             lines[1],
-            "30,1,0.5,0.8,30.02,0,0,0,0,174,174,80,30.02,\"car, red\",glass,0,right"
+            "30,1,0.5,0.8,30.02,0,0,0,0,174,174,80,1,1,0,30.02,\"car, red\",glass,0,right"
         );
         assert_eq!(lines.len(), 1 + 5);
     }
@@ -89,12 +90,12 @@ mod tests {
     #[test]
     fn a_false_return_has_empty_truth() {
         let lines = lines(&sample_cloud(), &Names::default());
-        assert!(lines[5].ends_with(",58,58,20,,,,,false"), "{}", lines[5]);
+        assert!(lines[5].ends_with(",58,58,20,1,1,0,,,,,false"), "{}", lines[5]);
     }
 
     #[test]
     fn without_truth_the_line_is_shorter() {
         let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
-        assert_eq!(lines(&cloud, &Names::default())[0].split(',').count(), 12);
+        assert_eq!(lines(&cloud, &Names::default())[0].split(',').count(), 15);
     }
 }

@@ -78,10 +78,11 @@ mod tests {
             "# .PCD v0.7 - Point Cloud Data file format\n\
              # macropulse scan 3\n\
              VERSION 0.7\n\
-             FIELDS x y z intensity range time_ns row column ring peak marks margin\n\
-             SIZE 4 4 4 4 4 8 2 2 2 2 2 2\n\
-             TYPE F F F F F F U U U U U U\n\
-             COUNT 1 1 1 1 1 1 1 1 1 1 1 1\n\
+             FIELDS x y z intensity range time_ns row column ring peak marks margin \
+             return_number number_of_returns flags\n\
+             SIZE 4 4 4 4 4 8 2 2 2 2 2 2 1 1 1\n\
+             TYPE F F F F F F U U U U U U U U U\n\
+             COUNT 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1\n\
              WIDTH 3\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 6\nDATA binary\n"
         );
     }
@@ -90,7 +91,7 @@ mod tests {
     fn truth_adds_five_fields_and_the_names() {
         let objects = ["car".to_owned()];
         let header = header(&sample_cloud(), &Names { objects: &objects, materials: &[] });
-        assert!(header.contains(" margin true_range object material incidence outcome\n"));
+        assert!(header.contains(" flags true_range object material incidence outcome\n"));
         assert!(header.contains(" 4 2 2 4 1\n"));
         assert!(header.contains("# object 0 car\n"));
     }
@@ -101,7 +102,7 @@ mod tests {
         let mut bytes = Vec::new();
         write(&cloud, &Names::default(), &mut bytes).unwrap();
         let body = &bytes[header(&cloud, &Names::default()).len()..];
-        let stride = 5 * 4 + 8 + 6 * 2;
+        let stride = 5 * 4 + 8 + 6 * 2 + 3;
         assert_eq!(body.len(), 6 * stride);
         let x = f32::from_le_bytes(body[2 * stride..2 * stride + 4].try_into().unwrap());
         assert!(x.is_nan());

@@ -211,7 +211,8 @@ fn set(
             truth.outcome[at] = outcome_from_code(code)
                 .ok_or_else(|| format!("point {at} has the outcome {code}; known are 0 to 5"))?;
         }
-        // Row, column and ring follow from the place in an organised file.
+        // Row, column and ring follow from the place in an organised file, return numbers and
+        // flags from the other columns.
         _ => {}
     }
     Ok(())

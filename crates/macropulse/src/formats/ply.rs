@@ -56,7 +56,7 @@ mod tests {
     fn only_returns_are_vertices() {
         let (header, body) = written(&sample_cloud(), &Names::default());
         assert!(header.contains("element vertex 5\n"));
-        assert_eq!(body.len(), 5 * (5 * 4 + 8 + 6 * 2 + 4 + 2 + 2 + 4 + 1));
+        assert_eq!(body.len(), 5 * (5 * 4 + 8 + 6 * 2 + 3 + 4 + 2 + 2 + 4 + 1));
         assert_eq!(body[..4], 30f32.to_le_bytes());
     }
 

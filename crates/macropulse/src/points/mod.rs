@@ -93,6 +93,12 @@ pub struct Truth {
     pub outcome: Vec<Outcome>,
 }
 
+/// Flag of a return with fewer than half of its marks.
+pub const FAINT: u8 = 1;
+
+/// Flag of a return for which another lag had as many marks.
+pub const AMBIGUOUS: u8 = 2;
+
 /// Object and material index of a pixel that met nothing.
 pub const NO_OBJECT: u16 = u16::MAX;
 
@@ -154,6 +160,17 @@ impl PointCloud {
             self.marks[pixel] = returns.marks[i];
             self.margin[pixel] = returns.margin[i];
         }
+    }
+
+    /// What is to be known of the return of a pixel, as bits: [`FAINT`], [`AMBIGUOUS`]; 0 for a
+    /// sound return, and for a pixel without one.
+    pub fn flags(&self, pixel: usize) -> u8 {
+        if self.range[pixel].is_nan() {
+            return 0;
+        }
+        let faint = 2 * self.peak[pixel] < self.marks[pixel];
+        let ambiguous = self.margin[pixel] == 0;
+        (u8::from(faint) * FAINT) | (u8::from(ambiguous) * AMBIGUOUS)
     }
 
     /// Number of pixels that have a return.
