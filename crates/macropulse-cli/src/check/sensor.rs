@@ -1,5 +1,7 @@
 //! The report on a sensor.
 
+use std::collections::BTreeMap;
+
 use macropulse::design::{Derived, Design};
 use serde_json::{Map, Value, json};
 
@@ -92,6 +94,12 @@ fn light(design: &Design, derived: &Derived) -> Columns {
         let lit = format!("{fewest} to {most} per label that is lit, {} on average", short(mean));
         columns.push("marks", lit);
         columns.push("", format!("{} in a scan", grouped(derived.marks_per_scan)));
+        let mut labels = BTreeMap::new();
+        for marks in design.coding.codebook.weights() {
+            *labels.entry(marks).or_insert(0_u64) += 1;
+        }
+        let labels = labels.iter().map(|(marks, count)| format!("{count} with {marks}"));
+        columns.push("", format!("labels by marks: {}", labels.collect::<Vec<_>>().join(", ")));
     } else {
         let pulse = short(design.light.pulse * 1e12);
         columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));
@@ -130,6 +138,7 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "marks_min": fewest,
         "marks_mean": mean,
         "marks_max": most,
+        "marks_per_label": design.coding.codebook.weights().collect::<Vec<_>>(),
         "marks_per_scan": derived.marks_per_scan,
         "mean_overlap": derived.mean_overlap,
         "reference_photons": derived.reference_photons,

@@ -41,9 +41,7 @@ impl Derived {
         let pixel_period = design.scan_period() / shots as f64;
         let gate = tof_from_range(design.scan.max_range);
         let codebook = &design.coding.codebook;
-        let weight_of = |label: u32| codebook.marks(label as u16, design.coding.first_word as u16);
-        let labels = if design.is_coded() { design.scan.columns } else { 1 };
-        let weights: Vec<usize> = (0..labels).map(|label| weight_of(label).len()).collect();
+        let weights: Vec<usize> = codebook.weights().collect();
         let sum: usize = weights.iter().sum();
         let mean = sum as f64 / weights.len() as f64;
         let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
