@@ -11,7 +11,7 @@
 //!
 //! with ρ_eff the material's backscatter towards the sensor and w the share of the beam.
 
-use crate::design::{Design, Detector};
+use crate::design::Design;
 use crate::scene::{Hits, Material};
 use crate::units::{fs_from_s, tof_from_range};
 
@@ -54,10 +54,7 @@ pub struct Link {
 impl Link {
     /// The link of a sensor through its air.
     pub fn of(design: &Design) -> Self {
-        let sensitivity = match design.detector {
-            Detector::PhotonCounting(counting) => counting.sensitivity,
-            Detector::FirstFiring(firing) => firing.sensitivity,
-        };
+        let sensitivity = design.detector.sensitivity();
         let extinction = design.visibility.map_or(0.0, |v| extinction(v, design.light.wavelength));
         Self {
             photons_at_one_metre: sensitivity.photons * sensitivity.range.powi(2)

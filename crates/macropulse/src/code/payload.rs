@@ -112,11 +112,6 @@ impl Payload {
         self.crc
     }
 
-    /// Whether a lit sync bit goes first.
-    pub fn has_sync(&self) -> bool {
-        self.sync
-    }
-
     /// All bits: sync, label and checksum.
     pub fn bits(&self) -> u32 {
         u32::from(self.sync) + self.checked_bits()

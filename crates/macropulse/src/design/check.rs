@@ -414,17 +414,13 @@ impl Check<'_> {
         if gate.1 >= i64::from(u32::MAX) / 4 {
             return self.refuse("tdc.resolution_ps", "is too fine for so long a range gate");
         }
-        let jitter = match detector {
-            Detector::PhotonCounting(counting) => counting.jitter,
-            Detector::FirstFiring(firing) => firing.jitter,
-        };
         let weight = coding.codebook.family().weight() as u32;
         Ok(Receiver {
             kind,
             gate_ticks: (gate.0 as u32, gate.1 as u32),
             ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
             tick_fs: tdc.tick_fs,
-            jitter_ticks: jitter * 1e15 / tdc.tick_fs as f64,
+            jitter_ticks: detector.jitter() * 1e15 / tdc.tick_fs as f64,
             false_alarm: self.within(
                 "receiver.false_alarm",
                 file.receiver.false_alarm,

@@ -1,7 +1,7 @@
 //! Quantities that follow from a sensor file, for people to read.
 
 use super::{Design, Mirror, Pattern};
-use crate::units::{SPEED_OF_LIGHT, range_from_tof, s_from_fs, tof_from_range};
+use crate::units::{range_from_tof, s_from_fs, tof_from_range};
 
 /// What follows from a design. SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,8 +28,8 @@ pub struct Derived {
     pub unambiguous_range: Option<f64>,
     /// Range covered by one tick, m.
     pub tick_range: f64,
-    /// Light under way and back while one idle-listening shot could be sent: the highest refresh
-    /// rate of a sensor with as many directions that waits for each echo, 1/s.
+    /// Highest refresh rate of a sensor with as many directions and beams that waits for every echo
+    /// before the next shot, 1/s.
     pub idle_listening_rate: f64,
     /// Mean photons per mark from the reference target.
     pub reference_photons: f64,
@@ -41,15 +41,9 @@ impl Derived {
         let pixel_period = design.scan_period() / shots as f64;
         let gate = tof_from_range(design.scan.max_range);
         let codebook = &design.coding.codebook;
-        let weights: Vec<usize> = codebook.weights().collect();
-        let sum: usize = weights.iter().sum();
-        let mean = sum as f64 / weights.len() as f64;
+        let mean = codebook.mean_weight();
         let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
         let at_once = f64::from(design.channels());
-        let sensitivity = match design.detector {
-            super::Detector::PhotonCounting(counting) => counting.sensitivity,
-            super::Detector::FirstFiring(firing) => firing.sensitivity,
-        };
         Self {
             pixel_period,
             shortest_dwell: shortest_dwell(design, pixel_period),
@@ -58,18 +52,18 @@ impl Derived {
             chips: codebook.chips(),
             macropulse,
             marks: (
-                weights.iter().copied().filter(|&w| w > 0).min().unwrap_or(0),
+                codebook.weights().filter(|&weight| weight > 0).min().unwrap_or(0),
                 mean,
-                weights.iter().copied().max().unwrap_or(0),
+                codebook.max_weight(),
             ),
             marks_per_scan: (mean * shots as f64).round() as u64,
             mean_overlap: macropulse / pixel_period,
             unambiguous_range: design
                 .is_coded()
                 .then(|| range_from_tof(f64::from(design.coding.word_modulus) * pixel_period)),
-            tick_range: s_from_fs(design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0,
+            tick_range: range_from_tof(s_from_fs(design.tdc.tick_fs)),
             idle_listening_rate: at_once / (gate * shots as f64),
-            reference_photons: sensitivity.photons,
+            reference_photons: design.detector.sensitivity().photons,
         }
     }
 }

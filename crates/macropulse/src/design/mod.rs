@@ -149,6 +149,24 @@ pub enum Detector {
     FirstFiring(FirstFiring),
 }
 
+impl Detector {
+    /// How much light it gets.
+    pub fn sensitivity(&self) -> Sensitivity {
+        match self {
+            Self::PhotonCounting(counting) => counting.sensitivity,
+            Self::FirstFiring(firing) => firing.sensitivity,
+        }
+    }
+
+    /// Standard deviation of its timing, s.
+    pub fn jitter(&self) -> f64 {
+        match self {
+            Self::PhotonCounting(counting) => counting.jitter,
+            Self::FirstFiring(firing) => firing.jitter,
+        }
+    }
+}
+
 /// A detector that counts photons, fast enough for every chip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhotonCounting {

@@ -6,7 +6,7 @@ use crate::code::correlation::{CrossCorrelation, aperiodic_sidelobe, periodic_si
 use crate::code::{Family, Payload};
 use crate::design::Design;
 use crate::predict::multiple_access::{MultipleAccess, Words, bit_error_hard, bit_error_soft};
-use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 
 /// Claims on words and correlations.
 pub(super) fn words(design: &Design) -> Result<Vec<Claim>, Error> {
@@ -19,9 +19,8 @@ pub(super) fn words(design: &Design) -> Result<Vec<Claim>, Error> {
     let worst: Vec<u16> =
         words.iter().filter_map(aperiodic_sidelobe).map(|sidelobe| sidelobe.height).collect();
     let c1 = aperiodic_sidelobe(&words[1]);
-    let error_mm = c1.map_or(0.0, |s| {
-        f64::from(s.lag) * s_from_fs(design.coding.chip_fs) * SPEED_OF_LIGHT / 2.0 * 1e3
-    });
+    let error_mm = c1
+        .map_or(0.0, |s| range_from_tof(f64::from(s.lag) * s_from_fs(design.coding.chip_fs)) * 1e3);
     let c0 = periodic_sidelobe(&words[0]).map_or(0, |sidelobe| sidelobe.height);
     let crowd = MultipleAccess::new(p, 25, Words::All).map_err(Error::Code)?;
     Ok(vec![

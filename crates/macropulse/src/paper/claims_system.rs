@@ -7,7 +7,7 @@ use crate::channel::extinction;
 use crate::design::safety::{Class1, Scanned};
 use crate::design::{Design, Pattern};
 use crate::predict::link::{Receiver, Sunlight, diffraction, field, spot_depth};
-use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 
 /// Claims on timing and converters.
 pub(super) fn timing(design: &Design) -> Vec<Claim> {
@@ -57,7 +57,7 @@ pub(super) fn timing(design: &Design) -> Vec<Claim> {
                 "{:.3} macropulses at any instant on average, whatever the scene; 25 deep needs \
                  the range to fall by {:.1} m per pixel",
                 derived.mean_overlap,
-                derived.pixel_period * SPEED_OF_LIGHT / 2.0
+                range_from_tof(derived.pixel_period)
             ),
             verdict: Verdict::Partly,
         },

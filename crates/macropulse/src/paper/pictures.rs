@@ -5,9 +5,9 @@ use super::experiment::{DISTANCES, SENSORS, Trial};
 use super::receivers::Comparison;
 use crate::code::CodeWord;
 use crate::design::{Design, Pattern};
-use crate::emit::bands;
+use crate::emit::{bands, shot_of_pixel};
 use crate::points::Outcome;
-use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
+use crate::units::{s_from_fs, tof_from_range};
 use crate::view::{
     AmplitudePicture, Axis, BitPicture, Chart, CloudPicture, Crop, Figure, Flight, Hue, Lane,
     Layout, Line, Note, RangePicture, ScaleBar, Span, Style, Timeline, Viewpoint,
@@ -41,18 +41,16 @@ pub(super) fn code_words(words: &[CodeWord]) -> Result<Figure, Error> {
 pub(super) fn payload(design: &Design, (row, column): (u16, u16)) -> Option<Figure> {
     let codebook = &design.coding.codebook;
     let payload = codebook.payload()?;
-    let pixel = u32::from(row) * design.scan.columns + u32::from(column);
-    let word = design.coding.first_word + pixel % design.coding.word_modulus;
+    let word = shot_of_pixel(design, 0, row.into(), column.into())?.word;
     let text = payload.text(column);
     let bits: Vec<bool> = text.chars().map(|bit| bit == '1').collect();
-    let marks: Vec<u32> =
-        codebook.word(word as u16).marks.iter().map(|&mark| u32::from(mark)).collect();
+    let marks: Vec<u32> = codebook.word(word).marks.iter().map(|&mark| u32::from(mark)).collect();
     let svg = BitPicture {
         title: format!("Payload and chips of pixel {row}, {column}"),
         bits: &bits,
         checksum_bits: usize::from(payload.crc().width),
         word: format!("C{word}"),
-        word_length: codebook.word(word as u16).length,
+        word_length: codebook.word(word).length,
         marks: &marks,
         width: 960.0,
     }
@@ -63,8 +61,8 @@ pub(super) fn payload(design: &Design, (row, column): (u16, u16)) -> Option<Figu
             "**Fig. 4.** Row {row}, column {column}: label {column} and checksum make the stream \
              `{text}`; every 1 bit becomes the {} chips of code word C{word}, every 0 bit stays \
              dark. {} marks in {} chips.",
-            codebook.word(word as u16).length,
-            codebook.marks(column, word as u16).len(),
+            codebook.word(word).length,
+            codebook.marks(column, word).len(),
             codebook.chips()
         ),
     ))
@@ -271,7 +269,7 @@ pub(super) fn refresh_over_range(design: &Design) -> Figure {
 /// The same, directions against range at a fixed refresh rate.
 pub(super) fn directions_over_range(design: &Design) -> Figure {
     let rate = 1.0 / design.scan_period();
-    let waiting = |range: f64, beams: f64| beams * SPEED_OF_LIGHT / (2.0 * range * rate);
+    let waiting = |range: f64, beams: f64| beams / (tof_from_range(range) * rate);
     let ranges: Vec<f64> = (0..=60).map(|i| 10_f64.powf(f64::from(i) / 20.0)).collect();
     let curve = |beams: f64| ranges.iter().map(|&r| [r, waiting(r, beams)]).collect();
     let reuse = design.derived().unambiguous_range.unwrap_or(f64::INFINITY);
