@@ -42,3 +42,4 @@ pub mod random;
 pub mod units;
 pub mod names;
 mod digest;
+mod kernels;

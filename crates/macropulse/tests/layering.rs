@@ -15,7 +15,7 @@ struct Rule {
     because: &'static str,
 }
 
-const RULES: [Rule; 17] = [
+const RULES: [Rule; 18] = [
     Rule {
         module: "code",
         may_name: &[],
@@ -81,6 +81,7 @@ const RULES: [Rule; 17] = [
     },
     Rule { module: "random", may_name: &[], because: "chance is addressed, not drawn by a stage" },
     Rule { module: "units", may_name: &[], because: "constants depend on nothing" },
+    Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
     Rule { module: "digest", may_name: &[], because: "a hash of bytes asks not whose they are" },
     Rule { module: "names", may_name: &[], because: "the likeness of words depends on nothing" },
 ];
@@ -325,4 +326,15 @@ fn a_breach_is_found() {
     assert_eq!(physical("// metres\nlet chips = 1;"), None);
     assert_eq!(foreign("use std::fmt;\nuse libm::exp;"), Some("libm".to_owned()));
     assert!(words("cloud.truth: Truth").any(|word| word == "Truth"));
+}
+
+/// Unsafe code stands in one folder.
+#[test]
+fn only_kernels_are_unsafe() {
+    for module in modules() {
+        for (file, text) in sources(&module) {
+            let is_unsafe = words(&bare(&text)).any(|word| word == "unsafe");
+            assert!(!is_unsafe || module == "kernels", "{file}");
+        }
+    }
 }

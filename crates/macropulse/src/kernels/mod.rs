@@ -1,0 +1,14 @@
+//! The few loops that are worth the widest instructions a processor has. All unsafe code of the
+//! library is in this folder.
+//!
+//! A loop is written once, in plain Rust, and compiled for each [`Level`]; [`on_every_level!`]
+//! calls the widest version that the processor at hand can run. The plain version is what other
+//! processors run and what the tests compare the others with. Compilers never contract or
+//! reassociate floating-point arithmetic of Rust, so that every level gives the same bits.
+
+#![allow(unsafe_code)]
+
+mod level;
+mod marks;
+
+pub(crate) use marks::matching;
