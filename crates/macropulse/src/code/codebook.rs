@@ -1,5 +1,6 @@
 //! The codebook: the marks of every macropulse a sensor can send.
 
+use super::correlation::aperiodic;
 use super::{CodeWord, Error, Family, Payload};
 
 /// Most marks a codebook may hold: half a gigabyte of them.
@@ -20,6 +21,12 @@ pub struct Codebook {
     marks: Vec<u16>,
     /// Where each template begins in `marks`, and where the last one ends.
     starts: Vec<u32>,
+    /// The highest sidelobe of each template.
+    sidelobes: Vec<u16>,
+    /// First chip of each lit bit: those of label 0, those of label 1, …
+    lit: Vec<u32>,
+    /// Where each label begins in `lit`, and where the last one ends.
+    lit_starts: Vec<u32>,
 }
 
 impl Codebook {
@@ -52,8 +59,14 @@ impl Codebook {
 
         let mut marks = Vec::with_capacity(total as usize);
         let mut starts = vec![0];
+        let mut sidelobes = Vec::new();
+        let (mut all_lit, mut lit_starts) = (Vec::new(), vec![0]);
+        let lobes: Vec<Lobes> = words.iter().map(Lobes::of).collect();
         for label in 0..labels {
             let lit = lit_bits(label);
+            sidelobes.extend(lobes.iter().map(|word| word.highest(&lit)));
+            all_lit.extend(lit.iter().map(|bit| bit * length));
+            lit_starts.push(all_lit.len() as u32);
             for word in &words {
                 for bit in &lit {
                     let first = (bit * length) as u16;
@@ -62,7 +75,8 @@ impl Codebook {
                 starts.push(marks.len() as u32);
             }
         }
-        Ok(Self { family, payload, labels, words, marks, starts })
+        let lit = all_lit;
+        Ok(Self { family, payload, labels, words, marks, starts, sidelobes, lit, lit_starts })
     }
 
     /// The codebook of a sensor that is not coded: a macropulse is one lit chip.
@@ -74,6 +88,9 @@ impl Codebook {
             words: Family::Single.words(),
             marks: vec![0],
             starts: vec![0, 1],
+            sidelobes: vec![0],
+            lit: vec![0],
+            lit_starts: vec![0, 1],
         }
     }
 
@@ -86,6 +103,24 @@ impl Codebook {
         let of_label = &self.starts[usize::from(label) * self.words.len()..][..=self.words.len()];
         let word = usize::from(word);
         &self.marks[of_label[word] as usize..of_label[word + 1] as usize]
+    }
+
+    /// The first chip of each lit bit of `label`, ascending: where its code words begin.
+    ///
+    /// # Panics
+    /// Like a slice, where `label` is not in the book.
+    pub fn lit_bits(&self, label: u16) -> &[u32] {
+        let label = usize::from(label);
+        &self.lit[self.lit_starts[label] as usize..self.lit_starts[label + 1] as usize]
+    }
+
+    /// Most of its own marks that the macropulse of `label` in `word` meets when it is shifted by
+    /// less than a code word: the peak that is nearest to the right one in height and in time.
+    ///
+    /// # Panics
+    /// Like a slice, where `label` or `word` is not in the book.
+    pub fn sidelobe(&self, label: u16, word: u16) -> u16 {
+        self.sidelobes[usize::from(label) * self.words.len() + usize::from(word)]
     }
 
     /// Chips of a macropulse, at most 65535.
@@ -142,6 +177,32 @@ impl Codebook {
     }
 }
 
+/// What a code word shares with itself at each positive lag: the word alone, and with the same
+/// word before it.
+struct Lobes {
+    alone: Vec<u16>,
+    follower: Vec<u16>,
+}
+
+impl Lobes {
+    fn of(word: &CodeWord) -> Self {
+        let own = aperiodic(word, word);
+        let lags = 1..word.length as i32;
+        Self {
+            alone: lags.clone().map(|lag| own.at(lag)).collect(),
+            follower: lags.map(|lag| own.at(lag - word.length as i32)).collect(),
+        }
+    }
+
+    /// The highest sidelobe of a macropulse whose `lit` bits carry the word.
+    fn highest(&self, lit: &[u32]) -> u16 {
+        let in_a_row = lit.windows(2).filter(|pair| pair[1] == pair[0] + 1).count() as u16;
+        let lit = lit.len() as u16;
+        let lobes = self.alone.iter().zip(&self.follower);
+        lobes.map(|(alone, follower)| lit * alone + in_a_row * follower).max().unwrap_or(0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::Crc;
@@ -172,6 +233,9 @@ mod tests {
                         book.word(word).marks.iter().map(move |m| 841 * bit as u16 + m)
                     });
                 assert!(chips.eq(book.marks(label, word).iter().copied()), "{label}, {word}");
+                let lit = book.lit_bits(label).iter().map(|&first| first as u16);
+                let spelt = lit.flat_map(|first| book.word(word).marks.iter().map(move |m| first + m));
+                assert!(spelt.eq(book.marks(label, word).iter().copied()), "{label}, {word}");
             }
         }
     }
@@ -183,6 +247,17 @@ mod tests {
         assert_eq!((book.min_weight(), book.max_weight()), (0, 319));
         approx::assert_relative_eq!(book.mean_weight(), 5256.0 * 29.0 / 848.0);
         assert_eq!(book.weights().nth(1), Some(3 * 29));
+    }
+
+    #[test]
+    fn a_sidelobe_is_the_most_marks_that_meet_when_shifted() {
+        let book = of_order(7, 848).unwrap();
+        for (label, word) in [(0, 3), (1, 0), (1, 2), (511, 6), (847, 4)] {
+            let marks = book.marks(label, word);
+            let met = |lag: u16| marks.iter().filter(|&&mark| marks.contains(&(mark + lag))).count();
+            let highest = (1..49).map(met).max().unwrap();
+            assert_eq!(usize::from(book.sidelobe(label, word)), highest, "{label}, {word}");
+        }
     }
 
     #[test]

@@ -3,11 +3,13 @@
 mod bitwise;
 mod correlator;
 mod direct;
+mod field;
 mod matched;
 mod returns;
 mod search;
 mod threshold;
 mod timeline;
+mod unexplained;
 
 pub use returns::{Reject, Returns};
 

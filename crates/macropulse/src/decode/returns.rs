@@ -79,6 +79,19 @@ impl Returns {
         self.rejects[reject as usize]
     }
 
+    /// None yet, with room for `returns`.
+    pub(super) fn with_capacity(returns: usize) -> Self {
+        Self {
+            shot: Vec::with_capacity(returns),
+            tof: Vec::with_capacity(returns),
+            peak: Vec::with_capacity(returns),
+            marks: Vec::with_capacity(returns),
+            margin: Vec::with_capacity(returns),
+            photons: Vec::with_capacity(returns),
+            rejects: Default::default(),
+        }
+    }
+
     pub(super) fn push(&mut self, found: Return) {
         self.shot.push(found.shot as u32);
         self.tof.push(found.tof);

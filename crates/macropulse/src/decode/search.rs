@@ -5,7 +5,7 @@
 //! B lit bits with k marks found has k/B or more of them in one of its code words, so that no lag
 //! with `least` marks is overlooked if every place with `least`/B votes is looked at.
 
-use super::timeline::Timeline;
+use super::unexplained::Unexplained;
 
 /// What is looked for: a macropulse, taken apart.
 #[derive(Debug)]
@@ -37,12 +37,12 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// The lag, in ticks from `first`, at which most marks of `sought` are lit in `timeline`; the
+    /// The lag, in ticks from `first`, at which most marks of `sought` are unexplained; the
     /// earliest of several. A mark also counts if one of the `width` − 1 next ticks is lit.
     /// `None` where no lag has `least` of them.
     pub fn best(
         &mut self,
-        timeline: &Timeline,
+        unexplained: &Unexplained,
         at: (i64, u32),
         sought: &Sought,
     ) -> Option<Candidate> {
@@ -54,7 +54,7 @@ impl Search {
 
         let mut ticks = 0;
         self.elected.clear();
-        for_each_tick(timeline, (first, places + reach), width, |tick| {
+        for_each_tick(unexplained, (first, places + reach), width, |tick| {
             ticks += 1;
             let ballot = &mut self.votes[tick..=tick + reach];
             for mark in &sought.word {
@@ -68,7 +68,7 @@ impl Search {
         let best = self.tally(reach, needed, sought);
         // Few ticks: taking every vote back is less work than wiping the whole ballot.
         if ticks * sought.word.len() * 16 < places {
-            for_each_tick(timeline, (first, places + reach), width, |tick| {
+            for_each_tick(unexplained, (first, places + reach), width, |tick| {
                 for mark in &sought.word {
                     self.votes[tick + reach - mark] = 0;
                 }
@@ -106,25 +106,23 @@ impl Search {
     }
 }
 
-/// Calls `on_tick` with every place, counted from `stretch.0`, at which a mark would count as lit.
+/// Calls `on_tick` with every place, counted from `stretch.0`, at which a mark would count as found.
 fn for_each_tick(
-    timeline: &Timeline,
+    unexplained: &Unexplained,
     stretch: (i64, usize),
     width: u32,
     mut on_tick: impl FnMut(usize),
 ) {
-    let (first, length) = stretch;
-    for start in (0..length).step_by(64) {
-        let tick = first + start as i64;
-        let mut lit = (0..width).fold(0, |lit, late| lit | timeline.from(tick + i64::from(late)));
-        if length - start < 64 {
-            lit &= (1 << (length - start)) - 1;
+    let (first, length) = (stretch.0, stretch.1 as i64);
+    let late = i64::from(width) - 1;
+    let mut next = 0;
+    unexplained.for_each(first..first + length + late, |tick| {
+        let place = tick - first;
+        for place in next.max(place - late)..=place.min(length - 1) {
+            on_tick(place as usize);
         }
-        while lit != 0 {
-            on_tick(start + lit.trailing_zeros() as usize);
-            lit &= lit - 1;
-        }
-    }
+        next = place + 1;
+    });
 }
 
 #[cfg(test)]
@@ -138,12 +136,12 @@ mod tests {
     }
 
     /// Every lag by itself.
-    fn exhaustive(timeline: &Timeline, first: i64, width: i64) -> Candidate {
+    fn exhaustive(unexplained: &Unexplained, first: i64, width: i64) -> Candidate {
         let Sought { word, bits, lags, .. } = sought(1);
         let count = |lag: usize| {
             let starts = bits.iter().map(|bit| first + (lag + bit) as i64);
             let places = starts.flat_map(|start| word.iter().map(move |&mark| start + mark as i64));
-            places.filter(|&place| (place..place + width).any(|tick| timeline.has(tick))).count()
+            places.filter(|&place| unexplained.any(place..place + width)).count()
         };
         let lag = (0..lags).rev().max_by_key(|&lag| count(lag)).unwrap();
         Candidate { lag, count: count(lag) as u16 }
@@ -155,11 +153,11 @@ mod tests {
         let mut search = Search::default();
         for lit in [0, 3, 30, 300] {
             for width in [1, 2, 4] {
-                let lit = (0..lit).map(|_| i64::from(chance.next_u32() % 1100) - 50);
-                let timeline = Timeline::new(-50..1100, lit);
-                let expected = exhaustive(&timeline, -7, i64::from(width));
+                let lit: Vec<u32> = (0..lit).map(|_| chance.next_u32() % 1050).collect();
+                let unexplained = Unexplained::new(&lit, -50..1100);
+                let expected = exhaustive(&unexplained, -7, i64::from(width));
                 for least in 1..=15 {
-                    let found = search.best(&timeline, (-7, width), &sought(least));
+                    let found = search.best(&unexplained, (-7, width), &sought(least));
                     let expected = Some(expected).filter(|expected| expected.count >= least);
                     assert_eq!(found, expected, "{least} of 15, width {width}");
                 }
@@ -169,9 +167,9 @@ mod tests {
 
     #[test]
     fn a_shot_without_light_is_not_found() {
-        let timeline = Timeline::new(0..1000, []);
+        let unexplained = Unexplained::new(&[], 0..1000);
         let dark = Sought { word: vec![0], bits: vec![], lags: 900, least: 1 };
-        assert_eq!(Search::default().best(&timeline, (0, 1), &dark), None);
-        assert_eq!(Search::default().best(&timeline, (0, 1), &sought(1)), None);
+        assert_eq!(Search::default().best(&unexplained, (0, 1), &dark), None);
+        assert_eq!(Search::default().best(&unexplained, (0, 1), &sought(1)), None);
     }
 }

@@ -8,7 +8,9 @@
 
 #![allow(unsafe_code)]
 
+mod correlate;
 mod level;
 mod marks;
 
-pub(crate) use marks::matching;
+pub(crate) use correlate::{LANES, Lanes, PLANES, count_marks};
+pub(crate) use marks::{WordTicks, begin_with};

@@ -1,7 +1,5 @@
 //! The light nobody has explained yet: who else could have sent it?
 
-use std::ops::Range;
-
 use super::{Band, Lock};
 use crate::decode::search::Sought;
 
@@ -20,12 +18,12 @@ pub(super) enum Evidence {
 impl Band<'_> {
     /// Searches the unexplained light for the shots that have no lag yet.
     pub(super) fn search(&mut self, evidence: Evidence) {
-        for shot in 0..self.log.len() {
+        for shot in 0..self.locks.len() {
             if self.locks[shot].is_some() {
                 continue;
             }
             let least = match evidence {
-                Evidence::Overwhelming | Evidence::Bright => self.weight(shot).div_ceil(2),
+                Evidence::Overwhelming | Evidence::Bright => self.sent.weight(shot).div_ceil(2),
                 Evidence::MoreThanChance => 1,
             };
             let lock = match self.predicted(shot) {
@@ -35,7 +33,7 @@ impl Band<'_> {
             let Some(lock) = lock.filter(|lock| lock.count >= least) else { continue };
             let by_chance = self.by_chance(shot, lock);
             let needed = match evidence {
-                Evidence::Overwhelming => by_chance.max(self.weight(shot).min(2 * by_chance)),
+                Evidence::Overwhelming => by_chance.max(self.sent.weight(shot).min(2 * by_chance)),
                 Evidence::Bright | Evidence::MoreThanChance => by_chance,
             };
             if lock.count >= needed {
@@ -46,21 +44,21 @@ impl Band<'_> {
 
     /// Gives a predicted shot the lag that unexplained light speaks for, where it fits better.
     pub(super) fn contest(&mut self) {
-        for shot in 0..self.log.len() {
+        for shot in 0..self.locks.len() {
             let Some(lock) = self.locks[shot].filter(|lock| !lock.searched) else { continue };
             // With so many marks in every lit bit nothing else can be meant: what is left over is
             // another surface in the same footprint.
-            if 8 * lock.count >= 7 * self.weight(shot) {
+            if 8 * lock.count >= 7 * self.sent.weight(shot) {
                 continue;
             }
             let density = self.density_in_gate(shot);
-            let by_chance = self.thresholds.least(self.weight(shot), density);
+            let by_chance = self.thresholds.least(self.sent.weight(shot), density);
             if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
                 continue;
             }
             if let Some(rival) = self.searched(shot, lock.count / 2)
                 && rival.count > lock.count
-                && self.is_believed(shot, rival)
+                && rival.count >= self.by_chance(shot, rival)
             {
                 self.lock(shot, rival);
             }
@@ -70,31 +68,24 @@ impl Band<'_> {
     /// Whether there are so many unexplained ticks within one macropulse somewhere in the gate
     /// of `shot` that they could be `marks` of its marks.
     fn is_crowded(&self, shot: usize, marks: u16) -> bool {
-        let per_tick = self.marks_per_tick[usize::from(self.log.word[shot])];
+        let per_tick = self.marks_per_tick[usize::from(self.sent.log.word[shot])];
         let needed = u32::from(marks).div_ceil(per_tick).max(1);
-        let gate = self.gate_and_macropulse(shot);
+        let gate = self.sent.gate_and_macropulse(shot);
         self.unexplained.at_most(gate.clone()) >= needed
-            && self.unexplained.densest(gate, self.length() as u32) >= needed
-    }
-
-    /// The time in which light of `shot` can arrive.
-    fn gate_and_macropulse(&self, shot: usize) -> Range<i64> {
-        let (nearest, farthest) = self.gate();
-        let end = farthest + self.length() + i64::from(self.width);
-        self.fired[shot] + nearest..self.fired[shot] + end
+            && self.unexplained.densest(gate, self.sent.length() as u32) >= needed
     }
 
     /// The lag at which most marks of `shot` are found, out of all that unexplained ticks speak
     /// for. `None` where these are fewer than `at_least` or chance could as well have put them
     /// there.
     pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
-        let (nearest, farthest) = self.gate();
-        let weight = self.weight(shot);
+        let (nearest, farthest) = self.sent.gate();
+        let weight = self.sent.weight(shot);
         if weight == 0 || farthest < nearest {
             return None;
         }
-        let gate = self.gate_and_macropulse(shot);
-        let ticks = self.unexplained.at_most(gate.clone()) * self.width;
+        let gate = self.sent.gate_and_macropulse(shot);
+        let ticks = self.unexplained.at_most(gate.clone()) * self.sent.width;
         let left_over = f64::from(ticks) / (gate.end - gate.start) as f64;
         // Marks under ticks that are explained already are missing here: half are taken to be
         // visible.
@@ -104,16 +95,16 @@ impl Band<'_> {
         if !self.is_crowded(shot, least) {
             return None;
         }
-        let scale = self.receiver.ticks_per_chip as usize;
-        let word = self.codebook.word(self.log.word[shot]);
+        let scale = self.sent.scale() as usize;
+        let word = self.sent.codebook.word(self.sent.log.word[shot]);
         let sought = Sought {
             word: word.marks.iter().map(|&mark| scale * usize::from(mark)).collect(),
-            bits: self.bits(shot).filter(|(lit, _)| *lit).map(|(_, bit)| bit as usize).collect(),
+            bits: self.sent.bits(shot, true).map(|bit| bit as usize).collect(),
             lags: (farthest - nearest + 1) as usize,
             least,
         };
-        let at = (self.fired[shot] + nearest, self.width);
-        let found = self.search.best(self.unexplained.timeline(), at, &sought)?;
+        let at = (self.sent.fired[shot] + nearest, self.sent.width);
+        let found = self.search.best(&self.unexplained, at, &sought)?;
         let best = self.best_near(shot, nearest + found.lag as i64, least)?;
         Some(Lock { searched: true, ..best })
     }

@@ -2,33 +2,40 @@
 
 use super::{Band, Lock};
 use crate::decode::threshold::binomial_tail;
-use crate::decode::timeline::Timeline;
 use crate::decode::{Reject, Return, Returns, photons_per_mark};
 use crate::units;
 
 impl Band<'_> {
     /// What was found of the home shots.
     pub(super) fn returns(mut self) -> Returns {
-        let left_over = self.unexplained.timeline().dilated(0, self.width - 1);
-        let mut returns = Returns::default();
-        for shot in self.log.home.clone() {
+        let home = self.sent.log.home.clone();
+        let mut returns = Returns::with_capacity(home.len());
+        // Where all marks are found nothing is to be learnt from the light around; and in clear
+        // weather a logarithm for each shot would take longer than the rest.
+        let all_found: Vec<f32> = (0..=self.sent.codebook.max_weight() as u16)
+            .map(|marks| photons_per_mark(marks, marks, 0.0))
+            .collect();
+        for shot in home {
             let Some(lock) = self.locks[shot] else {
                 returns.reject(Reject::NoPeak);
                 continue;
             };
-            let density = self.density_around(shot, lock);
-            if !self.carries_its_label(shot, lock, (&left_over, density)) {
+            if !self.carries_its_label(shot, lock) {
                 returns.reject(Reject::LabelMismatch);
                 continue;
             }
-            let marks = self.weight(shot);
+            let marks = self.sent.weight(shot);
+            let photons = match lock.count == marks {
+                true => all_found[usize::from(marks)],
+                false => photons_per_mark(lock.count, marks, self.density_around(shot, lock)),
+            };
             returns.push(Return {
                 shot,
                 tof: self.tof(shot, lock),
                 peak: lock.count,
                 marks,
                 margin: lock.margin,
-                photons: photons_per_mark(lock.count, marks, density),
+                photons,
             });
         }
         returns
@@ -39,62 +46,91 @@ impl Band<'_> {
     /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it;
     /// unexplained light only, as other shots may well shine there. A lit bit is dark if it has
     /// less than half the marks of the others and chance would not take away so many.
-    fn carries_its_label(&mut self, shot: usize, lock: Lock, around: (&Timeline, f64)) -> bool {
-        let (left_over, density) = around;
-        let bits = self.bits(shot);
-        let lit = bits.clone().filter(|(lit, _)| *lit).count() as u32;
-        let mean = f64::from(lock.count) / f64::from(lit);
-        let in_word = self.codebook.word(self.log.word[shot]).marks.len() as u16;
-        let by_chance = self.bit_thresholds.least(in_word, density);
-        let seen_share = mean / f64::from(in_word);
-        for (lit, bit) in bits {
-            if lit && lock.count == self.weight(shot) {
-                continue;
-            }
-            let timeline = if lit { self.seen() } else { left_over };
-            let found = self.found_in_bit(shot, lock.lag + bit, timeline);
-            let half = 2.0 * f64::from(found) >= mean;
-            let wrong = if lit {
-                let missing = binomial_tail(in_word, 1.0 - seen_share, in_word - found);
-                !half && missing <= self.receiver.false_alarm
-            } else {
-                half && found >= by_chance
-            };
-            if wrong {
-                return false;
-            }
+    fn carries_its_label(&mut self, shot: usize, lock: Lock) -> bool {
+        let all_found = lock.count == self.sent.weight(shot);
+        if all_found && self.is_dark() {
+            return true;
         }
-        true
+        let lit = self.sent.bits(shot, true).count() as u32;
+        let mean = f64::from(lock.count) / f64::from(lit);
+        (all_found || self.lit_bits_are_lit(shot, lock, mean))
+            && self.dark_bits_are_dark(shot, lock, mean)
+    }
+
+    fn lit_bits_are_lit(&mut self, shot: usize, lock: Lock, mean: f64) -> bool {
+        let in_word = self.in_word(shot);
+        let seen_share = mean / f64::from(in_word);
+        self.sent.bits(shot, true).all(|bit| {
+            let found = self.found_in_bit(shot, lock.lag + bit);
+            2.0 * f64::from(found) >= mean
+                || binomial_tail(in_word, 1.0 - seen_share, in_word - found)
+                    > self.sent.receiver.false_alarm
+        })
+    }
+
+    fn dark_bits_are_dark(&mut self, shot: usize, lock: Lock, mean: f64) -> bool {
+        let start = self.sent.fired[shot] + lock.lag;
+        let (word, scale) = (self.sent.codebook.word(self.sent.log.word[shot]), self.sent.scale());
+        let (length, width) = (i64::from(word.length) * scale, i64::from(self.sent.width));
+        // Half of a lit bit must come from somewhere.
+        let needed = (mean / 2.0).ceil() as u32;
+        let per_tick = self.marks_per_tick.get(usize::from(self.sent.log.word[shot]));
+        let per_tick = per_tick.copied().unwrap_or(1);
+        let mut dark = self.sent.bits(shot, false);
+        dark.all(|bit| {
+            let span = start + bit..start + bit + length + width;
+            if self.unexplained.at_most(span) * per_tick < needed {
+                return true;
+            }
+            let places = word.marks.iter().map(|&mark| start + bit + scale * i64::from(mark));
+            let found = places.filter(|&tick| self.unexplained.any(tick..tick + width)).count();
+            let density = self.density_around(shot, lock);
+            let by_chance = self.bit_thresholds.least(self.in_word(shot), density);
+            2.0 * (found as f64) < mean || found < usize::from(by_chance)
+        })
+    }
+
+    /// Marks of the code word of `shot`.
+    fn in_word(&self, shot: usize) -> u16 {
+        self.sent.codebook.word(self.sent.log.word[shot]).marks.len() as u16
     }
 
     /// Two-way time of flight, s. Where edges jitter, the mean over all marks that were found.
     fn tof(&self, shot: usize, lock: Lock) -> f64 {
-        let start = self.fired[shot] + lock.lag;
-        let tof = self.receiver.tof(self.log.fired_at_fs[shot], start);
-        tof + self.mean_offset(shot, start) * units::s_from_fs(self.receiver.tick_fs)
+        let (sent, start) = (self.sent, self.sent.fired[shot] + lock.lag);
+        let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start + sent.epoch);
+        tof + self.mean_offset(shot, start) * units::s_from_fs(sent.receiver.tick_fs)
     }
 
     /// By how many ticks the marks of `shot` are late on average if it begins at `start`. A
     /// window that is not centred on them would cut one side off, so it is centred again.
     fn mean_offset(&self, shot: usize, start: i64) -> f64 {
         const ROUNDS: usize = 3;
-        let reach = i64::from(self.width / 2);
+        let width = i64::from(self.sent.width);
+        let reach = width / 2;
         if reach == 0 {
             return 0.0;
         }
-        let mut mean = f64::from(self.width - 1) / 2.0;
+        // Whatever the rounds, no farther than this.
+        let around = ROUNDS as i64 * width;
+        let ticks =
+            self.field.ticks(start - around..start + self.sent.length() + width + around);
+        let mut mean = (width - 1) as f64 / 2.0;
         for _ in 0..ROUNDS {
             let middle = mean.round() as i64;
-            let (mut sum, mut count) = (0, 0);
-            for mark in self.marks(shot) {
-                let late = (middle - reach..=middle + reach)
-                    .filter(|late| self.ticks.has(start + mark + late));
-                for late in late {
-                    sum += late;
+            let (mut sum, mut count, mut next) = (0, 0, 0);
+            for mark in self.sent.places(shot) {
+                let first = start + mark + middle - reach;
+                while ticks.get(next).is_some_and(|&tick| i64::from(tick) < first) {
+                    next += 1;
+                }
+                let within = |&&tick: &&u32| i64::from(tick) <= first + 2 * reach;
+                for &tick in ticks[next..].iter().take_while(within) {
+                    sum += i64::from(tick) - start - mark;
                     count += 1;
                 }
             }
-            mean = f64::from(sum as i32) / f64::from(count.max(1));
+            mean = sum as f64 / f64::from(count.max(1));
         }
         mean
     }

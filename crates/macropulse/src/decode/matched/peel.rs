@@ -1,0 +1,222 @@
+//! Clean macropulses are taken off the stream of ticks one after another, as they come.
+//!
+//! 1. The earliest tick that nobody has explained is taken for the first mark of a macropulse.
+//!    The shot after the last one found is asked first: in smooth scenes it is the one.
+//! 2. Otherwise each shot in flight is asked whether its second mark is there, too; codes are made
+//!    so that hardly more than one says yes.
+//! 3. All marks of that shot are looked for. If none is missing no lag can have more, and none
+//!    earlier is left: this is the maximum. Its ticks are explained.
+//!
+//! A tick of which no macropulse without a gap can begin is left for the receivers that follow.
+//! Where marks are missed everywhere nothing can be peeled: this is soon noticed.
+
+use super::{Lock, Sent};
+use crate::kernels::begin_with;
+
+/// Ticks without a macropulse that are put up with before peeling ends, and how many more for
+/// each macropulse that was found.
+const PATIENCE: (usize, usize) = (256, 4);
+
+/// What was found without a gap, and what is left.
+#[derive(Debug)]
+pub(super) struct Peeled {
+    /// The lag of each shot that was found.
+    pub locks: Vec<Option<Lock>>,
+    /// Ticks that nobody has explained, in order.
+    pub left: Vec<u32>,
+}
+
+/// Peels the macropulses of the shots `sent` off the sorted `ticks`.
+pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
+    let mut peeler = Peeler {
+        sent,
+        ticks,
+        gate: sent.gate(),
+        scale: sent.receiver.ticks_per_chip,
+        reach: sent.gate().1 + sent.length(),
+        least: fewest_without_a_gap(sent, ticks),
+        explained: Explained::new(ticks.len()),
+        locks: vec![None; sent.fired.len()],
+        oldest: 0,
+        next: 0,
+    };
+    // Marks that jitter are not where they should be.
+    let (mut place, mut patience) = (0, if sent.width > 1 { 0 } else { PATIENCE.0 });
+    while place < ticks.len() && patience > 0 {
+        match peeler.shot_at(place) {
+            Some(()) => patience += PATIENCE.1,
+            None => patience -= 1,
+        }
+        place = peeler.explained.next_without(place + 1);
+    }
+    Peeled { left: peeler.explained.left(ticks), locks: peeler.locks }
+}
+
+/// Marks that chance does not put there all together, at none of the lags of a gate: the least N
+/// with L · dᴺ ≤ α, d the share of lit ticks. Two at least, as the second mark is asked for.
+fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> usize {
+    let span = sent.span();
+    let density = ticks.len() as f64 / (span.end - span.start).max(1) as f64;
+    let rarity = libm::log(sent.receiver.false_alarm / sent.lags());
+    (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as usize
+}
+
+struct Peeler<'a> {
+    sent: &'a Sent<'a>,
+    ticks: &'a [u32],
+    gate: (i64, i64),
+    scale: u32,
+    /// The last mark of the farthest echo comes no later than this after firing.
+    reach: i64,
+    /// Fewest marks with which a shot can be told from chance.
+    least: usize,
+    explained: Explained,
+    locks: Vec<Option<Lock>>,
+    /// No shot before this one is in flight any more.
+    oldest: usize,
+    /// The shot after the last one found.
+    next: usize,
+}
+
+impl Peeler<'_> {
+    /// Finds the shot whose light begins with the tick at `place`, and explains its ticks.
+    fn shot_at(&mut self, place: usize) -> Option<()> {
+        if self.next < self.locks.len() && self.fits_in_a_row(self.next, place) {
+            return Some(());
+        }
+        let tick = i64::from(self.ticks[place]);
+        let (sent, nearest) = (self.sent, self.gate.0);
+        let fired = &sent.fired;
+        while self.oldest < fired.len() && fired[self.oldest] + self.reach < tick {
+            self.oldest += 1;
+        }
+        let in_flight = self.oldest..fired.len();
+        for shot in in_flight.take_while(|&shot| fired[shot] + nearest <= tick) {
+            if self.fits(shot, place) {
+                return Some(());
+            }
+        }
+        None
+    }
+
+    /// The lag of `shot` if its first mark is the tick at `place`.
+    fn lag(&self, shot: usize, place: usize) -> Option<i64> {
+        let bit = self.sent.lit_bits(shot).first()?;
+        let first = i64::from(self.scale * bit) + self.sent.word(shot).first()?;
+        let lag = i64::from(self.ticks[place]) - first - self.sent.fired[shot];
+        (self.gate.0..=self.gate.1).contains(&lag).then_some(lag)
+    }
+
+    /// Whether the ticks from `place` on are all the marks of `shot`, with nothing between them.
+    fn fits_in_a_row(&mut self, shot: usize, place: usize) -> bool {
+        let Some(lag) = self.lag(shot, place) else { return false };
+        let (word, bits) = (self.sent.word(shot), self.sent.lit_bits(shot));
+        let count = bits.len() * word.marks();
+        let start = (self.sent.fired[shot] + lag) as u32;
+        if count < self.least
+            || !begin_with(&self.ticks[place..], word, bits, (start, self.scale))
+        {
+            return false;
+        }
+        self.explained.run(place, count);
+        self.lock(shot, lag, count);
+        true
+    }
+
+    /// Whether all marks of `shot` are among the ticks from `place` on.
+    fn fits(&mut self, shot: usize, place: usize) -> bool {
+        let Some(lag) = self.lag(shot, place) else { return false };
+        let marks = self.sent.marks(shot);
+        if marks.len() < self.least {
+            return false;
+        }
+        let (start, scale) = ((self.sent.fired[shot] + lag) as u32, self.scale);
+        let at = |mark: u16| start + scale * u32::from(mark);
+        // Nearly every shot is refused here.
+        let second = at(marks[1]);
+        let follower = self.ticks[place + 1..].iter().find(|&&tick| tick >= second);
+        if follower != Some(&second) {
+            return false;
+        }
+        if self.fits_in_a_row(shot, place) {
+            return true;
+        }
+        let mut places = place;
+        for &mark in marks {
+            let tick = at(mark);
+            places += self.ticks[places..].iter().take_while(|&&other| other < tick).count();
+            if self.ticks.get(places) != Some(&tick) {
+                return false;
+            }
+        }
+        let mut places = place;
+        for &mark in marks {
+            let tick = at(mark);
+            places += self.ticks[places..].iter().take_while(|&&other| other < tick).count();
+            self.explained.run(places, 1);
+        }
+        self.lock(shot, lag, marks.len());
+        true
+    }
+
+    /// Keeps `lag` unless the shot was found before: of several surfaces the first one counts.
+    fn lock(&mut self, shot: usize, lag: i64, count: usize) {
+        let count = count as u16;
+        let margin = count - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
+        self.locks[shot].get_or_insert(Lock { lag, count, margin, searched: true });
+        self.next = shot + 1;
+    }
+}
+
+/// Which ticks are explained, by their place in the list: one bit each.
+#[derive(Debug)]
+struct Explained {
+    words: Vec<u64>,
+    ticks: usize,
+}
+
+impl Explained {
+    fn new(ticks: usize) -> Self {
+        Self { words: vec![0; ticks / 64 + 1], ticks }
+    }
+
+    /// Explains `count` ticks from `first` on.
+    fn run(&mut self, first: usize, count: usize) {
+        let end = first + count;
+        let (from, to) = (first / 64, end / 64);
+        let (head, tail) = (u64::MAX << (first % 64), !(u64::MAX << (end % 64)));
+        if from == to {
+            self.words[from] |= head & tail;
+            return;
+        }
+        self.words[from] |= head;
+        self.words[from + 1..to].fill(u64::MAX);
+        self.words[to] |= tail;
+    }
+
+    /// The first place from `place` on whose tick is not explained; the number of ticks if all
+    /// are.
+    fn next_without(&self, place: usize) -> usize {
+        let mut index = place / 64;
+        let mut unexplained = !self.words[index.min(self.words.len() - 1)] & u64::MAX << (place % 64);
+        while unexplained == 0 && index + 1 < self.words.len() {
+            index += 1;
+            unexplained = !self.words[index];
+        }
+        (64 * index + unexplained.trailing_zeros() as usize).min(self.ticks)
+    }
+
+    /// The ticks that are not explained.
+    fn left(&self, ticks: &[u32]) -> Vec<u32> {
+        let mut left = Vec::new();
+        for (ticks, explained) in ticks.chunks(64).zip(&self.words) {
+            let mut unexplained = !explained;
+            while unexplained != 0 {
+                let Some(&tick) = ticks.get(unexplained.trailing_zeros() as usize) else { break };
+                left.push(tick);
+                unexplained &= unexplained - 1;
+            }
+        }
+        left
+    }
+}

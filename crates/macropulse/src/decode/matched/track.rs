@@ -1,0 +1,139 @@
+//! Shots whose neighbours have been found are looked for where their neighbours are.
+
+use super::{Band, Lock};
+use crate::decode::correlator::{BLOCK, Counts};
+
+impl Band<'_> {
+    /// Finds the shots that lie where their neighbours say and can be no other.
+    pub(super) fn track(&mut self) {
+        for shot in 0..self.locks.len() {
+            if self.locks[shot].is_none()
+                && let Some(lock) = self.predicted(shot)
+            {
+                self.lock(shot, lock);
+            }
+        }
+    }
+
+    /// The lags at which `shot` is to be expected, after its neighbours: on the plane through
+    /// three of them, on the lines through two, and at the lag of one.
+    fn expected(&self, shot: usize) -> [Option<i64>; 6] {
+        let at = |shot: Option<usize>| Some(self.locks.get(shot?)?.as_ref()?.lag);
+        let over = |shot: Option<usize>| {
+            self.above.get(shot?).copied().flatten().map(|shot| shot as usize)
+        };
+        let before = shot.checked_sub(1);
+        let (left, above) = (at(before), at(over(Some(shot))));
+        let plane = || Some(left? + above? - at(over(before))?);
+        let across = || Some(2 * left? - at(shot.checked_sub(2))?);
+        let down = || Some(2 * above? - at(over(over(Some(shot))))?);
+        [plane(), across(), down(), left, above, at(Some(shot + 1))]
+    }
+
+    /// The lag of `shot` if it lies where its neighbours say and can be no other.
+    pub(super) fn predicted(&mut self, shot: usize) -> Option<Lock> {
+        let weight = self.sent.weight(shot);
+        if weight == 0 {
+            return None;
+        }
+        let expected = self.expected(shot);
+        if expected.iter().all(Option::is_none) {
+            return None;
+        }
+        let density = self.density_in_gate(shot);
+        let least = weight.div_ceil(2).min(2 * self.thresholds.least(weight, density));
+        for (index, lag) in expected.iter().enumerate() {
+            let Some(lag) = *lag else { continue };
+            let mut tried = expected[..index].iter().flatten();
+            if tried.any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
+                continue;
+            }
+            // The flank of a peak just outside would show half as many marks as the peak.
+            let lock = self.best_near(shot, lag, least.div_ceil(2));
+            if lock.is_some_and(|lock| self.is_certain(shot, lock)) {
+                return lock;
+            }
+        }
+        None
+    }
+
+    /// The highest peak that can be climbed to from `lag`. `None` where fewer than `at_least`
+    /// marks fit anywhere around.
+    ///
+    /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
+    /// not have all its marks may be one of them: then the blocks to both sides are seen, too.
+    pub(super) fn best_near(&mut self, shot: usize, lag: i64, at_least: u16) -> Option<Lock> {
+        const STEPS: usize = 64;
+        let weight = self.sent.weight(shot);
+        let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
+        let mut middle = lag;
+        for _ in 0..STEPS {
+            if best.lag.abs_diff(middle) > BLOCK as u64 / 8 {
+                middle = best.lag;
+                best = self.best_in_block(shot, middle)?;
+                continue;
+            }
+            if best.count == weight {
+                break;
+            }
+            let sides = [middle - BLOCK, middle + BLOCK];
+            let sides = sides.map(|side| self.best_in_block(shot, side));
+            let higher = sides.into_iter().flatten().find(|side| {
+                side.count > best.count || (side.count == best.count && side.lag < best.lag)
+            });
+            match higher {
+                Some(side) => best = side,
+                None => break,
+            }
+        }
+        Some(best)
+    }
+
+    /// The highest peak in the [`BLOCK`] around `middle`.
+    fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Lock> {
+        let (nearest, farthest) = self.sent.gate();
+        let first = middle - BLOCK / 2;
+        let allowed = nearest - first..farthest + 1 - first;
+        if allowed.end <= 0 || allowed.start >= BLOCK {
+            return None;
+        }
+        let start = self.sent.fired[shot] + first;
+        let (words, bit) = self.field.bits(start, BLOCK + self.sent.length());
+        let marks = (self.sent.marks(shot), self.sent.scale() as usize);
+        let peak = Counts::new(words, bit, marks).peak(allowed, self.sent.width.into())?;
+        let margin = peak.count - peak.next;
+        Some(Lock { lag: first + peak.at, count: peak.count, margin, searched: false })
+    }
+
+    /// Whether `lock` can be no sidelobe and no other shot: half of the marks were found, or twice
+    /// what chance can give, and no lit bit is much darker than the others.
+    pub(super) fn is_certain(&mut self, shot: usize, lock: Lock) -> bool {
+        let weight = self.sent.weight(shot);
+        if lock.count == weight {
+            return true;
+        }
+        let by_chance = self.by_chance(shot, lock);
+        if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
+            return false;
+        }
+        let lit = self.sent.bits(shot, true).count() as u32;
+        let mut lit_bits = self.sent.bits(shot, true);
+        lit_bits.all(|bit| {
+            let found = self.found_in_bit(shot, lock.lag + bit);
+            3 * u32::from(found) * lit >= u32::from(lock.count)
+        })
+    }
+
+    /// Marks of the code word of `shot` that are found if it begins at `lag`.
+    pub(super) fn found_in_bit(&mut self, shot: usize, lag: i64) -> u16 {
+        let word = self.sent.codebook.word(self.sent.log.word[shot]);
+        let scale = self.sent.scale();
+        let start = self.sent.fired[shot] + lag;
+        let (words, first) = self.field.bits(start, scale * i64::from(word.length));
+        let is_lit = |mark: u16| {
+            let bit = first + scale as usize * usize::from(mark);
+            words.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1)
+        };
+        word.marks.iter().filter(|&&mark| is_lit(mark)).count() as u16
+    }
+}

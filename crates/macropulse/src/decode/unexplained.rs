@@ -1,0 +1,136 @@
+//! The ticks nobody has explained yet.
+
+use std::ops::Range;
+
+/// Ticks that are counted together where a rough place is enough.
+const CHUNK: i64 = 1024;
+
+/// The unexplained ticks, one bit each, and how many there are in each [`CHUNK`].
+#[derive(Debug)]
+pub(super) struct Unexplained {
+    /// Tick of the first bit.
+    origin: i64,
+    words: Vec<u64>,
+    per_chunk: Vec<u32>,
+}
+
+impl Unexplained {
+    /// Those of `ticks` that lie in `span`.
+    pub fn new(ticks: &[u32], span: Range<i64>) -> Self {
+        let chunks = ((span.end - span.start).max(0) / CHUNK + 1) as usize;
+        let mut unexplained = Self {
+            origin: span.start,
+            words: vec![0; chunks * (CHUNK / 64) as usize],
+            per_chunk: vec![0; chunks],
+        };
+        for &tick in ticks {
+            if let Some((word, bit)) = unexplained.place(i64::from(tick)) {
+                unexplained.words[word] |= 1 << bit;
+                unexplained.per_chunk[word / (CHUNK / 64) as usize] += 1;
+            }
+        }
+        unexplained
+    }
+
+    fn place(&self, tick: i64) -> Option<(usize, u32)> {
+        let bit = (tick - self.origin) as u64;
+        let word = (bit >> 6) as usize;
+        (word < self.words.len()).then_some((word, (bit & 63) as u32))
+    }
+
+    /// Explains the ticks at each of `places`, and the `width` − 1 behind it.
+    pub fn explain(&mut self, places: impl Iterator<Item = i64>, width: u32) {
+        for place in places {
+            for tick in place..place + i64::from(width) {
+                let Some((word, bit)) = self.place(tick) else { continue };
+                let was_lit = self.words[word] >> bit & 1;
+                self.words[word] &= !(1 << bit);
+                self.per_chunk[word / (CHUNK / 64) as usize] -= was_lit as u32;
+            }
+        }
+    }
+
+    /// Whether one of the ticks in `span` is unexplained.
+    pub fn any(&self, span: Range<i64>) -> bool {
+        span.into_iter().any(|tick| {
+            self.place(tick).is_some_and(|(word, bit)| self.words[word] >> bit & 1 == 1)
+        })
+    }
+
+    /// Calls `on_tick` with each unexplained tick of `span`, in order.
+    pub fn for_each(&self, span: Range<i64>, mut on_tick: impl FnMut(i64)) {
+        let mut chunk = self.chunk_of(span.start);
+        while chunk < self.per_chunk.len() {
+            let first = self.origin + CHUNK * chunk as i64;
+            if first >= span.end {
+                break;
+            }
+            let words = &self.words[chunk * (CHUNK / 64) as usize..][..(CHUNK / 64) as usize];
+            for (index, &word) in words.iter().enumerate().filter(|_| self.per_chunk[chunk] > 0) {
+                let mut lit = word;
+                while lit != 0 {
+                    let tick = first + 64 * index as i64 + i64::from(lit.trailing_zeros());
+                    if span.contains(&tick) {
+                        on_tick(tick);
+                    }
+                    lit &= lit - 1;
+                }
+            }
+            chunk += 1;
+        }
+    }
+
+    fn chunk_of(&self, tick: i64) -> usize {
+        (tick - self.origin).div_euclid(CHUNK).clamp(0, self.per_chunk.len() as i64) as usize
+    }
+
+    /// The chunks that touch `span`.
+    fn chunks(&self, span: Range<i64>) -> &[u32] {
+        let from = self.chunk_of(span.start);
+        &self.per_chunk[from..self.chunk_of(span.end + CHUNK - 1).max(from)]
+    }
+
+    /// No fewer than the ticks in `span`, not many more.
+    pub fn at_most(&self, span: Range<i64>) -> u32 {
+        self.chunks(span).iter().sum()
+    }
+
+    /// No fewer than the ticks in any run of `length` ticks that ends in `span`.
+    pub fn densest(&self, span: Range<i64>, length: u32) -> u32 {
+        let chunks = self.chunks(span);
+        let width = (i64::from(length) / CHUNK + 2) as usize;
+        let (mut sum, mut most) = (0, 0);
+        for (index, lit) in chunks.iter().enumerate() {
+            sum += lit;
+            if index >= width {
+                sum -= chunks[index - width];
+            }
+            most = most.max(sum);
+        }
+        most
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn explained_ticks_are_no_longer_counted() {
+        let lit: Vec<u32> = (0..10_000).step_by(10).collect();
+        let mut unexplained = Unexplained::new(&lit, 0..10_240);
+        assert_eq!(unexplained.at_most(0..10_240), 1000);
+        unexplained.explain(0..5120, 1);
+        unexplained.explain((0..5120).step_by(3), 3);
+        // The last three end at 5121.
+        assert_eq!(unexplained.at_most(0..5120), 0);
+        assert_eq!(unexplained.at_most(5121..10_240), 487);
+        // Four chunks hold any 2048 ticks.
+        assert!((205..=410).contains(&unexplained.densest(0..10_240, 2048)));
+        assert!(!unexplained.any(5110..5120));
+        assert!(unexplained.any(5110..5131));
+        let mut left = Vec::new();
+        unexplained.for_each(5000..5200, |tick| left.push(tick));
+        assert_eq!(left, [5130, 5140, 5150, 5160, 5170, 5180, 5190]);
+    }
+}
