@@ -28,8 +28,8 @@ pub(super) struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// The field of `ticks` over `span`.
-    pub fn new(ticks: &'a [u32], width: u32, span: Range<i64>) -> Self {
+    /// The field of `ticks` over `span`, in the memory `words`, whatever is in it.
+    pub fn new(ticks: &'a [u32], width: u32, span: Range<i64>, mut words: Vec<u64>) -> Self {
         let origin = span.start - MARGIN;
         let chunks = ((span.end + MARGIN - origin).max(0) / CHUNK + 1) as usize;
         let mut before = Vec::with_capacity(chunks + 1);
@@ -38,11 +38,12 @@ impl<'a> Field<'a> {
             passed += ticks_before(&ticks[passed..], origin + CHUNK * chunk);
             before.push(passed as u32);
         }
+        words.resize(words.len().max(chunks * WORDS), 0);
         Self {
             ticks,
             width: width as usize,
             origin,
-            words: vec![0; chunks * WORDS],
+            words,
             made: vec![false; chunks],
             before,
         }
@@ -87,8 +88,14 @@ impl<'a> Field<'a> {
     /// The words of the field and the bit at which `tick` lies in them, with all bits of the
     /// `length` ticks from there on.
     pub fn bits(&mut self, tick: i64, length: i64) -> (&[u64], usize) {
-        self.make(tick..tick + length);
+        // Blocks are read a word beyond their end.
+        self.make(tick..tick + length + 64);
         (&self.words, (tick - self.origin).max(0) as usize)
+    }
+
+    /// Gives its memory back.
+    pub fn into_words(self) -> Vec<u64> {
+        self.words
     }
 
     /// Number of ticks in `span`.

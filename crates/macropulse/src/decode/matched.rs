@@ -21,6 +21,7 @@ mod peel;
 mod track;
 mod verdict;
 
+use std::cell::Cell;
 use std::ops::Range;
 
 use super::field::Field;
@@ -38,16 +39,30 @@ use leftover::Evidence;
 pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
     let sent = Sent::new(receiver, sent, ticks.epoch);
     let peeled = peel::peel(&sent, &ticks.tick);
-    let mut band = Band::new(&sent, &ticks.tick, peeled);
-    if band.is_dark() {
-        return band.returns();
+    let mut band = Band::new(&sent, (&ticks.tick, peeled), MEMORY.take());
+    if !band.is_dark() {
+        band.track();
+        band.search(Evidence::Overwhelming);
+        band.search(Evidence::Bright);
+        band.search(Evidence::MoreThanChance);
+        band.contest();
     }
-    band.track();
-    band.search(Evidence::Overwhelming);
-    band.search(Evidence::Bright);
-    band.search(Evidence::MoreThanChance);
-    band.contest();
-    band.returns()
+    let returns = band.returns();
+    MEMORY.set(band.into_memory());
+    returns
+}
+
+thread_local! {
+    /// Kept from band to band: fresh memory costs more than what is done with it.
+    static MEMORY: Cell<Memory> = Cell::default();
+}
+
+/// Memory of a band.
+#[derive(Default)]
+struct Memory {
+    field: Vec<u64>,
+    unexplained: Vec<u64>,
+    search: Search,
 }
 
 /// The lag at which a shot was found.
@@ -167,8 +182,8 @@ struct Band<'a> {
     field: Field<'a>,
     /// Those that no shot has explained.
     unexplained: Unexplained,
-    /// Whether there are such.
-    dark: bool,
+    /// How many there were to begin with in the gate of each shot; empty if nowhere any.
+    left_in_gate: Vec<u32>,
     /// The shot at the same column one line earlier.
     above: Vec<Option<u32>>,
     locks: Vec<Option<Lock>>,
@@ -181,8 +196,8 @@ struct Band<'a> {
 }
 
 impl<'a> Band<'a> {
-    fn new(sent: &'a Sent<'a>, ticks: &'a [u32], peeled: peel::Peeled) -> Self {
-        let peel::Peeled { locks, left } = peeled;
+    fn new(sent: &'a Sent<'a>, ticks: (&'a [u32], peel::Peeled), memory: Memory) -> Self {
+        let (ticks, peel::Peeled { locks, left }) = ticks;
         // Nobody looks at a field that is explained altogether.
         let dark = left.is_empty();
         let span = if dark { 0..0 } else { sent.span() };
@@ -192,9 +207,9 @@ impl<'a> Band<'a> {
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
         Self {
             sent,
-            field: Field::new(ticks, sent.width, span.clone()),
-            unexplained: Unexplained::new(&left, span),
-            dark,
+            field: Field::new(ticks, sent.width, span.clone(), memory.field),
+            unexplained: Unexplained::new(&left, span, memory.unexplained),
+            left_in_gate: if dark { vec![] } else { in_gates(sent, &left) },
             above: if dark { vec![] } else { above(sent.log) },
             locks,
             thresholds: Thresholds::new(sent.lags(), receiver.false_alarm),
@@ -202,13 +217,18 @@ impl<'a> Band<'a> {
             marks_per_tick: (0..words)
                 .map(|word| crowding(codebook.word(word as u16), chips))
                 .collect(),
-            search: Search::default(),
+            search: memory.search,
         }
+    }
+
+    fn into_memory(self) -> Memory {
+        let (field, unexplained) = (self.field.into_words(), self.unexplained.into_words());
+        Memory { field, unexplained, search: self.search }
     }
 
     /// Whether nothing is left to be explained.
     fn is_dark(&self) -> bool {
-        self.dark
+        self.left_in_gate.is_empty()
     }
 
     /// Share of lit places around a shot found at `lock`, its own marks apart.
@@ -234,6 +254,11 @@ impl<'a> Band<'a> {
         self.thresholds.least(self.sent.weight(shot), density)
     }
 
+    /// Whether there may be light of `shot` that nobody has explained: two marks at least.
+    fn may_be_lit(&self, shot: usize) -> bool {
+        self.left_in_gate[shot] > 1 && self.sent.weight(shot) > 0
+    }
+
     /// Keeps `lock` and explains its ticks.
     fn lock(&mut self, shot: usize, lock: Lock) {
         let start = self.sent.fired[shot] + lock.lag;
@@ -257,6 +282,19 @@ fn crowding(word: &CodeWord, chips: u32) -> u32 {
         marks[first..].iter().take_while(|&&mark| mark < marks[first] + chips).count() as u32
     };
     (0..word.marks.len()).map(within).max().unwrap_or(1)
+}
+
+/// For each shot, how many of the sorted `ticks` lie where its light may be.
+fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {
+    let (mut first, mut last) = (0, 0);
+    let count = |shot| {
+        let gate = sent.gate_and_macropulse(shot);
+        let before = |end: i64| move |tick: &&u32| i64::from(**tick) < end;
+        first += ticks[first..].iter().take_while(before(gate.start)).count();
+        last += ticks[last..].iter().take_while(before(gate.end)).count();
+        (last - first) as u32
+    };
+    (0..sent.fired.len()).map(count).collect()
 }
 
 /// For each shot, the last one before it at the same column of another row.
@@ -341,7 +379,7 @@ mod tests {
                 let receiver = Receiver { false_alarm: 1e4, ..receiver(jitter) };
                 let sent = Sent::new(&receiver, (&codebook, &log), 0);
                 let nothing = peel::Peeled { locks: vec![None], left: tick.clone() };
-                let mut band = Band::new(&sent, &tick, nothing);
+                let mut band = Band::new(&sent, (&tick, nothing), Memory::default());
                 let (lag, count) = exhaustive(&sent, &tick, 0);
                 if let Some(lock) = band.searched(0, 1) {
                     found += 1;

@@ -154,7 +154,7 @@ mod tests {
         for lit in [0, 3, 30, 300] {
             for width in [1, 2, 4] {
                 let lit: Vec<u32> = (0..lit).map(|_| chance.next_u32() % 1050).collect();
-                let unexplained = Unexplained::new(&lit, -50..1100);
+                let unexplained = Unexplained::new(&lit, -50..1100, vec![]);
                 let expected = exhaustive(&unexplained, -7, i64::from(width));
                 for least in 1..=15 {
                     let found = search.best(&unexplained, (-7, width), &sought(least));
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_shot_without_light_is_not_found() {
-        let unexplained = Unexplained::new(&[], 0..1000);
+        let unexplained = Unexplained::new(&[], 0..1000, vec![]);
         let dark = Sought { word: vec![0], bits: vec![], lags: 900, least: 1 };
         assert_eq!(Search::default().best(&unexplained, (0, 1), &dark), None);
         assert_eq!(Search::default().best(&unexplained, (0, 1), &sought(1)), None);

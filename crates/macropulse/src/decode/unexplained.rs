@@ -3,57 +3,69 @@
 use std::ops::Range;
 
 /// Ticks that are counted together where a rough place is enough.
-const CHUNK: i64 = 1024;
+const CHUNK: i64 = 1 << CHUNK_BITS;
+const CHUNK_BITS: u32 = 10;
+
+/// Machine words of a chunk.
+const WORDS: usize = CHUNK as usize / 64;
 
 /// The unexplained ticks, one bit each, and how many there are in each [`CHUNK`].
 #[derive(Debug)]
 pub(super) struct Unexplained {
     /// Tick of the first bit.
     origin: i64,
+    /// Only to be looked at in chunks that have had ticks.
     words: Vec<u64>,
     per_chunk: Vec<u32>,
 }
 
 impl Unexplained {
-    /// Those of `ticks` that lie in `span`.
-    pub fn new(ticks: &[u32], span: Range<i64>) -> Self {
+    /// Those of `ticks` that lie in `span`, in the memory `words`, whatever is in it.
+    pub fn new(ticks: &[u32], span: Range<i64>, mut words: Vec<u64>) -> Self {
         let chunks = ((span.end - span.start).max(0) / CHUNK + 1) as usize;
-        let mut unexplained = Self {
-            origin: span.start,
-            words: vec![0; chunks * (CHUNK / 64) as usize],
-            per_chunk: vec![0; chunks],
-        };
+        words.resize(words.len().max(chunks * WORDS), 0);
+        let (origin, mut per_chunk) = (span.start, vec![0; chunks]);
         for &tick in ticks {
-            if let Some((word, bit)) = unexplained.place(i64::from(tick)) {
-                unexplained.words[word] |= 1 << bit;
-                unexplained.per_chunk[word / (CHUNK / 64) as usize] += 1;
+            let bit = (i64::from(tick) - origin) as u64;
+            let chunk = (bit >> CHUNK_BITS) as usize;
+            let Some(lit) = per_chunk.get_mut(chunk) else { continue };
+            if *lit == 0 {
+                words[chunk * WORDS..][..WORDS].fill(0);
             }
+            *lit += 1;
+            words[(bit >> 6) as usize] |= 1 << (bit & 63);
         }
-        unexplained
+        Self { origin, words, per_chunk }
     }
 
-    fn place(&self, tick: i64) -> Option<(usize, u32)> {
+    /// Gives its memory back.
+    pub fn into_words(self) -> Vec<u64> {
+        self.words
+    }
+
+    /// The chunk, word and bit of `tick`; `None` in a chunk without any.
+    fn place(&self, tick: i64) -> Option<(usize, usize, u32)> {
         let bit = (tick - self.origin) as u64;
-        let word = (bit >> 6) as usize;
-        (word < self.words.len()).then_some((word, (bit & 63) as u32))
+        let chunk = (bit >> CHUNK_BITS) as usize;
+        (*self.per_chunk.get(chunk)? > 0).then_some((chunk, (bit >> 6) as usize, (bit & 63) as u32))
     }
 
     /// Explains the ticks at each of `places`, and the `width` − 1 behind it.
     pub fn explain(&mut self, places: impl Iterator<Item = i64>, width: u32) {
         for place in places {
             for tick in place..place + i64::from(width) {
-                let Some((word, bit)) = self.place(tick) else { continue };
+                let Some((chunk, word, bit)) = self.place(tick) else { continue };
                 let was_lit = self.words[word] >> bit & 1;
                 self.words[word] &= !(1 << bit);
-                self.per_chunk[word / (CHUNK / 64) as usize] -= was_lit as u32;
+                self.per_chunk[chunk] -= was_lit as u32;
             }
         }
     }
 
     /// Whether one of the ticks in `span` is unexplained.
-    pub fn any(&self, span: Range<i64>) -> bool {
-        span.into_iter().any(|tick| {
-            self.place(tick).is_some_and(|(word, bit)| self.words[word] >> bit & 1 == 1)
+    pub fn any(&self, mut span: Range<i64>) -> bool {
+        span.any(|tick| {
+            self.place(tick).is_some_and(|(_, word, bit)| self.words[word] >> bit & 1 == 1)
         })
     }
 
@@ -65,7 +77,7 @@ impl Unexplained {
             if first >= span.end {
                 break;
             }
-            let words = &self.words[chunk * (CHUNK / 64) as usize..][..(CHUNK / 64) as usize];
+            let words = &self.words[chunk * WORDS..][..WORDS];
             for (index, &word) in words.iter().enumerate().filter(|_| self.per_chunk[chunk] > 0) {
                 let mut lit = word;
                 while lit != 0 {
@@ -118,7 +130,7 @@ mod tests {
     #[test]
     fn explained_ticks_are_no_longer_counted() {
         let lit: Vec<u32> = (0..10_000).step_by(10).collect();
-        let mut unexplained = Unexplained::new(&lit, 0..10_240);
+        let mut unexplained = Unexplained::new(&lit, 0..10_240, vec![u64::MAX; 500]);
         assert_eq!(unexplained.at_most(0..10_240), 1000);
         unexplained.explain(0..5120, 1);
         unexplained.explain((0..5120).step_by(3), 3);

@@ -19,7 +19,7 @@ impl Band<'_> {
     /// Searches the unexplained light for the shots that have no lag yet.
     pub(super) fn search(&mut self, evidence: Evidence) {
         for shot in 0..self.locks.len() {
-            if self.locks[shot].is_some() {
+            if self.locks[shot].is_some() || !self.may_be_lit(shot) {
                 continue;
             }
             let least = match evidence {

@@ -6,6 +6,8 @@
 //!    so that hardly more than one says yes.
 //! 3. All marks of that shot are looked for. If none is missing no lag can have more, and none
 //!    earlier is left: this is the maximum. Its ticks are explained.
+//! 4. Marks of one macropulse may be those of another one, too: the first tick that is not
+//!    explained may be the second mark.
 //!
 //! A tick of which no macropulse without a gap can begin is left for the receivers that follow.
 //! Where marks are missed everywhere nothing can be peeled: this is soon noticed.
@@ -16,6 +18,9 @@ use crate::kernels::begin_with;
 /// Ticks without a macropulse that are put up with before peeling ends, and how many more for
 /// each macropulse that was found.
 const PATIENCE: (usize, usize) = (256, 4);
+
+/// First marks that may be hidden under another macropulse.
+const MOST_HIDDEN: usize = 2;
 
 /// What was found without a gap, and what is left.
 #[derive(Debug)]
@@ -39,6 +44,7 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
         locks: vec![None; sent.fired.len()],
         oldest: 0,
         next: 0,
+        places: Vec::new(),
     };
     // Marks that jitter are not where they should be.
     let (mut place, mut patience) = (0, if sent.width > 1 { 0 } else { PATIENCE.0 });
@@ -76,6 +82,8 @@ struct Peeler<'a> {
     oldest: usize,
     /// The shot after the last one found.
     next: usize,
+    /// Where the marks of a shot were found.
+    places: Vec<usize>,
 }
 
 impl Peeler<'_> {
@@ -91,31 +99,27 @@ impl Peeler<'_> {
             self.oldest += 1;
         }
         let in_flight = self.oldest..fired.len();
-        for shot in in_flight.take_while(|&shot| fired[shot] + nearest <= tick) {
-            if self.fits(shot, place) {
-                return Some(());
+        let in_flight = in_flight.take_while(|&shot| fired[shot] + nearest <= tick);
+        // Its first marks may lie under those of a macropulse that was peeled off before.
+        for hidden in 0..=MOST_HIDDEN {
+            for shot in in_flight.clone() {
+                if self.fits(shot, place, hidden) {
+                    return Some(());
+                }
             }
         }
         None
     }
 
-    /// The lag of `shot` if its first mark is the tick at `place`.
-    fn lag(&self, shot: usize, place: usize) -> Option<i64> {
-        let bit = self.sent.lit_bits(shot).first()?;
-        let first = i64::from(self.scale * bit) + self.sent.word(shot).first()?;
-        let lag = i64::from(self.ticks[place]) - first - self.sent.fired[shot];
-        (self.gate.0..=self.gate.1).contains(&lag).then_some(lag)
-    }
-
     /// Whether the ticks from `place` on are all the marks of `shot`, with nothing between them.
     fn fits_in_a_row(&mut self, shot: usize, place: usize) -> bool {
-        let Some(lag) = self.lag(shot, place) else { return false };
         let (word, bits) = (self.sent.word(shot), self.sent.lit_bits(shot));
+        let (Some(bit), Some(mark)) = (bits.first(), word.first()) else { return false };
+        let first = i64::from(self.scale * bit) + mark;
+        let start = i64::from(self.ticks[place]) - first;
         let count = bits.len() * word.marks();
-        let start = (self.sent.fired[shot] + lag) as u32;
-        if count < self.least
-            || !begin_with(&self.ticks[place..], word, bits, (start, self.scale))
-        {
+        let Some(lag) = self.lag(shot, start, count) else { return false };
+        if !begin_with(&self.ticks[place..], word, bits, (start as u32, self.scale)) {
             return false;
         }
         self.explained.run(place, count);
@@ -123,38 +127,43 @@ impl Peeler<'_> {
         true
     }
 
-    /// Whether all marks of `shot` are among the ticks from `place` on.
-    fn fits(&mut self, shot: usize, place: usize) -> bool {
-        let Some(lag) = self.lag(shot, place) else { return false };
+    /// The lag of `shot` if its macropulse begins at `start` and could be told from chance.
+    fn lag(&self, shot: usize, start: i64, marks: usize) -> Option<i64> {
+        let lag = start - self.sent.fired[shot];
+        let possible = marks >= self.least && (self.gate.0..=self.gate.1).contains(&lag);
+        possible.then_some(lag)
+    }
+
+    /// Whether all marks of `shot` are there if the tick at `place` is the first one of them that
+    /// is not `hidden`.
+    fn fits(&mut self, shot: usize, place: usize, hidden: usize) -> bool {
         let marks = self.sent.marks(shot);
-        if marks.len() < self.least {
-            return false;
-        }
-        let (start, scale) = ((self.sent.fired[shot] + lag) as u32, self.scale);
-        let at = |mark: u16| start + scale * u32::from(mark);
+        let Some(&[shown, second]) = marks.get(hidden..hidden + 2) else { return false };
+        let scale = i64::from(self.scale);
+        let start = i64::from(self.ticks[place]) - scale * i64::from(shown);
+        let Some(lag) = self.lag(shot, start, marks.len()) else { return false };
         // Nearly every shot is refused here.
-        let second = at(marks[1]);
-        let follower = self.ticks[place + 1..].iter().find(|&&tick| tick >= second);
-        if follower != Some(&second) {
+        let next = start + scale * i64::from(second);
+        let follower = self.ticks[place + 1..].iter().find(|&&tick| i64::from(tick) >= next);
+        if follower.map(|&tick| i64::from(tick)) != Some(next) {
             return false;
         }
-        if self.fits_in_a_row(shot, place) {
-            return true;
-        }
-        let mut places = place;
+        let first = start + scale * i64::from(marks[0]);
+        let before = self.ticks[..place].iter().rev();
+        let from = place - before.take_while(|&&tick| i64::from(tick) >= first).count();
+        self.places.clear();
+        let mut next = from;
         for &mark in marks {
-            let tick = at(mark);
-            places += self.ticks[places..].iter().take_while(|&&other| other < tick).count();
-            if self.ticks.get(places) != Some(&tick) {
+            let tick = start as u32 + self.scale * u32::from(mark);
+            while self.ticks.get(next).is_some_and(|&other| other < tick) {
+                next += 1;
+            }
+            if self.ticks.get(next) != Some(&tick) {
                 return false;
             }
+            self.places.push(next);
         }
-        let mut places = place;
-        for &mark in marks {
-            let tick = at(mark);
-            places += self.ticks[places..].iter().take_while(|&&other| other < tick).count();
-            self.explained.run(places, 1);
-        }
+        self.explained.each(&self.places);
         self.lock(shot, lag, marks.len());
         true
     }
@@ -192,6 +201,13 @@ impl Explained {
         self.words[from] |= head;
         self.words[from + 1..to].fill(u64::MAX);
         self.words[to] |= tail;
+    }
+
+    /// Explains the ticks at `places`.
+    fn each(&mut self, places: &[usize]) {
+        for place in places {
+            self.words[place / 64] |= 1 << (place % 64);
+        }
     }
 
     /// The first place from `place` on whose tick is not explained; the number of ticks if all

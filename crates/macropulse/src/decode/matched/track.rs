@@ -8,6 +8,7 @@ impl Band<'_> {
     pub(super) fn track(&mut self) {
         for shot in 0..self.locks.len() {
             if self.locks[shot].is_none()
+                && self.may_be_lit(shot)
                 && let Some(lock) = self.predicted(shot)
             {
                 self.lock(shot, lock);

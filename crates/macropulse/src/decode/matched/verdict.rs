@@ -7,7 +7,7 @@ use crate::units;
 
 impl Band<'_> {
     /// What was found of the home shots.
-    pub(super) fn returns(mut self) -> Returns {
+    pub(super) fn returns(&mut self) -> Returns {
         let home = self.sent.log.home.clone();
         let mut returns = Returns::with_capacity(home.len());
         // Where all marks are found nothing is to be learnt from the light around; and in clear
@@ -51,7 +51,7 @@ impl Band<'_> {
         if all_found && self.is_dark() {
             return true;
         }
-        let lit = self.sent.bits(shot, true).count() as u32;
+        let lit = self.sent.lit_bits(shot).len() as u32;
         let mean = f64::from(lock.count) / f64::from(lit);
         (all_found || self.lit_bits_are_lit(shot, lock, mean))
             && self.dark_bits_are_dark(shot, lock, mean)
@@ -76,6 +76,10 @@ impl Band<'_> {
         let needed = (mean / 2.0).ceil() as u32;
         let per_tick = self.marks_per_tick.get(usize::from(self.sent.log.word[shot]));
         let per_tick = per_tick.copied().unwrap_or(1);
+        let whole = start..start + self.sent.length() + width;
+        if self.unexplained.at_most(whole) * per_tick < needed {
+            return true;
+        }
         let mut dark = self.sent.bits(shot, false);
         dark.all(|bit| {
             let span = start + bit..start + bit + length + width;
