@@ -41,16 +41,25 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
     let peeled = peel::peel(&sent, &ticks.tick);
     let mut band = Band::new(&sent, (&ticks.tick, peeled), MEMORY.take());
     if !band.is_dark() {
-        band.track();
-        band.search(Evidence::Overwhelming);
-        band.search(Evidence::Bright);
-        band.search(Evidence::MoreThanChance);
+        // What can be tracked from somewhere need not be searched, and is out of the way then.
+        band.search(Evidence::Overwhelming, SOUNDINGS);
+        band.track_back(Evidence::Overwhelming);
+        band.search(Evidence::Overwhelming, 1);
+        band.search(Evidence::Bright, 1);
+        // Faint light is one among many ticks everywhere: soundings must do.
+        band.search(Evidence::MoreThanChance, SOUNDINGS);
+        band.track_back(Evidence::MoreThanChance);
         band.contest();
     }
     let returns = band.returns();
     MEMORY.set(band.into_memory());
     returns
 }
+
+/// Where soundings are taken, one shot in this many in a row is searched for; the rows are
+/// staggered by this many shots.
+const SOUNDINGS: u32 = 16;
+const STAGGER: u32 = 5;
 
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
@@ -63,6 +72,7 @@ struct Memory {
     field: Vec<u64>,
     unexplained: Vec<u64>,
     search: Search,
+    thresholds: Option<(Thresholds, Thresholds)>,
 }
 
 /// The lag at which a shot was found.
@@ -204,7 +214,14 @@ impl<'a> Band<'a> {
         let (receiver, codebook) = (sent.receiver, sent.codebook);
         let chips = sent.width.div_ceil(receiver.ticks_per_chip.max(1));
         let words = if dark { 0 } else { codebook.words() };
-        let bits = codebook.payload().map_or(1, |payload| payload.bits());
+        let (lags, false_alarm) = (sent.lags(), receiver.false_alarm);
+        let bits = f64::from(codebook.payload().map_or(1, |payload| payload.bits()));
+        let remembered = memory.thresholds.filter(|(of_gate, of_bits)| {
+            of_gate.are_for(lags, false_alarm) && of_bits.are_for(bits, false_alarm)
+        });
+        let (thresholds, bit_thresholds) = remembered.unwrap_or_else(|| {
+            (Thresholds::new(lags, false_alarm), Thresholds::new(bits, false_alarm))
+        });
         Self {
             sent,
             field: Field::new(ticks, sent.width, span.clone(), memory.field),
@@ -212,8 +229,8 @@ impl<'a> Band<'a> {
             left_in_gate: if dark { vec![] } else { in_gates(sent, &left) },
             above: if dark { vec![] } else { above(sent.log) },
             locks,
-            thresholds: Thresholds::new(sent.lags(), receiver.false_alarm),
-            bit_thresholds: Thresholds::new(f64::from(bits), receiver.false_alarm),
+            thresholds,
+            bit_thresholds,
             marks_per_tick: (0..words)
                 .map(|word| crowding(codebook.word(word as u16), chips))
                 .collect(),
@@ -223,7 +240,8 @@ impl<'a> Band<'a> {
 
     fn into_memory(self) -> Memory {
         let (field, unexplained) = (self.field.into_words(), self.unexplained.into_words());
-        Memory { field, unexplained, search: self.search }
+        let thresholds = Some((self.thresholds, self.bit_thresholds));
+        Memory { field, unexplained, search: self.search, thresholds }
     }
 
     /// Whether nothing is left to be explained.
@@ -262,8 +280,10 @@ impl<'a> Band<'a> {
     /// Keeps `lock` and explains its ticks.
     fn lock(&mut self, shot: usize, lock: Lock) {
         let start = self.sent.fired[shot] + lock.lag;
-        let places = self.sent.places(shot).map(|mark| start + mark);
-        self.unexplained.explain(places, self.sent.width);
+        // One edge in twenty jitters farther than marks are looked for.
+        let farther = i64::from(self.sent.width / 2);
+        let places = self.sent.places(shot).map(|mark| start + mark - farther);
+        self.unexplained.explain(places, self.sent.width + 2 * farther as u32);
         self.locks[shot] = Some(lock);
     }
 }

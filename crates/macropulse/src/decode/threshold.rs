@@ -1,8 +1,6 @@
 //! How many marks must be found together before a return is believed.
 
-use std::collections::HashMap;
-
-use libm::{exp, exp2, lgamma, log, log1p, log2};
+use libm::{exp, lgamma, log, log1p};
 
 /// P(X ≥ k) of X ~ Bin(n, p): the chance that `least` or more of `marks` places are lit where
 /// each is lit with probability `density`.
@@ -47,30 +45,47 @@ pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64)
 }
 
 /// [`least_marks`] for fixed lags and false alarms, remembered.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Thresholds {
     lags: f64,
     false_alarm: f64,
-    known: HashMap<(u16, i32), u16>,
+    /// By marks, then by step of density; 0 where not yet known.
+    known: Vec<[u16; STEPS]>,
 }
+
+/// Steps of density, eight to an octave: the exponent and the first three bits of the fraction of
+/// a double. The first one is taken for everything below.
+const STEPS: usize = 8 * 24;
+const STEP_BITS: u32 = 49;
+const FIRST_STEP: u64 = (0x3FF_u64 << 3) - (STEPS as u64 - 1);
 
 impl Thresholds {
     /// For `lags` tried places and `false_alarm` false answers accepted among them.
     pub fn new(lags: f64, false_alarm: f64) -> Self {
-        Self { lags, false_alarm, known: HashMap::new() }
+        Self { lags, false_alarm, known: Vec::new() }
     }
 
-    /// The fewest of `marks` to believe at `density`, which is rounded up by less than a tenth.
+    /// Whether these are the thresholds that [`Thresholds::new`] would give.
+    pub fn are_for(&self, lags: f64, false_alarm: f64) -> bool {
+        (self.lags, self.false_alarm) == (lags, false_alarm)
+    }
+
+    /// The fewest of `marks` to believe at `density`, which is rounded up by less than an eighth.
     pub fn least(&mut self, marks: u16, density: f64) -> u16 {
-        const PER_OCTAVE: f64 = 8.0;
         if density <= 0.0 {
             return 1;
         }
-        let step = (log2(density) * PER_OCTAVE).ceil() as i32;
-        *self.known.entry((marks, step)).or_insert_with(|| {
-            let density = exp2(f64::from(step) / PER_OCTAVE).min(1.0);
-            least_marks(self.lags, marks, density, self.false_alarm)
-        })
+        let above = (density.min(1.0).to_bits() + (1 << STEP_BITS) - 1) >> STEP_BITS;
+        let step = above.saturating_sub(FIRST_STEP).min(STEPS as u64 - 1);
+        if self.known.len() <= usize::from(marks) {
+            self.known.resize(usize::from(marks) + 1, [0; STEPS]);
+        }
+        let known = &mut self.known[usize::from(marks)][step as usize];
+        if *known == 0 {
+            let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
+            *known = least_marks(self.lags, marks, density, self.false_alarm);
+        }
+        *known
     }
 }
 
@@ -121,7 +136,7 @@ mod tests {
         for density in [1e-4, 0.003, 0.011, 0.2, 0.7] {
             let exact = least_marks(4e5, 174, density, 1e-3);
             let remembered = thresholds.least(174, density);
-            assert!((exact..=exact + exact / 8 + 1).contains(&remembered));
+            assert!((exact..=exact + exact / 8 + 1).contains(&remembered), "{density}");
         }
     }
 }

@@ -15,9 +15,6 @@ pub(crate) type Lanes = [u64; LANES];
 /// Planes of a count; a macropulse has at most 65535 marks.
 pub(crate) const PLANES: usize = 16;
 
-/// Marks that are added in one go.
-const EIGHT: usize = 8;
-
 on_every_level! {
     /// Counts into `planes`, plane p of weight 2^p, for each lag of a block how many of the marks
     /// are lit: bit `first + lag + scale · mark` of `words`, the lowest bit first. Bits beyond
@@ -30,66 +27,65 @@ on_every_level! {
     ) {
         let (marks, scale) = marks;
         let used = ((usize::BITS - marks.len().leading_zeros()) as usize).min(PLANES);
-        let mut low = [[0; LANES]; 3];
-        let mut eights = marks.chunks_exact(EIGHT);
+        let (mut ones, mut twos, mut fours) = ([0; LANES], [0; LANES], [0; LANES]);
+        let mut eights = marks.chunks_exact(8);
         for eight in &mut eights {
-            let mut bits = [[0; LANES]; EIGHT];
-            for (bits, mark) in bits.iter_mut().zip(eight) {
-                *bits = read(words, first + scale * usize::from(*mark));
-            }
-            let mut carried = add_eight(&mut low, &bits);
+            // Seven adders take eight bits in and carry one out, so that most of the work stays
+            // in the three lowest planes.
+            let bits = |index: usize| read(words, first + scale * usize::from(eight[index]));
+            let (sum, a) = add(ones, bits(0), bits(1));
+            let (sum, mut b) = add(sum, bits(2), bits(3));
+            let (sum_of_twos, c) = add(twos, a, b);
+            let (sum, a) = add(sum, bits(4), bits(5));
+            (ones, b) = add(sum, bits(6), bits(7));
+            let d;
+            (twos, d) = add(sum_of_twos, a, b);
+            let mut carried;
+            (fours, carried) = add(fours, c, d);
             for plane in &mut planes[3..used.max(3)] {
-                carried = half_add(plane, &carried);
+                (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
             }
         }
-        planes[..3].copy_from_slice(&low);
+        planes[..3].copy_from_slice(&[ones, twos, fours]);
         for mark in eights.remainder() {
             let mut carried = read(words, first + scale * usize::from(*mark));
             for plane in &mut planes[..used] {
-                carried = half_add(plane, &carried);
+                (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
             }
         }
     }
 }
 
-/// Adds eight bits to the planes of weight one, two and four; what is carried to the plane of
-/// weight eight. Seven adders take eight bits in and give one bit out, so that most of the work
-/// stays in the three lowest planes.
+// Whole lanes in, whole lanes out: compilers keep these in one register.
+
 #[inline(always)]
-fn add_eight(low: &mut [Lanes; 3], bits: &[Lanes; EIGHT]) -> Lanes {
-    // Plain loops over the lanes, one thing at a time: compilers turn these into vectors.
-    let [ones, twos, fours] = low;
-    let mut eights = [0; LANES];
+fn map(a: Lanes, b: Lanes, of: impl Fn(u64, u64) -> u64) -> Lanes {
+    let mut lanes = [0; LANES];
     for lane in 0..LANES {
-        let a = add(&mut ones[lane], bits[0][lane], bits[1][lane]);
-        let b = add(&mut ones[lane], bits[2][lane], bits[3][lane]);
-        let c = add(&mut twos[lane], a, b);
-        let a = add(&mut ones[lane], bits[4][lane], bits[5][lane]);
-        let b = add(&mut ones[lane], bits[6][lane], bits[7][lane]);
-        let d = add(&mut twos[lane], a, b);
-        eights[lane] = add(&mut fours[lane], c, d);
+        lanes[lane] = of(a[lane], b[lane]);
     }
-    eights
+    lanes
 }
 
-/// Adds two bits to `sum`, in each of 64 lags; what is carried to the next plane.
 #[inline(always)]
-fn add(sum: &mut u64, a: u64, b: u64) -> u64 {
-    let half = *sum ^ a;
-    let carried = (*sum & a) | (half & b);
-    *sum = half ^ b;
-    carried
+fn xor(a: Lanes, b: Lanes) -> Lanes {
+    map(a, b, |a, b| a ^ b)
 }
 
-/// Adds one bit to `plane`; what is carried to the next one.
 #[inline(always)]
-fn half_add(plane: &mut Lanes, bits: &Lanes) -> Lanes {
-    let mut carried = [0; LANES];
-    for lane in 0..LANES {
-        carried[lane] = plane[lane] & bits[lane];
-        plane[lane] ^= bits[lane];
-    }
-    carried
+fn and(a: Lanes, b: Lanes) -> Lanes {
+    map(a, b, |a, b| a & b)
+}
+
+#[inline(always)]
+fn or(a: Lanes, b: Lanes) -> Lanes {
+    map(a, b, |a, b| a | b)
+}
+
+/// The sum of three bits, in each lag, and what is carried to the next plane.
+#[inline(always)]
+fn add(a: Lanes, b: Lanes, c: Lanes) -> (Lanes, Lanes) {
+    (xor(xor(a, b), c), or(and(a, b), and(c, or(a, b))))
 }
 
 /// The block of bits that begins with bit `first`.
@@ -97,7 +93,7 @@ fn half_add(plane: &mut Lanes, bits: &Lanes) -> Lanes {
 fn read(words: &[u64], first: usize) -> Lanes {
     let (word, shift) = (first / 64, first % 64);
     let mut lanes = [0; LANES];
-    match words.get(word..word + LANES + 1).and_then(<[u64]>::first_chunk::<{ LANES + 1 }>) {
+    match words.get(word..word + LANES + 1) {
         Some(words) => {
             for lane in 0..LANES {
                 // Two shifts, because a shift by 64 does not give 0.

@@ -1,6 +1,6 @@
 //! The light nobody has explained yet: who else could have sent it?
 
-use super::{Band, Lock};
+use super::{Band, Lock, STAGGER};
 use crate::decode::search::Sought;
 
 /// How much must speak for a lag.
@@ -16,30 +16,44 @@ pub(super) enum Evidence {
 }
 
 impl Band<'_> {
-    /// Searches the unexplained light for the shots that have no lag yet.
-    pub(super) fn search(&mut self, evidence: Evidence) {
+    /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
+    /// them in all the unexplained light of the gate.
+    pub(super) fn search(&mut self, evidence: Evidence, every: u32) {
         for shot in 0..self.locks.len() {
             if self.locks[shot].is_some() || !self.may_be_lit(shot) {
                 continue;
             }
-            let least = match evidence {
-                Evidence::Overwhelming | Evidence::Bright => self.sent.weight(shot).div_ceil(2),
-                Evidence::MoreThanChance => 1,
-            };
-            let lock = match self.predicted(shot) {
+            let lock = match self.predicted(shot, evidence) {
                 Some(lock) => Some(lock),
-                None => self.searched(shot, least),
+                None if self.is_among(shot, every) => self.believed(shot, evidence),
+                None => None,
             };
-            let Some(lock) = lock.filter(|lock| lock.count >= least) else { continue };
-            let by_chance = self.by_chance(shot, lock);
-            let needed = match evidence {
-                Evidence::Overwhelming => by_chance.max(self.sent.weight(shot).min(2 * by_chance)),
-                Evidence::Bright | Evidence::MoreThanChance => by_chance,
-            };
-            if lock.count >= needed {
+            if let Some(lock) = lock {
                 self.lock(shot, lock);
             }
         }
+    }
+
+    fn is_among(&self, shot: usize, every: u32) -> bool {
+        let log = self.sent.log;
+        let (row, column) = (u32::from(log.row[shot]), u32::from(log.column[shot]));
+        (column + STAGGER * row).is_multiple_of(every)
+    }
+
+    /// What a search for `shot` finds, if the `evidence` is there.
+    fn believed(&mut self, shot: usize, evidence: Evidence) -> Option<Lock> {
+        let weight = self.sent.weight(shot);
+        let least = match evidence {
+            Evidence::Overwhelming | Evidence::Bright => weight.div_ceil(2),
+            Evidence::MoreThanChance => 1,
+        };
+        let lock = self.searched(shot, least).filter(|lock| lock.count >= least)?;
+        let by_chance = self.by_chance(shot, lock);
+        let needed = match evidence {
+            Evidence::Overwhelming => by_chance.max(weight.min(2 * by_chance)),
+            Evidence::Bright | Evidence::MoreThanChance => by_chance,
+        };
+        (lock.count >= needed).then_some(lock)
     }
 
     /// Gives a predicted shot the lag that unexplained light speaks for, where it fits better.

@@ -1,15 +1,16 @@
 //! Shots whose neighbours have been found are looked for where their neighbours are.
 
+use super::leftover::Evidence;
 use super::{Band, Lock};
 use crate::decode::correlator::{BLOCK, Counts};
 
 impl Band<'_> {
-    /// Finds the shots that lie where their neighbours say and can be no other.
-    pub(super) fn track(&mut self) {
-        for shot in 0..self.locks.len() {
+    /// Goes from each shot that was found back to those before it.
+    pub(super) fn track_back(&mut self, evidence: Evidence) {
+        for shot in (0..self.locks.len()).rev() {
             if self.locks[shot].is_none()
                 && self.may_be_lit(shot)
-                && let Some(lock) = self.predicted(shot)
+                && let Some(lock) = self.predicted(shot, evidence)
             {
                 self.lock(shot, lock);
             }
@@ -31,8 +32,8 @@ impl Band<'_> {
         [plane(), across(), down(), left, above, at(Some(shot + 1))]
     }
 
-    /// The lag of `shot` if it lies where its neighbours say and can be no other.
-    pub(super) fn predicted(&mut self, shot: usize) -> Option<Lock> {
+    /// The lag of `shot` if it lies where its neighbours say and the `evidence` is there.
+    pub(super) fn predicted(&mut self, shot: usize, evidence: Evidence) -> Option<Lock> {
         let weight = self.sent.weight(shot);
         if weight == 0 {
             return None;
@@ -42,7 +43,11 @@ impl Band<'_> {
             return None;
         }
         let density = self.density_in_gate(shot);
-        let least = weight.div_ceil(2).min(2 * self.thresholds.least(weight, density));
+        let by_chance = self.thresholds.least(weight, density);
+        let least = match evidence {
+            Evidence::MoreThanChance => by_chance,
+            Evidence::Overwhelming | Evidence::Bright => weight.div_ceil(2).min(2 * by_chance),
+        };
         for (index, lag) in expected.iter().enumerate() {
             let Some(lag) = *lag else { continue };
             let mut tried = expected[..index].iter().flatten();
@@ -51,7 +56,7 @@ impl Band<'_> {
             }
             // The flank of a peak just outside would show half as many marks as the peak.
             let lock = self.best_near(shot, lag, least.div_ceil(2));
-            if lock.is_some_and(|lock| self.is_certain(shot, lock)) {
+            if lock.is_some_and(|lock| self.is_certain(shot, lock, evidence)) {
                 return lock;
             }
         }
@@ -106,18 +111,22 @@ impl Band<'_> {
         Some(Lock { lag: first + peak.at, count: peak.count, margin, searched: false })
     }
 
-    /// Whether `lock` can be no sidelobe and no other shot: half of the marks were found, or twice
-    /// what chance can give, and no lit bit is much darker than the others.
-    pub(super) fn is_certain(&mut self, shot: usize, lock: Lock) -> bool {
+    /// Whether chance does not reach `lock`; and, unless faint light is looked for, whether it can
+    /// be no sidelobe and no other shot: half of the marks were found, or twice what chance can
+    /// give, and no lit bit is much darker than the others.
+    fn is_certain(&mut self, shot: usize, lock: Lock, evidence: Evidence) -> bool {
         let weight = self.sent.weight(shot);
         if lock.count == weight {
             return true;
         }
         let by_chance = self.by_chance(shot, lock);
+        if evidence == Evidence::MoreThanChance {
+            return lock.count >= by_chance;
+        }
         if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;
         }
-        let lit = self.sent.bits(shot, true).count() as u32;
+        let lit = self.sent.lit_bits(shot).len() as u32;
         let mut lit_bits = self.sent.bits(shot, true);
         lit_bits.all(|bit| {
             let found = self.found_in_bit(shot, lock.lag + bit);
