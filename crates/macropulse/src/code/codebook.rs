@@ -234,7 +234,8 @@ mod tests {
                     });
                 assert!(chips.eq(book.marks(label, word).iter().copied()), "{label}, {word}");
                 let lit = book.lit_bits(label).iter().map(|&first| first as u16);
-                let spelt = lit.flat_map(|first| book.word(word).marks.iter().map(move |m| first + m));
+                let spelt =
+                    lit.flat_map(|first| book.word(word).marks.iter().map(move |m| first + m));
                 assert!(spelt.eq(book.marks(label, word).iter().copied()), "{label}, {word}");
             }
         }
@@ -254,7 +255,8 @@ mod tests {
         let book = of_order(7, 848).unwrap();
         for (label, word) in [(0, 3), (1, 0), (1, 2), (511, 6), (847, 4)] {
             let marks = book.marks(label, word);
-            let met = |lag: u16| marks.iter().filter(|&&mark| marks.contains(&(mark + lag))).count();
+            let met =
+                |lag: u16| marks.iter().filter(|&&mark| marks.contains(&(mark + lag))).count();
             let highest = (1..49).map(met).max().unwrap();
             assert_eq!(usize::from(book.sidelobe(label, word)), highest, "{label}, {word}");
         }

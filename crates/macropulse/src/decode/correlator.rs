@@ -95,13 +95,17 @@ mod tests {
     fn the_peak_is_the_highest_of_all_counts() {
         let mut chance = ChaCha8Rng::seed_from_u64(1);
         for marks in [0, 1, 7, 8, 9, 63, 64, 180, 319] {
-            let lit: Vec<usize> = (0..3000).map(|_| (chance.next_u32() % 12_000) as usize).collect();
+            let lit: Vec<usize> =
+                (0..3000).map(|_| (chance.next_u32() % 12_000) as usize).collect();
             let words = words(lit.iter().copied());
             let marks: Vec<u16> = (0..marks).map(|_| (chance.next_u32() % 10_000) as u16).collect();
             for first in [0, 41, 1000, 11_900, 20_000] {
                 let counts: Vec<usize> = (first..first + BLOCK as usize)
                     .map(|at| {
-                        marks.iter().filter(|&&mark| lit.contains(&(at + usize::from(mark)))).count()
+                        marks
+                            .iter()
+                            .filter(|&&mark| lit.contains(&(at + usize::from(mark))))
+                            .count()
                     })
                     .collect();
                 let highest = counts.iter().copied().max().unwrap();

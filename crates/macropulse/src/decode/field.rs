@@ -39,14 +39,7 @@ impl<'a> Field<'a> {
             before.push(passed as u32);
         }
         words.resize(words.len().max(chunks * WORDS), 0);
-        Self {
-            ticks,
-            width: width as usize,
-            origin,
-            words,
-            made: vec![false; chunks],
-            before,
-        }
+        Self { ticks, width: width as usize, origin, words, made: vec![false; chunks], before }
     }
 
     /// Makes sure that all bits of `span` are there.

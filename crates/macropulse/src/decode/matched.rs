@@ -61,6 +61,9 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
 const SOUNDINGS: u32 = 16;
 const STAGGER: u32 = 5;
 
+/// So many places of a gate may be taken for a code word by mistake, and looked at again.
+const FEW: f64 = 50.0;
+
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
     static MEMORY: Cell<Memory> = Cell::default();
@@ -72,7 +75,7 @@ struct Memory {
     field: Vec<u64>,
     unexplained: Vec<u64>,
     search: Search,
-    thresholds: Option<(Thresholds, Thresholds)>,
+    thresholds: Vec<Thresholds>,
 }
 
 /// The lag at which a shot was found.
@@ -159,6 +162,11 @@ impl<'a> Sent<'a> {
         i64::from(self.codebook.chips()) * self.scale()
     }
 
+    /// Bits of a payload.
+    fn bits_of_payload(&self) -> i64 {
+        self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()))
+    }
+
     /// Nearest and farthest lag.
     fn gate(&self) -> (i64, i64) {
         (self.receiver.gate_ticks.0.into(), self.receiver.gate_ticks.1.into())
@@ -200,8 +208,12 @@ struct Band<'a> {
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
     bit_thresholds: Thresholds,
+    /// For a code word that few places of a gate have by chance.
+    word_thresholds: Thresholds,
     /// For each word, the marks that one tick may count for.
     marks_per_tick: Vec<u32>,
+    /// For each shot, the number of marks that nowhere in its gate are unexplained.
+    barren: Vec<u16>,
     search: Search,
 }
 
@@ -215,22 +227,28 @@ impl<'a> Band<'a> {
         let chips = sent.width.div_ceil(receiver.ticks_per_chip.max(1));
         let words = if dark { 0 } else { codebook.words() };
         let (lags, false_alarm) = (sent.lags(), receiver.false_alarm);
-        let bits = f64::from(codebook.payload().map_or(1, |payload| payload.bits()));
-        let remembered = memory.thresholds.filter(|(of_gate, of_bits)| {
-            of_gate.are_for(lags, false_alarm) && of_bits.are_for(bits, false_alarm)
-        });
-        let (thresholds, bit_thresholds) = remembered.unwrap_or_else(|| {
-            (Thresholds::new(lags, false_alarm), Thresholds::new(bits, false_alarm))
+        let bits = sent.bits_of_payload() as f64;
+        let wanted = [(lags, false_alarm), (bits, false_alarm), (lags, FEW)];
+        let mut remembered = memory.thresholds;
+        remembered.retain(|thresholds| wanted.contains(&thresholds.are_for()));
+        let [thresholds, bit_thresholds, word_thresholds] = wanted.map(|(places, false_alarm)| {
+            let known = remembered.iter().position(|t| t.are_for() == (places, false_alarm));
+            match known {
+                Some(known) => remembered.swap_remove(known),
+                None => Thresholds::new(places, false_alarm),
+            }
         });
         Self {
             sent,
             field: Field::new(ticks, sent.width, span.clone(), memory.field),
             unexplained: Unexplained::new(&left, span, memory.unexplained),
-            left_in_gate: if dark { vec![] } else { in_gates(sent, &left) },
+            left_in_gate: if dark { vec![] } else { in_gates(sent, &left, ticks.len()) },
             above: if dark { vec![] } else { above(sent.log) },
             locks,
             thresholds,
             bit_thresholds,
+            word_thresholds,
+            barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
             marks_per_tick: (0..words)
                 .map(|word| crowding(codebook.word(word as u16), chips))
                 .collect(),
@@ -240,7 +258,7 @@ impl<'a> Band<'a> {
 
     fn into_memory(self) -> Memory {
         let (field, unexplained) = (self.field.into_words(), self.unexplained.into_words());
-        let thresholds = Some((self.thresholds, self.bit_thresholds));
+        let thresholds = vec![self.thresholds, self.bit_thresholds, self.word_thresholds];
         Memory { field, unexplained, search: self.search, thresholds }
     }
 
@@ -305,7 +323,11 @@ fn crowding(word: &CodeWord, chips: u32) -> u32 {
 }
 
 /// For each shot, how many of the sorted `ticks` lie where its light may be.
-fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {
+fn in_gates(sent: &Sent, ticks: &[u32], all: usize) -> Vec<u32> {
+    // Where most ticks are left there are some in every gate.
+    if 2 * ticks.len() > all {
+        return vec![u32::MAX; sent.fired.len()];
+    }
     let (mut first, mut last) = (0, 0);
     let count = |shot| {
         let gate = sent.gate_and_macropulse(shot);

@@ -6,6 +6,7 @@
 //! with `least` marks is overlooked if every place with `least`/B votes is looked at.
 
 use super::unexplained::Unexplained;
+use crate::kernels::{LANES, with_marks};
 
 /// What is looked for: a macropulse, taken apart.
 #[derive(Debug)]
@@ -18,6 +19,61 @@ pub(super) struct Sought {
     pub lags: usize,
     /// Fewest marks that are of interest.
     pub least: u16,
+}
+
+impl Sought {
+    /// Places at which a code word may begin.
+    pub fn places(&self) -> usize {
+        self.lags + self.bits.last().copied().unwrap_or(0)
+    }
+
+    /// Marks that are unexplained if the macropulse begins at `start`.
+    fn count(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
+        let starts = self.bits.iter().map(|&bit| start + bit as i64);
+        let places =
+            starts.flat_map(|start| self.word.iter().map(move |&mark| start + mark as i64));
+        places.filter(|&place| unexplained.any(place..place + i64::from(width))).count() as u16
+    }
+
+    /// Fewest marks in one of its code words, at least: else there are fewer than `least` in all.
+    pub fn in_one_word(&self) -> u16 {
+        self.least.div_ceil(self.bits.len().max(1) as u16)
+    }
+}
+
+/// As [`Search::best`], where a code word with so many marks stands out among all ticks: then
+/// code words are looked for in blocks of lags, however many ticks there are, and only where one
+/// is found are its unexplained marks counted. `all` is the field of all ticks, the bit in it at
+/// which the search begins, and the marks of the word and ticks per chip.
+pub(super) fn among_words(
+    all: (&[u64], usize, (&[u16], usize)),
+    unexplained: &Unexplained,
+    at: (i64, u32),
+    sought: &Sought,
+) -> Option<Candidate> {
+    let ((words, begin, marks), (first, width)) = (all, at);
+    let mut best: Option<Candidate> = None;
+    let places = sought.places();
+    for block in (0..places).step_by(64 * LANES) {
+        let lit = with_marks(words, begin + block, marks, sought.in_one_word());
+        for (lane, mut lit) in lit.into_iter().enumerate() {
+            while lit != 0 {
+                let place = block + 64 * lane + lit.trailing_zeros() as usize;
+                lit &= lit - 1;
+                let lags = sought.bits.iter().filter_map(|bit| place.checked_sub(*bit));
+                for lag in lags.filter(|lag| *lag < sought.lags) {
+                    let count = sought.count(unexplained, first + lag as i64, width);
+                    let better = |best: Candidate| {
+                        count > best.count || (count == best.count && lag < best.lag)
+                    };
+                    if best.is_none_or(better) {
+                        best = Some(Candidate { lag, count });
+                    }
+                }
+            }
+        }
+    }
+    best.filter(|best| best.count >= sought.least)
 }
 
 /// A lag and how many marks were found at it.
@@ -47,10 +103,13 @@ impl Search {
         sought: &Sought,
     ) -> Option<Candidate> {
         let (first, width) = at;
+        if sought.bits.is_empty() {
+            return None;
+        }
         let reach = sought.word.last()? + 1;
-        let places = sought.lags + sought.bits.last()?;
+        let places = sought.places();
         self.votes.resize(self.votes.len().max(places + 2 * reach), 0);
-        let needed = usize::from(sought.least).div_ceil(sought.bits.len()).clamp(1, 255) as u8;
+        let needed = sought.in_one_word().clamp(1, 255) as u8;
 
         let mut ticks = 0;
         self.elected.clear();
@@ -156,10 +215,20 @@ mod tests {
                 let lit: Vec<u32> = (0..lit).map(|_| chance.next_u32() % 1050).collect();
                 let unexplained = Unexplained::new(&lit, -50..1100, vec![]);
                 let expected = exhaustive(&unexplained, -7, i64::from(width));
+                let mut words = vec![0; 40];
+                for place in 0..1200 {
+                    if unexplained.any(place - 7..place - 7 + i64::from(width)) {
+                        words[place as usize / 64] |= 1 << (place % 64);
+                    }
+                }
                 for least in 1..=15 {
-                    let found = search.best(&unexplained, (-7, width), &sought(least));
+                    let (at, sought) = ((-7, width), sought(least));
                     let expected = Some(expected).filter(|expected| expected.count >= least);
+                    let found = search.best(&unexplained, at, &sought);
                     assert_eq!(found, expected, "{least} of 15, width {width}");
+                    let all = (words.as_slice(), 0, (&[0, 6, 12, 18, 19][..], 1));
+                    let found = among_words(all, &unexplained, at, &sought);
+                    assert_eq!(found, expected, "{least} of 15 by words, width {width}");
                 }
             }
         }

@@ -65,9 +65,9 @@ impl Thresholds {
         Self { lags, false_alarm, known: Vec::new() }
     }
 
-    /// Whether these are the thresholds that [`Thresholds::new`] would give.
-    pub fn are_for(&self, lags: f64, false_alarm: f64) -> bool {
-        (self.lags, self.false_alarm) == (lags, false_alarm)
+    /// What [`Thresholds::new`] was asked for.
+    pub fn are_for(&self) -> (f64, f64) {
+        (self.lags, self.false_alarm)
     }
 
     /// The fewest of `marks` to believe at `density`, which is rounded up by less than an eighth.

@@ -32,12 +32,17 @@ on_every_level! {
         for eight in &mut eights {
             // Seven adders take eight bits in and carry one out, so that most of the work stays
             // in the three lowest planes.
-            let bits = |index: usize| read(words, first + scale * usize::from(eight[index]));
-            let (sum, a) = add(ones, bits(0), bits(1));
-            let (sum, mut b) = add(sum, bits(2), bits(3));
+            // A closure would not be compiled for the level.
+            macro_rules! bits {
+                ($index:literal) => {
+                    read(words, first + scale * usize::from(eight[$index]))
+                };
+            }
+            let (sum, a) = add(ones, bits!(0), bits!(1));
+            let (sum, mut b) = add(sum, bits!(2), bits!(3));
             let (sum_of_twos, c) = add(twos, a, b);
-            let (sum, a) = add(sum, bits(4), bits(5));
-            (ones, b) = add(sum, bits(6), bits(7));
+            let (sum, a) = add(sum, bits!(4), bits!(5));
+            (ones, b) = add(sum, bits!(6), bits!(7));
             let d;
             (twos, d) = add(sum_of_twos, a, b);
             let mut carried;
@@ -56,31 +61,42 @@ on_every_level! {
     }
 }
 
+on_every_level! {
+    /// One bit for each lag of a block that has `least` or more of the marks, counted as by
+    /// [`count_marks`].
+    pub(crate) fn with_marks(
+        words: &[u64],
+        first: usize,
+        marks: (&[u16], usize),
+        least: u16,
+    ) -> Lanes {
+        let mut planes = [[0; LANES]; PLANES];
+        count_marks(words, first, marks, &mut planes);
+        let mut enough = [u64::MAX; LANES];
+        for (weight, plane) in planes.into_iter().enumerate() {
+            enough = if least >> weight & 1 == 1 { and(plane, enough) } else { or(plane, enough) };
+        }
+        enough
+    }
+}
+
 // Whole lanes in, whole lanes out: compilers keep these in one register.
 
-#[inline(always)]
-fn map(a: Lanes, b: Lanes, of: impl Fn(u64, u64) -> u64) -> Lanes {
-    let mut lanes = [0; LANES];
-    for lane in 0..LANES {
-        lanes[lane] = of(a[lane], b[lane]);
-    }
-    lanes
+macro_rules! on_lanes {
+    ($name:ident, $sign:tt) => {
+        #[inline(always)]
+        fn $name(mut a: Lanes, b: Lanes) -> Lanes {
+            for lane in 0..LANES {
+                a[lane] = a[lane] $sign b[lane];
+            }
+            a
+        }
+    };
 }
 
-#[inline(always)]
-fn xor(a: Lanes, b: Lanes) -> Lanes {
-    map(a, b, |a, b| a ^ b)
-}
-
-#[inline(always)]
-fn and(a: Lanes, b: Lanes) -> Lanes {
-    map(a, b, |a, b| a & b)
-}
-
-#[inline(always)]
-fn or(a: Lanes, b: Lanes) -> Lanes {
-    map(a, b, |a, b| a | b)
-}
+on_lanes!(xor, ^);
+on_lanes!(and, &);
+on_lanes!(or, |);
 
 /// The sum of three bits, in each lag, and what is carried to the next plane.
 #[inline(always)]
@@ -123,6 +139,7 @@ mod tests {
             marks in proptest::collection::vec(0..4000_u16, 0..400),
             first in 0..7000_usize,
             scale in 1..3_usize,
+            least in 0..200_u16,
         ) {
             let mut words = vec![0_u64; 100];
             lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
@@ -145,6 +162,13 @@ mod tests {
                 };
                 let counts: Vec<usize> = (0..64 * LANES).map(at).collect();
                 prop_assert_eq!(&counts, &expected, "{:?}", level);
+            }
+            for (level, lit) in at_each_level(|| with_marks(&words, first, (&marks, scale), least)) {
+                let is_lit = |lag: &usize| lit[lag / 64] >> (lag % 64) & 1 == 1;
+                let lags: Vec<usize> = (0..64 * LANES).filter(is_lit).collect();
+                let enough = |lag: &usize| expected[*lag] >= usize::from(least);
+                let expected: Vec<usize> = (0..64 * LANES).filter(enough).collect();
+                prop_assert_eq!(lags, expected, "{:?}", level);
             }
         }
     }

@@ -12,5 +12,5 @@ mod correlate;
 mod level;
 mod marks;
 
-pub(crate) use correlate::{LANES, Lanes, PLANES, count_marks};
+pub(crate) use correlate::{LANES, Lanes, PLANES, count_marks, with_marks};
 pub(crate) use marks::{WordTicks, begin_with};

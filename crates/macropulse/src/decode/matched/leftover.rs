@@ -1,7 +1,8 @@
 //! The light nobody has explained yet: who else could have sent it?
 
 use super::{Band, Lock, STAGGER};
-use crate::decode::search::Sought;
+use crate::decode::correlator::BLOCK;
+use crate::decode::search::{self, Sought};
 
 /// How much must speak for a lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,23 +80,31 @@ impl Band<'_> {
         }
     }
 
-    /// Whether there are so many unexplained ticks within one macropulse somewhere in the gate
-    /// of `shot` that they could be `marks` of its marks.
+    /// Whether there are so many unexplained ticks in the gate of `shot`, close enough together,
+    /// that they could be `marks` of its marks: within one macropulse, and for one of its lit
+    /// bits within one code word.
     fn is_crowded(&self, shot: usize, marks: u16) -> bool {
-        let per_tick = self.marks_per_tick[usize::from(self.sent.log.word[shot])];
-        let needed = u32::from(marks).div_ceil(per_tick).max(1);
-        let gate = self.sent.gate_and_macropulse(shot);
-        self.unexplained.at_most(gate.clone()) >= needed
-            && self.unexplained.densest(gate, self.sent.length() as u32) >= needed
+        let sent = self.sent;
+        let per_tick = self.marks_per_tick[usize::from(sent.log.word[shot])];
+        let bits = sent.lit_bits(shot).len() as u32;
+        let gate = sent.gate_and_macropulse(shot);
+        let needed = |bits: u32| u32::from(marks).div_ceil(bits).div_ceil(per_tick).max(1);
+        let word = (sent.length() / sent.bits_of_payload()) as u32;
+        self.unexplained.at_most(gate.clone()) >= needed(1)
+            && self.unexplained.densest(gate.clone(), word + sent.width) >= needed(bits)
+            && self.unexplained.densest(gate, sent.length() as u32 + sent.width) >= needed(1)
     }
 
     /// The lag at which most marks of `shot` are found, out of all that unexplained ticks speak
     /// for. `None` where these are fewer than `at_least` or chance could as well have put them
     /// there.
     pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
-        let (nearest, farthest) = self.sent.gate();
+        // Ticks only ever become explained.
+        if self.barren[shot] <= at_least {
+            return None;
+        }
         let weight = self.sent.weight(shot);
-        if weight == 0 || farthest < nearest {
+        if weight == 0 || self.sent.gate().1 < self.sent.gate().0 {
             return None;
         }
         let gate = self.sent.gate_and_macropulse(shot);
@@ -106,20 +115,41 @@ impl Band<'_> {
         let density = self.density_in_gate(shot);
         let visible = self.thresholds.least(weight, density).div_ceil(2);
         let least = self.thresholds.least(weight, left_over).max(visible).max(at_least);
-        if !self.is_crowded(shot, least) {
+        let found = match self.is_crowded(shot, least) {
+            true => self.most_unexplained(shot, least),
+            false => None,
+        };
+        let Some(lag) = found else {
+            self.barren[shot] = at_least;
             return None;
-        }
-        let scale = self.sent.scale() as usize;
-        let word = self.sent.codebook.word(self.sent.log.word[shot]);
+        };
+        let best = self.best_near(shot, lag, least)?;
+        Some(Lock { searched: true, ..best })
+    }
+
+    /// The lag at which most marks of `shot` are unexplained, if `least` are.
+    fn most_unexplained(&mut self, shot: usize, least: u16) -> Option<i64> {
+        let sent = self.sent;
+        let (nearest, farthest) = sent.gate();
+        let scale = sent.scale() as usize;
+        let word = sent.codebook.word(sent.log.word[shot]);
         let sought = Sought {
             word: word.marks.iter().map(|&mark| scale * usize::from(mark)).collect(),
-            bits: self.sent.bits(shot, true).map(|bit| bit as usize).collect(),
+            bits: sent.bits(shot, true).map(|bit| bit as usize).collect(),
             lags: (farthest - nearest + 1) as usize,
             least,
         };
-        let at = (self.sent.fired[shot] + nearest, self.sent.width);
-        let found = self.search.best(&self.unexplained, at, &sought)?;
-        let best = self.best_near(shot, nearest + found.lag as i64, least)?;
-        Some(Lock { searched: true, ..best })
+        let first = sent.fired[shot] + nearest;
+        let stands_out =
+            self.word_thresholds.least(word.marks.len() as u16, self.density_in_gate(shot));
+        let found = if sought.in_one_word() >= stands_out {
+            let length = sought.places() + 2 * BLOCK as usize + sent.length() as usize;
+            let (words, bit) = self.field.bits(first, length as i64);
+            let all = (words, bit, (word.marks.as_slice(), scale));
+            search::among_words(all, &self.unexplained, (first, sent.width), &sought)
+        } else {
+            self.search.best(&self.unexplained, (first, sent.width), &sought)
+        };
+        found.map(|found| nearest + found.lag as i64)
     }
 }

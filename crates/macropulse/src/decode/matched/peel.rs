@@ -171,7 +171,8 @@ impl Peeler<'_> {
     /// Keeps `lag` unless the shot was found before: of several surfaces the first one counts.
     fn lock(&mut self, shot: usize, lag: i64, count: usize) {
         let count = count as u16;
-        let margin = count - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
+        let margin = count
+            - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
         self.locks[shot].get_or_insert(Lock { lag, count, margin, searched: true });
         self.next = shot + 1;
     }
@@ -214,7 +215,8 @@ impl Explained {
     /// are.
     fn next_without(&self, place: usize) -> usize {
         let mut index = place / 64;
-        let mut unexplained = !self.words[index.min(self.words.len() - 1)] & u64::MAX << (place % 64);
+        let mut unexplained =
+            !self.words[index.min(self.words.len() - 1)] & u64::MAX << (place % 64);
         while unexplained == 0 && index + 1 < self.words.len() {
             index += 1;
             unexplained = !self.words[index];

@@ -127,6 +127,11 @@ impl Band<'_> {
             return false;
         }
         let lit = self.sent.lit_bits(shot).len() as u32;
+        // Not so many marks are missing altogether.
+        let in_word = self.sent.word(shot).marks() as u32;
+        if u32::from(weight - lock.count) + u32::from(lock.count).div_ceil(3 * lit) < in_word {
+            return true;
+        }
         let mut lit_bits = self.sent.bits(shot, true);
         lit_bits.all(|bit| {
             let found = self.found_in_bit(shot, lock.lag + bit);

@@ -59,6 +59,10 @@ impl Band<'_> {
 
     fn lit_bits_are_lit(&mut self, shot: usize, lock: Lock, mean: f64) -> bool {
         let in_word = self.in_word(shot);
+        // Not so many marks are missing altogether.
+        if f64::from(self.sent.weight(shot) - lock.count) < f64::from(in_word) - mean / 2.0 {
+            return true;
+        }
         let seen_share = mean / f64::from(in_word);
         self.sent.bits(shot, true).all(|bit| {
             let found = self.found_in_bit(shot, lock.lag + bit);
@@ -117,8 +121,7 @@ impl Band<'_> {
         }
         // Whatever the rounds, no farther than this.
         let around = ROUNDS as i64 * width;
-        let ticks =
-            self.field.ticks(start - around..start + self.sent.length() + width + around);
+        let ticks = self.field.ticks(start - around..start + self.sent.length() + width + around);
         let mut mean = (width - 1) as f64 / 2.0;
         for _ in 0..ROUNDS {
             let middle = mean.round() as i64;
@@ -135,6 +138,9 @@ impl Band<'_> {
                 }
             }
             mean = sum as f64 / f64::from(count.max(1));
+            if mean.round() as i64 == middle {
+                break;
+            }
         }
         mean
     }
