@@ -60,6 +60,11 @@ pub(super) fn among_words(
             while lit != 0 {
                 let place = block + 64 * lane + lit.trailing_zeros() as usize;
                 lit &= lit - 1;
+                // Most of what stands out is explained.
+                let word = sought.count_word(unexplained, first + place as i64, width);
+                if word < sought.in_one_word() {
+                    continue;
+                }
                 let lags = sought.bits.iter().filter_map(|bit| place.checked_sub(*bit));
                 for lag in lags.filter(|lag| *lag < sought.lags) {
                     let count = sought.count(unexplained, first + lag as i64, width);
