@@ -30,8 +30,12 @@ impl Sought {
     /// Marks that are unexplained if the macropulse begins at `start`.
     fn count(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
         let starts = self.bits.iter().map(|&bit| start + bit as i64);
-        let places =
-            starts.flat_map(|start| self.word.iter().map(move |&mark| start + mark as i64));
+        starts.map(|start| self.count_word(unexplained, start, width)).sum()
+    }
+
+    /// Marks that are unexplained if the code word begins at `start`.
+    fn count_word(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
+        let places = self.word.iter().map(|&mark| start + mark as i64);
         places.filter(|&place| unexplained.any(place..place + i64::from(width))).count() as u16
     }
 

@@ -15,11 +15,29 @@ pub(crate) type Lanes = [u64; LANES];
 /// Planes of a count; a macropulse has at most 65535 marks.
 pub(crate) const PLANES: usize = 16;
 
+/// Counts into `planes`, plane p of weight 2^p, for each lag of a block how many of the marks are
+/// lit: bit `first + lag + scale · mark` of `words`, the lowest bit first. Bits beyond the end are
+/// dark. `marks` ascend; `planes` must be dark before.
+pub(crate) fn count_marks(
+    words: &[u64],
+    first: usize,
+    marks: (&[u16], usize),
+    planes: &mut [Lanes; PLANES],
+) {
+    let last = marks.0.last().map_or(0, |&mark| marks.1 * usize::from(mark));
+    let reach = (first + last) / 64 + LANES + 1;
+    if reach <= words.len() {
+        count_within(words, first, marks, planes);
+    } else {
+        let mut longer = words.to_vec();
+        longer.resize(reach, 0);
+        count_within(&longer, first, marks, planes);
+    }
+}
+
 on_every_level! {
-    /// Counts into `planes`, plane p of weight 2^p, for each lag of a block how many of the marks
-    /// are lit: bit `first + lag + scale · mark` of `words`, the lowest bit first. Bits beyond
-    /// the end are dark. `planes` must be dark before.
-    pub(crate) fn count_marks(
+    /// [`count_marks`] where no block reaches beyond the end.
+    fn count_within(
         words: &[u64],
         first: usize,
         marks: (&[u16], usize),
@@ -61,23 +79,17 @@ on_every_level! {
     }
 }
 
-on_every_level! {
-    /// One bit for each lag of a block that has `least` or more of the marks, counted as by
-    /// [`count_marks`].
-    pub(crate) fn with_marks(
-        words: &[u64],
-        first: usize,
-        marks: (&[u16], usize),
-        least: u16,
-    ) -> Lanes {
-        let mut planes = [[0; LANES]; PLANES];
-        count_marks(words, first, marks, &mut planes);
-        let mut enough = [u64::MAX; LANES];
-        for (weight, plane) in planes.into_iter().enumerate() {
-            enough = if least >> weight & 1 == 1 { and(plane, enough) } else { or(plane, enough) };
-        }
-        enough
+/// One bit for each lag of a block that has `least` or more of the marks, counted as by
+/// [`count_marks`].
+pub(crate) fn with_marks(words: &[u64], first: usize, marks: (&[u16], usize), least: u16) -> Lanes {
+    let mut planes = [[0; LANES]; PLANES];
+    count_marks(words, first, marks, &mut planes);
+    let used = (usize::BITS - marks.0.len().leading_zeros()).max(16 - least.leading_zeros());
+    let mut enough = [u64::MAX; LANES];
+    for (weight, plane) in planes.into_iter().enumerate().take(used as usize) {
+        enough = if least >> weight & 1 == 1 { and(plane, enough) } else { or(plane, enough) };
     }
+    enough
 }
 
 // Whole lanes in, whole lanes out: compilers keep these in one register.
@@ -109,19 +121,10 @@ fn add(a: Lanes, b: Lanes, c: Lanes) -> (Lanes, Lanes) {
 fn read(words: &[u64], first: usize) -> Lanes {
     let (word, shift) = (first / 64, first % 64);
     let mut lanes = [0; LANES];
-    match words.get(word..word + LANES + 1) {
-        Some(words) => {
-            for lane in 0..LANES {
-                // Two shifts, because a shift by 64 does not give 0.
-                lanes[lane] = words[lane] >> shift | words[lane + 1] << 1 << (63 - shift);
-            }
-        }
-        None => {
-            let at = |word: usize| words.get(word).copied().unwrap_or(0);
-            for (lane, bits) in lanes.iter_mut().enumerate() {
-                *bits = at(word + lane) >> shift | at(word + lane + 1) << 1 << (63 - shift);
-            }
-        }
+    let Some(words) = words.get(word..word + LANES + 1) else { return lanes };
+    for lane in 0..LANES {
+        // Two shifts, because a shift by 64 does not give 0.
+        lanes[lane] = words[lane] >> shift | words[lane + 1] << 1 << (63 - shift);
     }
     lanes
 }
@@ -136,11 +139,12 @@ mod tests {
         #[test]
         fn every_level_counts_what_is_lit(
             lit in proptest::collection::vec(0..6000_usize, 0..3000),
-            marks in proptest::collection::vec(0..4000_u16, 0..400),
+            marks in proptest::collection::btree_set(0..4000_u16, 0..400),
             first in 0..7000_usize,
             scale in 1..3_usize,
             least in 0..200_u16,
         ) {
+            let marks: Vec<u16> = marks.into_iter().collect();
             let mut words = vec![0_u64; 100];
             lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
             let is_lit = |bit: usize| words.get(bit / 64).is_some_and(|w| w >> (bit % 64) & 1 == 1);
