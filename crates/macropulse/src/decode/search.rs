@@ -27,6 +27,33 @@ impl Sought {
         self.lags + self.bits.last().copied().unwrap_or(0)
     }
 
+    /// The lag with most marks, the earliest of several, of those at which one of the code words
+    /// is `elected`: its place and its marks, by place. `count` counts the marks of a lag.
+    fn best_of(&self, elected: &[(usize, u16)], count: impl Fn(usize) -> u16) -> Option<Candidate> {
+        let unelected = self.in_one_word() - 1;
+        let mut best = Candidate { lag: usize::MAX, count: self.least };
+        for (index, &(place, _)) in elected.iter().enumerate() {
+            let lags = self.bits.iter().filter_map(|bit| place.checked_sub(*bit));
+            for lag in lags.filter(|lag| *lag < self.lags) {
+                let marks = |bit: &usize| {
+                    let known = elected.binary_search_by_key(&(lag + bit), |word| word.0);
+                    known.map_or((false, unelected), |at| (at < index, elected[at].1))
+                };
+                let words = self.bits.iter().map(marks);
+                let seen_before = words.clone().any(|(before, _)| before);
+                let most: u16 = words.map(|(_, marks)| marks).sum();
+                if seen_before || most < best.count {
+                    continue;
+                }
+                let count = count(lag);
+                if count > best.count || (count == best.count && lag < best.lag) {
+                    best = Candidate { lag, count };
+                }
+            }
+        }
+        (best.lag != usize::MAX).then_some(best)
+    }
+
     /// Marks that are unexplained if the macropulse begins at `start`.
     fn count(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
         let starts = self.bits.iter().map(|&bit| start + bit as i64);
@@ -56,33 +83,30 @@ pub(super) fn among_words(
     sought: &Sought,
 ) -> Option<Candidate> {
     let ((words, begin, marks), (first, width)) = (all, at);
-    let mut best: Option<Candidate> = None;
-    let places = sought.places();
-    for block in (0..places).step_by(64 * LANES) {
-        let lit = with_marks(words, begin + block, marks, sought.in_one_word());
+    let (needed, reach) = (sought.in_one_word(), sought.word.last()? + 64 * LANES);
+    // Where code words begin, and how many of their marks are unexplained.
+    let mut elected: Vec<(usize, u16)> = Vec::new();
+    for block in (0..sought.places()).step_by(64 * LANES) {
+        let start = first + block as i64;
+        if unexplained.at_most(start..start + reach as i64 + i64::from(width)) * width
+            < u32::from(needed)
+        {
+            continue;
+        }
+        let lit = with_marks(words, begin + block, marks, needed);
         for (lane, mut lit) in lit.into_iter().enumerate() {
             while lit != 0 {
                 let place = block + 64 * lane + lit.trailing_zeros() as usize;
                 lit &= lit - 1;
                 // Most of what stands out is explained.
-                let word = sought.count_word(unexplained, first + place as i64, width);
-                if word < sought.in_one_word() {
-                    continue;
-                }
-                let lags = sought.bits.iter().filter_map(|bit| place.checked_sub(*bit));
-                for lag in lags.filter(|lag| *lag < sought.lags) {
-                    let count = sought.count(unexplained, first + lag as i64, width);
-                    let better = |best: Candidate| {
-                        count > best.count || (count == best.count && lag < best.lag)
-                    };
-                    if best.is_none_or(better) {
-                        best = Some(Candidate { lag, count });
-                    }
+                let found = sought.count_word(unexplained, first + place as i64, width);
+                if found >= needed {
+                    elected.push((place, found));
                 }
             }
         }
     }
-    best.filter(|best| best.count >= sought.least)
+    sought.best_of(&elected, |lag| sought.count(unexplained, first + lag as i64, width))
 }
 
 /// A lag and how many marks were found at it.
@@ -133,7 +157,12 @@ impl Search {
                 }
             }
         });
-        let best = self.tally(reach, needed, sought);
+        let votes = |place: usize| u16::from(self.votes[reach + place]);
+        let in_time = self.elected.iter().filter_map(|place| place.checked_sub(reach));
+        let mut elected: Vec<(usize, u16)> = in_time.map(|place| (place, votes(place))).collect();
+        elected.sort_unstable();
+        let best =
+            sought.best_of(&elected, |lag| sought.bits.iter().map(|bit| votes(lag + bit)).sum());
         // Few ticks: taking every vote back is less work than wiping the whole ballot.
         if ticks * sought.word.len() * 16 < places {
             for_each_tick(unexplained, (first, places + reach), width, |tick| {
@@ -143,32 +172,6 @@ impl Search {
             });
         } else {
             self.votes.fill(0);
-        }
-        best.filter(|best| best.count >= sought.least)
-    }
-
-    fn tally(&self, reach: usize, needed: u8, sought: &Sought) -> Option<Candidate> {
-        let mut best: Option<Candidate> = None;
-        for &place in &self.elected {
-            for bit in &sought.bits {
-                let Some(lag) = place.checked_sub(reach + bit) else { break };
-                if lag >= sought.lags {
-                    continue;
-                }
-                let words =
-                    sought.bits.iter().map(|other| (other, self.votes[reach + lag + other]));
-                let mut count = 0;
-                let mut seen_before = false;
-                for (other, votes) in words {
-                    seen_before |= other < bit && votes >= needed;
-                    count += u16::from(votes);
-                }
-                let better =
-                    |best: Candidate| count > best.count || (count == best.count && lag < best.lag);
-                if !seen_before && best.is_none_or(better) {
-                    best = Some(Candidate { lag, count });
-                }
-            }
         }
         best
     }

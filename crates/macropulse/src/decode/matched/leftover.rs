@@ -71,7 +71,8 @@ impl Band<'_> {
             if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
                 continue;
             }
-            if let Some(rival) = self.searched(shot, lock.count / 2)
+            // A quarter of its marks may lie under those of others.
+            if let Some(rival) = self.searched(shot, lock.count - lock.count / 4)
                 && rival.count > lock.count
                 && rival.count >= self.by_chance(shot, rival)
             {
