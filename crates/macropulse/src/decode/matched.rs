@@ -214,6 +214,8 @@ struct Band<'a> {
     marks_per_tick: Vec<u32>,
     /// For each shot, the number of marks that nowhere in its gate are unexplained.
     barren: Vec<u16>,
+    /// Memory for some of the marks of a shot.
+    some_marks: Vec<u16>,
     search: Search,
 }
 
@@ -249,6 +251,7 @@ impl<'a> Band<'a> {
             bit_thresholds,
             word_thresholds,
             barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
+            some_marks: Vec::new(),
             marks_per_tick: (0..words)
                 .map(|word| crowding(codebook.word(word as u16), chips))
                 .collect(),

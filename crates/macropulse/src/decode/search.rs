@@ -27,21 +27,29 @@ impl Sought {
         self.lags + self.bits.last().copied().unwrap_or(0)
     }
 
-    /// The lag with most marks, the earliest of several, of those at which one of the code words
-    /// is `elected`: its place and its marks, by place. `count` counts the marks of a lag.
-    fn best_of(&self, elected: &[(usize, u16)], count: impl Fn(usize) -> u16) -> Option<Candidate> {
-        let unelected = self.in_one_word() - 1;
+    /// The lag with most marks, the earliest of several, of those at which a code word begins that
+    /// was `elected`, by place. `marks` tells how many marks a place has at most, and `count` how
+    /// many a lag has.
+    fn best_of(
+        &self,
+        elected: impl Iterator<Item = usize>,
+        marks: impl Fn(usize) -> u16,
+        count: impl Fn(usize) -> u16,
+    ) -> Option<Candidate> {
+        let needed = self.in_one_word();
         let mut best = Candidate { lag: usize::MAX, count: self.least };
-        for (index, &(place, _)) in elected.iter().enumerate() {
-            let lags = self.bits.iter().filter_map(|bit| place.checked_sub(*bit));
-            for lag in lags.filter(|lag| *lag < self.lags) {
-                let marks = |bit: &usize| {
-                    let known = elected.binary_search_by_key(&(lag + bit), |word| word.0);
-                    known.map_or((false, unelected), |at| (at < index, elected[at].1))
+        for place in elected {
+            for bit in &self.bits {
+                let Some(lag) = place.checked_sub(*bit).filter(|lag| *lag < self.lags) else {
+                    continue;
                 };
-                let words = self.bits.iter().map(marks);
-                let seen_before = words.clone().any(|(before, _)| before);
-                let most: u16 = words.map(|(_, marks)| marks).sum();
+                let mut seen_before = false;
+                let mut most = 0;
+                for other in &self.bits {
+                    let marks = marks(lag + other);
+                    seen_before |= other < bit && marks >= needed;
+                    most += marks;
+                }
                 if seen_before || most < best.count {
                     continue;
                 }
@@ -106,7 +114,12 @@ pub(super) fn among_words(
             }
         }
     }
-    sought.best_of(&elected, |lag| sought.count(unexplained, first + lag as i64, width))
+    let marks = |place: usize| {
+        let known = elected.binary_search_by_key(&place, |word| word.0);
+        known.map_or(needed - 1, |at| elected[at].1)
+    };
+    let count = |lag| sought.count(unexplained, first + lag as i64, width);
+    sought.best_of(elected.iter().map(|word| word.0), marks, count)
 }
 
 /// A lag and how many marks were found at it.
@@ -158,11 +171,9 @@ impl Search {
             }
         });
         let votes = |place: usize| u16::from(self.votes[reach + place]);
-        let in_time = self.elected.iter().filter_map(|place| place.checked_sub(reach));
-        let mut elected: Vec<(usize, u16)> = in_time.map(|place| (place, votes(place))).collect();
-        elected.sort_unstable();
-        let best =
-            sought.best_of(&elected, |lag| sought.bits.iter().map(|bit| votes(lag + bit)).sum());
+        let elected = self.elected.iter().filter_map(|place| place.checked_sub(reach));
+        let count = |lag| sought.bits.iter().map(|bit| votes(lag + bit)).sum();
+        let best = sought.best_of(elected, votes, count);
         // Few ticks: taking every vote back is less work than wiping the whole ballot.
         if ticks * sought.word.len() * 16 < places {
             for_each_tick(unexplained, (first, places + reach), width, |tick| {

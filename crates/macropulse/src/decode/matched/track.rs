@@ -2,7 +2,7 @@
 
 use super::leftover::Evidence;
 use super::{Band, Lock};
-use crate::decode::correlator::{BLOCK, Counts};
+use crate::decode::correlator::{BLOCK, Counts, Peak};
 
 impl Band<'_> {
     /// Goes from each shot that was found back to those before it.
@@ -83,7 +83,10 @@ impl Band<'_> {
                 break;
             }
             let sides = [middle - BLOCK, middle + BLOCK];
-            let sides = sides.map(|side| self.best_in_block(shot, side));
+            let sides = sides.map(|side| match self.may_be_higher(shot, side, best.count) {
+                true => self.best_in_block(shot, side),
+                false => None,
+            });
             let higher = sides.into_iter().flatten().find(|side| {
                 side.count > best.count || (side.count == best.count && side.lag < best.lag)
             });
@@ -97,6 +100,13 @@ impl Band<'_> {
 
     /// The highest peak in the [`BLOCK`] around `middle`.
     fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Lock> {
+        let peak = self.peak_in_block(shot, middle, self.sent.marks(shot))?;
+        let (lag, margin) = (middle - BLOCK / 2 + peak.at, peak.count - peak.next);
+        Some(Lock { lag, count: peak.count, margin, searched: false })
+    }
+
+    /// The highest peak in the [`BLOCK`] around `middle`, of some of the marks of `shot`.
+    fn peak_in_block(&mut self, shot: usize, middle: i64, marks: &[u16]) -> Option<Peak> {
         let (nearest, farthest) = self.sent.gate();
         let first = middle - BLOCK / 2;
         let allowed = nearest - first..farthest + 1 - first;
@@ -105,10 +115,21 @@ impl Band<'_> {
         }
         let start = self.sent.fired[shot] + first;
         let (words, bit) = self.field.bits(start, BLOCK + self.sent.length());
-        let marks = (self.sent.marks(shot), self.sent.scale() as usize);
-        let peak = Counts::new(words, bit, marks).peak(allowed, self.sent.width.into())?;
-        let margin = peak.count - peak.next;
-        Some(Lock { lag: first + peak.at, count: peak.count, margin, searched: false })
+        let counts = Counts::new(words, bit, (marks, self.sent.scale() as usize));
+        counts.peak(allowed, self.sent.width.into())
+    }
+
+    /// Whether a peak of more than `count` marks may lie in the [`BLOCK`] around `middle`: one
+    /// mark in three is asked. Of the marks of a higher peak as large a share is lit; a tenth less
+    /// is allowed for luck.
+    fn may_be_higher(&mut self, shot: usize, middle: i64, count: u16) -> bool {
+        let mut some = std::mem::take(&mut self.some_marks);
+        some.clear();
+        some.extend(self.sent.marks(shot).iter().step_by(3));
+        let peak = self.peak_in_block(shot, middle, &some);
+        let (asked, all) = (some.len() as u32, u32::from(self.sent.weight(shot)));
+        self.some_marks = some;
+        peak.is_some_and(|peak| 10 * u32::from(peak.count) * all >= 9 * u32::from(count) * asked)
     }
 
     /// Whether chance does not reach `lock`; and, unless faint light is looked for, whether it can
