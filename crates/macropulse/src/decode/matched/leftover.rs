@@ -16,6 +16,9 @@ pub(super) enum Evidence {
     MoreThanChance,
 }
 
+/// So few ticks are searched so soon that no shot needs to be left out.
+const FEW_TICKS: u32 = 512;
+
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
     /// them in all the unexplained light of the gate.
@@ -38,7 +41,8 @@ impl Band<'_> {
     fn is_among(&self, shot: usize, every: u32) -> bool {
         let log = self.sent.log;
         let (row, column) = (u32::from(log.row[shot]), u32::from(log.column[shot]));
-        (column + STAGGER * row).is_multiple_of(every)
+        let left = || self.unexplained.at_most(self.sent.gate_and_macropulse(shot));
+        (column + STAGGER * row).is_multiple_of(every) || left() < FEW_TICKS
     }
 
     /// What a search for `shot` finds, if the `evidence` is there.
@@ -71,8 +75,7 @@ impl Band<'_> {
             if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
                 continue;
             }
-            // A quarter of its marks may lie under those of others.
-            if let Some(rival) = self.searched(shot, lock.count - lock.count / 4)
+            if let Some(rival) = self.searched(shot, lock.count / 2)
                 && rival.count > lock.count
                 && rival.count >= self.by_chance(shot, rival)
             {
