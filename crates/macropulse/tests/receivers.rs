@@ -143,7 +143,8 @@ fn false_edges_alone_are_no_return() {
     let log = careless.log(0..1);
     let ticks = careless.ticks(&log, sky, weather);
     let returns = careless.receiver.decode(&careless.codebook, &log, &ticks);
-    assert!(returns.rejected(Reject::NoPeak) < 424, "{:?}", returns.rejects);
+    // Among so many ticks one shot in sixteen is searched for faint light.
+    assert!(returns.rejected(Reject::NoPeak) < 848 - 848 / 16, "{:?}", returns.rejects);
 }
 
 /// Decodes with the labels of a sensor that has been fired with other ones.

@@ -70,8 +70,7 @@ impl Sought {
 
     /// Marks that are unexplained if the code word begins at `start`.
     fn count_word(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
-        let places = self.word.iter().map(|&mark| start + mark as i64);
-        places.filter(|&place| unexplained.any(place..place + i64::from(width))).count() as u16
+        unexplained.count(self.word.iter().map(|&mark| start + mark as i64), width)
     }
 
     /// Fewest marks in one of its code words, at least: else there are fewer than `least` in all.

@@ -62,6 +62,11 @@ impl Unexplained {
         }
     }
 
+    /// At how many of `places`, or of the `width` − 1 ticks behind it, a tick is unexplained.
+    pub fn count(&self, places: impl Iterator<Item = i64>, width: u32) -> u16 {
+        places.filter(|&place| self.any(place..place + i64::from(width))).count() as u16
+    }
+
     /// Whether one of the ticks in `span` is unexplained.
     pub fn any(&self, mut span: Range<i64>) -> bool {
         span.any(|tick| {

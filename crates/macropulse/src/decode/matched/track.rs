@@ -142,7 +142,11 @@ impl Band<'_> {
         }
         let by_chance = self.by_chance(shot, lock);
         if evidence == Evidence::MoreThanChance {
-            return lock.count >= by_chance;
+            // Many bright shots on top of each other are a worse impostor than chance is.
+            let start = self.sent.fired[shot] + lock.lag;
+            let places = self.sent.places(shot).map(|mark| start + mark);
+            return lock.count >= by_chance
+                && 2 * self.unexplained.count(places, self.sent.width) >= lock.count;
         }
         if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;

@@ -91,10 +91,10 @@ impl Band<'_> {
                 return true;
             }
             let places = word.marks.iter().map(|&mark| start + bit + scale * i64::from(mark));
-            let found = places.filter(|&tick| self.unexplained.any(tick..tick + width)).count();
+            let found = self.unexplained.count(places, self.sent.width);
             let density = self.density_around(shot, lock);
             let by_chance = self.bit_thresholds.least(self.in_word(shot), density);
-            2.0 * (found as f64) < mean || found < usize::from(by_chance)
+            2.0 * f64::from(found) < mean || found < by_chance
         })
     }
 
