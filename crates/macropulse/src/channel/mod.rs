@@ -13,7 +13,7 @@
 
 use crate::design::Design;
 use crate::scene::{Hits, Material};
-use crate::units::{fs_from_s, tof_from_range};
+use crate::units::tof_fs_from_ranges;
 
 /// Echoes of a band of shots, as columns, ordered by shot. Truth: the light itself, before any
 /// detector.
@@ -30,14 +30,20 @@ pub struct Echoes {
 /// The echoes of `hits` at the sensor `design`, whose scene has `materials`.
 pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
     let link = Link::of(design);
-    let mut echoes = Echoes::default();
+    let most = hits.shot.len();
+    let delay_fs = tof_fs_from_ranges(&hits.range);
+    let mut echoes = Echoes {
+        shot: Vec::with_capacity(most),
+        delay_fs: Vec::with_capacity(most),
+        photons: Vec::with_capacity(most),
+    };
     for i in 0..hits.shot.len() {
         let reflectance =
             materials[usize::from(hits.material[i])].backscatter(f64::from(hits.cosine[i]));
         let photons = link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i]);
         if photons > 0.0 {
             echoes.shot.push(hits.shot[i]);
-            echoes.delay_fs.push(fs_from_s(tof_from_range(hits.range[i])));
+            echoes.delay_fs.push(delay_fs[i]);
             echoes.photons.push(photons);
         }
     }
@@ -69,7 +75,10 @@ impl Link {
         if reflectance <= 0.0 || range <= 0.0 {
             return 0.0;
         }
-        let transmission = libm::exp(-self.extinction * range);
+        let transmission = match self.extinction == 0.0 {
+            true => 1.0,
+            false => libm::exp(-self.extinction * range),
+        };
         self.photons_at_one_metre * reflectance * transmission.powi(2) / range.powi(2)
     }
 }

@@ -8,7 +8,23 @@
 
 #![allow(unsafe_code)]
 
+mod delay;
 mod level;
 mod marks;
+mod merge;
+mod pack;
+mod philox;
+mod spacing;
+mod train;
+mod waits;
+mod whole;
 
+pub(crate) use delay::{delay, drawn};
 pub(crate) use marks::matching;
+pub(crate) use merge::{PAD, merge};
+pub(crate) use pack::{distinct, keep_below};
+pub(crate) use philox::{GROUP, philox};
+pub(crate) use spacing::all_apart;
+pub(crate) use train::{STEP, Train, append_train};
+pub(crate) use waits::{END, Events};
+pub(crate) use whole::whole;
