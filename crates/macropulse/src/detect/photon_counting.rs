@@ -22,6 +22,9 @@ use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
 use crate::units::FS_PER_S;
 
+/// Less than one edge in so many is put in its place alone, rather than merging all.
+const FEW: usize = 64;
+
 /// What the detector is given of a band.
 pub(super) struct Band<'a> {
     pub clock: Clock,
@@ -90,7 +93,9 @@ impl Counting {
             let span =
                 band.clock.time(band.log.fired_at_fs[0])..=band.clock.time(last + self.reach_fs);
             noise.edges(&band.clock, span, chance, &mut memory.false_edges);
-            if !memory.false_edges.is_empty() {
+            if memory.false_edges.len() < time.len() / FEW {
+                insert(&mut time, &memory.false_edges);
+            } else {
                 time.extend(PAD);
                 memory.false_edges.extend(PAD);
                 merge(&time, &memory.false_edges, &mut memory.merged, 0);
@@ -126,7 +131,7 @@ impl Counting {
             lit: self.lit[usize::from(log.label[shot])],
             start,
         };
-        append_train(train, time);
+        append_train(&train, time);
         if !seen.is_certain() || self.jitter.is_some() {
             let earlier = echoes.shot[..echo].iter().rev();
             let part = earlier.take_while(|other| **other == echoes.shot[echo]).count() as u32;
@@ -164,6 +169,18 @@ fn in_order_of_arrival(band: &Band, order: &mut Vec<u64>) {
     }
 }
 
+/// Puts each of `few` in its place among `time`; both ascend.
+fn insert(time: &mut Vec<u32>, few: &[u32]) {
+    let mut end = time.len();
+    time.resize(end + few.len(), 0);
+    for (before, &edge) in few.iter().enumerate().rev() {
+        let place = time[..end].partition_point(|other| *other <= edge);
+        time.copy_within(place..end, place + before + 1);
+        time[place + before] = edge;
+        end = place;
+    }
+}
+
 /// Makes one ascending row of the two that meet at `from`.
 fn join(time: &mut Vec<u32>, from: usize, memory: &mut Memory) {
     let (Some(last), Some(&first)) = (time[..from].last(), time.get(from)) else { return };
@@ -194,7 +211,10 @@ struct Bernoulli {
 
 impl Bernoulli {
     fn new(probability: f64) -> Self {
-        Self { threshold: (probability * 4_294_967_296.0).round() as u64 }
+        let all = 4_294_967_296.0;
+        Self {
+            threshold: if probability < 1.0 { (probability * all + 0.5) as u64 } else { 1 << 32 },
+        }
     }
 
     fn is_certain(self) -> bool {
@@ -283,6 +303,15 @@ mod tests {
             .collect();
         expected.sort_unstable();
         assert_eq!(absolute(&detect(&design, &log, &echoes, 1)), expected);
+    }
+
+    #[test]
+    fn a_few_edges_find_their_places() {
+        let mut time = vec![3, 5, 5, 8, 9];
+        insert(&mut time, &[1, 5, 6, 7, 11]);
+        assert_eq!(time, [1, 3, 5, 5, 5, 6, 7, 8, 9, 11]);
+        insert(&mut time, &[]);
+        assert_eq!(time.len(), 10);
     }
 
     /// H0: marks are seen with 1 − exp(−n). N ≈ 0.6 M marks, seed 11, α = 1e-6 (|z| < 4.9).

@@ -106,12 +106,12 @@ fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
     let count = (shots.end - shots.start) as usize;
     let mut log = ShotLog { first: shots.start, ..ShotLog::default() };
     let per_scan = design.shots_per_scan();
-    log.fired_at_fs.reserve_exact(count);
+    log.fired_at_fs = vec![0; count];
     match EqualSteps::new(design, shots.start) {
-        Some(steps) => log.fired_at_fs.extend(steps.take(count)),
-        None => log.fired_at_fs.extend(
-            shots.clone().map(|shot| fired_at_fs(design, shot / per_scan, shot % per_scan)),
-        ),
+        Some(steps) => steps.fill(&mut log.fired_at_fs),
+        None => log.fired_at_fs.iter_mut().zip(shots.clone()).for_each(|(place, shot)| {
+            *place = fired_at_fs(design, shot / per_scan, shot % per_scan);
+        }),
     }
     for column in [&mut log.row, &mut log.column, &mut log.label, &mut log.word, &mut log.channel] {
         column.reserve_exact(count);

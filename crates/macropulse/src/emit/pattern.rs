@@ -100,12 +100,16 @@ impl EqualSteps {
             chip_fs,
         })
     }
-}
 
-impl Iterator for EqualSteps {
-    type Item = i64;
+    /// The times of as many shots as there are places in `fired_at_fs`.
+    pub(super) fn fill(mut self, fired_at_fs: &mut [i64]) {
+        for place in fired_at_fs {
+            *place = self.next();
+        }
+    }
 
-    fn next(&mut self) -> Option<i64> {
+    #[inline]
+    fn next(&mut self) -> i64 {
         let fired_at_fs = self.fs - self.beyond_fs;
         self.rest += self.step.1;
         let carry = self.rest >= self.parts;
@@ -114,7 +118,7 @@ impl Iterator for EqualSteps {
         // Less than a chip and at most a chip more.
         self.beyond_fs += self.step.2 + i64::from(carry);
         self.beyond_fs -= if self.beyond_fs >= self.chip_fs { self.chip_fs } else { 0 };
-        Some(fired_at_fs)
+        fired_at_fs
     }
 }
 
@@ -222,8 +226,9 @@ mod tests {
             // The last ones are fired after two and a half hours.
             let scans = 9 * design.scan.rate_millihertz;
             for first in [0, 1, 12_345, scans / 7 * shots + 99, scans * shots - 7] {
-                let steps = EqualSteps::new(&design, first).unwrap();
-                for (shot, fs) in (first..).zip(steps).take(5000) {
+                let mut times = vec![0; 5000];
+                EqualSteps::new(&design, first).unwrap().fill(&mut times);
+                for (shot, fs) in (first..).zip(times) {
                     assert_eq!(
                         fs,
                         fired_at_fs(&design, shot / shots, shot % shots),

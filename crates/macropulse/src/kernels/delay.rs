@@ -1,27 +1,36 @@
 //! Times moved by random amounts that have been tabulated.
-#![allow(clippy::needless_range_loop)]
 
-use super::level::on_every_level;
+use super::level::Level;
 
-on_every_level! {
-    /// Adds to each of `times` what the number in the same place draws from `cells`, of which
-    /// there are 2 to the power of `bits`, 1 to 16, and tells how often a time is then below the
-    /// one before it.
-    ///
-    /// The leading bits of a number choose the cell, the others whether they are below its bound,
-    /// the upper 32 bits; then the next 16 bits are the amount, else the last 16.
-    pub(crate) fn delay(times: &mut [u32], numbers: &[u32], cells: &[u64], bits: u32) -> usize {
-        let count = times.len().min(numbers.len());
-        let (times, numbers) = (&mut times[..count], &numbers[..count]);
-        let (mut before, mut falls) = (0, 0);
-        for i in 0..count {
-            let time = times[i].wrapping_add_signed(drawn(numbers[i], cells, bits));
-            times[i] = time;
-            falls += usize::from(time < before);
-            before = time;
-        }
-        falls
+/// Adds to each of `times` what the number in the same place draws from `cells`, of which there
+/// are 2 to the power of `bits`, 1 to 16, and tells how often a time is then below the one before
+/// it.
+///
+/// The leading bits of a number choose the cell, the others whether they are below its bound, the
+/// upper 32 bits; then the next 16 bits are the amount, else the last 16.
+pub(crate) fn delay(times: &mut [u32], numbers: &[u32], cells: &[u64], bits: u32) -> usize {
+    let is_complete = (1..=16).contains(&bits) && cells.len() == 1 << bits;
+    match Level::here() {
+        // SAFETY: the processor has what this level asks for, and there is a cell for each number.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 if is_complete => unsafe { avx512::delay(times, numbers, cells, bits) },
+        _ => delay_one_by_one(times, numbers, (cells, bits), (0, 0)),
     }
+}
+
+/// As [`delay`], where the time before the first of these is `before` and `falls` were counted.
+fn delay_one_by_one(
+    times: &mut [u32],
+    numbers: &[u32],
+    (cells, bits): (&[u64], u32),
+    (mut before, mut falls): (u32, usize),
+) -> usize {
+    for (time, number) in times.iter_mut().zip(numbers) {
+        *time = time.wrapping_add_signed(drawn(*number, cells, bits));
+        falls += usize::from(*time < before);
+        before = *time;
+    }
+    falls
 }
 
 /// What `number` draws from `cells`, as [`delay`] does.
@@ -31,6 +40,73 @@ pub(crate) fn drawn(number: u32, cells: &[u64], bits: u32) -> i32 {
     let amounts = cell as u32;
     let is_own = number << bits < (cell >> 32) as u32;
     (if is_own { amounts } else { amounts << 16 }) as i32 >> 16
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    use std::arch::x86_64::{
+        __m512i, _mm_cvtsi32_si128, _mm512_add_epi32, _mm512_alignr_epi32, _mm512_castsi512_si256,
+        _mm512_cmplt_epu32_mask, _mm512_extracti64x4_epi64, _mm512_i32gather_epi64,
+        _mm512_loadu_si512, _mm512_mask_slli_epi32, _mm512_permutex2var_epi32, _mm512_setr_epi32,
+        _mm512_setzero_si512, _mm512_sll_epi32, _mm512_srai_epi32, _mm512_srl_epi32,
+        _mm512_storeu_si512,
+    };
+
+    const STEP: usize = 16;
+
+    /// # Safety
+    /// There must be 2 to the power of `bits` cells, `bits` from 1 to 31.
+    #[target_feature(enable = "avx512f,popcnt")]
+    pub(super) unsafe fn delay(
+        times: &mut [u32],
+        numbers: &[u32],
+        cells: &[u64],
+        bits: u32,
+    ) -> usize {
+        let index_by = _mm_cvtsi32_si128(32 - bits as i32);
+        let place_by = _mm_cvtsi32_si128(bits as i32);
+        let lower = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+        let upper = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+        let (mut before, mut falls) = (_mm512_setzero_si512(), 0);
+        let mut done = 0;
+        let steps = times.as_chunks_mut::<STEP>().0.iter_mut();
+        for (step, numbers) in steps.zip(numbers.as_chunks::<STEP>().0) {
+            // SAFETY: sixteen numbers are there to be read.
+            let number = unsafe { _mm512_loadu_si512(numbers.as_ptr().cast()) };
+            let index = _mm512_srl_epi32(number, index_by);
+            // SAFETY: an index of `bits` bits is that of a cell.
+            let (first, second): (__m512i, __m512i) = unsafe {
+                (
+                    _mm512_i32gather_epi64::<8>(
+                        _mm512_castsi512_si256(index),
+                        cells.as_ptr().cast(),
+                    ),
+                    _mm512_i32gather_epi64::<8>(
+                        _mm512_extracti64x4_epi64::<1>(index),
+                        cells.as_ptr().cast(),
+                    ),
+                )
+            };
+            let amounts = _mm512_permutex2var_epi32(first, lower, second);
+            let bounds = _mm512_permutex2var_epi32(first, upper, second);
+            let is_own = _mm512_cmplt_epu32_mask(_mm512_sll_epi32(number, place_by), bounds);
+            let amount =
+                _mm512_srai_epi32::<16>(_mm512_mask_slli_epi32::<16>(amounts, !is_own, amounts));
+            // SAFETY: sixteen times are there to be read and written.
+            let now = unsafe {
+                let now = _mm512_add_epi32(_mm512_loadu_si512(step.as_ptr().cast()), amount);
+                _mm512_storeu_si512(step.as_mut_ptr().cast(), now);
+                now
+            };
+            let shifted = _mm512_alignr_epi32::<15>(now, before);
+            falls += _mm512_cmplt_epu32_mask(now, shifted).count_ones() as usize;
+            before = now;
+            done += STEP;
+        }
+        let last = done.checked_sub(1).map_or(0, |last| times[last]);
+        let (rest, numbers) = (&mut times[done..], &numbers[done..]);
+        super::delay_one_by_one(rest, numbers, (cells, bits), (last, falls))
+    }
 }
 
 #[cfg(test)]

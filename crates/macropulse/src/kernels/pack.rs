@@ -2,6 +2,8 @@
 //!
 //! Compilers know no way to write this with vectors, but AVX-512 has an instruction for it.
 
+use std::ops::Range;
+
 use super::level::Level;
 
 /// Numbers looked at together.
@@ -34,29 +36,38 @@ fn keep_below_one_by_one(
     kept
 }
 
-/// Divides `times`, which ascend, by 2 to the power of `shift`, rounding down, and keeps one of
-/// each; gives how many. `shift` is from 1 to 31.
-pub(crate) fn distinct(times: &mut [u32], shift: u32) -> usize {
+/// Divides `times[from]`, which ascend, by 2 to the power of `shift`, 1 to 31, rounding down, and
+/// puts one of each at `kept` and behind; gives where they end. One that equals `last` is left
+/// out as well; in the end `last` is the last one. `kept` is not behind the beginning of `from`.
+pub(crate) fn distinct(
+    times: &mut [u32],
+    from: Range<usize>,
+    kept: usize,
+    shift: u32,
+    last: &mut u32,
+) -> usize {
+    let end = from.end.min(times.len());
+    let place = (from.start, kept.min(from.start));
     match Level::here() {
         // SAFETY: the processor has what this level asks for.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { avx512::distinct(times, shift) },
-        _ => distinct_one_by_one(times, shift, u32::MAX, (0, 0)),
+        Level::Avx512 => unsafe { avx512::distinct(&mut times[..end], shift, last, place) },
+        _ => distinct_one_by_one(&mut times[..end], shift, last, place),
     }
 }
 
-/// As [`distinct`], from `at` on, where `kept` are kept already and `last` was the last one.
+/// As [`distinct`], of all from `at` on.
 fn distinct_one_by_one(
     times: &mut [u32],
     shift: u32,
-    mut last: u32,
+    last: &mut u32,
     (at, mut kept): (usize, usize),
 ) -> usize {
     for i in at..times.len() {
         let now = times[i] >> (shift & 31);
         times[kept] = now;
-        kept += usize::from(now != last);
-        last = now;
+        kept += usize::from(now != *last);
+        *last = now;
     }
     kept
 }
@@ -104,11 +115,15 @@ mod avx512 {
     }
 
     #[target_feature(enable = "avx512f,popcnt")]
-    pub(super) fn distinct(times: &mut [u32], shift: u32) -> usize {
+    pub(super) fn distinct(
+        times: &mut [u32],
+        shift: u32,
+        last: &mut u32,
+        (mut at, mut kept): (usize, usize),
+    ) -> usize {
         let by = _mm_cvtsi32_si128(shift as i32);
-        let mut before = _mm512_set1_epi32(-1);
-        let (mut at, mut kept) = (0, 0);
-        while let Some(step) = times[at..].first_chunk() {
+        let mut before = _mm512_set1_epi32(*last as i32);
+        while let Some(step) = times.get(at..).and_then(<[u32]>::first_chunk) {
             let now = _mm512_srl_epi32(load(step), by);
             let mask = _mm512_cmpneq_epu32_mask(now, _mm512_alignr_epi32::<15>(now, before));
             if let Some(place) = times[kept..].first_chunk_mut() {
@@ -118,9 +133,10 @@ mod avx512 {
             at += STEP;
             before = now;
         }
-        let mut last = [0; STEP];
-        store(&mut last, before);
-        super::distinct_one_by_one(times, shift, last[STEP - 1], (at, kept))
+        let mut lasts = [0; STEP];
+        store(&mut lasts, before);
+        *last = lasts[STEP - 1];
+        super::distinct_one_by_one(times, shift, last, (at, kept))
     }
 }
 
@@ -153,7 +169,8 @@ mod tests {
 
         #[test]
         fn one_of_each_is_left_at_every_level(
-            mut times in proptest::collection::vec(0..5000_u32, 0..200),
+            mut times in proptest::collection::vec(0..5000_u32, 0..300),
+            block in 1..150_usize,
             shift in 1..8_u32,
         ) {
             times.sort_unstable();
@@ -161,7 +178,10 @@ mod tests {
             expected.dedup();
             for (level, kept) in at_each_level(|| {
                 let mut times = times.clone();
-                let kept = distinct(&mut times, shift);
+                let (mut kept, mut last) = (0, u32::MAX);
+                for from in (0..times.len()).step_by(block) {
+                    kept = distinct(&mut times, from..from + block, kept, shift, &mut last);
+                }
                 times.truncate(kept);
                 times
             }) {

@@ -17,7 +17,7 @@ pub(crate) const GROUP: usize = 4 * BLOCKS;
 const ROUNDS: usize = 10;
 const MULTIPLIERS: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
 /// What the key grows by from round to round: the golden ratio and √3 − 1.
-const STEPS: [u64; 2] = [0x9E37_79B9, 0xBB67_AE85];
+const STEPS: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const LOW: u64 = 0xFFFF_FFFF;
 
 on_every_level! {
@@ -25,7 +25,8 @@ on_every_level! {
     /// number at 16·w + i is word w of block i.
     pub(crate) fn philox(key: [u32; 2], address: [u32; 3], groups: &mut [[u32; GROUP]]) {
         for (g, group) in groups.iter_mut().enumerate() {
-            // One number in 64 bits each, as the multiplication has it.
+            // One number in 64 bits each, as the multiplication has it. Only the lower 32 count:
+            // what stands above them never comes down again.
             let first = (g as u32).wrapping_mul(BLOCKS as u32);
             let mut a = [0; BLOCKS];
             for i in 0..BLOCKS {
@@ -34,18 +35,17 @@ on_every_level! {
             let mut b = [u64::from(address[0]); BLOCKS];
             let mut c = [u64::from(address[1]); BLOCKS];
             let mut d = [u64::from(address[2]); BLOCKS];
-            let mut key = [u64::from(key[0]), u64::from(key[1])];
+            let mut key = key;
             for _ in 0..ROUNDS {
                 for i in 0..BLOCKS {
-                    // Said to be of 32 bits, they are multiplied in one step.
-                    let (from_a, from_c) =
-                        ((a[i] & LOW) * MULTIPLIERS[0], (c[i] & LOW) * MULTIPLIERS[1]);
-                    a[i] = (from_c >> 32) ^ b[i] ^ key[0];
-                    b[i] = from_c & LOW;
-                    c[i] = (from_a >> 32) ^ d[i] ^ key[1];
-                    d[i] = from_a & LOW;
+                    let from_a = (a[i] & LOW) * MULTIPLIERS[0];
+                    let from_c = (c[i] & LOW) * MULTIPLIERS[1];
+                    a[i] = (from_c >> 32) ^ b[i] ^ u64::from(key[0]);
+                    b[i] = from_c;
+                    c[i] = (from_a >> 32) ^ d[i] ^ u64::from(key[1]);
+                    d[i] = from_a;
                 }
-                key = [(key[0] + STEPS[0]) & LOW, (key[1] + STEPS[1]) & LOW];
+                key = [key[0].wrapping_add(STEPS[0]), key[1].wrapping_add(STEPS[1])];
             }
             for i in 0..BLOCKS {
                 group[i] = a[i] as u32;
@@ -72,7 +72,7 @@ mod tests {
         for _ in 0..ROUNDS {
             let (a, c) = (product(0, counter[0]), product(1, counter[2]));
             counter = [c.0 ^ counter[1] ^ key[0], c.1, a.0 ^ counter[3] ^ key[1], a.1];
-            key = [key[0].wrapping_add(STEPS[0] as u32), key[1].wrapping_add(STEPS[1] as u32)];
+            key = [key[0].wrapping_add(STEPS[0]), key[1].wrapping_add(STEPS[1])];
         }
         counter
     }

@@ -1,7 +1,8 @@
 //! Trains: the marks of one macropulse, put in a row.
-#![allow(clippy::needless_range_loop)]
 
-use super::level::on_every_level;
+use std::mem::MaybeUninit;
+
+use super::level::Level;
 
 /// Marks written at once; code words are padded to a multiple of it.
 pub(crate) const STEP: usize = 16;
@@ -21,27 +22,85 @@ pub(crate) struct Train<'a> {
     pub(crate) start: u32,
 }
 
-on_every_level! {
-    /// Appends the times of all marks of `train`.
-    pub(crate) fn append_train(train: Train<'_>, times: &mut Vec<u32>) {
-        let padded = train.word.len() / STEP * STEP;
-        let (word, weight) = (&train.word[..padded], train.weight.min(padded));
-        // Each bit is written with its padding, which the next one overwrites.
-        times.reserve(train.lit.count_ones() as usize * weight + padded);
-        let spare = times.spare_capacity_mut();
-        let (mut lit, mut written) = (train.lit, 0);
+/// Appends the times of all marks of `train`.
+pub(crate) fn append_train(train: &Train, times: &mut Vec<u32>) {
+    let word = train.word.as_chunks::<STEP>().0;
+    let weight = train.weight.min(STEP * word.len());
+    let bits = train.lit.count_ones() as usize;
+    // Each bit is written with its padding, which the next one overwrites.
+    times.reserve(bits * weight + STEP * word.len());
+    let places = times.spare_capacity_mut();
+    let is_written = match Level::here() {
+        // SAFETY: the processor has what this level asks for.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { avx512::write(train, (word, weight), places) },
+        _ => write(train, (word, weight), places),
+    };
+    if is_written {
+        let length = times.len() + bits * weight;
+        // SAFETY: room for that was reserved, and every bit has written its `weight` marks.
+        unsafe { times.set_len(length) }
+    }
+}
+
+/// Writes the bits one behind the other; false where they have no room.
+fn write(
+    train: &Train,
+    (word, weight): (&[[u32; STEP]], usize),
+    places: &mut [MaybeUninit<u32>],
+) -> bool {
+    let (mut lit, mut written) = (train.lit, 0);
+    while lit != 0 {
+        let start = train.start.wrapping_add(lit.trailing_zeros().wrapping_mul(train.bit));
+        let Some(places) = places.get_mut(written..written + STEP * word.len()) else {
+            return false;
+        };
+        for (place, mark) in places.iter_mut().zip(word.as_flattened()) {
+            place.write(start.wrapping_add(*mark));
+        }
+        written += weight;
+        lit &= lit - 1;
+    }
+    true
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    use super::{STEP, Train};
+    use std::arch::x86_64::{
+        _mm512_add_epi32, _mm512_loadu_si512, _mm512_set1_epi32, _mm512_storeu_si512,
+    };
+    use std::mem::MaybeUninit;
+
+    /// As [`super::write`]. Left to itself, the compiler asks more of each bit than it writes.
+    #[target_feature(enable = "avx512f,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) fn write(
+        train: &Train,
+        (word, weight): (&[[u32; STEP]], usize),
+        places: &mut [MaybeUninit<u32>],
+    ) -> bool {
+        let bits = train.lit.count_ones() as usize;
+        if places.len() < bits.saturating_sub(1) * weight + STEP * word.len() {
+            return false;
+        }
+        let (mut lit, mut place) = (train.lit, places.as_mut_ptr());
         while lit != 0 {
             let start = train.start.wrapping_add(lit.trailing_zeros().wrapping_mul(train.bit));
-            let places = &mut spare[written..][..padded];
-            for i in 0..padded {
-                places[i].write(start.wrapping_add(word[i]));
+            let start = _mm512_set1_epi32(start as i32);
+            for (step, marks) in word.iter().enumerate() {
+                // SAFETY: sixteen marks are there to be read. The last bit ends where the room
+                // does that was asked for above, and the others end before that.
+                unsafe {
+                    let marks = _mm512_loadu_si512(marks.as_ptr().cast());
+                    let place = place.add(STEP * step);
+                    _mm512_storeu_si512(place.cast(), _mm512_add_epi32(marks, start));
+                }
             }
-            written += weight;
             lit &= lit - 1;
+            // SAFETY: as above.
+            place = unsafe { place.add(weight) };
         }
-        let length = times.len() + written;
-        // SAFETY: room for `written` numbers was reserved, and every bit wrote its `weight` ones.
-        unsafe { times.set_len(length) }
+        true
     }
 }
 
@@ -67,7 +126,7 @@ mod tests {
             for (level, times) in at_each_level(|| {
                 let mut times = before.clone();
                 let train = Train { word: &word, weight: marks.len(), bit, lit, start };
-                append_train(train, &mut times);
+                append_train(&train, &mut times);
                 times
             }) {
                 prop_assert_eq!(&times, &expected, "{:?}", level);

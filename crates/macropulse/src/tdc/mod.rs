@@ -71,10 +71,7 @@ pub fn ticks(design: &Design, edges: Edges) -> Ticks {
         ..Bank::default()
     };
     let merged = if channel.is_empty() && amplitude.is_empty() {
-        let distinct = distinct(&mut time, PARTS_OF_TICK.trailing_zeros());
-        time.truncate(distinct);
-        bank.take_all(&mut time);
-        found - distinct
+        bank.take_all(&mut time)
     } else {
         bank.take_by_channel(&mut time, &mut channel, &mut amplitude)
     };
@@ -91,7 +88,7 @@ pub fn ticks(design: &Design, edges: Edges) -> Ticks {
 }
 
 /// Edges looked at together.
-const BLOCK: usize = 256;
+const BLOCK: usize = 512;
 
 /// Converters served first-free, each busy for the same time: an edge finds one free unless as
 /// many edges as there are converters were taken within the last dead time.
@@ -105,27 +102,28 @@ struct Bank {
 }
 
 impl Bank {
-    /// Leaves those of `ticks`, which are all different and ascend, that find a converter free.
+    /// Makes ticks of `times` and leaves those that find a converter free. Gives how many fell
+    /// into the tick of another one.
     ///
     /// If each of a block of edges is a dead time later than the one `peak` places before it, no
     /// more than `peak` converters are busy at any of them: all are taken, and there is no new
     /// peak. Few blocks are different.
-    fn take_all(&mut self, ticks: &mut Vec<u32>) {
-        let (mut read, mut taken) = (0, 0);
-        while read < ticks.len() {
-            let size = BLOCK.min(ticks.len() - read);
-            if taken < read {
-                ticks.copy_within(read..read + size, taken);
-            }
-            let block = taken..taken + size;
+    fn take_all(&mut self, times: &mut Vec<u32>) -> usize {
+        let (mut taken, mut merged, mut last) = (0, 0, u32::MAX);
+        for read in (0..times.len()).step_by(BLOCK) {
+            let from = read..times.len().min(read + BLOCK);
+            let found = from.len();
+            let end = distinct(times, from, taken, PARTS_OF_TICK.trailing_zeros(), &mut last);
+            let block = taken..end;
+            merged += found - block.len();
             let is_free = self.peak > 0
                 && taken.checked_sub(self.peak).is_some_and(|back| {
-                    all_apart(&ticks[back..][..size], &ticks[block.clone()], self.dead)
+                    all_apart(&times[back..][..block.len()], &times[block.clone()], self.dead)
                 });
-            taken = if is_free { block.end } else { self.take_block(ticks, block) };
-            read += size;
+            taken = if is_free { block.end } else { self.take_block(times, block) };
         }
-        ticks.truncate(taken);
+        times.truncate(taken);
+        merged
     }
 
     /// Takes the edges of `block` one by one; all before it were taken. Gives where those taken
