@@ -6,12 +6,13 @@ use rayon::prelude::*;
 
 use crate::decode::{Reject, Returns};
 use crate::design::Design;
+use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, ShotLog, bands};
 use crate::points::PointCloud;
 use crate::random::Chance;
 use crate::scene::{Hits, Scene};
 use crate::score::{self, Score};
-use crate::{channel, detect, tdc};
+use crate::{channel, tdc};
 
 /// One scan, measured.
 #[derive(Debug, Clone)]
@@ -90,16 +91,16 @@ fn measure_all(
     bands: &[Band],
     watch: &Watch,
 ) -> Vec<Option<Measured>> {
-    let chance = Chance::new(seed);
-    let measured = |band: &Band| {
+    let detectors = Detectors::new(design, Chance::new(seed));
+    let measured = |memory: &mut Memory, band: &Band| {
         if (watch.stop)() {
             return None;
         }
-        let measured = measure(design, scene, &chance, band.shot_log(design));
+        let measured = measure((design, scene), &detectors, memory, band.shot_log(design));
         (watch.done)(band.shots);
         Some(measured)
     };
-    bands.par_iter().map(measured).collect()
+    bands.par_iter().map_init(Memory::default, measured).collect()
 }
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
@@ -110,7 +111,12 @@ struct Measured {
     tally: Tally,
 }
 
-fn measure(design: &Design, scene: &Scene, chance: &Chance, log: ShotLog) -> Measured {
+fn measure(
+    (design, scene): (&Design, &Scene),
+    detectors: &Detectors,
+    memory: &mut Memory,
+    log: ShotLog,
+) -> Measured {
     let mut tally = Tally::default();
     let mut clock = Instant::now();
     let mut lap = |stage: usize, tally: &mut Tally| {
@@ -121,9 +127,10 @@ fn measure(design: &Design, scene: &Scene, chance: &Chance, log: ShotLog) -> Mea
     lap(0, &mut tally);
     let echoes = channel::echoes(design, &scene.materials, &hits);
     lap(1, &mut tally);
-    let edges = detect::edges(design, &log, &echoes, chance);
+    let edges = detectors.edges(&log, &echoes, memory);
+    tally.edges = edges.time.len() as u64;
     lap(2, &mut tally);
-    let ticks = tdc::ticks(design, &log, &edges);
+    let ticks = tdc::ticks(design, edges);
     lap(3, &mut tally);
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
     lap(4, &mut tally);
@@ -131,13 +138,13 @@ fn measure(design: &Design, scene: &Scene, chance: &Chance, log: ShotLog) -> Mea
     tally.shots = log.home.len() as u64;
     tally.surfaces = hits.shot.iter().filter(|s| home(s)).count() as u64;
     tally.echoes = echoes.shot.iter().filter(|s| home(s)).count() as u64;
-    tally.edges = edges.time_fs.len() as u64;
     tally.ticks = ticks.tick.len() as u64;
     tally.merged = ticks.merged;
     tally.lost = ticks.lost;
     tally.peak_busy = ticks.peak_busy;
     tally.returns = returns.shot.len() as u64;
     tally.rejects = returns.rejects;
+    memory.take_back(ticks.tick);
     Measured { log, hits, returns, tally }
 }
 

@@ -3,6 +3,8 @@
 //! Inside, every `f64` is in SI base units. Absolute time is an integer number of femtoseconds
 //! since the first scan began (`i64`, good for ±2.5 h); 1 fs is 0.15 µm of range.
 
+use crate::kernels::whole;
+
 /// Speed of light in vacuum, m/s (exact, SI 2019).
 pub const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
@@ -14,7 +16,8 @@ pub const FS_PER_S: i64 = 1_000_000_000_000_000;
 
 /// One-way range in metres of an echo whose light was `tof` seconds under way, there and back.
 ///
-/// `R = c·t/2` \[KP16 eq. 1\]; with [`tof_from_range`] the only place of this factor 2.
+/// `R = c·t/2` \[KP16 eq. 1\]; with [`tof_from_range`] and its column the only place
+/// of this factor 2.
 pub fn range_from_tof(tof: f64) -> f64 {
     SPEED_OF_LIGHT * tof / 2.0
 }
@@ -22,6 +25,14 @@ pub fn range_from_tof(tof: f64) -> f64 {
 /// Two-way time of flight in seconds to a target at `range` metres. Inverse of [`range_from_tof`].
 pub fn tof_from_range(range: f64) -> f64 {
     2.0 * range / SPEED_OF_LIGHT
+}
+
+/// Two-way times of flight to targets at `ranges` metres, in whole femtoseconds: for each what
+/// [`fs_from_s`] makes of [`tof_from_range`].
+pub fn tof_fs_from_ranges(ranges: &[f64]) -> Vec<i64> {
+    let mut tof_fs = vec![0; ranges.len()];
+    whole(ranges, 2.0, SPEED_OF_LIGHT, FS_PER_S as f64, &mut tof_fs);
+    tof_fs
 }
 
 /// Seconds to whole femtoseconds, rounded to the nearest.
@@ -48,6 +59,14 @@ mod tests {
     fn range_and_tof_are_inverse() {
         for range in [0.0, 0.375e-3, 30.0, 150.0, 5e3] {
             approx::assert_relative_eq!(range_from_tof(tof_from_range(range)), range);
+        }
+    }
+
+    #[test]
+    fn a_column_of_ranges_comes_to_the_same_as_each_alone() {
+        let ranges: Vec<f64> = (0..100_000).map(|i| f64::from(i) * 1.7e-3 + 1e-9).collect();
+        for (range, tof_fs) in ranges.iter().zip(tof_fs_from_ranges(&ranges)) {
+            assert_eq!(tof_fs, fs_from_s(tof_from_range(*range)));
         }
     }
 

@@ -28,11 +28,14 @@ fn clear(name: &str) -> Design {
     Design::open(name, &PERFECT.iter().map(owned).collect::<Vec<_>>()).unwrap()
 }
 
-/// Coded sensors are measured in a few bands around the horizon, the others as a whole.
+/// Coded sensors are measured in a few lines around the horizon, the others as a whole.
 fn measure(design: &Design, scene: &Scene) -> PointCloud {
     let all = bands(design, 0);
-    let part: Vec<Band> =
-        if design.is_coded() { all.skip(26).step_by(4).take(2).collect() } else { all.collect() };
+    let around = |band: &Band| {
+        let row = band.first / u64::from(design.scan.columns);
+        (234..243).contains(&row) || (270..279).contains(&row)
+    };
+    let part: Vec<Band> = all.filter(|band| !design.is_coded() || around(band)).collect();
     sim::scan_part(design, scene, 7, &part).cloud
 }
 

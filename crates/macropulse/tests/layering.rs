@@ -44,12 +44,12 @@ const RULES: [Rule; 18] = [
     },
     Rule {
         module: "detect",
-        may_name: &["channel", "design", "emit", "random", "units"],
+        may_name: &["channel", "design", "emit", "kernels", "random", "units"],
         because: "a detector sees light, not what reflected it, and is not told the truth",
     },
     Rule {
         module: "tdc",
-        may_name: &["design", "detect", "emit"],
+        may_name: &["design", "detect", "kernels"],
         because: "a converter sees edges alone",
     },
     Rule {
@@ -79,8 +79,16 @@ const RULES: [Rule; 18] = [
         may_name: &["channel", "code", "units"],
         because: "an oracle that ran the simulation would agree with it whatever it did",
     },
-    Rule { module: "random", may_name: &[], because: "chance is addressed, not drawn by a stage" },
-    Rule { module: "units", may_name: &[], because: "constants depend on nothing" },
+    Rule {
+        module: "random",
+        may_name: &["kernels"],
+        because: "chance is addressed, not drawn by a stage; the numbers come in wide loops",
+    },
+    Rule {
+        module: "units",
+        may_name: &["kernels"],
+        because: "constants depend on nothing; whole columns are converted in a wide loop",
+    },
     Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
     Rule { module: "digest", may_name: &[], because: "a hash of bytes asks not whose they are" },
     Rule { module: "names", may_name: &[], because: "the likeness of words depends on nothing" },

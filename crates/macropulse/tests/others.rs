@@ -32,18 +32,26 @@ fn example(name: &str, folder: &str) -> Option<Scene> {
     Some(Scene::from_toml(&text, name, &base).unwrap())
 }
 
-/// A scan by a ready sensor; of a coded one only the bands named.
+/// Lines in each of the stretches that a coded sensor is measured in.
+const LINES: u64 = 9;
+
+/// A scan by a ready sensor; of a coded one only the stretches named.
 struct Seen {
     design: Design,
     scan: Scan,
 }
 
 impl Seen {
-    fn new(sensor: &str, scene: &Scene, coded_bands: &[usize]) -> Self {
+    fn new(sensor: &str, scene: &Scene, coded: &[u64]) -> Self {
         let design = Design::open(sensor, &[]).unwrap();
         let all: Vec<Band> = bands(&design, 0).collect();
         let part: Vec<Band> = match design.is_coded() {
-            true => coded_bands.iter().map(|&band| all[band]).collect(),
+            true => all
+                .into_iter()
+                .filter(|band| {
+                    coded.contains(&(band.first / u64::from(design.scan.columns) / LINES))
+                })
+                .collect(),
             false => all,
         };
         let scan = sim::scan_part(&design, scene, 11, &part);

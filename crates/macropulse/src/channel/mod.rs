@@ -13,7 +13,7 @@
 
 use crate::design::Design;
 use crate::scene::{Hits, Material};
-use crate::units::{fs_from_s, tof_from_range};
+use crate::units::tof_fs_from_ranges;
 
 /// Echoes of a band of shots, as columns, ordered by shot. Truth: the light itself, before any
 /// detector.
@@ -30,18 +30,31 @@ pub struct Echoes {
 /// The echoes of `hits` at the sensor `design`, whose scene has `materials`.
 pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
     let link = Link::of(design);
-    let mut echoes = Echoes::default();
-    for i in 0..hits.shot.len() {
-        let reflectance =
-            materials[usize::from(hits.material[i])].backscatter(f64::from(hits.cosine[i]));
-        let photons = link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i]);
-        if photons > 0.0 {
-            echoes.shot.push(hits.shot[i]);
-            echoes.delay_fs.push(fs_from_s(tof_from_range(hits.range[i])));
-            echoes.photons.push(photons);
-        }
+    let photons: Vec<f64> = (0..hits.shot.len())
+        .map(|i| {
+            let material = &materials[usize::from(hits.material[i])];
+            let reflectance = material.backscatter(f64::from(hits.cosine[i]));
+            link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i])
+        })
+        .collect();
+    let mut echoes =
+        Echoes { shot: hits.shot.clone(), delay_fs: tof_fs_from_ranges(&hits.range), photons };
+    if !echoes.photons.iter().all(|&photons| photons > 0.0) {
+        echoes.leave_out_the_dark();
     }
     echoes
+}
+
+impl Echoes {
+    /// What has no light is no echo.
+    fn leave_out_the_dark(&mut self) {
+        let is_lit: Vec<bool> = self.photons.iter().map(|&photons| photons > 0.0).collect();
+        let mut of_shots = is_lit.iter();
+        self.shot.retain(|_| of_shots.next() == Some(&true));
+        let mut of_delays = is_lit.iter();
+        self.delay_fs.retain(|_| of_delays.next() == Some(&true));
+        self.photons.retain(|&photons| photons > 0.0);
+    }
 }
 
 /// The link equation with everything that does not depend on the target multiplied out.
@@ -69,7 +82,10 @@ impl Link {
         if reflectance <= 0.0 || range <= 0.0 {
             return 0.0;
         }
-        let transmission = libm::exp(-self.extinction * range);
+        let transmission = match self.extinction == 0.0 {
+            true => 1.0,
+            false => libm::exp(-self.extinction * range),
+        };
         self.photons_at_one_metre * reflectance * transmission.powi(2) / range.powi(2)
     }
 }
@@ -100,6 +116,24 @@ mod tests {
         approx::assert_relative_eq!(extinction(23e3, 905e-9), 0.0890e-3, max_relative = 2e-3);
         // In dense fog the wavelength does not matter.
         assert_eq!(extinction(400.0, 905e-9), extinction(400.0, 1550e-9));
+    }
+
+    #[test]
+    fn what_has_no_light_is_no_echo() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        let materials = [Material::matt("white", 1.0), Material::matt("black", 0.0)];
+        let hits = Hits {
+            shot: vec![3, 5, 5, 9],
+            weight: vec![1.0; 4],
+            range: vec![10.0, 20.0, 30.0, 40.0],
+            cosine: vec![1.0, 1.0, 0.5, 0.0],
+            material: vec![0, 1, 0, 0],
+            object: vec![0; 4],
+        };
+        let echoes = echoes(&design, &materials, &hits);
+        assert_eq!(echoes.shot, [3, 5]);
+        assert_eq!(echoes.delay_fs[1], crate::units::fs_from_s(crate::units::tof_from_range(30.0)));
+        assert_eq!(echoes.photons[1], Link::of(&design).photons(0.5, 30.0));
     }
 
     #[test]

@@ -6,8 +6,8 @@ use super::file::{
     SpinningFile,
 };
 use super::{
-    Coding, Design, Detector, Effect, Error, FirstFiring, Light, Pattern, PhotonCounting, Scan,
-    Sensitivity, Tdc,
+    Coding, Design, Detector, Effect, Error, FirstFiring, Light, PARTS_OF_TICK, Pattern,
+    PhotonCounting, Scan, Sensitivity, Tdc,
 };
 use crate::code::{Codebook, Crc, Family, Payload};
 use crate::decode::{Receiver, ReceiverKind};
@@ -15,6 +15,10 @@ use crate::units::{fs_from_s, tof_from_range};
 
 /// Pixels of the largest range image: a scan of it takes some 4 GB.
 const MOST_PIXELS: u64 = 1 << 25;
+
+/// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
+const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, if shots are not coded) with the \
+     jitter must be within 67 million ticks; use longer ticks or a shorter max_range_m";
 
 /// The format this program reads.
 const VERSION: u32 = 1;
@@ -56,6 +60,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         warnings: Vec::new(),
         text: chain.text(),
     };
+    check.clock(&design)?;
     check.timing(&mut design)?;
     Ok(design)
 }
@@ -411,8 +416,8 @@ impl Check<'_> {
         }
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
-        if gate.1 >= i64::from(u32::MAX) / 4 {
-            return self.refuse("tdc.resolution_ps", "is too fine for so long a range gate");
+        if gate.1 >= i64::from(u32::MAX / PARTS_OF_TICK) {
+            return self.refuse("tdc.resolution_ps", TOO_FINE);
         }
         let weight = coding.codebook.family().weight() as u32;
         Ok(Receiver {
@@ -433,6 +438,15 @@ impl Check<'_> {
                 1
             },
         })
+    }
+
+    /// One shot and all that arrives together with its echoes must be within what is timed in
+    /// one go.
+    fn clock(&self, design: &Design) -> Result<(), Error> {
+        if design.longest_band_fs() < 0 {
+            return self.refuse("tdc.resolution_ps", TOO_FINE);
+        }
+        Ok(())
     }
 
     /// A macropulse must end before the next one begins.

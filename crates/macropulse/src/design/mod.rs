@@ -7,6 +7,7 @@
 //!
 //! A `Design` that exists is valid, and nobody downstream checks it again.
 
+mod band;
 mod check;
 mod derived;
 mod document;
@@ -17,6 +18,7 @@ pub mod safety;
 
 use std::path::Path;
 
+pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use derived::Derived;
 pub use effect::Effect;
 pub use file::{Firing, Label, Mirror};

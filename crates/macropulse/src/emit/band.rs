@@ -3,13 +3,16 @@
 //! How a scan is cut into bands depends on the sensor alone, never on the number of threads, so
 //! the bytes that come out do not depend on it either.
 
-use super::ShotLog;
-use super::pattern::{fired_at_fs, pixel};
-use crate::design::{Design, Pattern};
-use crate::units::{fs_from_s, tof_from_range};
+use std::iter::repeat_n;
+use std::ops::Range;
 
-/// A band holds about this many shots, in whole lines.
-const SHOTS: u64 = 8192;
+use super::ShotLog;
+use super::pattern::{EqualSteps, fired_at_fs, pixel};
+use crate::design::{Design, Mirror, Pattern};
+
+/// A band holds about this many shots, in whole lines: few enough for the edges of a coded sensor
+/// to stay in the cache, enough for the halo to be a small part of it.
+const SHOTS: u64 = 1700;
 
 /// One band: consecutive shots of one scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,22 +27,35 @@ pub struct Band {
 
 /// The bands of scan number `scan`, in the order of time.
 pub fn bands(design: &Design, scan: u64) -> impl Iterator<Item = Band> {
-    let line = match &design.scan.pattern {
-        Pattern::Raster { .. } => u64::from(design.scan.columns),
-        Pattern::Spinning { order, .. } => order.len() as u64,
-        Pattern::Flash { .. } => design.shots_per_scan(),
-    };
     let total = design.shots_per_scan();
-    // Ticks within a band are counted in 32 bits; leave room for the halo.
-    let longest_fs = (i64::from(u32::MAX) / 4) as f64 * design.tdc.tick_fs as f64;
-    let line_fs = design.scan_period() * 1e15 * line as f64 / total as f64;
-    let lines = (SHOTS / line).min((longest_fs / line_fs) as u64).max(1);
-    let step = lines * line;
+    let step = shots_of_band(design);
     (0..total.div_ceil(step)).map(move |n| Band {
         scan,
         first: n * step,
         shots: step.min(total - n * step),
     })
+}
+
+/// Shots of every band but the last: whole lines, or equal parts of a line where a line takes
+/// longer than the clock of a band counts.
+fn shots_of_band(design: &Design) -> u64 {
+    let line = match &design.scan.pattern {
+        Pattern::Raster { .. } => u64::from(design.scan.columns),
+        Pattern::Spinning { order, .. } => order.len() as u64,
+        Pattern::Flash { .. } => return design.shots_per_scan(),
+    };
+    let room_fs = design.longest_band_fs();
+    let line_fs = design.scan_period() * 1e15 * line as f64 / design.shots_per_scan() as f64;
+    let lines = (SHOTS / line).min((room_fs as f64 / line_fs) as u64);
+    if lines > 0 || line_fs <= room_fs as f64 {
+        return lines.max(1) * line;
+    }
+    // A mirror that swings is slowest at the ends of a line.
+    let lasts_fs =
+        |from: u64, to: u64| fired_at_fs(design, 0, to - 1) - fired_at_fs(design, 0, from);
+    let fits = |shots: &u64| lasts_fs(0, *shots).max(lasts_fs(line - shots, line)) <= room_fs;
+    let parts = (2..=line).map(|parts| line.div_ceil(parts));
+    parts.into_iter().find(fits).unwrap_or(1)
 }
 
 impl Band {
@@ -48,31 +64,107 @@ impl Band {
     ///
     /// A sensor whose shots each have a detector of their own needs no halo.
     pub fn shot_log(&self, design: &Design) -> ShotLog {
-        let per_scan = design.shots_per_scan();
-        let home_first = self.scan * per_scan + self.first;
-        let halo = if design.is_coded() { halo_shots(design) } else { 0 };
-        let first = home_first.saturating_sub(halo);
-        let last = home_first + self.shots + halo;
-        let count = (last - first) as usize;
-        let mut log = ShotLog { first, ..ShotLog::default() };
-        log.fired_at_fs.reserve_exact(count);
-        for shot in first..last {
-            let (scan, order) = (shot / per_scan, shot % per_scan);
-            let (row, column) = pixel(design, order);
-            log.fired_at_fs.push(fired_at_fs(design, scan, order));
-            log.row.push(row);
-            log.column.push(column);
-            log.label.push(if design.is_coded() { column } else { 0 });
-            log.word.push(word(design, row, column));
-            log.channel.push(match design.scan.pattern {
-                Pattern::Raster { .. } => 0,
-                Pattern::Spinning { .. } => row,
-                Pattern::Flash { .. } => order as u16,
-            });
+        let home_first = self.scan * design.shots_per_scan() + self.first;
+        let home_last = home_first + self.shots;
+        let shots = match design.is_coded() {
+            true => with_halo(design, home_first..home_last),
+            false => home_first..home_last,
+        };
+        let home = (home_first - shots.start) as usize;
+        ShotLog { home: home..home + self.shots as usize, ..log_of(design, shots) }
+    }
+}
+
+/// The shots `home` and those before and after them that are fired within one range gate and one
+/// macropulse.
+fn with_halo(design: &Design, home: Range<u64>) -> Range<u64> {
+    let per_scan = design.shots_per_scan();
+    let fired = |shot: u64| fired_at_fs(design, shot / per_scan, shot % per_scan);
+    let reach = design.reach_fs();
+    let (opens, closes) = (fired(home.start) - reach, fired(home.end - 1) + reach);
+    // As many as are fired in that time on average, and then one by one: a resonant mirror is
+    // faster in the middle of a line, and slower at its ends.
+    let mean = (reach as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
+    let (mut first, mut end) = (home.start.saturating_sub(mean), home.end + mean);
+    while first > 0 && fired(first - 1) >= opens {
+        first -= 1;
+    }
+    while first < home.start && fired(first) < opens {
+        first += 1;
+    }
+    while fired(end) <= closes {
+        end += 1;
+    }
+    while end > home.end && fired(end - 1) > closes {
+        end -= 1;
+    }
+    first..end
+}
+
+/// The log of `shots`, all of it home.
+fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
+    let count = (shots.end - shots.start) as usize;
+    let mut log = ShotLog { first: shots.start, ..ShotLog::default() };
+    let per_scan = design.shots_per_scan();
+    log.fired_at_fs = vec![0; count];
+    match EqualSteps::new(design, shots.start) {
+        Some(steps) => steps.fill(&mut log.fired_at_fs),
+        None => log.fired_at_fs.iter_mut().zip(shots.clone()).for_each(|(place, shot)| {
+            *place = fired_at_fs(design, shot / per_scan, shot % per_scan);
+        }),
+    }
+    for column in [&mut log.row, &mut log.column, &mut log.label, &mut log.word, &mut log.channel] {
+        column.reserve_exact(count);
+    }
+    match design.scan.pattern {
+        Pattern::Raster { mirror: Mirror::Uniform, .. } => add_lines(design, shots, &mut log),
+        _ => add_pixels(design, shots, &mut log),
+    }
+    log
+}
+
+/// Pixels, labels and words of a raster that goes from the left to the right, line by line.
+fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
+    let columns = u64::from(design.scan.columns);
+    let mut next = shots.start;
+    while next < shots.end {
+        let (row, column) = pixel(design, next % design.shots_per_scan());
+        let run = (columns - u64::from(column)).min(shots.end - next) as usize;
+        let pixels = column..column + run as u16;
+        log.row.extend(repeat_n(row, run));
+        log.column.extend(pixels.clone());
+        if design.is_coded() {
+            log.label.extend(pixels);
+        } else {
+            log.label.extend(repeat_n(0, run));
         }
-        let home = (home_first - first) as usize;
-        log.home = home..home + self.shots as usize;
-        log
+        let (first, modulus) = (design.coding.first_word as u16, design.coding.word_modulus as u16);
+        let mut word = word(design, row, column);
+        log.word.extend((0..run).map(|_| {
+            let now = word;
+            word += 1;
+            word -= if word == first + modulus { modulus } else { 0 };
+            now
+        }));
+        log.channel.extend(repeat_n(0, run));
+        next += run as u64;
+    }
+}
+
+/// Pixels, labels, words and detectors in whatever order.
+fn add_pixels(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
+    for shot in shots {
+        let order = shot % design.shots_per_scan();
+        let (row, column) = pixel(design, order);
+        log.row.push(row);
+        log.column.push(column);
+        log.label.push(if design.is_coded() { column } else { 0 });
+        log.word.push(word(design, row, column));
+        log.channel.push(match design.scan.pattern {
+            Pattern::Raster { .. } => 0,
+            Pattern::Spinning { .. } => row,
+            Pattern::Flash { .. } => order as u16,
+        });
     }
 }
 
@@ -80,16 +172,6 @@ impl Band {
 pub(super) fn word(design: &Design, row: u16, column: u16) -> u16 {
     let pixel = u32::from(row) * design.scan.columns + u32::from(column);
     (design.coding.first_word + pixel % design.coding.word_modulus) as u16
-}
-
-/// Shots fired in one range gate and one macropulse, rounded up.
-///
-/// Counted with the shortest dwell, because a resonant mirror is faster than the mean.
-fn halo_shots(design: &Design) -> u64 {
-    let derived = design.derived();
-    let dwell = fs_from_s(derived.shortest_dwell.min(derived.pixel_period)).max(1);
-    let reach = fs_from_s(tof_from_range(design.scan.max_range) + derived.macropulse);
-    reach as u64 / dwell as u64 + 2
 }
 
 #[cfg(test)]

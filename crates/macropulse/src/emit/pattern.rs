@@ -43,9 +43,8 @@ pub(super) fn order_of_pixel(design: &Design, row: u16, column: u16) -> u64 {
 
 /// Absolute time at which shot number `order` of scan `scan` is fired, fs.
 pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
-    let shots = design.shots_per_scan();
     let columns = u64::from(design.scan.columns);
-    let exact = |passed: u64| fraction_of_scan(design, scan, passed, shots);
+    let exact = |passed: u64| fraction_of_scan(design, scan, passed);
     let fs = match &design.scan.pattern {
         Pattern::Raster { mirror: Mirror::Uniform, duty: 1.0, .. } => exact(order),
         Pattern::Raster { mirror, duty, .. } => {
@@ -63,11 +62,78 @@ pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
     fs - fs.rem_euclid(design.coding.chip_fs)
 }
 
+/// The times of consecutive shots, where all of them are equally far apart: those of
+/// [`fired_at_fs`] without a division for each.
+///
+/// The exact time is a whole number of femtoseconds and a rest, counted in parts of one; a shot
+/// later both have grown by the same.
+pub(super) struct EqualSteps {
+    fs: i64,
+    rest: u64,
+    /// How far `fs` lies beyond the edge of the chip clock.
+    beyond_fs: i64,
+    step: (i64, u64, i64),
+    parts: u64,
+    chip_fs: i64,
+}
+
+impl EqualSteps {
+    /// From shot number `first` on, counted from the first one of the first scan; `None` where
+    /// shots are not equally far apart.
+    pub(super) fn new(design: &Design, first: u64) -> Option<Self> {
+        match design.scan.pattern {
+            Pattern::Raster { mirror: Mirror::Uniform, duty: 1.0, .. }
+            | Pattern::Spinning { firing: Firing::BlocksInTurn, .. } => {}
+            _ => return None,
+        }
+        let (parts, chip_fs) = (parts_of_fs(design), design.coding.chip_fs);
+        let numerator = u128::from(first) * NUMERATOR;
+        let whole = |numerator: u128| (numerator / parts) as i64;
+        let rest = |numerator: u128| (numerator % parts) as u64;
+        let step_fs = whole(NUMERATOR);
+        Some(Self {
+            fs: whole(numerator),
+            rest: rest(numerator),
+            beyond_fs: whole(numerator) % chip_fs,
+            step: (step_fs, rest(NUMERATOR), step_fs % chip_fs),
+            parts: parts as u64,
+            chip_fs,
+        })
+    }
+
+    /// The times of as many shots as there are places in `fired_at_fs`.
+    pub(super) fn fill(mut self, fired_at_fs: &mut [i64]) {
+        for place in fired_at_fs {
+            *place = self.next();
+        }
+    }
+
+    #[inline]
+    fn next(&mut self) -> i64 {
+        let fired_at_fs = self.fs - self.beyond_fs;
+        self.rest += self.step.1;
+        let carry = self.rest >= self.parts;
+        self.rest -= if carry { self.parts } else { 0 };
+        self.fs += self.step.0 + i64::from(carry);
+        // Less than a chip and at most a chip more.
+        self.beyond_fs += self.step.2 + i64::from(carry);
+        self.beyond_fs -= if self.beyond_fs >= self.chip_fs { self.chip_fs } else { 0 };
+        fired_at_fs
+    }
+}
+
+/// Femtoseconds in 1000 s, the time in which scans are counted.
+const NUMERATOR: u128 = FS_PER_S as u128 * 1000;
+
+/// What times of shots are whole numbers of, per femtosecond.
+fn parts_of_fs(design: &Design) -> u128 {
+    u128::from(design.shots_per_scan()) * u128::from(design.scan.rate_millihertz)
+}
+
 /// ⌊(scan + passed/shots) · T_scan⌋ in femtoseconds, without rounding on the way.
-fn fraction_of_scan(design: &Design, scan: u64, passed: u64, shots: u64) -> i64 {
-    let numerator =
-        (u128::from(scan) * u128::from(shots) + u128::from(passed)) * FS_PER_S as u128 * 1000;
-    (numerator / (u128::from(shots) * u128::from(design.scan.rate_millihertz))) as i64
+fn fraction_of_scan(design: &Design, scan: u64, passed: u64) -> i64 {
+    let shot = u128::from(scan) * u128::from(design.shots_per_scan()) + u128::from(passed);
+    (shot * NUMERATOR / parts_of_fs(design)) as i64
 }
 
 /// When, as a fraction of the line time, the mirror has crossed the fraction `across` of the line.
@@ -127,7 +193,11 @@ mod tests {
     use super::*;
 
     fn sensor(name: &str) -> Design {
-        Design::open(name, &[]).unwrap()
+        sensor_with(name, &[])
+    }
+
+    fn sensor_with(name: &str, set: &[(String, String)]) -> Design {
+        Design::open(name, set).unwrap()
     }
 
     #[test]
@@ -139,6 +209,49 @@ mod tests {
         assert_eq!(fired_at_fs(&design, 0, 100), 1_637_840 * 2500);
         // Sixty scans are one second to the femtosecond.
         assert_eq!(fired_at_fs(&design, 60, 0), FS_PER_S);
+    }
+
+    #[test]
+    fn steps_come_to_the_same_as_fractions() {
+        let odd = [("scan.scans_per_s".to_owned(), "59.94".to_owned())];
+        let turn = [("scan.spinning.azimuth_step_deg".to_owned(), "0.0864".to_owned())];
+        for (name, set) in [
+            ("kim-park-2016", &[][..]),
+            ("kim-park-2016", &odd),
+            ("hdl-64e", &[]),
+            ("hdl-64e", &turn),
+        ] {
+            let design = sensor_with(name, set);
+            let shots = design.shots_per_scan();
+            // The last ones are fired after two and a half hours.
+            let scans = 9 * design.scan.rate_millihertz;
+            for first in [0, 1, 12_345, scans / 7 * shots + 99, scans * shots - 7] {
+                let mut times = vec![0; 5000];
+                EqualSteps::new(&design, first).unwrap().fill(&mut times);
+                for (shot, fs) in (first..).zip(times) {
+                    assert_eq!(
+                        fs,
+                        fired_at_fs(&design, shot / shots, shot % shots),
+                        "{name} {shot}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_steps_are_equal_before_a_resonant_mirror_or_in_a_flash() {
+        let mirror = [("scan.raster.mirror".to_owned(), "sinusoidal".to_owned())];
+        let duty = [("scan.raster.duty".to_owned(), "0.8".to_owned())];
+        let together = [("scan.spinning.firing".to_owned(), "together".to_owned())];
+        for (name, set) in [
+            ("kim-park-2016", &mirror[..]),
+            ("kim-park-2016", &duty),
+            ("hdl-64e", &together),
+            ("peregrine", &[]),
+        ] {
+            assert!(EqualSteps::new(&sensor_with(name, set), 5).is_none(), "{name}");
+        }
     }
 
     #[test]

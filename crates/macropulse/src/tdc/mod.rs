@@ -8,9 +8,11 @@
 //!    them busy the edge is lost.
 //! 4. Where every detector has its own channel, the bank is divided evenly among them.
 
-use crate::design::{Design, Tdc};
+use std::ops::Range;
+
+use crate::design::{Design, PARTS_OF_TICK, Tdc};
 use crate::detect::Edges;
-use crate::emit::ShotLog;
+use crate::kernels::{all_apart, distinct};
 
 /// What the time-to-digital converters hand to the decoder: integers. Sorted by channel, then by
 /// tick, no tick twice in a channel.
@@ -58,139 +60,181 @@ impl Reading {
     }
 }
 
-/// The ticks of the `edges` of one band.
-pub fn ticks(design: &Design, log: &ShotLog, edges: &Edges) -> Ticks {
+/// The ticks of the `edges` of one band, in the memory that the edges had.
+pub fn ticks(design: &Design, edges: Edges) -> Ticks {
     let tdc = &design.tdc;
-    // Jitter may put an edge a little before the first shot.
-    let start = log.fired_at_fs.first().copied().unwrap_or(0);
-    let epoch_clocks = start.div_euclid(tdc.clock_fs) - 1;
-    let mut ticks =
-        Ticks { epoch: epoch_clocks * (tdc.clock_fs / tdc.tick_fs), ..Ticks::default() };
-    let per_channel = (tdc.converters / design.channels()).max(1) as usize;
-    let mut bank = Bank::new(
-        per_channel,
-        tdc.dead_fs.div_euclid(tdc.tick_fs) + i64::from(tdc.dead_fs % tdc.tick_fs > 0),
-    );
-    let mut previous = None;
-    for (i, &time_fs) in edges.time_fs.iter().enumerate() {
-        let channel = edges.channel.get(i).copied().unwrap_or(0);
-        let reading = Reading::at(tdc, time_fs);
-        let Ok(tick) = u32::try_from(reading.ticks_since(tdc, epoch_clocks as u32)) else {
-            ticks.lost += 1;
-            continue;
-        };
-        match previous {
-            Some((before, _)) if before != channel => bank.release(),
-            Some((_, last)) if last == tick => {
-                ticks.merged += 1;
-                continue;
-            }
-            _ => {}
-        }
-        previous = Some((channel, tick));
-        if !bank.take(tick) {
-            ticks.lost += 1;
-            continue;
-        }
-        ticks.tick.push(tick);
-        if !edges.channel.is_empty() {
-            ticks.channel.push(channel);
-        }
-        if let Some(&amplitude) = edges.amplitude.get(i) {
-            ticks.amplitude.push(amplitude);
-        }
+    let Edges { epoch, mut time, mut channel, mut amplitude } = edges;
+    let found = time.len();
+    let mut bank = Bank {
+        converters: (tdc.converters / design.channels()).max(1) as usize,
+        dead: u32::try_from((tdc.dead_fs + tdc.tick_fs - 1) / tdc.tick_fs).unwrap_or(u32::MAX),
+        ..Bank::default()
+    };
+    let merged = if channel.is_empty() && amplitude.is_empty() {
+        bank.take_all(&mut time)
+    } else {
+        bank.take_by_channel(&mut time, &mut channel, &mut amplitude)
+    };
+    let lost = (found - merged - time.len()) as u64;
+    Ticks {
+        epoch,
+        tick: time,
+        channel,
+        amplitude,
+        peak_busy: bank.peak as u32,
+        lost,
+        merged: merged as u64,
     }
-    ticks.peak_busy = bank.peak;
-    ticks
 }
+
+/// Edges looked at together.
+const BLOCK: usize = 512;
 
 /// Converters served first-free, each busy for the same time: an edge finds one free unless as
 /// many edges as there are converters were taken within the last dead time.
+#[derive(Debug, Default)]
 struct Bank {
-    dead: i64,
-    /// Ticks of the edges taken last, as a ring as long as the bank.
-    taken: Vec<i64>,
-    next: usize,
-    /// First entry of the ring, counted back from `next`, that is still busy.
-    busy: usize,
-    peak: u32,
+    converters: usize,
+    /// Time for which a converter is busy, ticks.
+    dead: u32,
+    /// Most converters that were busy at once.
+    peak: usize,
 }
 
 impl Bank {
-    fn new(converters: usize, dead: i64) -> Self {
-        Self { dead, taken: vec![i64::MIN / 2; converters], next: 0, busy: 0, peak: 0 }
-    }
-
-    /// All converters become free.
-    fn release(&mut self) {
-        self.taken.fill(i64::MIN / 2);
-        self.busy = 0;
-    }
-
-    fn take(&mut self, tick: u32) -> bool {
-        let (now, size) = (i64::from(tick), self.taken.len());
-        while self.busy > 0 {
-            let oldest = self.taken[(self.next + size - self.busy) % size];
-            if oldest + self.dead > now {
-                break;
-            }
-            self.busy -= 1;
+    /// Makes ticks of `times` and leaves those that find a converter free. Gives how many fell
+    /// into the tick of another one.
+    ///
+    /// If each of a block of edges is a dead time later than the one `peak` places before it, no
+    /// more than `peak` converters are busy at any of them: all are taken, and there is no new
+    /// peak. Few blocks are different.
+    fn take_all(&mut self, times: &mut Vec<u32>) -> usize {
+        let (mut taken, mut merged, mut last) = (0, 0, u32::MAX);
+        for read in (0..times.len()).step_by(BLOCK) {
+            let from = read..times.len().min(read + BLOCK);
+            let found = from.len();
+            let end = distinct(times, from, taken, PARTS_OF_TICK.trailing_zeros(), &mut last);
+            let block = taken..end;
+            merged += found - block.len();
+            let is_free = self.peak > 0
+                && taken.checked_sub(self.peak).is_some_and(|back| {
+                    all_apart(&times[back..][..block.len()], &times[block.clone()], self.dead)
+                });
+            taken = if is_free { block.end } else { self.take_block(times, block) };
         }
-        if self.busy == size {
+        times.truncate(taken);
+        merged
+    }
+
+    /// Takes the edges of `block` one by one; all before it were taken. Gives where those taken
+    /// end.
+    fn take_block(&mut self, ticks: &mut [u32], block: Range<usize>) -> usize {
+        // Of edges before that, none is still busy.
+        let mut busy = block.start.saturating_sub(self.peak)..block.start;
+        for read in block {
+            let now = ticks[read];
+            if self.takes(now, ticks, &mut busy) {
+                ticks[busy.end] = now;
+                busy.end += 1;
+            }
+        }
+        busy.end
+    }
+
+    /// Whether an edge at `now` finds a converter free. Of `taken` those in the range `busy` may
+    /// still be.
+    fn takes(&mut self, now: u32, taken: &[u32], busy: &mut Range<usize>) -> bool {
+        while busy.start < busy.end && now - taken[busy.start] >= self.dead {
+            busy.start += 1;
+        }
+        if busy.len() == self.converters {
             return false;
         }
-        self.taken[self.next] = now;
-        self.next = (self.next + 1) % size;
-        self.busy += 1;
-        self.peak = self.peak.max(self.busy as u32);
+        self.peak = self.peak.max(busy.len() + 1);
         true
+    }
+
+    /// Makes ticks of `times` and leaves those that find one of the converters of their channel
+    /// free, and what belongs to them. Gives how many fell into the tick of another one.
+    fn take_by_channel(
+        &mut self,
+        times: &mut Vec<u32>,
+        channels: &mut Vec<u16>,
+        amplitudes: &mut Vec<f32>,
+    ) -> usize {
+        let (mut merged, mut busy, mut before) = (0, 0..0, None);
+        for read in 0..times.len() {
+            let channel = channels.get(read).copied().unwrap_or(0);
+            let now = times[read] / PARTS_OF_TICK;
+            if before == Some((channel, now)) {
+                merged += 1;
+                continue;
+            }
+            if before.is_some_and(|(other, _)| other != channel) {
+                busy.start = busy.end;
+            }
+            before = Some((channel, now));
+            if self.takes(now, times, &mut busy) {
+                times[busy.end] = now;
+                if let Some(place) = channels.get_mut(busy.end) {
+                    *place = channel;
+                }
+                if read < amplitudes.len() {
+                    amplitudes[busy.end] = amplitudes[read];
+                }
+                busy.end += 1;
+            }
+        }
+        times.truncate(busy.end);
+        channels.truncate(busy.end);
+        amplitudes.truncate(busy.end);
+        merged
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+    use std::collections::VecDeque;
 
-    fn sensor(set: &[(&str, &str)]) -> (Design, ShotLog) {
+    fn sensor(set: &[(&str, &str)]) -> Design {
         let set: Vec<(String, String)> =
             set.iter().map(|(k, v)| (format!("tdc.{k}"), (*v).to_owned())).collect();
-        let design = Design::open("kim-park-2016", &set).unwrap();
-        let log = crate::emit::bands(&design, 0).next().unwrap().shot_log(&design);
-        (design, log)
+        Design::open("kim-park-2016", &set).unwrap()
     }
 
-    fn timed(design: &Design, log: &ShotLog, time_fs: Vec<i64>) -> Ticks {
-        ticks(design, log, &Edges { time_fs, ..Edges::default() })
+    fn timed(design: &Design, epoch: i64, time: Vec<u32>) -> Ticks {
+        ticks(design, Edges { epoch, time, ..Edges::default() })
     }
 
     #[test]
     fn edges_in_one_tick_are_one() {
-        let (design, log) = sensor(&[]);
-        let ticks = timed(&design, &log, vec![1_000_000, 1_002_499, 1_002_500]);
-        let absolute: Vec<i64> = ticks.tick.iter().map(|t| i64::from(*t) + ticks.epoch).collect();
-        assert_eq!(absolute, [400, 401]);
-        assert_eq!(ticks.merged, 1);
+        let ticks = timed(&sensor(&[]), 4000, vec![64 * 400, 64 * 400 + 63, 64 * 401]);
+        assert_eq!((ticks.epoch, &ticks.tick[..]), (4000, &[400, 401][..]));
+        assert_eq!((ticks.merged, ticks.lost), (1, 0));
     }
 
+    /// What the converters put out says the same as the time since the epoch, even if the counter
+    /// rolls over on the way.
     #[test]
     fn the_counter_rolls_over_unnoticed() {
-        let (design, mut log) = sensor(&[]);
-        let rollover = (1_i64 << 32) * design.tdc.clock_fs;
+        let tdc = &sensor(&[]).tdc;
+        let rollover = (1_i64 << 32) * tdc.clock_fs;
         approx::assert_relative_eq!(rollover as f64 * 1e-15, 0.4295, max_relative = 1e-4);
-        log.fired_at_fs = vec![rollover - 5_000_000];
-        let edges = vec![rollover - 2_500, rollover, rollover + 2_500];
-        let ticks = timed(&design, &log, edges);
-        let absolute: Vec<i64> = ticks.tick.iter().map(|t| i64::from(*t) + ticks.epoch).collect();
-        let first = rollover / 2_500 - 1;
-        assert_eq!(absolute, [first, first + 1, first + 2]);
-        assert_eq!(Reading::at(&design.tdc, rollover).clock, 0);
+        assert_eq!(Reading::at(tdc, rollover).clock, 0);
+        let epoch = rollover / tdc.clock_fs - 50;
+        for tick in [0, 1, 1999, 2000, 2001, 67_000_000] {
+            let time_fs = epoch * tdc.clock_fs + tick * tdc.tick_fs;
+            assert_eq!(Reading::at(tdc, time_fs).ticks_since(tdc, epoch as u32), tick);
+        }
     }
 
     #[test]
     fn a_bank_of_two_loses_the_third_edge_within_the_dead_time() {
-        let (design, log) = sensor(&[("converters", "2"), ("dead_time_ns", "3.3")]);
-        let ns = |t: f64| (t * 1e6) as i64;
-        let ticks = timed(&design, &log, vec![ns(10.0), ns(11.0), ns(12.0), ns(13.4), ns(13.5)]);
+        let design = sensor(&[("converters", "2"), ("dead_time_ns", "3.3")]);
+        let ns = |t: f64| (t * 400.0 * 64.0) as u32;
+        let ticks = timed(&design, 0, vec![ns(10.0), ns(11.0), ns(12.0), ns(13.4), ns(13.5)]);
         assert_eq!((ticks.tick.len(), ticks.lost, ticks.peak_busy), (3, 2, 2));
     }
 
@@ -198,14 +242,76 @@ mod tests {
     fn each_channel_has_its_share_of_the_bank() {
         let design =
             Design::open("peregrine", &[("tdc.dead_time_ns".into(), "100".into())]).unwrap();
-        let log = crate::emit::bands(&design, 0).next().unwrap().shot_log(&design);
         let edges = Edges {
-            time_fs: vec![1_000_000, 2_000_000, 1_000_000],
+            epoch: 0,
+            time: vec![6400, 12_800, 6400],
             channel: vec![0, 0, 1],
-            amplitude: vec![1.0; 3],
+            amplitude: vec![1.0, 2.0, 3.0],
         };
-        let ticks = ticks(&design, &log, &edges);
-        assert_eq!((ticks.tick.len(), ticks.lost), (2, 1));
-        assert_eq!(ticks.channel, [0, 1]);
+        let ticks = ticks(&design, edges);
+        assert_eq!((ticks.tick, ticks.lost), (vec![100, 100], 1));
+        assert_eq!((ticks.channel, ticks.amplitude), (vec![0, 1], vec![1.0, 3.0]));
+    }
+
+    /// The bank as one would tell it: every converter remembers when it is free again.
+    fn told(design: &Design, times: &[u32]) -> Ticks {
+        let dead = (design.tdc.dead_fs as u64).div_ceil(design.tdc.tick_fs as u64);
+        let mut busy_until: VecDeque<u64> = VecDeque::new();
+        let (mut ticks, mut before) = (Ticks::default(), None);
+        for tick in times.iter().map(|time| time / 64) {
+            if before.replace(tick) == Some(tick) {
+                ticks.merged += 1;
+                continue;
+            }
+            while busy_until.front().is_some_and(|until| *until <= u64::from(tick)) {
+                busy_until.pop_front();
+            }
+            if busy_until.len() == design.tdc.converters as usize {
+                ticks.lost += 1;
+                continue;
+            }
+            busy_until.push_back(u64::from(tick) + dead);
+            ticks.peak_busy = ticks.peak_busy.max(busy_until.len() as u32);
+            ticks.tick.push(tick);
+        }
+        ticks
+    }
+
+    proptest! {
+        #[test]
+        fn blocks_come_to_the_same_as_one_edge_after_the_other(
+            gaps in proptest::collection::vec(0..30_000_u32, 0..1000),
+            scale in 0..4_u32,
+            converters in 1..60_u32,
+            dead_ns in 0..5_u32,
+        ) {
+            let set = [
+                ("converters", converters.to_string()), ("dead_time_ns", dead_ns.to_string()),
+            ];
+            let design = sensor(&set.each_ref().map(|(key, value)| (*key, &value[..])));
+            let times: Vec<u32> = gaps.iter().scan(0, |time, gap| {
+                *time += gap >> (4 * scale);
+                Some(*time)
+            }).collect();
+            let expected = told(&design, &times);
+            prop_assert_eq!(timed(&design, 0, times), expected);
+        }
+
+        /// Sensors with amplitudes go edge by edge.
+        #[test]
+        fn with_and_without_amplitudes_the_bank_is_the_same(
+            mut times in proptest::collection::vec(0..1_000_000_u32, 0..300),
+            converters in 1..60_u32,
+        ) {
+            times.sort_unstable();
+            let design = sensor(&[("converters", &converters.to_string())]);
+            let without = timed(&design, 0, times.clone());
+            let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
+            let edges = Edges { time: times, amplitude, ..Edges::default() };
+            let with = ticks(&design, edges);
+            let of_ticks: Vec<f32> = with.tick.iter().map(|tick| *tick as f32).collect();
+            prop_assert_eq!(&with.amplitude, &of_ticks);
+            prop_assert_eq!(Ticks { amplitude: Vec::new(), ..with }, without);
+        }
     }
 }

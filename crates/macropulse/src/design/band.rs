@@ -1,0 +1,58 @@
+//! How long a stretch of time may be that is computed in one go.
+//!
+//! Edges are timed in 32 bits, in parts of a tick. What a band sees must lie within: its shots,
+//! those of its halo, and their echoes.
+
+use super::Design;
+use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+
+/// Parts of a tick in which edges are timed. Jitter is rounded to one, by 6 µm for 2.5 ps.
+pub const PARTS_OF_TICK: u32 = 64;
+
+/// Jitter beyond so many standard deviations does not happen: once in 10¹⁸ edges.
+pub const MOST_SIGMA: f64 = 9.0;
+
+impl Design {
+    /// From the firing of a shot to the end of its last possible echo, fs: the range gate and a
+    /// macropulse.
+    pub fn reach_fs(&self) -> i64 {
+        let macropulse = i64::from(self.coding.codebook.chips()) * self.coding.chip_fs;
+        fs_from_s(tof_from_range(self.scan.max_range)) + macropulse
+    }
+
+    /// How far jitter can displace an edge, fs.
+    pub fn most_jitter_fs(&self) -> i64 {
+        (MOST_SIGMA * self.detector.jitter() * FS_PER_S as f64).ceil() as i64
+    }
+
+    /// The longest time from the first to the last shot of a band without its halo, fs; negative
+    /// where not even one shot has room.
+    pub fn longest_band_fs(&self) -> i64 {
+        let counted = i64::from(u32::MAX / PARTS_OF_TICK).saturating_mul(self.tdc.tick_fs);
+        // A halo on both sides, and the echoes of the last shot.
+        let reaches = if self.is_coded() { 3 } else { 1 };
+        // The clock starts at one of its own periods, and jitter goes both ways.
+        counted - reaches * self.reach_fs() - 2 * self.most_jitter_fs() - 2 * self.tdc.clock_fs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_band_of_the_paper_may_last_160_microseconds() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        assert_eq!(design.reach_fs(), 1_000_692_286 + 10_933 * 2500);
+        // Four lines of 848 shots, 139 µs, have room.
+        assert!((160..168).contains(&(design.longest_band_fs() / 1_000_000_000)));
+    }
+
+    #[test]
+    fn a_gate_too_long_for_its_ticks_is_refused() {
+        let fine = [("tdc.resolution_ps", "0.01"), ("tdc.clock_ps", "1.0")]
+            .map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let error = Design::open("hdl-64e", &fine).unwrap_err().to_string();
+        assert!(error.contains("range gate"), "{error}");
+    }
+}

@@ -1,0 +1,66 @@
+//! The time line of a band.
+
+use crate::design::{Design, PARTS_OF_TICK};
+
+/// Counts parts of a tick from a period of the converters' clock on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clock {
+    /// Ticks from the beginning of the first scan.
+    pub epoch: i64,
+    epoch_fs: i64,
+    tick_fs: i64,
+    parts_per_fs: f64,
+}
+
+impl Clock {
+    /// The clock of a band whose first shot is fired at `first_fs`. It starts early enough for an
+    /// edge that jitter puts before that.
+    pub fn new(design: &Design, first_fs: i64) -> Self {
+        let (tick_fs, clock_fs) = (design.tdc.tick_fs, design.tdc.clock_fs);
+        let epoch_fs = (first_fs - design.most_jitter_fs()).div_euclid(clock_fs) * clock_fs;
+        let parts_per_fs = f64::from(PARTS_OF_TICK) / tick_fs as f64;
+        Self { epoch: epoch_fs / tick_fs, epoch_fs, tick_fs, parts_per_fs }
+    }
+
+    /// Whole parts of a tick in `fs`, rounded down.
+    pub fn parts(&self, fs: i64) -> i64 {
+        let rounded = (fs as f64 * self.parts_per_fs) as i64;
+        // At most one off, so that what wraps in between is of no account.
+        let over = fs
+            .wrapping_mul(i64::from(PARTS_OF_TICK))
+            .wrapping_sub(rounded.wrapping_mul(self.tick_fs));
+        rounded + i64::from(over >= self.tick_fs) - i64::from(over < 0)
+    }
+
+    /// Parts of a tick from the epoch to the absolute time `time_fs`.
+    pub fn time(&self, time_fs: i64) -> i64 {
+        self.parts(time_fs - self.epoch_fs)
+    }
+
+    /// Parts of a tick from the beginning of the first scan to the epoch.
+    pub fn epoch_parts(&self) -> i64 {
+        self.epoch * i64::from(PARTS_OF_TICK)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn parts_are_rounded_down(fs in 0..1_000_000_000_000_i64, tick in 0..3_usize) {
+            let tick = ["2.5", "0.1", "10.0"][tick];
+            let set = [("tdc.resolution_ps", tick), ("tdc.bits", "16")]
+                .map(|(key, value)| (key.to_owned(), value.to_owned()));
+            let design = Design::open("kim-park-2016", &set).unwrap_or_else(|_| {
+                Design::open("kim-park-2016", &[]).unwrap()
+            });
+            let clock = Clock::new(&design, 1_234_567_890);
+            prop_assert_eq!(clock.parts(fs), fs * 64 / design.tdc.tick_fs);
+            prop_assert_eq!(clock.epoch_fs % design.tdc.clock_fs, 0);
+            prop_assert!(clock.time(1_234_567_890) >= 0);
+        }
+    }
+}
