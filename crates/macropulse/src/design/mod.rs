@@ -9,6 +9,7 @@
 
 mod check;
 mod derived;
+mod directions;
 mod document;
 mod effect;
 mod file;
@@ -16,8 +17,10 @@ mod presets;
 pub mod safety;
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 pub use derived::Derived;
+pub use directions::Directions;
 pub use effect::Effect;
 pub use file::{Firing, Label, Mirror};
 pub use presets::{names as preset_names, text as preset_text};
@@ -57,6 +60,8 @@ pub struct Design {
     pub warnings: Vec<String>,
     /// The whole sensor as TOML, defaults included: the same design without the files it came from.
     pub text: String,
+    /// Made when first asked for.
+    directions: OnceLock<Directions>,
 }
 
 /// Where and when the sensor looks.
@@ -261,6 +266,11 @@ impl Design {
     /// Shots in one scan.
     pub fn shots_per_scan(&self) -> u64 {
         u64::from(self.scan.rows) * u64::from(self.scan.columns)
+    }
+
+    /// Where its pixels lie.
+    pub fn directions(&self) -> &Directions {
+        self.directions.get_or_init(|| Directions::of_scan(&self.scan))
     }
 
     /// Duration of one scan, s.

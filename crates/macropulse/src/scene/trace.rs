@@ -7,7 +7,7 @@
 
 use super::{Hit, Hits, Ray, Scene};
 use crate::design::Design;
-use crate::emit::{ShotLog, beam_axes, direction};
+use crate::emit::{ShotLog, beam_axes};
 
 /// Panes a ray is followed through.
 const PANES: usize = 6;
@@ -23,9 +23,10 @@ impl Scene {
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Hits {
         let footprint = Footprint::of(design);
         let world_from_sensor = self.sensor.world_from_sensor();
+        let directions = design.directions();
         let mut hits = Hits::default();
         for shot in 0..log.len() {
-            let axis = direction(design, log.row[shot], log.column[shot]);
+            let axis = directions.of(log.row[shot], log.column[shot]);
             for (aim, weight) in footprint.rays(axis) {
                 let ray = Ray {
                     origin: self.sensor.position,
