@@ -108,8 +108,12 @@ mod tests {
     #[test]
     fn every_pixel_has_the_direction_of_the_formula_to_the_last_bit() {
         let together = [("scan.spinning.firing".to_owned(), "together".to_owned())];
-        let sensors =
-            [("kim-park-2016", &[][..]), ("hdl-64e", &[]), ("hdl-64e", &together), ("peregrine", &[])];
+        let sensors = [
+            ("kim-park-2016", &[][..]),
+            ("hdl-64e", &[]),
+            ("hdl-64e", &together),
+            ("peregrine", &[]),
+        ];
         for (name, set) in sensors {
             let design = Design::open(name, set).unwrap();
             for row in 0..design.scan.rows as u16 {

@@ -10,5 +10,15 @@
 
 mod level;
 mod marks;
+mod packet;
+mod shapes;
+mod tree;
+mod triangles;
+mod wide;
 
 pub(crate) use marks::matching;
+pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
+pub(crate) use shapes::{Form, meet, meet_packet, turned};
+pub(crate) use tree::Tree;
+pub(crate) use triangles::{Corners, Triangles, cosine, cosines};
+pub(crate) use wide::LANES;
