@@ -20,5 +20,5 @@ pub(crate) use marks::matching;
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
 pub(crate) use shapes::{Form, meet, meet_packet, turned};
 pub(crate) use tree::Tree;
-pub(crate) use triangles::{Corners, Triangles, cosine, cosines};
+pub(crate) use triangles::{Corners, Triangles, cosine, cosines, normals};
 pub(crate) use wide::LANES;

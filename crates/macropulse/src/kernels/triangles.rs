@@ -208,9 +208,9 @@ pub(crate) fn cosine(direction: [f64; 3], normal: [f64; 3]) -> f32 {
 }
 
 on_every_level! {
-    /// The cosines of incidence of the rays of a packet on the triangles they have met; anything
-    /// for the others.
-    pub(crate) fn cosines(triangles: &Triangles, packet: &Packet) -> Lanes<f32> {
+    /// The unit normals of the triangles that a packet has met, by axis; anything for rays that
+    /// have met none.
+    pub(crate) fn normals(triangles: &Triangles, packet: &Packet) -> [Lanes<f64>; 3] {
         let mut gathered = [[[0.0; LANES]; 3]; 3];
         for lane in 0..LANES {
             if let Some(corners) = triangles.corners.get(packet.leaf[lane] as usize) {
@@ -222,10 +222,25 @@ on_every_level! {
             }
         }
         let [a, b, c] = &gathered;
-        let mut cosines = [0.0; LANES];
+        let mut normals = [[0.0; LANES]; 3];
         for lane in 0..LANES {
             let corner = |of: &[Lanes<f64>; 3]| [of[0][lane], of[1][lane], of[2][lane]];
-            cosines[lane] = cosine(packet.along(lane), normal(&[corner(a), corner(b), corner(c)]));
+            let normal = normal(&[corner(a), corner(b), corner(c)]);
+            for axis in 0..3 {
+                normals[axis][lane] = normal[axis];
+            }
+        }
+        normals
+    }
+}
+
+on_every_level! {
+    /// |cos| of the angles between the rays of a packet and a normal for each.
+    pub(crate) fn cosines(packet: &Packet, normals: &[Lanes<f64>; 3]) -> Lanes<f32> {
+        let mut cosines = [0.0; LANES];
+        for lane in 0..LANES {
+            let normal = [normals[0][lane], normals[1][lane], normals[2][lane]];
+            cosines[lane] = cosine(packet.along(lane), normal);
         }
         cosines
     }

@@ -112,7 +112,7 @@ impl Solid {
     }
 
     /// The unit normal in the world where a ray has met `face` at `range`.
-    #[inline]
+    #[inline(always)]
     fn normal(&self, ray: &Ray, (range, face): (f64, u32)) -> [f64; 3] {
         let Shape::Sphere { radius } = self.shape else { return self.normals[face as usize] };
         let origin = DVec3::from(self.from_world.point(ray.origin));
@@ -121,7 +121,7 @@ impl Solid {
     }
 
     /// The hit of a ray that has met `face` at `range`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn hit(&self, ray: &Ray, (range, face): (f64, u32)) -> Hit {
         let normal = self.normal(ray, (range, face));
         Hit { range, normal, material: self.material, object: self.object }

@@ -12,7 +12,7 @@ use super::closed_form::Solid;
 use super::hits::{CastRays, Hit, Ray};
 use super::pose::Transform;
 use super::raycast::{Facet, Facets};
-use crate::kernels::{LANES, Lanes, NONE, Packet, Tree, Waiting, cosine, cosines, turned};
+use crate::kernels::{LANES, Lanes, NONE, Packet, Tree, Waiting, cosines, normals, turned};
 
 /// Everything that light can meet.
 pub(super) struct World {
@@ -101,21 +101,24 @@ impl World {
 
     /// Fills in what the rays of `packet` have met.
     pub(super) fn describe(&self, packet: &Packet, met: &mut Met) {
+        let mut across = [[0.0; LANES]; 3];
         if packet.leaf != [NONE; LANES] {
-            met.cosine = cosines(&self.facets.triangles, packet);
+            across = normals(&self.facets.triangles, packet);
         }
         for lane in 0..LANES {
-            if packet.leaf[lane] != NONE {
-                [met.material[lane], met.object[lane]] =
-                    self.facets.paint[packet.leaf[lane] as usize];
+            if let Some(paint) = self.facets.paint.get(packet.leaf[lane] as usize) {
+                [met.material[lane], met.object[lane]] = *paint;
             } else if met.thing[lane] != NONE {
                 let ray = Ray { origin: packet.origin, direction: packet.along(lane) };
                 let found = (packet.range[lane], met.face[lane]);
                 let hit = self.hit(met.thing[lane], &ray, found);
-                met.cosine[lane] = cosine(ray.direction, hit.normal);
                 (met.material[lane], met.object[lane]) = (hit.material, hit.object);
+                for axis in 0..3 {
+                    across[axis][lane] = hit.normal[axis];
+                }
             }
         }
+        met.cosine = cosines(packet, &across);
     }
 
     /// Lets the rays of `set` meet a thing, and notes which they have met where.
@@ -160,6 +163,7 @@ impl World {
     }
 
     /// The hit of a ray on a thing, whose face, or whose leaf, it has met at `range`.
+    #[inline(always)]
     fn hit(&self, index: u32, ray: &Ray, (range, face): (f64, u32)) -> Hit {
         match &self.things[index as usize] {
             Thing::Solid(solid) => solid.hit(ray, (range, face)),
@@ -252,7 +256,7 @@ mod tests {
     use super::super::closed_form::Shape;
     use super::super::pose::Pose;
     use super::*;
-    use crate::kernels::Corners;
+    use crate::kernels::{Corners, cosine};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
