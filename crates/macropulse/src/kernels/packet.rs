@@ -282,7 +282,7 @@ impl<'a, W: Wide, const FROM_CENTRE: bool> Descent<'a, W, FROM_CENTRE> {
 
     /// A coordinate on an axis, from the start of the rays.
     #[inline(always)]
-    fn from_origin(&self, axis: usize, coordinate: f32) -> W {
+    fn shifted(&self, axis: usize, coordinate: f32) -> W {
         W::splat(if FROM_CENTRE { coordinate } else { coordinate - self.origin[axis] })
     }
 
@@ -290,7 +290,7 @@ impl<'a, W: Wide, const FROM_CENTRE: bool> Descent<'a, W, FROM_CENTRE> {
     #[inline(always)]
     fn enters(&self, bounds: &[[[f32; 2]; 2]; 3], side: usize) -> (W, u32) {
         let slab = |axis: usize, bound: usize| {
-            self.from_origin(axis, bounds[axis][bound & 1][side]).times(self.inverse[axis])
+            self.shifted(axis, bounds[axis][bound & 1][side]).times(self.inverse[axis])
         };
         let [x, y, z] = self.backward;
         let enter = slab(0, x).most(slab(1, y)).most(slab(2, z).most(self.start));
@@ -414,11 +414,11 @@ fn passing<W: Wide, const FROM_CENTRE: bool>(
     let narrow = &triangles.narrow[leaf as usize];
     let (across_u, across_v) = (narrow[u].to_array(), narrow[v].to_array());
     let depths = narrow[along].to_array();
-    let depth = |corner: usize| descent.from_origin(along, depths[corner]);
+    let depth = |corner: usize| descent.shifted(along, depths[corner]);
     let depths = [depth(0), depth(1), depth(2)];
     let [p, q] = descent.shear;
     let sheared = |axis: usize, shear: W, of: &[f32; 3], corner: usize| {
-        descent.from_origin(axis, of[corner]).minus(shear.times(depths[corner]))
+        descent.shifted(axis, of[corner]).minus(shear.times(depths[corner]))
     };
     let us =
         [sheared(u, p, &across_u, 0), sheared(u, p, &across_u, 1), sheared(u, p, &across_u, 2)];
@@ -452,97 +452,4 @@ fn settle(wide: &[Lanes<f32>; 6], unsure: u32) -> u32 {
         passing |= u32::from(passes_exactly(of(0), of(3))) << lane;
     }
     passing
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::level::forced::at_each_level;
-    use super::super::triangles::{Corners, Met};
-    use super::*;
-    use proptest::prelude::*;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    /// Triangles with whole coordinates, so that edges, corners and planes are often met exactly.
-    fn soup(chance: &mut ChaCha8Rng, count: usize) -> Vec<Corners> {
-        let corner =
-            |chance: &mut ChaCha8Rng| [0; 3].map(|_| f64::from(chance.random_range(-6..7_i32)));
-        (0..count).map(|_| [0; 3].map(|_| corner(chance))).collect()
-    }
-
-    fn direction(chance: &mut ChaCha8Rng, kind: u32, aim: [f64; 3], origin: [f64; 3]) -> [f64; 3] {
-        let any = [0; 3].map(|_| chance.random_range(-1.0..1.0_f64));
-        let wanted = match kind {
-            0 => any,
-            1 => [0, 1, 2].map(|axis| aim[axis] - origin[axis] + 0.2 * any[axis]),
-            2 => [0, 1, 2].map(|axis| aim[axis] - origin[axis]),
-            3 => {
-                let mut along = [0.0, -0.0, 0.0];
-                along[chance.random_range(0..3_usize)] = any[0].signum();
-                along
-            }
-            _ => [f64::NAN, 0.0, f64::INFINITY],
-        };
-        let length = wanted.iter().map(|slope| slope * slope).sum::<f64>().sqrt();
-        if length == 0.0 { wanted } else { wanted.map(|slope| slope / length) }
-    }
-
-    proptest! {
-        #[test]
-        fn each_ray_meets_what_it_would_have_met_alone(
-            seed in 0..u64::MAX,
-            count in 0..120_usize,
-            coherent in proptest::bool::ANY,
-            from_corner in proptest::bool::ANY,
-            nearest in prop_oneof![Just(0.0), 0.0..8.0_f64],
-            farthest in prop_oneof![Just(f64::INFINITY), 1.0..20.0_f64, Just(f64::NAN)],
-        ) {
-            let mut chance = ChaCha8Rng::seed_from_u64(seed);
-            let corners = soup(&mut chance, count);
-            let centre = [0; 3].map(|_| chance.random_range(-5.0..5.0_f64));
-            let (triangles, _) = Triangles::new(&corners, centre);
-            let mut origin = [centre, [0; 3].map(|_| chance.random_range(-9.0..9.0))][seed as usize % 2];
-            let mut aim = [1.0, 2.0, 3.0];
-            if let Some(corner) = corners.first().filter(|_| from_corner) {
-                origin = corner[0];
-            }
-            if let Some(corner) = corners.last() {
-                aim = corner[1];
-            }
-            let mut packet = Packet::from(origin);
-            for lane in 0..LANES {
-                let kind = if coherent { 1 } else { chance.random_range(0..5) };
-                packet.set(lane, direction(&mut chance, kind, aim, origin), farthest);
-                packet.nearest[lane] = nearest;
-            }
-            for (level, cast) in at_each_level(|| {
-                let mut cast = packet.clone();
-                cast.cast(&triangles, &mut Waiting::default());
-                cast
-            }) {
-                for lane in 0..LANES {
-                    let ray = (origin, packet.along(lane));
-                    let alone = triangles.nearest(ray, (nearest, farthest));
-                    let (range, leaf) = (cast.range[lane], cast.leaf[lane]);
-                    let together = (leaf != NONE).then_some(Met { range, leaf });
-                    prop_assert_eq!(together, alone, "{:?}, ray {}: {:?}", level, lane, ray);
-                }
-            }
-        }
-    }
-
-    /// The control of the test above: it does meet triangles, and some exactly on an edge.
-    #[test]
-    fn the_soup_is_thick() {
-        let mut chance = ChaCha8Rng::seed_from_u64(7);
-        let corners = soup(&mut chance, 100);
-        let (triangles, _) = Triangles::new(&corners, [0.0; 3]);
-        let mut packet = Packet::from([0.0; 3]);
-        for lane in 0..LANES {
-            let toward = direction(&mut chance, 2, corners[lane][0], [0.0; 3]);
-            packet.set(lane, toward, f64::INFINITY);
-        }
-        packet.cast(&triangles, &mut Waiting::default());
-        assert!(packet.leaf.iter().filter(|leaf| **leaf != NONE).count() > LANES / 2);
-    }
 }

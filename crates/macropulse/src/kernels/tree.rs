@@ -89,20 +89,25 @@ impl Tree {
         if self.pairs.is_empty() {
             return;
         }
-        let nothing = (0.0, Node::default());
-        match self.depth + 1 < STACK {
-            true => self.descend(&aim, farthest, &mut [nothing; STACK], &mut visit),
-            false => self.descend(&aim, farthest, &mut vec![nothing; self.depth + 2], &mut visit),
+        let nothing = Node::default();
+        if self.depth + 1 < STACK {
+            let stack = (&mut [0.0; STACK][..], &mut [nothing; STACK][..]);
+            self.descend(&aim, farthest, stack, &mut visit);
+        } else {
+            let room = self.depth + 2;
+            let stack = (&mut vec![0.0; room][..], &mut vec![nothing; room][..]);
+            self.descend(&aim, farthest, stack, &mut visit);
         }
     }
 
-    /// Walks the hierarchy, the nearer child first. `stack` holds the children put off.
+    /// Walks the hierarchy, the nearer child first. The
+    /// two slices hold the children put off, and where they are entered.
     #[inline(always)]
     fn descend(
         &self,
         aim: &Aim,
         farthest: f64,
-        stack: &mut [(f32, Node)],
+        (enters, nodes): (&mut [f32], &mut [Node]),
         visit: &mut impl FnMut(u32, &Aim) -> f64,
     ) {
         let margin = self.margin(aim.origin);
@@ -117,7 +122,7 @@ impl Tree {
                 let [near, far] = [pair.child[swap], pair.child[1 - swap]];
                 let (first, second) = if right < left { (right, left) } else { (left, right) };
                 // Written always and kept only if both are entered: no branch to mispredict.
-                stack[waiting] = (second, far);
+                (enters[waiting], nodes[waiting]) = (second, far);
                 waiting += usize::from(second < f32::INFINITY);
                 if first < f32::INFINITY {
                     node = near;
@@ -134,9 +139,8 @@ impl Tree {
                     return;
                 }
                 waiting -= 1;
-                let (enter, put_off) = stack[waiting];
-                if enter <= limit {
-                    break put_off;
+                if enters[waiting] <= limit {
+                    break nodes[waiting];
                 }
             };
         }

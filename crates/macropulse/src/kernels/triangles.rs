@@ -36,17 +36,23 @@ pub(crate) struct Met {
 }
 
 impl Triangles {
-    /// Builds the hierarchy of `corners`, exact about `centre`. Gives it with the index that each
+    /// Builds the hierarchy of `count` triangles with the corners that `corners_of` gives, exact
+    /// about `centre`. Gives it with the index that each
     /// leaf had; triangles without area or with a coordinate that is not finite cannot be hit and
     /// are left out.
-    pub(crate) fn new(corners: &[Corners], centre: [f64; 3]) -> (Self, Vec<u32>) {
+    pub(crate) fn new(
+        count: usize,
+        corners_of: impl Fn(usize) -> Corners,
+        centre: [f64; 3],
+    ) -> (Self, Vec<u32>) {
         let origin = DVec3::from(centre);
-        let mut kept = Vec::with_capacity(corners.len());
-        let mut triangles = Vec::with_capacity(corners.len());
-        for (index, corners) in corners.iter().enumerate() {
+        let mut kept = Vec::with_capacity(count);
+        let mut triangles = Vec::with_capacity(count);
+        for index in 0..count {
+            let corners = corners_of(index);
             let local = corners.map(|corner| DVec3::from(corner) - origin);
             let near = local.iter().all(|corner| corner.abs().max_element() < FARTHEST);
-            if near && has_area(corners) {
+            if near && has_area(&corners) {
                 let [v0, v1, v2] = local.map(|corner| corner.as_vec3a());
                 triangles.push(Triangle { v0, v1, v2 });
                 kept.push(index as u32);
@@ -60,7 +66,7 @@ impl Triangles {
         let narrow = order.iter().map(by_axis).collect();
         drop(triangles);
         let order: Vec<u32> = order.iter().map(|index| kept[*index as usize]).collect();
-        let corners = order.iter().map(|index| corners[*index as usize]).collect();
+        let corners = order.iter().map(|index| corners_of(*index as usize)).collect();
         (Self { tree, narrow, corners }, order)
     }
 
@@ -202,7 +208,7 @@ fn has_area([a, b, c]: &Corners) -> bool {
 
 /// |cos| of the angle between a direction and a normal.
 #[inline(always)]
-pub(crate) fn cosine(direction: [f64; 3], normal: [f64; 3]) -> f32 {
+fn cosine(direction: [f64; 3], normal: [f64; 3]) -> f32 {
     let dot = DVec3::from(direction).dot(DVec3::from(normal)).abs();
     (if dot < 1.0 { dot } else { 1.0 }) as f32
 }

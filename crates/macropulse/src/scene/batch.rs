@@ -93,32 +93,34 @@ impl<'a> Batch<'a> {
         self.packet.range[self.count..].fill(f64::NAN);
         self.count = 0;
         self.scene.world.cast_packet(&mut self.packet, &mut self.met);
-        self.scene.world.describe(&self.packet, &mut self.met);
-        let Self { packet, met, through, .. } = self;
-        let glass = |lane: usize| through[usize::from(met.material[lane])] > 0.0;
-        if (0..LANES).any(|lane| met.is_hit(packet, lane) && glass(lane)) {
+        let Self { packet, met, .. } = self;
+        let mut hit = [0; LANES];
+        let mut count = 0;
+        for lane in 0..LANES {
+            hit[count] = lane;
+            count += usize::from(met.is_hit(packet, lane));
+        }
+        let hit = &hit[..count];
+        if hit.is_empty() {
+            return;
+        }
+        self.scene.world.describe(packet, met);
+        if hit.iter().any(|lane| self.through[usize::from(met.material[*lane])] > 0.0) {
             self.follow();
         } else {
-            self.write_first();
+            self.write_first(hit);
         }
     }
 
-    /// Writes what the rays have met first.
-    fn write_first(&mut self) {
+    /// Writes what the rays of the lanes in `hit` have met first.
+    fn write_first(&mut self, hit: &[usize]) {
         let Self { packet, met, hits, .. } = self;
-        let mut order = [0; LANES];
-        let mut count = 0;
-        for lane in 0..LANES {
-            order[count] = lane;
-            count += usize::from(met.is_hit(packet, lane));
-        }
-        let order = &order[..count];
-        hits.shot.extend(order.iter().map(|lane| self.shot[*lane]));
-        hits.weight.extend(order.iter().map(|lane| self.weight[*lane]));
-        hits.range.extend(order.iter().map(|lane| packet.range[*lane]));
-        hits.cosine.extend(order.iter().map(|lane| met.cosine[*lane]));
-        hits.material.extend(order.iter().map(|lane| met.material[*lane]));
-        hits.object.extend(order.iter().map(|lane| met.object[*lane]));
+        keep(&mut hits.shot, hit, &self.shot);
+        keep(&mut hits.weight, hit, &self.weight);
+        keep(&mut hits.range, hit, &packet.range);
+        keep(&mut hits.cosine, hit, &met.cosine);
+        keep(&mut hits.material, hit, &met.material);
+        keep(&mut hits.object, hit, &met.object);
     }
 
     /// Sends the rays that have met glass on, until none is left, and writes what all have met.
@@ -128,7 +130,7 @@ impl<'a> Batch<'a> {
         layers.clear();
         for pane in 0..PANES {
             let mut goes_on = false;
-            for lane in 0..LANES {
+            for (lane, transmitted) in transmitted.iter_mut().enumerate() {
                 if !met.is_hit(packet, lane) {
                     packet.range[lane] = f64::NAN;
                     continue;
@@ -136,15 +138,15 @@ impl<'a> Batch<'a> {
                 let (range, material) = (packet.range[lane], met.material[lane]);
                 layers.push(Surface {
                     lane,
-                    transmitted: transmitted[lane],
+                    transmitted: *transmitted,
                     range,
                     cosine: met.cosine[lane],
                     material,
                     object: met.object[lane],
                 });
                 let through = self.through[usize::from(material)];
-                transmitted[lane] *= through * through;
-                let bright = transmitted[lane] >= FAINTEST;
+                *transmitted *= through * through;
+                let bright = *transmitted >= FAINTEST;
                 packet.nearest[lane] = range + BEHIND;
                 packet.range[lane] = if bright { self.farthest } else { f64::NAN };
                 goes_on |= bright;
@@ -165,5 +167,15 @@ impl<'a> Batch<'a> {
             self.hits.material.push(material);
             self.hits.object.push(object);
         }
+    }
+}
+
+/// Adds the values of some lanes to a column.
+#[inline(always)]
+fn keep<T: Copy>(column: &mut Vec<T>, lanes: &[usize], values: &Lanes<T>) {
+    if lanes.len() == LANES {
+        column.extend_from_slice(values);
+    } else {
+        column.extend(lanes.iter().map(|lane| values[*lane]));
     }
 }

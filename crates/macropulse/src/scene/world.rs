@@ -40,7 +40,7 @@ pub(super) struct Copy {
 
 /// A surface that stands alone.
 enum Thing {
-    Solid(Solid),
+    Solid(Box<Solid>),
     Copy { copy: Copy, from_world: Transform },
 }
 
@@ -60,8 +60,11 @@ impl World {
         let (unbounded, bounded): (Vec<Solid>, Vec<Solid>) =
             solids.into_iter().partition(|solid| solid.half_extent().is_none());
         let first = unbounded.len();
-        let mut things: Vec<Thing> =
-            unbounded.into_iter().chain(bounded).map(Thing::Solid).collect();
+        let mut things: Vec<Thing> = unbounded
+            .into_iter()
+            .chain(bounded)
+            .map(|solid| Thing::Solid(Box::new(solid)))
+            .collect();
         things.extend(
             copies
                 .iter()
@@ -113,9 +116,8 @@ impl World {
                 let found = (packet.range[lane], met.face[lane]);
                 let hit = self.hit(met.thing[lane], &ray, found);
                 (met.material[lane], met.object[lane]) = (hit.material, hit.object);
-                for axis in 0..3 {
-                    across[axis][lane] = hit.normal[axis];
-                }
+                let [x, y, z] = &mut across;
+                [x[lane], y[lane], z[lane]] = hit.normal;
             }
         }
         met.cosine = cosines(packet, &across);
@@ -256,7 +258,7 @@ mod tests {
     use super::super::closed_form::Shape;
     use super::super::pose::Pose;
     use super::*;
-    use crate::kernels::{Corners, cosine};
+    use crate::kernels::Corners;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -345,7 +347,8 @@ mod tests {
                     let Some(hit) = alone else { continue };
                     hits += 1;
                     assert_eq!(packet.range[lane], hit.range);
-                    assert_eq!(met.cosine[lane], cosine(ray.direction, hit.normal));
+                    let cosine = DVec3::from(ray.direction).dot(DVec3::from(hit.normal)).abs();
+                    assert_eq!(met.cosine[lane], cosine.min(1.0) as f32);
                     assert_eq!((met.material[lane], met.object[lane]), (hit.material, hit.object));
                 }
             }
