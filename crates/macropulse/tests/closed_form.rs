@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands, direction};
+use macropulse::emit::{Band, bands};
 use macropulse::paper::{PERFECT, SENSORS};
 use macropulse::points::PointCloud;
 use macropulse::scene::Scene;
@@ -65,7 +65,7 @@ fn pixels(
         !design.coding.codebook.marks(label as u16, 0).is_empty()
     });
     let seen = with_light.filter_map(|at| {
-        let aim = direction(design, (at / cloud.columns) as u16, (at % cloud.columns) as u16);
+        let aim = design.directions().of((at / cloud.columns) as u16, (at % cloud.columns) as u16);
         let expected = formula(aim)?;
         (design.scan.min_range..farthest).contains(&expected).then_some(Pixel { at, aim, expected })
     });

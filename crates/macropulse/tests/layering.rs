@@ -34,7 +34,7 @@ const RULES: [Rule; 18] = [
     },
     Rule {
         module: "scene",
-        may_name: &["design", "digest", "emit", "names"],
+        may_name: &["design", "digest", "emit", "kernels", "names"],
         because: "surfaces do not know what their echoes become",
     },
     Rule {

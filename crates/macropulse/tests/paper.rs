@@ -417,7 +417,7 @@ mod others {
         let heights = (0..cloud.range.len()).filter_map(|pixel| {
             let object = cloud.truth.object[pixel];
             let (row, column) = (pixel / cloud.columns, pixel % cloud.columns);
-            let [_, _, up] = macropulse::emit::direction(&design, row as u16, column as u16);
+            let [_, _, up] = design.directions().of(row as u16, column as u16);
             let height = scene.sensor.position[2] + up * f64::from(cloud.truth.range[pixel]);
             (object != NO_OBJECT && scene.objects[usize::from(object)].is_target).then_some(height)
         });

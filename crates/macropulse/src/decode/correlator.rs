@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use crate::kernels::{LANES, Lanes, PLANES, count_marks};
+use crate::kernels::{BLOCK_WORDS, Block, PLANES, count_marks};
 
 /// Lags that are counted at once.
-pub(super) const BLOCK: i64 = 64 * LANES as i64;
+pub(super) const BLOCK: i64 = 64 * BLOCK_WORDS as i64;
 
 /// Where most marks fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub(super) struct Peak {
 /// The counts of a block of lags, in bit planes.
 #[derive(Debug)]
 pub(super) struct Counts {
-    planes: [Lanes; PLANES],
+    planes: [Block; PLANES],
     /// Planes that can be lit at all.
     used: usize,
 }
@@ -31,7 +31,7 @@ impl Counts {
     /// `scale` bits long, are lit.
     pub fn new(words: &[u64], first: usize, (marks, scale): (&[u16], usize)) -> Self {
         let used = ((usize::BITS - marks.len().leading_zeros()) as usize).min(PLANES);
-        let mut planes = [[0; LANES]; PLANES];
+        let mut planes = [[0; BLOCK_WORDS]; PLANES];
         count_marks(words, first, (marks, scale), &mut planes);
         Self { planes, used }
     }
@@ -47,13 +47,13 @@ impl Counts {
         Some(Peak { at, count, next })
     }
 
-    fn highest(&self, mut places: Lanes) -> Option<(i64, u16)> {
+    fn highest(&self, mut places: Block) -> Option<(i64, u16)> {
         if is_dark(&places) {
             return None;
         }
         let mut count = 0;
         for (weight, plane) in self.planes[..self.used].iter().enumerate().rev() {
-            let lit: Lanes = std::array::from_fn(|lane| places[lane] & plane[lane]);
+            let lit: Block = std::array::from_fn(|lane| places[lane] & plane[lane]);
             if !is_dark(&lit) {
                 places = lit;
                 count |= 1 << weight;
@@ -64,12 +64,12 @@ impl Counts {
     }
 }
 
-fn is_dark(lanes: &Lanes) -> bool {
+fn is_dark(lanes: &Block) -> bool {
     lanes.iter().fold(0, |any, lane| any | lane) == 0
 }
 
 /// The offsets of `range` that lie in a block, one bit each.
-fn between(range: Range<i64>) -> Lanes {
+fn between(range: Range<i64>) -> Block {
     std::array::from_fn(|lane| {
         let below = |end: i64| match (end - 64 * lane as i64).clamp(0, 64) {
             64 => u64::MAX,

@@ -6,7 +6,7 @@
 //! with `least` marks is overlooked if every place with `least`/B votes is looked at.
 
 use super::unexplained::Unexplained;
-use crate::kernels::{LANES, with_marks};
+use crate::kernels::{BLOCK_WORDS, with_marks};
 
 /// What is looked for: a macropulse, taken apart.
 #[derive(Debug)]
@@ -90,10 +90,10 @@ pub(super) fn among_words(
     sought: &Sought,
 ) -> Option<Candidate> {
     let ((words, begin, marks), (first, width)) = (all, at);
-    let (needed, reach) = (sought.in_one_word(), sought.word.last()? + 64 * LANES);
+    let (needed, reach) = (sought.in_one_word(), sought.word.last()? + 64 * BLOCK_WORDS);
     // Where code words begin, and how many of their marks are unexplained.
     let mut elected: Vec<(usize, u16)> = Vec::new();
-    for block in (0..sought.places()).step_by(64 * LANES) {
+    for block in (0..sought.places()).step_by(64 * BLOCK_WORDS) {
         let start = first + block as i64;
         if unexplained.at_most(start..start + reach as i64 + i64::from(width)) * width
             < u32::from(needed)

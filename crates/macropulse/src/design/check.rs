@@ -1,5 +1,7 @@
 //! From typed keys to a checked `Design`: every limit is tested here, once.
 
+use std::sync::OnceLock;
+
 use super::document::Chain;
 use super::file::{
     CodeFile, DetectorFile, FamilyFile, ReceiverKindFile, ScanFile, SensitivityFile, SensorFile,
@@ -59,6 +61,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         defaults: chain.defaults_used(),
         warnings: Vec::new(),
         text: chain.text(),
+        directions: OnceLock::new(),
     };
     check.clock(&design)?;
     check.timing(&mut design)?;

@@ -10,6 +10,7 @@
 mod band;
 mod check;
 mod derived;
+mod directions;
 mod document;
 mod effect;
 mod file;
@@ -17,9 +18,11 @@ mod presets;
 pub mod safety;
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use derived::Derived;
+pub use directions::Directions;
 pub use effect::Effect;
 pub use file::{Firing, Label, Mirror};
 pub use presets::{names as preset_names, text as preset_text};
@@ -59,6 +62,8 @@ pub struct Design {
     pub warnings: Vec<String>,
     /// The whole sensor as TOML, defaults included: the same design without the files it came from.
     pub text: String,
+    /// Made when first asked for.
+    directions: OnceLock<Directions>,
 }
 
 /// Where and when the sensor looks.
@@ -263,6 +268,11 @@ impl Design {
     /// Shots in one scan.
     pub fn shots_per_scan(&self) -> u64 {
         u64::from(self.scan.rows) * u64::from(self.scan.columns)
+    }
+
+    /// Where its pixels lie.
+    pub fn directions(&self) -> &Directions {
+        self.directions.get_or_init(|| Directions::of_scan(&self.scan))
     }
 
     /// Duration of one scan, s.

@@ -6,6 +6,6 @@ mod shot;
 mod shot_log;
 
 pub use band::{Band, bands};
-pub use pattern::{beam_axes, direction};
+pub use pattern::beam_axes;
 pub use shot::{Shot, most_scans, shot_of_pixel};
 pub use shot_log::ShotLog;

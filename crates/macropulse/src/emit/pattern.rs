@@ -1,9 +1,9 @@
-//! Scan patterns: the pixel, the time and the direction of every shot.
+//! Scan patterns: the pixel and the time of every shot.
 //!
 //! Shots are numbered from the first one of the first scan. Times are exact: shot `k` of a uniform
 //! raster fires at ⌊k · T_scan / shots⌋ on the chip clock, in integers, however long the run.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::design::{Design, Firing, Mirror, Pattern};
 use crate::units::{FS_PER_S, fs_from_s};
@@ -149,33 +149,6 @@ fn moment(mirror: Mirror, duty: f64, across: f64) -> f64 {
     }
 }
 
-/// Unit vector in the sensor frame (x forward, y left, z up) at which the middle of a pixel lies.
-///
-/// Column 0 is at the left, row 0 at the top. A spinning sensor begins to the rear, turns
-/// clockwise seen from above, and goes on turning while its lasers fire one after another.
-pub fn direction(design: &Design, row: u16, column: u16) -> [f64; 3] {
-    let (rows, columns) = (f64::from(design.scan.rows), f64::from(design.scan.columns));
-    let across = (f64::from(column) + 0.5) / columns;
-    let down = (f64::from(row) + 0.5) / rows;
-    let (azimuth, elevation) = match &design.scan.pattern {
-        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
-            (horizontal * (0.5 - across), vertical * (0.5 - down))
-        }
-        Pattern::Spinning { elevations, order, firing } => {
-            let lasers = order.len() as f64;
-            let turn = match firing {
-                Firing::BlocksInTurn => order.iter().position(|&r| r == row).unwrap_or(0),
-                Firing::Together => 0,
-            };
-            let turned = (f64::from(column) + turn as f64 / lasers) / columns;
-            (PI - TAU * turned, elevations[usize::from(row)])
-        }
-    };
-    let (sin_a, cos_a) = (libm::sin(azimuth), libm::cos(azimuth));
-    let (sin_e, cos_e) = (libm::sin(elevation), libm::cos(elevation));
-    [cos_e * cos_a, cos_e * sin_a, sin_e]
-}
-
 /// Two unit vectors across `direction`: to the left and up.
 pub fn beam_axes(direction: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let [x, y, z] = direction;
@@ -267,17 +240,6 @@ mod tests {
         // 2/π of the mean at the centre [KP16 §2.2 gives the mean only].
         approx::assert_relative_eq!(mid / 0.001, 2.0 / PI, max_relative = 1e-4);
         assert!(edge > 10.0 * mid);
-    }
-
-    #[test]
-    fn directions_are_unit_vectors_left_to_right_and_top_down() {
-        for name in ["kim-park-2016", "hdl-64e", "peregrine"] {
-            let design = sensor(name);
-            let (row, column) = (design.scan.rows as u16 - 1, design.scan.columns as u16 / 2 + 3);
-            let d = direction(&design, row, column);
-            approx::assert_relative_eq!(d.iter().map(|v| v * v).sum::<f64>(), 1.0, epsilon = 1e-12);
-            assert!(d[0] > 0.0 && d[1] < 0.0 && d[2] < 0.0, "{name}: {d:?}");
-        }
     }
 
     #[test]

@@ -7,10 +7,10 @@
 use super::level::on_every_level;
 
 /// Machine words of one block of lags.
-pub(crate) const LANES: usize = 8;
+pub(crate) const BLOCK_WORDS: usize = 8;
 
-/// One bit for each of 64 · [`LANES`] lags.
-pub(crate) type Lanes = [u64; LANES];
+/// One bit for each of 64 · [`BLOCK_WORDS`] lags.
+pub(crate) type Block = [u64; BLOCK_WORDS];
 
 /// Planes of a count; a macropulse has at most 65535 marks.
 pub(crate) const PLANES: usize = 16;
@@ -22,10 +22,10 @@ pub(crate) fn count_marks(
     words: &[u64],
     first: usize,
     marks: (&[u16], usize),
-    planes: &mut [Lanes; PLANES],
+    planes: &mut [Block; PLANES],
 ) {
     let last = marks.0.last().map_or(0, |&mark| marks.1 * usize::from(mark));
-    let reach = (first + last) / 64 + LANES + 1;
+    let reach = (first + last) / 64 + BLOCK_WORDS + 1;
     if reach <= words.len() {
         count_within(words, first, marks, planes);
     } else {
@@ -41,11 +41,11 @@ on_every_level! {
         words: &[u64],
         first: usize,
         marks: (&[u16], usize),
-        planes: &mut [Lanes; PLANES],
+        planes: &mut [Block; PLANES],
     ) {
         let (marks, scale) = marks;
         let used = ((usize::BITS - marks.len().leading_zeros()) as usize).min(PLANES);
-        let (mut ones, mut twos, mut fours) = ([0; LANES], [0; LANES], [0; LANES]);
+        let (mut ones, mut twos, mut fours) = ([0; BLOCK_WORDS], [0; BLOCK_WORDS], [0; BLOCK_WORDS]);
         let mut eights = marks.chunks_exact(8);
         for eight in &mut eights {
             // Seven adders take eight bits in and carry one out, so that most of the work stays
@@ -81,11 +81,11 @@ on_every_level! {
 
 /// One bit for each lag of a block that has `least` or more of the marks, counted as by
 /// [`count_marks`].
-pub(crate) fn with_marks(words: &[u64], first: usize, marks: (&[u16], usize), least: u16) -> Lanes {
-    let mut planes = [[0; LANES]; PLANES];
+pub(crate) fn with_marks(words: &[u64], first: usize, marks: (&[u16], usize), least: u16) -> Block {
+    let mut planes = [[0; BLOCK_WORDS]; PLANES];
     count_marks(words, first, marks, &mut planes);
     let used = (usize::BITS - marks.0.len().leading_zeros()).max(16 - least.leading_zeros());
-    let mut enough = [u64::MAX; LANES];
+    let mut enough = [u64::MAX; BLOCK_WORDS];
     for (weight, plane) in planes.into_iter().enumerate().take(used as usize) {
         enough = if least >> weight & 1 == 1 { and(plane, enough) } else { or(plane, enough) };
     }
@@ -97,8 +97,8 @@ pub(crate) fn with_marks(words: &[u64], first: usize, marks: (&[u16], usize), le
 macro_rules! on_lanes {
     ($name:ident, $sign:tt) => {
         #[inline(always)]
-        fn $name(mut a: Lanes, b: Lanes) -> Lanes {
-            for lane in 0..LANES {
+        fn $name(mut a: Block, b: Block) -> Block {
+            for lane in 0..BLOCK_WORDS {
                 a[lane] = a[lane] $sign b[lane];
             }
             a
@@ -112,17 +112,17 @@ on_lanes!(or, |);
 
 /// The sum of three bits, in each lag, and what is carried to the next plane.
 #[inline(always)]
-fn add(a: Lanes, b: Lanes, c: Lanes) -> (Lanes, Lanes) {
+fn add(a: Block, b: Block, c: Block) -> (Block, Block) {
     (xor(xor(a, b), c), or(and(a, b), and(c, or(a, b))))
 }
 
 /// The block of bits that begins with bit `first`.
 #[inline(always)]
-fn read(words: &[u64], first: usize) -> Lanes {
+fn read(words: &[u64], first: usize) -> Block {
     let (word, shift) = (first / 64, first % 64);
-    let mut lanes = [0; LANES];
-    let Some(words) = words.get(word..word + LANES + 1) else { return lanes };
-    for lane in 0..LANES {
+    let mut lanes = [0; BLOCK_WORDS];
+    let Some(words) = words.get(word..word + BLOCK_WORDS + 1) else { return lanes };
+    for lane in 0..BLOCK_WORDS {
         // Two shifts, because a shift by 64 does not give 0.
         lanes[lane] = words[lane] >> shift | words[lane + 1] << 1 << (63 - shift);
     }
@@ -148,30 +148,30 @@ mod tests {
             let mut words = vec![0_u64; 100];
             lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
             let is_lit = |bit: usize| words.get(bit / 64).is_some_and(|w| w >> (bit % 64) & 1 == 1);
-            let expected: Vec<usize> = (0..64 * LANES)
+            let expected: Vec<usize> = (0..64 * BLOCK_WORDS)
                 .map(|lag| {
                     let place = |&&mark: &&u16| is_lit(first + lag + scale * usize::from(mark));
                     marks.iter().filter(place).count()
                 })
                 .collect();
             let counted = at_each_level(|| {
-                let mut planes = [[0; LANES]; PLANES];
+                let mut planes = [[0; BLOCK_WORDS]; PLANES];
                 count_marks(&words, first, (&marks, scale), &mut planes);
                 planes
             });
             for (level, planes) in counted {
                 let at = |lag: usize| {
-                    let bit = |plane: &Lanes| (plane[lag / 64] >> (lag % 64) & 1) as usize;
+                    let bit = |plane: &Block| (plane[lag / 64] >> (lag % 64) & 1) as usize;
                     planes.iter().enumerate().map(|(p, plane)| bit(plane) << p).sum::<usize>()
                 };
-                let counts: Vec<usize> = (0..64 * LANES).map(at).collect();
+                let counts: Vec<usize> = (0..64 * BLOCK_WORDS).map(at).collect();
                 prop_assert_eq!(&counts, &expected, "{:?}", level);
             }
             for (level, lit) in at_each_level(|| with_marks(&words, first, (&marks, scale), least)) {
                 let is_lit = |lag: &usize| lit[lag / 64] >> (lag % 64) & 1 == 1;
-                let lags: Vec<usize> = (0..64 * LANES).filter(is_lit).collect();
+                let lags: Vec<usize> = (0..64 * BLOCK_WORDS).filter(is_lit).collect();
                 let enough = |lag: &usize| expected[*lag] >= usize::from(least);
-                let expected: Vec<usize> = (0..64 * LANES).filter(enough).collect();
+                let expected: Vec<usize> = (0..64 * BLOCK_WORDS).filter(enough).collect();
                 prop_assert_eq!(lags, expected, "{:?}", level);
             }
         }

@@ -3,10 +3,13 @@
 //!
 //! A loop is written once, in plain Rust, and compiled for each [`Level`]; [`on_every_level!`]
 //! calls the widest version that the processor at hand can run. The plain version is what other
-//! processors run and what the tests compare the others with. Compilers never contract or
+//! processors run and what the tests compare the others with. Where comparisons are to become sets
+//! of lanes, which compilers do poorly, [`wide`] spells out the few operations. Compilers never contract or
 //! reassociate floating-point arithmetic of Rust, so that every level gives the same bits.
 
 #![allow(unsafe_code)]
+// Lanes of several arrays are walked in step, by their number.
+#![allow(clippy::needless_range_loop)]
 
 mod correlate;
 mod delay;
@@ -14,19 +17,31 @@ mod level;
 mod marks;
 mod merge;
 mod pack;
+mod packet;
+#[cfg(test)]
+mod packet_tests;
 mod philox;
+mod shapes;
 mod spacing;
 mod train;
+mod tree;
+mod triangles;
 mod waits;
 mod whole;
+mod wide;
 
-pub(crate) use correlate::{LANES, Lanes, PLANES, count_marks, with_marks};
+pub(crate) use correlate::{BLOCK_WORDS, Block, PLANES, count_marks, with_marks};
 pub(crate) use delay::{delay, drawn};
 pub(crate) use marks::{WordTicks, begin_with};
 pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
+pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
 pub(crate) use philox::{GROUP, philox};
+pub(crate) use shapes::{Form, meet, meet_packet, turned};
 pub(crate) use spacing::all_apart;
 pub(crate) use train::{STEP, Train, append_train};
+pub(crate) use tree::Tree;
+pub(crate) use triangles::{Corners, Triangles, cosines, normals};
 pub(crate) use waits::{END, Events};
 pub(crate) use whole::whole;
+pub(crate) use wide::LANES;

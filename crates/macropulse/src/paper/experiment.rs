@@ -6,7 +6,6 @@ use std::time::Instant;
 use super::Error;
 use super::geometry::{self, Prediction};
 use crate::design::Design;
-use crate::emit::direction;
 use crate::formats::Format;
 use crate::points::{Outcome, PointCloud};
 use crate::record;
@@ -117,7 +116,7 @@ fn samples_on_car(design: &Design, scene: &Scene) -> Vec<Sample> {
     let world_from_sensor = scene.sensor.world_from_sensor();
     let columns = design.scan.columns as usize;
     let sample = |pixel: usize| {
-        let aim = direction(design, (pixel / columns) as u16, (pixel % columns) as u16);
+        let aim = design.directions().of((pixel / columns) as u16, (pixel % columns) as u16);
         let ray =
             Ray { origin: scene.sensor.position, direction: world_from_sensor.direction(aim) };
         let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range)?;

@@ -3,7 +3,7 @@
 use crate::channel::Link;
 use crate::decode::Returns;
 use crate::design::Design;
-use crate::emit::{ShotLog, direction};
+use crate::emit::ShotLog;
 use crate::units::range_from_tof;
 
 /// How a pixel came out, measured against truth.
@@ -141,11 +141,12 @@ impl PointCloud {
             self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
         }
         let link = Link::of(design);
+        let directions = design.directions();
         for (i, &shot) in returns.shot.iter().enumerate() {
             let shot = shot as usize;
             let pixel = self.pixel(log, shot);
             let range = range_from_tof(returns.tof[i]);
-            let [x, y, z] = direction(design, log.row[shot], log.column[shot]);
+            let [x, y, z] = directions.of(log.row[shot], log.column[shot]);
             self.x[pixel] = (x * range) as f32;
             self.y[pixel] = (y * range) as f32;
             self.z[pixel] = (z * range) as f32;

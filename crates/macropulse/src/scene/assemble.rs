@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::path::Path;
+use std::rc::Rc;
 
 use glam::DVec3;
 use toml::Spanned;
@@ -12,10 +13,10 @@ use super::error::Error;
 use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
 use super::material::{self, Material, plain};
 use super::mesh::Mesh;
+use super::placed::{self, Placed, stand};
 use super::pose::Pose;
-use super::raycast::{Facet, Facets};
 use super::readers::{self, WithoutMaterials};
-use super::{Object, Scene, World};
+use super::{Object, Scene};
 use crate::digest::Fnv;
 
 /// What has been put together so far.
@@ -27,7 +28,7 @@ struct Assembly<'a> {
     materials: Vec<Material>,
     objects: Vec<Object>,
     solids: Vec<Solid>,
-    facets: Vec<Facet>,
+    placed: Vec<Placed>,
     notes: Vec<String>,
 }
 
@@ -45,7 +46,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         materials: vec![],
         objects: vec![],
         solids: vec![],
-        facets: vec![],
+        placed: vec![],
         notes: vec![],
     };
     assembly.define(&file)?;
@@ -59,15 +60,15 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     for (index, thing) in file.objects.iter().enumerate() {
         assembly.thing(index, thing)?;
     }
-    if assembly.solids.is_empty() && assembly.facets.is_empty() {
+    if assembly.solids.is_empty() && assembly.placed.is_empty() {
         assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
     }
-    let Assembly { materials, objects, solids, facets, notes, .. } = assembly;
+    let Assembly { materials, objects, solids, placed, notes, .. } = assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Fnv::new();
-    facets.iter().for_each(|facet| surfaces.facet(facet));
+    placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
-    let world = World { facets: Facets::new(facets, sensor.position), solids };
+    let world = placed::world(placed, solids, sensor.position);
     Ok(Scene { name, materials, objects, sensor, notes, world, surfaces })
 }
 
@@ -144,31 +145,12 @@ impl Assembly<'_> {
             }
             return Ok(());
         }
-        let mesh = self.mesh(&name, thing)?;
+        let mesh = Rc::new(self.mesh(&name, thing)?);
         let paints = self.paints(&name, thing, &mesh)?;
-        for pose in poses {
-            self.place(&mesh, &paints, pose, (thing.rest_on_ground, object));
-        }
+        let stand = |pose: &Pose| stand(&mesh, pose, thing.rest_on_ground);
+        let at = poses.iter().map(stand).collect();
+        self.placed.push(Placed { mesh, paints, at, object });
         Ok(())
-    }
-
-    /// Adds the triangles of `mesh`, carried to `pose`.
-    fn place(&mut self, mesh: &Mesh, paints: &[u16], pose: Pose, (rest, object): (bool, u16)) {
-        let turned = Pose { position: [0.0; 3], ..pose }.world_from_sensor();
-        let mut vertices: Vec<[f64; 3]> = mesh.vertices.iter().map(|v| turned.point(*v)).collect();
-        let used = mesh.triangles.iter().flatten().map(|corner| vertices[*corner as usize][2]);
-        let lowest = if rest { used.fold(f64::INFINITY, f64::min) } else { 0.0 };
-        for vertex in &mut vertices {
-            let [x, y, z] = pose.position;
-            *vertex = [vertex[0] + x, vertex[1] + y, vertex[2] + z - lowest];
-        }
-        for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
-            self.facets.push(Facet {
-                corners: triangle.map(|corner| vertices[corner as usize]),
-                material: paints[*material as usize],
-                object,
-            });
-        }
     }
 
     /// The mesh of an object in metres, x forward, z up.

@@ -219,7 +219,8 @@ fn plate(mesh: &mut Mesh, face: Face, (s, z): (f64, f64)) {
 fn solid(mesh: &Mesh) -> Facets {
     let corners = |triangle: &[u32; 3]| triangle.map(|corner| mesh.vertices[corner as usize]);
     let facet = |triangle| Facet { corners: corners(triangle), material: 0, object: 0 };
-    Facets::new(mesh.triangles.iter().map(facet).collect(), [0.0; 3])
+    let facets: Vec<Facet> = mesh.triangles.iter().map(facet).collect();
+    Facets::new(&facets, [0.0; 3])
 }
 
 /// Lays a patch of the given outline on the body, a few millimetres proud of it.

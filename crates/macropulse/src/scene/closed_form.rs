@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use super::hits::{CastRays, Hit, Ray};
 use super::pose::{Pose, Transform};
+use crate::kernels::{Form, Lanes, Packet, meet, meet_packet};
 
 /// A shape in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +50,8 @@ pub struct Solid {
     pose: Pose,
     to_world: Transform,
     from_world: Transform,
+    /// Of each face, in the world.
+    normals: [[f64; 3]; 6],
     material: u16,
     object: u16,
 }
@@ -57,7 +60,15 @@ impl Solid {
     /// `shape` at `pose`; `material` and `object` are indices into the scene's lists.
     pub fn new(shape: Shape, pose: Pose, material: u16, object: u16) -> Self {
         let to_world = pose.world_from_sensor();
-        Self { shape, pose, to_world, from_world: to_world.inverse(), material, object }
+        let from_world = to_world.inverse();
+        let normals = std::array::from_fn(|face| {
+            let outward = DVec3::AXES[face / 2] * if face % 2 == 1 { 1.0 } else { -1.0 };
+            to_world.direction(match shape {
+                Shape::Plane { normal } => normal,
+                _ => outward.to_array(),
+            })
+        });
+        Self { shape, pose, to_world, from_world, normals, material, object }
     }
 
     /// The shape.
@@ -81,64 +92,60 @@ impl Solid {
     }
 }
 
+impl Solid {
+    fn form(&self) -> Form {
+        match self.shape {
+            Shape::Plane { normal } => Form::Plane(normal),
+            Shape::Sphere { radius } => Form::Sphere(radius),
+            Shape::Box { half } => Form::Box(half),
+        }
+    }
+
+    /// Half the size of an upright box about the position that holds the solid; `None` for a
+    /// plane, which nothing holds.
+    pub(super) fn half_extent(&self) -> Option<DVec3> {
+        match self.shape {
+            Shape::Plane { .. } => None,
+            Shape::Sphere { radius } => Some(DVec3::splat(radius)),
+            Shape::Box { half } => Some(self.to_world.rotation().abs() * DVec3::from(half)),
+        }
+    }
+
+    /// The unit normal in the world where a ray has met `face` at `range`.
+    #[inline(always)]
+    fn normal(&self, ray: &Ray, (range, face): (f64, u32)) -> [f64; 3] {
+        let Shape::Sphere { radius } = self.shape else { return self.normals[face as usize] };
+        let origin = DVec3::from(self.from_world.point(ray.origin));
+        let along = DVec3::from(self.from_world.direction(ray.direction));
+        self.to_world.direction(((origin + along * range) / radius).to_array())
+    }
+
+    /// The hit of a ray that has met `face` at `range`.
+    #[inline(always)]
+    pub(super) fn hit(&self, ray: &Ray, (range, face): (f64, u32)) -> Hit {
+        let normal = self.normal(ray, (range, face));
+        Hit { range, normal, material: self.material, object: self.object }
+    }
+
+    /// Where the rays of `packet` meet the solid before `limit`, and its face; NaN for those
+    /// that do not.
+    pub(super) fn meet_packet(
+        &self,
+        packet: &Packet,
+        limit: &Lanes<f64>,
+    ) -> (Lanes<f64>, Lanes<u32>) {
+        let origin = DVec3::from(self.from_world.point(packet.origin));
+        meet_packet(&self.form(), self.from_world.rotation(), origin, packet, limit)
+    }
+}
+
 impl CastRays for Solid {
     fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
         let origin = DVec3::from(self.from_world.point(ray.origin));
         let along = DVec3::from(self.from_world.direction(ray.direction));
-        let crossings = match self.shape {
-            Shape::Plane { normal } => plane(origin, along, DVec3::from(normal)),
-            Shape::Sphere { radius } => sphere(origin, along, radius),
-            Shape::Box { half } => cuboid(origin, along, DVec3::from(half)),
-        };
-        // Crossings come nearest first; comparisons are false for NaN.
-        let (range, normal) =
-            crossings.into_iter().flatten().find(|(t, _)| *t > nearest && *t < farthest)?;
-        let normal = self.to_world.direction(normal.to_array());
-        Some(Hit { range, normal, material: self.material, object: self.object })
+        let met = meet(&self.form(), (origin, along), (nearest, farthest))?;
+        Some(self.hit(ray, met))
     }
-}
-
-/// Where a line enters and where it leaves, each as distance and outward normal.
-type Crossings = [Option<(f64, DVec3)>; 2];
-
-/// `t = −n·o / n·d`.
-fn plane(origin: DVec3, along: DVec3, normal: DVec3) -> Crossings {
-    [Some((-normal.dot(origin) / normal.dot(along), normal)), None]
-}
-
-/// Half chord `h = √(r² − |o − (o·d) d|²)` about the point of closest approach: no cancellation,
-/// however far the sphere is.
-fn sphere(origin: DVec3, along: DVec3, radius: f64) -> Crossings {
-    let closest = -origin.dot(along);
-    let square = radius * radius - (origin + along * closest).length_squared();
-    if square.is_nan() || square < 0.0 {
-        return [None, None];
-    }
-    [closest - square.sqrt(), closest + square.sqrt()]
-        .map(|t| Some((t, (origin + along * t) / radius)))
-}
-
-/// The latest entry and the earliest exit of three slabs.
-fn cuboid(origin: DVec3, along: DVec3, half: DVec3) -> Crossings {
-    let (mut enter, mut leave) = ((f64::NEG_INFINITY, DVec3::ZERO), (f64::INFINITY, DVec3::ZERO));
-    for axis in 0..3 {
-        if along[axis] == 0.0 {
-            if origin[axis].abs() > half[axis] {
-                return [None, None];
-            }
-            continue;
-        }
-        let outward = DVec3::AXES[axis] * along[axis].signum();
-        let near = (-half[axis] * along[axis].signum() - origin[axis]) / along[axis];
-        let far = (half[axis] * along[axis].signum() - origin[axis]) / along[axis];
-        if near > enter.0 {
-            enter = (near, -outward);
-        }
-        if far < leave.0 {
-            leave = (far, outward);
-        }
-    }
-    if enter.0 <= leave.0 { [Some(enter), Some(leave)] } else { [None, None] }
 }
 
 #[cfg(test)]

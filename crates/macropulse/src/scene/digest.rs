@@ -1,8 +1,8 @@
 //! What of a scene goes into its digest: all that decides what light meets.
 
 use super::closed_form::{Shape, Solid};
+use super::placed::Placed;
 use super::pose::Pose;
-use super::raycast::Facet;
 use crate::digest::Fnv;
 
 impl Fnv {
@@ -14,11 +14,21 @@ impl Fnv {
         }
     }
 
-    /// Takes in a triangle.
-    pub(super) fn facet(&mut self, facet: &Facet) {
-        facet.corners.iter().flatten().for_each(|value| self.number(*value));
-        self.bytes(&facet.material.to_le_bytes());
-        self.bytes(&facet.object.to_le_bytes());
+    /// Takes in a mesh, what it is made of, and where it stands.
+    pub(super) fn placed(&mut self, placed: &Placed) {
+        let Placed { mesh, paints, at, object } = placed;
+        mesh.vertices.iter().flatten().for_each(|value| self.number(*value));
+        for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
+            triangle.iter().for_each(|corner| self.bytes(&corner.to_le_bytes()));
+            self.bytes(&paints[usize::from(*material)].to_le_bytes());
+        }
+        for place in at {
+            let origin = place.point([0.0; 3]);
+            let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let turned = axes.map(|axis| place.direction(axis));
+            origin.iter().chain(turned.iter().flatten()).for_each(|value| self.number(*value));
+        }
+        self.bytes(&object.to_le_bytes());
     }
 
     /// Takes in a shape.

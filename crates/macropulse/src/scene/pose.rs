@@ -54,13 +54,25 @@ pub struct Transform {
 
 impl Transform {
     /// Carries a point over.
+    #[inline]
     pub fn point(&self, point: [f64; 3]) -> [f64; 3] {
         (self.rotation * DVec3::from(point) + self.translation).to_array()
     }
 
     /// Carries a direction over: turned, not shifted.
+    #[inline]
     pub fn direction(&self, direction: [f64; 3]) -> [f64; 3] {
         (self.rotation * DVec3::from(direction)).to_array()
+    }
+
+    /// The turn alone.
+    pub(super) fn rotation(&self) -> &DMat3 {
+        &self.rotation
+    }
+
+    /// The same map, shifted by `by` afterwards.
+    pub(super) fn shifted(self, by: [f64; 3]) -> Self {
+        Self { translation: self.translation + DVec3::from(by), ..self }
     }
 
     /// The map back.

@@ -5,65 +5,25 @@
 //! 2. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
 
-use super::{Hit, Hits, Ray, Scene};
+use super::batch::Batch;
+use super::{Hits, Scene};
 use crate::design::Design;
-use crate::emit::{ShotLog, beam_axes, direction};
-
-/// Panes a ray is followed through.
-const PANES: usize = 6;
-
-/// A ray goes on this far behind the pane it has met, m.
-const BEHIND: f64 = 1e-4;
-
-/// Light weaker than this fraction of the shot is not followed further.
-const FAINTEST: f32 = 1e-4;
+use crate::emit::{ShotLog, beam_axes};
 
 impl Scene {
     /// What the shots of `log` meet within the range gate, in the order of the log.
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Hits {
         let footprint = Footprint::of(design);
-        let world_from_sensor = self.sensor.world_from_sensor();
-        let mut hits = Hits::default();
+        let directions = design.directions();
+        let mut batch = Batch::new(self, design.scan.max_range);
         for shot in 0..log.len() {
-            let axis = direction(design, log.row[shot], log.column[shot]);
-            for (aim, weight) in footprint.rays(axis) {
-                let ray = Ray {
-                    origin: self.sensor.position,
-                    direction: world_from_sensor.direction(aim),
-                };
-                self.follow(ray, design.scan.max_range, |hit, transmitted| {
-                    hits.shot.push(shot as u32);
-                    hits.weight.push(weight * transmitted);
-                    hits.range.push(hit.range);
-                    hits.cosine.push(cosine(&ray, hit));
-                    hits.material.push(hit.material);
-                    hits.object.push(hit.object);
-                });
-            }
+            let axis = directions.of(log.row[shot], log.column[shot]);
+            footprint.rays(axis, |aim, weight| {
+                batch.add(shot as u32, weight, aim);
+            });
         }
-        hits
+        batch.finish()
     }
-
-    /// Calls `meet` with every surface along `ray` and the two-way transmission before it.
-    fn follow(&self, ray: Ray, farthest: f64, mut meet: impl FnMut(&Hit, f32)) {
-        let mut nearest = 0.0;
-        let mut transmitted = 1.0_f32;
-        for _ in 0..PANES {
-            let Some(hit) = self.cast(&ray, nearest, farthest) else { return };
-            meet(&hit, transmitted);
-            let through = self.materials[usize::from(hit.material)].transmission as f32;
-            transmitted *= through * through;
-            if transmitted < FAINTEST {
-                return;
-            }
-            nearest = hit.range + BEHIND;
-        }
-    }
-}
-
-fn cosine(ray: &Ray, hit: &Hit) -> f32 {
-    let dot: f64 = ray.direction.iter().zip(hit.normal).map(|(d, n)| d * n).sum();
-    dot.abs().min(1.0) as f32
 }
 
 /// Offsets across the beam, as tangents, and the share of the energy each stands for.
@@ -96,15 +56,24 @@ impl Footprint {
         Self { offsets }
     }
 
-    fn rays(&self, axis: [f64; 3]) -> impl Iterator<Item = ([f64; 3], f32)> {
+    /// Calls `cast` with the direction of each ray and its share of the energy.
+    #[inline]
+    fn rays(&self, axis: [f64; 3], mut cast: impl FnMut([f64; 3], f32)) {
+        let [(_, centre), around @ ..] = self.offsets.as_slice() else { return };
+        cast(axis, *centre);
+        if around.is_empty() {
+            return;
+        }
         let (left, up) = beam_axes(axis);
-        self.offsets.iter().map(move |&([a, b], weight)| {
-            if a == 0.0 && b == 0.0 {
-                return (axis, weight);
-            }
-            let aim: [f64; 3] = std::array::from_fn(|i| axis[i] + a * left[i] + b * up[i]);
-            let length = aim.iter().map(|v| v * v).sum::<f64>().sqrt();
-            (aim.map(|v| v / length), weight)
-        })
+        for &([a, b], weight) in around {
+            let [x, y, z] = axis;
+            let aim = [
+                x + a * left[0] + b * up[0],
+                y + a * left[1] + b * up[1],
+                z + a * left[2] + b * up[2],
+            ];
+            let length = (aim[0] * aim[0] + aim[1] * aim[1] + aim[2] * aim[2]).sqrt();
+            cast([aim[0] / length, aim[1] / length, aim[2] / length], weight);
+        }
     }
 }

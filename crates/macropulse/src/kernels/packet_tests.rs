@@ -1,0 +1,92 @@
+//! A packet against its rays one by one, at every level.
+
+use super::level::forced::at_each_level;
+use super::packet::{NONE, Packet, Waiting};
+use super::triangles::{Corners, Met, Triangles};
+use super::wide::LANES;
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Triangles with whole coordinates, so that edges, corners and planes are often met exactly.
+fn soup(chance: &mut ChaCha8Rng, count: usize) -> Vec<Corners> {
+    let corner =
+        |chance: &mut ChaCha8Rng| [0; 3].map(|_| f64::from(chance.random_range(-6..7_i32)));
+    (0..count).map(|_| [0; 3].map(|_| corner(chance))).collect()
+}
+
+fn direction(chance: &mut ChaCha8Rng, kind: u32, aim: [f64; 3], origin: [f64; 3]) -> [f64; 3] {
+    let any = [0; 3].map(|_| chance.random_range(-1.0..1.0_f64));
+    let wanted = match kind {
+        0 => any,
+        1 => [0, 1, 2].map(|axis| aim[axis] - origin[axis] + 0.2 * any[axis]),
+        2 => [0, 1, 2].map(|axis| aim[axis] - origin[axis]),
+        3 => {
+            let mut along = [0.0, -0.0, 0.0];
+            along[chance.random_range(0..3_usize)] = any[0].signum();
+            along
+        }
+        _ => [f64::NAN, 0.0, f64::INFINITY],
+    };
+    let length = wanted.iter().map(|slope| slope * slope).sum::<f64>().sqrt();
+    if length == 0.0 { wanted } else { wanted.map(|slope| slope / length) }
+}
+
+proptest! {
+    #[test]
+    fn each_ray_meets_what_it_would_have_met_alone(
+        seed in 0..u64::MAX,
+        count in 0..120_usize,
+        coherent in proptest::bool::ANY,
+        from_corner in proptest::bool::ANY,
+        nearest in prop_oneof![Just(0.0), 0.0..8.0_f64],
+        farthest in prop_oneof![Just(f64::INFINITY), 1.0..20.0_f64, Just(f64::NAN)],
+    ) {
+        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        let corners = soup(&mut chance, count);
+        let centre = [0; 3].map(|_| chance.random_range(-5.0..5.0_f64));
+        let (triangles, _) = Triangles::new(count, |index| corners[index], centre);
+        let mut origin = [centre, [0; 3].map(|_| chance.random_range(-9.0..9.0))][seed as usize % 2];
+        let mut aim = [1.0, 2.0, 3.0];
+        if let Some(corner) = corners.first().filter(|_| from_corner) {
+            origin = corner[0];
+        }
+        if let Some(corner) = corners.last() {
+            aim = corner[1];
+        }
+        let mut packet = Packet::from(origin);
+        for lane in 0..LANES {
+            let kind = if coherent { 1 } else { chance.random_range(0..5) };
+            packet.set(lane, direction(&mut chance, kind, aim, origin), farthest);
+            packet.nearest[lane] = nearest;
+        }
+        for (level, cast) in at_each_level(|| {
+            let mut cast = packet.clone();
+            cast.cast(&triangles, &mut Waiting::default());
+            cast
+        }) {
+            for lane in 0..LANES {
+                let ray = (origin, packet.along(lane));
+                let alone = triangles.nearest(ray, (nearest, farthest));
+                let (range, leaf) = (cast.range[lane], cast.leaf[lane]);
+                let together = (leaf != NONE).then_some(Met { range, leaf });
+                prop_assert_eq!(together, alone, "{:?}, ray {}: {:?}", level, lane, ray);
+            }
+        }
+    }
+}
+
+/// The control of the test above: it does meet triangles, and some exactly on an edge.
+#[test]
+fn the_soup_is_thick() {
+    let mut chance = ChaCha8Rng::seed_from_u64(7);
+    let corners = soup(&mut chance, 100);
+    let (triangles, _) = Triangles::new(100, |index| corners[index], [0.0; 3]);
+    let mut packet = Packet::from([0.0; 3]);
+    for lane in 0..LANES {
+        let toward = direction(&mut chance, 2, corners[lane][0], [0.0; 3]);
+        packet.set(lane, toward, f64::INFINITY);
+    }
+    packet.cast(&triangles, &mut Waiting::default());
+    assert!(packet.leaf.iter().filter(|leaf| **leaf != NONE).count() > LANES / 2);
+}

@@ -1,0 +1,88 @@
+//! Meshes where they stand: each triangle laid out in the world, or a mesh that occurs more than
+//! once kept once.
+
+use std::rc::Rc;
+
+use super::closed_form::Solid;
+use super::mesh::Mesh;
+use super::pose::{Pose, Transform};
+use super::raycast::{Facet, Facets};
+use super::world::{Copy, World};
+
+/// A mesh in metres, and where it stands.
+pub(super) struct Placed {
+    pub mesh: Rc<Mesh>,
+    /// The scene's material for each of the mesh.
+    pub paints: Vec<u16>,
+    pub at: Vec<Transform>,
+    pub object: u16,
+}
+
+/// The map that carries `mesh` to `pose`; its lowest corner to the position if it is to `rest`.
+pub(super) fn stand(mesh: &Mesh, pose: &Pose, rest: bool) -> Transform {
+    let place = pose.world_from_sensor();
+    if !rest {
+        return place;
+    }
+    let corners = mesh.triangles.iter().flatten();
+    let heights = corners.map(|corner| place.point(mesh.vertices[*corner as usize])[2]);
+    let lowest = heights.fold(f64::INFINITY, f64::min);
+    place.shifted([0.0, 0.0, pose.position[2] - lowest])
+}
+
+impl Placed {
+    /// The triangles of the mesh, each corner carried by `place`.
+    fn facets(&self, place: impl Fn([f64; 3]) -> [f64; 3]) -> impl Iterator<Item = Facet> {
+        let vertices: Vec<[f64; 3]> = self.mesh.vertices.iter().map(|v| place(*v)).collect();
+        let each = self.mesh.triangles.iter().zip(&self.mesh.material_of_triangle);
+        each.map(move |(triangle, material)| Facet {
+            corners: triangle.map(|corner| vertices[corner as usize]),
+            material: self.paints[usize::from(*material)],
+            object: self.object,
+        })
+    }
+
+    /// The mesh in its own frame, exact about its middle.
+    fn model(&self) -> Facets {
+        let facets: Vec<Facet> = self.facets(|vertex| vertex).collect();
+        let (low, high) = self.mesh.bounds().unwrap_or_default();
+        let middle = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
+        Facets::new(&facets, middle)
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        self.paints == other.paints
+            && (Rc::ptr_eq(&self.mesh, &other.mesh) || self.mesh == other.mesh)
+    }
+}
+
+/// The world of all that is placed, exact about `centre` (the sensor).
+pub(super) fn world(placed: Vec<Placed>, solids: Vec<Solid>, centre: [f64; 3]) -> World {
+    let mut facets = Vec::new();
+    let (mut models, mut copies) = (Vec::new(), Vec::new());
+    let mut seen: Vec<bool> = vec![false; placed.len()];
+    for (index, one) in placed.iter().enumerate() {
+        if seen[index] {
+            continue;
+        }
+        let like = |other: &usize| placed[*other].is_like(one);
+        let alike: Vec<usize> = (index..placed.len()).filter(like).collect();
+        let total: usize = alike.iter().map(|other| placed[*other].at.len()).sum();
+        alike.iter().for_each(|other| seen[*other] = true);
+        if total == 1 {
+            one.at.iter().for_each(|place| facets.extend(one.facets(|v| place.point(v))));
+            continue;
+        }
+        for other in alike.iter().map(|other| &placed[*other]) {
+            let copy = |to_world: &Transform| Copy {
+                model: models.len(),
+                to_world: *to_world,
+                object: other.object,
+            };
+            copies.extend(other.at.iter().map(copy));
+        }
+        models.push(one.model());
+    }
+    drop(placed);
+    World::new(&facets, (models, &copies), solids, centre)
+}
