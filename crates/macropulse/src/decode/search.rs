@@ -1,12 +1,14 @@
 //! The lag of a shot when nothing is known of it: every tick votes.
 //!
-//! A tick that is a mark of the code word says where the word began. Places with many votes are
-//! code words; the code words at the lit bits of the payload make the macropulse. A macropulse of
-//! B lit bits with k marks found has k/B or more of them in one of its code words, so that no lag
-//! with `least` marks is overlooked if every place with `least`/B votes is looked at.
+//! A tick that is a mark of the code word says where the word began. The votes for the code words
+//! at the lit bits of the payload, added up, are the marks of the macropulse.
+//!
+//! Where ticks are dense there are too many of them to vote. A macropulse of B lit bits with k
+//! marks found has k/B or more of them in one of its code words: if so many stand out, no lag with
+//! `least` marks is overlooked where every place with `least`/B marks of a word is looked at.
 
 use super::unexplained::Unexplained;
-use crate::kernels::{BLOCK_WORDS, with_marks};
+use crate::kernels::{BALLOT, BLOCK_WORDS, highest_sum, with_marks};
 
 /// What is looked for: a macropulse, taken apart.
 #[derive(Debug)]
@@ -133,8 +135,6 @@ pub(super) struct Candidate {
 pub(super) struct Search {
     /// Votes for each place at which a code word may begin, from one word before the first tick.
     votes: Vec<u8>,
-    /// Places that have as many votes as the best code word must have.
-    elected: Vec<usize>,
 }
 
 impl Search {
@@ -148,42 +148,29 @@ impl Search {
         sought: &Sought,
     ) -> Option<Candidate> {
         let (first, width) = at;
-        if sought.bits.is_empty() {
-            return None;
-        }
         let reach = sought.word.last()? + 1;
         let places = sought.places();
-        self.votes.resize(self.votes.len().max(places + 2 * reach), 0);
-        let needed = sought.in_one_word().clamp(1, 255) as u8;
+        self.votes.resize(self.votes.len().max(places + 2 * reach + BALLOT), 0);
+        let offsets: Vec<usize> = sought.word.iter().map(|mark| reach - mark).collect();
 
         let mut ticks = 0;
-        self.elected.clear();
         for_each_tick(unexplained, (first, places + reach), width, |tick| {
             ticks += 1;
             let ballot = &mut self.votes[tick..=tick + reach];
-            for mark in &sought.word {
-                let vote = &mut ballot[reach - mark];
-                *vote = vote.saturating_add(1);
-                if *vote == needed {
-                    self.elected.push(tick + reach - mark);
-                }
-            }
+            // A place has no more votes than the word has marks, of which there are few.
+            offsets.iter().for_each(|&offset| ballot[offset] = ballot[offset].wrapping_add(1));
         });
-        let votes = |place: usize| u16::from(self.votes[reach + place]);
-        let elected = self.elected.iter().filter_map(|place| place.checked_sub(reach));
-        let count = |lag| sought.bits.iter().map(|bit| votes(lag + bit)).sum();
-        let best = sought.best_of(elected, votes, count);
+        let starts: Vec<usize> = sought.bits.iter().map(|bit| reach + bit).collect();
+        let best = highest_sum(&self.votes, &starts, sought.lags, sought.least);
         // Few ticks: taking every vote back is less work than wiping the whole ballot.
         if ticks * sought.word.len() * 16 < places {
             for_each_tick(unexplained, (first, places + reach), width, |tick| {
-                for mark in &sought.word {
-                    self.votes[tick + reach - mark] = 0;
-                }
+                offsets.iter().for_each(|offset| self.votes[tick + offset] = 0);
             });
         } else {
             self.votes.fill(0);
         }
-        best
+        best.map(|(lag, count)| Candidate { lag, count })
     }
 }
 
@@ -222,7 +209,7 @@ mod tests {
         let count = |lag: usize| {
             let starts = bits.iter().map(|bit| first + (lag + bit) as i64);
             let places = starts.flat_map(|start| word.iter().map(move |&mark| start + mark as i64));
-            places.filter(|&place| unexplained.any(place..place + width)).count()
+            places.filter(|&place| unexplained.any(place, width as u32)).count()
         };
         let lag = (0..lags).rev().max_by_key(|&lag| count(lag)).unwrap();
         Candidate { lag, count: count(lag) as u16 }
@@ -239,7 +226,7 @@ mod tests {
                 let expected = exhaustive(&unexplained, -7, i64::from(width));
                 let mut words = vec![0; 40];
                 for place in 0..1200 {
-                    if unexplained.any(place - 7..place - 7 + i64::from(width)) {
+                    if unexplained.any(place - 7, width) {
                         words[place as usize / 64] |= 1 << (place % 64);
                     }
                 }

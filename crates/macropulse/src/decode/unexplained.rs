@@ -43,34 +43,40 @@ impl Unexplained {
         self.words
     }
 
-    /// The chunk, word and bit of `tick`; `None` in a chunk without any.
-    fn place(&self, tick: i64) -> Option<(usize, usize, u32)> {
-        let bit = (tick - self.origin) as u64;
-        let chunk = (bit >> CHUNK_BITS) as usize;
-        (*self.per_chunk.get(chunk)? > 0).then_some((chunk, (bit >> 6) as usize, (bit & 63) as u32))
-    }
-
     /// Explains the ticks at each of `places`, and the `width` − 1 behind it.
     pub fn explain(&mut self, places: impl Iterator<Item = i64>, width: u32) {
         for place in places {
-            for tick in place..place + i64::from(width) {
-                let Some((chunk, word, bit)) = self.place(tick) else { continue };
-                let was_lit = self.words[word] >> bit & 1;
-                self.words[word] &= !(1 << bit);
-                self.per_chunk[chunk] -= was_lit as u32;
+            for (word, mask) in self.masks(place, width) {
+                let Some(lit) = self.per_chunk.get_mut(word / WORDS).filter(|lit| **lit > 0) else {
+                    continue;
+                };
+                *lit -= (self.words[word] & mask).count_ones();
+                self.words[word] &= !mask;
             }
         }
     }
 
     /// At how many of `places`, or of the `width` − 1 ticks behind it, a tick is unexplained.
     pub fn count(&self, places: impl Iterator<Item = i64>, width: u32) -> u16 {
-        places.filter(|&place| self.any(place..place + i64::from(width))).count() as u16
+        places.filter(|&place| self.any(place, width)).count() as u16
     }
 
-    /// Whether one of the ticks in `span` is unexplained.
-    pub fn any(&self, mut span: Range<i64>) -> bool {
-        span.any(|tick| {
-            self.place(tick).is_some_and(|(_, word, bit)| self.words[word] >> bit & 1 == 1)
+    /// Whether the tick at `place`, or one of the `width` − 1 behind it, is unexplained.
+    pub fn any(&self, place: i64, width: u32) -> bool {
+        self.masks(place, width).any(|(word, mask)| {
+            self.per_chunk.get(word / WORDS).is_some_and(|lit| *lit > 0)
+                && self.words[word] & mask != 0
+        })
+    }
+
+    /// The words in which the `width` ticks from `place` on lie, and their bits in each.
+    fn masks(&self, place: i64, width: u32) -> impl Iterator<Item = (usize, u64)> + use<> {
+        let first = place - self.origin;
+        let end = first + i64::from(width);
+        (first >> 6..=(end - 1) >> 6).map(move |word| {
+            let from = (first - 64 * word).max(0);
+            let to = (end - 64 * word).min(64);
+            (word as usize, (u64::MAX >> (64 - (to - from))) << from)
         })
     }
 
@@ -144,8 +150,8 @@ mod tests {
         assert_eq!(unexplained.at_most(5121..10_240), 487);
         // Four chunks hold any 2048 ticks.
         assert!((205..=410).contains(&unexplained.densest(0..10_240, 2048)));
-        assert!(!unexplained.any(5110..5120));
-        assert!(unexplained.any(5110..5131));
+        assert!(!unexplained.any(5110, 10));
+        assert!(unexplained.any(5110, 21));
         let mut left = Vec::new();
         unexplained.for_each(5000..5200, |tick| left.push(tick));
         assert_eq!(left, [5130, 5140, 5150, 5160, 5170, 5180, 5190]);

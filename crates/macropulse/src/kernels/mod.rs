@@ -11,6 +11,7 @@
 // Lanes of several arrays are walked in step, by their number.
 #![allow(clippy::needless_range_loop)]
 
+mod ballot;
 mod correlate;
 mod delay;
 mod level;
@@ -30,6 +31,7 @@ mod waits;
 mod whole;
 mod wide;
 
+pub(crate) use ballot::{BALLOT, highest_sum};
 pub(crate) use correlate::{BLOCK_WORDS, Block, PLANES, count_marks, with_marks};
 pub(crate) use delay::{delay, drawn};
 pub(crate) use marks::{WordTicks, begin_with};
