@@ -1,5 +1,7 @@
 //! The whole flow, as function calls.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -36,14 +38,11 @@ pub fn scan(design: &Design, scene: &Scene, seed: u64, number: u64) -> Scan {
 
 /// As [`scan`], but only the `bands` given, all of one scan; the rest of the cloud stays empty.
 pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> Scan {
-    let number = bands.first().map_or(0, |band| band.scan);
-    let mut scan = Scan::empty(design, number);
+    let mut scans = Scans::new(design, scene, seed);
     // A watch that never says stop lets every band through.
     let nobody = Watch { done: &|_| {}, stop: &|| false };
-    for band in measure_all((design, scene), seed, bands, &nobody).iter().flatten() {
-        scan.add(design, scene, band);
-    }
-    scan
+    scans.measure(bands, &nobody);
+    scans.scan
 }
 
 /// As [`scan`], with somebody looking on; `None` if the watch said stop before the end.
@@ -54,13 +53,9 @@ pub fn scan_watched(
     number: u64,
     watch: &Watch,
 ) -> Option<Scan> {
-    let bands: Vec<Band> = bands(design, number).collect();
-    let measured = measure_all((design, scene), seed, &bands, watch);
-    let mut scan = Scan::empty(design, number);
-    for band in &measured {
-        scan.add(design, scene, band.as_ref()?);
-    }
-    Some(scan)
+    let mut scans = Scans::new(design, scene, seed);
+    scans.scan(number, watch)?;
+    Some(scans.scan)
 }
 
 /// Who looks on while scans are computed. Asked and told from many threads.
@@ -71,36 +66,58 @@ pub struct Watch<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl Scan {
-    fn empty(design: &Design, number: u64) -> Self {
-        let mut cloud = PointCloud::empty(design, number);
+/// Scan after scan of one sensor in one scene, as many as there may be in the memory of one.
+pub struct Scans<'a> {
+    design: &'a Design,
+    scene: &'a Scene,
+    detectors: Detectors<'a>,
+    scan: Scan,
+}
+
+impl<'a> Scans<'a> {
+    /// The scans of the sensor `design` in `scene`, with the chance of `seed`.
+    pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Self {
+        let mut cloud = PointCloud::empty(design, 0);
         cloud.truth = score::empty_truth(&cloud);
-        Self { cloud, score: Score::default(), tally: Tally::default() }
+        let scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
+        Self { design, scene, detectors: Detectors::new(design, Chance::new(seed)), scan }
     }
 
-    fn add(&mut self, design: &Design, scene: &Scene, band: &Measured) {
-        self.cloud.add(design, &band.log, &band.returns);
-        self.score.add(&score::judge(&mut self.cloud, design, scene, &band.log, &band.hits));
-        self.tally.add(&band.tally);
+    /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
+    /// its end.
+    pub fn scan(&mut self, number: u64, watch: &Watch) -> Option<&mut Scan> {
+        let bands: Vec<Band> = bands(self.design, number).collect();
+        self.measure(&bands, watch).then_some(&mut self.scan)
+    }
+
+    /// Measures `bands` of one scan; whether to the end.
+    fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
+        self.scan.cloud.clear(bands.first().map_or(0, |band| band.scan));
+        (self.scan.score, self.scan.tally) = Default::default();
+        let (design, scene, detectors) = (self.design, self.scene, &self.detectors);
+        let scan = Mutex::new(&mut self.scan);
+        let stopped = AtomicBool::new(false);
+        bands.par_iter().for_each_init(Memory::default, |memory, band| {
+            if stopped.load(Ordering::Relaxed) || (watch.stop)() {
+                return stopped.store(true, Ordering::Relaxed);
+            }
+            let measured = measure((design, scene), detectors, memory, band);
+            // Bands have no pixel in common, and counts add up in any order.
+            scan.lock().unwrap_or_else(PoisonError::into_inner).add(design, scene, &measured);
+            (watch.done)(band.shots);
+        });
+        !stopped.into_inner()
     }
 }
 
-fn measure_all(
-    (design, scene): (&Design, &Scene),
-    seed: u64,
-    bands: &[Band],
-    watch: &Watch,
-) -> Vec<Option<Measured>> {
-    let detectors = Detectors::new(design, Chance::new(seed));
-    let measured = |memory: &mut Memory, band: &Band| {
-        if (watch.stop)() {
-            return None;
-        }
-        let measured = measure((design, scene), &detectors, memory, band.shot_log(design));
-        (watch.done)(band.shots);
-        Some(measured)
-    };
-    bands.par_iter().map_init(Memory::default, measured).collect()
+impl Scan {
+    fn add(&mut self, design: &Design, scene: &Scene, band: &Measured) {
+        let clock = Instant::now();
+        self.cloud.add(design, &band.log, &band.returns);
+        self.score.add(&score::judge(&mut self.cloud, design, scene, &band.log, &band.hits));
+        self.tally.add(&band.tally);
+        self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+    }
 }
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
@@ -115,25 +132,29 @@ fn measure(
     (design, scene): (&Design, &Scene),
     detectors: &Detectors,
     memory: &mut Memory,
-    log: ShotLog,
+    band: &Band,
 ) -> Measured {
     let mut tally = Tally::default();
     let mut clock = Instant::now();
-    let mut lap = |stage: usize, tally: &mut Tally| {
+    let mut stages = 0..POINTS;
+    let mut lap = |tally: &mut Tally| {
+        let stage = stages.next().unwrap_or(POINTS);
         tally.seconds[stage] += clock.elapsed().as_secs_f64();
         clock = Instant::now();
     };
+    let log = band.shot_log(design);
+    lap(&mut tally);
     let hits = scene.trace(design, &log);
-    lap(0, &mut tally);
+    lap(&mut tally);
     let echoes = channel::echoes(design, &scene.materials, &hits);
-    lap(1, &mut tally);
+    lap(&mut tally);
     let edges = detectors.edges(&log, &echoes, memory);
     tally.edges = edges.time.len() as u64;
-    lap(2, &mut tally);
+    lap(&mut tally);
     let ticks = tdc::ticks(design, edges);
-    lap(3, &mut tally);
+    lap(&mut tally);
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
-    lap(4, &mut tally);
+    lap(&mut tally);
     let home = |shot: &u32| log.home.contains(&(*shot as usize));
     tally.shots = log.home.len() as u64;
     tally.surfaces = hits.shot.iter().filter(|s| home(s)).count() as u64;
@@ -147,6 +168,9 @@ fn measure(
     memory.take_back(ticks.tick);
     Measured { log, hits, returns, tally }
 }
+
+/// The last stage, after those of a band: its points and their score.
+const POINTS: usize = 6;
 
 /// Counts of a run, stage by stage. Edges and ticks include the halos of the bands; the other
 /// counts are of home shots alone.
@@ -173,12 +197,13 @@ pub struct Tally {
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
     /// Seconds spent in each of [`Tally::STAGES`], summed over threads.
-    pub seconds: [f64; 5],
+    pub seconds: [f64; POINTS + 1],
 }
 
 impl Tally {
     /// The stages whose time is taken.
-    pub const STAGES: [&str; 5] = ["scene", "channel", "detect", "tdc", "decode"];
+    pub const STAGES: [&str; POINTS + 1] =
+        ["emit", "scene", "channel", "detect", "tdc", "decode", "points"];
 
     /// The sum over several bands or scans; of the busiest moment the maximum.
     pub fn add(&mut self, other: &Self) {

@@ -8,7 +8,7 @@ use macropulse::points::Truth;
 use macropulse::record::{self, COLOUR};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
-use macropulse::sim::{self, Tally, Watch};
+use macropulse::sim::{Scans, Tally, Watch};
 
 use super::scenario::Scenario;
 use crate::fault::{Fault, complain};
@@ -49,17 +49,16 @@ impl<'a> Run<'a> {
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
+        let mut scans = Scans::new(design, &scenario.scene, scenario.seed);
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
-            let (scene, seed) = (&scenario.scene, scenario.seed);
-            let Some(mut scan) = sim::scan_watched(design, scene, seed, run.scans, &watch) else {
-                break;
-            };
+            let Some(scan) = scans.scan(run.scans, &watch) else { break };
             run.score.add(&scan.score);
             run.tally.add(&scan.tally);
+            let mut truth = Truth::default();
             if !scenario.truth {
-                scan.cloud.truth = Truth::default();
+                std::mem::swap(&mut truth, &mut scan.cloud.truth);
             }
             if let Some(folder) = &mut folder {
                 let writing = Instant::now();
@@ -75,6 +74,9 @@ impl<'a> Run<'a> {
                 })?;
                 run.files.extend(files);
                 run.writing += writing.elapsed().as_secs_f64();
+            }
+            if !scenario.truth {
+                scan.cloud.truth = truth;
             }
             run.scans += 1;
         }

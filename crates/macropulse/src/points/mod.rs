@@ -125,6 +125,21 @@ impl PointCloud {
         }
     }
 
+    /// Makes it the cloud of scan number `scan`, without any return, in the same memory.
+    pub fn clear(&mut self, scan: u64) {
+        self.scan = scan;
+        let columns = [&mut self.x, &mut self.y, &mut self.z, &mut self.intensity, &mut self.range];
+        columns.into_iter().for_each(|column| column.fill(f32::NAN));
+        self.time_ns.fill(f64::NAN);
+        let columns = [&mut self.peak, &mut self.marks, &mut self.margin];
+        columns.into_iter().for_each(|column| column.fill(0));
+        let truth = &mut self.truth;
+        [&mut truth.range, &mut truth.cosine].into_iter().for_each(|column| column.fill(f32::NAN));
+        let columns = [&mut truth.object, &mut truth.material];
+        columns.into_iter().for_each(|column| column.fill(NO_OBJECT));
+        truth.outcome.fill(Outcome::Empty);
+    }
+
     /// Index of the pixel of shot `shot`.
     pub fn pixel(&self, log: &ShotLog, shot: usize) -> usize {
         usize::from(log.row[shot]) * self.columns + usize::from(log.column[shot])
