@@ -13,6 +13,7 @@ mod progress;
 mod scenes;
 mod sensors;
 mod simulate;
+mod speed;
 mod text;
 
 use std::process::ExitCode;
@@ -39,6 +40,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Scenes(scenes) => scenes::run(scenes),
         Command::Check(check) => check::run(check, common),
         Command::Encode(encode) => encode::run(encode),
+        Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),
     }
 }
