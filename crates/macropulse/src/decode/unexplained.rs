@@ -47,11 +47,11 @@ impl Unexplained {
     pub fn explain(&mut self, places: impl Iterator<Item = i64>, width: u32) {
         for place in places {
             for (word, mask) in self.masks(place, width) {
-                let Some(lit) = self.per_chunk.get_mut(word / WORDS).filter(|lit| **lit > 0) else {
-                    continue;
-                };
-                *lit -= (self.words[word] & mask).count_ones();
-                self.words[word] &= !mask;
+                let Some(lit) = self.per_chunk.get_mut(word / WORDS) else { continue };
+                if *lit > 0 {
+                    *lit -= (self.words[word] & mask).count_ones();
+                    self.words[word] &= !mask;
+                }
             }
         }
     }

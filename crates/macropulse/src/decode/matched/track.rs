@@ -4,6 +4,9 @@ use super::leftover::Evidence;
 use super::{Band, Lock};
 use crate::decode::correlator::{BLOCK, Counts, Peak};
 
+/// Where light is faint, a shot is looked for near one that was found so many shots away.
+const WIDEST_GAP: usize = 12;
+
 impl Band<'_> {
     /// Goes from each shot that was found back to those before it.
     pub(super) fn track_back(&mut self, evidence: Evidence) {
@@ -18,8 +21,9 @@ impl Band<'_> {
     }
 
     /// The lags at which `shot` is to be expected, after its neighbours: on the plane through
-    /// three of them, on the lines through two, and at the lag of one.
-    fn expected(&self, shot: usize) -> [Option<i64>; 6] {
+    /// three of them, on the lines through two, and at the lag of one. Where light is faint, gaps
+    /// are looked across.
+    fn expected(&self, shot: usize, evidence: Evidence) -> [Option<i64>; 6] {
         let at = |shot: Option<usize>| Some(self.locks.get(shot?)?.as_ref()?.lag);
         let over = |shot: Option<usize>| {
             self.above.get(shot?).copied().flatten().map(|shot| shot as usize)
@@ -29,7 +33,10 @@ impl Band<'_> {
         let plane = || Some(left? + above? - at(over(before))?);
         let across = || Some(2 * left? - at(shot.checked_sub(2))?);
         let down = || Some(2 * above? - at(over(over(Some(shot))))?);
-        [plane(), across(), down(), left, above, at(Some(shot + 1))]
+        let gap = if evidence == Evidence::MoreThanChance { WIDEST_GAP } else { 1 };
+        let nearest_left = || (1..=gap).find_map(|away| at(shot.checked_sub(away)));
+        let nearest_right = || (1..=gap).find_map(|away| at(Some(shot + away)));
+        [plane(), across(), down(), nearest_left(), above, nearest_right()]
     }
 
     /// The lag of `shot` if it lies where its neighbours say and the `evidence` is there.
@@ -38,7 +45,7 @@ impl Band<'_> {
         if weight == 0 {
             return None;
         }
-        let expected = self.expected(shot);
+        let expected = self.expected(shot, evidence);
         if expected.iter().all(Option::is_none) {
             return None;
         }
