@@ -71,7 +71,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
 
 /// Everything counted; only the seconds may differ.
 fn counted(scan: &Scan) -> Tally {
-    Tally { seconds: [0.0; 5], ..scan.tally }
+    Tally { seconds: Default::default(), ..scan.tally }
 }
 
 fn assert_same_on_any_pool(sensor: &str, part: Part) {

@@ -16,6 +16,8 @@
 //! A return is believed if chance would not reach its count of marks at any lag of the gate, see
 //! [`super::threshold`].
 
+#[cfg(test)]
+mod exhaustive;
 mod leftover;
 mod peel;
 mod track;
@@ -358,6 +360,7 @@ fn above(log: &ShotLog) -> Vec<Option<u32>> {
 #[cfg(test)]
 mod tests {
     use super::super::ReceiverKind;
+    use super::exhaustive::exhaustive;
     use super::*;
     use crate::code::{Crc, Family, Payload};
     use rand_chacha::ChaCha8Rng;
@@ -394,21 +397,6 @@ mod tests {
             channel: vec![0; shots.into()],
             home: 0..shots.into(),
         }
-    }
-
-    /// The earliest lag of the whole gate with most marks, every lag by itself.
-    fn exhaustive(sent: &Sent, ticks: &[u32], shot: usize) -> (i64, u16) {
-        let (nearest, farthest) = sent.gate();
-        let is_lit = |place: i64| {
-            let next = ticks.partition_point(|&tick| i64::from(tick) < place);
-            ticks.get(next).is_some_and(|&tick| i64::from(tick) < place + i64::from(sent.width))
-        };
-        let count = |lag: i64| {
-            let start = sent.fired[shot] + lag;
-            sent.places(shot).filter(|mark| is_lit(start + mark)).count() as u16
-        };
-        let best = (nearest..=farthest).rev().max_by_key(|&lag| count(lag)).unwrap();
-        (best, count(best))
     }
 
     #[test]
