@@ -1,0 +1,71 @@
+//! Whole scans of `kim-park-2016`, from rays to scored points: scans per second on one thread and
+//! on all. The sensor makes sixty.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod common;
+
+use std::time::Instant;
+
+use common::{SEED, detector};
+use macropulse::design::Design;
+use macropulse::scene::Scene;
+use macropulse::sim::{Scans, Tally, Watch};
+use rayon::ThreadPoolBuilder;
+
+/// Scans timed together, and how often: the best round counts.
+const SCANS: u64 = 8;
+const ROUNDS: u64 = 5;
+
+fn main() {
+    // `cargo test --benches` only asks whether it runs.
+    let in_earnest = std::env::args().any(|word| word == "--bench");
+    let (scans, rounds) = if in_earnest { (SCANS, ROUNDS) } else { (1, 1) };
+    let declared = Design::open("kim-park-2016", &[]).unwrap();
+    let clean = Design::open("kim-park-2016", &detector(0.0, 0.0)).unwrap();
+    let runs = [
+        ("car-50m", "clean", &clean),
+        ("car-50m", "declared", &declared),
+        ("street", "clean", &clean),
+    ];
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    println!("Scans per second, wall time, and where the time of a scan goes, ms of one thread");
+    println!("{:>20} {:>7} {:>8}  {}", "", "threads", "scans/s", Tally::STAGES.join(" "));
+    for (name, detector, design) in runs {
+        let scene = Scene::open(name).unwrap();
+        for threads in [1, all] {
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let (rate, seconds) = pool.install(|| best(design, &scene, (scans, rounds)));
+            let stages = Tally::STAGES.iter().zip(seconds);
+            let stages: Vec<String> = stages
+                .map(|(stage, seconds)| format!("{:>width$.1}", 1e3 * seconds, width = stage.len()))
+                .collect();
+            let name = format!("{name} {detector}");
+            println!("{name:>20} {threads:>7} {rate:>8.1}  {}", stages.join(" "));
+        }
+    }
+}
+
+/// Scans per second in the best of the rounds, and seconds in each stage per scan of that round.
+fn best(
+    design: &Design,
+    scene: &Scene,
+    (scans, rounds): (u64, u64),
+) -> (f64, [f64; Tally::STAGES.len()]) {
+    let watch = Watch { done: &|_| {}, stop: &|| false };
+    let mut stream = Scans::new(design, scene, SEED);
+    // Memory is there after the first one.
+    stream.scan(0, &watch).unwrap();
+    let mut best = (0.0, [0.0; Tally::STAGES.len()]);
+    for round in 0..rounds {
+        let mut tally = Tally::default();
+        let began = Instant::now();
+        for number in 1 + round * scans..=(round + 1) * scans {
+            tally.add(&stream.scan(number, &watch).unwrap().tally);
+        }
+        let rate = scans as f64 / began.elapsed().as_secs_f64();
+        if rate > best.0 {
+            best = (rate, tally.seconds.map(|seconds| seconds / scans as f64));
+        }
+    }
+    best
+}
