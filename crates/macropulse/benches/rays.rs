@@ -5,11 +5,14 @@
 //! million triangles. All on one thread.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod common;
+
 use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::hint::black_box;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
+use common::clock;
 use criterion::{Criterion, Throughput};
 use glam::{DVec3, Vec3A};
 use macropulse::scene::{Ray, Scene};
@@ -186,16 +189,6 @@ const WAYS: [Way; 4] = [
     ("obvhs", Rivals::obvhs),
     ("parry3d", Rivals::parry),
 ];
-
-/// Time for which this thread was on a processor, s; on other systems than Linux, any time.
-fn clock() -> f64 {
-    // The counter is brought up to date when the thread is put aside.
-    std::thread::yield_now();
-    let spent = fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let spent = spent.and_then(|text| text.split(' ').next()?.parse::<u64>().ok());
-    let since = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs_f64();
-    spent.map_or_else(since, |ns| ns as f64 * 1e-9)
-}
 
 /// Millions of rays per second: the best of several rounds, the ways taking turns.
 fn rates(rivals: &Rivals, rays: &[[f64; 3]]) -> [f64; WAYS.len()] {
