@@ -54,8 +54,9 @@ const RULES: [Rule; 18] = [
     },
     Rule {
         module: "decode",
-        may_name: &["code", "emit", "tdc", "units"],
-        because: "the receiver knows ticks and what was fired, as the hardware would",
+        may_name: &["code", "emit", "kernels", "tdc", "units"],
+        because: "the receiver knows ticks and what was fired, as the hardware would; fast loops \
+                  know numbers alone",
     },
     Rule {
         module: "points",

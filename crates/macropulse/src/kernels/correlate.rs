@@ -99,16 +99,16 @@ macro_rules! on_lanes {
         #[inline(always)]
         fn $name(mut a: Block, b: Block) -> Block {
             for lane in 0..BLOCK_WORDS {
-                a[lane] = a[lane] $sign b[lane];
+                a[lane] $sign b[lane];
             }
             a
         }
     };
 }
 
-on_lanes!(xor, ^);
-on_lanes!(and, &);
-on_lanes!(or, |);
+on_lanes!(xor, ^=);
+on_lanes!(and, &=);
+on_lanes!(or, |=);
 
 /// The sum of three bits, in each lag, and what is carried to the next plane.
 #[inline(always)]

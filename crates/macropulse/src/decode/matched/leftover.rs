@@ -16,6 +16,9 @@ pub(super) enum Evidence {
     MoreThanChance,
 }
 
+/// So few ticks are searched so soon that no shot needs to be left out.
+const FEW_TICKS: u32 = 128;
+
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
     /// them in all the unexplained light of the gate.
@@ -38,7 +41,8 @@ impl Band<'_> {
     fn is_among(&self, shot: usize, every: u32) -> bool {
         let log = self.sent.log;
         let (row, column) = (u32::from(log.row[shot]), u32::from(log.column[shot]));
-        (column + STAGGER * row).is_multiple_of(every)
+        let left = || self.unexplained.at_most(self.sent.gate_and_macropulse(shot));
+        (column + STAGGER * row).is_multiple_of(every) || left() < FEW_TICKS
     }
 
     /// What a search for `shot` finds, if the `evidence` is there.

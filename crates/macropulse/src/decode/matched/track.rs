@@ -153,7 +153,7 @@ impl Band<'_> {
             let start = self.sent.fired[shot] + lock.lag;
             let places = self.sent.places(shot).map(|mark| start + mark);
             return lock.count >= by_chance
-                && 2 * self.unexplained.count(places, self.sent.width) >= lock.count;
+                && 4 * self.unexplained.count(places, self.sent.width) >= 3 * lock.count;
         }
         if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;
