@@ -61,12 +61,12 @@ fn measure() -> Result<Figures, Fault> {
             set.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
         Design::open("kim-park-2016", &set)
     };
-    let (full, clean) = (sensor(&[])?, sensor(&PERFECT)?);
+    let (full, clean) = (sensor(&[])?, sensor(PERFECT)?);
     let noise = [
         ("detector.photon-counting.missed_marks", "0.2"),
         ("detector.photon-counting.dark_counts_hz", "1e9"),
     ];
-    let noisy = sensor(&[&PERFECT[..], &noise].concat())?;
+    let noisy = sensor(&[PERFECT, &noise].concat())?;
     let (street, car) = (Scene::open("street")?, Scene::open("car-50m")?);
     let one = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
