@@ -359,45 +359,10 @@ fn above(log: &ShotLog) -> Vec<Option<u32>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ReceiverKind;
-    use super::exhaustive::exhaustive;
+    use super::exhaustive::{PERIOD, codebook, exhaustive, log, receiver};
     use super::*;
-    use crate::code::{Crc, Family, Payload};
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
-
-    /// Chips from shot to shot: about five are in flight.
-    const PERIOD: i64 = 1100;
-
-    fn receiver(jitter_ticks: f64) -> Receiver {
-        Receiver {
-            kind: ReceiverKind::Matched,
-            gate_ticks: (50, 5000),
-            ticks_per_chip: 1,
-            tick_fs: 2500,
-            jitter_ticks,
-            false_alarm: 1e-2,
-            bit_threshold: 6,
-        }
-    }
-
-    fn codebook() -> Codebook {
-        let payload = Payload::new(4, Crc::default(), false).unwrap();
-        Codebook::new(Family::prime(11).unwrap(), Some(payload), 16).unwrap()
-    }
-
-    fn log(shots: u16) -> ShotLog {
-        ShotLog {
-            first: 0,
-            fired_at_fs: (0..shots).map(|shot| i64::from(shot) * PERIOD * 2500).collect(),
-            row: vec![0; shots.into()],
-            column: (0..shots).collect(),
-            label: (0..shots).map(|shot| 1 + shot % 15).collect(),
-            word: (0..shots).map(|shot| 1 + shot % 10).collect(),
-            channel: vec![0; shots.into()],
-            home: 0..shots.into(),
-        }
-    }
 
     #[test]
     fn a_search_finds_the_maximum_over_the_gate() {
@@ -430,7 +395,7 @@ mod tests {
         let (codebook, log, receiver) = (codebook(), log(400), receiver(0.0));
         let mut tick = Vec::new();
         for shot in 0..400 {
-            let start = shot as u32 * PERIOD as u32 + 50 + chance.next_u32() % 4951;
+            let start = shot as u32 * PERIOD + 50 + chance.next_u32() % 4951;
             for &mark in codebook.marks(log.label[shot], log.word[shot]) {
                 if !chance.next_u32().is_multiple_of(10) {
                     tick.push(start + u32::from(mark));

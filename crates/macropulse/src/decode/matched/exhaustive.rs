@@ -14,8 +14,8 @@ use crate::code::{Codebook, Crc, Family, Payload};
 use crate::emit::ShotLog;
 use crate::tdc::Ticks;
 
-/// Chips from shot to shot.
-const PERIOD: u32 = 1100;
+/// Chips from shot to shot: about five are in flight.
+pub(super) const PERIOD: u32 = 1100;
 
 /// Farthest lag.
 const GATE: u32 = 5000;
@@ -33,24 +33,24 @@ struct Weather {
     roughness: u32,
 }
 
-fn codebook() -> Codebook {
+pub(super) fn codebook() -> Codebook {
     let payload = Payload::new(4, Crc::default(), false).unwrap();
     Codebook::new(Family::prime(11).unwrap(), Some(payload), 16).unwrap()
 }
 
-fn receiver(weather: Weather) -> Receiver {
+pub(super) fn receiver(jitter_ticks: f64) -> Receiver {
     Receiver {
         kind: ReceiverKind::Matched,
         gate_ticks: (50, GATE),
         ticks_per_chip: 1,
         tick_fs: 2500,
-        jitter_ticks: if weather.late > 0 { 0.2 } else { 0.0 },
+        jitter_ticks,
         false_alarm: 1e-2,
         bit_threshold: 6,
     }
 }
 
-fn log(shots: u16) -> ShotLog {
+pub(super) fn log(shots: u16) -> ShotLog {
     ShotLog {
         first: 0,
         fired_at_fs: (0..shots).map(|shot| i64::from(shot) * i64::from(PERIOD) * 2500).collect(),
@@ -105,7 +105,8 @@ pub(super) fn exhaustive(sent: &Sent, ticks: &[u32], shot: usize) -> (i64, u16) 
 
 /// Returns, and those of them that are not the exhaustive maximum, with what it would be.
 fn differences(weather: Weather, seed: u64) -> (Returns, Vec<(usize, u16, u16)>) {
-    let (book, log, receiver) = (codebook(), log(48), receiver(weather));
+    let (book, log, receiver) =
+        (codebook(), log(48), receiver(if weather.late > 0 { 0.2 } else { 0.0 }));
     let ticks = ticks(&book, &log, weather, seed);
     let returns = decode(&receiver, (&book, &log), &ticks);
     let sent = Sent::new(&receiver, (&book, &log), 0);
