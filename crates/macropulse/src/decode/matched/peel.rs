@@ -154,7 +154,8 @@ impl Peeler<'_> {
         self.places.clear();
         let mut next = from;
         for &mark in marks {
-            let tick = start as u32 + self.scale * u32::from(mark);
+            // Beyond the last tick that can be counted there is none: it is looked for in vain.
+            let tick = (start as u32).wrapping_add(self.scale.wrapping_mul(u32::from(mark)));
             while self.ticks.get(next).is_some_and(|&other| other < tick) {
                 next += 1;
             }
