@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::kernels::{BLOCK_WORDS, Block, PLANES, count_marks};
+use crate::kernels::{BLOCK_WORDS, Block, Marks, PLANES, count_marks};
 
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * BLOCK_WORDS as i64;
@@ -27,13 +27,12 @@ pub(super) struct Counts {
 }
 
 impl Counts {
-    /// For each of [`BLOCK`] places from bit `first` of `words` on: how many of the marks, each
-    /// `scale` bits long, are lit.
-    pub fn new(words: &[u64], first: usize, (marks, scale): (&[u16], usize)) -> Self {
-        let used = ((usize::BITS - marks.len().leading_zeros()) as usize).min(PLANES);
+    /// For each of [`BLOCK`] places from bit `first` of `words` on: how many of the `marks` are
+    /// lit.
+    pub fn new(words: &[u64], first: usize, marks: Marks) -> Self {
         let mut planes = [[0; BLOCK_WORDS]; PLANES];
-        count_marks(words, first, (marks, scale), &mut planes);
-        Self { planes, used }
+        count_marks(words, first, marks, &mut planes);
+        Self { planes, used: marks.planes() }
     }
 
     /// The highest count among the places of `allowed`, as offsets into the block, and the first
@@ -115,7 +114,8 @@ mod tests {
                 let others = counts.iter().enumerate().filter(|(other, _)| other.abs_diff(at) > 3);
                 let next = others.map(|(_, &count)| count).max().unwrap() as u16;
                 let expected = Peak { at: at as i64, count: highest as u16, next };
-                let found = Counts::new(&words, first, (&marks, 1));
+                let found =
+                    Counts::new(&words, first, Marks { word: &marks, bits: &[0], scale: 1 });
                 assert_eq!(found.peak(0..BLOCK, 3), Some(expected));
             }
         }
@@ -123,7 +123,8 @@ mod tests {
 
     #[test]
     fn places_that_are_not_allowed_are_not_found() {
-        let counts = Counts::new(&words([100, 300].into_iter()), 0, (&[0], 1));
+        let one = Marks { word: &[0], bits: &[0], scale: 1 };
+        let counts = Counts::new(&words([100, 300].into_iter()), 0, one);
         let expected = Peak { at: 300, count: 1, next: 0 };
         assert_eq!(counts.peak(101..BLOCK, 0), Some(expected));
         assert_eq!(counts.peak(7..7, 0), None);

@@ -3,8 +3,15 @@
 
 use std::ops::Range;
 
+use super::FARTHEST_JITTER;
+use crate::kernels::{Pattern, lit_in, look_ahead};
+
 /// Ticks that are turned into bits together, once somebody looks at one of them.
-const CHUNK: i64 = 1 << 14;
+const CHUNK: i64 = CELLS * CELL;
+const CELLS: i64 = 16;
+
+/// Ticks that are counted together: where these begin and end is near enough.
+pub(super) const CELL: i64 = 1 << 10;
 
 /// Machine words of a chunk.
 const WORDS: usize = CHUNK as usize / 64;
@@ -21,61 +28,94 @@ pub(super) struct Field<'a> {
     width: usize,
     /// Tick of the first bit.
     origin: i64,
-    words: Vec<u64>,
-    made: Vec<bool>,
-    /// Ticks before each chunk, and before the end.
+    /// Ticks before each [`CELL`], and before the end.
     before: Vec<u32>,
+    /// What is made of each chunk.
+    made: Vec<Made>,
+    memory: Memory,
+}
+
+/// Memory of a field, whatever is in it.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    /// One bit for each tick.
+    ticks: Vec<u64>,
+    /// One for each place at which a mark counts as found, unless that is the same.
+    lit: Vec<u64>,
+}
+
+/// How far the bits of a chunk are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Made {
+    Nothing,
+    Ticks,
+    Lit,
 }
 
 impl<'a> Field<'a> {
-    /// The field of `ticks` over `span`, in the memory `words`, whatever is in it.
-    pub fn new(ticks: &'a [u32], width: u32, span: Range<i64>, mut words: Vec<u64>) -> Self {
+    /// The field of `ticks` over `span`.
+    pub fn new(ticks: &'a [u32], width: u32, span: Range<i64>, mut memory: Memory) -> Self {
         let origin = span.start - MARGIN;
         let chunks = ((span.end + MARGIN - origin).max(0) / CHUNK + 1) as usize;
-        let mut before = Vec::with_capacity(chunks + 1);
+        let cells = chunks as i64 * CELLS;
+        let mut before = Vec::with_capacity(cells as usize + 1);
         let mut passed = 0;
-        for chunk in 0..=chunks as i64 {
-            passed += ticks_before(&ticks[passed..], origin + CHUNK * chunk);
+        for cell in 0..=cells {
+            let end = origin + CELL * cell;
+            let is_before = |tick: &&u32| i64::from(**tick) < end;
+            passed += ticks[passed..].iter().take_while(is_before).count();
             before.push(passed as u32);
         }
-        words.resize(words.len().max(chunks * WORDS), 0);
-        Self { ticks, width: width as usize, origin, words, made: vec![false; chunks], before }
+        let width = width as usize;
+        memory.ticks.resize(memory.ticks.len().max(chunks * WORDS), 0);
+        if width > 1 {
+            memory.lit.resize(memory.lit.len().max(chunks * WORDS), 0);
+        }
+        Self { ticks, width, origin, before, made: vec![Made::Nothing; chunks], memory }
     }
 
     /// Makes sure that all bits of `span` are there.
     fn make(&mut self, span: Range<i64>) {
         let chunk = |tick: i64| ((tick - self.origin) / CHUNK).max(0) as usize;
         for chunk in chunk(span.start)..(chunk(span.end - 1) + 1).min(self.made.len()) {
-            if !self.made[chunk] {
+            if self.made[chunk] < Made::Lit {
                 self.make_chunk(chunk);
-                self.made[chunk] = true;
             }
         }
     }
 
     fn make_chunk(&mut self, chunk: usize) {
+        const REACH: usize = FARTHEST_JITTER as usize / 64 + 2;
+        self.make_ticks(chunk);
+        self.made[chunk] = Made::Lit;
+        if self.width == 1 {
+            return;
+        }
+        let mut bits = [0; WORDS + REACH];
+        let next = chunk + 1;
+        bits[..WORDS].copy_from_slice(&self.memory.ticks[chunk * WORDS..][..WORDS]);
+        if next < self.made.len() {
+            self.make_ticks(next);
+            bits[WORDS..].copy_from_slice(&self.memory.ticks[next * WORDS..][..REACH]);
+        }
+        look_ahead(&mut bits, self.width - 1);
+        self.memory.lit[chunk * WORDS..][..WORDS].copy_from_slice(&bits[..WORDS]);
+    }
+
+    fn make_ticks(&mut self, chunk: usize) {
+        if self.made[chunk] > Made::Nothing {
+            return;
+        }
+        self.made[chunk] = Made::Ticks;
+        let cells = CELLS as usize;
+        let [from, to] = [chunk, chunk + 1].map(|chunk| self.before[chunk * cells] as usize);
+        let words = &mut self.memory.ticks[chunk * WORDS..][..WORDS];
+        words.fill(0);
         let start = self.origin + CHUNK * chunk as i64;
-        let reach = self.width - 1;
-        let mut bits = [0_u64; WORDS + 18];
-        for &tick in &self.ticks[self.before[chunk] as usize..] {
-            let bit = (i64::from(tick) - start) as usize;
-            if bit >= CHUNK as usize + reach {
-                break;
-            }
-            bits[bit / 64] |= 1 << (bit % 64);
+        for &tick in &self.ticks[from..to] {
+            let bit = (i64::from(tick) - start) as usize % CHUNK as usize;
+            words[bit / 64] |= 1 << (bit % 64);
         }
-        // Each round looks as far ahead again as all rounds before it.
-        let mut reached = 0;
-        while reached < reach {
-            let step = (reached + 1).min(reach - reached);
-            let (words, shift) = (step / 64, step % 64);
-            for word in 0..bits.len() - words {
-                let next = bits.get(word + words + 1).copied().unwrap_or(0);
-                bits[word] |= bits[word + words] >> shift | next << 1 << (63 - shift);
-            }
-            reached += step;
-        }
-        self.words[chunk * WORDS..][..WORDS].copy_from_slice(&bits[..WORDS]);
     }
 
     /// The words of the field and the bit at which `tick` lies in them, with all bits of the
@@ -83,51 +123,48 @@ impl<'a> Field<'a> {
     pub fn bits(&mut self, tick: i64, length: i64) -> (&[u64], usize) {
         // Blocks are read a word beyond their end.
         self.make(tick..tick + length + 64);
-        (&self.words, (tick - self.origin).max(0) as usize)
+        let words = if self.width == 1 { &self.memory.ticks } else { &self.memory.lit };
+        (words, (tick - self.origin).max(0) as usize)
+    }
+
+    /// One bit for each tick, from [`MARGIN`] ticks before the span on, and how many there are in
+    /// each [`CELL`].
+    pub fn all(&mut self) -> (&[u64], Vec<u32>) {
+        (0..self.made.len()).for_each(|chunk| self.make_ticks(chunk));
+        let cells = self.before.windows(2).map(|before| before[1] - before[0]);
+        (&self.memory.ticks[..self.made.len() * WORDS], cells.collect())
+    }
+
+    /// How many ticks lie where the pattern, begun at `start`, is lit.
+    pub fn ticks_in(&mut self, start: i64, pattern: &Pattern) -> u32 {
+        self.make(start..start + 64 * pattern.reach() as i64);
+        lit_in(&self.memory.ticks, (start - self.origin).max(0) as usize, pattern)
     }
 
     /// Gives its memory back.
-    pub fn into_words(self) -> Vec<u64> {
-        self.words
+    pub fn into_memory(self) -> Memory {
+        self.memory
     }
 
-    /// Number of ticks in `span`.
-    pub fn count(&self, span: Range<i64>) -> usize {
-        self.before(span.end).saturating_sub(self.before(span.start))
+    /// The cells that touch `span`.
+    fn cells(&self, span: &Range<i64>) -> Range<usize> {
+        let last = self.before.len() as i64 - 1;
+        let first = (span.start - self.origin).div_euclid(CELL).clamp(0, last);
+        let end = (span.end - self.origin + CELL - 1).div_euclid(CELL).clamp(first, last);
+        first as usize..end as usize
     }
 
-    fn before(&self, tick: i64) -> usize {
-        let last = self.before.len() as i64 - 2;
-        let chunk = ((tick - self.origin) / CHUNK).clamp(0, last) as usize;
-        let within = self.before[chunk] as usize..self.before[chunk + 1] as usize;
-        within.start + self.ticks[within].partition_point(|&other| i64::from(other) < tick)
-    }
-
-    /// The ticks in `span`.
-    pub fn ticks(&self, span: Range<i64>) -> &'a [u32] {
-        &self.ticks[self.before(span.start)..self.before(span.end)]
-    }
-
-    /// Share of lit places in `span`, were its ticks spread evenly.
+    /// Share of lit places in and about `span`, were its ticks spread evenly.
     pub fn density(&self, span: Range<i64>) -> f64 {
         self.density_without(span, (0, 0))
     }
 
-    /// Share of lit places in `span`, of which (ticks, places) are left out.
+    /// Share of lit places in and about `span`, of which (ticks, places) are left out.
     pub fn density_without(&self, span: Range<i64>, own: (usize, usize)) -> f64 {
-        let places = ((span.end - span.start) as usize).saturating_sub(own.1).max(1);
-        let ticks = self.count(span).saturating_sub(own.0);
+        let cells = self.cells(&span);
+        let places = (cells.len() * CELL as usize).saturating_sub(own.1).max(1);
+        let ticks = (self.before[cells.end] - self.before[cells.start]) as usize;
+        let ticks = ticks.saturating_sub(own.0);
         (self.width as f64 * ticks as f64 / places as f64).min(1.0)
     }
-}
-
-/// How many of the sorted `ticks` lie before `end`, which is soon reached.
-fn ticks_before(ticks: &[u32], end: i64) -> usize {
-    let is_before = |tick: &u32| i64::from(*tick) < end;
-    let mut reach = 64;
-    while ticks.get(reach).is_some_and(is_before) {
-        reach *= 2;
-    }
-    let reach = reach.min(ticks.len());
-    ticks[..reach].partition_point(is_before)
 }

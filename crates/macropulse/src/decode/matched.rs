@@ -10,12 +10,14 @@
 //!    searched for the shots that no neighbour predicted, the bright ones first: where many
 //!    bright ones overlap, their light could pass for a faint one.
 //! 4. *Contest.* A predicted shot keeps its lag unless unexplained ticks crowd somewhere in its
-//!    gate: then these are searched for a better one.
+//!    gate: then these are searched for a better one. The light of the lesser one is explained,
+//!    too.
 //! 5. *Check.* A bit that should be dark must not be lit, nor a lit one dark.
 //!
 //! A return is believed if chance would not reach its count of marks at any lag of the gate, see
 //! [`super::threshold`].
 
+mod contest;
 #[cfg(test)]
 mod exhaustive;
 mod leftover;
@@ -26,14 +28,14 @@ mod verdict;
 use std::cell::Cell;
 use std::ops::Range;
 
-use super::field::Field;
+use super::field::{self, Field};
 use super::search::Search;
 use super::threshold::Thresholds;
 use super::unexplained::Unexplained;
 use super::{FARTHEST_JITTER, Receiver, Returns};
 use crate::code::{CodeWord, Codebook};
 use crate::emit::ShotLog;
-use crate::kernels::WordTicks;
+use crate::kernels::{Pattern, WordTicks};
 use crate::tdc::Ticks;
 use leftover::Evidence;
 
@@ -66,6 +68,12 @@ const STAGGER: u32 = 5;
 /// So many places of a gate may be taken for a code word by mistake, and looked at again.
 const FEW: f64 = 50.0;
 
+/// Surfaces that light of a shot may come from beside the one that is taken for its range.
+const SURFACES: usize = 3;
+
+/// How often chance may light an end of a macropulse where there is none.
+const BY_CHANCE: f64 = 1e-3;
+
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
     static MEMORY: Cell<Memory> = Cell::default();
@@ -74,7 +82,7 @@ thread_local! {
 /// Memory of a band.
 #[derive(Default)]
 struct Memory {
-    field: Vec<u64>,
+    field: field::Memory,
     unexplained: Vec<u64>,
     search: Search,
     thresholds: Vec<Thresholds>,
@@ -103,17 +111,30 @@ struct Sent<'a> {
     width: u32,
     /// The code words, in ticks.
     words: Vec<WordTicks>,
+    /// The same as bits, one for each mark.
+    patterns: Vec<Pattern>,
+    /// What they explain: from so many ticks before the first mark on.
+    explained: (i64, Vec<Pattern>),
 }
 
 impl<'a> Sent<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), epoch: i64) -> Self {
         let (codebook, log) = sent;
         let fired = (0..log.len()).map(|shot| receiver.fired(log, shot) - epoch).collect();
-        let in_ticks = |word: usize| {
-            WordTicks::new(&codebook.word(word as u16).marks, receiver.ticks_per_chip)
-        };
-        let words = (0..codebook.words()).map(in_ticks).collect();
-        Self { receiver, codebook, log, epoch, fired, width: window(receiver.jitter_ticks), words }
+        let width = window(receiver.jitter_ticks);
+        // One edge in twenty jitters farther than marks are looked for.
+        let farther = width / 2;
+        let scale = receiver.ticks_per_chip;
+        let (mut words, mut patterns, mut explained) = (Vec::new(), Vec::new(), Vec::new());
+        for word in 0..codebook.words() {
+            let marks = &codebook.word(word as u16).marks;
+            let ticks = || marks.iter().map(|&mark| scale as usize * usize::from(mark));
+            words.push(WordTicks::new(marks, scale));
+            patterns.push(Pattern::new(ticks(), 1));
+            explained.push(Pattern::new(ticks(), (width + 2 * farther) as usize));
+        }
+        let explained = (i64::from(farther), explained);
+        Self { receiver, codebook, log, epoch, fired, width, words, patterns, explained }
     }
 
     /// The lit chips of `shot`.
@@ -207,17 +228,21 @@ struct Band<'a> {
     /// The shot at the same column one line earlier.
     above: Vec<Option<u32>>,
     locks: Vec<Option<Lock>>,
+    /// The lags of further surfaces that each shot was found at.
+    behind: Vec<[Option<i64>; SURFACES]>,
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
     bit_thresholds: Thresholds,
     /// For a code word that few places of a gate have by chance.
     word_thresholds: Thresholds,
+    /// For the first marks of a macropulse, or the last ones.
+    end_thresholds: Thresholds,
     /// For each word, the marks that one tick may count for.
     marks_per_tick: Vec<u32>,
     /// For each shot, the number of marks that nowhere in its gate are unexplained.
     barren: Vec<u16>,
-    /// Memory for some of the marks of a shot.
-    some_marks: Vec<u16>,
+    /// Memory for the lit bits of a shot.
+    bits: Vec<usize>,
     search: Search,
 }
 
@@ -232,28 +257,36 @@ impl<'a> Band<'a> {
         let words = if dark { 0 } else { codebook.words() };
         let (lags, false_alarm) = (sent.lags(), receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
-        let wanted = [(lags, false_alarm), (bits, false_alarm), (lags, FEW)];
+        let wanted = [(lags, false_alarm), (bits, false_alarm), (lags, FEW), (1.0, BY_CHANCE)];
         let mut remembered = memory.thresholds;
         remembered.retain(|thresholds| wanted.contains(&thresholds.are_for()));
-        let [thresholds, bit_thresholds, word_thresholds] = wanted.map(|(places, false_alarm)| {
-            let known = remembered.iter().position(|t| t.are_for() == (places, false_alarm));
-            match known {
-                Some(known) => remembered.swap_remove(known),
-                None => Thresholds::new(places, false_alarm),
-            }
-        });
+        let [thresholds, bit_thresholds, word_thresholds, end_thresholds] =
+            wanted.map(|(places, false_alarm)| {
+                let known = remembered.iter().position(|t| t.are_for() == (places, false_alarm));
+                match known {
+                    Some(known) => remembered.swap_remove(known),
+                    None => Thresholds::new(places, false_alarm),
+                }
+            });
+        let mut field = Field::new(ticks, sent.width, span.clone(), memory.field);
+        let unexplained = match left.len() == ticks.len() {
+            true => Unexplained::all(&mut field, span, memory.unexplained),
+            false => Unexplained::new(&left, span, memory.unexplained),
+        };
         Self {
             sent,
-            field: Field::new(ticks, sent.width, span.clone(), memory.field),
-            unexplained: Unexplained::new(&left, span, memory.unexplained),
+            field,
+            unexplained,
             left_in_gate: if dark { vec![] } else { in_gates(sent, &left, ticks.len()) },
             above: if dark { vec![] } else { above(sent.log) },
+            behind: vec![[None; SURFACES]; if dark { 0 } else { locks.len() }],
             locks,
             thresholds,
             bit_thresholds,
             word_thresholds,
+            end_thresholds,
+            bits: Vec::new(),
             barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
-            some_marks: Vec::new(),
             marks_per_tick: (0..words)
                 .map(|word| crowding(codebook.word(word as u16), chips))
                 .collect(),
@@ -262,8 +295,9 @@ impl<'a> Band<'a> {
     }
 
     fn into_memory(self) -> Memory {
-        let (field, unexplained) = (self.field.into_words(), self.unexplained.into_words());
-        let thresholds = vec![self.thresholds, self.bit_thresholds, self.word_thresholds];
+        let (field, unexplained) = (self.field.into_memory(), self.unexplained.into_words());
+        let thresholds =
+            vec![self.thresholds, self.bit_thresholds, self.word_thresholds, self.end_thresholds];
         Memory { field, unexplained, search: self.search, thresholds }
     }
 
@@ -302,12 +336,17 @@ impl<'a> Band<'a> {
 
     /// Keeps `lock` and explains its ticks.
     fn lock(&mut self, shot: usize, lock: Lock) {
-        let start = self.sent.fired[shot] + lock.lag;
-        // One edge in twenty jitters farther than marks are looked for.
-        let farther = i64::from(self.sent.width / 2);
-        let places = self.sent.places(shot).map(|mark| start + mark - farther);
-        self.unexplained.explain(places, self.sent.width + 2 * farther as u32);
+        self.explain(shot, lock.lag);
         self.locks[shot] = Some(lock);
+    }
+
+    /// Explains the ticks of `shot` at `lag`.
+    fn explain(&mut self, shot: usize, lag: i64) {
+        let (farther, words) = &self.sent.explained;
+        let start = self.sent.fired[shot] + lag - farther;
+        let scale = self.sent.scale();
+        let bits = self.sent.lit_bits(shot).iter().map(|&bit| start + scale * i64::from(bit));
+        self.unexplained.explain(bits, &words[usize::from(self.sent.log.word[shot])]);
     }
 }
 

@@ -1,61 +1,62 @@
-//! The lag of a shot when nothing is known of it: every tick votes.
+//! The lag of a shot when nothing is known of it.
 //!
-//! A tick that is a mark of the code word says where the word began. The votes for the code words
-//! at the lit bits of the payload, added up, are the marks of the macropulse.
+//! Every unexplained tick votes: one that is a mark of the code word says where the word began. A
+//! macropulse of B lit bits with k marks found has k/B or more of them in one of its code words.
+//! No lag with `least` marks is overlooked where every place with `least`/B votes is looked at,
+//! and the votes at all lit bits added up.
 //!
-//! Where ticks are dense there are too many of them to vote. A macropulse of B lit bits with k
-//! marks found has k/B or more of them in one of its code words: if so many stand out, no lag with
-//! `least` marks is overlooked where every place with `least`/B marks of a word is looked at.
+//! Where ticks are dense, and so many marks of a word stand out among them, the marks are counted
+//! for blocks of places instead, those with too few ticks left out.
 
 use super::unexplained::Unexplained;
-use crate::kernels::{BALLOT, BLOCK_WORDS, highest_sum, with_marks};
+use crate::kernels::{
+    BALLOT, BLOCK_WORDS, Marks, Pattern, elect, highest_sum, lit_in, vote, with_marks,
+};
 
 /// What is looked for: a macropulse, taken apart.
 #[derive(Debug)]
-pub(super) struct Sought {
-    /// Ticks from the start of the code word to each mark.
-    pub word: Vec<usize>,
+pub(super) struct Sought<'a> {
+    /// The code word.
+    pub word: Marks<'a>,
+    /// The same as bits.
+    pub pattern: &'a Pattern,
     /// Ticks from the start of the macropulse to each lit bit.
-    pub bits: Vec<usize>,
+    pub bits: &'a [usize],
     /// Number of lags tried.
     pub lags: usize,
     /// Fewest marks that are of interest.
     pub least: u16,
+    /// Marks of a code word that hardly any place has by chance.
+    pub stands_out: u16,
 }
 
-impl Sought {
+impl Sought<'_> {
     /// Places at which a code word may begin.
-    pub fn places(&self) -> usize {
+    fn places(&self) -> usize {
         self.lags + self.bits.last().copied().unwrap_or(0)
     }
 
-    /// The lag with most marks, the earliest of several, of those at which a code word begins that
-    /// was `elected`, by place. `marks` tells how many marks a place has at most, and `count` how
-    /// many a lag has.
-    fn best_of(
-        &self,
-        elected: impl Iterator<Item = usize>,
-        marks: impl Fn(usize) -> u16,
-        count: impl Fn(usize) -> u16,
-    ) -> Option<Candidate> {
-        let needed = self.in_one_word();
+    /// Ticks of a code word.
+    fn reach(&self) -> usize {
+        self.word.last() + 1
+    }
+
+    /// Fewest marks in one of its code words, at least: else there are fewer than `least` in all.
+    fn in_one_word(&self) -> u16 {
+        self.least.div_ceil(self.bits.len().max(1) as u16)
+    }
+
+    /// The lag with most marks, the earliest of several, of those at which a code word begins at
+    /// one of the places `elected`. `marks` tells how many marks a place has.
+    fn best_of(&self, elected: &[u32], marks: impl Fn(usize) -> u16) -> Option<Candidate> {
         let mut best = Candidate { lag: usize::MAX, count: self.least };
-        for place in elected {
-            for bit in &self.bits {
-                let Some(lag) = place.checked_sub(*bit).filter(|lag| *lag < self.lags) else {
-                    continue;
-                };
-                let mut seen_before = false;
-                let mut most = 0;
-                for other in &self.bits {
-                    let marks = marks(lag + other);
-                    seen_before |= other < bit && marks >= needed;
-                    most += marks;
-                }
-                if seen_before || most < best.count {
+        for &place in elected {
+            for bit in self.bits {
+                let Some(lag) = (place as usize).checked_sub(*bit) else { break };
+                if lag >= self.lags {
                     continue;
                 }
-                let count = count(lag);
+                let count = self.bits.iter().map(|other| marks(lag + other)).sum();
                 if count > best.count || (count == best.count && lag < best.lag) {
                     best = Candidate { lag, count };
                 }
@@ -63,64 +64,6 @@ impl Sought {
         }
         (best.lag != usize::MAX).then_some(best)
     }
-
-    /// Marks that are unexplained if the macropulse begins at `start`.
-    fn count(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
-        let starts = self.bits.iter().map(|&bit| start + bit as i64);
-        starts.map(|start| self.count_word(unexplained, start, width)).sum()
-    }
-
-    /// Marks that are unexplained if the code word begins at `start`.
-    fn count_word(&self, unexplained: &Unexplained, start: i64, width: u32) -> u16 {
-        unexplained.count(self.word.iter().map(|&mark| start + mark as i64), width)
-    }
-
-    /// Fewest marks in one of its code words, at least: else there are fewer than `least` in all.
-    pub fn in_one_word(&self) -> u16 {
-        self.least.div_ceil(self.bits.len().max(1) as u16)
-    }
-}
-
-/// As [`Search::best`], where a code word with so many marks stands out among all ticks: then
-/// code words are looked for in blocks of lags, however many ticks there are, and only where one
-/// is found are its unexplained marks counted. `all` is the field of all ticks, the bit in it at
-/// which the search begins, and the marks of the word and ticks per chip.
-pub(super) fn among_words(
-    all: (&[u64], usize, (&[u16], usize)),
-    unexplained: &Unexplained,
-    at: (i64, u32),
-    sought: &Sought,
-) -> Option<Candidate> {
-    let ((words, begin, marks), (first, width)) = (all, at);
-    let (needed, reach) = (sought.in_one_word(), sought.word.last()? + 64 * BLOCK_WORDS);
-    // Where code words begin, and how many of their marks are unexplained.
-    let mut elected: Vec<(usize, u16)> = Vec::new();
-    for block in (0..sought.places()).step_by(64 * BLOCK_WORDS) {
-        let start = first + block as i64;
-        if unexplained.at_most(start..start + reach as i64 + i64::from(width)) * width
-            < u32::from(needed)
-        {
-            continue;
-        }
-        let lit = with_marks(words, begin + block, marks, needed);
-        for (lane, mut lit) in lit.into_iter().enumerate() {
-            while lit != 0 {
-                let place = block + 64 * lane + lit.trailing_zeros() as usize;
-                lit &= lit - 1;
-                // Most of what stands out is explained.
-                let found = sought.count_word(unexplained, first + place as i64, width);
-                if found >= needed {
-                    elected.push((place, found));
-                }
-            }
-        }
-    }
-    let marks = |place: usize| {
-        let known = elected.binary_search_by_key(&place, |word| word.0);
-        known.map_or(needed - 1, |at| elected[at].1)
-    };
-    let count = |lag| sought.count(unexplained, first + lag as i64, width);
-    sought.best_of(elected.iter().map(|word| word.0), marks, count)
 }
 
 /// A lag and how many marks were found at it.
@@ -130,12 +73,29 @@ pub(super) struct Candidate {
     pub count: u16,
 }
 
-/// The ballot, kept from shot to shot.
+/// Memory kept from shot to shot.
 #[derive(Debug, Default)]
 pub(super) struct Search {
     /// Votes for each place at which a code word may begin, from one word before the first tick.
     votes: Vec<u8>,
+    /// The votes of one tick.
+    ballot: Vec<[u8; BALLOT]>,
+    /// Places with enough votes.
+    elected: Vec<u32>,
+    /// Unexplained ticks where a mark counts as found.
+    lit: Vec<u64>,
+    /// Blocks of places with enough ticks.
+    blocks: Vec<u32>,
 }
+
+/// Places counted together.
+const BLOCK: usize = 64 * BLOCK_WORDS;
+
+/// What it takes to count the marks of a word in a block of places, in votes.
+const VOTES_PER_BLOCK: usize = 64;
+
+/// If more than one in so many places is elected, all of them are looked at in order.
+const FEW: usize = 256;
 
 impl Search {
     /// The lag, in ticks from `first`, at which most marks of `sought` are unexplained; the
@@ -148,28 +108,82 @@ impl Search {
         sought: &Sought,
     ) -> Option<Candidate> {
         let (first, width) = at;
-        let reach = sought.word.last()? + 1;
-        let places = sought.places();
-        self.votes.resize(self.votes.len().max(places + 2 * reach + BALLOT), 0);
-        let offsets: Vec<usize> = sought.word.iter().map(|mark| reach - mark).collect();
-
-        let mut ticks = 0;
-        for_each_tick(unexplained, (first, places + reach), width, |tick| {
-            ticks += 1;
-            let ballot = &mut self.votes[tick..=tick + reach];
-            // A place has no more votes than the word has marks, of which there are few.
-            offsets.iter().for_each(|&offset| ballot[offset] = ballot[offset].wrapping_add(1));
-        });
-        let starts: Vec<usize> = sought.bits.iter().map(|bit| reach + bit).collect();
-        let best = highest_sum(&self.votes, &starts, sought.lags, sought.least);
-        // Few ticks: taking every vote back is less work than wiping the whole ballot.
-        if ticks * sought.word.len() * 16 < places {
-            for_each_tick(unexplained, (first, places + reach), width, |tick| {
-                offsets.iter().for_each(|offset| self.votes[tick + offset] = 0);
-            });
-        } else {
-            self.votes.fill(0);
+        if sought.bits.is_empty() || sought.word.len() == 0 {
+            return None;
         }
+        let needed = sought.in_one_word();
+        let span = first..first + (sought.places() + sought.reach()) as i64 + i64::from(width);
+        let votes = (unexplained.at_most(span) * width) as usize * sought.word.len();
+        if needed >= sought.stands_out {
+            self.choose_blocks(unexplained, at, sought);
+            if VOTES_PER_BLOCK * self.blocks.len() < votes {
+                return self.by_words(unexplained, at, sought);
+            }
+        }
+        self.by_votes(unexplained, at, sought)
+    }
+
+    /// The blocks of places where enough ticks for a code word are unexplained.
+    fn choose_blocks(&mut self, unexplained: &Unexplained, at: (i64, u32), sought: &Sought) {
+        let ((first, width), needed) = (at, u32::from(sought.in_one_word()));
+        let length = (BLOCK + sought.reach()) as i64 + i64::from(width);
+        self.blocks.clear();
+        self.blocks.extend((0..sought.places() as u32).step_by(BLOCK).filter(|&block| {
+            let start = first + i64::from(block);
+            unexplained.at_most(start..start + length) * width >= needed
+        }));
+    }
+
+    fn by_words(
+        &mut self,
+        unexplained: &Unexplained,
+        at: (i64, u32),
+        sought: &Sought,
+    ) -> Option<Candidate> {
+        let (first, width) = at;
+        let needed = sought.in_one_word();
+        let length = sought.places() + sought.reach() + 2 * BLOCK;
+        let begin = unexplained.lit(first..first + length as i64, width, &mut self.lit);
+        self.elected.clear();
+        for &block in &self.blocks {
+            let lit = with_marks(&self.lit, begin + block as usize, sought.word, needed);
+            for (lane, mut lit) in lit.into_iter().enumerate() {
+                while lit != 0 {
+                    self.elected.push(block + 64 * lane as u32 + lit.trailing_zeros());
+                    lit &= lit - 1;
+                }
+            }
+        }
+        let marks = |place| lit_in(&self.lit, begin + place, sought.pattern) as u16;
+        sought.best_of(&self.elected, marks)
+    }
+
+    fn by_votes(
+        &mut self,
+        unexplained: &Unexplained,
+        at: (i64, u32),
+        sought: &Sought,
+    ) -> Option<Candidate> {
+        let ((first, width), reach, places) = (at, sought.reach(), sought.places());
+        let length = places + 2 * reach + 2 * BALLOT;
+        self.votes.clear();
+        self.votes.resize(length, 0);
+        self.ballot.clear();
+        self.ballot.resize(reach / BALLOT + 1, [0; BALLOT]);
+        for &mark in sought.word.word {
+            let offset = reach - sought.word.scale * usize::from(mark);
+            self.ballot[offset / BALLOT][offset % BALLOT] += 1;
+        }
+        for_each_tick(unexplained, (first, places + reach), width, |tick| {
+            vote(&mut self.votes, tick, &self.ballot);
+        });
+        let votes = &self.votes[reach..];
+        let needed = sought.in_one_word().min(128) as u8;
+        if elect(&votes[..places.next_multiple_of(BALLOT)], needed, &mut self.elected, places / FEW)
+        {
+            return sought.best_of(&self.elected, |place| u16::from(votes[place]));
+        }
+        let best = highest_sum(votes, sought.bits, sought.lags, sought.least);
         best.map(|(lag, count)| Candidate { lag, count })
     }
 }
@@ -199,16 +213,25 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
 
-    fn sought(least: u16) -> Sought {
-        Sought { word: vec![0, 6, 12, 18, 19], bits: vec![0, 50, 75], lags: 900, least }
+    const WORD: [u16; 5] = [0, 6, 12, 18, 19];
+
+    fn pattern() -> Pattern {
+        Pattern::new(WORD.into_iter().map(usize::from), 1)
+    }
+
+    fn sought(pattern: &Pattern, least: u16) -> Sought<'_> {
+        let word = Marks { word: &WORD, bits: &[0], scale: 1 };
+        Sought { word, pattern, bits: &[0, 50, 75], lags: 900, least, stands_out: 6 }
     }
 
     /// Every lag by itself.
     fn exhaustive(unexplained: &Unexplained, first: i64, width: i64) -> Candidate {
-        let Sought { word, bits, lags, .. } = sought(1);
+        let pattern = pattern();
+        let Sought { bits, lags, .. } = sought(&pattern, 1);
         let count = |lag: usize| {
             let starts = bits.iter().map(|bit| first + (lag + bit) as i64);
-            let places = starts.flat_map(|start| word.iter().map(move |&mark| start + mark as i64));
+            let places =
+                starts.flat_map(|start| WORD.iter().map(move |&mark| start + i64::from(mark)));
             places.filter(|&place| unexplained.any(place, width as u32)).count()
         };
         let lag = (0..lags).rev().max_by_key(|&lag| count(lag)).unwrap();
@@ -218,25 +241,19 @@ mod tests {
     #[test]
     fn the_best_lag_is_that_of_an_exhaustive_search() {
         let mut chance = ChaCha8Rng::seed_from_u64(2);
-        let mut search = Search::default();
+        let (mut search, pattern) = (Search::default(), pattern());
         for lit in [0, 3, 30, 300] {
             for width in [1, 2, 4] {
                 let lit: Vec<u32> = (0..lit).map(|_| chance.next_u32() % 1050).collect();
                 let unexplained = Unexplained::new(&lit, -50..1100, vec![]);
                 let expected = exhaustive(&unexplained, -7, i64::from(width));
-                let mut words = vec![0; 40];
-                for place in 0..1200 {
-                    if unexplained.any(place - 7, width) {
-                        words[place as usize / 64] |= 1 << (place % 64);
-                    }
-                }
                 for least in 1..=15 {
-                    let (at, sought) = ((-7, width), sought(least));
+                    let (at, sought) = ((-7, width), sought(&pattern, least));
                     let expected = Some(expected).filter(|expected| expected.count >= least);
                     let found = search.best(&unexplained, at, &sought);
                     assert_eq!(found, expected, "{least} of 15, width {width}");
-                    let all = (words.as_slice(), 0, (&[0, 6, 12, 18, 19][..], 1));
-                    let found = among_words(all, &unexplained, at, &sought);
+                    search.choose_blocks(&unexplained, at, &sought);
+                    let found = search.by_words(&unexplained, at, &sought);
                     assert_eq!(found, expected, "{least} of 15 by words, width {width}");
                 }
             }
@@ -246,8 +263,9 @@ mod tests {
     #[test]
     fn a_shot_without_light_is_not_found() {
         let unexplained = Unexplained::new(&[], 0..1000, vec![]);
-        let dark = Sought { word: vec![0], bits: vec![], lags: 900, least: 1 };
+        let pattern = pattern();
+        let dark = Sought { bits: &[], ..sought(&pattern, 1) };
         assert_eq!(Search::default().best(&unexplained, (0, 1), &dark), None);
-        assert_eq!(Search::default().best(&unexplained, (0, 1), &sought(1)), None);
+        assert_eq!(Search::default().best(&unexplained, (0, 1), &sought(&pattern, 1)), None);
     }
 }

@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use super::field::{CELL, Field, MARGIN};
+use crate::kernels::{Pattern, look_ahead, put_out};
+
 /// Ticks that are counted together where a rough place is enough.
-const CHUNK: i64 = 1 << CHUNK_BITS;
-const CHUNK_BITS: u32 = 10;
+const CHUNK: i64 = CELL;
 
 /// Machine words of a chunk.
 const WORDS: usize = CHUNK as usize / 64;
@@ -17,25 +19,39 @@ pub(super) struct Unexplained {
     /// Only to be looked at in chunks that have had ticks.
     words: Vec<u64>,
     per_chunk: Vec<u32>,
+    /// Memory for the ticks of some words.
+    were_lit: Vec<u8>,
 }
 
 impl Unexplained {
     /// Those of `ticks` that lie in `span`, in the memory `words`, whatever is in it.
     pub fn new(ticks: &[u32], span: Range<i64>, mut words: Vec<u64>) -> Self {
-        let chunks = ((span.end - span.start).max(0) / CHUNK + 1) as usize;
+        let chunks = ((2 * MARGIN + span.end - span.start).max(0) / CHUNK + 1) as usize;
         words.resize(words.len().max(chunks * WORDS), 0);
-        let (origin, mut per_chunk) = (span.start, vec![0; chunks]);
-        for &tick in ticks {
-            let bit = (i64::from(tick) - origin) as u64;
-            let chunk = (bit >> CHUNK_BITS) as usize;
-            let Some(lit) = per_chunk.get_mut(chunk) else { continue };
-            if *lit == 0 {
-                words[chunk * WORDS..][..WORDS].fill(0);
+        let (origin, mut per_chunk) = (span.start - MARGIN, Vec::with_capacity(chunks));
+        let mut rest = &ticks[ticks.partition_point(|&tick| i64::from(tick) < origin)..];
+        for (chunk, words) in words.chunks_exact_mut(WORDS).enumerate().take(chunks) {
+            let start = origin + CHUNK * chunk as i64;
+            let lit = rest.iter().take_while(|&&tick| i64::from(tick) < start + CHUNK).count();
+            if lit > 0 {
+                words.fill(0);
             }
-            *lit += 1;
-            words[(bit >> 6) as usize] |= 1 << (bit & 63);
+            for &tick in &rest[..lit] {
+                let bit = (i64::from(tick) - start) as usize % CHUNK as usize;
+                words[bit / 64] |= 1 << (bit % 64);
+            }
+            per_chunk.push(lit as u32);
+            rest = &rest[lit..];
         }
-        Self { origin, words, per_chunk }
+        Self { origin, words, per_chunk, were_lit: Vec::new() }
+    }
+
+    /// All ticks of `field`, in the memory `words`, whatever is in it.
+    pub fn all(field: &mut Field, span: Range<i64>, mut words: Vec<u64>) -> Self {
+        let (ticks, per_chunk) = field.all();
+        words.clear();
+        words.extend_from_slice(ticks);
+        Self { origin: span.start - MARGIN, words, per_chunk, were_lit: Vec::new() }
     }
 
     /// Gives its memory back.
@@ -43,15 +59,24 @@ impl Unexplained {
         self.words
     }
 
-    /// Explains the ticks at each of `places`, and the `width` − 1 behind it.
-    pub fn explain(&mut self, places: impl Iterator<Item = i64>, width: u32) {
-        for place in places {
-            for (word, mask) in self.masks(place, width) {
-                let Some(lit) = self.per_chunk.get_mut(word / WORDS) else { continue };
+    /// Explains the ticks of `pattern`, begun at each of `starts`.
+    pub fn explain(&mut self, starts: impl Iterator<Item = i64>, pattern: &Pattern) {
+        self.were_lit.resize(pattern.reach(), 0);
+        for start in starts {
+            let Ok(first) = usize::try_from(start - self.origin) else { continue };
+            put_out(&mut self.words, first, pattern, &mut self.were_lit);
+            let mut word = first / 64;
+            let mut rest = self.were_lit.as_slice();
+            while let Some(lit) = self.per_chunk.get_mut(word / WORDS) {
+                let (here, behind) = rest.split_at(rest.len().min(WORDS - word % WORDS));
+                // The words of a chunk without ticks are anything.
                 if *lit > 0 {
-                    *lit -= (self.words[word] & mask).count_ones();
-                    self.words[word] &= !mask;
+                    *lit -= here.iter().map(|&count| u32::from(count)).sum::<u32>();
                 }
+                if behind.is_empty() {
+                    break;
+                }
+                (word, rest) = (word + here.len(), behind);
             }
         }
     }
@@ -78,6 +103,21 @@ impl Unexplained {
             let to = (end - 64 * word).min(64);
             (word as usize, (u64::MAX >> (64 - (to - from))) << from)
         })
+    }
+
+    /// Puts into `lit` the places of `span` that are unexplained ticks, or up to `width` − 1 before
+    /// one, and tells which bit of it is the first of them.
+    pub fn lit(&self, span: Range<i64>, width: u32, lit: &mut Vec<u64>) -> usize {
+        let chunks = self.chunk_of(span.start)..self.chunk_of(span.end + CHUNK - 1);
+        lit.clear();
+        for chunk in chunks.clone() {
+            match self.per_chunk[chunk] {
+                0 => lit.extend([0; WORDS]),
+                _ => lit.extend(&self.words[chunk * WORDS..][..WORDS]),
+            }
+        }
+        look_ahead(lit, width as usize - 1);
+        (span.start - self.origin - CHUNK * chunks.start as i64) as usize
     }
 
     /// Calls `on_tick` with each unexplained tick of `span`, in order.
@@ -143,8 +183,7 @@ mod tests {
         let lit: Vec<u32> = (0..10_000).step_by(10).collect();
         let mut unexplained = Unexplained::new(&lit, 0..10_240, vec![u64::MAX; 500]);
         assert_eq!(unexplained.at_most(0..10_240), 1000);
-        unexplained.explain(0..5120, 1);
-        unexplained.explain((0..5120).step_by(3), 3);
+        unexplained.explain([0, 2560].into_iter(), &Pattern::new((0..2560).step_by(3), 3));
         // The last three end at 5121.
         assert_eq!(unexplained.at_most(0..5120), 0);
         assert_eq!(unexplained.at_most(5121..10_240), 487);

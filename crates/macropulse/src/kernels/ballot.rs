@@ -6,6 +6,54 @@ use super::level::on_every_level;
 pub(crate) const BALLOT: usize = 64;
 
 on_every_level! {
+    /// Casts a vote for each place at which a code word would begin that has a mark at `tick`:
+    /// `ballot` says how many for the places from `tick` on.
+    pub(crate) fn vote(votes: &mut [u8], tick: usize, ballot: &[[u8; BALLOT]]) {
+        let places = votes.get_mut(tick..).unwrap_or_default();
+        for (places, ballot) in places.as_chunks_mut::<BALLOT>().0.iter_mut().zip(ballot) {
+            for lane in 0..BALLOT {
+                // A place has no more votes than a word has marks, of which there are few.
+                places[lane] = places[lane].wrapping_add(ballot[lane]);
+            }
+        }
+    }
+}
+
+on_every_level! {
+    /// Puts the places with `least` votes or more, which is 1 to 128, into `elected`, in order, in place
+    /// of what was there. `false`, and not all of them, where they are more than `seats`.
+    pub(crate) fn elect(votes: &[u8], least: u8, elected: &mut Vec<u32>, seats: usize) -> bool {
+        elected.clear();
+        let least = least.clamp(1, 128);
+        for (block, votes) in votes.as_chunks::<BALLOT>().0.iter().enumerate() {
+            let mut any = 0;
+            for lane in 0..BALLOT {
+                any |= u8::from(votes[lane] >= least);
+            }
+            if any == 0 {
+                continue;
+            }
+            for (part, votes) in votes.as_chunks::<8>().0.iter().enumerate() {
+                // The highest bit of each byte says whether it is large enough.
+                let votes = u64::from_le_bytes(*votes);
+                let (ones, highest) = (0x0101_0101_0101_0101, 0x8080_8080_8080_8080);
+                let with_rest = (votes & !highest) + ones * u64::from(128 - least);
+                let mut enough = (with_rest | votes) & highest;
+                while enough != 0 {
+                    let lane = 8 * part + enough.trailing_zeros() as usize / 8;
+                    elected.push((block * BALLOT + lane) as u32);
+                    enough &= enough - 1;
+                }
+            }
+            if elected.len() > seats {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+on_every_level! {
     /// The lag below `lags` with the highest sum of `votes[start + lag]` over all `starts`, the
     /// earliest of several, and the sum; `None` where none reaches `least`.
     pub(crate) fn highest_sum(
@@ -55,6 +103,42 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn every_level_casts_votes_and_elects(
+            votes in proptest::collection::vec(prop_oneof![0_u8..4, any::<u8>()], 640),
+            ballot in proptest::collection::vec(0_u8..3, 2 * BALLOT),
+            tick in 0..700_usize,
+            least in 1..=128_u8,
+            seats in 0..200_usize,
+        ) {
+            let mut after = votes.clone();
+            for (place, votes) in after.iter_mut().enumerate().skip(tick).take(2 * BALLOT) {
+                *votes = votes.wrapping_add(ballot[place - tick]);
+            }
+            let ballot: Vec<[u8; BALLOT]> = ballot.as_chunks().0.to_vec();
+            let cast = at_each_level(|| {
+                let mut votes = votes.clone();
+                vote(&mut votes, tick, &ballot);
+                votes
+            });
+            for (level, votes) in cast {
+                let whole = tick + (640_usize.saturating_sub(tick)) / BALLOT * BALLOT;
+                prop_assert_eq!(&votes[..whole.min(640)], &after[..whole.min(640)], "{:?}", level);
+            }
+            let enough = (0..640).filter(|&place| votes[place as usize] >= least);
+            let enough: Vec<u32> = enough.collect();
+            let elections = at_each_level(|| {
+                let mut elected = vec![7];
+                let all = elect(&votes, least, &mut elected, seats);
+                (all, elected)
+            });
+            for (level, (all, elected)) in elections {
+                prop_assert_eq!(all, enough.len() <= seats, "{:?}", level);
+                prop_assert_eq!(&elected[..], &enough[..elected.len()]);
+                prop_assert!(!all || elected.len() == enough.len());
+            }
+        }
+
         #[test]
         fn every_level_finds_the_earliest_highest_sum(
             votes in proptest::collection::vec(0_u8..60, 1000),

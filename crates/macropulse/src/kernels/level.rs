@@ -9,7 +9,7 @@ pub(crate) enum Level {
     Plain,
     /// x86-64 with AVX2 and BMI (2013).
     Avx2,
-    /// x86-64 with AVX-512 F, BW, CD, DQ and VL (2017).
+    /// x86-64 with AVX-512 F, BW, CD, DQ, VL, VBMI2 and VPOPCNTDQ (2019).
     Avx512,
 }
 
@@ -32,7 +32,8 @@ impl Level {
         }
         if !has!("avx2" "bmi1" "bmi2" "lzcnt" "popcnt") {
             Self::Plain
-        } else if !has!("avx512f" "avx512bw" "avx512cd" "avx512dq" "avx512vl") {
+        } else if !has!("avx512f" "avx512bw" "avx512cd" "avx512dq" "avx512vl" "avx512vbmi2" "avx512vpopcntdq")
+        {
             Self::Avx2
         } else {
             Self::Avx512
@@ -67,6 +68,7 @@ macro_rules! on_every_level {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
             #[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl")]
+            #[target_feature(enable = "avx512vbmi2,avx512vpopcntdq")]
             fn avx512($($arg: $kind),*) $(-> $out)? {
                 plain($($arg),*)
             }

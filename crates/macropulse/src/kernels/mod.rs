@@ -21,6 +21,7 @@ mod pack;
 mod packet;
 #[cfg(test)]
 mod packet_tests;
+mod pattern;
 mod philox;
 mod shapes;
 mod spacing;
@@ -31,13 +32,14 @@ mod waits;
 mod whole;
 mod wide;
 
-pub(crate) use ballot::{BALLOT, highest_sum};
-pub(crate) use correlate::{BLOCK_WORDS, Block, PLANES, count_marks, with_marks};
+pub(crate) use ballot::{BALLOT, elect, highest_sum, vote};
+pub(crate) use correlate::{BLOCK_WORDS, Block, Marks, PLANES, count_marks, with_marks};
 pub(crate) use delay::{delay, drawn};
 pub(crate) use marks::{WordTicks, begin_with};
 pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
+pub(crate) use pattern::{Pattern, lit_in, look_ahead, put_out};
 pub(crate) use philox::{GROUP, philox};
 pub(crate) use shapes::{Form, meet, meet_packet, turned};
 pub(crate) use spacing::all_apart;

@@ -1,8 +1,8 @@
 //! The light nobody has explained yet: who else could have sent it?
 
-use super::{Band, Lock, STAGGER};
-use crate::decode::correlator::BLOCK;
-use crate::decode::search::{self, Sought};
+use super::{Band, Lock, SOUNDINGS, STAGGER};
+use crate::decode::search::Sought;
+use crate::kernels::Marks;
 
 /// How much must speak for a lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,8 +16,11 @@ pub(super) enum Evidence {
     MoreThanChance,
 }
 
+/// So much less often faint light is searched for far from any that was found.
+const RARER: u32 = 4;
+
 /// So few ticks are searched so soon that no shot needs to be left out.
-const FEW_TICKS: u32 = 128;
+const FEW_TICKS: u32 = 32;
 
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
@@ -29,7 +32,9 @@ impl Band<'_> {
             }
             let lock = match self.predicted(shot, evidence) {
                 Some(lock) => Some(lock),
-                None if self.is_among(shot, every) => self.believed(shot, evidence),
+                None if self.is_among(shot, every * self.rarer(shot, evidence)) => {
+                    self.believed(shot, evidence)
+                }
                 None => None,
             };
             if let Some(lock) = lock {
@@ -38,7 +43,21 @@ impl Band<'_> {
         }
     }
 
-    fn is_among(&self, shot: usize, every: u32) -> bool {
+    /// By how much less often `shot` is searched for where light is faint and none of the shots
+    /// around was found.
+    fn rarer(&self, shot: usize, evidence: Evidence) -> u32 {
+        let around = SOUNDINGS as usize;
+        let above = self.above[shot].map(|shot| shot as usize);
+        let neighbours = [shot.checked_sub(around), Some(shot + around), above];
+        let is_found = |shot: usize| self.locks.get(shot).is_some_and(Option::is_some);
+        match evidence {
+            Evidence::Overwhelming | Evidence::Bright => 1,
+            Evidence::MoreThanChance if neighbours.into_iter().flatten().any(is_found) => 1,
+            Evidence::MoreThanChance => RARER,
+        }
+    }
+
+    pub(super) fn is_among(&self, shot: usize, every: u32) -> bool {
         let log = self.sent.log;
         let (row, column) = (u32::from(log.row[shot]), u32::from(log.column[shot]));
         let left = || self.unexplained.at_most(self.sent.gate_and_macropulse(shot));
@@ -61,33 +80,10 @@ impl Band<'_> {
         (lock.count >= needed).then_some(lock)
     }
 
-    /// Gives a predicted shot the lag that unexplained light speaks for, where it fits better.
-    pub(super) fn contest(&mut self) {
-        for shot in 0..self.locks.len() {
-            let Some(lock) = self.locks[shot].filter(|lock| !lock.searched) else { continue };
-            // With so many marks in every lit bit nothing else can be meant: what is left over is
-            // another surface in the same footprint.
-            if 8 * lock.count >= 7 * self.sent.weight(shot) {
-                continue;
-            }
-            let density = self.density_in_gate(shot);
-            let by_chance = self.thresholds.least(self.sent.weight(shot), density);
-            if !self.is_crowded(shot, lock.count.saturating_sub(by_chance)) {
-                continue;
-            }
-            if let Some(rival) = self.searched(shot, lock.count / 2)
-                && rival.count > lock.count
-                && rival.count >= self.by_chance(shot, rival)
-            {
-                self.lock(shot, rival);
-            }
-        }
-    }
-
     /// Whether there are so many unexplained ticks in the gate of `shot`, close enough together,
     /// that they could be `marks` of its marks: within one macropulse, and for one of its lit
     /// bits within one code word.
-    fn is_crowded(&self, shot: usize, marks: u16) -> bool {
+    pub(super) fn is_crowded(&self, shot: usize, marks: u16) -> bool {
         let sent = self.sent;
         let per_tick = self.marks_per_tick[usize::from(sent.log.word[shot])];
         let bits = sent.lit_bits(shot).len() as u32;
@@ -135,25 +131,21 @@ impl Band<'_> {
     fn most_unexplained(&mut self, shot: usize, least: u16) -> Option<i64> {
         let sent = self.sent;
         let (nearest, farthest) = sent.gate();
-        let scale = sent.scale() as usize;
         let word = sent.codebook.word(sent.log.word[shot]);
+        let scale = sent.scale() as usize;
+        self.bits.clear();
+        self.bits.extend(sent.lit_bits(shot).iter().map(|&bit| scale * bit as usize));
+        let density = self.density_in_gate(shot);
         let sought = Sought {
-            word: word.marks.iter().map(|&mark| scale * usize::from(mark)).collect(),
-            bits: sent.bits(shot, true).map(|bit| bit as usize).collect(),
+            word: Marks { word: &word.marks, bits: &[0], scale },
+            pattern: &sent.patterns[usize::from(sent.log.word[shot])],
+            bits: &self.bits,
             lags: (farthest - nearest + 1) as usize,
             least,
+            stands_out: self.word_thresholds.least(word.marks.len() as u16, density),
         };
         let first = sent.fired[shot] + nearest;
-        let stands_out =
-            self.word_thresholds.least(word.marks.len() as u16, self.density_in_gate(shot));
-        let found = if sought.in_one_word() >= stands_out {
-            let length = sought.places() + 2 * BLOCK as usize + sent.length() as usize;
-            let (words, bit) = self.field.bits(first, length as i64);
-            let all = (words, bit, (word.marks.as_slice(), scale));
-            search::among_words(all, &self.unexplained, (first, sent.width), &sought)
-        } else {
-            self.search.best(&self.unexplained, (first, sent.width), &sought)
-        };
+        let found = self.search.best(&self.unexplained, (first, sent.width), &sought);
         found.map(|found| nearest + found.lag as i64)
     }
 }

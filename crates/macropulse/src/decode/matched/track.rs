@@ -2,7 +2,11 @@
 
 use super::leftover::Evidence;
 use super::{Band, Lock};
-use crate::decode::correlator::{BLOCK, Counts, Peak};
+use crate::decode::correlator::{BLOCK, Counts};
+use crate::kernels::{Marks, lit_in};
+
+/// How far from a peak the sides of its block are, at least.
+const NEAREST_SIDE: i64 = BLOCK / 2 - BLOCK / 8;
 
 /// Where light is faint, a shot is looked for near one that was found so many shots away.
 const WIDEST_GAP: usize = 12;
@@ -74,7 +78,8 @@ impl Band<'_> {
     /// marks fit anywhere around.
     ///
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
-    /// not have all its marks may be one of them: then the blocks to both sides are seen, too.
+    /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
+    /// unless its first and last marks are there.
     pub(super) fn best_near(&mut self, shot: usize, lag: i64, at_least: u16) -> Option<Lock> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
@@ -86,14 +91,11 @@ impl Band<'_> {
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
-            if best.count == weight {
+            if best.count == weight || self.both_ends_are_lit(shot, best.lag) {
                 break;
             }
             let sides = [middle - BLOCK, middle + BLOCK];
-            let sides = sides.map(|side| match self.may_be_higher(shot, side, best.count) {
-                true => self.best_in_block(shot, side),
-                false => None,
-            });
+            let sides = sides.map(|side| self.best_in_block(shot, side));
             let higher = sides.into_iter().flatten().find(|side| {
                 side.count > best.count || (side.count == best.count && side.lag < best.lag)
             });
@@ -107,42 +109,45 @@ impl Band<'_> {
 
     /// The highest peak in the [`BLOCK`] around `middle`.
     fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Lock> {
-        let peak = self.peak_in_block(shot, middle, self.sent.marks(shot))?;
-        let (lag, margin) = (middle - BLOCK / 2 + peak.at, peak.count - peak.next);
-        Some(Lock { lag, count: peak.count, margin, searched: false })
-    }
-
-    /// The highest peak in the [`BLOCK`] around `middle`, of some of the marks of `shot`.
-    fn peak_in_block(&mut self, shot: usize, middle: i64, marks: &[u16]) -> Option<Peak> {
         let (nearest, farthest) = self.sent.gate();
         let first = middle - BLOCK / 2;
         let allowed = nearest - first..farthest + 1 - first;
         if allowed.end <= 0 || allowed.start >= BLOCK {
             return None;
         }
+        let word = self.sent.codebook.word(self.sent.log.word[shot]);
+        let (bits, scale) = (self.sent.lit_bits(shot), self.sent.scale() as usize);
         let start = self.sent.fired[shot] + first;
         let (words, bit) = self.field.bits(start, BLOCK + self.sent.length());
-        let counts = Counts::new(words, bit, (marks, self.sent.scale() as usize));
-        counts.peak(allowed, self.sent.width.into())
+        let counts = Counts::new(words, bit, Marks { word: &word.marks, bits, scale });
+        let peak = counts.peak(allowed, self.sent.width.into())?;
+        let (lag, margin) = (first + peak.at, peak.count - peak.next);
+        Some(Lock { lag, count: peak.count, margin, searched: false })
     }
 
-    /// Whether a peak of more than `count` marks may lie in the [`BLOCK`] around `middle`: one
-    /// mark in three is asked. Of the marks of a higher peak as large a share is lit; a tenth less
-    /// is allowed for luck.
-    fn may_be_higher(&mut self, shot: usize, middle: i64, count: u16) -> bool {
-        let mut some = std::mem::take(&mut self.some_marks);
-        some.clear();
-        some.extend(self.sent.marks(shot).iter().step_by(3));
-        let peak = self.peak_in_block(shot, middle, &some);
-        let (asked, all) = (some.len() as u32, u32::from(self.sent.weight(shot)));
-        self.some_marks = some;
-        peak.is_some_and(|peak| 10 * u32::from(peak.count) * all >= 9 * u32::from(count) * asked)
+    /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`. At
+    /// a sidelobe that far from the peak as the sides of a block are, those at one of the ends have
+    /// nothing to fall upon, and only chance could light them.
+    fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
+        let (scale, marks) = (self.sent.scale(), self.sent.marks(shot));
+        let (Some(&first), Some(&last)) = (marks.first(), marks.last()) else { return false };
+        let chips = (NEAREST_SIDE / scale) as u16;
+        let begins = marks.partition_point(|&mark| mark - first < chips);
+        let ends = marks.partition_point(|&mark| last - mark >= chips);
+        let start = self.sent.fired[shot] + lag;
+        let density = self.field.density(start..start + self.sent.length());
+        let (words, bit) = self.field.bits(start, self.sent.length());
+        [&marks[..begins], &marks[ends..]].into_iter().all(|marks| {
+            let places = marks.iter().map(|&mark| bit + scale as usize * usize::from(mark));
+            let found = places.filter(|place| words[place / 64] >> (place % 64) & 1 == 1).count();
+            found as u16 >= self.end_thresholds.least(marks.len() as u16, density)
+        })
     }
 
     /// Whether chance does not reach `lock`; and, unless faint light is looked for, whether it can
     /// be no sidelobe and no other shot: half of the marks were found, or twice what chance can
     /// give, and no lit bit is much darker than the others.
-    fn is_certain(&mut self, shot: usize, lock: Lock, evidence: Evidence) -> bool {
+    pub(super) fn is_certain(&mut self, shot: usize, lock: Lock, evidence: Evidence) -> bool {
         let weight = self.sent.weight(shot);
         if lock.count == weight {
             return true;
@@ -173,14 +178,9 @@ impl Band<'_> {
 
     /// Marks of the code word of `shot` that are found if it begins at `lag`.
     pub(super) fn found_in_bit(&mut self, shot: usize, lag: i64) -> u16 {
-        let word = self.sent.codebook.word(self.sent.log.word[shot]);
-        let scale = self.sent.scale();
+        let pattern = &self.sent.patterns[usize::from(self.sent.log.word[shot])];
         let start = self.sent.fired[shot] + lag;
-        let (words, first) = self.field.bits(start, scale * i64::from(word.length));
-        let is_lit = |mark: u16| {
-            let bit = first + scale as usize * usize::from(mark);
-            words.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1)
-        };
-        word.marks.iter().filter(|&&mark| is_lit(mark)).count() as u16
+        let (words, first) = self.field.bits(start, 64 * pattern.reach() as i64);
+        lit_in(words, first, pattern) as u16
     }
 }

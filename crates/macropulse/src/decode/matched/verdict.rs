@@ -1,5 +1,7 @@
 //! What becomes of a shot that was found: the check of its bits, its time of flight, its energy.
 
+use std::collections::VecDeque;
+
 use super::{Band, Lock};
 use crate::decode::threshold::binomial_tail;
 use crate::decode::{Reject, Return, Returns, photons_per_mark};
@@ -104,7 +106,7 @@ impl Band<'_> {
     }
 
     /// Two-way time of flight, s. Where edges jitter, the mean over all marks that were found.
-    fn tof(&self, shot: usize, lock: Lock) -> f64 {
+    fn tof(&mut self, shot: usize, lock: Lock) -> f64 {
         let (sent, start) = (self.sent, self.sent.fired[shot] + lock.lag);
         let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start + sent.epoch);
         tof + self.mean_offset(shot, start) * units::s_from_fs(sent.receiver.tick_fs)
@@ -112,32 +114,41 @@ impl Band<'_> {
 
     /// By how many ticks the marks of `shot` are late on average if it begins at `start`. A
     /// window that is not centred on them would cut one side off, so it is centred again.
-    fn mean_offset(&self, shot: usize, start: i64) -> f64 {
+    fn mean_offset(&mut self, shot: usize, start: i64) -> f64 {
         const ROUNDS: usize = 3;
         let width = i64::from(self.sent.width);
         let reach = width / 2;
         if reach == 0 {
             return 0.0;
         }
-        // Whatever the rounds, no farther than this.
-        let around = ROUNDS as i64 * width;
-        let ticks = self.field.ticks(start - around..start + self.sent.length() + width + around);
+        let pattern = &self.sent.patterns[usize::from(self.sent.log.word[shot])];
+        let (bits, scale) = (self.sent.lit_bits(shot), self.sent.scale());
+        let mut late = |by: i64| -> u32 {
+            let starts = bits.iter().map(|&bit| start + scale * i64::from(bit) + by);
+            starts.map(|start| self.field.ticks_in(start, pattern)).sum()
+        };
+        // How many are late by how much, from the first one that was asked for on.
+        let (mut first, mut counts) = (0, VecDeque::new());
         let mut mean = (width - 1) as f64 / 2.0;
         for _ in 0..ROUNDS {
             let middle = mean.round() as i64;
-            let (mut sum, mut count, mut next) = (0, 0, 0);
-            for mark in self.sent.places(shot) {
-                let first = start + mark + middle - reach;
-                while ticks.get(next).is_some_and(|&tick| i64::from(tick) < first) {
-                    next += 1;
-                }
-                let within = |&&tick: &&u32| i64::from(tick) <= first + 2 * reach;
-                for &tick in ticks[next..].iter().take_while(within) {
-                    sum += i64::from(tick) - start - mark;
-                    count += 1;
-                }
+            let within = middle - reach..=middle + reach;
+            if counts.is_empty() {
+                first = *within.start();
             }
-            mean = sum as f64 / f64::from(count.max(1));
+            while first > *within.start() {
+                first -= 1;
+                counts.push_front(late(first));
+            }
+            while first + counts.len() as i64 <= *within.end() {
+                counts.push_back(late(first + counts.len() as i64));
+            }
+            let (mut sum, mut count) = (0, 0);
+            for by in within {
+                let found = i64::from(counts[(by - first) as usize]);
+                (sum, count) = (sum + by * found, count + found);
+            }
+            mean = sum as f64 / count.max(1) as f64;
             if mean.round() as i64 == middle {
                 break;
             }

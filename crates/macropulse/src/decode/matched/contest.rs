@@ -1,0 +1,88 @@
+//! Light that a shot which was found could have sent as well: another surface in its footprint, as
+//! behind glass, or the one that was meant if it was found in the wrong place.
+
+use super::leftover::Evidence;
+use super::{Band, Lock, SOUNDINGS};
+use crate::decode::correlator::BLOCK;
+
+impl Band<'_> {
+    /// Gives each shot that was found the lag that most speaks for, and explains its light at the
+    /// other one. The surfaces behind a pane are tracked as those before it are.
+    pub(super) fn contest(&mut self) {
+        self.contest_each(SOUNDINGS);
+        for shot in (0..self.locks.len()).rev() {
+            self.look_behind(shot);
+        }
+        self.contest_each(1);
+    }
+
+    fn contest_each(&mut self, every: u32) {
+        for shot in 0..self.locks.len() {
+            self.look_behind(shot);
+            let Some(lock) = self.locks[shot].filter(|lock| !lock.searched) else { continue };
+            if self.is_among(shot, every)
+                && self.may_be_elsewhere(shot, lock)
+                && let Some(rival) = self.searched(shot, lock.count / 2)
+                && rival.count >= self.by_chance(shot, rival)
+            {
+                self.settle(shot, lock, rival);
+            }
+        }
+    }
+
+    /// Looks for further surfaces where the neighbours have one.
+    fn look_behind(&mut self, shot: usize) {
+        let above = self.above[shot].map(|shot| shot as usize);
+        let neighbours = [shot.checked_sub(1), Some(shot + 1), above];
+        for neighbour in neighbours.into_iter().flatten() {
+            let Some(surfaces) = self.behind.get(neighbour) else { continue };
+            if surfaces.iter().all(Option::is_none) {
+                continue;
+            }
+            let seen_there = surfaces.map(|lag| lag.or(self.locks[neighbour].map(|lock| lock.lag)));
+            for lag in seen_there.into_iter().flatten() {
+                let Some(lock) = self.locks[shot] else { return };
+                let own = self.behind[shot].iter().flatten().chain([&lock.lag]);
+                if own.into_iter().any(|own| own.abs_diff(lag) < BLOCK as u64 / 4) {
+                    continue;
+                }
+                if !self.may_be_elsewhere(shot, lock) {
+                    return;
+                }
+                let density = self.density_in_gate(shot);
+                let least = self.thresholds.least(self.sent.weight(shot), density);
+                if let Some(rival) = self.best_near(shot, lag, least)
+                    && rival.lag != lock.lag
+                    && self.is_certain(shot, rival, Evidence::MoreThanChance)
+                {
+                    self.settle(shot, lock, rival);
+                }
+            }
+        }
+    }
+
+    /// Whether there is light left over that could be more than `lock` of `shot`. With so many
+    /// marks in every lit bit nothing else can be meant: what is left over is another surface in
+    /// the same footprint.
+    fn may_be_elsewhere(&mut self, shot: usize, lock: Lock) -> bool {
+        let weight = self.sent.weight(shot);
+        if 8 * lock.count >= 7 * weight {
+            return false;
+        }
+        let density = self.density_in_gate(shot);
+        let by_chance = self.thresholds.least(weight, density);
+        self.is_crowded(shot, lock.count.saturating_sub(by_chance))
+    }
+
+    /// Explains the light of `shot` at `rival`, and gives it that lag if it fits better than
+    /// `lock` does.
+    fn settle(&mut self, shot: usize, lock: Lock, rival: Lock) {
+        self.explain(shot, rival.lag);
+        let is_better =
+            rival.count > lock.count || (rival.count == lock.count && rival.lag < lock.lag);
+        if let Some(free) = self.behind[shot].iter_mut().find(|lag| lag.is_none()) {
+            *free = Some(if is_better { lock.lag } else { rival.lag });
+        }
+        self.locks[shot] = Some(if is_better { rival } else { lock });
+    }
+}
