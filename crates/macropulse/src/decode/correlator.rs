@@ -19,7 +19,7 @@ pub(super) struct Peak {
 }
 
 /// The counts of a block of lags, in bit planes.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Counts {
     planes: [Block; PLANES],
     /// Planes that can be lit at all.
@@ -27,12 +27,11 @@ pub(super) struct Counts {
 }
 
 impl Counts {
-    /// For each of [`BLOCK`] places from bit `first` of `words` on: how many of the `marks` are
-    /// lit.
-    pub fn new(words: &[u64], first: usize, marks: Marks) -> Self {
-        let mut planes = [[0; BLOCK_WORDS]; PLANES];
-        count_marks(words, first, marks, &mut planes);
-        Self { planes, used: marks.planes() }
+    /// Counts, for each of [`BLOCK`] places from bit `first` of `words` on, how many of the `marks`
+    /// are lit.
+    pub fn count(&mut self, words: &[u64], first: usize, marks: Marks) {
+        self.used = marks.planes();
+        count_marks(words, first, marks, &mut self.planes);
     }
 
     /// The highest count among the places of `allowed`, as offsets into the block, and the first
@@ -114,8 +113,8 @@ mod tests {
                 let others = counts.iter().enumerate().filter(|(other, _)| other.abs_diff(at) > 3);
                 let next = others.map(|(_, &count)| count).max().unwrap() as u16;
                 let expected = Peak { at: at as i64, count: highest as u16, next };
-                let found =
-                    Counts::new(&words, first, Marks { word: &marks, bits: &[0], scale: 1 });
+                let mut found = Counts::default();
+                found.count(&words, first, Marks { word: &marks, bits: &[0], scale: 1 });
                 assert_eq!(found.peak(0..BLOCK, 3), Some(expected));
             }
         }
@@ -124,7 +123,8 @@ mod tests {
     #[test]
     fn places_that_are_not_allowed_are_not_found() {
         let one = Marks { word: &[0], bits: &[0], scale: 1 };
-        let counts = Counts::new(&words([100, 300].into_iter()), 0, one);
+        let mut counts = Counts::default();
+        counts.count(&words([100, 300].into_iter()), 0, one);
         let expected = Peak { at: 300, count: 1, next: 0 };
         assert_eq!(counts.peak(101..BLOCK, 0), Some(expected));
         assert_eq!(counts.peak(7..7, 0), None);

@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::FARTHEST_JITTER;
+use super::unexplained::Unexplained;
 use crate::kernels::{Pattern, lit_in, look_ahead};
 
 /// Ticks that are turned into bits together, once somebody looks at one of them.
@@ -33,6 +34,9 @@ pub(super) struct Field<'a> {
     /// What is made of each chunk.
     made: Vec<Made>,
     memory: Memory,
+    unexplained: Unexplained,
+    /// Whether nothing was explained to begin with: then what is not yet made is as the ticks are.
+    all_unexplained: bool,
 }
 
 /// Memory of a field, whatever is in it.
@@ -42,6 +46,7 @@ pub(super) struct Memory {
     ticks: Vec<u64>,
     /// One for each place at which a mark counts as found, unless that is the same.
     lit: Vec<u64>,
+    unexplained: Vec<u64>,
 }
 
 /// How far the bits of a chunk are made.
@@ -53,8 +58,14 @@ enum Made {
 }
 
 impl<'a> Field<'a> {
-    /// The field of `ticks` over `span`.
-    pub fn new(ticks: &'a [u32], width: u32, span: Range<i64>, mut memory: Memory) -> Self {
+    /// The field of `ticks` over `span`, of which those `left` are not explained yet, or all of
+    /// them.
+    pub fn new(
+        (ticks, left): (&'a [u32], Option<&[u32]>),
+        width: u32,
+        span: Range<i64>,
+        mut memory: Memory,
+    ) -> Self {
         let origin = span.start - MARGIN;
         let chunks = ((span.end + MARGIN - origin).max(0) / CHUNK + 1) as usize;
         let cells = chunks as i64 * CELLS;
@@ -71,13 +82,21 @@ impl<'a> Field<'a> {
         if width > 1 {
             memory.lit.resize(memory.lit.len().max(chunks * WORDS), 0);
         }
-        Self { ticks, width, origin, before, made: vec![Made::Nothing; chunks], memory }
+        let words = std::mem::take(&mut memory.unexplained);
+        let unexplained = match left {
+            Some(left) => Unexplained::new(left, span, words),
+            None => {
+                let cells = before.windows(2).map(|before| before[1] - before[0]);
+                Unexplained::counted(cells.collect(), span.start, words)
+            }
+        };
+        let (made, all_unexplained) = (vec![Made::Nothing; chunks], left.is_none());
+        Self { ticks, width, origin, before, made, memory, unexplained, all_unexplained }
     }
 
     /// Makes sure that all bits of `span` are there.
     fn make(&mut self, span: Range<i64>) {
-        let chunk = |tick: i64| ((tick - self.origin) / CHUNK).max(0) as usize;
-        for chunk in chunk(span.start)..(chunk(span.end - 1) + 1).min(self.made.len()) {
+        for chunk in self.chunks(span) {
             if self.made[chunk] < Made::Lit {
                 self.make_chunk(chunk);
             }
@@ -116,6 +135,28 @@ impl<'a> Field<'a> {
             let bit = (i64::from(tick) - start) as usize % CHUNK as usize;
             words[bit / 64] |= 1 << (bit % 64);
         }
+        if self.all_unexplained {
+            self.unexplained.learn(chunk * WORDS, words);
+        }
+    }
+
+    /// The ticks that nobody has explained, made known in `span`, elsewhere counted only.
+    pub fn unexplained(&mut self, span: Range<i64>) -> &mut Unexplained {
+        if self.all_unexplained {
+            self.chunks(span).for_each(|chunk| self.make_ticks(chunk));
+        }
+        &mut self.unexplained
+    }
+
+    /// How many ticks nobody has explained, as counts only.
+    pub fn left(&self) -> &Unexplained {
+        &self.unexplained
+    }
+
+    /// The chunks that touch `span`.
+    fn chunks(&self, span: Range<i64>) -> Range<usize> {
+        let chunk = |tick: i64| ((tick - self.origin) / CHUNK).max(0) as usize;
+        chunk(span.start)..(chunk(span.end - 1) + 1).min(self.made.len())
     }
 
     /// The words of the field and the bit at which `tick` lies in them, with all bits of the
@@ -127,14 +168,6 @@ impl<'a> Field<'a> {
         (words, (tick - self.origin).max(0) as usize)
     }
 
-    /// One bit for each tick, from [`MARGIN`] ticks before the span on, and how many there are in
-    /// each [`CELL`].
-    pub fn all(&mut self) -> (&[u64], Vec<u32>) {
-        (0..self.made.len()).for_each(|chunk| self.make_ticks(chunk));
-        let cells = self.before.windows(2).map(|before| before[1] - before[0]);
-        (&self.memory.ticks[..self.made.len() * WORDS], cells.collect())
-    }
-
     /// How many ticks lie where the pattern, begun at `start`, is lit.
     pub fn ticks_in(&mut self, start: i64, pattern: &Pattern) -> u32 {
         self.make(start..start + 64 * pattern.reach() as i64);
@@ -143,7 +176,7 @@ impl<'a> Field<'a> {
 
     /// Gives its memory back.
     pub fn into_memory(self) -> Memory {
-        self.memory
+        Memory { unexplained: self.unexplained.into_words(), ..self.memory }
     }
 
     /// The cells that touch `span`.

@@ -28,10 +28,10 @@ mod verdict;
 use std::cell::Cell;
 use std::ops::Range;
 
+use super::correlator::Counts;
 use super::field::{self, Field};
 use super::search::Search;
 use super::threshold::Thresholds;
-use super::unexplained::Unexplained;
 use super::{FARTHEST_JITTER, Receiver, Returns};
 use crate::code::{CodeWord, Codebook};
 use crate::emit::ShotLog;
@@ -83,7 +83,6 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     field: field::Memory,
-    unexplained: Vec<u64>,
     search: Search,
     thresholds: Vec<Thresholds>,
 }
@@ -219,10 +218,7 @@ impl<'a> Sent<'a> {
 
 struct Band<'a> {
     sent: &'a Sent<'a>,
-    /// All ticks.
     field: Field<'a>,
-    /// Those that no shot has explained.
-    unexplained: Unexplained,
     /// How many there were to begin with in the gate of each shot; empty if nowhere any.
     left_in_gate: Vec<u32>,
     /// The shot at the same column one line earlier.
@@ -241,6 +237,7 @@ struct Band<'a> {
     marks_per_tick: Vec<u32>,
     /// For each shot, the number of marks that nowhere in its gate are unexplained.
     barren: Vec<u16>,
+    counts: Counts,
     /// Memory for the lit bits of a shot.
     bits: Vec<usize>,
     search: Search,
@@ -250,7 +247,7 @@ impl<'a> Band<'a> {
     fn new(sent: &'a Sent<'a>, ticks: (&'a [u32], peel::Peeled), memory: Memory) -> Self {
         let (ticks, peel::Peeled { locks, left }) = ticks;
         // Nobody looks at a field that is explained altogether.
-        let dark = left.is_empty();
+        let dark = left.as_ref().is_some_and(Vec::is_empty);
         let span = if dark { 0..0 } else { sent.span() };
         let (receiver, codebook) = (sent.receiver, sent.codebook);
         let chips = sent.width.div_ceil(receiver.ticks_per_chip.max(1));
@@ -268,16 +265,14 @@ impl<'a> Band<'a> {
                     None => Thresholds::new(places, false_alarm),
                 }
             });
-        let mut field = Field::new(ticks, sent.width, span.clone(), memory.field);
-        let unexplained = match left.len() == ticks.len() {
-            true => Unexplained::all(&mut field, span, memory.unexplained),
-            false => Unexplained::new(&left, span, memory.unexplained),
-        };
         Self {
             sent,
-            field,
-            unexplained,
-            left_in_gate: if dark { vec![] } else { in_gates(sent, &left, ticks.len()) },
+            field: Field::new((ticks, left.as_deref()), sent.width, span, memory.field),
+            left_in_gate: match &left {
+                _ if dark => vec![],
+                Some(left) => in_gates(sent, left),
+                None => vec![u32::MAX; sent.fired.len()],
+            },
             above: if dark { vec![] } else { above(sent.log) },
             behind: vec![[None; SURFACES]; if dark { 0 } else { locks.len() }],
             locks,
@@ -285,6 +280,7 @@ impl<'a> Band<'a> {
             bit_thresholds,
             word_thresholds,
             end_thresholds,
+            counts: Counts::default(),
             bits: Vec::new(),
             barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
             marks_per_tick: (0..words)
@@ -295,10 +291,9 @@ impl<'a> Band<'a> {
     }
 
     fn into_memory(self) -> Memory {
-        let (field, unexplained) = (self.field.into_memory(), self.unexplained.into_words());
         let thresholds =
             vec![self.thresholds, self.bit_thresholds, self.word_thresholds, self.end_thresholds];
-        Memory { field, unexplained, search: self.search, thresholds }
+        Memory { field: self.field.into_memory(), search: self.search, thresholds }
     }
 
     /// Whether nothing is left to be explained.
@@ -346,7 +341,8 @@ impl<'a> Band<'a> {
         let start = self.sent.fired[shot] + lag - farther;
         let scale = self.sent.scale();
         let bits = self.sent.lit_bits(shot).iter().map(|&bit| start + scale * i64::from(bit));
-        self.unexplained.explain(bits, &words[usize::from(self.sent.log.word[shot])]);
+        let unexplained = self.field.unexplained(start..start + self.sent.length() + 2 * farther);
+        unexplained.explain(bits, &words[usize::from(self.sent.log.word[shot])]);
     }
 }
 
@@ -367,11 +363,7 @@ fn crowding(word: &CodeWord, chips: u32) -> u32 {
 }
 
 /// For each shot, how many of the sorted `ticks` lie where its light may be.
-fn in_gates(sent: &Sent, ticks: &[u32], all: usize) -> Vec<u32> {
-    // Where most ticks are left there are some in every gate.
-    if 2 * ticks.len() > all {
-        return vec![u32::MAX; sent.fired.len()];
-    }
+fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {
     let (mut first, mut last) = (0, 0);
     let count = |shot| {
         let gate = sent.gate_and_macropulse(shot);
@@ -415,7 +407,7 @@ mod tests {
                 tick.dedup();
                 let receiver = Receiver { false_alarm: 1e4, ..receiver(jitter) };
                 let sent = Sent::new(&receiver, (&codebook, &log), 0);
-                let nothing = peel::Peeled { locks: vec![None], left: tick.clone() };
+                let nothing = peel::Peeled { locks: vec![None], left: None };
                 let mut band = Band::new(&sent, (&tick, nothing), Memory::default());
                 let (lag, count) = exhaustive(&sent, &tick, 0);
                 if let Some(lock) = band.searched(0, 1) {

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::field::{CELL, Field, MARGIN};
-use crate::kernels::{Pattern, look_ahead, put_out};
+use super::field::{CELL, MARGIN};
+use crate::kernels::{Pattern, look_ahead, lowest_and_highest_run, put_out};
 
 /// Ticks that are counted together where a rough place is enough.
 const CHUNK: i64 = CELL;
@@ -46,12 +46,16 @@ impl Unexplained {
         Self { origin, words, per_chunk, were_lit: Vec::new() }
     }
 
-    /// All ticks of `field`, in the memory `words`, whatever is in it.
-    pub fn all(field: &mut Field, span: Range<i64>, mut words: Vec<u64>) -> Self {
-        let (ticks, per_chunk) = field.all();
-        words.clear();
-        words.extend_from_slice(ticks);
-        Self { origin: span.start - MARGIN, words, per_chunk, were_lit: Vec::new() }
+    /// As many as there are in each chunk, from [`MARGIN`] before `start` on, of which nothing is
+    /// known but their number yet, in the memory `words`, whatever is in it.
+    pub fn counted(per_chunk: Vec<u32>, start: i64, mut words: Vec<u64>) -> Self {
+        words.resize(words.len().max(per_chunk.len() * WORDS), 0);
+        Self { origin: start - MARGIN, words, per_chunk, were_lit: Vec::new() }
+    }
+
+    /// Makes known which ticks there are, from machine word `first` on.
+    pub fn learn(&mut self, first: usize, ticks: &[u64]) {
+        self.words[first..first + ticks.len()].copy_from_slice(ticks);
     }
 
     /// Gives its memory back.
@@ -158,19 +162,33 @@ impl Unexplained {
         self.chunks(span).iter().sum()
     }
 
-    /// No fewer than the ticks in any run of `length` ticks that ends in `span`.
-    pub fn densest(&self, span: Range<i64>, length: u32) -> u32 {
-        let chunks = self.chunks(span);
-        let width = (i64::from(length) / CHUNK + 2) as usize;
-        let (mut sum, mut most) = (0, 0);
-        for (index, lit) in chunks.iter().enumerate() {
+    /// The ticks in `span`, to be counted in runs.
+    pub fn runs(&self, span: Range<i64>) -> Runs {
+        let mut sum = 0;
+        let sums = self.chunks(span).iter().map(|lit| {
             sum += lit;
-            if index >= width {
-                sum -= chunks[index - width];
-            }
-            most = most.max(sum);
-        }
-        most
+            sum
+        });
+        Runs { before: std::iter::once(0).chain(sums).collect() }
+    }
+}
+
+/// How many ticks there are before each chunk, and before the end.
+#[derive(Debug)]
+pub(super) struct Runs {
+    before: Vec<u32>,
+}
+
+impl Runs {
+    /// No fewer than there are in all, not many more.
+    pub fn at_most(&self) -> u32 {
+        self.before.last().copied().unwrap_or(0)
+    }
+
+    /// For runs of `length` ticks, wherever they begin: about how many are in the emptiest, and no
+    /// fewer than in the fullest.
+    pub fn emptiest_and_fullest(&self, length: u32) -> (u32, u32) {
+        lowest_and_highest_run(&self.before, (i64::from(length) / CHUNK + 2) as usize)
     }
 }
 
@@ -188,7 +206,8 @@ mod tests {
         assert_eq!(unexplained.at_most(0..5120), 0);
         assert_eq!(unexplained.at_most(5121..10_240), 487);
         // Four chunks hold any 2048 ticks.
-        assert!((205..=410).contains(&unexplained.densest(0..10_240, 2048)));
+        let (emptiest, fullest) = unexplained.runs(0..10_240).emptiest_and_fullest(2048);
+        assert!((205..=410).contains(&fullest) && emptiest == 0, "{emptiest} {fullest}");
         assert!(!unexplained.any(5110, 10));
         assert!(unexplained.any(5110, 21));
         let mut left = Vec::new();

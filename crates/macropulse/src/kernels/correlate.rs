@@ -46,7 +46,7 @@ impl Marks<'_> {
 
 /// Counts into `planes`, plane p of weight 2^p, for each lag of a block how many of the marks are
 /// lit: bit `first + lag + mark` of `words`, the lowest bit first. Bits beyond the end are dark.
-/// `planes` must be dark before.
+/// Planes that cannot be lit are left as they are.
 pub(crate) fn count_marks(words: &[u64], first: usize, marks: Marks, planes: &mut [Block; PLANES]) {
     let reach = (first + marks.last()) / 64 + BLOCK_WORDS + 1;
     let mut longer = Vec::new();
@@ -72,6 +72,7 @@ on_every_level! {
     /// [`count_marks`] where no block reaches beyond the end.
     fn count_within(words: &[u64], first: usize, marks: Marks, planes: &mut [Block; PLANES]) {
         let used = marks.planes();
+        planes[..used].fill([0; BLOCK_WORDS]);
         for &bit in marks.bits {
             for &mark in marks.word {
                 let place = first + marks.scale * (bit as usize + usize::from(mark));
@@ -228,8 +229,8 @@ pub(crate) fn with_marks(words: &[u64], first: usize, marks: Marks, least: u16) 
     count_marks(words, first, marks, &mut planes);
     let used = marks.planes().max((u16::BITS - least.leading_zeros()) as usize);
     let mut enough = [u64::MAX; BLOCK_WORDS];
-    for (weight, plane) in planes.into_iter().enumerate().take(used) {
-        enough = if least >> weight & 1 == 1 { and(plane, enough) } else { or(plane, enough) };
+    for (weight, plane) in planes.iter().enumerate().take(used) {
+        enough = if least >> weight & 1 == 1 { and(*plane, enough) } else { or(*plane, enough) };
     }
     enough
 }

@@ -2,7 +2,7 @@
 //! behind glass, or the one that was meant if it was found in the wrong place.
 
 use super::leftover::Evidence;
-use super::{Band, Lock, SOUNDINGS};
+use super::{Band, Lock, SOUNDINGS, SURFACES};
 use crate::decode::correlator::BLOCK;
 
 impl Band<'_> {
@@ -19,15 +19,42 @@ impl Band<'_> {
     fn contest_each(&mut self, every: u32) {
         for shot in 0..self.locks.len() {
             self.look_behind(shot);
-            let Some(lock) = self.locks[shot].filter(|lock| !lock.searched) else { continue };
-            if self.is_among(shot, every)
-                && self.may_be_elsewhere(shot, lock)
-                && let Some(rival) = self.searched(shot, lock.count / 2)
-                && rival.count >= self.by_chance(shot, rival)
-            {
-                self.settle(shot, lock, rival);
+            if !self.is_among(shot, every) || every == 1 && self.is_alone(shot) {
+                continue;
+            }
+            for _ in 0..=SURFACES {
+                let Some(lock) = self.locks[shot] else { break };
+                if !self.may_be_elsewhere(shot, lock) {
+                    break;
+                }
+                let Some(lag) = self.unexplained_lag(shot, lock.count / 2) else { break };
+                // Another peak may be so near that the higher one is climbed to, known or not.
+                match self.best_near(shot, lag, lock.count / 2) {
+                    Some(rival) if !self.is_known(shot, rival.lag) => {
+                        if rival.count < self.by_chance(shot, rival) {
+                            break;
+                        }
+                        self.settle(shot, lock, rival);
+                    }
+                    _ => self.explain(shot, lag),
+                }
             }
         }
+    }
+
+    /// Whether nothing else than the lag of `shot` can be meant, or hardly: so many marks were
+    /// found, and no neighbour has further surfaces.
+    fn is_alone(&self, shot: usize) -> bool {
+        let all_but_few = |lock: Lock| 8 * lock.count >= 7 * self.sent.weight(shot);
+        let is_behind = |shot: usize| self.behind.get(shot).is_some_and(|lags| lags[0].is_some());
+        let around = [shot.checked_sub(1), Some(shot), Some(shot + 1)];
+        self.locks[shot].is_some_and(all_but_few) && !around.into_iter().flatten().any(is_behind)
+    }
+
+    /// Whether a surface of `shot` was found at `lag`.
+    fn is_known(&self, shot: usize, lag: i64) -> bool {
+        self.locks[shot].is_some_and(|lock| lock.lag == lag)
+            || self.behind[shot].contains(&Some(lag))
     }
 
     /// Looks for further surfaces where the neighbours have one.
@@ -49,11 +76,10 @@ impl Band<'_> {
                 if !self.may_be_elsewhere(shot, lock) {
                     return;
                 }
-                let density = self.density_in_gate(shot);
-                let least = self.thresholds.least(self.sent.weight(shot), density);
-                if let Some(rival) = self.best_near(shot, lag, least)
-                    && rival.lag != lock.lag
-                    && self.is_certain(shot, rival, Evidence::MoreThanChance)
+                if let Some(rival) = self.best_near(shot, lag, lock.count / 2)
+                    && !self.is_known(shot, rival.lag)
+                    && self.is_certain(shot, rival, Evidence::Bright)
+                    && self.is_unexplained(shot, rival)
                 {
                     self.settle(shot, lock, rival);
                 }
@@ -61,16 +87,10 @@ impl Band<'_> {
         }
     }
 
-    /// Whether there is light left over that could be more than `lock` of `shot`. With so many
-    /// marks in every lit bit nothing else can be meant: what is left over is another surface in
-    /// the same footprint.
+    /// Whether there is light left over that could be more than `lock` of `shot`.
     fn may_be_elsewhere(&mut self, shot: usize, lock: Lock) -> bool {
-        let weight = self.sent.weight(shot);
-        if 8 * lock.count >= 7 * weight {
-            return false;
-        }
         let density = self.density_in_gate(shot);
-        let by_chance = self.thresholds.least(weight, density);
+        let by_chance = self.thresholds.least(self.sent.weight(shot), density);
         self.is_crowded(shot, lock.count.saturating_sub(by_chance))
     }
 

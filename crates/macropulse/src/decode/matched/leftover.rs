@@ -60,7 +60,7 @@ impl Band<'_> {
     pub(super) fn is_among(&self, shot: usize, every: u32) -> bool {
         let log = self.sent.log;
         let (row, column) = (u32::from(log.row[shot]), u32::from(log.column[shot]));
-        let left = || self.unexplained.at_most(self.sent.gate_and_macropulse(shot));
+        let left = || self.field.left().at_most(self.sent.gate_and_macropulse(shot));
         (column + STAGGER * row).is_multiple_of(every) || left() < FEW_TICKS
     }
 
@@ -81,24 +81,38 @@ impl Band<'_> {
     }
 
     /// Whether there are so many unexplained ticks in the gate of `shot`, close enough together,
-    /// that they could be `marks` of its marks: within one macropulse, and for one of its lit
-    /// bits within one code word.
+    /// that they could be `marks` of its marks: within one macropulse, besides those that are
+    /// everywhere, and for one of its lit bits within one code word.
     pub(super) fn is_crowded(&self, shot: usize, marks: u16) -> bool {
         let sent = self.sent;
         let per_tick = self.marks_per_tick[usize::from(sent.log.word[shot])];
         let bits = sent.lit_bits(shot).len() as u32;
         let gate = sent.gate_and_macropulse(shot);
         let needed = |bits: u32| u32::from(marks).div_ceil(bits).div_ceil(per_tick).max(1);
-        let word = (sent.length() / sent.bits_of_payload()) as u32;
-        self.unexplained.at_most(gate.clone()) >= needed(1)
-            && self.unexplained.densest(gate.clone(), word + sent.width) >= needed(bits)
-            && self.unexplained.densest(gate, sent.length() as u32 + sent.width) >= needed(1)
+        let runs = self.field.left().runs(gate);
+        if runs.at_most() < needed(1) {
+            return false;
+        }
+        let length = sent.length() as u32;
+        let (emptiest, fullest) = runs.emptiest_and_fullest(length + sent.width);
+        if fullest - emptiest < needed(1) {
+            return false;
+        }
+        let word = length / sent.bits_of_payload() as u32;
+        runs.emptiest_and_fullest(word + sent.width).1 >= needed(bits)
     }
 
-    /// The lag at which most marks of `shot` are found, out of all that unexplained ticks speak
-    /// for. `None` where these are fewer than `at_least` or chance could as well have put them
-    /// there.
+    /// The peak near the lag that most unexplained ticks speak for, see
+    /// [`Band::unexplained_lag`].
     pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
+        let lag = self.unexplained_lag(shot, at_least)?;
+        let best = self.best_near(shot, lag, at_least)?;
+        Some(Lock { searched: true, ..best })
+    }
+
+    /// The lag at which most marks of `shot` are unexplained. `None` where these are fewer than
+    /// `at_least` or chance could as well have put them there.
+    pub(super) fn unexplained_lag(&mut self, shot: usize, at_least: u16) -> Option<i64> {
         // Ticks only ever become explained.
         if self.barren[shot] <= at_least {
             return None;
@@ -108,7 +122,7 @@ impl Band<'_> {
             return None;
         }
         let gate = self.sent.gate_and_macropulse(shot);
-        let ticks = self.unexplained.at_most(gate.clone()) * self.sent.width;
+        let ticks = self.field.left().at_most(gate.clone()) * self.sent.width;
         let left_over = f64::from(ticks) / (gate.end - gate.start) as f64;
         // Marks under ticks that are explained already are missing here: half are taken to be
         // visible.
@@ -119,12 +133,10 @@ impl Band<'_> {
             true => self.most_unexplained(shot, least),
             false => None,
         };
-        let Some(lag) = found else {
+        if found.is_none() {
             self.barren[shot] = at_least;
-            return None;
-        };
-        let best = self.best_near(shot, lag, least)?;
-        Some(Lock { searched: true, ..best })
+        }
+        found
     }
 
     /// The lag at which most marks of `shot` are unexplained, if `least` are.
@@ -145,7 +157,8 @@ impl Band<'_> {
             stands_out: self.word_thresholds.least(word.marks.len() as u16, density),
         };
         let first = sent.fired[shot] + nearest;
-        let found = self.search.best(&self.unexplained, (first, sent.width), &sought);
+        let unexplained = self.field.unexplained(sent.gate_and_macropulse(shot));
+        let found = self.search.best(unexplained, (first, sent.width), &sought);
         found.map(|found| nearest + found.lag as i64)
     }
 }

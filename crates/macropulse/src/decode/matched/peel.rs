@@ -27,8 +27,8 @@ const MOST_HIDDEN: usize = 2;
 pub(super) struct Peeled {
     /// The lag of each shot that was found.
     pub locks: Vec<Option<Lock>>,
-    /// Ticks that nobody has explained, in order.
-    pub left: Vec<u32>,
+    /// Ticks that nobody has explained, in order, unless these are all.
+    pub left: Option<Vec<u32>>,
 }
 
 /// Peels the macropulses of the shots `sent` off the sorted `ticks`.
@@ -55,7 +55,9 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
         }
         place = peeler.explained.next_without(place + 1);
     }
-    Peeled { left: peeler.explained.left(ticks), locks: peeler.locks }
+    let found_any = ticks.is_empty() || peeler.locks.iter().any(Option::is_some);
+    let left = found_any.then(|| peeler.explained.left(ticks));
+    Peeled { locks: peeler.locks, left }
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N

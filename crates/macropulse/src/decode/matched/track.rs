@@ -2,7 +2,7 @@
 
 use super::leftover::Evidence;
 use super::{Band, Lock};
-use crate::decode::correlator::{BLOCK, Counts};
+use crate::decode::correlator::BLOCK;
 use crate::kernels::{Marks, lit_in};
 
 /// How far from a peak the sides of its block are, at least.
@@ -79,7 +79,7 @@ impl Band<'_> {
     ///
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
-    /// unless its first and last marks are there.
+    /// unless it is bright and its first and last marks are there.
     pub(super) fn best_near(&mut self, shot: usize, lag: i64, at_least: u16) -> Option<Lock> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
@@ -91,7 +91,8 @@ impl Band<'_> {
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
-            if best.count == weight || self.both_ends_are_lit(shot, best.lag) {
+            let is_bright = 2 * best.count >= weight;
+            if best.count == weight || is_bright && self.both_ends_are_lit(shot, best.lag) {
                 break;
             }
             let sides = [middle - BLOCK, middle + BLOCK];
@@ -101,10 +102,37 @@ impl Band<'_> {
             });
             match higher {
                 Some(side) => best = side,
-                None => break,
+                None if is_bright => break,
+                None => match self.whole_bits_away(shot, best) {
+                    Some(lag) => (middle, best) = (lag, self.best_in_block(shot, lag)?),
+                    None => break,
+                },
             }
         }
         Some(best)
+    }
+
+    /// The lag at which more marks of `shot` are found than at `lock`, some of its bits earlier or
+    /// later: there, a part of the lit bits falls upon lit bits. Several such lags: the best.
+    fn whole_bits_away(&mut self, shot: usize, lock: Lock) -> Option<i64> {
+        let bits = self.sent.bits_of_payload();
+        let length = self.sent.length() / bits;
+        let (nearest, farthest) = self.sent.gate();
+        let found: Vec<u16> =
+            (-bits..2 * bits).map(|bit| self.found_in_bit(shot, lock.lag + bit * length)).collect();
+        let mut best = None;
+        for away in -bits..=bits {
+            let lag = lock.lag + away * length;
+            if !(nearest..=farthest).contains(&lag) {
+                continue;
+            }
+            let lit = self.sent.bits(shot, true).map(|bit| (bits + away + bit / length) as usize);
+            let count: u16 = lit.filter_map(|bit| found.get(bit)).sum();
+            if count > best.map_or(lock.count, |(count, _)| count) {
+                best = Some((count, lag));
+            }
+        }
+        best.map(|(_, lag)| lag)
     }
 
     /// The highest peak in the [`BLOCK`] around `middle`.
@@ -119,8 +147,8 @@ impl Band<'_> {
         let (bits, scale) = (self.sent.lit_bits(shot), self.sent.scale() as usize);
         let start = self.sent.fired[shot] + first;
         let (words, bit) = self.field.bits(start, BLOCK + self.sent.length());
-        let counts = Counts::new(words, bit, Marks { word: &word.marks, bits, scale });
-        let peak = counts.peak(allowed, self.sent.width.into())?;
+        self.counts.count(words, bit, Marks { word: &word.marks, bits, scale });
+        let peak = self.counts.peak(allowed, self.sent.width.into())?;
         let (lag, margin) = (first + peak.at, peak.count - peak.next);
         Some(Lock { lag, count: peak.count, margin, searched: false })
     }
@@ -154,11 +182,7 @@ impl Band<'_> {
         }
         let by_chance = self.by_chance(shot, lock);
         if evidence == Evidence::MoreThanChance {
-            // Many bright shots on top of each other are a worse impostor than chance is.
-            let start = self.sent.fired[shot] + lock.lag;
-            let places = self.sent.places(shot).map(|mark| start + mark);
-            return lock.count >= by_chance
-                && 4 * self.unexplained.count(places, self.sent.width) >= 3 * lock.count;
+            return lock.count >= by_chance && self.is_unexplained(shot, lock);
         }
         if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;
@@ -174,6 +198,16 @@ impl Band<'_> {
             let found = self.found_in_bit(shot, lock.lag + bit);
             3 * u32::from(found) * lit >= u32::from(lock.count)
         })
+    }
+
+    /// Whether three in four of the marks found at `lock` are not explained by anybody else. Many
+    /// bright shots on top of each other are a worse impostor than chance is.
+    pub(super) fn is_unexplained(&mut self, shot: usize, lock: Lock) -> bool {
+        let start = self.sent.fired[shot] + lock.lag;
+        let places = self.sent.places(shot).map(|mark| start + mark);
+        let end = start + self.sent.length() + i64::from(self.sent.width);
+        let unexplained = self.field.unexplained(start..end);
+        4 * unexplained.count(places, self.sent.width) >= 3 * lock.count
     }
 
     /// Marks of the code word of `shot` that are found if it begins at `lag`.

@@ -83,17 +83,17 @@ impl Band<'_> {
         let per_tick = self.marks_per_tick.get(usize::from(self.sent.log.word[shot]));
         let per_tick = per_tick.copied().unwrap_or(1);
         let whole = start..start + self.sent.length() + width;
-        if self.unexplained.at_most(whole) * per_tick < needed {
+        if self.field.left().at_most(whole) * per_tick < needed {
             return true;
         }
         let mut dark = self.sent.bits(shot, false);
         dark.all(|bit| {
             let span = start + bit..start + bit + length + width;
-            if self.unexplained.at_most(span) * per_tick < needed {
+            if self.field.left().at_most(span.clone()) * per_tick < needed {
                 return true;
             }
             let places = word.marks.iter().map(|&mark| start + bit + scale * i64::from(mark));
-            let found = self.unexplained.count(places, self.sent.width);
+            let found = self.field.unexplained(span).count(places, self.sent.width);
             let density = self.density_around(shot, lock);
             let by_chance = self.bit_thresholds.least(self.in_word(shot), density);
             2.0 * f64::from(found) < mean || found < by_chance
