@@ -89,6 +89,9 @@ impl Band<'_> {
 
     /// Whether there is light left over that could be more than `lock` of `shot`.
     fn may_be_elsewhere(&mut self, shot: usize, lock: Lock) -> bool {
+        if self.left_in_gate[shot] < u32::from(lock.count / 2) {
+            return false;
+        }
         let density = self.density_in_gate(shot);
         let by_chance = self.thresholds.least(self.sent.weight(shot), density);
         self.is_crowded(shot, lock.count.saturating_sub(by_chance))
