@@ -8,10 +8,11 @@
 //! Where ticks are dense, and so many marks of a word stand out among them, the marks are counted
 //! for blocks of places instead, those with too few ticks left out.
 
+use std::ops::Range;
+
+use super::correlator::BLOCK;
 use super::unexplained::Unexplained;
-use crate::kernels::{
-    BALLOT, BLOCK_WORDS, Marks, Pattern, elect, highest_sum, lit_in, vote, with_marks,
-};
+use crate::kernels::{BALLOT, Marks, Pattern, elect, highest_sum, lit_in, vote, with_marks};
 
 /// What is looked for: a macropulse, taken apart.
 #[derive(Debug)]
@@ -80,16 +81,15 @@ pub(super) struct Search {
     votes: Vec<u8>,
     /// The votes of one tick.
     ballot: Vec<[u8; BALLOT]>,
+    /// Where there are votes.
+    touched: Vec<Range<usize>>,
     /// Places with enough votes.
     elected: Vec<u32>,
     /// Unexplained ticks where a mark counts as found.
     lit: Vec<u64>,
     /// Blocks of places with enough ticks.
-    blocks: Vec<u32>,
+    blocks: Vec<i64>,
 }
-
-/// Places counted together.
-const BLOCK: usize = 64 * BLOCK_WORDS;
 
 /// What it takes to count the marks of a word in a block of places, in votes.
 const VOTES_PER_BLOCK: usize = 64;
@@ -125,13 +125,16 @@ impl Search {
 
     /// The blocks of places where enough ticks for a code word are unexplained.
     fn choose_blocks(&mut self, unexplained: &Unexplained, at: (i64, u32), sought: &Sought) {
-        let ((first, width), needed) = (at, u32::from(sought.in_one_word()));
-        let length = (BLOCK + sought.reach()) as i64 + i64::from(width);
+        let ((first, width), places) = (at, sought.places() as i64);
+        let length = BLOCK + sought.reach() as i64 + i64::from(width);
+        let runs = unexplained.runs(first..first + places + length);
+        let needed = u32::from(sought.in_one_word());
+        let enough = |block: &i64| {
+            let start = first + block;
+            runs.at_most_in(start..start + length) * width >= needed
+        };
         self.blocks.clear();
-        self.blocks.extend((0..sought.places() as u32).step_by(BLOCK).filter(|&block| {
-            let start = first + i64::from(block);
-            unexplained.at_most(start..start + length) * width >= needed
-        }));
+        self.blocks.extend((0..places).step_by(BLOCK as usize).filter(enough));
     }
 
     fn by_words(
@@ -140,16 +143,19 @@ impl Search {
         at: (i64, u32),
         sought: &Sought,
     ) -> Option<Candidate> {
+        if self.blocks.is_empty() {
+            return None;
+        }
         let (first, width) = at;
-        let needed = sought.in_one_word();
-        let length = sought.places() + sought.reach() + 2 * BLOCK;
-        let begin = unexplained.lit(first..first + length as i64, width, &mut self.lit);
+        let length = (sought.places() + sought.reach()) as i64 + 2 * BLOCK;
+        let begin = unexplained.lit(first..first + length, width, &mut self.lit);
         self.elected.clear();
         for &block in &self.blocks {
-            let lit = with_marks(&self.lit, begin + block as usize, sought.word, needed);
+            let place = begin + block as usize;
+            let lit = with_marks(&self.lit, place, sought.word, sought.in_one_word());
             for (lane, mut lit) in lit.into_iter().enumerate() {
                 while lit != 0 {
-                    self.elected.push(block + 64 * lane as u32 + lit.trailing_zeros());
+                    self.elected.push(block as u32 + 64 * lane as u32 + lit.trailing_zeros());
                     lit &= lit - 1;
                 }
             }
@@ -165,22 +171,42 @@ impl Search {
         sought: &Sought,
     ) -> Option<Candidate> {
         let ((first, width), reach, places) = (at, sought.reach(), sought.places());
-        let length = places + 2 * reach + 2 * BALLOT;
-        self.votes.clear();
-        self.votes.resize(length, 0);
+        self.votes.resize(self.votes.len().max(places + 2 * reach + 3 * BALLOT), 0);
         self.ballot.clear();
         self.ballot.resize(reach / BALLOT + 1, [0; BALLOT]);
         for &mark in sought.word.word {
             let offset = reach - sought.word.scale * usize::from(mark);
             self.ballot[offset / BALLOT][offset % BALLOT] += 1;
         }
+        let length = self.ballot.len() * BALLOT;
+        self.touched.clear();
         for_each_tick(unexplained, (first, places + reach), width, |tick| {
             vote(&mut self.votes, tick, &self.ballot);
+            match self.touched.last_mut() {
+                Some(last) if tick <= last.end => last.end = tick + length,
+                _ => self.touched.push(tick..tick + length),
+            }
         });
+        let best = self.elected(sought);
+        for touched in &self.touched {
+            self.votes[touched.clone()].fill(0);
+        }
+        best
+    }
+
+    /// The lag with most votes.
+    fn elected(&mut self, sought: &Sought) -> Option<Candidate> {
+        let (reach, needed) = (sought.reach(), sought.in_one_word().min(128) as u8);
         let votes = &self.votes[reach..];
-        let needed = sought.in_one_word().min(128) as u8;
-        if elect(&votes[..places.next_multiple_of(BALLOT)], needed, &mut self.elected, places / FEW)
-        {
+        self.elected.clear();
+        let few = self.touched.iter().all(|touched| {
+            // Nothing can begin before the first place.
+            let places = touched.start.saturating_sub(reach)..touched.end.saturating_sub(reach);
+            let end = places.start + places.len().next_multiple_of(BALLOT);
+            let votes = votes.get(places.start..end).unwrap_or_default();
+            elect(votes, places.start, needed, &mut self.elected, sought.places() / FEW)
+        });
+        if few {
             return sought.best_of(&self.elected, |place| u16::from(votes[place]));
         }
         let best = highest_sum(votes, sought.bits, sought.lags, sought.least);

@@ -165,17 +165,20 @@ impl Unexplained {
     /// The ticks in `span`, to be counted in runs.
     pub fn runs(&self, span: Range<i64>) -> Runs {
         let mut sum = 0;
+        let first = self.origin + CHUNK * self.chunk_of(span.start) as i64;
         let sums = self.chunks(span).iter().map(|lit| {
             sum += lit;
             sum
         });
-        Runs { before: std::iter::once(0).chain(sums).collect() }
+        Runs { first, before: std::iter::once(0).chain(sums).collect() }
     }
 }
 
 /// How many ticks there are before each chunk, and before the end.
 #[derive(Debug)]
 pub(super) struct Runs {
+    /// The first tick that is counted.
+    first: i64,
     before: Vec<u32>,
 }
 
@@ -183,6 +186,14 @@ impl Runs {
     /// No fewer than there are in all, not many more.
     pub fn at_most(&self) -> u32 {
         self.before.last().copied().unwrap_or(0)
+    }
+
+    /// No fewer than there are in `span`, not many more.
+    pub fn at_most_in(&self, span: Range<i64>) -> u32 {
+        let last = self.before.len() as i64 - 1;
+        let from = ((span.start - self.first) / CHUNK).clamp(0, last);
+        let to = ((span.end - self.first + CHUNK - 1) / CHUNK).clamp(from, last);
+        self.before[to as usize] - self.before[from as usize]
     }
 
     /// For runs of `length` ticks, wherever they begin: about how many are in the emptiest, and no

@@ -20,10 +20,16 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// Puts the places with `least` votes or more, which is 1 to 128, into `elected`, in order, in place
-    /// of what was there. `false`, and not all of them, where they are more than `seats`.
-    pub(crate) fn elect(votes: &[u8], least: u8, elected: &mut Vec<u32>, seats: usize) -> bool {
-        elected.clear();
+    /// Appends the places with `least` votes or more, which is 1 to 128, to `elected`, in order.
+    /// `votes` are those of whole [`BALLOT`]s from place `first` on. `false`, and not all of them,
+    /// where more than `seats` are elected then.
+    pub(crate) fn elect(
+        votes: &[u8],
+        first: usize,
+        least: u8,
+        elected: &mut Vec<u32>,
+        seats: usize,
+    ) -> bool {
         let least = least.clamp(1, 128);
         for (block, votes) in votes.as_chunks::<BALLOT>().0.iter().enumerate() {
             let mut any = 0;
@@ -41,7 +47,7 @@ on_every_level! {
                 let mut enough = (with_rest | votes) & highest;
                 while enough != 0 {
                     let lane = 8 * part + enough.trailing_zeros() as usize / 8;
-                    elected.push((block * BALLOT + lane) as u32);
+                    elected.push((first + block * BALLOT + lane) as u32);
                     enough &= enough - 1;
                 }
             }
@@ -128,8 +134,9 @@ mod tests {
             let enough = (0..640).filter(|&place| votes[place as usize] >= least);
             let enough: Vec<u32> = enough.collect();
             let elections = at_each_level(|| {
-                let mut elected = vec![7];
-                let all = elect(&votes, least, &mut elected, seats);
+                let mut elected = Vec::new();
+                let all = elect(&votes[..320], 0, least, &mut elected, seats)
+                    && elect(&votes[320..], 320, least, &mut elected, seats);
                 (all, elected)
             });
             for (level, (all, elected)) in elections {

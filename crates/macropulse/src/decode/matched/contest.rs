@@ -19,25 +19,29 @@ impl Band<'_> {
     fn contest_each(&mut self, every: u32) {
         for shot in 0..self.locks.len() {
             self.look_behind(shot);
-            if !self.is_among(shot, every) || every == 1 && self.is_alone(shot) {
-                continue;
+            if self.is_among(shot, every) && (every > 1 || !self.is_alone(shot)) {
+                self.contest_one(shot);
             }
-            for _ in 0..=SURFACES {
-                let Some(lock) = self.locks[shot] else { break };
-                if !self.may_be_elsewhere(shot, lock) {
-                    break;
-                }
-                let Some(lag) = self.unexplained_lag(shot, lock.count / 2) else { break };
-                // Another peak may be so near that the higher one is climbed to, known or not.
-                match self.best_near(shot, lag, lock.count / 2) {
-                    Some(rival) if !self.is_known(shot, rival.lag) => {
-                        if rival.count < self.by_chance(shot, rival) {
-                            break;
-                        }
-                        self.settle(shot, lock, rival);
+        }
+    }
+
+    /// Searches for other surfaces of `shot`, wherever they are.
+    pub(super) fn contest_one(&mut self, shot: usize) {
+        for _ in 0..=SURFACES {
+            let Some(lock) = self.locks[shot] else { return };
+            if !self.may_be_elsewhere(shot, lock) {
+                return;
+            }
+            let Some(lag) = self.unexplained_lag(shot, lock.count / 2) else { return };
+            // Another peak may be so near that the higher one is climbed to, known or not.
+            match self.best_near(shot, lag, lock.count / 2) {
+                Some(rival) if !self.is_known(shot, rival.lag) => {
+                    if rival.count < self.by_chance(shot, rival) {
+                        return;
                     }
-                    _ => self.explain(shot, lag),
+                    self.settle(shot, lock, rival);
                 }
+                _ => self.explain(shot, lag),
             }
         }
     }
@@ -94,7 +98,7 @@ impl Band<'_> {
         }
         let density = self.density_in_gate(shot);
         let by_chance = self.thresholds.least(self.sent.weight(shot), density);
-        self.is_crowded(shot, lock.count.saturating_sub(by_chance))
+        self.is_crowded(shot, lock.count.saturating_sub(by_chance).max(lock.count / 2))
     }
 
     /// Explains the light of `shot` at `rival`, and gives it that lag if it fits better than
