@@ -22,6 +22,9 @@ const RARER: u32 = 4;
 /// So few ticks are searched so soon that no shot needs to be left out.
 const FEW_TICKS: u32 = 32;
 
+/// The emptiest of so many macropulses side by side tells how much light is everywhere.
+const MANY: u32 = 16;
+
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
     /// them in all the unexplained light of the gate.
@@ -89,13 +92,17 @@ impl Band<'_> {
         let bits = sent.lit_bits(shot).len() as u32;
         let gate = sent.gate_and_macropulse(shot);
         let needed = |bits: u32| u32::from(marks).div_ceil(bits).div_ceil(per_tick).max(1);
+        let gate_length = gate.end - gate.start;
         let runs = self.field.left().runs(gate);
         if runs.at_most() < needed(1) {
             return false;
         }
         let length = sent.length() as u32;
         let (emptiest, fullest) = runs.emptiest_and_fullest(length + sent.width);
-        if fullest - emptiest < needed(1) {
+        // In a short gate it may be full everywhere of light that is sought.
+        let is_long = gate_length > i64::from(MANY * length);
+        let everywhere = if is_long { emptiest } else { 0 };
+        if fullest - everywhere < needed(1) {
             return false;
         }
         let word = length / sent.bits_of_payload() as u32;
