@@ -12,6 +12,8 @@
 //! with a dark bit is read shifted, and lost. The *blind* receiver tries how many dark bits went
 //! before.
 
+use std::array;
+
 use super::timeline::Timeline;
 use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns, photons_per_mark};
 use crate::code::Codebook;
@@ -62,6 +64,22 @@ struct Claim {
     count: u16,
 }
 
+/// One of so many marks behind the first one must be found before the others are looked for.
+const PROPOSALS: usize = 3;
+
+/// Machine words of ticks in which they are looked for at once.
+const NEAR: usize = 3;
+
+/// Which ticks from the first one of `marks` on are the next [`PROPOSALS`].
+fn nearest(marks: &[i64]) -> Option<[u64; NEAR]> {
+    let mut bits = [0; NEAR];
+    for mark in marks.iter().skip(1).take(PROPOSALS) {
+        let behind = (mark - marks[0]) as usize;
+        *bits.get_mut(behind / 64)? |= 1 << (behind % 64);
+    }
+    Some(bits)
+}
+
 struct Band<'a> {
     receiver: &'a Receiver,
     codebook: &'a Codebook,
@@ -69,6 +87,9 @@ struct Band<'a> {
     fired: Vec<i64>,
     /// The marks of each word, in ticks.
     words: Vec<Vec<i64>>,
+    /// For each word, which of the ticks from its first mark on are its next three marks; `None`
+    /// where these are farther.
+    nearest: Vec<Option<[u64; NEAR]>>,
     bits: u32,
     /// Ticks from one bit to the next.
     bit_length: i64,
@@ -93,6 +114,7 @@ impl<'a> Band<'a> {
         let in_ticks = |word: usize| -> Vec<i64> {
             codebook.word(word as u16).marks.iter().map(|&mark| scale * i64::from(mark)).collect()
         };
+        let words: Vec<Vec<i64>> = (0..codebook.words()).map(in_ticks).collect();
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
         // Both the opening tick and the mark jitter: √2 σ between them, of which 2 σ are allowed.
         let slack = (8_f64.sqrt() * receiver.jitter_ticks).min(FARTHEST_JITTER);
@@ -101,7 +123,8 @@ impl<'a> Band<'a> {
             receiver,
             codebook,
             log,
-            words: (0..codebook.words()).map(in_ticks).collect(),
+            nearest: words.iter().map(|word| nearest(word)).collect(),
+            words,
             bits,
             bit_length: scale * i64::from(codebook.chips() / bits),
             slack,
@@ -123,11 +146,15 @@ impl<'a> Band<'a> {
     /// enough marks.
     fn recognise(&mut self, tick: i64) -> Option<Macropulse> {
         let mut best = (0, 0, tick);
+        let near: [u64; NEAR] = array::from_fn(|part| self.seen.from(tick + 64 * part as i64));
         for (index, word) in self.words.iter().enumerate() {
             let Some((first, others)) = word.split_first() else { continue };
             let start = tick - first;
-            let mut proposals = others.iter().take(3);
-            if !others.is_empty() && !proposals.any(|mark| self.seen.has(start + mark)) {
+            let is_proposed = match &self.nearest[index] {
+                Some(nearest) => nearest.iter().zip(&near).any(|(marks, seen)| marks & seen != 0),
+                None => others.iter().take(PROPOSALS).any(|mark| self.seen.has(start + mark)),
+            };
+            if !others.is_empty() && !is_proposed {
                 continue;
             }
             let found = self.found(index, start);

@@ -6,6 +6,8 @@
 //!    number of rows and columns it spans.
 //! 3. A grid may fall on it with one row or column more or less.
 
+use rayon::prelude::*;
+
 use crate::design::{Design, Pattern};
 use crate::scene::{Ray, Scene};
 
@@ -79,35 +81,33 @@ fn silhouette(design: &Design, scene: &Scene, window: Window) -> Option<(Window,
     let at = |(from, to): (f64, f64), i: usize| from + (to - from) * (i as f64 + 0.5) / GRID as f64;
     let half = |(from, to): (f64, f64)| (to - from) / GRID as f64 / 2.0;
     let world_from_sensor = scene.sensor.world_from_sensor();
-    let mut around: Option<Window> = None;
-    let mut filled = 0;
-    for row in 0..GRID {
+    let meets_target = |elevation: f64, azimuth: f64| {
+        let (sin_a, cos_a) = libm::sincos(azimuth);
+        let (sin_e, cos_e) = libm::sincos(elevation);
+        let direction = world_from_sensor.direction([cos_e * cos_a, cos_e * sin_a, sin_e]);
+        let ray = Ray { origin: scene.sensor.position, direction };
+        let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range);
+        hit.is_some_and(|hit| scene.objects[usize::from(hit.object)].is_target)
+    };
+    let (tall, wide) = (half(window.elevation), half(window.azimuth));
+    let row = |row: usize| {
         let elevation = at(window.elevation, row);
-        for column in 0..GRID {
-            let azimuth = at(window.azimuth, column);
-            let (sin_a, cos_a) = libm::sincos(azimuth);
-            let (sin_e, cos_e) = libm::sincos(elevation);
-            let direction = world_from_sensor.direction([cos_e * cos_a, cos_e * sin_a, sin_e]);
-            let ray = Ray { origin: scene.sensor.position, direction };
-            let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range);
-            if !hit.is_some_and(|hit| scene.objects[usize::from(hit.object)].is_target) {
-                continue;
-            }
-            filled += 1;
-            let grow = |(least, most): (f64, f64), value: f64, half: f64| {
-                (least.min(value - half), most.max(value + half))
-            };
-            let start = around.unwrap_or(Window {
-                azimuth: (azimuth, azimuth),
-                elevation: (elevation, elevation),
-            });
-            around = Some(Window {
-                azimuth: grow(start.azimuth, azimuth, half(window.azimuth)),
-                elevation: grow(start.elevation, elevation, half(window.elevation)),
-            });
-        }
-    }
-    around.map(|around| (around, filled))
+        let azimuths = (0..GRID).map(|column| at(window.azimuth, column));
+        let met: Vec<f64> = azimuths.filter(|&azimuth| meets_target(elevation, azimuth)).collect();
+        let around = Window {
+            azimuth: (met.first()? - wide, met.last()? + wide),
+            elevation: (elevation - tall, elevation + tall),
+        };
+        Some((around, met.len()))
+    };
+    (0..GRID).into_par_iter().filter_map(row).reduce_with(|(a, filled), (b, more)| {
+        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+        let around = Window {
+            azimuth: both(a.azimuth, b.azimuth),
+            elevation: both(a.elevation, b.elevation),
+        };
+        (around, filled + more)
+    })
 }
 
 /// Everything the sensor looks at.

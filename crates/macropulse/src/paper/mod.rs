@@ -14,6 +14,8 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 pub use claim::{Claim, Verdict};
 pub use experiment::{DISTANCES, SENSORS, Trial};
 pub use geometry::{Prediction, predict};
@@ -90,12 +92,13 @@ fn designs() -> Result<Vec<Design>, Error> {
 /// If something cannot be written, or the watch says stop.
 pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let designs = designs()?;
-    let mut trials = Vec::new();
-    for (design, sensor) in designs.iter().zip(SENSORS) {
-        for distance in DISTANCES {
-            trials.push(experiment::trial(design, (sensor, distance), seed, folder, watch)?);
-        }
-    }
+    let sensors: Vec<_> = designs.iter().zip(SENSORS).collect();
+    let trials = sensors.par_iter().flat_map(|(design, sensor)| {
+        DISTANCES.par_iter().map(move |&distance| {
+            experiment::trial(design, (sensor, distance), seed, folder, watch)
+        })
+    });
+    let trials = trials.collect::<Result<Vec<_>, Error>>()?;
     let comparisons = receivers::compare(seed, watch)?;
     let claims = claims(&designs[0], &trials, &comparisons)?;
     let findings = Findings { designs, trials, comparisons, claims };
