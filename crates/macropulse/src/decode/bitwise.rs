@@ -18,6 +18,7 @@ use super::timeline::Timeline;
 use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns, photons_per_mark};
 use crate::code::Codebook;
 use crate::emit::ShotLog;
+use crate::kernels::Pattern;
 use crate::tdc::Ticks;
 
 /// Which bit the opening tick may belong to.
@@ -87,6 +88,8 @@ struct Band<'a> {
     fired: Vec<i64>,
     /// The marks of each word, in ticks.
     words: Vec<Vec<i64>>,
+    /// The same as bits.
+    patterns: Vec<Pattern>,
     /// For each word, which of the ticks from its first mark on are its next three marks; `None`
     /// where these are farther.
     nearest: Vec<Option<[u64; NEAR]>>,
@@ -123,6 +126,10 @@ impl<'a> Band<'a> {
             receiver,
             codebook,
             log,
+            patterns: words
+                .iter()
+                .map(|word| Pattern::new(word.iter().map(|&mark| mark as usize), 1))
+                .collect(),
             nearest: words.iter().map(|word| nearest(word)).collect(),
             words,
             bits,
@@ -139,7 +146,11 @@ impl<'a> Band<'a> {
 
     /// Marks of `word` found if it starts at `start`.
     fn found(&self, word: usize, start: i64) -> u16 {
-        self.words[word].iter().filter(|&mark| self.seen.has(start + mark)).count() as u16
+        let one_by_one = || self.words[word].iter().filter(|&mark| self.seen.has(start + mark));
+        match self.seen.lit_in(start, &self.patterns[word]) {
+            Some(found) => found as u16,
+            None => one_by_one().count() as u16,
+        }
     }
 
     /// The macropulse that `tick` opens, its ticks taken off the queue. `None` where no word has

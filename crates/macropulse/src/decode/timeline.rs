@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::kernels::{Pattern, lit_in};
+
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
@@ -45,6 +47,12 @@ impl Timeline {
     /// Darkens `tick`.
     pub fn clear(&mut self, tick: i64) {
         self.darken(tick);
+    }
+
+    /// How many ticks of `pattern` are lit if it begins at `tick`; `None` if that is before all.
+    pub fn lit_in(&self, tick: i64, pattern: &Pattern) -> Option<u32> {
+        let bit = usize::try_from(tick - self.origin).ok()?;
+        Some(lit_in(&self.words, bit, pattern))
     }
 
     /// Sixty-four ticks from `tick` on, the first one in the lowest bit.
