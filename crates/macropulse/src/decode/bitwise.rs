@@ -111,7 +111,7 @@ struct Band<'a> {
 impl<'a> Band<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &Ticks) -> Self {
         let (codebook, log) = sent;
-        let fired: Vec<i64> = (0..log.len()).map(|shot| receiver.fired(log, shot)).collect();
+        let fired = receiver.all_fired(log);
         let queue = receiver.timeline(codebook, &fired, ticks);
         let scale = i64::from(receiver.ticks_per_chip);
         let in_ticks = |word: usize| -> Vec<i64> {

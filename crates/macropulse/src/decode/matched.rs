@@ -25,7 +25,7 @@ mod peel;
 mod track;
 mod verdict;
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::ops::Range;
 
 use super::correlator::Counts;
@@ -87,6 +87,7 @@ struct Memory {
     field: field::Memory,
     search: Search,
     thresholds: Vec<Thresholds>,
+    all_found: Vec<f32>,
 }
 
 /// The lag at which a shot was found.
@@ -112,30 +113,56 @@ struct Sent<'a> {
     width: u32,
     /// The code words, in ticks.
     words: Vec<WordTicks>,
-    /// The same as bits, one for each mark.
+    /// The same as bits, once somebody asks: where everything is clear nobody does.
+    bits: OnceCell<Bits>,
+}
+
+/// The code words, as bits.
+struct Bits {
+    /// How many ticks before a mark others are explained by it.
+    farther: i64,
     patterns: Vec<Pattern>,
-    /// What they explain: from so many ticks before the first mark on.
-    explained: (i64, Vec<Pattern>),
+    explained: Vec<Pattern>,
 }
 
 impl<'a> Sent<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), epoch: i64) -> Self {
         let (codebook, log) = sent;
-        let fired = (0..log.len()).map(|shot| receiver.fired(log, shot) - epoch).collect();
+        let fired = receiver.all_fired(log).iter().map(|fired| fired - epoch).collect();
         let width = window(receiver.jitter_ticks);
-        // One edge in twenty jitters farther than marks are looked for.
-        let farther = width / 2;
-        let scale = receiver.ticks_per_chip;
-        let (mut words, mut patterns, mut explained) = (Vec::new(), Vec::new(), Vec::new());
-        for word in 0..codebook.words() {
-            let marks = &codebook.word(word as u16).marks;
-            let ticks = || marks.iter().map(|&mark| scale as usize * usize::from(mark));
-            words.push(WordTicks::new(marks, scale));
-            patterns.push(Pattern::new(ticks(), 1));
-            explained.push(Pattern::new(ticks(), (width + 2 * farther) as usize));
-        }
-        let explained = (i64::from(farther), explained);
-        Self { receiver, codebook, log, epoch, fired, width, words, patterns, explained }
+        let ticks = |word: usize| {
+            WordTicks::new(&codebook.word(word as u16).marks, receiver.ticks_per_chip)
+        };
+        let words = (0..codebook.words()).map(ticks).collect();
+        Self { receiver, codebook, log, epoch, fired, width, words, bits: OnceCell::new() }
+    }
+
+    /// The code word of `shot` as bits, one for each mark.
+    fn pattern(&self, shot: usize) -> &Pattern {
+        &self.as_bits().patterns[usize::from(self.log.word[shot])]
+    }
+
+    /// The ticks that the code word of `shot` explains, from so many before its start on.
+    fn explains(&self, shot: usize) -> (i64, &Pattern) {
+        let bits = self.as_bits();
+        (bits.farther, &bits.explained[usize::from(self.log.word[shot])])
+    }
+
+    fn as_bits(&self) -> &Bits {
+        self.bits.get_or_init(|| {
+            // One edge in twenty jitters farther than marks are looked for.
+            let farther = self.width / 2;
+            let scale = self.receiver.ticks_per_chip as usize;
+            let all = |width: u32| {
+                let word = |word: usize| {
+                    let marks = self.codebook.word(word as u16).marks.iter();
+                    Pattern::new(marks.map(|&mark| scale * usize::from(mark)), width as usize)
+                };
+                (0..self.codebook.words()).map(word).collect()
+            };
+            let (patterns, explained) = (all(1), all(self.width + 2 * farther));
+            Bits { farther: farther.into(), patterns, explained }
+        })
     }
 
     /// The lit chips of `shot`.
@@ -243,6 +270,8 @@ struct Band<'a> {
     /// Memory for the lit bits of a shot.
     bits: Vec<usize>,
     search: Search,
+    /// Photons per mark where all marks are found, by their number.
+    all_found: Vec<f32>,
 }
 
 impl<'a> Band<'a> {
@@ -289,13 +318,15 @@ impl<'a> Band<'a> {
                 .map(|word| crowding(codebook.word(word as u16), chips))
                 .collect(),
             search: memory.search,
+            all_found: memory.all_found,
         }
     }
 
     fn into_memory(self) -> Memory {
         let thresholds =
             vec![self.thresholds, self.bit_thresholds, self.word_thresholds, self.end_thresholds];
-        Memory { field: self.field.into_memory(), search: self.search, thresholds }
+        let (field, all_found) = (self.field.into_memory(), self.all_found);
+        Memory { field, search: self.search, thresholds, all_found }
     }
 
     /// Whether nothing is left to be explained.
@@ -339,12 +370,12 @@ impl<'a> Band<'a> {
 
     /// Explains the ticks of `shot` at `lag`.
     fn explain(&mut self, shot: usize, lag: i64) {
-        let (farther, words) = &self.sent.explained;
+        let (farther, pattern) = self.sent.explains(shot);
         let start = self.sent.fired[shot] + lag - farther;
         let scale = self.sent.scale();
         let bits = self.sent.lit_bits(shot).iter().map(|&bit| start + scale * i64::from(bit));
         let unexplained = self.field.unexplained(start..start + self.sent.length() + 2 * farther);
-        unexplained.explain(bits, &words[usize::from(self.sent.log.word[shot])]);
+        unexplained.explain(bits, pattern);
     }
 }
 

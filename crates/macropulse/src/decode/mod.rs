@@ -86,6 +86,25 @@ impl Receiver {
         log.fired_at_fs[shot].div_euclid(self.tick_fs)
     }
 
+    /// The absolute ticks in which the shots were fired.
+    fn all_fired(&self, log: &ShotLog) -> Vec<i64> {
+        // Whole numbers up to here are exact as floating-point ones, and a quotient of two is
+        // wrong by one at most; a division of whole numbers takes several times as long.
+        const EXACT: i64 = 1 << 52;
+        let Some(&first) = log.fired_at_fs.first() else { return Vec::new() };
+        let (start, rest) = (first.div_euclid(self.tick_fs), first.rem_euclid(self.tick_fs));
+        let ticks = |fired: &i64| {
+            let since = fired - first + rest;
+            if since.abs() >= EXACT {
+                return fired.div_euclid(self.tick_fs);
+            }
+            let about = (since as f64 / self.tick_fs as f64) as i64;
+            let over = since - about * self.tick_fs;
+            start + about + i64::from(over >= self.tick_fs) - i64::from(over < 0)
+        };
+        log.fired_at_fs.iter().map(ticks).collect()
+    }
+
     /// The ticks in which light of shots that were `fired` can arrive.
     fn timeline(&self, codebook: &Codebook, fired: &[i64], ticks: &Ticks) -> Timeline {
         let absolute = |tick: Option<&u32>| ticks.epoch + i64::from(tick.copied().unwrap_or(0));
@@ -118,6 +137,26 @@ fn photons_per_mark(peak: u16, marks: u16, density: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shots_are_fired_in_the_tick_that_holds_their_time() {
+        let receiver = Receiver {
+            kind: ReceiverKind::Matched,
+            gate_ticks: (0, 1),
+            ticks_per_chip: 1,
+            tick_fs: 2497,
+            jitter_ticks: 0.0,
+            false_alarm: 0.1,
+            bit_threshold: 1,
+        };
+        for first in [0, 7, -2498, 10_i64.pow(17) + 1] {
+            let times = [0, 1, 2489, 2490, 2496, 2497, -1, -2497, 2497 * 2497, 1 << 51, 1 << 53];
+            let fired_at_fs: Vec<i64> = times.iter().map(|time| first + time).collect();
+            let expected: Vec<i64> = fired_at_fs.iter().map(|time| time.div_euclid(2497)).collect();
+            let log = ShotLog { fired_at_fs, ..ShotLog::default() };
+            assert_eq!(receiver.all_fired(&log), expected);
+        }
+    }
 
     #[test]
     fn photons_follow_from_the_share_of_marks_seen() {

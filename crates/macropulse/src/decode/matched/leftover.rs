@@ -157,7 +157,7 @@ impl Band<'_> {
         let density = self.density_in_gate(shot);
         let sought = Sought {
             word: Marks { word: &word.marks, bits: &[0], scale },
-            pattern: &sent.patterns[usize::from(sent.log.word[shot])],
+            pattern: sent.pattern(shot),
             bits: &self.bits,
             lags: (farthest - nearest + 1) as usize,
             least,

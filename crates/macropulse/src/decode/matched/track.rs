@@ -219,7 +219,7 @@ impl Band<'_> {
 
     /// Marks of the code word of `shot` that are found if it begins at `lag`.
     pub(super) fn found_in_bit(&mut self, shot: usize, lag: i64) -> u16 {
-        let pattern = &self.sent.patterns[usize::from(self.sent.log.word[shot])];
+        let pattern = self.sent.pattern(shot);
         let start = self.sent.fired[shot] + lag;
         let (words, first) = self.field.bits(start, 64 * pattern.reach() as i64);
         lit_in(words, first, pattern) as u16

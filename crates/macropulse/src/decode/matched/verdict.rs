@@ -14,9 +14,9 @@ impl Band<'_> {
         let mut returns = Returns::with_capacity(home.len());
         // Where all marks are found nothing is to be learnt from the light around; and in clear
         // weather a logarithm for each shot would take longer than the rest.
-        let all_found: Vec<f32> = (0..=self.sent.codebook.max_weight() as u16)
-            .map(|marks| photons_per_mark(marks, marks, 0.0))
-            .collect();
+        let most = self.sent.codebook.max_weight() as u16;
+        let known = self.all_found.len() as u16;
+        self.all_found.extend((known..=most).map(|marks| photons_per_mark(marks, marks, 0.0)));
         for shot in home {
             let Some(mut lock) = self.locks[shot] else {
                 returns.reject(Reject::NoPeak);
@@ -33,7 +33,7 @@ impl Band<'_> {
             }
             let marks = self.sent.weight(shot);
             let photons = match lock.count == marks {
-                true => all_found[usize::from(marks)],
+                true => self.all_found[usize::from(marks)],
                 false => photons_per_mark(lock.count, marks, self.density_around(shot, lock)),
             };
             returns.push(Return {
@@ -126,7 +126,7 @@ impl Band<'_> {
         if reach == 0 {
             return 0.0;
         }
-        let pattern = &self.sent.patterns[usize::from(self.sent.log.word[shot])];
+        let pattern = self.sent.pattern(shot);
         let (bits, scale) = (self.sent.lit_bits(shot), self.sent.scale());
         let mut late = |by: i64| -> u32 {
             let starts = bits.iter().map(|&bit| start + scale * i64::from(bit) + by);
