@@ -9,7 +9,7 @@ mod common;
 
 use std::hint::black_box;
 
-use common::{Met, SEED, clock, detector, spread};
+use common::{Met, SEED, clock, conditions, detector, spread};
 use macropulse::decode::Returns;
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
@@ -21,9 +21,6 @@ use macropulse::units;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-/// Conditions: fraction of the marks missed, false edges per second.
-const CONDITIONS: [(f64, f64); 5] = [(0.0, 0.0), (0.05, 1e8), (0.2, 1e9), (0.4, 1e9), (0.0, 1e10)];
-
 const SCENES: [&str; 3] = ["car-50m", "street", "random"];
 
 /// Bands of a scan that are decoded: one in twenty-four.
@@ -32,8 +29,6 @@ const BANDS: usize = 10;
 /// Rounds are run until they add up to this, s; the best of them counts. What takes longer is run
 /// once.
 const ENOUGH: f64 = 0.3;
-
-type Keys = Vec<(String, String)>;
 
 fn open(keys: &[(String, String)]) -> Design {
     Design::open("kim-park-2016", keys).unwrap()
@@ -153,16 +148,10 @@ fn scenes() {
     );
     let declared = open(&[]);
     let bands = spread(&declared, BANDS);
-    let conditions = CONDITIONS.map(|(missed, rate)| {
-        let name = format!("{:.0} % missed, {rate:.0e}/s", 100.0 * missed);
-        (name, detector(missed, rate))
-    });
-    let as_declared = ("as declared".to_owned(), Keys::new());
-    let conditions: Vec<(String, Keys)> = conditions.into_iter().chain([as_declared]).collect();
     for scene in SCENES {
         let met = met(&declared, &bands, scene);
-        for (condition, keys) in &conditions {
-            let design = open(keys);
+        for (condition, keys) in conditions() {
+            let design = open(&keys);
             let sample = Sample::new(&design, &met);
             let (seconds, returns) = sample.seconds();
             let (seconds, score) = (sample.scaled(seconds), sample.score(&returns));

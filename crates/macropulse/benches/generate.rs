@@ -6,25 +6,13 @@
 mod common;
 
 use std::hint::black_box;
+use std::time::Duration;
 
-use common::{Met, SEED, detector, spread};
+use common::{Met, SEED, conditions, spread};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::random::Chance;
-
-/// Conditions: fraction of the marks missed, false edges per second.
-const CONDITIONS: [(f64, f64); 9] = [
-    (0.0, 0.0),
-    (0.05, 0.0),
-    (0.2, 0.0),
-    (0.4, 0.0),
-    (0.0, 1e8),
-    (0.0, 1e9),
-    (0.2, 1e9),
-    (0.0, 1e10),
-    (0.2, 1e10),
-];
 
 /// The ticks of all bands, counted.
 fn ticks(met: &Met, design: &Design, detectors: &Detectors, memory: &mut Memory) -> usize {
@@ -49,18 +37,14 @@ fn generate(criterion: &mut Criterion) {
         let Some(met) = met else { continue };
         let mut group = criterion.benchmark_group(format!("generate/{name}"));
         group.throughput(Throughput::Elements(1)).sample_size(10);
-        let mut run = |condition: String, design: &Design| {
-            let detectors = Detectors::new(design, Chance::new(SEED));
+        group.warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_secs(1));
+        for (condition, keys) in conditions() {
+            let Ok(design) = Design::open("kim-park-2016", &keys) else { continue };
+            let detectors = Detectors::new(&design, Chance::new(SEED));
             let mut memory = Memory::default();
             group.bench_function(condition, |bencher| {
-                bencher.iter(|| ticks(met, design, &detectors, &mut memory));
+                bencher.iter(|| ticks(met, &design, &detectors, &mut memory));
             });
-        };
-        run("as declared".to_owned(), &declared);
-        for (missed, rate) in CONDITIONS {
-            if let Ok(design) = Design::open("kim-park-2016", &detector(missed, rate)) {
-                run(format!("{:.0} % missed, {rate:.0e} false per s", 100.0 * missed), &design);
-            }
         }
         group.finish();
     }

@@ -17,6 +17,22 @@ use rand::RngExt;
 /// Seed of all that is drawn.
 pub const SEED: u64 = 20_160_913;
 
+/// Fractions of the marks that are missed.
+const MISSED: [f64; 4] = [0.0, 0.05, 0.2, 0.4];
+
+/// False edges per second.
+const FALSE: [f64; 4] = [0.0, 1e8, 1e9, 1e10];
+
+/// Name and keys of each condition: the detector as declared, and without jitter all that miss so
+/// many marks and add so many false edges.
+pub fn conditions() -> impl Iterator<Item = (String, Vec<(String, String)>)> {
+    let both = MISSED.into_iter().flat_map(|missed| FALSE.map(|rate| (missed, rate)));
+    let all = both.map(|(missed, rate)| {
+        (format!("{:.0} % missed, {rate:.0e}/s", 100.0 * missed), detector(missed, rate))
+    });
+    std::iter::once(("as declared".to_owned(), Vec::new())).chain(all)
+}
+
 /// What bands of a scan meet.
 pub struct Met {
     materials: Vec<Material>,

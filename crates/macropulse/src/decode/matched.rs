@@ -51,7 +51,8 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
         band.track(Evidence::MoreThanChance);
         band.track_back(Evidence::MoreThanChance);
         band.search(Evidence::Overwhelming, 1);
-        band.search(Evidence::Bright, 1);
+        // Where light lies upon light everywhere, more stands out when some is explained.
+        while band.search(Evidence::Bright, 1) > band.locks.len() / MANY_FOUND {}
         // Faint light is one among many ticks everywhere: soundings must do.
         band.search(Evidence::MoreThanChance, SOUNDINGS);
         band.track_back(Evidence::MoreThanChance);
@@ -66,6 +67,9 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
 /// staggered by this many shots.
 const SOUNDINGS: u32 = 16;
 const STAGGER: u32 = 5;
+
+/// After one in so many shots was found, the others are searched for once more.
+const MANY_FOUND: usize = 64;
 
 /// So many places of a gate may be taken for a code word by mistake, and looked at again.
 const FEW: f64 = 50.0;

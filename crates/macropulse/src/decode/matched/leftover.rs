@@ -27,8 +27,9 @@ const MANY: u32 = 16;
 
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
-    /// them in all the unexplained light of the gate.
-    pub(super) fn search(&mut self, evidence: Evidence, every: u32) {
+    /// them in all the unexplained light of the gate. Tells how many were found.
+    pub(super) fn search(&mut self, evidence: Evidence, every: u32) -> usize {
+        let mut found = 0;
         for shot in 0..self.locks.len() {
             if self.locks[shot].is_some() || !self.may_be_lit(shot) {
                 continue;
@@ -42,8 +43,10 @@ impl Band<'_> {
             };
             if let Some(lock) = lock {
                 self.lock(shot, lock);
+                found += 1;
             }
         }
+        found
     }
 
     /// By how much less often `shot` is searched for where light is faint and none of the shots
@@ -136,10 +139,11 @@ impl Band<'_> {
         let density = self.density_in_gate(shot);
         let visible = self.thresholds.least(weight, density).div_ceil(2);
         let least = self.thresholds.least(weight, left_over).max(visible).max(at_least);
-        let found = match self.is_crowded(shot, least) {
-            true => self.most_unexplained(shot, least),
-            false => None,
-        };
+        // What does not stand out today may do so when more is explained.
+        if !self.is_crowded(shot, least) {
+            return None;
+        }
+        let found = self.most_unexplained(shot, least);
         if found.is_none() {
             self.barren[shot] = at_least;
         }

@@ -189,7 +189,9 @@ impl Band<'_> {
         }
         let by_chance = self.by_chance(shot, lock);
         if evidence == Evidence::MoreThanChance {
-            return lock.count >= by_chance && self.is_unexplained(shot, lock);
+            return lock.count >= by_chance
+                && self.lit_bits_are_lit(shot, lock)
+                && self.is_unexplained(shot, lock);
         }
         if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;

@@ -60,12 +60,14 @@ impl Band<'_> {
         }
         let lit = self.sent.lit_bits(shot).len() as u32;
         let mean = f64::from(lock.count) / f64::from(lit);
-        (all_found || self.lit_bits_are_lit(shot, lock, mean))
+        (all_found || self.lit_bits_are_lit(shot, lock))
             && self.dark_bits_are_dark(shot, lock, mean)
     }
 
-    fn lit_bits_are_lit(&mut self, shot: usize, lock: Lock, mean: f64) -> bool {
+    /// Whether no lit bit of `shot` is darker than chance makes it.
+    pub(super) fn lit_bits_are_lit(&mut self, shot: usize, lock: Lock) -> bool {
         let in_word = self.in_word(shot);
+        let mean = f64::from(lock.count) / self.sent.lit_bits(shot).len() as f64;
         // Not so many marks are missing altogether.
         if f64::from(self.sent.weight(shot) - lock.count) < f64::from(in_word) - mean / 2.0 {
             return true;
