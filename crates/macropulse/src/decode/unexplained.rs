@@ -164,13 +164,16 @@ impl Unexplained {
 
     /// The ticks in `span`, to be counted in runs.
     pub fn runs(&self, span: Range<i64>) -> Runs {
-        let mut sum = 0;
         let first = self.origin + CHUNK * self.chunk_of(span.start) as i64;
-        let sums = self.chunks(span).iter().map(|lit| {
+        let chunks = self.chunks(span);
+        let mut sum = 0;
+        let mut before = Vec::with_capacity(chunks.len() + 1);
+        before.push(0);
+        before.extend(chunks.iter().map(|lit| {
             sum += lit;
             sum
-        });
-        Runs { first, before: std::iter::once(0).chain(sums).collect() }
+        }));
+        Runs { first, before }
     }
 }
 

@@ -164,16 +164,20 @@ impl Band<'_> {
     /// a sidelobe that far from the peak as the sides of a block are, those at one of the ends have
     /// nothing to fall upon, and only chance could light them.
     fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
-        let (scale, marks) = (self.sent.scale(), self.sent.marks(shot));
+        let (scale, bits) = (self.sent.scale(), self.sent.lit_bits(shot));
+        let marks = &self.sent.codebook.word(self.sent.log.word[shot]).marks;
         let (Some(&first), Some(&last)) = (marks.first(), marks.last()) else { return false };
+        let (Some(&first_bit), Some(&last_bit)) = (bits.first(), bits.last()) else { return false };
         let chips = (NEAREST_SIDE / scale) as u16;
-        let begins = marks.partition_point(|&mark| mark - first < chips);
-        let ends = marks.partition_point(|&mark| last - mark >= chips);
+        let begins = &marks[..marks.partition_point(|&mark| mark - first < chips)];
+        let ends = &marks[marks.partition_point(|&mark| last - mark >= chips)..];
         let start = self.sent.fired[shot] + lag;
         let density = self.field.density(start..start + self.sent.length());
-        let (words, bit) = self.field.bits(start, self.sent.length());
-        [&marks[..begins], &marks[ends..]].into_iter().all(|marks| {
-            let places = marks.iter().map(|&mark| bit + scale as usize * usize::from(mark));
+        let (words, place) = self.field.bits(start, self.sent.length());
+        [(first_bit, begins), (last_bit, ends)].into_iter().all(|(bit, marks)| {
+            let places =
+                marks.iter().map(|&mark| scale as usize * (bit as usize + usize::from(mark)));
+            let places = places.map(|mark| place + mark);
             let found = places.filter(|place| words[place / 64] >> (place % 64) & 1 == 1).count();
             found as u16 >= self.end_thresholds.least(marks.len() as u16, density)
         })
