@@ -48,8 +48,6 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
         // What can be tracked from somewhere need not be searched, and is out of the way then.
         band.search(Evidence::Overwhelming, SOUNDINGS);
         band.track_back(Evidence::Overwhelming);
-        band.track(Evidence::MoreThanChance);
-        band.track_back(Evidence::MoreThanChance);
         band.search(Evidence::Overwhelming, 1);
         // Where light lies upon light everywhere, more stands out when some is explained.
         while band.search(Evidence::Bright, 1) > band.locks.len() / MANY_FOUND {}

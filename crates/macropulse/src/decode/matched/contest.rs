@@ -36,7 +36,7 @@ impl Band<'_> {
             // Another peak may be so near that the higher one is climbed to, known or not.
             match self.best_near(shot, lag, lock.count / 2) {
                 Some(rival) if !self.is_known(shot, rival.lag) => {
-                    if rival.count < self.by_chance(shot, rival) {
+                    if !self.is_certain(shot, rival, Evidence::Bright) {
                         return;
                     }
                     self.settle(shot, lock, rival);

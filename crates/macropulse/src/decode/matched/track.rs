@@ -12,22 +12,15 @@ const NEAREST_SIDE: i64 = BLOCK / 2 - BLOCK / 8;
 const WIDEST_GAP: usize = 12;
 
 impl Band<'_> {
-    /// Goes from each shot that was found on to those after it.
-    pub(super) fn track(&mut self, evidence: Evidence) {
-        (0..self.locks.len()).for_each(|shot| self.track_one(shot, evidence));
-    }
-
     /// Goes from each shot that was found back to those before it.
     pub(super) fn track_back(&mut self, evidence: Evidence) {
-        (0..self.locks.len()).rev().for_each(|shot| self.track_one(shot, evidence));
-    }
-
-    fn track_one(&mut self, shot: usize, evidence: Evidence) {
-        if self.locks[shot].is_none()
-            && self.may_be_lit(shot)
-            && let Some(lock) = self.predicted(shot, evidence)
-        {
-            self.lock(shot, lock);
+        for shot in (0..self.locks.len()).rev() {
+            if self.locks[shot].is_none()
+                && self.may_be_lit(shot)
+                && let Some(lock) = self.predicted(shot, evidence)
+            {
+                self.lock(shot, lock);
+            }
         }
     }
 
@@ -193,9 +186,7 @@ impl Band<'_> {
         }
         let by_chance = self.by_chance(shot, lock);
         if evidence == Evidence::MoreThanChance {
-            return lock.count >= by_chance
-                && self.lit_bits_are_lit(shot, lock)
-                && self.is_unexplained(shot, lock);
+            return lock.count >= by_chance && self.is_unexplained(shot, lock);
         }
         if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;
