@@ -20,7 +20,7 @@ pub(super) enum Evidence {
 const RARER: u32 = 4;
 
 /// So few ticks are searched so soon that no shot needs to be left out.
-const FEW_TICKS: u32 = 128;
+const FEW_TICKS: u32 = 64;
 
 /// The emptiest of so many macropulses side by side tells how much light is everywhere.
 const MANY: u32 = 16;
