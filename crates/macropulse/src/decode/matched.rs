@@ -376,7 +376,8 @@ impl<'a> Band<'a> {
         let start = self.sent.fired[shot] + lag - farther;
         let scale = self.sent.scale();
         let bits = self.sent.lit_bits(shot).iter().map(|&bit| start + scale * i64::from(bit));
-        let unexplained = self.field.unexplained(start..start + self.sent.length() + 2 * farther);
+        let end = start + self.sent.length() + i64::from(self.sent.width) + 2 * farther;
+        let unexplained = self.field.unexplained(start..end);
         unexplained.explain(bits, pattern);
     }
 }

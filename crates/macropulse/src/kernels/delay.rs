@@ -9,11 +9,12 @@ use super::level::Level;
 /// The leading bits of a number choose the cell, the others whether they are below its bound, the
 /// upper 32 bits; then the next 16 bits are the amount, else the last 16.
 pub(crate) fn delay(times: &mut [u32], numbers: &[u32], cells: &[u64], bits: u32) -> usize {
-    let is_complete = (1..=16).contains(&bits) && cells.len() == 1 << bits;
     match Level::here() {
         // SAFETY: the processor has what this level asks for, and there is a cell for each number.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 if is_complete => unsafe { avx512::delay(times, numbers, cells, bits) },
+        Level::Avx512 if (1..=16).contains(&bits) && cells.len() == 1 << bits => unsafe {
+            avx512::delay(times, numbers, cells, bits)
+        },
         _ => delay_one_by_one(times, numbers, (cells, bits), (0, 0)),
     }
 }

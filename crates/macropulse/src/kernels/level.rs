@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 /// A set of instructions that kernels are compiled for, each including those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 pub(crate) enum Level {
     /// What every processor of the target has.
     Plain,

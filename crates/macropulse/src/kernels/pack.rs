@@ -6,9 +6,6 @@ use std::ops::Range;
 
 use super::level::Level;
 
-/// Numbers looked at together.
-const STEP: usize = 16;
-
 /// Keeps those of `times[from..]` whose number in `numbers` is below `bound`; the first one of
 /// both belong together, and there are as many numbers at least.
 pub(crate) fn keep_below(times: &mut Vec<u32>, from: usize, numbers: &[u32], bound: u32) {
@@ -74,12 +71,14 @@ fn distinct_one_by_one(
 
 #[cfg(target_arch = "x86_64")]
 mod avx512 {
-    use super::STEP;
     use std::arch::x86_64::{
         __m512i, _mm_cvtsi32_si128, _mm512_alignr_epi32, _mm512_cmplt_epu32_mask,
         _mm512_cmpneq_epu32_mask, _mm512_loadu_si512, _mm512_maskz_compress_epi32,
         _mm512_set1_epi32, _mm512_srl_epi32, _mm512_storeu_si512,
     };
+
+    /// Numbers looked at together.
+    const STEP: usize = 16;
 
     #[inline]
     #[target_feature(enable = "avx512f")]

@@ -108,6 +108,7 @@ fn on_level<L: Leaves>(
     origin: [f32; 3],
     leaves: L,
 ) {
+    #[cfg(target_arch = "x86_64")]
     type Moving<'a> = (&'a mut Packet, &'a mut Waiting);
 
     #[cfg(target_arch = "x86_64")]

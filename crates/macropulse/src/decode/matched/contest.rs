@@ -27,6 +27,9 @@ impl Band<'_> {
 
     /// Searches for other surfaces of `shot`, wherever they are.
     pub(super) fn contest_one(&mut self, shot: usize) {
+        if self.is_dark() {
+            return;
+        }
         for _ in 0..=SURFACES {
             let Some(lock) = self.locks[shot] else { return };
             if !self.may_be_elsewhere(shot, lock) {

@@ -23,7 +23,7 @@ const RARER: u32 = 4;
 const FEW_TICKS: u32 = 64;
 
 /// The emptiest of so many macropulses side by side tells how much light is everywhere.
-const MANY: u32 = 16;
+const MANY: i64 = 16;
 
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
@@ -103,7 +103,7 @@ impl Band<'_> {
         let length = sent.length() as u32;
         let (emptiest, fullest) = runs.emptiest_and_fullest(length + sent.width);
         // In a short gate it may be full everywhere of light that is sought.
-        let is_long = gate_length > i64::from(MANY * length);
+        let is_long = gate_length > MANY * sent.length();
         let everywhere = if is_long { emptiest } else { 0 };
         if fullest - everywhere < needed(1) {
             return false;
