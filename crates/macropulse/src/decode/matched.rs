@@ -98,8 +98,6 @@ struct Lock {
     lag: i64,
     count: u16,
     margin: u16,
-    /// Whether the whole gate was searched, not only around a prediction.
-    searched: bool,
 }
 
 /// What was sent, as the receiver knows it.

@@ -73,13 +73,44 @@ on_every_level! {
     fn count_within(words: &[u64], first: usize, marks: Marks, planes: &mut [Block; PLANES]) {
         let used = marks.planes();
         planes[..used].fill([0; BLOCK_WORDS]);
+        let [mut ones, mut twos, mut fours] = [[0; BLOCK_WORDS]; 3];
+        let (mut eight, mut filled) = ([0; 8], 0);
         for &bit in marks.bits {
             for &mark in marks.word {
-                let place = first + marks.scale * (bit as usize + usize::from(mark));
-                let mut carried = read(words, place);
-                for plane in &mut planes[..used] {
+                eight[filled] = first + marks.scale * (bit as usize + usize::from(mark));
+                filled += 1;
+                if filled < eight.len() {
+                    continue;
+                }
+                filled = 0;
+                // Seven adders take eight bits in and carry one out, so that most of the work
+                // stays in the three lowest planes. A closure would not be compiled for the level.
+                macro_rules! bits {
+                    ($index:literal) => {
+                        read(words, eight[$index])
+                    };
+                }
+                let (sum, a) = add(ones, bits!(0), bits!(1));
+                let (sum, mut b) = add(sum, bits!(2), bits!(3));
+                let (sum_of_twos, c) = add(twos, a, b);
+                let (sum, a) = add(sum, bits!(4), bits!(5));
+                (ones, b) = add(sum, bits!(6), bits!(7));
+                let d;
+                (twos, d) = add(sum_of_twos, a, b);
+                let mut carried;
+                (fours, carried) = add(fours, c, d);
+                for plane in &mut planes[3..used.max(3)] {
                     (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
                 }
+            }
+        }
+        for (plane, sum) in planes[..used].iter_mut().zip([ones, twos, fours]) {
+            *plane = sum;
+        }
+        for place in &eight[..filled] {
+            let mut carried = read(words, *place);
+            for plane in &mut planes[..used] {
+                (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
             }
         }
     }
@@ -252,6 +283,12 @@ macro_rules! on_lanes {
 on_lanes!(xor, ^=);
 on_lanes!(and, &=);
 on_lanes!(or, |=);
+
+/// The sum of three bits, in each lag, and what is carried to the next plane.
+#[inline(always)]
+fn add(a: Block, b: Block, c: Block) -> (Block, Block) {
+    (xor(xor(a, b), c), or(and(a, b), and(c, or(a, b))))
+}
 
 /// The block of bits that begins with bit `first`.
 #[inline(always)]

@@ -6,8 +6,8 @@ use super::{Band, Lock, SOUNDINGS, SURFACES};
 use crate::decode::correlator::BLOCK;
 
 impl Band<'_> {
-    /// Gives each shot that was found the lag that most speaks for, and explains its light at the
-    /// other one. The surfaces behind a pane are tracked as those before it are.
+    /// Gives each shot that was found the lag for which most speaks, and explains its light at the
+    /// other ones. The surfaces behind a pane are tracked as those before it are.
     pub(super) fn contest(&mut self) {
         self.contest_each(SOUNDINGS);
         for shot in (0..self.locks.len()).rev() {

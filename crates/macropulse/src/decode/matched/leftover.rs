@@ -116,8 +116,7 @@ impl Band<'_> {
     /// [`Band::unexplained_lag`].
     pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
         let lag = self.unexplained_lag(shot, at_least)?;
-        let best = self.best_near(shot, lag, at_least)?;
-        Some(Lock { searched: true, ..best })
+        self.best_near(shot, lag, at_least)
     }
 
     /// The lag at which most marks of `shot` are unexplained. `None` where these are fewer than

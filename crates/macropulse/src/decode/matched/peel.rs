@@ -176,7 +176,7 @@ impl Peeler<'_> {
         let count = count as u16;
         let margin = count
             - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
-        self.locks[shot].get_or_insert(Lock { lag, count, margin, searched: true });
+        self.locks[shot].get_or_insert(Lock { lag, count, margin });
         self.next = shot + 1;
     }
 }

@@ -150,7 +150,7 @@ impl Band<'_> {
         self.counts.count(words, bit, Marks { word: &word.marks, bits, scale });
         let peak = self.counts.peak(allowed, self.sent.width.into())?;
         let (lag, margin) = (first + peak.at, peak.count - peak.next);
-        Some(Lock { lag, count: peak.count, margin, searched: false })
+        Some(Lock { lag, count: peak.count, margin })
     }
 
     /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`. At

@@ -65,7 +65,7 @@ impl Band<'_> {
     }
 
     /// Whether no lit bit of `shot` is darker than chance makes it.
-    pub(super) fn lit_bits_are_lit(&mut self, shot: usize, lock: Lock) -> bool {
+    fn lit_bits_are_lit(&mut self, shot: usize, lock: Lock) -> bool {
         let in_word = self.in_word(shot);
         let mean = f64::from(lock.count) / self.sent.lit_bits(shot).len() as f64;
         // Not so many marks are missing altogether.
