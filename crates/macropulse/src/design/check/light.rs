@@ -1,0 +1,37 @@
+//! The light a sensor sends.
+
+use super::Check;
+use crate::design::file::SensorFile;
+use crate::design::{Error, Light};
+
+impl Check<'_> {
+    pub(super) fn light(&self, file: &SensorFile, footprint_off: bool) -> Result<Light, Error> {
+        let light = &file.light;
+        let rays = light.footprint_rays;
+        if ![1, 7, 19].contains(&rays) {
+            return self
+                .refuse("light.footprint_rays", format!("is {rays}, but can be 1, 7 or 19"));
+        }
+        let divergence = self.within("light.divergence_mrad", light.divergence_mrad, 0.0, 500.0)?;
+        if !footprint_off && (rays == 1 || divergence == 0.0) {
+            return self.refuse(
+                "light.footprint_rays",
+                "the footprint is not idealised: it needs 7 or 19 rays and a divergence, \
+                 or \"footprint\" in the list `idealised`",
+            );
+        }
+        Ok(Light {
+            wavelength: self.within("light.wavelength_nm", light.wavelength_nm, 200.0, 20e3)?
+                * 1e-9,
+            beam_diameter: self.within(
+                "light.beam_diameter_mm",
+                light.beam_diameter_mm,
+                0.0,
+                1e3,
+            )? * 1e-3,
+            divergence: if footprint_off { 0.0 } else { divergence * 1e-3 },
+            footprint_rays: if footprint_off { 1 } else { rays },
+            pulse: self.within("light.pulse_ps", light.pulse_ps, 1e-3, 1e9)? * 1e-12,
+        })
+    }
+}

@@ -1,0 +1,194 @@
+//! From typed keys to a checked `Design`: every limit is tested here, once.
+
+mod code;
+mod detector;
+mod light;
+mod receiver;
+mod scan;
+
+use std::sync::OnceLock;
+
+use super::document::Chain;
+use super::file::SensorFile;
+use super::{Design, Effect, Error};
+
+/// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
+const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, if shots are not coded) with the \
+     jitter must be within 67 million ticks; use longer ticks or a shorter max_range_m";
+
+/// The format this program reads.
+const VERSION: u32 = 1;
+
+pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
+    let file: SensorFile =
+        serde_path_to_error::deserialize(toml::Value::Table(chain.merged.clone()))
+            .map_err(|error| typed_wrongly(chain, &error))?;
+    if file.version != VERSION {
+        let message = format!("is {}, but this program reads version {VERSION}", file.version);
+        return Err(chain.error("version", message));
+    }
+    let check = Check { chain };
+    let idealised = check.effects(&file.idealised)?;
+    let scan = check.scan(&file.scan)?;
+    let tdc = check.tdc(&file)?;
+    let coding = check.coding(file.code.as_ref(), &scan, &tdc)?;
+    let off = |effect| idealised.contains(&effect);
+    let light = check.light(&file, off(Effect::Footprint))?;
+    let detector = check.detector(&file.detector, off(Effect::Background))?;
+    let visibility =
+        check.within("atmosphere.visibility_km", file.atmosphere.visibility_km, 0.01, 1e3)? * 1e3;
+    let receiver = check.receiver(&file, &scan, &tdc, (&coding, detector))?;
+    let right_within =
+        check.within("receiver.right_within_m", file.receiver.right_within_m, 0.0, 0.35)?;
+    let mut design = Design {
+        name: file.name,
+        summary: file.summary,
+        scan,
+        light,
+        coding,
+        detector,
+        visibility: (!off(Effect::Atmosphere)).then_some(visibility),
+        tdc,
+        receiver,
+        right_within,
+        idealised,
+        defaults: chain.defaults_used(),
+        warnings: Vec::new(),
+        text: chain.text(),
+        directions: OnceLock::new(),
+    };
+    check.clock(&design)?;
+    check.timing(&mut design)?;
+    Ok(design)
+}
+
+/// Turns serde's words into a sentence with a place and the nearest known key.
+fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Error>) -> Error {
+    let path = error.path().to_string();
+    let said = error.inner().message().to_owned();
+    let path = if path == "." { String::new() } else { path };
+    let quoted: Vec<&str> = said.split('`').skip(1).step_by(2).collect();
+    if said.starts_with("unknown field") || said.starts_with("unknown variant") {
+        let (wrong, known) = (quoted[0], &quoted[1..]);
+        let hint = crate::names::nearest(wrong, known.iter().copied())
+            .map(|near| format!("; did you mean `{near}`?"))
+            .unwrap_or_else(|| format!("; known are {}", known.join(", ")));
+        let what = if said.starts_with("unknown field") { "key" } else { "value" };
+        let place = match (what, path.as_str()) {
+            ("value", _) => path.clone(),
+            (_, "") => wrong.to_owned(),
+            (_, inside) if inside.ends_with(wrong) => path.clone(),
+            (_, inside) => format!("{inside}.{wrong}"),
+        };
+        return chain.error(&place, format!("unknown {what} `{wrong}`{hint}"));
+    }
+    if said.starts_with("missing field") {
+        return chain.error(&path, format!("the key `{}` is missing", quoted[0]));
+    }
+    chain.error(&path, said)
+}
+
+struct Check<'a> {
+    chain: &'a Chain,
+}
+
+impl Check<'_> {
+    fn refuse<T>(&self, path: &str, message: impl Into<String>) -> Result<T, Error> {
+        Err(self.chain.error(path, message))
+    }
+
+    /// A number in [least, most]; NaN and infinities are refused by the same comparison.
+    fn within(&self, path: &str, value: f64, least: f64, most: f64) -> Result<f64, Error> {
+        if value >= least && value <= most {
+            return Ok(value);
+        }
+        self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
+    }
+
+    fn count(&self, path: &str, value: u32, least: u32, most: u32) -> Result<u32, Error> {
+        if (least..=most).contains(&value) {
+            return Ok(value);
+        }
+        self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
+    }
+
+    /// A duration that must be a whole, positive number of femtoseconds.
+    fn whole_fs(&self, path: &str, picoseconds: f64) -> Result<i64, Error> {
+        let ps = self.within(path, picoseconds, 1e-3, 1e9)?;
+        let fs = (ps * 1e3).round();
+        if (ps * 1e3 - fs).abs() > 1e-6 * fs {
+            return self
+                .refuse(path, format!("is {ps} ps, but must be a whole number of femtoseconds"));
+        }
+        Ok(fs as i64)
+    }
+
+    fn effects(&self, names: &[String]) -> Result<Vec<Effect>, Error> {
+        let mut found = Vec::new();
+        for name in names {
+            match Effect::ALL.into_iter().find(|effect| effect.name() == name) {
+                Some(effect) => found.push(effect),
+                None => {
+                    let known: Vec<&str> = Effect::ALL.iter().map(|e| e.name()).collect();
+                    let hint = crate::names::nearest(name, known.iter().copied())
+                        .map(|near| format!("; did you mean `{near}`?"))
+                        .unwrap_or_default();
+                    let message =
+                        format!("`{name}` is no effect{hint} known are {}", known.join(", "));
+                    return self.refuse("idealised", message);
+                }
+            }
+        }
+        for effect in Effect::ALL {
+            if !effect.is_modelled() && !found.contains(&effect) {
+                let message = format!(
+                    "`{}` is not modelled yet: add it to this list, which declares that {}",
+                    effect.name(),
+                    effect.assumption()
+                );
+                return self.refuse("idealised", message);
+            }
+        }
+        Ok(found)
+    }
+
+    /// One shot and all that arrives together with its echoes must be within what is timed in
+    /// one go.
+    fn clock(&self, design: &Design) -> Result<(), Error> {
+        if design.longest_band_fs() < 0 {
+            return self.refuse("tdc.resolution_ps", TOO_FINE);
+        }
+        Ok(())
+    }
+
+    /// A macropulse must end before the next one begins.
+    fn timing(&self, design: &mut Design) -> Result<(), Error> {
+        let derived = design.derived();
+        if design.is_coded() && derived.macropulse > derived.pixel_period {
+            let message = format!(
+                "a macropulse lasts {:.3} ns, longer than the {:.3} ns of a pixel: \
+                 fewer bits, shorter words or chips, or a slower scan",
+                derived.macropulse * 1e9,
+                derived.pixel_period * 1e9
+            );
+            return self.refuse("code", message);
+        }
+        if design.is_coded() && derived.macropulse > derived.shortest_dwell {
+            design.warnings.push(format!(
+                "a macropulse ({:.2} ns) is longer than the shortest dwell ({:.2} ns): neighbouring \
+                 macropulses overlap on their way out",
+                derived.macropulse * 1e9,
+                derived.shortest_dwell * 1e9
+            ));
+        }
+        if let Some(range) = derived.unambiguous_range
+            && range < design.scan.max_range
+        {
+            design.warnings.push(format!(
+                "a code word returns after {range:.1} m, within the range gate of {:.1} m",
+                design.scan.max_range
+            ));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,78 @@
+//! From edges to returns: converters and receiver.
+
+use super::{Check, TOO_FINE};
+use crate::decode::{Receiver, ReceiverKind};
+use crate::design::file::{ReceiverKindFile, SensorFile};
+use crate::design::{Coding, Detector, Error, PARTS_OF_TICK, Scan, Tdc};
+use crate::units::{fs_from_s, tof_from_range};
+
+impl Check<'_> {
+    pub(super) fn tdc(&self, file: &SensorFile) -> Result<Tdc, Error> {
+        let tick_fs = self.whole_fs("tdc.resolution_ps", file.tdc.resolution_ps)?;
+        let clock_fs = self.whole_fs("tdc.clock_ps", file.tdc.clock_ps)?;
+        let bits = self.count("tdc.bits", file.tdc.bits, 1, 16)?;
+        if clock_fs % tick_fs != 0 {
+            return self.refuse("tdc.clock_ps", "must be a whole number of ticks (resolution_ps)");
+        }
+        if clock_fs / tick_fs > 1 << bits {
+            let message = format!(
+                "{bits} bits hold {} ticks, but a clock period has {}",
+                1 << bits,
+                clock_fs / tick_fs
+            );
+            return self.refuse("tdc.bits", message);
+        }
+        let dead = self.within("tdc.dead_time_ns", file.tdc.dead_time_ns, 0.0, 1e6)?;
+        Ok(Tdc {
+            converters: self.count("tdc.converters", file.tdc.converters, 1, 1 << 24)?,
+            tick_fs,
+            clock_fs,
+            dead_fs: fs_from_s(dead * 1e-9),
+        })
+    }
+
+    pub(super) fn receiver(
+        &self,
+        file: &SensorFile,
+        scan: &Scan,
+        tdc: &Tdc,
+        (coding, detector): (&Coding, Detector),
+    ) -> Result<Receiver, Error> {
+        let kind = match file.receiver.kind {
+            ReceiverKindFile::Literal => ReceiverKind::Literal,
+            ReceiverKindFile::Blind => ReceiverKind::Blind,
+            ReceiverKindFile::Matched => ReceiverKind::Matched,
+            ReceiverKindFile::Direct => ReceiverKind::Direct,
+        };
+        if (kind == ReceiverKind::Direct) == coding.label.is_some() {
+            return self.refuse(
+                "receiver.kind",
+                "`direct` is for shots without [code], the other receivers for shots with it",
+            );
+        }
+        let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
+        let gate = (ticks(scan.min_range), ticks(scan.max_range));
+        if gate.1 >= i64::from(u32::MAX / PARTS_OF_TICK) {
+            return self.refuse("tdc.resolution_ps", TOO_FINE);
+        }
+        let weight = coding.codebook.family().weight() as u32;
+        Ok(Receiver {
+            kind,
+            gate_ticks: (gate.0 as u32, gate.1 as u32),
+            ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
+            tick_fs: tdc.tick_fs,
+            jitter_ticks: detector.jitter() * 1e15 / tdc.tick_fs as f64,
+            false_alarm: self.within(
+                "receiver.false_alarm",
+                file.receiver.false_alarm,
+                1e-30,
+                0.5,
+            )?,
+            bit_threshold: if coding.label.is_some() {
+                self.count("receiver.bit_threshold", file.receiver.bit_threshold, 1, weight)? as u16
+            } else {
+                1
+            },
+        })
+    }
+}
