@@ -23,6 +23,12 @@ pub enum Stage {
     Firing = 3,
     /// How late is a mark that is seen? Indexed by shot, a part for each of its echoes.
     Jitter = 4,
+    /// The photons of the marks of one shot, and what a detector makes of each. Indexed by shot.
+    Photons = 5,
+    /// Which cell a false count falls on. Indexed by the time of the count.
+    Cell = 6,
+    /// How late does a cell answer? Indexed by the time of the photon.
+    Answer = 7,
 }
 
 /// Where a run of random numbers stands.

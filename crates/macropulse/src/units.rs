@@ -11,6 +11,9 @@ pub const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 /// Planck constant, J·s (exact, SI 2019).
 pub const PLANCK: f64 = 6.626_070_15e-34;
 
+/// Elementary charge, C (exact, SI 2019).
+pub const ELEMENTARY_CHARGE: f64 = 1.602_176_634e-19;
+
 /// Femtoseconds in a second.
 pub const FS_PER_S: i64 = 1_000_000_000_000_000;
 

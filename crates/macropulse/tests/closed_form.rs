@@ -109,10 +109,7 @@ fn assert_measures(design: &Design, cloud: &PointCloud, pixels: &[Pixel]) {
 
 /// The detector's own jitter, m: no measurement can be better.
 fn jitter(design: &Design) -> f64 {
-    range_from_tof(match design.detector {
-        macropulse::design::Detector::PhotonCounting(counting) => counting.jitter,
-        macropulse::design::Detector::FirstFiring(firing) => firing.jitter,
-    })
+    range_from_tof(design.detector.jitter())
 }
 
 /// The built-in wall is 50 m ahead.

@@ -10,14 +10,15 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use approx::assert_relative_eq;
+use macropulse::channel::Link;
 use macropulse::code::correlation::{aperiodic_sidelobe, periodic_sidelobe};
-use macropulse::design::safety::{Class1, Scanned};
+use macropulse::design::safety::{Class1, Rule};
 use macropulse::design::{Derived, Design, Pattern};
 use macropulse::emit::{Band, bands};
 use macropulse::paper::Verdict::{Assumed, Fails, Holds, Partly, Unsaid};
 use macropulse::paper::{Claim, DISTANCES, SENSORS, Verdict, claims_on_paper, predict};
 use macropulse::points::NO_OBJECT;
-use macropulse::predict::link::{Receiver, Sunlight, diffraction, field, spot_depth};
+use macropulse::predict::link::{diffraction, spot_depth};
 use macropulse::predict::multiple_access::{mean_overlap, shots_in_flight, word_reuse_range};
 use macropulse::predict::ranging;
 use macropulse::scene::Scene;
@@ -261,20 +262,11 @@ mod light {
 
     const WAVELENGTH: f64 = 905e-9;
 
-    fn crossing(groups: Option<f64>) -> Scanned {
-        Scanned {
-            pixel_pitch: (43.2_f64 / 848.0).to_radians(),
-            pixel_period: DERIVED.pixel_period,
-            aperture: 7e-3,
-            distance: 0.1,
-            groups,
-        }
-    }
-
-    /// 25 mm of aperture, 0.7 of optics, 23 km of visibility.
-    fn receiver() -> Receiver {
-        let extinction = macropulse::channel::extinction(23e3, WAVELENGTH);
-        Receiver { wavelength: WAVELENGTH, aperture: 25e-3, optics: 0.7, extinction }
+    /// The sensor with the energy of class 1, 25 mm of aperture, 0.7 of optics and 23 km of
+    /// visibility; lines of the scan counted as repeated exposures or not.
+    fn honest(count_lines: bool) -> Design {
+        let set = [("safety.count_lines".to_owned(), count_lines.to_string())];
+        Design::open("kim-park-2016-physical", &set).unwrap()
     }
 
     #[test]
@@ -310,28 +302,26 @@ mod light {
         // 198 nJ in every pixel would be 4.8 W.
         assert_relative_eq!(single / DERIVED.pixel_period, 4.8, max_relative = 0.01);
         // 79 pixels cross a pupil of 7 mm, in less than the 5 µs that count as one.
-        let crossed = 7e-3 / 0.1 / crossing(None).pixel_pitch;
-        assert_relative_eq!(crossed, 79.0, max_relative = 5e-3);
-        assert!(crossed * DERIVED.pixel_period < 5e-6);
-        assert_relative_eq!(limits.per_shot(&crossing(None)), 2.5e-9, max_relative = 0.01);
-        let groups = Some(47_534.0);
-        assert_relative_eq!(limits.per_shot(&crossing(groups)), 1.0e-9, max_relative = 0.01);
+        let strict = honest(true).budget.unwrap();
+        let line = strict.limits.iter().find(|limit| limit.rule == Rule::Line).unwrap();
+        assert_relative_eq!(line.shots, 79.0, max_relative = 5e-3);
+        assert!(line.duration < 5e-6);
+        let lax = honest(false).budget.unwrap();
+        assert_relative_eq!(lax.energy, 2.5e-9, max_relative = 0.01);
+        assert_relative_eq!(strict.energy, 1.0e-9, max_relative = 0.011);
         reported("eye-safety", Assumed, &["1.01 nJ", "2.51 nJ", "197.9 nJ", "1.00 mW"]);
     }
 
     #[test]
     fn at_that_energy_150_m_are_out_of_reach() {
-        let energy = Class1::at(WAVELENGTH).unwrap().per_shot(&crossing(Some(47_534.0)));
-        let photons = receiver().photons(energy, 1.0, 150.0);
+        let design = honest(true);
+        let budget = design.budget.as_ref().unwrap();
+        let through_air = Link::of(&design).transmission(150.0).powi(2);
+        let photons = budget.photons(budget.energy, 1.0, 150.0) * through_air;
         assert_relative_eq!(photons, 21.7, max_relative = 5e-3);
         let per_mark = photons / DERIVED.marks.1;
         assert_relative_eq!(per_mark, 0.12, max_relative = 0.02);
-        let Pattern::Raster { horizontal, vertical, .. } = DESIGN.scan.pattern else {
-            panic!("the sensor of the paper is a raster")
-        };
-        let field = field(horizontal, vertical);
-        let sun = Sunlight { irradiance: 0.817e9, bandwidth: 10e-9, albedo: 0.3, field };
-        let background = receiver().background(&sun) * s_from_fs(DESIGN.coding.chip_fs);
+        let background = budget.background() * s_from_fs(DESIGN.coding.chip_fs);
         assert_relative_eq!(background, 947.0, max_relative = 2e-3);
         // Instead, white at 150 m is declared to be seen with 0.99 a mark: −ln 0.01 photons.
         assert_relative_eq!(DERIVED.reference_photons, -0.01_f64.ln(), max_relative = 1e-9);

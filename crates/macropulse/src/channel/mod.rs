@@ -9,11 +9,13 @@
 //!
 //! n = n₀ · (ρ_eff / ρ₀) · (R₀ / R)² · T² · w
 //!
-//! with ρ_eff the material's backscatter towards the sensor and w the share of the beam.
+//! with ρ_eff the material's backscatter towards the sensor and w the share of the beam. A sensor
+//! with a link budget has n₀ from it, for a white target at its reach. Where its field follows the
+//! beam, the share of the spot that is still in the field when the echo arrives is a factor too.
 
-use crate::design::Design;
+use crate::design::{Design, Field};
 use crate::scene::{Hits, Material};
-use crate::units::tof_fs_from_ranges;
+use crate::units::{tof_from_range, tof_fs_from_ranges};
 
 /// Echoes of a band of shots, as columns, ordered by shot. Truth: the light itself, before any
 /// detector.
@@ -62,6 +64,7 @@ impl Echoes {
 pub struct Link {
     photons_at_one_metre: f64,
     extinction: f64,
+    field: Option<Field>,
 }
 
 impl Link {
@@ -73,6 +76,15 @@ impl Link {
             photons_at_one_metre: sensitivity.photons * sensitivity.range.powi(2)
                 / sensitivity.reflectance,
             extinction,
+            field: design.budget.as_ref().map(|b| b.field).filter(|f| f.trailing.is_some()),
+        }
+    }
+
+    /// One-way transmission of the air over `range` metres: exp(−σ·R).
+    pub fn transmission(&self, range: f64) -> f64 {
+        match self.extinction == 0.0 {
+            true => 1.0,
+            false => libm::exp(-self.extinction * range),
         }
     }
 
@@ -82,11 +94,9 @@ impl Link {
         if reflectance <= 0.0 || range <= 0.0 {
             return 0.0;
         }
-        let transmission = match self.extinction == 0.0 {
-            true => 1.0,
-            false => libm::exp(-self.extinction * range),
-        };
-        self.photons_at_one_metre * reflectance * transmission.powi(2) / range.powi(2)
+        let share = self.field.map_or(1.0, |field| field.share(tof_from_range(range)));
+        let light = self.photons_at_one_metre * reflectance * share;
+        light * self.transmission(range).powi(2) / range.powi(2)
     }
 }
 

@@ -350,6 +350,7 @@ mod tests {
     fn decode(kind: ReceiverKind, log: &ShotLog, ticks: &Ticks) -> Returns {
         let receiver = Receiver {
             kind,
+            effort: crate::decode::Effort::Quick,
             gate_ticks: (0, 3000),
             ticks_per_chip: 1,
             tick_fs: 2500,

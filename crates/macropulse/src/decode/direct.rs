@@ -50,6 +50,7 @@ mod tests {
     fn decode(log: &ShotLog, ticks: &Ticks) -> Returns {
         let receiver = Receiver {
             kind: ReceiverKind::Direct,
+            effort: crate::decode::Effort::Quick,
             gate_ticks: (10, 500),
             ticks_per_chip: 1,
             tick_fs: 1_000_000,

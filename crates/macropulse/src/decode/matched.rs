@@ -32,7 +32,7 @@ use super::correlator::Counts;
 use super::field::{self, Field};
 use super::search::Search;
 use super::threshold::Thresholds;
-use super::{FARTHEST_JITTER, Receiver, Returns};
+use super::{Effort, FARTHEST_JITTER, Receiver, Returns};
 use crate::code::{CodeWord, Codebook};
 use crate::emit::ShotLog;
 use crate::kernels::{Pattern, WordTicks};
@@ -52,7 +52,8 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
         // Where light lies upon light everywhere, more stands out when some is explained.
         while band.search(Evidence::Bright, 1) > band.locks.len() / MANY_FOUND {}
         // Faint light is one among many ticks everywhere: soundings must do.
-        band.search(Evidence::MoreThanChance, SOUNDINGS);
+        let every = if sent.is_thorough() { 1 } else { SOUNDINGS };
+        band.search(Evidence::MoreThanChance, every);
         band.track_back(Evidence::MoreThanChance);
         band.contest();
     }
@@ -223,6 +224,11 @@ impl<'a> Sent<'a> {
         (self.receiver.gate_ticks.0.into(), self.receiver.gate_ticks.1.into())
     }
 
+    /// Whether faint light is searched for wherever it may be.
+    fn is_thorough(&self) -> bool {
+        self.receiver.effort == Effort::Thorough
+    }
+
     /// Number of lags in the gate.
     fn lags(&self) -> f64 {
         let (nearest, farthest) = self.gate();
@@ -285,16 +291,14 @@ impl<'a> Band<'a> {
         let words = if dark { 0 } else { codebook.words() };
         let (lags, false_alarm) = (sent.lags(), receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
-        let wanted = [(lags, false_alarm), (bits, false_alarm), (lags, FEW), (1.0, BY_CHANCE)];
+        let wanted = [(lags, false_alarm), (bits, false_alarm), (lags, FEW), (1.0, BY_CHANCE)]
+            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm, sent.is_thorough()));
         let mut remembered = memory.thresholds;
-        remembered.retain(|thresholds| wanted.contains(&thresholds.are_for()));
+        remembered.retain(|known| wanted.iter().any(|wanted| known.is_as(wanted)));
         let [thresholds, bit_thresholds, word_thresholds, end_thresholds] =
-            wanted.map(|(places, false_alarm)| {
-                let known = remembered.iter().position(|t| t.are_for() == (places, false_alarm));
-                match known {
-                    Some(known) => remembered.swap_remove(known),
-                    None => Thresholds::new(places, false_alarm),
-                }
+            wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
+                Some(known) => remembered.swap_remove(known),
+                None => wanted,
             });
         Self {
             sent,

@@ -13,6 +13,8 @@ mod unexplained;
 
 pub use returns::{Reject, Returns};
 
+use serde::Deserialize;
+
 use crate::code::Codebook;
 use crate::emit::ShotLog;
 use crate::tdc::Ticks;
@@ -33,11 +35,25 @@ pub enum ReceiverKind {
     Direct,
 }
 
+/// How much the matched receiver does for faint light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effort {
+    /// Searches for one shot in so many where light is faint, finds the others from there, and
+    /// passes by what lies evenly over everything: a target that is barely seen may be lost where
+    /// it stands alone or fills the whole field.
+    Quick,
+    /// Searches for every shot that is not found otherwise; takes many times as long in noise.
+    Thorough,
+}
+
 /// What the receiver is set to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Receiver {
     /// Which receiver decodes.
     pub kind: ReceiverKind,
+    /// How much the matched receiver does for faint light.
+    pub effort: Effort,
     /// Nearest and farthest round trip accepted, in ticks.
     pub gate_ticks: (u32, u32),
     /// TDC ticks per chip.
@@ -142,6 +158,7 @@ mod tests {
     fn shots_are_fired_in_the_tick_that_holds_their_time() {
         let receiver = Receiver {
             kind: ReceiverKind::Matched,
+            effort: Effort::Quick,
             gate_ticks: (0, 1),
             ticks_per_chip: 1,
             tick_fs: 2497,

@@ -49,6 +49,8 @@ pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64)
 pub(super) struct Thresholds {
     lags: f64,
     false_alarm: f64,
+    /// Whether densities are taken as they are.
+    exact: bool,
     /// By marks, then by step of density; 0 where not yet known.
     known: Vec<[u16; STEPS]>,
 }
@@ -60,20 +62,25 @@ const STEP_BITS: u32 = 49;
 const FIRST_STEP: u64 = (0x3FF_u64 << 3) - (STEPS as u64 - 1);
 
 impl Thresholds {
-    /// For `lags` tried places and `false_alarm` false answers accepted among them.
-    pub fn new(lags: f64, false_alarm: f64) -> Self {
-        Self { lags, false_alarm, known: Vec::new() }
+    /// For `lags` tried places and `false_alarm` false answers accepted among them; densities are
+    /// taken as they are, where they are to be `exact`.
+    pub fn new(lags: f64, false_alarm: f64, exact: bool) -> Self {
+        Self { lags, false_alarm, exact, known: Vec::new() }
     }
 
-    /// What [`Thresholds::new`] was asked for.
-    pub fn are_for(&self) -> (f64, f64) {
-        (self.lags, self.false_alarm)
+    /// Whether it gives what `other` gives.
+    pub fn is_as(&self, other: &Self) -> bool {
+        (self.lags, self.false_alarm, self.exact) == (other.lags, other.false_alarm, other.exact)
     }
 
-    /// The fewest of `marks` to believe at `density`, which is rounded up by less than an eighth.
+    /// The fewest of `marks` to believe at `density`; where that need not be exact, it is rounded
+    /// up by less than an eighth.
     pub fn least(&mut self, marks: u16, density: f64) -> u16 {
         if density <= 0.0 {
             return 1;
+        }
+        if self.exact {
+            return least_marks(self.lags, marks, density, self.false_alarm);
         }
         let above = (density.min(1.0).to_bits() + (1 << STEP_BITS) - 1) >> STEP_BITS;
         let step = above.saturating_sub(FIRST_STEP).min(STEPS as u64 - 1);
@@ -127,12 +134,12 @@ mod tests {
     fn what_chance_always_reaches_is_never_believed() {
         assert_eq!(least_marks(4e5, 58, 1.0, 1e-3), 59);
         assert_eq!(least_marks(4e5, 58, 0.99, 1e-3), 59);
-        assert_eq!(Thresholds::new(4e5, 1e-3).least(58, 0.0), 1);
+        assert_eq!(Thresholds::new(4e5, 1e-3, false).least(58, 0.0), 1);
     }
 
     #[test]
     fn a_remembered_threshold_is_never_too_low() {
-        let mut thresholds = Thresholds::new(4e5, 1e-3);
+        let mut thresholds = Thresholds::new(4e5, 1e-3, false);
         for density in [1e-4, 0.003, 0.011, 0.2, 0.7] {
             let exact = least_marks(4e5, 174, density, 1e-3);
             let remembered = thresholds.least(174, density);

@@ -17,7 +17,7 @@ const LONGEST_CHAIN: usize = 16;
 /// the parent's table instead of adding to it.
 const ALTERNATIVES: [(&str, &[&str]); 2] = [
     ("scan", &["raster", "spinning", "flash"]),
-    ("detector", &["photon-counting", "first-firing"]),
+    ("detector", &["photon-counting", "geiger", "linear", "first-firing"]),
 ];
 
 /// One TOML text with its origin.
@@ -185,7 +185,11 @@ fn alternatives(group: &str) -> impl Iterator<Item = &'static str> {
 /// The defaults without the tables that the sensor does not have: no code, another kind of scan.
 fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
     let mut kept = defaults.clone();
-    kept.retain(|key, _| key != "code" || sensor.contains_key("code"));
+    kept.retain(|key, _| match key {
+        "code" => sensor.contains_key("code"),
+        "sun" | "safety" => sensor.contains_key("optics"),
+        _ => true,
+    });
     for (group, kinds) in ALTERNATIVES {
         if let Some(toml::Value::Table(inner)) = kept.get_mut(group) {
             let chosen = sensor.get(group).and_then(toml::Value::as_table);

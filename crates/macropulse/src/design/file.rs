@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::decode::Effort;
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorFile {
@@ -14,6 +16,9 @@ pub(super) struct SensorFile {
     pub light: LightFile,
     pub code: Option<CodeFile>,
     pub detector: DetectorFile,
+    pub optics: Option<OpticsFile>,
+    pub sun: Option<SunFile>,
+    pub safety: Option<SafetyFile>,
     pub atmosphere: AtmosphereFile,
     pub tdc: TdcFile,
     pub receiver: ReceiverFile,
@@ -95,6 +100,60 @@ pub(super) struct LightFile {
     pub divergence_mrad: f64,
     pub footprint_rays: u32,
     pub pulse_ps: f64,
+    pub energy: Option<EnergyFile>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) enum EnergyFile {
+    #[serde(rename = "class-1")]
+    Class1,
+    #[serde(rename = "shot_nj")]
+    ShotNj(f64),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OpticsFile {
+    pub aperture_mm: f64,
+    pub transmission: f64,
+    pub filter_nm: f64,
+    pub field: FieldFile,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) enum FieldFile {
+    #[serde(rename = "staring")]
+    Staring,
+    #[serde(rename = "descanned")]
+    Descanned,
+    #[serde(rename = "in-flight")]
+    InFlight,
+    #[serde(rename = "trailing_pixels")]
+    TrailingPixels(f64),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SunFile {
+    pub sky: SkyFile,
+    pub irradiance_w_m2_nm: Option<f64>,
+    pub albedo: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum SkyFile {
+    Day,
+    Night,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SafetyFile {
+    pub distance_mm: f64,
+    pub count_lines: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -143,6 +202,8 @@ pub(super) struct WordFile {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct DetectorFile {
     pub photon_counting: Option<PhotonCountingFile>,
+    pub geiger: Option<GeigerFile>,
+    pub linear: Option<LinearFile>,
     pub first_firing: Option<FirstFiringFile>,
 }
 
@@ -157,7 +218,8 @@ pub(super) struct SensitivityFile {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PhotonCountingFile {
-    pub sensitivity: SensitivityFile,
+    pub sensitivity: Option<SensitivityFile>,
+    pub efficiency: Option<f64>,
     pub missed_marks: f64,
     pub dark_counts_hz: f64,
     pub background_hz: f64,
@@ -166,8 +228,34 @@ pub(super) struct PhotonCountingFile {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub(super) struct GeigerFile {
+    pub sensitivity: Option<SensitivityFile>,
+    pub efficiency: Option<f64>,
+    pub cells: u32,
+    pub dead_time_ns: f64,
+    pub dark_counts_hz: f64,
+    pub background_hz: f64,
+    pub jitter_ps: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LinearFile {
+    pub efficiency: f64,
+    pub gain: f64,
+    pub ionisation_ratio: f64,
+    pub bandwidth_mhz: f64,
+    pub amplifier_pa_rthz: f64,
+    pub dark_current_na: f64,
+    pub false_alarm_hz: f64,
+    pub jitter_ps: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct FirstFiringFile {
-    pub sensitivity: SensitivityFile,
+    pub sensitivity: Option<SensitivityFile>,
+    pub efficiency: Option<f64>,
     pub firing_photons: u32,
     pub noise_photons: f64,
     pub false_firing_hz: f64,
@@ -194,6 +282,7 @@ pub(super) struct TdcFile {
 #[serde(deny_unknown_fields)]
 pub(super) struct ReceiverFile {
     pub kind: ReceiverKindFile,
+    pub effort: Effort,
     pub false_alarm: f64,
     pub bit_threshold: u32,
     pub right_within_m: f64,

@@ -8,20 +8,26 @@
 //! A `Design` that exists is valid, and nobody downstream checks it again.
 
 mod band;
+mod budget;
 mod check;
 mod derived;
+mod detector;
 mod directions;
 mod document;
 mod effect;
 mod file;
+mod linear;
 mod presets;
 pub mod safety;
+mod spectrum;
 
 use std::path::Path;
 use std::sync::OnceLock;
 
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
+pub use budget::{Budget, Field, Trailing, solid_angle};
 pub use derived::Derived;
+pub use detector::{Detector, FirstFiring, Geiger, Linear, PhotonCounting, Sensitivity};
 pub use directions::Directions;
 pub use effect::Effect;
 pub use file::{Firing, Label, Mirror};
@@ -44,6 +50,8 @@ pub struct Design {
     pub light: Light,
     /// The language its shots speak; a single mark where they are not coded.
     pub coding: Coding,
+    /// Where the photons come from; `None` where the detector is declared by its sensitivity.
+    pub budget: Option<Budget>,
     /// From light to edges.
     pub detector: Detector,
     /// Meteorological visibility, m; `None` where the air is idealised away.
@@ -145,73 +153,6 @@ pub struct Coding {
     pub first_word: u32,
     /// See `first_word`.
     pub word_modulus: u32,
-}
-
-/// Light to edges.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Detector {
-    /// Every mark is a Bernoulli trial of its own.
-    PhotonCounting(PhotonCounting),
-    /// One firing per shot \[KP16 Fig. 7\].
-    FirstFiring(FirstFiring),
-}
-
-impl Detector {
-    /// How much light it gets.
-    pub fn sensitivity(&self) -> Sensitivity {
-        match self {
-            Self::PhotonCounting(counting) => counting.sensitivity,
-            Self::FirstFiring(firing) => firing.sensitivity,
-        }
-    }
-
-    /// Standard deviation of its timing, s.
-    pub fn jitter(&self) -> f64 {
-        match self {
-            Self::PhotonCounting(counting) => counting.jitter,
-            Self::FirstFiring(firing) => firing.jitter,
-        }
-    }
-}
-
-/// A detector that counts photons, fast enough for every chip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PhotonCounting {
-    /// Mean photons detected per mark at the reference target.
-    pub sensitivity: Sensitivity,
-    /// Marks lost for another reason than lack of light, as a fraction.
-    pub missed_marks: f64,
-    /// Dark and background counts together, 1/s.
-    pub false_rate: f64,
-    /// Standard deviation of the timing, s.
-    pub jitter: f64,
-}
-
-/// A detector that fires once, when enough photons of one shot have come.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstFiring {
-    /// Mean photons detected per shot at the reference target.
-    pub sensitivity: Sensitivity,
-    /// Photons needed to fire; 1 is a Geiger detector.
-    pub firing_photons: u32,
-    /// White noise integrated over one pulse, photons rms.
-    pub noise_photons: f64,
-    /// Firings without a target, 1/s.
-    pub false_rate: f64,
-    /// Standard deviation of the timing, s.
-    pub jitter: f64,
-}
-
-/// How much light a detector gets, declared by what it can see.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensitivity {
-    /// Mean photons detected per mark from a target of `reflectance` at `range`, square on.
-    /// Infinite for a detector that never misses.
-    pub photons: f64,
-    /// Range of the reference target, m.
-    pub range: f64,
-    /// Reflectance of the reference target.
-    pub reflectance: f64,
 }
 
 /// The bank of time-to-digital converters.

@@ -3,9 +3,10 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 5] = [
+const PRESETS: [(&str, &str); 6] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
+    ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
     ("hdl-64e", include_str!("../../../../sensors/hdl-64e.toml")),
     ("hdl-64e-equal-spacing", include_str!("../../../../sensors/hdl-64e-equal-spacing.toml")),
     ("peregrine", include_str!("../../../../sensors/peregrine.toml")),

@@ -17,11 +17,8 @@
 
 use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 
-use super::Edges;
-use super::clock::Clock;
-use crate::channel::Echoes;
-use crate::design::{Design, FirstFiring};
-use crate::emit::ShotLog;
+use super::{Band, Edges};
+use crate::design::FirstFiring;
 use crate::random::{Chance, Stage};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
@@ -34,14 +31,6 @@ const LATEST: f64 = 0.99;
 
 /// A detector that never misses is given this much light.
 const PLENTY: f64 = 1e9;
-
-/// What the detectors are given of a band.
-pub(super) struct Band<'a> {
-    pub clock: Clock,
-    pub design: &'a Design,
-    pub log: &'a ShotLog,
-    pub echoes: &'a Echoes,
-}
 
 pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges {
     let &Band { clock, design, log, echoes } = band;
@@ -156,6 +145,9 @@ fn quantile(p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::channel::Echoes;
+    use crate::design::Design;
+    use crate::emit::ShotLog;
 
     /// The edges of shots that all have an echo of so many photons, in the first nine bands or
     /// what the sensor has of them.

@@ -5,13 +5,19 @@
 
 mod clock;
 mod first_firing;
+mod geiger;
 mod jitter;
+mod linear;
 mod noise;
 mod photon_counting;
 
 pub use first_firing::photons_for;
 
+use std::ops::{Range, RangeInclusive};
+
 use clock::Clock;
+use geiger::Cells;
+use linear::Thresholding;
 use photon_counting::Counting;
 
 use crate::channel::Echoes;
@@ -45,7 +51,44 @@ pub struct Detectors<'a> {
 #[derive(Debug)]
 enum Kind {
     Counting(Counting),
+    Cells(Cells),
+    Thresholding(Thresholding),
     Firing(FirstFiring),
+}
+
+/// What the detectors are given of a band.
+struct Band<'a> {
+    clock: Clock,
+    design: &'a Design,
+    log: &'a ShotLog,
+    echoes: &'a Echoes,
+}
+
+impl Band<'_> {
+    /// Calls `visit` with every shot that has echoes, and with where they are.
+    fn each_shot_with_echoes(&self, mut visit: impl FnMut(usize, Range<usize>)) {
+        let mut first = 0;
+        for echoes in self.echoes.shot.chunk_by(|one, next| one == next) {
+            visit(echoes[0] as usize, first..first + echoes.len());
+            first += echoes.len();
+        }
+    }
+
+    /// When the marks of an echo arrive, fs.
+    fn marks(&self, echo: usize) -> impl Iterator<Item = i64> {
+        let shot = self.echoes.shot[echo] as usize;
+        let begins = self.log.fired_at_fs[shot] + self.echoes.delay_fs[echo];
+        let coding = &self.design.coding;
+        let marks = coding.codebook.marks(self.log.label[shot], self.log.word[shot]);
+        marks.iter().map(move |mark| begins + i64::from(*mark) * coding.chip_fs)
+    }
+
+    /// The time in which light of the band can arrive, in parts of a tick.
+    fn span(&self) -> RangeInclusive<i64> {
+        let fired = &self.log.fired_at_fs;
+        let (first, last) = (fired.first().unwrap_or(&0), fired.last().unwrap_or(&0));
+        self.clock.time(*first)..=self.clock.time(last + self.design.reach_fs())
+    }
 }
 
 impl<'a> Detectors<'a> {
@@ -53,6 +96,8 @@ impl<'a> Detectors<'a> {
     pub fn new(design: &'a Design, chance: Chance) -> Self {
         let kind = match &design.detector {
             Detector::PhotonCounting(counting) => Kind::Counting(Counting::new(counting, design)),
+            Detector::Geiger(geiger) => Kind::Cells(Cells::new(geiger, design)),
+            Detector::Linear(linear) => Kind::Thresholding(Thresholding::new(linear, design)),
             Detector::FirstFiring(firing) => Kind::Firing(*firing),
         };
         Self { design, chance, kind }
@@ -62,14 +107,12 @@ impl<'a> Detectors<'a> {
     pub fn edges(&self, log: &ShotLog, echoes: &Echoes, memory: &mut Memory) -> Edges {
         let Some(first) = log.fired_at_fs.first() else { return Edges::default() };
         let clock = Clock::new(self.design, *first);
+        let band = Band { clock, design: self.design, log, echoes };
         match &self.kind {
-            Kind::Counting(counting) => {
-                counting.edges(&photon_counting::Band { clock, log, echoes }, &self.chance, memory)
-            }
-            Kind::Firing(firing) => {
-                let band = first_firing::Band { clock, design: self.design, log, echoes };
-                first_firing::edges(firing, &band, &self.chance)
-            }
+            Kind::Counting(counting) => counting.edges(&band, &self.chance, memory),
+            Kind::Cells(cells) => cells.edges(&band, &self.chance, memory),
+            Kind::Thresholding(linear) => linear.edges(&band, &self.chance, memory),
+            Kind::Firing(firing) => first_firing::edges(firing, &band, &self.chance),
         }
     }
 }

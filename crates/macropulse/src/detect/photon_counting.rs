@@ -11,26 +11,16 @@
 //! Echoes are taken in the order in which they begin to arrive, so that the edges of one follow
 //! those of all before it, or are merged with the last few of them.
 
-use super::clock::Clock;
 use super::jitter::Jitter;
 use super::noise::Noise;
-use super::{Edges, Memory};
-use crate::channel::Echoes;
+use super::{Band, Edges, Memory};
 use crate::design::{Design, PARTS_OF_TICK, PhotonCounting};
-use crate::emit::ShotLog;
 use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
 use crate::units::FS_PER_S;
 
 /// Less than one edge in so many is put in its place alone, rather than merging all.
 const FEW: usize = 64;
-
-/// What the detector is given of a band.
-pub(super) struct Band<'a> {
-    pub clock: Clock,
-    pub log: &'a ShotLog,
-    pub echoes: &'a Echoes,
-}
 
 /// The detector, and the language of the light it sees.
 #[derive(Debug)]
@@ -47,7 +37,6 @@ pub(super) struct Counting {
     kept: f64,
     jitter: Option<Jitter>,
     noise: Option<Noise>,
-    reach_fs: i64,
 }
 
 impl Counting {
@@ -76,7 +65,6 @@ impl Counting {
             kept: 1.0 - counting.missed_marks,
             jitter: Jitter::new(counting.jitter * parts),
             noise: Noise::new(counting.false_rate, design),
-            reach_fs: design.reach_fs(),
         }
     }
 
@@ -89,10 +77,8 @@ impl Counting {
             self.add_echo(band, *arrival, chance, (&mut time, memory));
         }
         memory.order = order;
-        if let (Some(noise), Some(last)) = (&self.noise, band.log.fired_at_fs.last()) {
-            let span =
-                band.clock.time(band.log.fired_at_fs[0])..=band.clock.time(last + self.reach_fs);
-            noise.edges(&band.clock, span, chance, &mut memory.false_edges);
+        if let Some(noise) = &self.noise {
+            noise.edges(&band.clock, band.span(), chance, &mut memory.false_edges);
             if memory.false_edges.len() < time.len() / FEW {
                 insert(&mut time, &memory.false_edges);
             } else {
@@ -231,6 +217,8 @@ impl Bernoulli {
 mod tests {
     use super::super::Detectors;
     use super::*;
+    use crate::channel::Echoes;
+    use crate::emit::ShotLog;
 
     fn sensor(set: &[(&str, &str)]) -> Design {
         let set: Vec<(String, String)> = set

@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 
 use super::claim::{Claim, Verdict, holds};
-use crate::channel::extinction;
-use crate::design::safety::{Class1, Scanned};
+use crate::channel::Link;
+use crate::design::safety::Class1;
 use crate::design::{Design, Pattern};
-use crate::predict::link::{Receiver, Sunlight, diffraction, field, spot_depth};
+use crate::predict::link::{diffraction, spot_depth};
 use crate::units::{range_from_tof, s_from_fs};
 
 /// Claims on timing and converters.
@@ -163,8 +163,10 @@ fn mirror(design: &Design) -> Claim {
     }
 }
 
-/// Claims on light, eyes and parts.
-pub(super) fn light(design: &Design) -> Vec<Claim> {
+/// Claims on light, eyes and parts: what the `strict` reading of class 1 leaves, and the `lax` one
+/// without the factor for repeated exposures.
+pub(super) fn light(design: &Design, lax: &Design, strict: &Design) -> Vec<Claim> {
+    let (Some(lax), Some(budget)) = (&lax.budget, &strict.budget) else { return Vec::new() };
     let derived = design.derived();
     let Pattern::Raster { horizontal, vertical, .. } = design.scan.pattern else {
         return Vec::new();
@@ -177,33 +179,12 @@ pub(super) fn light(design: &Design) -> Vec<Claim> {
     let chip_range = derived.tick_range;
     let tilt = libm::atan(chip_range / spot).to_degrees();
     let smear = spot_depth(spot, PI / 4.0) / chip_range;
-    let scanned = Scanned {
-        pixel_pitch: pitch,
-        pixel_period: derived.pixel_period,
-        aperture: 7e-3,
-        distance: 0.1,
-        groups: None,
-    };
-    let lines = scanned.aperture / scanned.distance / pitch_down;
-    let groups = lines * 600.0;
-    let limits = Class1::at(wavelength);
-    let strict = Scanned { groups: Some(groups), ..scanned };
-    let (lax, energy) = limits.map_or((0.0, 0.0), |l| (l.per_shot(&scanned), l.per_shot(&strict)));
-    let receiver = Receiver {
-        wavelength,
-        aperture: 25e-3,
-        optics: 0.7,
-        extinction: extinction(23e3, wavelength),
-    };
-    let photons = receiver.photons(energy, 1.0, design.scan.max_range);
+    let (lax, energy) = (lax.energy, budget.energy);
+    let through_air = Link::of(strict).transmission(design.scan.max_range).powi(2);
+    let photons = budget.photons(energy, 1.0, design.scan.max_range) * through_air;
     let per_mark = photons / derived.marks.1;
-    let sun = Sunlight {
-        irradiance: 0.817e9,
-        bandwidth: 10e-9,
-        albedo: 0.3,
-        field: field(horizontal, vertical),
-    };
-    let background = receiver.background(&sun) * s_from_fs(design.coding.chip_fs);
+    let background = budget.background() * s_from_fs(design.coding.chip_fs);
+    let limits = Class1::at(wavelength);
     vec![
         Claim {
             id: "pitch",

@@ -105,6 +105,26 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
             c.false_rate,
             c.jitter * 1e12
         ),
+        Detector::Geiger(g) => format!(
+            "{} cells in Geiger mode; {:.2} photons a mark from reflectance {} at {} m; dead for \
+             {} ns; {:.0e} false counts/s",
+            g.cells,
+            g.sensitivity.photons,
+            g.sensitivity.reflectance,
+            g.sensitivity.range,
+            s_from_fs(g.dead_fs) * 1e9,
+            g.false_rate
+        ),
+        Detector::Linear(l) => format!(
+            "linear; threshold {:.1} photons, noise {:.1}; {:.2} photons a mark from reflectance \
+             {} at {} m; {:.0e} false alarms/s",
+            l.threshold,
+            l.noise,
+            l.sensitivity.photons,
+            l.sensitivity.reflectance,
+            l.sensitivity.range,
+            l.false_rate
+        ),
         Detector::FirstFiring(f) => format!(
             "fires at {} photons, {:.0} from reflectance {} at {} m; noise {} photons; jitter {} ps",
             f.firing_photons,

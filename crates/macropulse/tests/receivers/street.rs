@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use macropulse::code::{Codebook, Crc, Family, Payload};
-use macropulse::decode::{Receiver, ReceiverKind, Returns};
+use macropulse::decode::{Effort, Receiver, ReceiverKind, Returns};
 use macropulse::emit::ShotLog;
 use macropulse::tdc::Ticks;
 use rand_chacha::ChaCha8Rng;
@@ -90,6 +90,7 @@ impl Sensor {
             codebook: Codebook::new(Family::prime(29).unwrap(), Some(payload), 1024).unwrap(),
             receiver: Receiver {
                 kind,
+                effort: Effort::Quick,
                 gate_ticks: (0, GATE),
                 ticks_per_chip: 1,
                 tick_fs: TICK_FS,

@@ -44,6 +44,7 @@ pub(super) fn codebook() -> Codebook {
 pub(super) fn receiver(jitter_ticks: f64) -> Receiver {
     Receiver {
         kind: ReceiverKind::Matched,
+        effort: crate::decode::Effort::Quick,
         gate_ticks: (50, GATE),
         ticks_per_chip: 1,
         tick_fs: 2500,

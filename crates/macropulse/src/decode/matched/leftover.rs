@@ -58,6 +58,7 @@ impl Band<'_> {
         let is_found = |shot: usize| self.locks.get(shot).is_some_and(Option::is_some);
         match evidence {
             Evidence::Overwhelming | Evidence::Bright => 1,
+            Evidence::MoreThanChance if self.sent.is_thorough() => 1,
             Evidence::MoreThanChance if neighbours.into_iter().flatten().any(is_found) => 1,
             Evidence::MoreThanChance => RARER,
         }
@@ -103,7 +104,7 @@ impl Band<'_> {
         let length = sent.length() as u32;
         let (emptiest, fullest) = runs.emptiest_and_fullest(length + sent.width);
         // In a short gate it may be full everywhere of light that is sought.
-        let is_long = gate_length > MANY * sent.length();
+        let is_long = gate_length > MANY * sent.length() && !sent.is_thorough();
         let everywhere = if is_long { emptiest } else { 0 };
         if fullest - everywhere < needed(1) {
             return false;

@@ -1,64 +1,258 @@
 //! From light to edges.
 
 use super::Check;
-use crate::design::file::{DetectorFile, SensitivityFile};
-use crate::design::{Detector, Error, FirstFiring, PhotonCounting, Sensitivity};
+use crate::design::budget::Budget;
+use crate::design::file::{
+    DetectorFile, FirstFiringFile, GeigerFile, LinearFile, PhotonCountingFile, SensitivityFile,
+};
+use crate::design::linear::Amplifier;
+use crate::design::{
+    Coding, Detector, Effect, Error, FirstFiring, Geiger, Light, Linear, Pattern, PhotonCounting,
+    Scan, Sensitivity,
+};
+use crate::units::fs_from_s;
 
-impl Check<'_> {
-    pub(super) fn detector(&self, file: &DetectorFile, dark_sky: bool) -> Result<Detector, Error> {
-        match (&file.photon_counting, &file.first_firing) {
-            (Some(counting), None) => {
-                let at = |key: &str| format!("detector.photon-counting.{key}");
-                let pd = self.pd(&at("sensitivity"), &counting.sensitivity)?;
-                let dark =
-                    self.within(&at("dark_counts_hz"), counting.dark_counts_hz, 0.0, 1e12)?;
-                let light = self.within(&at("background_hz"), counting.background_hz, 0.0, 1e12)?;
-                Ok(Detector::PhotonCounting(PhotonCounting {
-                    sensitivity: sensitivity(&counting.sensitivity, -(-pd).ln_1p()),
-                    missed_marks: self.within(
-                        &at("missed_marks"),
-                        counting.missed_marks,
-                        0.0,
-                        1.0,
-                    )?,
-                    false_rate: dark + if dark_sky { 0.0 } else { light },
-                    jitter: self.within(&at("jitter_ps"), counting.jitter_ps, 0.0, 1e6)? * 1e-12,
-                }))
-            }
-            (None, Some(firing)) => {
-                let at = |key: &str| format!("detector.first-firing.{key}");
-                let pd = self.pd(&at("sensitivity"), &firing.sensitivity)?;
-                let needed =
-                    self.count(&at("firing_photons"), firing.firing_photons, 1, 1 << 20)?;
-                let noise = self.within(&at("noise_photons"), firing.noise_photons, 0.0, 1e6)?;
-                let photons = crate::detect::photons_for(pd, needed, noise);
-                Ok(Detector::FirstFiring(FirstFiring {
-                    sensitivity: sensitivity(&firing.sensitivity, photons),
-                    firing_photons: needed,
-                    noise_photons: noise,
-                    false_rate: self.within(
-                        &at("false_firing_hz"),
-                        firing.false_firing_hz,
-                        0.0,
-                        1e9,
-                    )?,
-                    jitter: self.within(&at("jitter_ps"), firing.jitter_ps, 0.0, 1e6)? * 1e-12,
-                }))
-            }
-            _ => self.refuse(
-                "detector",
-                "needs exactly one of [detector.photon-counting], [detector.first-firing]",
-            ),
-        }
+/// The most false edges per second of a detector whose every count is followed on its own.
+const MOST_COUNTS: f64 = 1e12;
+
+/// What a detector gets to see.
+pub(super) struct Before<'a> {
+    pub scan: &'a Scan,
+    pub light: &'a Light,
+    pub coding: &'a Coding,
+    pub budget: Option<&'a Budget>,
+    pub idealised: &'a [Effect],
+}
+
+impl Before<'_> {
+    /// What is detected per mark of the budget: of a white target, at the reach, in clear air.
+    fn honest(&self, budget: &Budget) -> Sensitivity {
+        let energy = budget.energy / self.coding.codebook.mean_weight();
+        let range = self.scan.reach;
+        let photons = budget.photons(energy, 1.0, range) * budget.efficiency;
+        Sensitivity { photons, range, reflectance: 1.0 }
     }
 
-    fn pd(&self, path: &str, file: &SensitivityFile) -> Result<f64, Error> {
-        self.within(&format!("{path}.range_m"), file.range_m, 0.01, 1e6)?;
-        self.within(&format!("{path}.reflectance"), file.reflectance, 1e-6, 1e6)?;
-        self.within(&format!("{path}.pd"), file.pd, 1e-6, 1.0)
+    fn is_off(&self, effect: Effect) -> bool {
+        self.idealised.contains(&effect)
     }
 }
 
-fn sensitivity(file: &SensitivityFile, photons: f64) -> Sensitivity {
-    Sensitivity { photons, range: file.range_m, reflectance: file.reflectance }
+/// The dotted key of the efficiency and its value.
+pub(super) fn efficiency(file: &DetectorFile) -> (&'static str, Option<f64>) {
+    match file {
+        DetectorFile { photon_counting: Some(counting), .. } => {
+            ("detector.photon-counting.efficiency", counting.efficiency)
+        }
+        DetectorFile { geiger: Some(geiger), .. } => {
+            ("detector.geiger.efficiency", geiger.efficiency)
+        }
+        DetectorFile { linear: Some(linear), .. } => {
+            ("detector.linear.efficiency", Some(linear.efficiency))
+        }
+        DetectorFile { first_firing: Some(firing), .. } => {
+            ("detector.first-firing.efficiency", firing.efficiency)
+        }
+        _ => ("detector", None),
+    }
+}
+
+impl Check<'_> {
+    pub(super) fn detector(&self, file: &DetectorFile, before: &Before) -> Result<Detector, Error> {
+        let detector = match file {
+            DetectorFile {
+                photon_counting: Some(counting),
+                geiger: None,
+                linear: None,
+                first_firing: None,
+            } => Detector::PhotonCounting(self.photon_counting(counting, before)?),
+            DetectorFile {
+                photon_counting: None,
+                geiger: Some(geiger),
+                linear: None,
+                first_firing: None,
+            } => Detector::Geiger(self.geiger(geiger, before)?),
+            DetectorFile {
+                photon_counting: None,
+                geiger: None,
+                linear: Some(linear),
+                first_firing: None,
+            } => Detector::Linear(self.linear(linear, before)?),
+            DetectorFile {
+                photon_counting: None,
+                geiger: None,
+                linear: None,
+                first_firing: Some(firing),
+            } => Detector::FirstFiring(self.first_firing(firing, before)?),
+            _ => {
+                return self.refuse(
+                    "detector",
+                    "needs exactly one of [detector.photon-counting], [detector.geiger], \
+                     [detector.linear], [detector.first-firing]",
+                );
+            }
+        };
+        let several = !matches!(before.scan.pattern, Pattern::Raster { .. });
+        if several && !matches!(detector, Detector::FirstFiring(_)) {
+            return self.refuse(
+                "detector",
+                "a spinning or flash sensor has a detector for each direction, and only \
+                 [detector.first-firing] models those",
+            );
+        }
+        let has_bandwidth = matches!(detector, Detector::Linear(_) | Detector::Geiger(_));
+        if !has_bandwidth && !before.is_off(Effect::DetectorBandwidth) {
+            let message = format!(
+                "this detector has no bandwidth of its own: add `{}` to this list, which declares \
+                 that {}",
+                Effect::DetectorBandwidth.name(),
+                Effect::DetectorBandwidth.assumption()
+            );
+            return self.refuse("idealised", message);
+        }
+        Ok(detector)
+    }
+
+    fn photon_counting(
+        &self,
+        file: &PhotonCountingFile,
+        before: &Before,
+    ) -> Result<PhotonCounting, Error> {
+        let at = |key: &str| format!("detector.photon-counting.{key}");
+        let declared = (at("sensitivity"), &file.sensitivity);
+        let sensitivity = self.sensitivity(declared, before, |pd| -(-pd).ln_1p())?;
+        let dark = self.within(&at("dark_counts_hz"), file.dark_counts_hz, 0.0, MOST_COUNTS)?;
+        Ok(PhotonCounting {
+            sensitivity,
+            missed_marks: self.within(&at("missed_marks"), file.missed_marks, 0.0, 1.0)?,
+            false_rate: dark
+                + self.background((at("background_hz"), file.background_hz), before)?,
+            jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
+        })
+    }
+
+    fn geiger(&self, file: &GeigerFile, before: &Before) -> Result<Geiger, Error> {
+        let at = |key: &str| format!("detector.geiger.{key}");
+        let declared = (at("sensitivity"), &file.sensitivity);
+        let sensitivity = self.sensitivity(declared, before, |pd| -(-pd).ln_1p())?;
+        let dark = self.within(&at("dark_counts_hz"), file.dark_counts_hz, 0.0, MOST_COUNTS)?;
+        let light = self.background((at("background_hz"), file.background_hz), before)?;
+        if dark + light > MOST_COUNTS {
+            let message = format!(
+                "{:.1e} counts per second would fire it again and again, more than are followed \
+                 one by one ({MOST_COUNTS:.0e}): narrow the field or the filter",
+                dark + light
+            );
+            return self.refuse("detector.geiger", message);
+        }
+        let dead = self.within(&at("dead_time_ns"), file.dead_time_ns, 0.0, 1e6)?;
+        Ok(Geiger {
+            sensitivity,
+            cells: self.count(&at("cells"), file.cells, 1, 1 << 20)?,
+            dead_fs: fs_from_s(dead * 1e-9),
+            false_rate: dark + light,
+            jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
+        })
+    }
+
+    fn linear(&self, file: &LinearFile, before: &Before) -> Result<Linear, Error> {
+        let at = |key: &str| format!("detector.linear.{key}");
+        let Some(budget) = before.budget else {
+            return self.refuse(
+                "detector.linear",
+                "counts its noise in electrons, so the light must be counted as well: take \
+                 \"link-budget\" off the list `idealised`",
+            );
+        };
+        let amplifier = Amplifier {
+            gain: self.within(&at("gain"), file.gain, 1.0, 1e6)?,
+            ionisation: self.within(&at("ionisation_ratio"), file.ionisation_ratio, 0.0, 1.0)?,
+            bandwidth: self.within(&at("bandwidth_mhz"), file.bandwidth_mhz, 1e-3, 1e9)? * 1e6,
+            current_noise: self.within(
+                &at("amplifier_pa_rthz"),
+                file.amplifier_pa_rthz,
+                0.0,
+                1e6,
+            )? * 1e-12,
+            dark_current: self.within(&at("dark_current_na"), file.dark_current_na, 0.0, 1e6)?
+                * 1e-9,
+            pulse: before.light.pulse,
+        };
+        let path = at("false_alarm_hz");
+        let rate = self.within(&path, file.false_alarm_hz, 1e-3, MOST_COUNTS)?;
+        let Some(tnr) = amplifier.threshold_for(rate) else {
+            let message = format!(
+                "is {rate:.3e}, but noise of this bandwidth crosses even its own mean only \
+                 {:.3e} times per second",
+                amplifier.highest_rate()
+            );
+            return self.refuse(&path, message);
+        };
+        let noise = amplifier.noise_electrons(budget.background() * budget.efficiency);
+        Ok(Linear {
+            sensitivity: before.honest(budget),
+            threshold: tnr * noise,
+            noise,
+            excess: amplifier.excess(),
+            response: amplifier.response(),
+            false_rate: rate,
+            jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
+        })
+    }
+
+    fn first_firing(&self, file: &FirstFiringFile, before: &Before) -> Result<FirstFiring, Error> {
+        let at = |key: &str| format!("detector.first-firing.{key}");
+        let needed = self.count(&at("firing_photons"), file.firing_photons, 1, 1 << 20)?;
+        let noise = self.within(&at("noise_photons"), file.noise_photons, 0.0, 1e6)?;
+        let photons = |pd| crate::detect::photons_for(pd, needed, noise);
+        let path = at("false_firing_hz");
+        Ok(FirstFiring {
+            sensitivity: self.sensitivity(
+                (at("sensitivity"), &file.sensitivity),
+                before,
+                photons,
+            )?,
+            firing_photons: needed,
+            noise_photons: noise,
+            false_rate: self.within(&path, file.false_firing_hz, 0.0, 1e9)?,
+            jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
+        })
+    }
+
+    /// What is detected per mark: by the budget, or as declared, with `photons` for what a
+    /// probability of detection needs.
+    fn sensitivity(
+        &self,
+        (path, declared): (String, &Option<SensitivityFile>),
+        before: &Before,
+        photons: impl Fn(f64) -> f64,
+    ) -> Result<Sensitivity, Error> {
+        if let Some(budget) = before.budget {
+            return Ok(before.honest(budget));
+        }
+        let Some(declared) = declared else {
+            return self.refuse(&path, "is needed where the link budget is idealised");
+        };
+        let at = |key: &str| format!("{path}.{key}");
+        Ok(Sensitivity {
+            photons: photons(self.within(&at("pd"), declared.pd, 1e-6, 1.0)?),
+            range: self.within(&at("range_m"), declared.range_m, 0.01, 1e6)?,
+            reflectance: self.within(&at("reflectance"), declared.reflectance, 1e-6, 1e6)?,
+        })
+    }
+
+    /// Counts per second that sunlight makes: by the budget, or as declared.
+    fn background(&self, (path, declared): (String, f64), before: &Before) -> Result<f64, Error> {
+        let declared = self.within(&path, declared, 0.0, MOST_COUNTS)?;
+        match before.budget {
+            _ if before.is_off(Effect::Background) => Ok(0.0),
+            None => Ok(declared),
+            Some(_) if declared > 0.0 => self.refuse(
+                &path,
+                "follows from [sun] and [optics] where the link budget is not idealised: leave it \
+                 out",
+            ),
+            Some(budget) => Ok(budget.background() * budget.efficiency),
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! From typed keys to a checked `Design`: every limit is tested here, once.
 
+mod budget;
 mod code;
 mod detector;
 mod light;
@@ -34,7 +35,19 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     let coding = check.coding(file.code.as_ref(), &scan, &tdc)?;
     let off = |effect| idealised.contains(&effect);
     let light = check.light(&file, off(Effect::Footprint))?;
-    let detector = check.detector(&file.detector, off(Effect::Background))?;
+    let parts =
+        budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
+    let budget = check.budget(&file, &parts, detector::efficiency(&file.detector))?;
+    let detector = check.detector(
+        &file.detector,
+        &detector::Before {
+            scan: &scan,
+            light: &light,
+            coding: &coding,
+            budget: budget.as_ref(),
+            idealised: &idealised,
+        },
+    )?;
     let visibility =
         check.within("atmosphere.visibility_km", file.atmosphere.visibility_km, 0.01, 1e3)? * 1e3;
     let receiver = check.receiver(&file, &scan, &tdc, (&coding, detector))?;
@@ -46,6 +59,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         scan,
         light,
         coding,
+        budget,
         detector,
         visibility: (!off(Effect::Atmosphere)).then_some(visibility),
         tdc,

@@ -58,6 +58,7 @@ impl Check<'_> {
         let weight = coding.codebook.family().weight() as u32;
         Ok(Receiver {
             kind,
+            effort: file.receiver.effort,
             gate_ticks: (gate.0 as u32, gate.1 as u32),
             ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
             tick_fs: tdc.tick_fs,

@@ -1,0 +1,155 @@
+//! Where the photons come from: energy, aperture, optics and sun.
+
+use std::f64::consts::PI;
+
+use super::safety::Limit;
+use crate::units::{PLANCK, SPEED_OF_LIGHT};
+
+/// What an honest link is made of. SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// Wavelength, m.
+    pub wavelength: f64,
+    /// Energy of a shot, J, the mean over its labels: every mark has the same.
+    pub energy: f64,
+    /// What class 1 allows to a shot; empty where no rule fits the wavelength or the scan.
+    pub limits: Vec<Limit>,
+    /// Diameter of the receiving aperture, m.
+    pub aperture: f64,
+    /// Transmission of the optics, both ways together.
+    pub transmission: f64,
+    /// Width of the optical filter, m.
+    pub filter: f64,
+    /// What the detector looks at.
+    pub field: Field,
+    /// Spectral irradiance of the scene, W/m² per metre of wavelength; 0 at night.
+    pub irradiance: f64,
+    /// Mean diffuse reflectance of what lies in the field, for the sunlight it sends back.
+    pub albedo: f64,
+    /// Detections per photon.
+    pub efficiency: f64,
+}
+
+/// What a detector looks at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Field {
+    /// Solid angle, sr.
+    pub solid_angle: f64,
+    /// Where it follows the beam.
+    pub trailing: Option<Trailing>,
+}
+
+/// A field that follows the beam along its line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trailing {
+    /// Its length in pixels: from the one the beam is on back to those it has left.
+    pub pixels: f64,
+    /// Time between shots, s.
+    pub pixel_period: f64,
+}
+
+impl Budget {
+    /// Area of the aperture, m².
+    pub fn area(&self) -> f64 {
+        PI * self.aperture.powi(2) / 4.0
+    }
+
+    /// Energy of one photon, J: h·c/λ.
+    pub fn photon_energy(&self) -> f64 {
+        PLANCK * SPEED_OF_LIGHT / self.wavelength
+    }
+
+    /// Photons that reach the detector of `energy` joules sent, through clear air, at an extended
+    /// Lambertian target of `reflectance` at `range` metres, square on:
+    /// E·ρ·A·η/(π·R²) over h·c/λ (docs/physics.md#link-equation).
+    pub fn photons(&self, energy: f64, reflectance: f64, range: f64) -> f64 {
+        let received =
+            energy * reflectance * self.area() * self.transmission / (PI * range.powi(2));
+        received / self.photon_energy()
+    }
+
+    /// Photons of sunlight per second that reach the detector: E_λ·Δλ·ρ_b/π·A·Ω·η over h·c/λ
+    /// (docs/physics.md#background).
+    pub fn background(&self) -> f64 {
+        let power = self.irradiance * self.filter * self.albedo / PI
+            * self.area()
+            * self.field.solid_angle
+            * self.transmission;
+        power / self.photon_energy()
+    }
+}
+
+impl Field {
+    /// The share of a shot's light that the field still holds when it arrives, `tof` seconds
+    /// after the shot was fired: 1 where the detector stares. A field of W pixels that follows
+    /// the beam holds a spot L pixels behind it with the share W − L, between 0 and 1.
+    pub fn share(&self, tof: f64) -> f64 {
+        match self.trailing {
+            None => 1.0,
+            Some(Trailing { pixels, pixel_period }) => {
+                (pixels - tof / pixel_period).clamp(0.0, 1.0)
+            }
+        }
+    }
+}
+
+/// Solid angle, sr, of a rectangular field `horizontal` by `vertical` radians across:
+/// 4·asin(sin(h/2)·sin(v/2)); beyond half a turn, that of the band h·2·sin(v/2).
+pub fn solid_angle(horizontal: f64, vertical: f64) -> f64 {
+    if horizontal > PI {
+        return horizontal * 2.0 * libm::sin(vertical / 2.0);
+    }
+    4.0 * libm::asin(libm::sin(horizontal / 2.0) * libm::sin(vertical / 2.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Design;
+    use approx::assert_relative_eq;
+
+    fn physical(overrides: &[(&str, &str)]) -> Budget {
+        let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let overrides: Vec<_> = overrides.iter().map(owned).collect();
+        Design::open("kim-park-2016-physical", &overrides).unwrap().budget.unwrap()
+    }
+
+    #[test]
+    fn a_nanojoule_brings_22_photons_from_150_metres() {
+        let budget = physical(&[]);
+        assert_relative_eq!(budget.energy, 1.01e-9, max_relative = 5e-3);
+        let transmission = libm::exp(-0.0890e-3 * 150.0);
+        let photons = budget.photons(budget.energy, 1.0, 150.0) * transmission.powi(2);
+        assert_relative_eq!(photons, 21.7, max_relative = 5e-3);
+        assert_eq!(budget.photons(0.0, 1.0, 150.0), 0.0);
+    }
+
+    #[test]
+    fn a_staring_receiver_drowns_in_sunlight() {
+        let budget = physical(&[]);
+        assert_relative_eq!(budget.field.solid_angle, 0.310, max_relative = 1e-3);
+        assert_relative_eq!(budget.background() * 2.5e-12, 947.0, max_relative = 2e-3);
+        assert_eq!(physical(&[("sun.sky", "night")]).background(), 0.0);
+    }
+
+    #[test]
+    fn a_field_of_one_pixel_loses_what_lies_beyond_six_metres() {
+        let one = physical(&[("optics.field", "descanned")]).field;
+        let wide = physical(&[("optics.field", "in-flight")]).field;
+        let tof = crate::units::tof_from_range;
+        assert_eq!(one.share(0.0), 1.0);
+        assert_relative_eq!(one.share(tof(3.07)), 0.5, max_relative = 1e-3);
+        assert_eq!(one.share(tof(6.2)), 0.0);
+        assert_eq!(wide.share(tof(150.0)), 1.0);
+        assert_eq!(physical(&[]).field.share(tof(150.0)), 1.0);
+        let pitch = (43.2_f64 / 848.0).to_radians() * (24.3_f64 / 480.0).to_radians();
+        assert_relative_eq!(one.solid_angle, pitch, max_relative = 1e-6);
+        assert_relative_eq!(wide.solid_angle / one.solid_angle, 25.44, max_relative = 1e-3);
+    }
+
+    #[test]
+    fn solid_angles_of_known_fields() {
+        assert_relative_eq!(solid_angle(PI / 2.0, PI / 2.0), 4.0 * PI / 6.0, max_relative = 1e-12);
+        assert_relative_eq!(solid_angle(2.0 * PI, PI), 4.0 * PI, max_relative = 1e-12);
+    }
+}

@@ -1,0 +1,130 @@
+//! What a detector is set to.
+
+/// Light to edges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Detector {
+    /// Every mark is a Bernoulli trial of its own.
+    PhotonCounting(PhotonCounting),
+    /// Cells that are blind for a while after each count.
+    Geiger(Geiger),
+    /// An amplified current that crosses a threshold.
+    Linear(Linear),
+    /// One firing per shot \[KP16 Fig. 7\].
+    FirstFiring(FirstFiring),
+}
+
+impl Detector {
+    /// How much light it gets.
+    pub fn sensitivity(&self) -> Sensitivity {
+        match self {
+            Self::PhotonCounting(counting) => counting.sensitivity,
+            Self::Geiger(geiger) => geiger.sensitivity,
+            Self::Linear(linear) => linear.sensitivity,
+            Self::FirstFiring(firing) => firing.sensitivity,
+        }
+    }
+
+    /// Standard deviation of its timing, s; of a linear detector at its threshold, where it is
+    /// largest.
+    pub fn jitter(&self) -> f64 {
+        match self {
+            Self::PhotonCounting(counting) => counting.jitter,
+            Self::Geiger(geiger) => geiger.jitter,
+            Self::Linear(linear) => linear.timing(linear.threshold),
+            Self::FirstFiring(firing) => firing.jitter,
+        }
+    }
+
+    /// Edges per second without any light of the sensor's own.
+    pub fn false_rate(&self) -> f64 {
+        match self {
+            Self::PhotonCounting(counting) => counting.false_rate,
+            Self::Geiger(geiger) => geiger.false_rate,
+            Self::Linear(linear) => linear.false_rate,
+            Self::FirstFiring(firing) => firing.false_rate,
+        }
+    }
+}
+
+/// A detector that counts photons, fast enough for every chip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhotonCounting {
+    /// Mean photons detected per mark at the reference target.
+    pub sensitivity: Sensitivity,
+    /// Marks lost for another reason than lack of light, as a fraction.
+    pub missed_marks: f64,
+    /// Dark and background counts together, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing, s.
+    pub jitter: f64,
+}
+
+/// Cells in Geiger mode that share the light: each is blind for a while after it has fired.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Geiger {
+    /// Mean photons detected per mark at the reference target, all cells being armed.
+    pub sensitivity: Sensitivity,
+    /// Cells; light falls on each of them alike.
+    pub cells: u32,
+    /// Time for which a cell that has fired is blind, fs.
+    pub dead_fs: i64,
+    /// Dark and background counts of all cells together, were they always armed, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing, s.
+    pub jitter: f64,
+}
+
+/// A photodiode with an amplifier and a threshold. Amplitudes are in detected photons: in
+/// electrons before multiplication.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear {
+    /// Mean photons detected per mark at the reference target.
+    pub sensitivity: Sensitivity,
+    /// Amplitude that makes an edge.
+    pub threshold: f64,
+    /// Noise without a mark, rms.
+    pub noise: f64,
+    /// Excess noise factor of the multiplication.
+    pub excess: f64,
+    /// Full width at half maximum of a mark behind the amplifier, s.
+    pub response: f64,
+    /// Crossings of the threshold by noise alone, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing of the converter's input alone, s.
+    pub jitter: f64,
+}
+
+impl Linear {
+    /// Standard deviation, s, of the time at which a mark of `amplitude` detected photons crosses
+    /// the threshold: noise over the slope, τ·noise/amplitude, with the jitter of the input.
+    pub fn timing(&self, amplitude: f64) -> f64 {
+        libm::hypot(self.jitter, self.response * self.noise / amplitude.max(self.threshold))
+    }
+}
+
+/// A detector that fires once, when enough photons of one shot have come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstFiring {
+    /// Mean photons detected per shot at the reference target.
+    pub sensitivity: Sensitivity,
+    /// Photons needed to fire; 1 is a Geiger detector.
+    pub firing_photons: u32,
+    /// White noise integrated over one pulse, photons rms.
+    pub noise_photons: f64,
+    /// Firings without a target, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing, s.
+    pub jitter: f64,
+}
+
+/// How much light a detector gets, declared by what it can see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// Mean photons detected per mark from a target of `reflectance` at `range`, square on.
+    /// Infinite for a detector that never misses.
+    pub photons: f64,
+    /// Range of the reference target, m.
+    pub range: f64,
+    /// Reflectance of the reference target.
+    pub reflectance: f64,
+}
