@@ -77,7 +77,7 @@ const RULES: [Rule; 18] = [
     Rule { module: "view", may_name: &["points"], because: "pictures show columns, no physics" },
     Rule {
         module: "predict",
-        may_name: &["channel", "code", "units"],
+        may_name: &["channel", "code", "design", "units"],
         because: "an oracle that ran the simulation would agree with it whatever it did",
     },
     Rule {

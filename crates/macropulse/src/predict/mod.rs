@@ -1,5 +1,10 @@
 //! Closed form: what theory says a simulation will measure.
 
+pub mod detection;
+mod forecast;
 pub mod link;
+mod matched;
 pub mod multiple_access;
 pub mod ranging;
+
+pub use forecast::{Forecast, Forecaster};

@@ -1,0 +1,156 @@
+//! What becomes of one mark: light to edges to ticks, in closed form.
+
+use crate::design::{Detector, FirstFiring, Geiger, Linear, Tdc};
+
+/// Terms of a Poisson sum that are less than this share of all are left out.
+const NEGLIGIBLE: f64 = 1e-15;
+
+/// From so many photons on, their number passes for a normal variable.
+const MANY: f64 = 1e4;
+
+/// `Q(x)`: probability that a standard normal variable exceeds `x`.
+pub fn normal_tail(x: f64) -> f64 {
+    0.5 * libm::erfc(x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// Probability that a mark of which `photons` are detected on average makes an edge, where
+/// nothing else keeps the detector busy but `edges_per_s` false counts that fall on it.
+///
+/// * counting: (1 − m)·(1 − exp(−n)), m the marks lost for other reasons;
+/// * Geiger: 1 − exp(−n·a), a the share of cells that are armed, [`armed`];
+/// * linear: Σ_k Poisson(k; n)·Q((threshold − k)/√(k·(F − 1) + noise²)), see [`crossing`];
+/// * first firing: [`firing`].
+pub fn mark_pd(detector: &Detector, photons: f64, edges_per_s: f64) -> f64 {
+    match detector {
+        Detector::PhotonCounting(counting) => {
+            -(1.0 - counting.missed_marks) * libm::expm1(-photons)
+        }
+        Detector::Geiger(geiger) => -libm::expm1(-photons * armed(geiger, edges_per_s)),
+        Detector::Linear(linear) => crossing(linear, photons),
+        Detector::FirstFiring(firing_) => firing(firing_, photons),
+    }
+}
+
+/// Share of the cells that are armed at any moment, 1/(1 + r·τ/N): each of N cells is blind for
+/// the dead time τ after each of its firings, and r photons per second fall on all of them.
+pub fn armed(geiger: &Geiger, edges_per_s: f64) -> f64 {
+    let each = edges_per_s / f64::from(geiger.cells);
+    1.0 / (1.0 + each * crate::units::s_from_fs(geiger.dead_fs))
+}
+
+/// Probability that a mark of which `photons` are detected on average crosses the threshold of a
+/// linear detector, summed over the photons k that come:
+/// Σ_k e^(−n)·n^k/k! · Q((threshold − k)/√(k·(F − 1) + noise²)). No photon, no edge.
+///
+/// With so much noise of the amplifier that the photons' own does not matter it is the
+/// ½·erfc((TNR − SNR)/√2) of textbooks.
+pub fn crossing(linear: &Linear, photons: f64) -> f64 {
+    let Linear { threshold, noise, excess, .. } = *linear;
+    let above = |count: f64, variance: f64| normal_tail((threshold - count) / variance.sqrt());
+    if photons > MANY {
+        return above(photons, photons * excess + noise * noise);
+    }
+    let of = |k: f64| libm::exp(k * photons.ln() - photons - libm::lgamma(k + 1.0));
+    let mut sum = 0.0;
+    let mut k = 1.0;
+    loop {
+        let share = of(k);
+        sum += share * above(k, k * (excess - 1.0) + noise * noise);
+        if k > photons && share < NEGLIGIBLE {
+            return sum;
+        }
+        k += 1.0;
+    }
+}
+
+/// Probability that a detector which needs m photons fires at a mark of which n are detected on
+/// average, with a photons rms of noise: 1 − exp(−n) for m = 1 without noise, else
+/// Q((m − n)/√(n + a²)).
+pub fn firing(detector: &FirstFiring, photons: f64) -> f64 {
+    let (needed, noise) = (f64::from(detector.firing_photons), detector.noise_photons);
+    if detector.firing_photons == 1 && noise == 0.0 {
+        return -libm::expm1(-photons);
+    }
+    normal_tail((needed - photons) / (photons + noise * noise).sqrt())
+}
+
+/// Share of edges that find all converters of the bank busy, where `edges_per_s` come at random
+/// and each keeps one busy for the dead time: Erlang's B, a^c/c! / Σ_k a^k/k! \[Erl17\], which does
+/// not depend on how the busy times are distributed.
+pub fn bank_loss(tdc: &Tdc, edges_per_s: f64) -> f64 {
+    let offered = edges_per_s * crate::units::s_from_fs(tdc.dead_fs);
+    if offered <= 0.0 {
+        return 0.0;
+    }
+    // B(c) = a·B(c − 1)/(c + a·B(c − 1)), B(0) = 1.
+    (1..=tdc.converters).fold(1.0, |loss, converters| {
+        let carried = offered * loss;
+        carried / (f64::from(converters) + carried)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Design;
+    use approx::assert_relative_eq;
+
+    fn linear(threshold: f64, noise: f64, excess: f64) -> Linear {
+        let set = [("name".to_owned(), "\"any\"".to_owned())];
+        let Detector::PhotonCounting(counting) =
+            Design::open("kim-park-2016", &set).unwrap().detector
+        else {
+            panic!("it counts photons")
+        };
+        Linear {
+            sensitivity: counting.sensitivity,
+            threshold,
+            noise,
+            excess,
+            response: 1e-9,
+            false_rate: 0.0,
+            jitter: 0.0,
+        }
+    }
+
+    /// TNR 9.78 dB: SNR of 9.8, 12, 13, 14 and 16 dB give 0.50, 0.816, 0.917, 0.973 and 0.9994.
+    #[test]
+    fn a_noisy_amplifier_has_the_curve_of_the_textbook() {
+        let noise = 1000.0;
+        let db = |db: f64| 10_f64.powf(db / 20.0);
+        for (snr, pd) in [(9.776, 0.5), (12.0, 0.816), (13.0, 0.917), (14.0, 0.973), (16.0, 0.9994)]
+        {
+            let found = crossing(&linear(db(9.776) * noise, noise, 1.0), db(snr) * noise);
+            assert!((found - pd).abs() < 2e-3, "SNR {snr} dB: {found}");
+        }
+    }
+
+    /// With neither noise nor excess noise an edge takes as many photons as the threshold says.
+    #[test]
+    fn without_noise_it_is_the_tail_of_poisson() {
+        let found = crossing(&linear(2.5, 1e-9, 1.0), 2.0);
+        assert_relative_eq!(found, 1.0 - (-2.0_f64).exp() * 5.0, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn sum_and_normal_approximation_meet() {
+        let detector = linear(MANY, 300.0, 4.0);
+        let (below, above) = (crossing(&detector, MANY), crossing(&detector, MANY * (1.0 + 1e-9)));
+        assert!((below - above).abs() < 2e-3, "{below}, {above}");
+    }
+
+    #[test]
+    fn erlang_has_the_published_values() {
+        let mut tdc = Design::open("kim-park-2016", &[]).unwrap().tdc;
+        let loss = |tdc: &Tdc, offered: f64| {
+            bank_loss(tdc, offered / crate::units::s_from_fs(tdc.dead_fs))
+        };
+        // 10 Erlang offered to 10 lines: 21.46 %; 1 to 1: one half.
+        tdc.converters = 10;
+        assert_relative_eq!(loss(&tdc, 10.0), 0.214_58, max_relative = 1e-4);
+        tdc.converters = 1;
+        assert_relative_eq!(loss(&tdc, 1.0), 0.5, max_relative = 1e-12);
+        tdc.converters = 1150;
+        assert_relative_eq!(loss(&tdc, 1e5), 1.0 - 1150.0 / 1e5, max_relative = 1e-3);
+    }
+}

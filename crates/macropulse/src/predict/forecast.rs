@@ -1,0 +1,198 @@
+//! What a scan will measure of a target at one range, in closed form.
+//!
+//! The target is extended, Lambertian and square on, and so is all around it: the light of the
+//! other shots in flight is that of the same target. The beam is a line.
+
+use std::collections::BTreeMap;
+
+use super::detection::{bank_loss, mark_pd};
+use super::matched;
+use crate::channel::Link;
+use crate::design::{Design, Detector};
+use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
+
+/// A sensor, perhaps with more or less light than it has.
+#[derive(Debug, Clone, Copy)]
+pub struct Forecaster<'a> {
+    design: &'a Design,
+    /// Factor on the light of the sensor.
+    light: f64,
+    /// Factor on the false edges of detector and background.
+    background: f64,
+}
+
+/// What is to be expected of a target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Forecast {
+    /// Range, m.
+    pub range: f64,
+    /// Reflectance of the target.
+    pub reflectance: f64,
+    /// Photons of a shot that reach the detector, the mean over labels; detected ones where the
+    /// sensor has no link budget.
+    pub photons_per_shot: f64,
+    /// Photons detected per mark.
+    pub detected_per_mark: f64,
+    /// Probability that a mark makes a tick where it is looked for.
+    pub mark_pd: f64,
+    /// Share of edges that find every converter busy.
+    pub bank_loss: f64,
+    /// Probability that a place in the gate is lit by something else.
+    pub density: f64,
+    /// Ratio of the marks expected to the spread of what is there by chance, (p − d)·√N/√(d·(1 − d))
+    /// of a shot with the mean number of marks; of a linear detector without a code, amplitude to
+    /// noise.
+    pub snr: f64,
+    /// Probability that a shot which is lit gives a return there.
+    pub pd: f64,
+    /// False returns per shot that meets nothing.
+    pub false_per_shot: f64,
+    /// Standard deviation of the range, m.
+    pub precision: f64,
+    /// The least that any unbiased estimate could have from as many photons, m: c/2·σ/√n, σ the
+    /// rms length of a micropulse with the jitter.
+    pub bound: f64,
+}
+
+impl<'a> Forecaster<'a> {
+    /// The sensor as it is.
+    pub fn new(design: &'a Design) -> Self {
+        Self { design, light: 1.0, background: 1.0 }
+    }
+
+    /// The same with so many times the light.
+    pub fn with_light(self, factor: f64) -> Self {
+        Self { light: self.light * factor, ..self }
+    }
+
+    /// The same with so many times the false edges.
+    pub fn with_background(self, factor: f64) -> Self {
+        Self { background: self.background * factor, ..self }
+    }
+
+    /// What it will measure of a target of `reflectance` at `range` metres.
+    pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
+        let design = self.design;
+        let detector = &design.detector;
+        let codebook = &design.coding.codebook;
+        let derived = design.derived();
+        let detected = self.light * Link::of(design).photons(reflectance, range);
+        let weights = weights(design);
+        let mean_weight = codebook.mean_weight();
+
+        let false_rate = self.background * detector.false_rate();
+        let photon_rate = detected * mean_weight / derived.pixel_period;
+        let falling = match detector {
+            Detector::Geiger(_) => false_rate + photon_rate,
+            _ => 0.0,
+        };
+        let edge = mark_pd(detector, detected, falling);
+        let false_edges = match detector {
+            Detector::Geiger(geiger) => false_rate * super::detection::armed(geiger, falling),
+            _ => false_rate,
+        };
+        // Edges that share a tick keep a single converter busy.
+        let tick = s_from_fs(design.tdc.tick_fs);
+        let own = edge * mean_weight / derived.pixel_period;
+        let edges = -libm::expm1(-(false_edges + own) * tick) / tick;
+        let loss = bank_loss(&design.tdc, edges);
+        let place = matched::Place::of(design);
+        // Where the bank is overrun, all is lit until the last converter is taken: what is lost
+        // then makes the rest no clearer.
+        let density = -libm::expm1(-(false_edges + own) * place.width);
+        let seen = edge * place.share * (1.0 - loss);
+        let mark_pd = 1.0 - (1.0 - seen) * (1.0 - density);
+
+        let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
+        let (pd, false_per_shot) = match design.is_coded() {
+            true => {
+                let without = -libm::expm1(-false_edges * place.width);
+                matched::chances(design, &weights, (mark_pd, density, without))
+            }
+            false => first(design, mark_pd, false_edges, range),
+        };
+        let spread = (density * (1.0 - density)).max(f64::MIN_POSITIVE).sqrt();
+        let timing = matched::Timing::of(design, detected);
+        let marks_seen = (mean_weight * seen).max(1.0);
+        let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
+        Forecast {
+            range,
+            reflectance,
+            photons_per_shot: detected * mean_weight / efficiency,
+            detected_per_mark: detected,
+            mark_pd,
+            bank_loss: loss,
+            density,
+            snr: match detector {
+                Detector::Linear(linear) if !design.is_coded() => detected / linear.noise,
+                _ => (mark_pd - density) * mean_weight.sqrt() / spread,
+            },
+            pd,
+            false_per_shot,
+            precision: timing.precision(marks_seen),
+            bound: SPEED_OF_LIGHT / 2.0 * timing.spread / photons.sqrt(),
+        }
+    }
+
+    /// The factor on the light that gives probability `pd` to a target of `reflectance` at `range`
+    /// metres; `None` where 10⁹ times the light would not.
+    pub fn light_needed(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
+        let enough = |factor: f64| self.with_light(factor).forecast(reflectance, range).pd >= pd;
+        bisect(1e-9, 1e9, enough)
+    }
+
+    /// The factor on the background that still leaves probability `pd` to a target of
+    /// `reflectance` at `range` metres; `None` where not even 10⁻¹² of it does.
+    pub fn background_bearable(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
+        let bears = |divisor: f64| {
+            self.with_background(1.0 / divisor).forecast(reflectance, range).pd >= pd
+        };
+        bisect(1e-6, 1e12, bears).map(|divisor| 1.0 / divisor)
+    }
+
+    /// The farthest range, m, at which a target of `reflectance` is seen with probability `pd`;
+    /// `None` where it is not seen at the nearest.
+    pub fn reach(&self, pd: f64, reflectance: f64) -> Option<f64> {
+        let scan = &self.design.scan;
+        let (nearest, farthest) = (scan.min_range.max(0.1), 20.0 * scan.max_range);
+        let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
+        match bisect(nearest, farthest, lost) {
+            Some(range) if range <= nearest => None,
+            found => Some(found.unwrap_or(farthest)),
+        }
+    }
+}
+
+/// The least number from `low` to `high` of which `holds` is true, to a part in a million, if it
+/// is false below and true above; `None` where it is not even true of `high`.
+fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    if holds(low) {
+        return Some(low);
+    }
+    if !holds(high) {
+        return None;
+    }
+    let (mut low, mut high) = (low, high);
+    while high / low > 1.0 + 1e-6 {
+        let middle = (low * high).sqrt();
+        if holds(middle) { high = middle } else { low = middle }
+    }
+    Some(high)
+}
+
+/// How many labels have so many marks, dark ones left out.
+fn weights(design: &Design) -> BTreeMap<usize, usize> {
+    let mut weights = BTreeMap::new();
+    for weight in design.coding.codebook.weights().filter(|&weight| weight > 0) {
+        *weights.entry(weight).or_insert(0) += 1;
+    }
+    weights
+}
+
+/// The chances of a sensor that takes the first edge in its gate: a target is seen if nothing
+/// came before it, exp(−K), K the false edges until then.
+fn first(design: &Design, seen: f64, false_edges: f64, range: f64) -> (f64, f64) {
+    let since = |range: f64| tof_from_range(range) - tof_from_range(design.scan.min_range);
+    let nothing_before = libm::exp(-false_edges * since(range).max(0.0));
+    (seen * nothing_before, -libm::expm1(-false_edges * since(design.scan.max_range)))
+}

@@ -1,0 +1,205 @@
+//! What the matched receiver makes of ticks, in closed form.
+//!
+//! It believes the best of L lags if chance would not light so many of its N marks at any: the
+//! least k with L·P(Bin(N, d) ≥ k) ≤ α. d is the share of lit places in the gate or, if that is
+//! more, around the k marks, which count as well: chance finds most where there is most. Shots
+//! that meet the same range do not overlap.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use crate::design::{Design, Detector};
+use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+
+/// rms length of a Gaussian over its full width at half maximum.
+const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
+
+/// The light around a macropulse is counted in stretches of so many ticks, and reaches beyond it by
+/// one of them on average.
+const AROUND: f64 = 1024.0;
+
+/// Terms of the sum over harmonics of a tick.
+const HARMONICS: u32 = 16;
+
+/// Where the receiver looks for a mark.
+pub(super) struct Place {
+    /// How long it looks, s.
+    pub width: f64,
+    /// Share of the edges of marks that fall within.
+    pub share: f64,
+}
+
+impl Place {
+    /// A tick where edges are exact, else one more than four deviations, rounded up.
+    pub fn of(design: &Design) -> Self {
+        let tick = s_from_fs(design.tdc.tick_fs);
+        let sigma = design.detector.jitter() / tick;
+        if !design.is_coded() || sigma <= 0.05 {
+            return Self { width: tick, share: 1.0 };
+        }
+        let ticks = 1.0 + (4.0 * sigma).ceil();
+        let half = ticks / 2.0 / (sigma * std::f64::consts::SQRT_2);
+        Self { width: ticks * tick, share: libm::erf(half) }
+    }
+}
+
+/// Probability of a return from a lit shot and from one that meets nothing, where each of its
+/// marks is found with probability `seen`, and a place in the gate is lit with probability
+/// `density`, by what is no shot's light with `false_density`; the mean over labels, of which so
+/// many have so many marks.
+pub(super) fn chances(
+    design: &Design,
+    weights: &BTreeMap<usize, usize>,
+    (seen, density, false_density): (f64, f64, f64),
+) -> (f64, f64) {
+    let gate = Gate::of(design);
+    let labels: usize = weights.values().sum();
+    let mut sums = (0.0, 0.0);
+    for (&marks, &count) in weights {
+        let least = gate.least_marks(marks, (density, false_density));
+        let share = count as f64 / labels as f64;
+        sums.0 += share * binomial_tail(marks, seen, least);
+        sums.1 += share * (gate.lags * binomial_tail(marks, density, least)).min(1.0);
+    }
+    sums
+}
+
+/// What the threshold depends on beside the light.
+struct Gate {
+    /// Places at which a macropulse may begin.
+    lags: f64,
+    /// What each mark found adds to the share of lit places around it.
+    own: f64,
+    /// False returns accepted.
+    false_alarm: f64,
+}
+
+impl Gate {
+    fn of(design: &Design) -> Self {
+        let (nearest, farthest) = design.receiver.gate_ticks;
+        let chips = i64::from(design.coding.codebook.chips());
+        let around =
+            s_from_fs(chips * design.coding.chip_fs) + AROUND * s_from_fs(design.tdc.tick_fs);
+        Self {
+            lags: f64::from(farthest - nearest) + 1.0,
+            own: Place::of(design).width / around,
+            false_alarm: design.receiver.false_alarm,
+        }
+    }
+
+    /// The fewest of `marks` that are believed; one more than there are if none will do.
+    fn least_marks(&self, marks: usize, (density, false_density): (f64, f64)) -> usize {
+        let rare = |&least: &usize| {
+            // Some of the marks are lit by ticks that others have made.
+            let ticks = (least as f64 - marks as f64 * density).max(0.0);
+            let around = (false_density + self.own * ticks).clamp(density, 1.0);
+            self.lags * binomial_tail(marks, around, least) <= self.false_alarm
+        };
+        (1..=marks).find(rare).unwrap_or(marks + 1)
+    }
+}
+
+/// P(Bin(`marks`, `share`) ≥ `least`), the incomplete beta function in disguise, summed from the
+/// smaller side.
+pub(super) fn binomial_tail(marks: usize, share: f64, least: usize) -> f64 {
+    if least == 0 || share >= 1.0 {
+        return if least <= marks { 1.0 } else { 0.0 };
+    }
+    if least > marks || share <= 0.0 {
+        return 0.0;
+    }
+    let n = marks as f64;
+    let of = |k: usize| {
+        let k = k as f64;
+        let choose = libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
+        libm::exp(choose + k * share.ln() + (n - k) * libm::log1p(-share))
+    };
+    if (least as f64) < n * share {
+        return 1.0 - (0..least).map(of).sum::<f64>();
+    }
+    (least..=marks).rev().map(of).sum()
+}
+
+/// How well a mark is timed.
+pub(super) struct Timing {
+    /// rms length of a micropulse with the jitter, s.
+    pub spread: f64,
+    /// Standard deviation of an edge, in ticks.
+    sigma: f64,
+    /// Length of a tick, s.
+    tick: f64,
+}
+
+impl Timing {
+    /// Timing of marks of which `detected` photons are detected.
+    pub fn of(design: &Design, detected: f64) -> Self {
+        let tick = s_from_fs(design.tdc.tick_fs);
+        let jitter = match &design.detector {
+            Detector::Linear(linear) => linear.timing(detected),
+            other => other.jitter(),
+        };
+        let spread = libm::hypot(design.light.pulse * RMS_OF_FWHM, jitter);
+        let sigma = match &design.detector {
+            Detector::FirstFiring(_) => spread,
+            _ => jitter,
+        };
+        Self { spread, sigma: sigma / tick, tick }
+    }
+
+    /// Standard deviation, m, of the range from the mean of `marks` edges.
+    ///
+    /// Edges are rounded down to ticks, and jitter σ (in ticks) dithers them: of the variance
+    /// 1/12 of rounding, B = Σ_m exp(−4π²m²σ²)/(2π²m²) is common to all marks, and the rest is
+    /// averaged with the jitter: B + (σ² + 1/12 − B)/k \[WKL96\].
+    pub fn precision(&self, marks: f64) -> f64 {
+        let harmonic = |m: u32| {
+            let m = f64::from(m) * PI;
+            libm::exp(-4.0 * (m * self.sigma).powi(2)) / (2.0 * m * m)
+        };
+        // What lies beyond the harmonics that are summed, where they do not die out by themselves.
+        let common: f64 = match self.sigma {
+            0.0 => 1.0 / 12.0,
+            _ => (1..=HARMONICS).map(harmonic).sum(),
+        };
+        let own = self.sigma.powi(2) + 1.0 / 12.0 - common;
+        let ticks = (common + own.max(0.0) / marks).sqrt();
+        SPEED_OF_LIGHT / 2.0 * self.tick * ticks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn the_tail_is_that_of_the_binomial() {
+        assert_relative_eq!(binomial_tail(10, 0.5, 7), 176.0 / 1024.0, max_relative = 1e-12);
+        assert_relative_eq!(binomial_tail(10, 0.5, 3), 968.0 / 1024.0, max_relative = 1e-12);
+        assert_eq!(binomial_tail(10, 0.5, 0), 1.0);
+        assert_eq!(binomial_tail(10, 0.5, 11), 0.0);
+        assert_eq!((binomial_tail(9, 1.0, 9), binomial_tail(9, 0.0, 1)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn the_least_marks_are_rare_and_one_fewer_is_not() {
+        let gate = Gate { lags: 4e5, own: 0.0, false_alarm: 1e-6 };
+        let least = gate.least_marks(180, (0.01, 0.0));
+        assert!(4e5 * binomial_tail(180, 0.01, least) <= 1e-6);
+        assert!(4e5 * binomial_tail(180, 0.01, least - 1) > 1e-6);
+        assert_eq!(gate.least_marks(5, (0.5, 0.5)), 6);
+        // The marks that are found make the light around denser.
+        assert!(Gate { own: 1e-3, ..gate }.least_marks(180, (0.01, 0.01)) > least);
+    }
+
+    #[test]
+    fn rounding_alone_has_the_variance_of_a_twelfth() {
+        let timing = |sigma| Timing { spread: 0.0, sigma, tick: 2.0 / SPEED_OF_LIGHT };
+        let rounding = 12_f64.sqrt().recip();
+        assert_relative_eq!(timing(0.0).precision(100.0), rounding, max_relative = 1e-12);
+        assert_relative_eq!(timing(1e-3).precision(1e9), rounding, max_relative = 0.02);
+        // Jitter of many ticks is averaged, and rounding with it.
+        let wide = (100.0 + 1.0 / 12.0_f64).sqrt() / 10.0;
+        assert_relative_eq!(timing(10.0).precision(100.0), wide, max_relative = 1e-12);
+    }
+}

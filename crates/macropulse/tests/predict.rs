@@ -1,0 +1,319 @@
+//! Theory beside simulation: what `predict` says of a target, and what a scan of it gives.
+//!
+//! The sensor stands at the centre of a hollow sphere, so that every shot meets the same surface
+//! square on at the same range.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use macropulse::channel::Echoes;
+use macropulse::design::{Design, Detector};
+use macropulse::detect::{Detectors, Memory};
+use macropulse::emit::{Band, ShotLog, bands};
+use macropulse::points::Outcome;
+use macropulse::predict::Forecaster;
+use macropulse::predict::detection::{armed, bank_loss, mark_pd};
+use macropulse::random::Chance;
+use macropulse::scene::Scene;
+use macropulse::sim::{self, Scan};
+use macropulse::tdc;
+
+/// Chance of a false alarm in each comparison of this file.
+const ALPHA: f64 = 1e-4;
+
+fn sensor(name: &str, set: &[(&str, &str)]) -> Design {
+    let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    Design::open(name, &set.iter().map(owned).collect::<Vec<_>>()).unwrap()
+}
+
+/// A hollow sphere of a matt material about the sensor.
+fn room(range: f64, reflectance: f64) -> Scene {
+    let text = format!(
+        "version = 1\n[[material]]\nname = \"paint\"\ndiffuse = {reflectance}\n\
+         [[object]]\nshape.sphere.radius_m = {range}\nmaterial = \"paint\"\n"
+    );
+    Scene::from_toml(&text, "room", Path::new("")).unwrap()
+}
+
+/// Some `count` bands of one scan, spread over it.
+fn measure(design: &Design, scene: &Scene, seed: u64, count: usize) -> Scan {
+    let all: Vec<Band> = bands(design, 0).collect();
+    let part: Vec<Band> = all.iter().step_by(all.len().div_ceil(count)).copied().collect();
+    sim::scan_part(design, scene, seed, &part)
+}
+
+/// Whether `count` of `trials` may well have come with probability `share`: neither tail of the
+/// binomial distribution beyond it is below half of [`ALPHA`].
+fn agrees(count: u64, trials: u64, share: f64) -> bool {
+    if share <= 0.0 || share >= 1.0 {
+        return count as f64 == trials as f64 * share.clamp(0.0, 1.0);
+    }
+    let (k, n) = (count as f64, trials as f64);
+    let log_choose = libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
+    let at = (log_choose + k * share.ln() + (n - k) * (-share).ln_1p()).exp();
+    // Away from the mean terms only fall.
+    let tail = |step: f64| {
+        let (mut term, mut sum, mut j) = (at, 0.0, k);
+        while term > sum * 1e-12 && (0.0..=n).contains(&j) {
+            sum += term;
+            term *= match step > 0.0 {
+                true => share / (1.0 - share) * (n - j) / (j + 1.0),
+                false => (1.0 - share) / share * j / (n - j + 1.0),
+            };
+            j += step;
+        }
+        sum
+    };
+    let outwards = if k > n * share { 1.0 } else { -1.0 };
+    tail(outwards) > ALPHA / 2.0
+}
+
+#[test]
+fn the_comparison_knows_the_binomial() {
+    assert!(agrees(50, 100, 0.5) && agrees(0, 100, 1e-9) && agrees(35, 100, 0.5));
+    assert!(!agrees(75, 100, 0.5) && !agrees(25, 100, 0.5) && !agrees(3, 1000, 1e-6));
+}
+
+/// Pixels whose shot gave a return of its own target, and those with an echo.
+fn detected(scan: &Scan) -> (u64, u64) {
+    let score = &scan.score;
+    (score.count(Outcome::Right) + score.count(Outcome::Near), score.with_echo())
+}
+
+/// N = 1694 lit shots in each case, seed 1. Control: the forecast for twice the light is rejected
+/// wherever detection is neither certain nor hopeless.
+#[test]
+fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
+    let hopeless = [("sun.sky", "\"day\"")];
+    let night = [("sun.sky", "\"night\"")];
+    let strip = [("optics.field", "\"in-flight\"")];
+    let mut graded = 0;
+    for (name, set) in [("as it is", hopeless), ("at night", night), ("a strip", strip)] {
+        let set = [&set[..], &[("receiver.effort", "\"thorough\"")]].concat();
+        let design = sensor("kim-park-2016-physical", &set);
+        for range in [10.0, 20.0, 50.0, 150.0] {
+            let forecaster = Forecaster::new(&design);
+            let predicted = forecaster.forecast(1.0, range).pd;
+            let (found, shots) = detected(&measure(&design, &room(range * 0.9999, 1.0), 1, 1));
+            assert!(
+                agrees(found, shots, predicted),
+                "{name}, {range} m: {found} of {shots}, predicted {predicted}"
+            );
+            if set[0] == hopeless[0] {
+                assert_eq!(found, 0, "{range} m: sunlight in every chip");
+            }
+            if (0.001..0.999).contains(&predicted) {
+                let brighter = forecaster.with_light(2.0).forecast(1.0, range).pd;
+                assert!(!agrees(found, shots, brighter), "{name}, {range} m: {brighter}");
+                graded += 1;
+            }
+        }
+    }
+    assert!(graded >= 2, "{graded} cases can tell right from wrong");
+}
+
+/// The first band of a sensor, an echo of `photons` detected per mark from 20 m for every shot.
+fn lit(design: &Design, photons: f64) -> (ShotLog, Echoes) {
+    let log = bands(design, 0).next().unwrap().shot_log(design);
+    let echoes = Echoes {
+        shot: (0..log.len() as u32).collect(),
+        delay_fs: vec![133_426_000; log.len()],
+        photons: vec![photons; log.len()],
+    };
+    (log, echoes)
+}
+
+/// A sensor with the detector written in `lines`, without any false edge worth the name.
+fn with_detector(lines: &str) -> Design {
+    let text = format!(
+        "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
+         idealised = [\"detector-bandwidth\", \"footprint\", \"inter-chip\", \
+         \"mirror-motion\"]\n[sun]\nsky = \"night\"\n{lines}"
+    );
+    Design::from_toml(&text, "mine", Path::new(""), &[]).unwrap()
+}
+
+/// N = 310 000 marks for each of nine signals from 10⁻³ to 10 photons, seed 2. Control: the
+/// prediction for a tenth more light is rejected in most cases.
+#[test]
+fn marks_are_seen_as_predicted_over_four_decades_of_light() {
+    let detectors = [
+        "[detector.photon-counting]\nefficiency = 0.25\nmissed_marks = 0.1\njitter_ps = 0.0",
+        "[detector.geiger]\nefficiency = 0.25\ncells = 1000000\ndead_time_ns = 5.0",
+        "[detector.linear]\nefficiency = 0.8\ngain = 100.0\nionisation_ratio = 0.02\n\
+         bandwidth_mhz = 176000.0\namplifier_pa_rthz = 20.0\nfalse_alarm_hz = 1.0",
+    ];
+    for lines in detectors {
+        let design = with_detector(lines);
+        // A linear detector takes as many photons as its threshold.
+        let unit = match &design.detector {
+            Detector::Linear(linear) => linear.threshold / 3.0,
+            _ => 1.0,
+        };
+        let (mut told_apart, mut some) = (0, 0);
+        for step in 0..9 {
+            let photons = unit * 10_f64.powf(-3.0 + 0.5 * f64::from(step));
+            let (log, echoes) = lit(&design, photons);
+            let marks: u64 = log
+                .label
+                .iter()
+                .zip(&log.word)
+                .map(|(&label, &word)| design.coding.codebook.marks(label, word).len() as u64)
+                .sum();
+            let detectors = Detectors::new(&design, Chance::new(2));
+            let found = detectors.edges(&log, &echoes, &mut Memory::default());
+            // Several photons of one mark are one tick.
+            let edges = tdc::ticks(&design, found).tick.len() as u64;
+            let predicted = mark_pd(&design.detector, photons, 0.0);
+            assert!(
+                agrees(edges, marks, predicted),
+                "{lines}: {photons} photons, {edges} of {marks}, predicted {predicted}"
+            );
+            let brighter = mark_pd(&design.detector, 1.1 * photons, 0.0);
+            some += u32::from((1e-4..0.9999).contains(&predicted));
+            told_apart += u32::from(!agrees(edges, marks, brighter));
+        }
+        assert!(some >= 3 && told_apart + 1 >= some.min(5), "{lines}: {told_apart} of {some}");
+    }
+}
+
+/// Dark counts alone, N some 10⁵, seed 3. Control: the rate without dead time is rejected.
+#[test]
+fn blind_cells_lose_what_is_predicted() {
+    for (cells, rate) in [(1, 1e8), (4, 1e9), (64, 1e10)] {
+        let design = with_detector(&format!(
+            "[detector.geiger]\nefficiency = 0.25\ncells = {cells}\ndead_time_ns = 10.0\n\
+             dark_counts_hz = {rate}"
+        ));
+        let Detector::Geiger(geiger) = &design.detector else { panic!("it was asked for") };
+        let mut edges = 0;
+        let mut seconds = 0.0;
+        for band in bands(&design, 0).take(8) {
+            let log = band.shot_log(&design);
+            let detectors = Detectors::new(&design, Chance::new(3));
+            let found = detectors.edges(&log, &Echoes::default(), &mut Memory::default());
+            edges += found.time.len();
+            let lasts = log.fired_at_fs[log.len() - 1] - log.fired_at_fs[0] + design.reach_fs();
+            seconds += lasts as f64 * 1e-15;
+        }
+        let predicted = rate * armed(geiger, rate) * seconds;
+        // A renewal process with a dead time is no more irregular than Poisson.
+        let deviations = (edges as f64 - predicted).abs() / predicted.sqrt();
+        assert!(deviations < 3.9, "{cells} cells: {edges}, predicted {predicted}");
+        let blindless = rate * seconds;
+        assert!((edges as f64 - blindless).abs() / blindless.sqrt() > 10.0);
+    }
+}
+
+/// N = 150 000 edges, seed 4. Control: one converter more is rejected.
+#[test]
+fn a_small_bank_loses_what_erlang_says() {
+    for converters in [1, 3, 6] {
+        let count = converters.to_string();
+        let design = sensor(
+            "kim-park-2016",
+            &[
+                ("tdc.converters", count.as_str()),
+                ("detector.photon-counting.dark_counts_hz", "1e9"),
+            ],
+        );
+        let (mut edges, mut lost) = (0, 0);
+        for band in bands(&design, 0).take(4) {
+            let log = band.shot_log(&design);
+            let detectors = Detectors::new(&design, Chance::new(4));
+            let found = detectors.edges(&log, &Echoes::default(), &mut Memory::default());
+            let ticks = tdc::ticks(&design, found);
+            edges += ticks.tick.len() as u64 + ticks.lost;
+            lost += ticks.lost;
+        }
+        let mut bank = design.tdc.clone();
+        // Losses come in runs: so many independent ones are in the count.
+        let independent = edges / 10;
+        assert!(
+            agrees(lost / 10, independent, bank_loss(&bank, 1e9)),
+            "{converters}: {lost} of {edges}, predicted {}",
+            bank_loss(&bank, 1e9)
+        );
+        bank.converters += 1;
+        assert!(!agrees(lost / 10, independent, bank_loss(&bank, 1e9)), "{converters}");
+    }
+}
+
+/// N = 5000 pixels on a wall, which meet all phases of a tick; seed 1. A standard deviation from so
+/// many is known to 1 %. Control: rounding alone, and jitter alone, are rejected.
+#[test]
+fn range_is_as_precise_as_predicted() {
+    let wall = Scene::open("wall").unwrap();
+    let spread = |jitter: &str| {
+        let set = [
+            ("detector.photon-counting.jitter_ps", jitter),
+            ("detector.photon-counting.dark_counts_hz", "0.0"),
+        ];
+        let design = sensor("kim-park-2016-fixed", &set);
+        let cloud = measure(&design, &wall, 1, 3).cloud;
+        let truth = &cloud.truth;
+        let right = (0..truth.range.len()).filter(|&i| truth.outcome[i] == Outcome::Right);
+        let error = |i| f64::from(cloud.range[i]) - f64::from(truth.range[i]);
+        let errors: Vec<f64> = right.map(error).collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        let square = errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>();
+        let forecast = Forecaster::new(&design).forecast(1.0, 50.0);
+        assert!(forecast.bound < forecast.precision);
+        ((square / errors.len() as f64).sqrt(), forecast.precision)
+    };
+    let (rounding, _) = spread("0.0");
+    for jitter in ["0.0", "0.3", "0.5"] {
+        let (measured, predicted) = spread(jitter);
+        assert!((measured / predicted - 1.0).abs() < 0.04, "{jitter} ps: {measured}, {predicted}");
+        let differs = (measured / rounding - 1.0).abs() > 0.04;
+        assert_eq!(differs, jitter != "0.0", "{jitter} ps");
+    }
+    // Where jitter is wide, the receiver's choice of a window costs it some of what is predicted.
+    let (measured, predicted) = spread("2.5");
+    assert!((1.0..1.3).contains(&(measured / predicted)), "{measured}, {predicted}");
+}
+
+/// N = 1696 shots into the open, seed 1: the threshold is a bound, since the lags of a gate are
+/// not independent. Control: a receiver that accepts ten times as much breaks it.
+#[test]
+fn false_returns_stay_below_what_is_predicted() {
+    let sky = "version = 1\n[[object]]\nshape.sphere.radius_m = 1\nposition_m = [-50, 0, 0]\n";
+    let sky = Scene::from_toml(sky, "sky", Path::new("")).unwrap();
+    let run = |alarm: &str| {
+        let set = [
+            ("detector.photon-counting.jitter_ps", "0.0"),
+            ("detector.photon-counting.dark_counts_hz", "1e10"),
+            ("receiver.false_alarm", alarm),
+            ("receiver.effort", "\"thorough\""),
+            ("scan.max_range_m", "60"),
+        ];
+        let design = sensor("kim-park-2016-fixed", &set);
+        let forecast = Forecaster::new(&design).forecast(1e-9, 50.0);
+        let scan = measure(&design, &sky, 1, 1);
+        let found = scan.score.count(Outcome::False);
+        (found, scan.tally.shots, forecast.false_per_shot)
+    };
+    let (found, shots, strict) = run("0.02");
+    assert!(found as f64 <= shots as f64 * strict || agrees(found, shots, strict));
+    let (found, shots, lax) = run("0.2");
+    assert!(found as f64 <= shots as f64 * lax || agrees(found, shots, lax));
+    assert!(found as f64 > shots as f64 * strict && !agrees(found, shots, strict));
+}
+
+/// N = 133 000 and 4096 shots, seed 5: a detector that fires once is blind after a false firing.
+/// Control: without the false firings before the target the prediction is rejected.
+#[test]
+fn noise_before_the_target_costs_a_single_firing() {
+    for (name, range, rate) in [("hdl-64e", 60.0, "2e5"), ("peregrine", 40.0, "1e6")] {
+        let set = [("detector.first-firing.false_firing_hz", rate)];
+        let design = sensor(name, &set);
+        let forecast = Forecaster::new(&design).forecast(0.5, range);
+        let (found, shots) = detected(&measure(&design, &room(range, 0.5), 5, usize::MAX));
+        assert!(
+            agrees(found, shots, forecast.pd),
+            "{name}: {found} of {shots}, predicted {}",
+            forecast.pd
+        );
+        assert!(!agrees(found, shots, forecast.mark_pd), "{name}");
+    }
+}
