@@ -1,5 +1,6 @@
 //! The command line of Macropulse: one file per subcommand.
 
+mod budget;
 mod check;
 mod completions;
 mod encode;
@@ -39,6 +40,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Sensors(sensors) => sensors::run(sensors),
         Command::Scenes(scenes) => scenes::run(scenes),
         Command::Check(check) => check::run(check, common),
+        Command::Budget(budget) => budget::run(budget, common),
         Command::Encode(encode) => encode::run(encode),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),

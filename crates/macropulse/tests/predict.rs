@@ -268,6 +268,18 @@ fn range_is_as_precise_as_predicted() {
         let differs = (measured / rounding - 1.0).abs() > 0.04;
         assert_eq!(differs, jitter != "0.0", "{jitter} ps");
     }
+    for (name, range) in [("hdl-64e", 50.0), ("peregrine", 40.0)] {
+        let design = sensor(name, &[]);
+        let cloud = measure(&design, &room(range, 0.5), 6, usize::MAX).cloud;
+        let seen = cloud.range.iter().filter(|range| !range.is_nan());
+        let errors = seen.map(|seen| f64::from(*seen) - range);
+        // Firings of noise are no measurement of this target.
+        let errors: Vec<f64> = errors.filter(|error| error.abs() < 0.35).collect();
+        let square = errors.iter().map(|error| error * error).sum::<f64>();
+        let measured = (square / errors.len() as f64).sqrt();
+        let predicted = Forecaster::new(&design).forecast(0.5, range).precision;
+        assert!((measured / predicted - 1.0).abs() < 0.05, "{name}: {measured}, {predicted}");
+    }
     // Where jitter is wide, the receiver's choice of a window costs it some of what is predicted.
     let (measured, predicted) = spread("2.5");
     assert!((1.0..1.3).contains(&(measured / predicted)), "{measured}, {predicted}");

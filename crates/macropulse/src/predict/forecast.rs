@@ -12,9 +12,13 @@ use crate::design::{Design, Detector};
 use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 
 /// A sensor, perhaps with more or less light than it has.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Forecaster<'a> {
     design: &'a Design,
+    pixel_period: f64,
+    /// How many labels have so many marks, dark ones left out.
+    weights: BTreeMap<usize, usize>,
+    mean_weight: f64,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the false edges of detector and background.
@@ -40,8 +44,7 @@ pub struct Forecast {
     /// Probability that a place in the gate is lit by something else.
     pub density: f64,
     /// Ratio of the marks expected to the spread of what is there by chance, (p − d)·√N/√(d·(1 − d))
-    /// of a shot with the mean number of marks; of a linear detector without a code, amplitude to
-    /// noise.
+    /// of a shot with the mean number of marks; without a code, photons to their noise.
     pub snr: f64,
     /// Probability that a shot which is lit gives a return there.
     pub pd: f64,
@@ -57,31 +60,34 @@ pub struct Forecast {
 impl<'a> Forecaster<'a> {
     /// The sensor as it is.
     pub fn new(design: &'a Design) -> Self {
-        Self { design, light: 1.0, background: 1.0 }
+        let codebook = &design.coding.codebook;
+        let mut weights = BTreeMap::new();
+        for weight in codebook.weights().filter(|&weight| weight > 0) {
+            *weights.entry(weight).or_insert(0) += 1;
+        }
+        let pixel_period = design.scan_period() / design.shots_per_scan() as f64;
+        let mean_weight = codebook.mean_weight();
+        Self { design, pixel_period, weights, mean_weight, light: 1.0, background: 1.0 }
     }
 
     /// The same with so many times the light.
-    pub fn with_light(self, factor: f64) -> Self {
-        Self { light: self.light * factor, ..self }
+    pub fn with_light(&self, factor: f64) -> Self {
+        Self { light: self.light * factor, ..self.clone() }
     }
 
     /// The same with so many times the false edges.
-    pub fn with_background(self, factor: f64) -> Self {
-        Self { background: self.background * factor, ..self }
+    pub fn with_background(&self, factor: f64) -> Self {
+        Self { background: self.background * factor, ..self.clone() }
     }
 
     /// What it will measure of a target of `reflectance` at `range` metres.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
         let design = self.design;
         let detector = &design.detector;
-        let codebook = &design.coding.codebook;
-        let derived = design.derived();
+        let (pixel_period, mean_weight) = (self.pixel_period, self.mean_weight);
         let detected = self.light * Link::of(design).photons(reflectance, range);
-        let weights = weights(design);
-        let mean_weight = codebook.mean_weight();
-
         let false_rate = self.background * detector.false_rate();
-        let photon_rate = detected * mean_weight / derived.pixel_period;
+        let photon_rate = detected * mean_weight / pixel_period;
         let falling = match detector {
             Detector::Geiger(_) => false_rate + photon_rate,
             _ => 0.0,
@@ -93,7 +99,7 @@ impl<'a> Forecaster<'a> {
         };
         // Edges that share a tick keep a single converter busy.
         let tick = s_from_fs(design.tdc.tick_fs);
-        let own = edge * mean_weight / derived.pixel_period;
+        let own = edge * mean_weight / pixel_period;
         let edges = -libm::expm1(-(false_edges + own) * tick) / tick;
         let loss = bank_loss(&design.tdc, edges);
         let place = matched::Place::of(design);
@@ -107,7 +113,7 @@ impl<'a> Forecaster<'a> {
         let (pd, false_per_shot) = match design.is_coded() {
             true => {
                 let without = -libm::expm1(-false_edges * place.width);
-                matched::chances(design, &weights, (mark_pd, density, without))
+                matched::chances(design, &self.weights, (mark_pd, density, without))
             }
             false => first(design, mark_pd, false_edges, range),
         };
@@ -124,7 +130,7 @@ impl<'a> Forecaster<'a> {
             bank_loss: loss,
             density,
             snr: match detector {
-                Detector::Linear(linear) if !design.is_coded() => detected / linear.noise,
+                _ if !design.is_coded() => detected / noise_of_one(detector, detected),
                 _ => (mark_pd - density) * mean_weight.sqrt() / spread,
             },
             pd,
@@ -180,13 +186,13 @@ fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     Some(high)
 }
 
-/// How many labels have so many marks, dark ones left out.
-fn weights(design: &Design) -> BTreeMap<usize, usize> {
-    let mut weights = BTreeMap::new();
-    for weight in design.coding.codebook.weights().filter(|&weight| weight > 0) {
-        *weights.entry(weight).or_insert(0) += 1;
+/// The noise of an amplitude of `photons`, rms.
+fn noise_of_one(detector: &Detector, photons: f64) -> f64 {
+    match detector {
+        Detector::Linear(linear) => (photons * linear.excess + linear.noise.powi(2)).sqrt(),
+        Detector::FirstFiring(firing) => (photons + firing.noise_photons.powi(2)).sqrt(),
+        Detector::PhotonCounting(_) | Detector::Geiger(_) => photons.sqrt(),
     }
-    weights
 }
 
 /// The chances of a sensor that takes the first edge in its gate: a target is seen if nothing

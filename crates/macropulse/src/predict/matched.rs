@@ -8,7 +8,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use crate::design::{Design, Detector};
+use super::detection::normal_tail;
+use crate::design::{Design, Detector, FirstFiring};
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
 
 /// rms length of a Gaussian over its full width at half maximum.
@@ -17,6 +18,9 @@ const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
 /// The light around a macropulse is counted in stretches of so many ticks, and reaches beyond it by
 /// one of them on average.
 const AROUND: f64 = 1024.0;
+
+/// The walk of a firing is calibrated up to this share of the pulse.
+const LATEST: f64 = 0.99;
 
 /// Terms of the sum over harmonics of a tick.
 const HARMONICS: u32 = 16;
@@ -89,13 +93,18 @@ impl Gate {
 
     /// The fewest of `marks` that are believed; one more than there are if none will do.
     fn least_marks(&self, marks: usize, (density, false_density): (f64, f64)) -> usize {
-        let rare = |&least: &usize| {
+        let is_common = |least: usize| {
             // Some of the marks are lit by ticks that others have made.
             let ticks = (least as f64 - marks as f64 * density).max(0.0);
             let around = (false_density + self.own * ticks).clamp(density, 1.0);
-            self.lags * binomial_tail(marks, around, least) <= self.false_alarm
+            self.lags * binomial_tail(marks, around, least) > self.false_alarm
         };
-        (1..=marks).find(rare).unwrap_or(marks + 1)
+        let (mut common, mut rare) = (0, marks + 1);
+        while rare - common > 1 {
+            let middle = usize::midpoint(common, rare);
+            if is_common(middle) { common = middle } else { rare = middle }
+        }
+        rare
     }
 }
 
@@ -109,15 +118,22 @@ pub(super) fn binomial_tail(marks: usize, share: f64, least: usize) -> f64 {
         return 0.0;
     }
     let n = marks as f64;
-    let of = |k: usize| {
-        let k = k as f64;
-        let choose = libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
-        libm::exp(choose + k * share.ln() + (n - k) * libm::log1p(-share))
-    };
-    if (least as f64) < n * share {
-        return 1.0 - (0..least).map(of).sum::<f64>();
+    let (k, odds) = (least as f64, share / (1.0 - share));
+    let choose = libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
+    let first = libm::exp(choose + k * share.ln() + (n - k) * libm::log1p(-share));
+    // Each term by the one before it, away from the mean.
+    if k < n * share {
+        let below = (1..=least).rev().scan(first, |term, k| {
+            *term *= k as f64 / (n - k as f64 + 1.0) / odds;
+            Some(*term)
+        });
+        return 1.0 - below.sum::<f64>();
     }
-    (least..=marks).rev().map(of).sum()
+    let above = (least..marks).scan(first, |term, k| {
+        *term *= odds * (n - k as f64) / (k as f64 + 1.0);
+        Some(*term)
+    });
+    first + above.sum::<f64>()
 }
 
 /// How well a mark is timed.
@@ -138,9 +154,12 @@ impl Timing {
             Detector::Linear(linear) => linear.timing(detected),
             other => other.jitter(),
         };
-        let spread = libm::hypot(design.light.pulse * RMS_OF_FWHM, jitter);
+        let rms = design.light.pulse * RMS_OF_FWHM;
+        let spread = libm::hypot(rms, jitter);
         let sigma = match &design.detector {
-            Detector::FirstFiring(_) => spread,
+            Detector::FirstFiring(firing) => {
+                libm::hypot(rms * firing_time(firing, detected), jitter)
+            }
             _ => jitter,
         };
         Self { spread, sigma: sigma / tick, tick }
@@ -165,6 +184,26 @@ impl Timing {
         let ticks = (common + own.max(0.0) / marks).sqrt();
         SPEED_OF_LIGHT / 2.0 * self.tick * ticks
     }
+}
+
+/// Standard deviation of the moment at which the m-th of n photons comes, in rms lengths of a
+/// Gaussian pulse: √m/(n·φ(z)), z = Φ⁻¹(m/n); m at most [`LATEST`] of n.
+fn firing_time(firing: &FirstFiring, photons: f64) -> f64 {
+    let needed = f64::from(firing.firing_photons);
+    let share = (needed / photons).min(LATEST);
+    let z = quantile(share);
+    let density = libm::exp(-z * z / 2.0) / (2.0 * PI).sqrt();
+    share / needed.sqrt() / density
+}
+
+/// Φ⁻¹(p), found by bisecting Q.
+fn quantile(p: f64) -> f64 {
+    let (mut low, mut high) = (-9.0, 9.0);
+    for _ in 0..50 {
+        let middle = (low + high) / 2.0;
+        if normal_tail(middle) > 1.0 - p { low = middle } else { high = middle }
+    }
+    low
 }
 
 #[cfg(test)]

@@ -6,5 +6,6 @@ pub mod link;
 mod matched;
 pub mod multiple_access;
 pub mod ranging;
+pub mod verdict;
 
 pub use forecast::{Forecast, Forecaster};

@@ -1,0 +1,114 @@
+//! `macropulse budget`: will it work, how far, and what fails first?
+
+mod figures;
+mod page;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use macropulse::design::Design;
+use macropulse::formats::write_atomically;
+use macropulse::predict::verdict::Wanted;
+
+use crate::fault::Fault;
+use crate::folder::Folder;
+use crate::options::{Changes, Common};
+use crate::text::{print, print_json};
+use figures::Figures;
+
+/// Work out the link budget of a sensor: photons, Pd, false points, precision, eye safety
+///
+/// Everything is closed form; the tests hold that simulation agrees. Says what fails first, by
+/// what factor, and what would be needed.
+#[derive(Args)]
+#[command(after_help = "Example:
+  macropulse budget kim-park-2016-physical -o out")]
+pub struct Budget {
+    /// A ready sensor, or a TOML file
+    #[arg(value_name = "NAME-or-FILE")]
+    sensor: String,
+
+    #[command(flatten)]
+    changes: Changes,
+
+    /// Range of the target, m; the sensor's own reach if not given
+    #[arg(long, value_name = "M", value_parser = positive)]
+    range: Option<f64>,
+
+    /// Reflectance of the target; 1 is white
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = positive)]
+    reflectance: f64,
+
+    /// Probability of a return that is wanted
+    #[arg(long, value_name = "SHARE", default_value_t = 0.9, value_parser = share)]
+    pd: f64,
+
+    /// False points per shot that are accepted
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-4, value_parser = share)]
+    false_points: f64,
+
+    /// Folder for budget.html, with the curves; without it only the text is printed
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+fn positive(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(value) if (1e-6..=1e6).contains(&value) => Ok(value),
+        _ => Err("must be a number between 0.000001 and 1000000".to_owned()),
+    }
+}
+
+fn share(typed: &str) -> Result<f64, String> {
+    match typed.parse() {
+        Ok(value) if (1e-12..1.0).contains(&value) => Ok(value),
+        _ => Err("must be a number between 0 and 1, as 0.9".to_owned()),
+    }
+}
+
+pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
+    let day = Design::open(&options.sensor, &options.changes.set)?;
+    let wanted = Wanted {
+        reflectance: options.reflectance,
+        range: options.range.unwrap_or(day.scan.reach),
+        pd: options.pd,
+        false_points: options.false_points,
+    };
+    let night = night(options, &day)?;
+    let figures = Figures::of(&day, &night, wanted);
+    if let Some(output) = &options.output {
+        let mut folder = Folder::claim(output)?;
+        folder.make()?;
+        let html = page::page(&figures).html();
+        write_atomically(&folder.path().join("budget.html"), |out| out.write_all(html.as_bytes()))?;
+        folder.keep();
+    }
+    if options.json {
+        return print_json(vec![figures.json()]);
+    }
+    if common.quiet {
+        return Ok(());
+    }
+    print(&figures.text())?;
+    match &options.output {
+        Some(output) => {
+            print(&format!("\n  curves      {}\n", output.join("budget.html").display()))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The sensor without the sun; the same where the sun is no part of it.
+fn night(options: &Budget, day: &Design) -> Result<Design, Fault> {
+    if day.budget.is_none() {
+        return Ok(day.clone());
+    }
+    let mut set = options.changes.set.clone();
+    set.retain(|(key, _)| key != "sun.sky");
+    set.push(("sun.sky".to_owned(), "\"night\"".to_owned()));
+    Ok(Design::open(&options.sensor, &set)?)
+}

@@ -1,0 +1,88 @@
+//! Link budgets from the command line.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod common;
+
+use common::Desk;
+
+fn json(line: &str) -> serde_json::Value {
+    let ran = Desk::new().run(line);
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+    serde_json::from_str(&ran.out).unwrap()
+}
+
+fn assert_about(value: &serde_json::Value, key: &str, expected: f64, tolerance: f64) {
+    let found = value[key].as_f64().unwrap();
+    assert!((found / expected - 1.0).abs() < tolerance, "{key}: {found}, expected {expected}");
+}
+
+#[test]
+fn the_paper_with_honest_light_has_the_numbers_of_its_budget() {
+    let budget = json("budget kim-park-2016-physical --json");
+    assert_about(&budget, "energy_per_macropulse_nj", 1.0, 0.02);
+    assert_about(&budget, "photons_per_macropulse", 21.7, 0.005);
+    assert_about(&budget, "photons_per_micropulse", 0.12, 0.01);
+    assert_about(&budget, "background_photons_per_chip", 947.0, 0.002);
+    assert_about(&budget, "single_pulse_ael_nj", 197.9, 0.001);
+    assert_about(&budget, "cw_ael_mw", 1.0, 0.003);
+    assert_about(&budget, "mark_by_mark_shortfall", 81.0, 0.01);
+    assert_eq!(budget["closes"], false);
+    assert_eq!(budget["first_failure"]["what"], "sunlight");
+    assert_eq!(budget["range_m"], 150.0);
+}
+
+#[test]
+fn at_night_and_square_on_nothing_but_the_slant_fails() {
+    let budget = json("budget kim-park-2016-physical --set sun.sky=night --json");
+    assert_eq!(budget["first_failure"]["what"], "slant");
+    assert!(budget["pd"].as_f64().unwrap() > 0.9);
+}
+
+#[test]
+fn a_sensor_declared_by_its_sensitivity_has_no_energy_to_tell() {
+    let budget = json("budget kim-park-2016 --json");
+    assert!(budget["energy_per_macropulse_nj"].is_null());
+    assert_about(&budget, "detected_per_micropulse", 4.605, 0.001);
+    assert_eq!(budget["closes"], true);
+    assert_eq!(budget["idealised"].as_array().unwrap().len(), 8);
+}
+
+#[test]
+fn the_curves_are_one_page() {
+    let desk = Desk::new();
+    let ran = desk.run("budget hdl-64e -o out");
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+    assert_eq!(desk.files(), ["out", "out/budget.html"]);
+    assert!(ran.out.contains("closes") && ran.out.contains("out/budget.html"), "{}", ran.out);
+    let page = std::fs::read_to_string(desk.path().join("out/budget.html")).unwrap();
+    assert_eq!(page.matches("<figure>").count(), 5);
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_a_reason() {
+    let cases = [
+        ("budget kim-park-2016-physical --range 0", "between 0.000001 and 1000000"),
+        ("budget kim-park-2016-physical --pd 1.5", "between 0 and 1"),
+        ("budget kim-park-2016-fysical", "did you mean `kim-park-2016-physical`"),
+        (
+            "budget kim-park-2016-physical --set light.energy={shot_nj=5.0}",
+            "class 1 allows 1.0056 nJ (the shots of one line)",
+        ),
+        ("budget kim-park-2016-physical --set light.wavelength_nm=1310", "no limit of class 1"),
+        ("budget kim-park-2016-physical --set optics.aperture_mm=nan", "optics.aperture_mm"),
+        (
+            "budget kim-park-2016 --set idealised=['link-budget','footprint','inter-chip','mirror-motion']",
+            "eye safety limits an energy",
+        ),
+        (
+            "budget peregrine --set idealised=['detector-bandwidth','footprint','inter-chip','mirror-motion']",
+            "needs [optics]",
+        ),
+    ];
+    for (line, reason) in cases {
+        let ran = Desk::new().run(line);
+        assert_eq!(ran.code, Some(2), "{line}");
+        assert!(ran.err.contains(reason), "{line}: {}", ran.err);
+    }
+}

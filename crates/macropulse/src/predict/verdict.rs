@@ -1,0 +1,230 @@
+//! Whether a design will do what is wanted of it, and what fails first.
+
+use std::f64::consts::FRAC_PI_4;
+
+use super::forecast::{Forecast, Forecaster};
+use super::link::spot_depth;
+use crate::design::safety::strictest;
+use crate::design::{Design, Detector};
+use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+
+/// Share of converters' work that may be lost.
+const LOSS: f64 = 0.01;
+
+/// What is wanted of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Reflectance of the target.
+    pub reflectance: f64,
+    /// Range of the target, m.
+    pub range: f64,
+    /// Least probability of a return.
+    pub pd: f64,
+    /// Most false returns per shot that meets nothing.
+    pub false_points: f64,
+}
+
+/// One thing that must hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Check {
+    /// What it is about.
+    pub name: &'static str,
+    /// By what factor it is missed; it holds up to 1. Infinite where no factor would do.
+    pub shortfall: f64,
+    /// What was found.
+    pub finding: String,
+    /// What would be needed.
+    pub remedy: String,
+}
+
+impl Check {
+    /// Whether it holds.
+    pub fn holds(&self) -> bool {
+        self.shortfall <= 1.0
+    }
+}
+
+/// What must hold, in the order of the light: eyes, the light alone, sunlight, converters, false
+/// returns, chips on a slanted surface. `night` is `day` without the sun. What is idealised is
+/// left out.
+pub fn checks(day: &Design, night: &Design, wanted: &Wanted) -> Vec<Check> {
+    let (by_day, by_night) = (Forecaster::new(day), Forecaster::new(night));
+    let forecast = by_day.forecast(wanted.reflectance, wanted.range);
+    let mut checks = Vec::new();
+    checks.extend(eyes(day));
+    let light = light(&by_night, wanted);
+    let bright_enough = light.holds();
+    checks.push(light);
+    if bright_enough && day.budget.as_ref().is_some_and(|budget| budget.irradiance > 0.0) {
+        checks.push(sunlight(&by_day, wanted, &forecast));
+    }
+    checks.push(converters(day, &forecast));
+    checks.push(Check {
+        name: "false points",
+        shortfall: forecast.false_per_shot / wanted.false_points,
+        finding: format!(
+            "{:.1e} per shot, wanted {:.1e}",
+            forecast.false_per_shot, wanted.false_points
+        ),
+        remedy: "a smaller false_alarm of the receiver, or fewer false edges".into(),
+    });
+    checks.extend(slant(day, wanted.range));
+    checks
+}
+
+/// The light that a receiver needs which decides mark by mark and must see all, with probability
+/// 0.99, over the light there is from `wanted`, the mean number of marks taken; of a counter
+/// without noise, n = −ln(1 − 0.99^(1/N)) each. `None` where shots are not coded.
+pub fn mark_by_mark(design: &Design, wanted: &Wanted) -> Option<f64> {
+    let marks = design.coding.codebook.mean_weight();
+    let needed = -libm::log1p(-libm::pow(0.99, 1.0 / marks));
+    let forecast = Forecaster::new(design).forecast(wanted.reflectance, wanted.range);
+    design.is_coded().then(|| needed / forecast.detected_per_mark)
+}
+
+fn eyes(design: &Design) -> Option<Check> {
+    let budget = design.budget.as_ref()?;
+    let limit = strictest(&budget.limits)?;
+    Some(Check {
+        name: "eye safety",
+        shortfall: budget.energy / limit.energy * (1.0 - 1e-12),
+        finding: format!(
+            "{:.3} nJ a shot; class 1 allows {:.3} nJ ({})",
+            budget.energy * 1e9,
+            limit.energy * 1e9,
+            limit.rule.name()
+        ),
+        remedy: "less energy a shot, fewer shots through one pupil, or 1550 nm".into(),
+    })
+}
+
+fn light(night: &Forecaster, wanted: &Wanted) -> Check {
+    let factor = night.light_needed(wanted.pd, wanted.reflectance, wanted.range);
+    let found = night.forecast(wanted.reflectance, wanted.range);
+    let remedy = match factor {
+        Some(factor) => format!(
+            "{factor:.3} times the energy, or an aperture {:.2} times as wide",
+            factor.sqrt()
+        ),
+        None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
+    };
+    Check {
+        name: "light",
+        shortfall: factor.unwrap_or(f64::INFINITY),
+        finding: format!(
+            "in the dark Pd {:.3} from {:.1} photons a shot, wanted {}",
+            found.pd, found.photons_per_shot, wanted.pd
+        ),
+        remedy,
+    }
+}
+
+fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
+    let bearable = day.background_bearable(wanted.pd, wanted.reflectance, wanted.range);
+    Check {
+        name: "sunlight",
+        shortfall: bearable.map_or(f64::INFINITY, |bearable| bearable.recip()),
+        finding: format!(
+            "by day Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
+            forecast.pd, forecast.density
+        ),
+        remedy: "a narrower field or filter by that factor, or more light in fewer marks".into(),
+    }
+}
+
+fn converters(design: &Design, forecast: &Forecast) -> Check {
+    let loss = forecast.bank_loss;
+    Check {
+        name: "converters",
+        shortfall: if loss > LOSS { 1.0 / (1.0 - loss) } else { loss / LOSS },
+        finding: format!(
+            "{:.2} % of edges find all {} of a detector's bank busy",
+            loss * 100.0,
+            design.tdc.converters
+        ),
+        remedy: "more converters, a shorter dead time, or fewer false edges".into(),
+    }
+}
+
+/// Chips on a surface that is slanted by 45°.
+fn slant(design: &Design, range: f64) -> Option<Check> {
+    if design.light.divergence == 0.0 {
+        return None;
+    }
+    let spot = libm::hypot(design.light.beam_diameter, design.light.divergence * range);
+    let depth = spot_depth(spot, FRAC_PI_4);
+    let chip = match design.is_coded() {
+        true => s_from_fs(design.coding.chip_fs),
+        false => design.light.pulse,
+    };
+    let chip = match &design.detector {
+        Detector::Linear(linear) => chip.max(linear.response),
+        _ => chip,
+    } * SPEED_OF_LIGHT
+        / 2.0;
+    Some(Check {
+        name: "slant",
+        shortfall: depth / chip,
+        finding: format!(
+            "a spot of {:.0} mm on a surface at 45° is {:.0} mm deep, a chip {:.2} mm",
+            spot * 1e3,
+            depth * 1e3,
+            chip * 1e3
+        ),
+        remedy: "longer chips, or a wider beam that spreads less".into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn physical(set: &[(&str, &str)]) -> [Design; 2] {
+        ["day", "night"].map(|sky| {
+            let sky = [("sun.sky", sky)];
+            let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+            let set: Vec<_> = set.iter().chain(&sky).map(owned).collect();
+            Design::open("kim-park-2016-physical", &set).unwrap()
+        })
+    }
+
+    const WHITE: Wanted = Wanted { reflectance: 1.0, range: 150.0, pd: 0.9, false_points: 1e-4 };
+
+    fn failing(checks: &[Check]) -> Vec<&str> {
+        checks.iter().filter(|check| !check.holds()).map(|check| check.name).collect()
+    }
+
+    #[test]
+    fn sunlight_is_what_fails_first_in_the_paper() {
+        let [day, night] = physical(&[]);
+        assert_eq!(failing(&checks(&day, &night, &WHITE)), ["sunlight", "converters", "slant"]);
+        assert_eq!(failing(&checks(&night, &night, &WHITE)), ["slant"]);
+    }
+
+    /// 81 times too little light for a receiver that must see every micropulse.
+    #[test]
+    fn chip_by_chip_it_is_short_by_a_factor_of_80() {
+        let [day, _] = physical(&[]);
+        let factor = mark_by_mark(&day, &WHITE).unwrap();
+        assert!((78.0..83.0).contains(&factor), "{factor}");
+        assert_eq!(mark_by_mark(&Design::open("hdl-64e", &[]).unwrap(), &WHITE), None);
+    }
+
+    #[test]
+    fn more_energy_than_class_1_allows_is_said_with_its_factor() {
+        let own = "['eye-safety', 'detector-bandwidth', 'inter-chip', 'mirror-motion']";
+        let [day, night] = physical(&[("light.energy", "{ shot_nj = 10.1 }"), ("idealised", own)]);
+        let checks = checks(&day, &night, &WHITE);
+        assert_eq!(checks[0].name, "eye safety");
+        assert!((9.8..10.2).contains(&checks[0].shortfall), "{}", checks[0].shortfall);
+    }
+
+    #[test]
+    fn a_black_target_needs_more_light() {
+        let [day, night] = physical(&[]);
+        let checks = checks(&day, &night, &Wanted { reflectance: 0.05, ..WHITE });
+        let light = checks.iter().find(|check| check.name == "light").unwrap();
+        assert!(light.shortfall > 5.0 && light.shortfall < 40.0, "{}", light.shortfall);
+        assert!(checks.iter().all(|check| check.name != "sunlight"));
+    }
+}
