@@ -86,12 +86,11 @@ fn detected(scan: &Scan) -> (u64, u64) {
 fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
     let hopeless = [("sun.sky", "\"day\"")];
     let night = [("sun.sky", "\"night\"")];
-    let strip = [("optics.field", "\"in-flight\"")];
     let mut graded = 0;
-    for (name, set) in [("as it is", hopeless), ("at night", night), ("a strip", strip)] {
+    for (name, set) in [("as it is", hopeless), ("at night", night)] {
         let set = [&set[..], &[("receiver.effort", "\"thorough\"")]].concat();
         let design = sensor("kim-park-2016-physical", &set);
-        for range in [10.0, 20.0, 50.0, 150.0] {
+        for range in [10.0, 20.0, 50.0, 130.0, 150.0] {
             let forecaster = Forecaster::new(&design);
             let predicted = forecaster.forecast(1.0, range).pd;
             let (found, shots) = detected(&measure(&design, &room(range * 0.9999, 1.0), 1, 1));
@@ -110,6 +109,21 @@ fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
         }
     }
     assert!(graded >= 2, "{graded} cases can tell right from wrong");
+}
+
+/// N = 1694 lit shots, seed 1: where every fifth place is lit by the sun, light around a macropulse
+/// that chance has made denser lifts the threshold more than the forecast says. Control: without
+/// its sunlight the forecast is far off.
+#[test]
+fn in_dense_light_the_forecast_is_a_bound() {
+    let set = [("optics.field", "\"in-flight\""), ("receiver.effort", "\"thorough\"")];
+    let design = sensor("kim-park-2016-physical", &set);
+    let (found, shots) = detected(&measure(&design, &room(99.99, 1.0), 1, 1));
+    let forecaster = Forecaster::new(&design);
+    let share = found as f64 / shots as f64;
+    let predicted = forecaster.forecast(1.0, 100.0).pd;
+    assert!((0.4..1.0).contains(&(share / predicted)), "{share}, predicted {predicted}");
+    assert!(forecaster.with_background(0.0).forecast(1.0, 100.0).pd > 0.99);
 }
 
 /// The first band of a sensor, an echo of `photons` detected per mark from 20 m for every shot.

@@ -20,9 +20,10 @@ impl Design {
         fs_from_s(tof_from_range(self.scan.max_range)) + macropulse
     }
 
-    /// How far jitter can displace an edge, fs.
+    /// How far jitter, and the length of a micropulse, can displace an edge, fs.
     pub fn most_jitter_fs(&self) -> i64 {
-        (MOST_SIGMA * self.detector.jitter() * FS_PER_S as f64).ceil() as i64
+        let most = MOST_SIGMA * (self.detector.jitter() + self.light.spread.unwrap_or(0.0));
+        (most * FS_PER_S as f64).ceil() as i64
     }
 
     /// The longest time from the first to the last shot of a band without its halo, fs; negative

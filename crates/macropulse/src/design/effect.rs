@@ -69,6 +69,6 @@ impl Effect {
 
     /// Whether it can also be switched on. The others must be declared as idealised.
     pub fn is_modelled(self) -> bool {
-        !matches!(self, Self::InterChip | Self::MirrorMotion)
+        self != Self::MirrorMotion
     }
 }

@@ -138,6 +138,9 @@ pub struct Light {
     pub footprint_rays: u32,
     /// Length of one micropulse (full width at half maximum), s.
     pub pulse: f64,
+    /// Its rms length, s, where its light is followed into neighbouring chips; `None` where it is
+    /// taken to stay in its own.
+    pub spread: Option<f64>,
 }
 
 /// How shots are told apart.

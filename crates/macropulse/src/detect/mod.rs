@@ -10,6 +10,7 @@ mod jitter;
 mod linear;
 mod noise;
 mod photon_counting;
+mod shape;
 
 pub use first_firing::photons_for;
 
@@ -19,6 +20,7 @@ use clock::Clock;
 use geiger::Cells;
 use linear::Thresholding;
 use photon_counting::Counting;
+use shape::Shape;
 
 use crate::channel::Echoes;
 use crate::design::{Design, Detector, FirstFiring};
@@ -45,6 +47,7 @@ pub struct Edges {
 pub struct Detectors<'a> {
     design: &'a Design,
     chance: Chance,
+    shape: Option<Shape>,
     kind: Kind,
 }
 
@@ -100,13 +103,15 @@ impl<'a> Detectors<'a> {
             Detector::Linear(linear) => Kind::Thresholding(Thresholding::new(linear, design)),
             Detector::FirstFiring(firing) => Kind::Firing(*firing),
         };
-        Self { design, chance, kind }
+        Self { design, chance, shape: Shape::of(design), kind }
     }
 
     /// The edges that the `echoes` of the shots in `log` make.
     pub fn edges(&self, log: &ShotLog, echoes: &Echoes, memory: &mut Memory) -> Edges {
         let Some(first) = log.fired_at_fs.first() else { return Edges::default() };
         let clock = Clock::new(self.design, *first);
+        let spread = self.shape.as_ref().map(|shape| shape.spread(echoes));
+        let echoes = spread.as_ref().unwrap_or(echoes);
         let band = Band { clock, design: self.design, log, echoes };
         match &self.kind {
             Kind::Counting(counting) => counting.edges(&band, &self.chance, memory),

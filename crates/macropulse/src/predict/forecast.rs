@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::detection::{bank_loss, mark_pd};
+use super::detection::bank_loss;
 use super::matched;
 use crate::channel::Link;
 use crate::design::{Design, Detector};
@@ -92,7 +92,7 @@ impl<'a> Forecaster<'a> {
             Detector::Geiger(_) => false_rate + photon_rate,
             _ => 0.0,
         };
-        let edge = mark_pd(detector, detected, falling);
+        let edge = matched::edges(design, detected, falling);
         let false_edges = match detector {
             Detector::Geiger(geiger) => false_rate * super::detection::armed(geiger, falling),
             _ => false_rate,
@@ -106,7 +106,7 @@ impl<'a> Forecaster<'a> {
         // Where the bank is overrun, all is lit until the last converter is taken: what is lost
         // then makes the rest no clearer.
         let density = -libm::expm1(-(false_edges + own) * place.width);
-        let seen = edge * place.share * (1.0 - loss);
+        let seen = place.seen(design, detected, falling) * (1.0 - loss);
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - density);
 
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);

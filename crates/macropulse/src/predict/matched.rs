@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::detection::normal_tail;
+use super::detection::{mark_pd, normal_tail};
 use crate::design::{Design, Detector, FirstFiring};
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
 
@@ -37,7 +37,7 @@ impl Place {
     /// A tick where edges are exact, else one more than four deviations, rounded up.
     pub fn of(design: &Design) -> Self {
         let tick = s_from_fs(design.tdc.tick_fs);
-        let sigma = design.detector.jitter() / tick;
+        let sigma = design.receiver.jitter_ticks;
         if !design.is_coded() || sigma <= 0.05 {
             return Self { width: tick, share: 1.0 };
         }
@@ -45,6 +45,30 @@ impl Place {
         let half = ticks / 2.0 / (sigma * std::f64::consts::SQRT_2);
         Self { width: ticks * tick, share: libm::erf(half) }
     }
+}
+
+impl Place {
+    /// Probability that a mark of which `detected` photons are detected is found where it is
+    /// looked for. Photons of a micropulse that reaches beyond its chip fall there or not each by
+    /// itself; else its one edge does.
+    pub fn seen(&self, design: &Design, detected: f64, falling: f64) -> f64 {
+        match design.light.spread {
+            Some(_) => mark_pd(&design.detector, detected * self.share, falling),
+            None => mark_pd(&design.detector, detected, falling) * self.share,
+        }
+    }
+}
+
+/// Ticks that a mark of which `detected` photons are detected lights on average, each with the
+/// share of the light that falls into it.
+pub(super) fn edges(design: &Design, detected: f64, falling: f64) -> f64 {
+    let lit = |photons: f64| mark_pd(&design.detector, photons, falling);
+    let Some(spread) = design.light.spread else { return lit(detected) };
+    let width = spread * 2_f64.sqrt() / s_from_fs(design.tdc.tick_fs);
+    let below = |place: f64| 0.5 * libm::erfc(-place / width);
+    let farthest = (4.0 * width).ceil() as i32;
+    let share = |tick: i32| below(f64::from(tick) + 0.5) - below(f64::from(tick) - 0.5);
+    (-farthest..=farthest).map(|tick| lit(detected * share(tick))).sum()
 }
 
 /// Probability of a return from a lit shot and from one that meets nothing, where each of its
@@ -160,7 +184,7 @@ impl Timing {
             Detector::FirstFiring(firing) => {
                 libm::hypot(rms * firing_time(firing, detected), jitter)
             }
-            _ => jitter,
+            _ => libm::hypot(jitter, design.light.spread.unwrap_or(0.0)),
         };
         Self { spread, sigma: sigma / tick, tick }
     }

@@ -110,6 +110,16 @@ impl Check<'_> {
             );
             return self.refuse("idealised", message);
         }
+        let by_photons = matches!(detector, Detector::PhotonCounting(_) | Detector::Geiger(_));
+        if !by_photons && !before.is_off(Effect::InterChip) {
+            let message = format!(
+                "this detector judges every mark alone: add `{}` to this list, which declares \
+                 that {}",
+                Effect::InterChip.name(),
+                Effect::InterChip.assumption()
+            );
+            return self.refuse("idealised", message);
+        }
         Ok(detector)
     }
 

@@ -2,11 +2,19 @@
 
 use super::Check;
 use crate::design::file::SensorFile;
-use crate::design::{Error, Light};
+use crate::design::{Effect, Error, Light};
+
+/// rms length of a Gaussian over its full width at half maximum.
+const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
 
 impl Check<'_> {
-    pub(super) fn light(&self, file: &SensorFile, footprint_off: bool) -> Result<Light, Error> {
+    pub(super) fn light(
+        &self,
+        file: &SensorFile,
+        off: impl Fn(Effect) -> bool,
+    ) -> Result<Light, Error> {
         let light = &file.light;
+        let footprint_off = off(Effect::Footprint);
         let rays = light.footprint_rays;
         if ![1, 7, 19].contains(&rays) {
             return self
@@ -20,6 +28,7 @@ impl Check<'_> {
                  or \"footprint\" in the list `idealised`",
             );
         }
+        let pulse = self.within("light.pulse_ps", light.pulse_ps, 1e-3, 1e9)? * 1e-12;
         Ok(Light {
             wavelength: self.within("light.wavelength_nm", light.wavelength_nm, 200.0, 20e3)?
                 * 1e-9,
@@ -31,7 +40,8 @@ impl Check<'_> {
             )? * 1e-3,
             divergence: if footprint_off { 0.0 } else { divergence * 1e-3 },
             footprint_rays: if footprint_off { 1 } else { rays },
-            pulse: self.within("light.pulse_ps", light.pulse_ps, 1e-3, 1e9)? * 1e-12,
+            pulse,
+            spread: (!off(Effect::InterChip)).then_some(pulse * RMS_OF_FWHM),
         })
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     let tdc = check.tdc(&file)?;
     let coding = check.coding(file.code.as_ref(), &scan, &tdc)?;
     let off = |effect| idealised.contains(&effect);
-    let light = check.light(&file, off(Effect::Footprint))?;
+    let light = check.light(&file, off)?;
     let parts =
         budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
     let budget = check.budget(&file, &parts, detector::efficiency(&file.detector))?;
@@ -50,7 +50,8 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     )?;
     let visibility =
         check.within("atmosphere.visibility_km", file.atmosphere.visibility_km, 0.01, 1e3)? * 1e3;
-    let receiver = check.receiver(&file, &scan, &tdc, (&coding, detector))?;
+    let timing = libm::hypot(detector.jitter(), light.spread.unwrap_or(0.0));
+    let receiver = check.receiver(&file, &scan, &tdc, (&coding, timing))?;
     let right_within =
         check.within("receiver.right_within_m", file.receiver.right_within_m, 0.0, 0.35)?;
     let mut design = Design {

@@ -3,7 +3,7 @@
 use super::{Check, TOO_FINE};
 use crate::decode::{Receiver, ReceiverKind};
 use crate::design::file::{ReceiverKindFile, SensorFile};
-use crate::design::{Coding, Detector, Error, PARTS_OF_TICK, Scan, Tdc};
+use crate::design::{Coding, Error, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
 
 impl Check<'_> {
@@ -36,7 +36,7 @@ impl Check<'_> {
         file: &SensorFile,
         scan: &Scan,
         tdc: &Tdc,
-        (coding, detector): (&Coding, Detector),
+        (coding, timing): (&Coding, f64),
     ) -> Result<Receiver, Error> {
         let kind = match file.receiver.kind {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
@@ -62,7 +62,7 @@ impl Check<'_> {
             gate_ticks: (gate.0 as u32, gate.1 as u32),
             ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
             tick_fs: tdc.tick_fs,
-            jitter_ticks: detector.jitter() * 1e15 / tdc.tick_fs as f64,
+            jitter_ticks: timing * 1e15 / tdc.tick_fs as f64,
             false_alarm: self.within(
                 "receiver.false_alarm",
                 file.receiver.false_alarm,

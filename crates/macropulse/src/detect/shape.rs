@@ -1,0 +1,94 @@
+//! The shape of a micropulse: its light reaches into the ticks, and the chips, around its own.
+
+use crate::channel::Echoes;
+use crate::design::{Design, Detector};
+use crate::units::{FS_PER_S, fs_from_s};
+
+/// How far the light of a micropulse is followed, in rms lengths.
+const FARTHEST: f64 = 3.0;
+
+/// Slices of a micropulse are at least this fraction of its rms length.
+const FINEST: f64 = 0.5;
+
+/// A Gaussian micropulse in slices.
+#[derive(Debug)]
+pub(super) struct Shape {
+    /// Delay, fs, and share of the light of each slice.
+    slices: Vec<(i64, f64)>,
+}
+
+impl Shape {
+    /// The micropulse of a sensor whose light is followed beyond its chip, in front of a detector
+    /// that answers photon by photon; `None` for the others.
+    pub fn of(design: &Design) -> Option<Self> {
+        let rms = design.light.spread?;
+        if !matches!(design.detector, Detector::PhotonCounting(_) | Detector::Geiger(_)) {
+            return None;
+        }
+        let width = (design.tdc.tick_fs as f64 / FS_PER_S as f64).max(FINEST * rms);
+        let reach = (FARTHEST * rms / width).ceil() as i64;
+        let below = |place: f64| 0.5 * libm::erfc(-place * width / rms / std::f64::consts::SQRT_2);
+        let share = |slice: i64| below(slice as f64 + 0.5) - below(slice as f64 - 0.5);
+        let total: f64 = (-reach..=reach).map(share).sum();
+        let slice = |slice: i64| (fs_from_s(slice as f64 * width), share(slice) / total);
+        Some(Self { slices: (-reach..=reach).map(slice).collect() })
+    }
+
+    /// Every echo as those of its slices, which are detected independently of each other: photons
+    /// are.
+    pub fn spread(&self, echoes: &Echoes) -> Echoes {
+        let mut spread = Echoes::default();
+        for echo in 0..echoes.shot.len() {
+            for &(late, share) in &self.slices {
+                spread.shot.push(echoes.shot[echo]);
+                spread.delay_fs.push(echoes.delay_fs[echo] + late);
+                spread.photons.push(echoes.photons[echo] * share);
+            }
+        }
+        spread
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn physical(pulse: &str) -> Design {
+        let set = [
+            ("idealised".to_owned(), "['detector-bandwidth', 'mirror-motion']".to_owned()),
+            ("light.pulse_ps".to_owned(), pulse.to_owned()),
+        ];
+        Design::open("kim-park-2016-physical", &set).unwrap()
+    }
+
+    #[test]
+    fn light_is_spread_as_a_gaussian_and_none_is_lost() {
+        for pulse in ["0.5", "2.5", "25.0", "1000.0"] {
+            let slices = Shape::of(&physical(pulse)).unwrap().slices;
+            assert!((3..=13).contains(&slices.len()), "{pulse} ps: {}", slices.len());
+            let total: f64 = slices.iter().map(|(_, share)| share).sum();
+            approx::assert_relative_eq!(total, 1.0, max_relative = 1e-12);
+            let square = |(late, share): &(i64, f64)| share * (*late as f64).powi(2);
+            let rms = slices.iter().map(square).sum::<f64>().sqrt() * 1e-3;
+            let expected: f64 = pulse.parse::<f64>().unwrap() * 0.42466;
+            // What lies beyond three deviations is missing, and slices have a width.
+            assert!(expected < 2.0 || (rms / expected - 1.0).abs() < 0.03, "{pulse} ps: {rms} ps");
+        }
+    }
+
+    /// A micropulse as long as its chip sends an eighth of its light into each neighbour.
+    #[test]
+    fn a_chip_keeps_three_quarters_of_its_light() {
+        let slices = Shape::of(&physical("2.5")).unwrap().slices;
+        let shares: Vec<f64> = slices.iter().map(|(_, share)| *share).collect();
+        let middle = shares.len() / 2;
+        approx::assert_relative_eq!(shares[middle], 0.761, max_relative = 2e-3);
+        approx::assert_relative_eq!(shares[middle + 1], 0.119, max_relative = 5e-3);
+    }
+
+    #[test]
+    fn an_ideal_micropulse_stays_in_its_chip() {
+        assert!(Shape::of(&Design::open("kim-park-2016-physical", &[]).unwrap()).is_some());
+        assert!(Shape::of(&Design::open("kim-park-2016", &[]).unwrap()).is_none());
+    }
+}
