@@ -153,6 +153,12 @@ impl Svg {
         self.push(format_args!("</svg>"));
     }
 
+    /// Another drawing, moved down by `top`.
+    pub fn drawing(&mut self, top: f64, svg: &str) {
+        let top = number(top);
+        self.push(format_args!("<g transform=\"translate(0 {top})\">\n{svg}</g>"));
+    }
+
     pub fn finish(mut self) -> String {
         self.text.push_str("</svg>\n");
         self.text
