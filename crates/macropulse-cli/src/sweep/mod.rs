@@ -14,7 +14,7 @@ use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::{Changes, Common};
 use crate::progress::Progress;
-use crate::text::{counted, print};
+use crate::text::{NO_BREAK, counted, print};
 
 /// Vary a key of a sensor and draw how well it does, with 95 % intervals
 ///
@@ -130,7 +130,8 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     let missing: Vec<usize> = plan.missing(folder.path()).iter().map(|(job, _)| *job).collect();
     if !done {
         let (left, all) = (missing.len(), counted(plan.count() as u64, "scan"));
-        complain(&format!("{left} of {all} are missing; the same command goes on from here"));
+        let told = format!("{left} of {all} are missing; the same command goes on from here");
+        complain(&told.replace(NO_BREAK, " "));
         return Err(Fault::Interrupted);
     }
     let told = match missing.as_slice() {

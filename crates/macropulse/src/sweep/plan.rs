@@ -98,18 +98,17 @@ impl Plan {
                 "{count} values with {seeds} seeds each are too many; {MOST_JOBS} scans at most"
             ));
         }
-        let (of_scene, of_sensor) = split(&request.set);
-        // What is wrong already without what is varied is said as such.
-        for sensor in &request.sensors {
-            Design::open(sensor, &of_sensor)?;
-        }
-        let mut scenes = vec![(of_scene.clone(), Scene::open_changed(&request.scene, &of_scene)?)];
+        let mut scenes: Vec<(Changes, Scene)> = Vec::new();
         let combinations = combinations(&axes);
         for values in &combinations {
             let (changes, _) = changes(request, &axes, values);
             if scenes.iter().all(|(known, _)| *known != changes) {
-                let scene = Scene::open_changed(&request.scene, &changes)
-                    .map_err(|error| at(&axes, values, &error.to_string()))?;
+                let scene = Scene::open_changed(&request.scene, &changes).map_err(|error| {
+                    match axes.iter().any(|axis| axis.key.starts_with(OF_SCENE)) {
+                        true => at(&axes, values, &error.to_string()),
+                        false => error.into(),
+                    }
+                })?;
                 scenes.push((changes, scene));
             }
         }
@@ -184,8 +183,14 @@ impl Point {
         let scene = &scenes[scene_index].1;
         let varied = axes.iter().zip(values).find(|(axis, _)| is_sensor(request, axis));
         let sensor = varied.map(|(_, name)| name).or(request.sensors.first());
-        let design = Design::open(sensor.map_or("", String::as_str), &of_sensor)
-            .map_err(|error| at(axes, values, &error.to_string()))?;
+        let sensor = sensor.map_or("", String::as_str);
+        let design = Design::open(sensor, &of_sensor).map_err(|error| {
+            // What is wrong as well without what is varied is said as such.
+            match Design::open(sensor, &split(&request.set).1) {
+                Err(plain) if plain == error => plain.into(),
+                _ => at(axes, values, &error.to_string()),
+            }
+        })?;
         let bands = spread(&design, request.shots);
         Ok(Self {
             values: values.to_vec(),
@@ -319,8 +324,7 @@ mod tests {
         assert_eq!((plan.count(), plan.jobs().count()), (12, 12));
         let names: std::collections::BTreeSet<String> = plan.jobs().map(|job| job.name()).collect();
         assert_eq!(names.len(), 12);
-        // The scene as it is, and each of the three moved.
-        assert_eq!(plan.scenes.len(), 4);
+        assert_eq!(plan.scenes.len(), 3);
         assert_eq!(plan.points[0].scene.digest, plan.points[3].scene.digest);
     }
 
@@ -371,6 +375,10 @@ mod tests {
         assert!(told(&set).contains("varied and set"));
         set.set[0].0 = "scan.max_rnage_m".to_owned();
         assert!(told(&set).starts_with("--set: scan.max_rnage_m"));
+        let misspelt = told(&request(&["perigrine"], &["scan.max_range_m=60,70"]));
+        assert!(misspelt.starts_with("perigrine: no such sensor; did you mean"), "{misspelt}");
+        let scene = Request { scene: "wal".to_owned(), ..request(&one, &["tdc.bits=8,9"]) };
+        assert!(told(&scene).starts_with("there is no scene"));
         let many = Request { seeds: 0..60_000, ..request(&one, &["scan.max_range_m=60,70"]) };
         assert!(told(&many).contains("100000 scans at most"));
         let none = Request { seeds: 3..3, ..request(&one, &["scan.max_range_m=60,70"]) };
