@@ -121,6 +121,7 @@ impl From<sweep::Error> for Fault {
     fn from(error: sweep::Error) -> Self {
         match error {
             sweep::Error::Formats(error) => error.into(),
+            sweep::Error::View(error) => Self::Ours(error.to_string()),
             wrong => Self::Wrong(wrong.to_string()),
         }
     }

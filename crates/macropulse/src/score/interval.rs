@@ -27,7 +27,7 @@ impl Estimate {
     /// The probability behind `counts`, hits and trials of each seed.
     ///
     /// Wilson's interval \[Wilson27\] for p = x/n, all hits over all trials, with an effective
-    /// number of trials in place of n \[KG98, FLLM19\]:
+    /// number of trials in place of n \[KG98, FLLS19\]:
     ///
     /// `n* = n / d · (z/t)²`, `d = max(1, v·n / (p(1 − p)))`,
     /// `v = m/(m − 1) · Σ(xⱼ − p·nⱼ)² / n²`,
@@ -169,7 +169,7 @@ mod tests {
         assert_relative_eq!(student_t(1_000_000), NORMAL, max_relative = 1e-5);
     }
 
-    /// The examples by which R. G. Newcombe compared seven methods (1998), to his four digits.
+    /// The examples by which seven methods were compared \[Newc98\], to their four digits.
     #[test]
     fn intervals_of_wilson() {
         for (hits, trials, low, high) in [

@@ -37,6 +37,9 @@ pub enum Error {
     /// A file could not be written or read.
     #[error(transparent)]
     Formats(#[from] crate::formats::Error),
+    /// The picture could not be drawn.
+    #[error(transparent)]
+    View(#[from] crate::view::Error),
 }
 
 impl Error {

@@ -1,13 +1,12 @@
 //! Curves with their intervals, a chart for each score.
 
 use super::{Axis, Spread, Table};
-use crate::view::{self, Chart, Hue, Style};
+use crate::view::{self, Chart, Hue, Stack, Style};
 
-/// A chart for each score, one below the other, as SVG.
-pub(super) fn svg(table: &Table, title: &str) -> String {
-    let charts: Vec<Chart> =
-        (0..table.metrics.len()).map(|metric| chart(table, metric, title)).collect();
-    view::stacked(title, &charts)
+/// A chart for each score, one below the other.
+pub(super) fn stack(table: &Table, title: &str) -> Stack {
+    let charts = (0..table.metrics.len()).map(|metric| chart(table, metric, title)).collect();
+    Stack { title: title.to_owned(), charts }
 }
 
 /// The score of number `at`: along x the first key, a curve for each value of the second.

@@ -9,7 +9,7 @@ use crate::formats::{quoted, write_atomically};
 use crate::score::Estimate;
 
 /// Files written beside the manifest.
-const FILES: [&str; 2] = ["sweep.csv", "sweep.svg"];
+const FILES: [&str; 3] = ["sweep.csv", "sweep.svg", "sweep.png"];
 
 /// Scores of every point, with intervals.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,18 +36,27 @@ pub struct Row {
 }
 
 impl Plan {
-    /// Makes the table of `metrics` from the jobs in `folder` and writes `sweep.csv`, `sweep.svg`
-    /// and `manifest.json` beside them.
+    /// Makes the table of `metrics` from the jobs in `folder` and writes `sweep.csv`, `sweep.svg`,
+    /// `sweep.png` and `manifest.json` beside them.
     ///
     /// # Errors
     /// If a job is missing or its file is damaged, or a file cannot be written.
     pub fn finish(&self, folder: &Path, metrics: &[Metric]) -> Result<Table, Error> {
         let table = self.table(folder, metrics)?;
-        let title = format!("{} in {}", self.sensors().join(", "), self.scene);
-        let texts = [table.csv(), picture::svg(&table, &title), self.manifest(metrics)];
-        for (file, text) in FILES.into_iter().chain(["manifest.json"]).zip(texts) {
-            write_atomically(&folder.join(file), |out| out.write_all(text.as_bytes()))?;
+        let seeds = self.seeds.end - self.seeds.start;
+        let seeds = if seeds == 1 { "1 seed".to_owned() } else { format!("{seeds} seeds") };
+        let title = format!(
+            "{} in {}, {seeds} each; whiskers: 95 % intervals",
+            self.sensors().join(", "),
+            self.scene
+        );
+        let picture = picture::stack(&table, &title);
+        let contents = [table.csv().into_bytes(), picture.svg().into_bytes(), picture.png()?];
+        for (file, bytes) in FILES.iter().zip(contents) {
+            write_atomically(&folder.join(file), |out| out.write_all(&bytes))?;
         }
+        let manifest = self.manifest(metrics);
+        write_atomically(&folder.join("manifest.json"), |out| out.write_all(manifest.as_bytes()))?;
         Ok(table)
     }
 

@@ -166,6 +166,10 @@ impl Chart {
 
     /// The chart as SVG.
     pub fn svg(&self) -> String {
+        self.draw().finish()
+    }
+
+    pub(super) fn draw(&self) -> Svg {
         let mut svg = Svg::new(self.size, &self.title);
         let plane = self.plane();
         plane.draw_axes(&mut svg, [&self.x.title, &self.y.title]);
@@ -197,7 +201,7 @@ impl Chart {
         for note in &self.notes {
             draw_note(&mut svg, note, &plane);
         }
-        svg.finish()
+        svg
     }
 
     fn plane(&self) -> Plane {

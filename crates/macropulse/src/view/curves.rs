@@ -63,7 +63,7 @@ pub(super) fn band_path(band: &Band, plane: &Plane) -> String {
 pub(super) fn draw_whiskers(svg: &mut Svg, whiskers: &Band, plane: &Plane) {
     /// Half the width of the cross strokes at both ends.
     const HALF: f64 = 4.0;
-    let class = format!("line {}", whiskers.hue.class());
+    let class = format!("line thin {}", whiskers.hue.class());
     for [x, low, high] in &whiskers.points {
         let (Some([x, low]), Some([_, high])) = (plane.place([*x, *low]), plane.place([*x, *high]))
         else {
