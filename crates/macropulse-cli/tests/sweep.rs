@@ -1,6 +1,6 @@
 //! Sweeps: in one go, in parts, interrupted, and refused.
 
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 mod common;
 
@@ -122,6 +122,19 @@ fn shards_do_their_own_jobs_and_together_the_whole() {
 }
 
 #[test]
+fn shards_may_run_side_by_side_in_a_folder_that_is_not_there_yet() {
+    let desk = Desk::new();
+    let line = format!("{TINY} {MARKS} --seeds 3");
+    let start = |shard| desk.command(&format!("{line} -q -o new/parts --shard {shard}/4")).spawn();
+    let started = [1, 2, 3, 4].map(|shard| start(shard).unwrap());
+    for mut program in started {
+        assert_eq!(program.wait().unwrap().code(), Some(0));
+    }
+    good(&desk, &format!("{line} -o whole"));
+    same_results(&desk, "whole", "new/parts");
+}
+
+#[test]
 fn the_bytes_depend_on_the_seed_and_not_on_the_threads() {
     let desk = Desk::new();
     let line = format!("{TINY} --vary scan.raster.rows=8,24 --shots 1000 --seeds 3");
@@ -221,6 +234,12 @@ fn a_folder_belongs_to_one_sweep() {
     desk.refused(&format!("{TINY} --vary tdc.converters=50,60 --seeds 2 -o out"), &words);
     good(&desk, "simulate --sensor peregrine --scene wall -o run");
     desk.refused(&format!("{TINY} {MARKS} -o run"), &["run holds the results of another run"]);
+    desk.put("file", "");
+    desk.refused(&format!("{TINY} {MARKS} -o file"), &["file", "choose another folder"]);
+    desk.refused(
+        &format!("{TINY} {MARKS} -o file/below"),
+        &["file/below", "choose another folder"],
+    );
 }
 
 #[test]

@@ -10,7 +10,6 @@ use macropulse::sim::Watch;
 use macropulse::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
 use crate::fault::{Fault, complain};
-use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::{Changes, Common};
 use crate::progress::Progress;
@@ -119,15 +118,13 @@ impl Sweep {
 
 pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     let plan = Plan::of(&options.request())?;
-    let mut folder = Folder::claim(&options.output)?;
-    plan.check_folder(folder.path())?;
+    let folder = options.output.as_path();
+    plan.check_folder(folder)?;
     let interrupt = Interrupt::listen()?;
-    folder.make()?;
-    plan.claim_folder(folder.path())?;
-    folder.keep();
+    plan.claim_folder(folder)?;
     let shard = options.shard.unwrap_or(Shard::WHOLE);
-    let done = work(&plan, folder.path(), shard, (common, &interrupt))?;
-    let missing: Vec<usize> = plan.missing(folder.path()).iter().map(|(job, _)| *job).collect();
+    let done = work(&plan, folder, shard, (common, &interrupt))?;
+    let missing: Vec<usize> = plan.missing(folder).iter().map(|(job, _)| *job).collect();
     if !done {
         let (left, all) = (missing.len(), counted(plan.count() as u64, "scan"));
         let told = format!("{left} of {all} are missing; the same command goes on from here");
@@ -137,10 +134,10 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     let told = match missing.as_slice() {
         [] => {
             let scores = &options.score.0;
-            let table = interrupt.undisturbed(|| plan.finish(folder.path(), scores))?;
+            let table = interrupt.undisturbed(|| plan.finish(folder, scores))?;
             match options.json {
                 true => summary::json(&plan, &table),
-                false => summary::text(&plan, &table, folder.path()),
+                false => summary::text(&plan, &table, folder),
             }
         }
         missing if options.json => summary::json_of_missing(&plan, missing, shard),

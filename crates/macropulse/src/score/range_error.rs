@@ -8,9 +8,11 @@ pub struct RangeError {
     /// Right points.
     pub count: u64,
     /// Mean error, m; `None` without a point.
-    pub mean_m: Option<f64>,
+    #[serde(rename = "mean_m")]
+    pub mean: Option<f64>,
     /// Standard deviation of the errors, `√(Σ(e − ē)²/(N − 1))`, m; `None` of fewer than two.
-    pub deviation_m: Option<f64>,
+    #[serde(rename = "deviation_m")]
+    pub deviation: Option<f64>,
 }
 
 impl RangeError {
@@ -27,8 +29,8 @@ impl RangeError {
         let squares = errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>();
         Self {
             count: errors.len() as u64,
-            mean_m: (!errors.is_empty()).then_some(mean),
-            deviation_m: (errors.len() > 1).then(|| (squares / (count - 1.0)).sqrt()),
+            mean: (!errors.is_empty()).then_some(mean),
+            deviation: (errors.len() > 1).then(|| (squares / (count - 1.0)).sqrt()),
         }
     }
 }
@@ -64,15 +66,15 @@ mod tests {
         let mean = 0.25 / 3.0;
         let squares = [0.5, -0.25, 0.0].map(|e: f64| (e - mean).powi(2)).iter().sum::<f64>();
         assert_eq!(error.count, 3);
-        approx::assert_relative_eq!(error.mean_m.unwrap(), mean, max_relative = 1e-12);
+        approx::assert_relative_eq!(error.mean.unwrap(), mean, max_relative = 1e-12);
         let deviation = (squares / 2.0).sqrt();
-        approx::assert_relative_eq!(error.deviation_m.unwrap(), deviation, max_relative = 1e-12);
+        approx::assert_relative_eq!(error.deviation.unwrap(), deviation, max_relative = 1e-12);
     }
 
     #[test]
     fn one_point_has_no_deviation_and_none_no_mean() {
         let one = RangeError::of(&cloud(&[(10.5, 10.0, Outcome::Right)]));
-        assert_eq!((one.count, one.mean_m, one.deviation_m), (1, Some(0.5), None));
+        assert_eq!((one.count, one.mean, one.deviation), (1, Some(0.5), None));
         assert_eq!(RangeError::of(&cloud(&[])), RangeError::default());
     }
 }

@@ -150,14 +150,15 @@ impl Plan {
         }
     }
 
-    /// Marks `folder`, which is there, as that of this sweep.
+    /// Makes `folder`, if need be, and marks it as that of this sweep. It is not taken away again
+    /// if something goes wrong: others may be at work in it.
     ///
     /// # Errors
-    /// If it cannot be written into.
+    /// If it cannot be made or written into.
     pub fn claim_folder(&self, folder: &Path) -> Result<(), Error> {
-        let jobs = folder_of_jobs(folder);
-        fs::create_dir_all(&jobs).map_err(|error| {
-            Error::Asked(format!("cannot make the folder {}: {error}", jobs.display()))
+        fs::create_dir_all(folder_of_jobs(folder)).map_err(|error| {
+            let place = folder.display();
+            Error::Asked(format!("cannot write into {place}: {error}; choose another folder"))
         })?;
         write_atomically(&folder.join(DESCRIPTION), |out| out.write_all(self.text().as_bytes()))?;
         Ok(())

@@ -153,9 +153,9 @@ impl Metric {
             })
             .at_least(0.0),
             Self::Precision => {
-                mean(&|counted| counted.right.deviation_m.unwrap_or(f64::NAN)).at_least(0.0)
+                mean(&|counted| counted.right.deviation.unwrap_or(f64::NAN)).at_least(0.0)
             }
-            Self::Bias => mean(&|counted| counted.right.mean_m.unwrap_or(f64::NAN)),
+            Self::Bias => mean(&|counted| counted.right.mean.unwrap_or(f64::NAN)),
             Self::Lost => rate(&|counted| [counted.lost, counted.edges]),
             Self::Busy => mean(&|counted| f64::from(counted.peak_busy)).at_least(0.0),
         }
@@ -175,7 +175,7 @@ mod tests {
             samples_on_target: 8,
             points_on_target: 6,
         };
-        let right = RangeError { count: 60, mean_m: Some(1e-4), deviation_m: Some(2e-4) };
+        let right = RangeError { count: 60, mean: Some(1e-4), deviation: Some(2e-4) };
         Counted { score, edges: 1000, lost: 5, peak_busy: 7, right, ..Counted::default() }
     }
 
