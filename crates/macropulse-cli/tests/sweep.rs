@@ -185,6 +185,20 @@ fn other_scores_need_no_new_scans() {
 }
 
 #[test]
+fn an_empty_point_says_where_the_light_went() {
+    let desk = Desk::new();
+    let line = "sweep peregrine --scene wall --vary scan.max_range_m=20,60 --seeds 1 -o out --json";
+    let ran = desk.run(line);
+    assert_eq!(ran.code, Some(0));
+    let sentence = "1 of 2 rows of the table are without a single return: no ray met";
+    assert!(ran.err.contains(sentence), "{}", ran.err);
+    assert!(read(&desk, "out/manifest.json").contains(sentence));
+    let sweep: Value = serde_json::from_str(&ran.out).unwrap();
+    assert!(sweep["rows"][0]["empty"].is_string() && sweep["rows"][1]["empty"].is_null());
+    assert!(sweep["rows"][0]["pd"]["value"].is_null());
+}
+
+#[test]
 fn wrong_input_is_one_sentence() {
     let desk = Desk::new();
     let refused =

@@ -135,6 +135,7 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
         [] => {
             let scores = &options.score.0;
             let table = interrupt.undisturbed(|| plan.finish(folder, scores))?;
+            table.empty().iter().for_each(|sentence| complain(sentence));
             match options.json {
                 true => summary::json(&plan, &table),
                 false => summary::text(&plan, &table, folder),

@@ -19,8 +19,8 @@ pub fn text(plan: &Plan, table: &Table, folder: &Path) -> String {
     }
     let folder = folder.display();
     let text = format!(
-        "{}\n\n{}\n  sweep.csv, sweep.svg, sweep.png and manifest.json written to {folder}; in brackets the \
-         95 % intervals\n",
+        "{}\n\n{}\n  sweep.csv, sweep.svg, sweep.png and manifest.json written to {folder}; in \
+         brackets the 95 % intervals\n",
         headline(plan),
         aligned(&lines)
     );

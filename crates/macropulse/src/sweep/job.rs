@@ -48,6 +48,8 @@ pub struct Counted {
     pub peak_busy: u32,
     /// Range errors of the right points.
     pub right: RangeError,
+    /// Where the last light was lost if there is not a single return.
+    pub empty: Option<String>,
 }
 
 impl Job<'_> {
@@ -83,6 +85,7 @@ impl Job<'_> {
             lost: scan.tally.lost,
             peak_busy: scan.tally.peak_busy,
             right: RangeError::of(&scan.cloud),
+            empty: scan.tally.where_all_was_lost().map(str::to_owned),
         }))
     }
 
@@ -193,5 +196,43 @@ impl Plan {
             }
         }
         Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Design;
+    use crate::sim;
+    use crate::sweep::Request;
+
+    #[test]
+    fn a_job_counts_what_a_scan_of_that_sensor_counts() {
+        let scene = Scene::open("wall").unwrap();
+        let plan = Plan::of(&Request {
+            sensors: vec!["peregrine".to_owned()],
+            scene: "wall".to_owned(),
+            set: vec![("scan.flash.rows".to_owned(), "8".to_owned())],
+            vary: vec!["scan.max_range_m=20,60".parse().unwrap()],
+            seeds: 1..3,
+            shots: None,
+        })
+        .unwrap();
+        let nobody = Watch { done: &|_| {}, stop: &|| false };
+        let counted: Vec<Counted> =
+            plan.jobs().map(|job| job.measure(&nobody).unwrap().unwrap()).collect();
+        let set = [("scan.flash.rows", "8"), ("scan.max_range_m", "60")];
+        let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let scan = sim::scan(&Design::open("peregrine", &set).unwrap(), &scene, 2, 0);
+        let wanted = &counted[3];
+        assert_eq!((wanted.seed, wanted.score, wanted.edges), (2, scan.score, scan.tally.edges));
+        assert_eq!(wanted.right, RangeError::of(&scan.cloud));
+        assert!(wanted.right.count > 1000 && wanted.right != counted[2].right);
+        // The wall is 50 m away.
+        assert!(counted[0].empty.as_ref().unwrap().contains("range gate"));
+        assert_eq!(wanted.empty, None);
+        assert!(counted.iter().all(|counted| counted.is_possible(8 * 128)));
+        let stopped = Watch { done: &|_| {}, stop: &|| true };
+        assert_eq!(plan.jobs().next().unwrap().measure(&stopped).unwrap(), None);
     }
 }

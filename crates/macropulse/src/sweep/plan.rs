@@ -222,6 +222,9 @@ fn axes(request: &Request) -> Result<Vec<Axis>, Error> {
     if request.sensors.len() > 1 {
         axes.push(Axis::of_sensors(&request.sensors)?);
     }
+    if let Some(axis) = axes.iter().find(|axis| axis.values.is_empty()) {
+        return Error::asked(format!("{} has no values", axis.key));
+    }
     if let [one, other, ..] = axes.as_slice()
         && one.key == other.key
     {
@@ -370,6 +373,9 @@ mod tests {
         );
         let scene = told(&request(&one, &["scene:object.wal.position_m.x=1,2"]));
         assert!(scene.contains("did you mean `wall`"), "{scene}");
+        let mut without = request(&one, &["scan.max_range_m=60,70"]);
+        without.vary[0].values.clear();
+        assert!(told(&without).contains("has no values"));
         let mut set = request(&one, &["scan.max_range_m=60,70"]);
         set.set.push(("scan.max_range_m".to_owned(), "3".to_owned()));
         assert!(told(&set).contains("varied and set"));

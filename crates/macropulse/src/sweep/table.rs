@@ -33,6 +33,8 @@ pub struct Row {
     pub pixels: u64,
     /// An estimate of each score.
     pub scores: Vec<Estimate>,
+    /// Where the last light was lost if no seed gave a single return.
+    pub empty: Option<String>,
 }
 
 impl Plan {
@@ -55,7 +57,7 @@ impl Plan {
         for (file, bytes) in FILES.iter().zip(contents) {
             write_atomically(&folder.join(file), |out| out.write_all(&bytes))?;
         }
-        let manifest = self.manifest(metrics);
+        let manifest = self.manifest(&table);
         write_atomically(&folder.join("manifest.json"), |out| out.write_all(manifest.as_bytes()))?;
         Ok(table)
     }
@@ -71,6 +73,7 @@ impl Plan {
                 seeds,
                 pixels: seeds * point.shots,
                 scores: metrics.iter().map(|metric| metric.estimate(&counted)).collect(),
+                empty: counted.iter().map(|seed| seed.empty.clone()).min().flatten(),
             });
         }
         Ok(Table { axes: self.axes.clone(), metrics: metrics.to_vec(), rows })
@@ -81,7 +84,7 @@ impl Plan {
         each_once(self.points.iter().map(|point| point.sensor.name.as_str()))
     }
 
-    fn manifest(&self, metrics: &[Metric]) -> String {
+    fn manifest(&self, table: &Table) -> String {
         let mut manifest = self.description();
         let all = |of: fn(&super::Point) -> &[String]| {
             each_once(self.points.iter().flat_map(of).map(String::as_str))
@@ -93,10 +96,13 @@ impl Plan {
             .map(|(key, value)| (key.clone(), value.as_str().into()))
             .collect();
         let scores: Map<String, Value> =
-            metrics.iter().map(|metric| (metric.column(), metric.meaning().into())).collect();
+            table.metrics.iter().map(|metric| (metric.column(), metric.meaning().into())).collect();
+        let mut notes: Vec<String> =
+            all(|point| &point.notes).into_iter().map(str::to_owned).collect();
+        notes.extend(table.empty());
         manifest["defaults"] = defaults.into();
         manifest["idealisations"] = all(|point| &point.idealisations).into();
-        manifest["notes"] = all(|point| &point.notes).into();
+        manifest["notes"] = notes.into();
         manifest["scores"] = scores.into();
         manifest["confidence"] = 0.95.into();
         manifest["files"] = FILES.as_slice().into();
@@ -141,6 +147,15 @@ impl Table {
         text
     }
 
+    /// What is to be said if there are points without a single return.
+    pub fn empty(&self) -> Option<String> {
+        let reasons: Vec<&String> = self.rows.iter().filter_map(|row| row.empty.as_ref()).collect();
+        let reason = reasons.first()?;
+        let all = self.rows.len();
+        let empty = reasons.len();
+        Some(format!("{empty} of {all} rows of the table are without a single return: {reason}"))
+    }
+
     /// The rows for programs: an object for each, what is not known being null.
     pub fn json(&self) -> Value {
         let rows = self.rows.iter().map(|row| {
@@ -157,6 +172,7 @@ impl Table {
                 let estimate = json!({ "value": value, "low": low, "high": high });
                 object.insert(metric.column(), estimate);
             }
+            object.insert("empty".to_owned(), row.empty.as_deref().into());
             Value::from(object)
         });
         rows.collect()
@@ -183,6 +199,7 @@ mod tests {
             seeds: 2,
             pixels: 200,
             scores,
+            empty: None,
         };
         Table {
             axes: axes.map(|typed| Axis::from_str(typed).unwrap()).to_vec(),
