@@ -4,7 +4,7 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use macropulse::{design, formats, paper, record, scene};
+use macropulse::{design, formats, paper, record, scene, sweep};
 
 /// Why a command did not do what was asked.
 #[derive(Debug)]
@@ -113,6 +113,16 @@ impl From<record::Error> for Fault {
         match error {
             record::Error::Formats(error) => error.into(),
             record::Error::View(error) => Self::Ours(error.to_string()),
+        }
+    }
+}
+
+impl From<sweep::Error> for Fault {
+    fn from(error: sweep::Error) -> Self {
+        match error {
+            sweep::Error::Formats(error) => error.into(),
+            sweep::Error::View(error) => Self::Ours(error.to_string()),
+            wrong => Self::Wrong(wrong.to_string()),
         }
     }
 }

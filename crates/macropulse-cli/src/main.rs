@@ -15,6 +15,7 @@ mod scenes;
 mod sensors;
 mod simulate;
 mod speed;
+mod sweep;
 mod text;
 
 use std::process::ExitCode;
@@ -36,6 +37,7 @@ fn run(options: &Options) -> Result<(), Fault> {
     let common = &options.common;
     match &options.command {
         Command::Simulate(simulate) => simulate::run(simulate, common),
+        Command::Sweep(sweep) => sweep::run(sweep, common),
         Command::Paper(paper) => paper::run(paper, common),
         Command::Sensors(sensors) => sensors::run(sensors),
         Command::Scenes(scenes) => scenes::run(scenes),

@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::fault::Fault;
-use crate::{budget, check, completions, encode, paper, scenes, sensors, simulate, speed};
+use crate::{budget, check, completions, encode, paper, scenes, sensors, simulate, speed, sweep};
 
 /// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
 /// it, get a point cloud.
@@ -22,6 +22,7 @@ pub struct Options {
 #[derive(Subcommand)]
 pub enum Command {
     Simulate(simulate::Simulate),
+    Sweep(sweep::Sweep),
     Paper(paper::Paper),
     Sensors(sensors::Sensors),
     Scenes(scenes::Scenes),

@@ -35,6 +35,7 @@ pub mod view;
 
 pub mod sim;
 pub mod record;
+pub mod sweep;
 pub mod paper;
 
 pub mod predict;

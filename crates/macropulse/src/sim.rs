@@ -87,7 +87,13 @@ impl<'a> Scans<'a> {
     /// its end.
     pub fn scan(&mut self, number: u64, watch: &Watch) -> Option<&mut Scan> {
         let bands: Vec<Band> = bands(self.design, number).collect();
-        self.measure(&bands, watch).then_some(&mut self.scan)
+        self.part(&bands, watch)
+    }
+
+    /// As [`Scans::scan`], but only the `bands` given, all of one scan; the rest of the cloud
+    /// stays empty.
+    pub fn part(&mut self, bands: &[Band], watch: &Watch) -> Option<&mut Scan> {
+        self.measure(bands, watch).then_some(&mut self.scan)
     }
 
     /// Measures `bands` of one scan; whether to the end.

@@ -15,7 +15,7 @@ struct Rule {
     because: &'static str,
 }
 
-const RULES: [Rule; 18] = [
+const RULES: [Rule; 19] = [
     Rule {
         module: "code",
         may_name: &[],
@@ -79,6 +79,14 @@ const RULES: [Rule; 18] = [
         module: "predict",
         may_name: &["channel", "code", "design", "units"],
         because: "an oracle that ran the simulation would agree with it whatever it did",
+    },
+    Rule {
+        module: "sweep",
+        may_name: &[
+            "design", "digest", "emit", "formats", "names", "points", "scene", "score", "sim",
+            "view",
+        ],
+        because: "a sweep repeats whole scans and counts; how one is made is no affair of its",
     },
     Rule {
         module: "random",

@@ -35,6 +35,14 @@ pub enum Error {
         /// What is wrong and what to do.
         message: String,
     },
+    /// A value was changed to what cannot be.
+    #[error("{key}: {message}")]
+    Changed {
+        /// The dotted key, or several.
+        key: String,
+        /// What is wrong and what to do.
+        message: String,
+    },
     /// Neither a built-in scene nor a file.
     #[error("there is no scene {asked:?}: it is neither a file nor built in; {}built in are {known}", nearest.as_ref().map(|name| format!("did you mean {name:?}? ")).unwrap_or_default())]
     UnknownScene {

@@ -5,6 +5,7 @@ mod batch;
 mod builtin;
 mod car;
 mod car_parts;
+mod change;
 mod closed_form;
 mod digest;
 mod error;

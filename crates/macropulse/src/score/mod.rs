@@ -1,5 +1,11 @@
 //! Measurement against truth: the only stage that sees both sides.
 
+mod interval;
+mod range_error;
+
+pub use interval::Estimate;
+pub use range_error::RangeError;
+
 use crate::design::Design;
 use crate::emit::ShotLog;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth};
@@ -10,7 +16,7 @@ use crate::scene::{Hits, Scene};
 pub const NEAR: f64 = 0.35;
 
 /// How many pixels came out how.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Score {
     /// Pixels by outcome, in the order of [`Outcome::ALL`].
     pub pixels: [u64; 6],

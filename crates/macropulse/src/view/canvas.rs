@@ -1,7 +1,7 @@
 //! A rectangle of coloured pixels that takes rectangles and text.
 
 use super::Error;
-use super::colour::{NIGHT, Rgb};
+use super::colour::{NIGHT, Rgb, mix};
 use super::font::{ADVANCE, glyph};
 
 const LONGEST_SIDE: usize = 16_384;
@@ -38,10 +38,16 @@ impl Canvas {
         }
     }
 
-    #[cfg(test)]
     pub fn get(&self, x: usize, y: usize) -> Rgb {
         let at = 3 * (y * self.width + x);
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
+    }
+
+    /// Covers a pixel with `share` of a colour.
+    pub fn blend(&mut self, x: usize, y: usize, (colour, share): (Rgb, f64)) {
+        if x < self.width && y < self.height && share > 0.0 {
+            self.put(x, y, mix(self.get(x, y), colour, share));
+        }
     }
 
     /// Fills the rectangle with its corner at `corner`, `size` wide and high.

@@ -1,6 +1,8 @@
 //! Charts as SVG: lines, steps, dots, bars, shaded bands, notes.
 
-use super::curves::{band_path, curve_class, draw_curve, draw_dots, draw_line, draw_note};
+use super::curves::{
+    band_path, curve_class, draw_curve, draw_dots, draw_line, draw_note, draw_whiskers,
+};
 use super::plot::{Plane, Ruler, room_for_ticks};
 use super::svg::{Anchor, Hue, Svg, text_width};
 use super::ticks::label;
@@ -126,6 +128,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Shaded areas behind everything.
     pub bands: Vec<Band>,
+    /// Intervals about values, drawn as upright strokes from the lower to the upper y.
+    pub whiskers: Vec<Band>,
     /// Lines across the chart.
     pub lines: Vec<Line>,
     /// Remarks.
@@ -145,6 +149,7 @@ impl Chart {
             y: Axis { upright: true, ..y },
             series: Vec::new(),
             bands: Vec::new(),
+            whiskers: Vec::new(),
             lines: Vec::new(),
             notes: Vec::new(),
             legend: false,
@@ -161,6 +166,10 @@ impl Chart {
 
     /// The chart as SVG.
     pub fn svg(&self) -> String {
+        self.draw().finish()
+    }
+
+    pub(super) fn draw(&self) -> Svg {
         let mut svg = Svg::new(self.size, &self.title);
         let plane = self.plane();
         plane.draw_axes(&mut svg, [&self.x.title, &self.y.title]);
@@ -175,6 +184,9 @@ impl Chart {
         }
         svg.close_window();
         self.draw_bars(&mut svg, &plane, BarPart::Value);
+        for whiskers in &self.whiskers {
+            draw_whiskers(&mut svg, whiskers, &plane);
+        }
         for series in &self.series {
             draw_dots(&mut svg, series, &plane);
         }
@@ -189,7 +201,7 @@ impl Chart {
         for note in &self.notes {
             draw_note(&mut svg, note, &plane);
         }
-        svg.finish()
+        svg
     }
 
     fn plane(&self) -> Plane {
@@ -210,9 +222,8 @@ impl Chart {
             let zero = (series.style == Style::Bars).then_some(0.0);
             series.points.iter().map(|point| point[1]).chain(zero)
         });
-        let ys = ys.chain(
-            self.bands.iter().flat_map(|band| band.points.iter().flat_map(|p| [p[1], p[2]])),
-        );
+        let bands = self.bands.iter().chain(&self.whiskers);
+        let ys = ys.chain(bands.flat_map(|band| band.points.iter().flat_map(|p| [p[1], p[2]])));
         Ruler::new(&self.y, ys, [self.size[1] - 52.0, top])
     }
 
@@ -387,6 +398,20 @@ mod tests {
     }
 
     #[test]
+    fn whiskers_widen_the_axis_and_end_where_they_should() {
+        let mut chart = Chart::new("t", Axis::linear("x"), Axis::linear("y"));
+        chart = chart.series("", Style::Joined, vec![[0.0, 5.0], [1.0, 5.0]]);
+        chart
+            .whiskers
+            .push(Band { points: vec![[0.0, 0.0, 8.0], [1.0, 5.0, 5.0]], hue: Hue::Blue });
+        let plane = chart.plane();
+        let [x, low] = plane.place([0.0, 0.0]).unwrap().map(number);
+        let high = number(plane.place([0.0, 8.0]).unwrap()[1]);
+        let stroke = format!("x1=\"{x}\" y1=\"{low}\" x2=\"{x}\" y2=\"{high}\"");
+        assert!(chart.svg().contains(&stroke), "{stroke}");
+    }
+
+    #[test]
     fn bars_say_their_value_where_there_is_room() {
         let bars = |count: usize| {
             let points = (0..count).map(|at| [at as f64 / count as f64, 3658.0]).collect();
@@ -406,6 +431,7 @@ mod tests {
             for points in [vec![], vec![[1.0, f64::INFINITY]], vec![[0.0, 1e-9], [2.0, 1e9]]] {
                 let mut chart = Chart::new("<t>", Axis::categories("x", &["<a>"]), Axis::log("y"));
                 chart.bands.push(Band { points: vec![[0.0, 1.0, 2.0]; 2], hue: Hue::Teal });
+                chart.whiskers.push(Band { points: vec![[0.0, f64::NAN, 2.0]], hue: Hue::Teal });
                 chart.lines = vec![Line::AtX(1.0, "<".into()), Line::AtY(1.0, "&".into())];
                 chart.notes = vec![Note { at: [1.0, 1.0], text: "\"".into() }];
                 let svg = chart.series("<s>", style, points).svg();

@@ -60,6 +60,22 @@ pub(super) fn band_path(band: &Band, plane: &Plane) -> String {
     if corners.len() < 3 { String::new() } else { format!("M{}Z", corners.join("L")) }
 }
 
+pub(super) fn draw_whiskers(svg: &mut Svg, whiskers: &Band, plane: &Plane) {
+    /// Half the width of the cross strokes at both ends.
+    const HALF: f64 = 4.0;
+    let class = format!("line thin {}", whiskers.hue.class());
+    for [x, low, high] in &whiskers.points {
+        let (Some([x, low]), Some([_, high])) = (plane.place([*x, *low]), plane.place([*x, *high]))
+        else {
+            continue;
+        };
+        svg.line([x, low], [x, high], &class);
+        for end in [low, high] {
+            svg.line([x - HALF, end], [x + HALF, end], &class);
+        }
+    }
+}
+
 pub(super) fn draw_line(svg: &mut Svg, line: &Line, plane: &Plane) {
     const CLASS: &str = "line thin dashed h-grey";
     match line {

@@ -1,7 +1,5 @@
 //! The few SVG elements charts are made of, and the one style they share.
 
-use std::fmt::Write;
-
 /// Colours of series and bars. What each looks like depends on the reader's light or dark page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Hue {
@@ -74,88 +72,165 @@ pub(super) enum Anchor {
     End,
 }
 
-/// An SVG in the making.
-#[derive(Debug)]
+/// One element of a drawing, with the classes that say what it looks like.
+#[derive(Debug, Clone)]
+pub(super) enum Stroke {
+    Line {
+        from: [f64; 2],
+        to: [f64; 2],
+        class: String,
+    },
+    /// Steps M, L, H, V and Z with absolute coordinates.
+    Path {
+        steps: String,
+        class: String,
+    },
+    Rect {
+        corner: [f64; 2],
+        size: [f64; 2],
+        class: String,
+    },
+    Dot {
+        centre: [f64; 2],
+        radius: f64,
+        class: String,
+    },
+    Text {
+        place: [f64; 2],
+        anchor: Anchor,
+        class: String,
+        text: String,
+    },
+    /// Until the window closes, what lies outside of it is cut off.
+    OpenWindow {
+        corner: [f64; 2],
+        size: [f64; 2],
+    },
+    CloseWindow,
+    /// Until the group closes, everything is moved to the right and down.
+    OpenGroup {
+        shift: [f64; 2],
+    },
+    CloseGroup,
+}
+
+/// A drawing in the making.
+#[derive(Debug, Clone)]
 pub(super) struct Svg {
-    text: String,
+    pub size: [f64; 2],
+    title: String,
+    pub strokes: Vec<Stroke>,
 }
 
 impl Svg {
     /// A drawing of `size`, called `title` for those who cannot see it.
     pub fn new(size: [f64; 2], title: &str) -> Self {
-        let [width, height] = size.map(number);
-        let text = format!(
-            "<svg class=\"mp\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-             width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"{}\">\n",
-            escape(title)
-        );
-        Self { text }
-    }
-
-    fn push(&mut self, arguments: std::fmt::Arguments) {
-        // Writing to a String cannot fail.
-        let _ = self.text.write_fmt(arguments);
-        self.text.push('\n');
+        Self { size, title: title.to_owned(), strokes: Vec::new() }
     }
 
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], class: &str) {
-        let [x1, y1, x2, y2] = [from[0], from[1], to[0], to[1]].map(number);
-        self.push(format_args!(
-            "<line class=\"{class}\" x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"/>"
-        ));
+        self.strokes.push(Stroke::Line { from, to, class: class.to_owned() });
     }
 
     pub fn path(&mut self, steps: &str, class: &str) {
         if !steps.is_empty() {
-            self.push(format_args!("<path class=\"{class}\" d=\"{steps}\"/>"));
+            self.strokes.push(Stroke::Path { steps: steps.to_owned(), class: class.to_owned() });
         }
     }
 
     /// A rectangle with a hint of round corners.
     pub fn rect(&mut self, corner: [f64; 2], size: [f64; 2], class: &str) {
-        let [x, y, width, height] =
-            [corner[0], corner[1], size[0].max(0.0), size[1].max(0.0)].map(number);
-        let round = number((size[0].min(size[1]) / 4.0).clamp(0.0, 2.5));
-        self.push(format_args!(
-            "<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"{round}\"/>"
-        ));
+        self.strokes.push(Stroke::Rect { corner, size, class: class.to_owned() });
     }
 
     pub fn dot(&mut self, centre: [f64; 2], radius: f64, class: &str) {
-        let [x, y, r] = [centre[0], centre[1], radius].map(number);
-        self.push(format_args!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{r}\"/>"));
+        self.strokes.push(Stroke::Dot { centre, radius, class: class.to_owned() });
     }
 
     /// `text` with its baseline at `place`.
     pub fn text(&mut self, place: [f64; 2], anchor: Anchor, class: &str, text: &str) {
-        let [x, y] = place.map(number);
-        let anchor = match anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
-        };
-        self.push(format_args!(
-            "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
-            escape(text)
-        ));
+        let (class, text) = (class.to_owned(), text.to_owned());
+        self.strokes.push(Stroke::Text { place, anchor, class, text });
     }
 
-    /// What is drawn until [`Svg::close_window`] is cut off at this rectangle. A nested drawing
-    /// needs no identifier, which would have to be unique in the page.
+    /// What is drawn until [`Svg::close_window`] is cut off at this rectangle.
     pub fn open_window(&mut self, corner: [f64; 2], size: [f64; 2]) {
-        let [x, y, width, height] = [corner[0], corner[1], size[0], size[1]].map(number);
-        self.push(format_args!(
-            "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\">"
-        ));
+        self.strokes.push(Stroke::OpenWindow { corner, size });
     }
 
     pub fn close_window(&mut self) {
-        self.push(format_args!("</svg>"));
+        self.strokes.push(Stroke::CloseWindow);
     }
 
-    pub fn finish(mut self) -> String {
-        self.text.push_str("</svg>\n");
-        self.text
+    /// Adds another drawing, moved to the right and down by `shift`.
+    pub fn add(&mut self, shift: [f64; 2], other: Self) {
+        self.strokes.push(Stroke::OpenGroup { shift });
+        self.strokes.extend(other.strokes);
+        self.strokes.push(Stroke::CloseGroup);
+    }
+
+    /// The drawing as SVG.
+    pub fn finish(self) -> String {
+        let [width, height] = self.size.map(number);
+        let mut text = format!(
+            "<svg class=\"mp\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+             width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"{}\">\n",
+            escape(&self.title)
+        );
+        for stroke in &self.strokes {
+            text += &stroke.markup();
+            text.push('\n');
+        }
+        text + "</svg>\n"
+    }
+}
+
+impl Stroke {
+    fn markup(&self) -> String {
+        match self {
+            Self::Line { from, to, class } => {
+                let [x1, y1, x2, y2] = [from[0], from[1], to[0], to[1]].map(number);
+                format!("<line class=\"{class}\" x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"/>")
+            }
+            Self::Path { steps, class } => format!("<path class=\"{class}\" d=\"{steps}\"/>"),
+            Self::Rect { corner, size, class } => {
+                let [x, y, width, height] =
+                    [corner[0], corner[1], size[0].max(0.0), size[1].max(0.0)].map(number);
+                let round = number((size[0].min(size[1]) / 4.0).clamp(0.0, 2.5));
+                format!(
+                    "<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"{round}\"/>"
+                )
+            }
+            Self::Dot { centre, radius, class } => {
+                let [x, y, r] = [centre[0], centre[1], *radius].map(number);
+                format!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{r}\"/>")
+            }
+            Self::Text { place, anchor, class, text } => {
+                let [x, y] = place.map(number);
+                let anchor = match anchor {
+                    Anchor::Start => "start",
+                    Anchor::Middle => "middle",
+                    Anchor::End => "end",
+                };
+                format!(
+                    "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
+                    escape(text)
+                )
+            }
+            // A nested drawing needs no identifier, which would have to be unique in the page.
+            Self::OpenWindow { corner, size } => {
+                let [x, y, width, height] = [corner[0], corner[1], size[0], size[1]].map(number);
+                format!(
+                    "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\">"
+                )
+            }
+            Self::CloseWindow => "</svg>".to_owned(),
+            Self::OpenGroup { shift } => {
+                let [x, y] = shift.map(number);
+                format!("<g transform=\"translate({x} {y})\">")
+            }
+            Self::CloseGroup => "</g>".to_owned(),
+        }
     }
 }
 

@@ -1,0 +1,136 @@
+//! A scene with some of its values changed.
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use super::{Error, Scene};
+use crate::names::nearest;
+
+/// Names of the three numbers of a position or size.
+const COORDINATES: [&str; 3] = ["x", "y", "z"];
+
+impl Scene {
+    /// As [`Scene::open`], with `changes` of single values: dotted keys, each with its new value
+    /// as TOML. An object is called by its name, a coordinate x, y or z: the wall of the ready
+    /// scene of that name is moved by `object.wall.position_m.x`.
+    ///
+    /// # Errors
+    /// As [`Scene::open`]; and if a key leads nowhere, or the scene refuses the value.
+    pub fn open_changed(name_or_file: &str, changes: &[(String, String)]) -> Result<Self, Error> {
+        // What is wrong without the changes is said with its place in the file.
+        let scene = Self::open(name_or_file)?;
+        if changes.is_empty() {
+            return Ok(scene);
+        }
+        let path = Path::new(name_or_file);
+        let (text, base) = match Self::builtin(name_or_file) {
+            Some(text) => (text.to_owned(), Path::new("")),
+            None => {
+                let text = std::fs::read_to_string(path)
+                    .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+                (text, path.parent().unwrap_or(Path::new("")))
+            }
+        };
+        let keys = || changes.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>().join(", ");
+        let refused = |message: String| Error::Changed { key: keys(), message };
+        let mut table: Table =
+            text.parse().map_err(|error: toml::de::Error| refused(error.message().to_owned()))?;
+        for (key, value) in changes {
+            change(&mut table, key, value)
+                .map_err(|message| Error::Changed { key: key.clone(), message })?;
+        }
+        let text = toml::to_string(&table).map_err(|error| refused(error.to_string()))?;
+        Self::from_toml(&text, name_or_file, base).map_err(|error| match error {
+            // Its place would be in a text that nobody wrote.
+            Error::Typed { message, .. } => refused(message),
+            error => error,
+        })
+    }
+}
+
+fn change(table: &mut Table, key: &str, typed: &str) -> Result<(), String> {
+    let value = format!("v = {typed}").parse::<Table>().ok();
+    let value = value
+        .and_then(|mut parsed| parsed.remove("v"))
+        .unwrap_or_else(|| Value::String(typed.to_owned()));
+    let (above, last) = key.rsplit_once('.').unwrap_or(("", key));
+    let mut at = None;
+    for step in above.split('.').filter(|step| !step.is_empty()) {
+        at = Some(match at {
+            None => table.get_mut(step).ok_or_else(|| absent(step))?,
+            Some(value) => below(value, step)?,
+        });
+    }
+    match at {
+        None => drop(table.insert(last.to_owned(), value)),
+        Some(Value::Table(inner)) => drop(inner.insert(last.to_owned(), value)),
+        Some(list) => *below(list, last)? = value,
+    }
+    Ok(())
+}
+
+/// What `step` leads to from `value`.
+fn below<'a>(value: &'a mut Value, step: &str) -> Result<&'a mut Value, String> {
+    match value {
+        Value::Table(inner) => inner.get_mut(step).ok_or_else(|| absent(step)),
+        Value::Array(list) => {
+            let names: Vec<String> = match list.first().is_some_and(Value::is_table) {
+                true => list.iter().enumerate().map(name).collect(),
+                false => COORDINATES.map(str::to_owned).to_vec(),
+            };
+            let place = names.iter().position(|name| name == step);
+            place.and_then(|place| list.get_mut(place)).ok_or_else(|| {
+                let hint = nearest(step, names.iter().map(String::as_str))
+                    .map(|near| format!("did you mean `{near}`? "))
+                    .unwrap_or_default();
+                format!("nothing in it is called `{step}`; {hint}there are {}", names.join(", "))
+            })
+        }
+        _ => Err(format!("is a single value, so it has no `{step}`")),
+    }
+}
+
+/// As scenes call an object without a name.
+fn name((index, value): (usize, &Value)) -> String {
+    let named = value.get("name").and_then(Value::as_str).map(str::to_owned);
+    named.unwrap_or_else(|| format!("object-{}", index + 1))
+}
+
+fn absent(step: &str) -> String {
+    format!("the scene does not have `{step}`; write it there first")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Ray;
+
+    fn changed(key: &str, value: &str) -> Result<Scene, String> {
+        let changes = [(key.to_owned(), value.to_owned())];
+        Scene::open_changed("wall", &changes).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_wall_moves() {
+        let ray = Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0] };
+        let range = |scene: Scene| scene.cast(&ray, 0.0, 1e3).unwrap().range;
+        assert_eq!(range(changed("object.wall.position_m.x", "80.5").unwrap()), 80.5);
+        assert_eq!(range(Scene::open_changed("wall", &[]).unwrap()), 50.0);
+        // A key that the file leaves open, and a whole list.
+        let turned = changed("sensor.yaw_deg", "60").unwrap();
+        assert_ne!(turned.sensor, Scene::open("wall").unwrap().sensor);
+        assert_eq!(range(changed("object.wall.position_m", "[7, 0, 0]").unwrap()), 7.0);
+    }
+
+    #[test]
+    fn a_key_that_leads_nowhere_says_so() {
+        let told = |key: &str, value: &str| changed(key, value).unwrap_err();
+        assert!(told("object.wal.position_m.x", "1").contains("did you mean `wall`?"));
+        assert!(told("object.wall.position_m.w", "1").contains("there are x, y, z"));
+        assert!(told("object.wall.positoin_m", "1").contains("did you mean `position_m`?"));
+        assert!(told("ground.z_m", "1").contains("does not have `ground`"));
+        assert!(told("object.wall.position_m.x", "nan").starts_with("object.wall.position_m.x: "));
+        assert!(told("version.x", "1").contains("single value"));
+    }
+}
