@@ -23,6 +23,12 @@ pub enum Stage {
     Firing = 3,
     /// How late is a mark that is seen? Indexed by shot, a part for each of its echoes.
     Jitter = 4,
+    /// Is this mark of another lidar seen? Indexed by its shot, a part for each way of its light.
+    OtherMarks = 5,
+    /// How late is such a mark? Indexed likewise.
+    OtherJitter = 6,
+    /// The firing of a one-mark detector in the light of others. Indexed by our own shot.
+    OtherFiring = 7,
 }
 
 /// Where a run of random numbers stands.

@@ -11,6 +11,10 @@
 //!
 //! with ρ_eff the material's backscatter towards the sensor and w the share of the beam.
 
+mod others;
+
+pub use others::{APERTURE_RADIUS, Foreign, foreign};
+
 use crate::design::Design;
 use crate::scene::{Hits, Material};
 use crate::units::tof_fs_from_ranges;
@@ -25,6 +29,8 @@ pub struct Echoes {
     pub delay_fs: Vec<i64>,
     /// Mean number of photons detected per mark; infinite for a detector that never misses.
     pub photons: Vec<f64>,
+    /// Light of other lidars that arrives beside them.
+    pub foreign: Foreign,
 }
 
 /// The echoes of `hits` at the sensor `design`, whose scene has `materials`.
@@ -37,8 +43,9 @@ pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
             link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i])
         })
         .collect();
+    let delay_fs = tof_fs_from_ranges(&hits.range);
     let mut echoes =
-        Echoes { shot: hits.shot.clone(), delay_fs: tof_fs_from_ranges(&hits.range), photons };
+        Echoes { shot: hits.shot.clone(), delay_fs, photons, foreign: Foreign::default() };
     if !echoes.photons.iter().all(|&photons| photons > 0.0) {
         echoes.leave_out_the_dark();
     }
@@ -57,6 +64,9 @@ impl Echoes {
     }
 }
 
+/// Half of the width of a receiver's filter, m: what sensor files leave unsaid.
+pub const FILTER: f64 = 15e-9;
+
 /// The link equation with everything that does not depend on the target multiplied out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Link {
@@ -74,6 +84,33 @@ impl Link {
                 / sensitivity.reflectance,
             extinction,
         }
+    }
+
+    /// The link from the lidar `other` into the receiver of `ours`; `None` where the filter of the
+    /// receiver, ±[`FILTER`] about its own wavelength, stops the light.
+    ///
+    /// What a foreign mark brings follows from the sensitivity that the other declares of itself,
+    /// n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector like its
+    /// own, which ours are taken to be. A detector of ours that never misses sees every mark; of
+    /// another that never misses, by which its energy is left open, ours is assumed.
+    pub fn of_other(ours: &Design, other: &Design) -> Option<Self> {
+        if (ours.light.wavelength - other.light.wavelength).abs() > FILTER {
+            return None;
+        }
+        let [own, its] = [ours, other].map(|design| Self::of(design).photons_at_one_metre);
+        let photons_at_one_metre = if own.is_infinite() || its.is_infinite() { own } else { its };
+        let extinction = ours.visibility.map_or(0.0, |v| extinction(v, other.light.wavelength));
+        Some(Self { photons_at_one_metre, extinction })
+    }
+
+    /// Mean photons detected per mark of light that has gone `way` metres through air, the last
+    /// `back` of them from a target of effective reflectance `reflectance`.
+    pub fn photons_by(&self, (way, back): (f64, f64), reflectance: f64) -> f64 {
+        if reflectance <= 0.0 || back <= 0.0 {
+            return 0.0;
+        }
+        let transmission = libm::exp(-self.extinction * way);
+        self.photons_at_one_metre * reflectance * transmission / (back * back)
     }
 
     /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which

@@ -7,6 +7,7 @@ mod clock;
 mod first_firing;
 mod jitter;
 mod noise;
+mod others;
 mod photon_counting;
 
 pub use first_firing::photons_for;
@@ -58,7 +59,7 @@ impl<'a> Detectors<'a> {
         Self { design, chance, kind }
     }
 
-    /// The edges that the `echoes` of the shots in `log` make.
+    /// The edges that the `echoes` of the shots in `log` make, and the foreign light among them.
     pub fn edges(&self, log: &ShotLog, echoes: &Echoes, memory: &mut Memory) -> Edges {
         let Some(first) = log.fired_at_fs.first() else { return Edges::default() };
         let clock = Clock::new(self.design, *first);
@@ -84,6 +85,8 @@ pub struct Memory {
     later: Vec<u32>,
     order: Vec<u64>,
     numbers: Vec<[u32; GROUP]>,
+    foreign: Vec<u32>,
+    offsets: Vec<i64>,
 }
 
 impl Memory {

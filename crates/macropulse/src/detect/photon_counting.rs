@@ -3,7 +3,8 @@
 //! 1. Every mark of every echo is seen with probability (1 − m)·(1 − exp(−n)), n the mean photons
 //!    detected per mark and m the fraction lost for other reasons (docs/physics.md#photon-counting).
 //! 2. A mark that is seen makes one edge at its arrival, displaced by Gaussian jitter.
-//! 3. Dark and background counts are Poisson in time.
+//! 3. Light of other lidars makes edges beside them.
+//! 4. Dark and background counts are Poisson in time.
 //!
 //! Marks that arrive within one tick make one edge in the end: the converters merge them, which is
 //! the hard limiter of the coding literature.
@@ -14,7 +15,7 @@
 use super::clock::Clock;
 use super::jitter::Jitter;
 use super::noise::Noise;
-use super::{Edges, Memory};
+use super::{Edges, Memory, others};
 use crate::channel::Echoes;
 use crate::design::{Design, PARTS_OF_TICK, PhotonCounting};
 use crate::emit::ShotLog;
@@ -48,6 +49,8 @@ pub(super) struct Counting {
     jitter: Option<Jitter>,
     noise: Option<Noise>,
     reach_fs: i64,
+    /// Length of a micropulse, s.
+    pulse: f64,
 }
 
 impl Counting {
@@ -77,6 +80,7 @@ impl Counting {
             jitter: Jitter::new(counting.jitter * parts),
             noise: Noise::new(counting.false_rate, design),
             reach_fs: design.reach_fs(),
+            pulse: design.light.pulse,
         }
     }
 
@@ -89,9 +93,18 @@ impl Counting {
             self.add_echo(band, *arrival, chance, (&mut time, memory));
         }
         memory.order = order;
-        if let (Some(noise), Some(last)) = (&self.noise, band.log.fired_at_fs.last()) {
-            let span =
-                band.clock.time(band.log.fired_at_fs[0])..=band.clock.time(last + self.reach_fs);
+        let Some(last) = band.log.fired_at_fs.last() else { return Edges::default() };
+        let span = band.clock.time(band.log.fired_at_fs[0])..=band.clock.time(last + self.reach_fs);
+        if !band.echoes.foreign.is_empty() {
+            let jitter = self.jitter.as_ref();
+            let counted = others::Counted { kept: self.kept, jitter, pulse: self.pulse };
+            counted.edges((&band.clock, &band.echoes.foreign), &span, chance, memory);
+            time.extend(PAD);
+            memory.foreign.extend(PAD);
+            merge(&time, &memory.foreign, &mut memory.merged, 0);
+            std::mem::swap(&mut time, &mut memory.merged);
+        }
+        if let Some(noise) = &self.noise {
             noise.edges(&band.clock, span, chance, &mut memory.false_edges);
             if memory.false_edges.len() < time.len() / FEW {
                 insert(&mut time, &memory.false_edges);
@@ -256,6 +269,7 @@ mod tests {
             shot: (0..shots).collect(),
             delay_fs: vec![200_000_000; shots as usize],
             photons: vec![photons; shots as usize],
+            ..Echoes::default()
         };
         detect(design, &log, &echoes, seed)
     }
@@ -293,6 +307,7 @@ mod tests {
             shot: (0..500).flat_map(|shot| [shot, shot]).collect(),
             delay_fs: delays.collect(),
             photons: vec![f64::INFINITY; 1000],
+            ..Echoes::default()
         };
         let mut expected: Vec<i64> = (0..1000)
             .flat_map(|i| {
@@ -392,6 +407,7 @@ mod tests {
                     shot: (0..shots).collect(),
                     delay_fs: vec![1000; shots as usize],
                     photons: vec![1.0; shots as usize],
+                    ..Echoes::default()
                 };
                 absolute(&detect(&design, &log, &echoes, 3))
             })

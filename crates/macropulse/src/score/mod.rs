@@ -1,5 +1,9 @@
 //! Measurement against truth: the only stage that sees both sides.
 
+mod ghosts;
+
+pub use ghosts::ghosts;
+
 use crate::design::Design;
 use crate::emit::ShotLog;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth};
@@ -21,6 +25,8 @@ pub struct Score {
     pub samples_on_target: u64,
     /// Returns that come from a surface of the target object.
     pub points_on_target: u64,
+    /// Wrong and false returns that light of other lidars has made, as [`ghosts`] has it.
+    pub ghosts: u64,
 }
 
 impl Score {
@@ -46,6 +52,7 @@ impl Score {
         self.dark += other.dark;
         self.samples_on_target += other.samples_on_target;
         self.points_on_target += other.points_on_target;
+        self.ghosts += other.ghosts;
     }
 }
 
