@@ -55,7 +55,7 @@ fn stands(pose: &Pose) -> String {
 
 /// One of the other lidars: what, where, when.
 fn told(other: &Other) -> String {
-    let (phase, drift) = (short(phase_ns(other)), short(drift_ppm(other)));
+    let (phase, drift) = (phase_ns(other), short(drift_ppm(other)));
     let (name, sensor) = (&other.name, &other.design.name);
     let stands = stands(&other.pose);
     format!("{name}: {sensor}, {stands}; reads 0 at {phase} ns of ours, {drift} ppm fast")
@@ -75,9 +75,9 @@ fn json(other: &Other) -> Value {
 }
 
 fn phase_ns(other: &Other) -> f64 {
-    other.clock.phase_fs as f64 * 1e-6
+    other.clock.phase_fs as f64 / 1e6
 }
 
 fn drift_ppm(other: &Other) -> f64 {
-    other.clock.drift as f64 * 1e-6
+    other.clock.drift as f64 / 1e6
 }

@@ -99,8 +99,10 @@ pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
             for theirs in other.clock.shots(&other.design, open.start - longest_fs..open.end) {
                 let look = |shot: usize, direction, way: f64| {
                     let arrives_fs = theirs.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
-                    let pixel = open.contains(&arrives_fs).then_some(direction)?;
-                    let pixel = design.scan.pixel_at(pixel)?;
+                    if !open.contains(&arrives_fs) {
+                        return None;
+                    }
+                    let pixel = design.scan.pixel_at(direction)?;
                     listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
                 };
                 let lit = scene.lit(other, &theirs, farthest, &look);

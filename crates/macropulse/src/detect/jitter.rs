@@ -60,7 +60,7 @@ impl Jitter {
     /// The delay that `number` draws, in parts of a tick.
     pub fn drawn(&self, number: u32) -> i32 {
         match self.step == 1.0 {
-            true => i32::from(drawn(number, &self.cells, self.bits)),
+            true => drawn(number, &self.cells, self.bits),
             false => self.coarse(number),
         }
     }

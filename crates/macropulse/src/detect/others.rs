@@ -121,7 +121,7 @@ pub(super) fn flashes(band: &first_firing::Band) -> Vec<Flash> {
         for marks in
             foreign.marks_of(entry).chunk_by(|first, mark| first / pulse_fs == mark / pulse_fs)
         {
-            let middle_fs = marks.iter().sum::<i64>() / marks.len() as i64;
+            let middle_fs = (marks[0] + marks[marks.len() - 1]) / 2;
             let arrives_fs = foreign.arrives_fs[entry] + middle_fs;
             let photons = foreign.photons[entry] * marks.len() as f64;
             flashes.extend(
@@ -196,7 +196,7 @@ mod tests {
             photons: vec![2.0],
             pulse: vec![2.5e-12],
             pixel: vec![(log.row[shot], log.column[shot])],
-            marks: vec![0..180],
+            marks: std::iter::once(0..180).collect(),
             mark_fs,
             shot: vec![0],
             way: vec![0],

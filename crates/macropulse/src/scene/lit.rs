@@ -139,10 +139,10 @@ impl<'a> Light<'a> {
         let world = &self.scene.world;
         world.cast_packet(&mut self.packet, &mut self.met);
         let normals = world.describe(&self.packet, &mut self.met);
+        let normal = |lane: usize| DVec3::from(normals.map(|axis| axis[lane]));
         for lane in 0..self.count {
             if self.met.is_hit(&self.packet, lane) {
-                let normal = DVec3::new(normals[0][lane], normals[1][lane], normals[2][lane]);
-                self.waiting.extend(self.point(lane, normal));
+                self.waiting.extend(self.point(lane, normal(lane)));
             }
         }
         self.count = 0;
@@ -233,7 +233,7 @@ mod tests {
         let scene = scene("[0, 4, 0]", "");
         let lit = lit(&scene);
         let other = &scene.others[0].design;
-        // Moved by 4 m, 43 % or so of its field of 5.4 m lie in ours.
+        // Moved by 4 m, a quarter of its field, which is 5.4 m wide there, lies in ours.
         assert!((800..3000).contains(&lit.shot.len()), "{}", lit.shot.len());
         for i in 0..lit.shot.len() {
             let (row, column) = (lit.shot[i] / 128, lit.shot[i] % 128);
@@ -244,8 +244,6 @@ mod tests {
             assert!((f64::from(lit.cosine[i]) - 10.0 / point.length()).abs() < 1e-6);
             let half = (DVec3::new(x, y, z) + point.normalize()).normalize().x;
             assert!((f64::from(lit.half_cosine[i]) - half).abs() < 1e-6);
-            // Both look level, so that the point lies in our row of the same elevation or nearer
-            // to the horizon.
             assert!(point.y.abs() <= 10.0 * 15_f64.to_radians().tan() + 1e-9);
         }
     }

@@ -111,7 +111,7 @@ mod tests {
             photons: vec![5.0],
             pulse: vec![2.5e-12],
             pixel: vec![(7, 7)],
-            marks: vec![0..mark_fs.len()],
+            marks: std::iter::once(0..mark_fs.len()).collect(),
             mark_fs,
             shot: vec![0],
             way: vec![0],
