@@ -71,3 +71,40 @@ fn completions_know_the_commands() {
         assert!(ran.out.contains("simulate"), "{shell}");
     }
 }
+
+#[test]
+fn the_other_lidars_of_a_scene_are_listed_and_their_ghosts_counted() {
+    let desk = Desk::new();
+    let others = "[[others]]\nsensor = \"hdl-64e\"\nposition_m = [3, 1, 2]\nphase_ns = 1234.5\n\
+                  [[others]]\nsensor = \"mine.toml\"\nname = \"van\"\ndrift_ppm = -20\n";
+    desk.put("mine.toml", "version = 1\nname = \"mine\"\nextends = \"peregrine\"\n");
+    desk.put("a.toml", &format!("version = 1\nground = {{ material = \"white\" }}\n{others}"));
+    let text = desk.run("check a.toml").out;
+    let plain = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in [
+        "hdl-64e 1: hdl-64e, at x 3, y 1, z 2 m",
+        "reads 0 at 1234.5 ns of ours, 0 ppm fast",
+        "van: mine,",
+        "-20 ppm fast",
+        "van: no phase_ns given",
+        "through the same aperture and optics",
+    ] {
+        assert!(plain.contains(words), "no {words:?} in {text}");
+    }
+    assert_eq!(desk.json("check a.toml --json")["others"][0]["phase_ns"], 1234.5);
+    let run = "simulate --sensor peregrine --scene a.toml --format none";
+    assert!(desk.run(run).out.contains("2 other lidars, "));
+    let counted = desk.json(&format!("{run} --json"));
+    assert!(counted["ghosts"].is_u64() && counted["foreign"].is_u64(), "{counted}");
+    let alone = desk.json("simulate --sensor peregrine --scene wall --format none --json");
+    assert_eq!(alone["ghosts"], serde_json::Value::Null);
+}
+
+#[test]
+fn a_wrong_other_lidar_is_told_with_its_place() {
+    let desk = Desk::new();
+    desk.put("a.toml", "version = 1\n[[others]]\nsensor = \"hdl64e\"\n");
+    desk.refused("check a.toml", &["a.toml:3:10:", "did you mean `hdl-64e`?"]);
+    desk.put("a.toml", "version = 1\n[[others]]\nsensor = \"hdl-64e\"\ndrift_ppm = nan\n");
+    desk.refused("simulate --sensor peregrine --scene a.toml -o out", &["a.toml:4:13:", "-1000"]);
+}

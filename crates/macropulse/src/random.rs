@@ -29,6 +29,15 @@ pub enum Stage {
     Cell = 6,
     /// How late does a cell answer? Indexed by the time of the photon.
     Answer = 7,
+    /// Is this mark of another lidar seen? Indexed by its shot, a part for each way of its light.
+    OtherMarks = 8,
+    /// How late is such a mark? Indexed likewise.
+    OtherJitter = 9,
+    /// The firing of a one-mark detector in the light of others. Indexed by our own shot.
+    OtherFiring = 10,
+    /// The photons of a mark of another lidar, and what a detector makes of each. Indexed by its
+    /// shot and the way of its light.
+    OtherPhotons = 11,
 }
 
 /// Where a run of random numbers stands.

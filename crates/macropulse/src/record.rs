@@ -125,6 +125,10 @@ pub fn manifest(run: &Run) -> Manifest {
     ] {
         manifest.counts.push(name, count);
     }
+    if !scene.others.is_empty() {
+        manifest.counts.push("foreign", tally.foreign);
+        manifest.counts.push("ghosts", run.score.ghosts);
+    }
     for (kind, count) in Reject::ALL.into_iter().zip(tally.rejects) {
         manifest.rejects.push(kind.name(), count);
     }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use crate::channel::Foreign;
 use crate::decode::{Reject, Returns};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
@@ -120,7 +121,11 @@ impl Scan {
     fn add(&mut self, design: &Design, scene: &Scene, band: &Measured) {
         let clock = Instant::now();
         self.cloud.add(design, &band.log, &band.returns);
-        self.score.add(&score::judge(&mut self.cloud, design, scene, &band.log, &band.hits));
+        let mut score = score::judge(&mut self.cloud, design, scene, &band.log, &band.hits);
+        if !band.foreign.is_empty() {
+            score.ghosts = score::ghosts(&self.cloud, design, &band.log, &band.foreign);
+        }
+        self.score.add(&score);
         self.tally.add(&band.tally);
         self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
     }
@@ -130,6 +135,7 @@ impl Scan {
 struct Measured {
     log: ShotLog,
     hits: Hits,
+    foreign: Foreign,
     returns: Returns,
     tally: Tally,
 }
@@ -152,7 +158,10 @@ fn measure(
     lap(&mut tally);
     let hits = scene.trace(design, &log);
     lap(&mut tally);
-    let echoes = channel::echoes(design, &scene.materials, &hits);
+    let mut echoes = channel::echoes(design, &scene.materials, &hits);
+    if !scene.others.is_empty() {
+        echoes.foreign = channel::foreign(design, scene, &log);
+    }
     lap(&mut tally);
     let edges = detectors.edges(&log, &echoes, memory);
     tally.edges = edges.time.len() as u64;
@@ -165,6 +174,7 @@ fn measure(
     tally.shots = log.home.len() as u64;
     tally.surfaces = hits.shot.iter().filter(|s| home(s)).count() as u64;
     tally.echoes = echoes.shot.iter().filter(|s| home(s)).count() as u64;
+    tally.foreign = echoes.foreign.len() as u64;
     tally.ticks = ticks.tick.len() as u64;
     tally.merged = ticks.merged;
     tally.lost = ticks.lost;
@@ -172,14 +182,14 @@ fn measure(
     tally.returns = returns.shot.len() as u64;
     tally.rejects = returns.rejects;
     memory.take_back(ticks.tick);
-    Measured { log, hits, returns, tally }
+    Measured { log, hits, foreign: echoes.foreign, returns, tally }
 }
 
 /// The last stage, after those of a band: its points and their score.
 const POINTS: usize = 6;
 
-/// Counts of a run, stage by stage. Edges and ticks include the halos of the bands; the other
-/// counts are of home shots alone.
+/// Counts of a run, stage by stage. Foreign light, edges and ticks include the halos of the bands;
+/// the other counts are of home shots alone.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
     /// Shots fired.
@@ -188,6 +198,8 @@ pub struct Tally {
     pub surfaces: u64,
     /// Echoes with any light.
     pub echoes: u64,
+    /// Shots of other lidars whose light arrives, each way on its own.
+    pub foreign: u64,
     /// Detector edges.
     pub edges: u64,
     /// Ticks that reached the decoder.
@@ -217,6 +229,7 @@ impl Tally {
             (&mut self.shots, other.shots),
             (&mut self.surfaces, other.surfaces),
             (&mut self.echoes, other.echoes),
+            (&mut self.foreign, other.foreign),
             (&mut self.edges, other.edges),
             (&mut self.ticks, other.ticks),
             (&mut self.merged, other.merged),

@@ -39,7 +39,7 @@ const RULES: [Rule; 19] = [
     },
     Rule {
         module: "channel",
-        may_name: &["design", "scene", "units"],
+        may_name: &["design", "emit", "scene", "units"],
         because: "light arrives whether or not it is detected",
     },
     Rule {
@@ -66,8 +66,8 @@ const RULES: [Rule; 19] = [
     },
     Rule {
         module: "score",
-        may_name: &["design", "emit", "points", "scene"],
-        because: "the one stage that sees both sides compares points with surfaces",
+        may_name: &["channel", "design", "emit", "points", "scene", "units"],
+        because: "the one stage that sees both sides compares points with surfaces and foreign light",
     },
     Rule {
         module: "formats",

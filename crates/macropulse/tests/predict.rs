@@ -133,6 +133,7 @@ fn lit(design: &Design, photons: f64) -> (ShotLog, Echoes) {
         shot: (0..log.len() as u32).collect(),
         delay_fs: vec![133_426_000; log.len()],
         photons: vec![photons; log.len()],
+        ..Echoes::default()
     };
     (log, echoes)
 }

@@ -1,7 +1,7 @@
 //! The report on a scene.
 
-use macropulse::scene::Scene;
-use serde_json::json;
+use macropulse::scene::{Other, Pose, Scene};
+use serde_json::{Value, json};
 
 use super::Report;
 use crate::text::{Columns, grouped, short};
@@ -12,27 +12,14 @@ pub fn report(scene: &Scene) -> Report {
     let materials: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
     let targets: Vec<&str> =
         scene.objects.iter().filter(|o| o.is_target).map(|o| o.name.as_str()).collect();
-    let stand = &scene.sensor;
-    let [yaw, pitch, roll] = [stand.yaw, stand.pitch, stand.roll].map(f64::to_degrees);
-    let [x, y, z] = stand.position;
     let mut columns = Columns::default();
     columns.push("triangles", grouped(scene.triangles() as u64));
     columns.push("objects", objects.join(", "));
     columns
         .push("targets", if targets.is_empty() { "none".to_owned() } else { targets.join(", ") });
     columns.push("materials", materials.join(", "));
-    columns.push(
-        "sensor",
-        format!(
-            "at x {}, y {}, z {} m; yaw {}, pitch {}, roll {} deg",
-            short(x),
-            short(y),
-            short(z),
-            short(yaw),
-            short(pitch),
-            short(roll)
-        ),
-    );
+    columns.push("sensor", stands(&scene.sensor));
+    columns.push_list("others", scene.others.iter().map(told));
     columns.push("digest", scene.digest());
     let notes = scene.notes.iter().cloned();
     columns.push_list(
@@ -48,12 +35,49 @@ pub fn report(scene: &Scene) -> Report {
             "objects": objects,
             "targets": targets,
             "materials": materials,
-            "sensor_position_m": stand.position,
-            "sensor_yaw_deg": yaw,
-            "sensor_pitch_deg": pitch,
-            "sensor_roll_deg": roll,
+            "sensor_position_m": scene.sensor.position,
+            "sensor_yaw_deg": scene.sensor.yaw.to_degrees(),
+            "sensor_pitch_deg": scene.sensor.pitch.to_degrees(),
+            "sensor_roll_deg": scene.sensor.roll.to_degrees(),
+            "others": scene.others.iter().map(json).collect::<Vec<_>>(),
             "digest": scene.digest(),
             "assumed": scene.notes,
         }),
     }
+}
+
+fn stands(pose: &Pose) -> String {
+    let [x, y, z] = pose.position.map(short);
+    let [yaw, pitch, roll] =
+        [pose.yaw, pose.pitch, pose.roll].map(|angle| short(angle.to_degrees()));
+    format!("at x {x}, y {y}, z {z} m; yaw {yaw}, pitch {pitch}, roll {roll} deg")
+}
+
+/// One of the other lidars: what, where, when.
+fn told(other: &Other) -> String {
+    let (phase, drift) = (phase_ns(other), short(drift_ppm(other)));
+    let (name, sensor) = (&other.name, &other.design.name);
+    let stands = stands(&other.pose);
+    format!("{name}: {sensor}, {stands}; reads 0 at {phase} ns of ours, {drift} ppm fast")
+}
+
+fn json(other: &Other) -> Value {
+    json!({
+        "name": other.name,
+        "sensor": other.design.name,
+        "position_m": other.pose.position,
+        "yaw_deg": other.pose.yaw.to_degrees(),
+        "pitch_deg": other.pose.pitch.to_degrees(),
+        "roll_deg": other.pose.roll.to_degrees(),
+        "phase_ns": phase_ns(other),
+        "drift_ppm": drift_ppm(other),
+    })
+}
+
+fn phase_ns(other: &Other) -> f64 {
+    other.clock.phase_fs as f64 / 1e6
+}
+
+fn drift_ppm(other: &Other) -> f64 {
+    other.clock.drift as f64 / 1e6
 }

@@ -14,6 +14,9 @@ impl Run<'_> {
         let mut columns = Columns::default();
         columns.push("shots", grouped(tally.shots));
         columns.push("light", self.light());
+        if !self.scene.others.is_empty() {
+            columns.push("others", self.others());
+        }
         columns.push("returns", grouped(tally.returns));
         columns.push("pixels", self.outcomes());
         if score.with_echo() > 0 {
@@ -70,6 +73,13 @@ impl Run<'_> {
         )
     }
 
+    fn others(&self) -> String {
+        let lidars = counted(self.scene.others.len() as u64, "other lidar");
+        let shots = counted(self.tally.foreign, "shot");
+        let ghosts = counted(self.score.ghosts, "ghost");
+        format!("{lidars}, {shots} of theirs seen, {ghosts}")
+    }
+
     fn outcomes(&self) -> String {
         let count = |outcome| (self.score.count(outcome), outcome);
         let met = Outcome::ALL.map(count).into_iter().filter(|(count, _)| *count > 0);
@@ -124,7 +134,7 @@ impl Run<'_> {
             .iter()
             .map(|(key, value)| (key.clone(), value.as_str().into()))
             .collect();
-        json!({
+        let mut json = json!({
             "sensor": self.design.name,
             "scene": self.scene.name,
             "seed": self.seed,
@@ -153,7 +163,12 @@ impl Run<'_> {
             "warnings": self.warnings,
             "folder": (!self.folder.is_empty()).then_some(&self.folder),
             "files": self.files,
-        })
+        });
+        if !self.scene.others.is_empty() {
+            json["foreign"] = tally.foreign.into();
+            json["ghosts"] = self.score.ghosts.into();
+        }
+        json
     }
 }
 

@@ -13,6 +13,10 @@
 //! with a link budget has n₀ from it, for a white target at its reach. Where its field follows the
 //! beam, the share of the spot that is still in the field when the echo arrives is a factor too.
 
+mod others;
+
+pub use others::{APERTURE_RADIUS, Foreign, foreign};
+
 use crate::design::{Design, Field};
 use crate::scene::{Hits, Material};
 use crate::units::{tof_from_range, tof_fs_from_ranges};
@@ -27,6 +31,8 @@ pub struct Echoes {
     pub delay_fs: Vec<i64>,
     /// Mean number of photons detected per mark; infinite for a detector that never misses.
     pub photons: Vec<f64>,
+    /// Light of other lidars that arrives beside them.
+    pub foreign: Foreign,
 }
 
 /// The echoes of `hits` at the sensor `design`, whose scene has `materials`.
@@ -39,8 +45,9 @@ pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
             link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i])
         })
         .collect();
+    let delay_fs = tof_fs_from_ranges(&hits.range);
     let mut echoes =
-        Echoes { shot: hits.shot.clone(), delay_fs: tof_fs_from_ranges(&hits.range), photons };
+        Echoes { shot: hits.shot.clone(), delay_fs, photons, foreign: Foreign::default() };
     if !echoes.photons.iter().all(|&photons| photons > 0.0) {
         echoes.leave_out_the_dark();
     }
@@ -58,6 +65,9 @@ impl Echoes {
         self.photons.retain(|&photons| photons > 0.0);
     }
 }
+
+/// Half of the width of a receiver's filter, m: what sensor files leave unsaid.
+pub const FILTER: f64 = 15e-9;
 
 /// The link equation with everything that does not depend on the target multiplied out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,6 +96,39 @@ impl Link {
             true => 1.0,
             false => libm::exp(-self.extinction * range),
         }
+    }
+
+    /// The link from the lidar `other` into the receiver of `ours`; `None` where the filter of the
+    /// receiver stops the light: ±[`FILTER`] about its own wavelength, unless it is known.
+    ///
+    /// What a foreign mark brings follows from the sensitivity that the other declares of itself,
+    /// n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector like its
+    /// own, which ours are taken to be unless both have a link budget. A detector of ours that never misses sees every mark; of
+    /// another that never misses, by which its energy is left open, ours is assumed.
+    pub fn of_other(ours: &Design, other: &Design) -> Option<Self> {
+        let filter = ours.budget.as_ref().map_or(FILTER, |budget| budget.filter / 2.0);
+        if (ours.light.wavelength - other.light.wavelength).abs() > filter {
+            return None;
+        }
+        let [own, its] = [ours, other].map(|design| Self::of(design).photons_at_one_metre);
+        let receivers = match (&ours.budget, &other.budget) {
+            (Some(ours), Some(other)) => ours.receiver() / other.receiver(),
+            _ => 1.0,
+        };
+        let its = its * receivers;
+        let photons_at_one_metre = if own.is_infinite() || its.is_infinite() { own } else { its };
+        let extinction = ours.visibility.map_or(0.0, |v| extinction(v, other.light.wavelength));
+        Some(Self { photons_at_one_metre, extinction, field: None })
+    }
+
+    /// Mean photons detected per mark of light that has gone `way` metres through air, the last
+    /// `back` of them from a target of effective reflectance `reflectance`.
+    pub fn photons_by(&self, (way, back): (f64, f64), reflectance: f64) -> f64 {
+        if reflectance <= 0.0 || back <= 0.0 {
+            return 0.0;
+        }
+        let transmission = libm::exp(-self.extinction * way);
+        self.photons_at_one_metre * reflectance * transmission / (back * back)
     }
 
     /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which

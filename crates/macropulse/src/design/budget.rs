@@ -54,6 +54,11 @@ impl Budget {
         PI * self.aperture.powi(2) / 4.0
     }
 
+    /// What the receiver makes of light at its aperture: area, transmission and efficiency, m².
+    pub fn receiver(&self) -> f64 {
+        self.area() * self.transmission * self.efficiency
+    }
+
     /// Energy of one photon, J: h·c/λ.
     pub fn photon_energy(&self) -> f64 {
         PLANCK * SPEED_OF_LIGHT / self.wavelength

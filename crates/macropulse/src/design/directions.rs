@@ -72,6 +72,56 @@ impl Directions {
     }
 }
 
+impl Scan {
+    /// The pixel, row and column, in whose cell the unit vector `direction` of the sensor frame
+    /// lies; `None` outside the field of view. A cell reaches half of the way to its neighbours.
+    pub fn pixel_at(&self, direction: [f64; 3]) -> Option<(u16, u16)> {
+        let [x, y, z] = direction;
+        let (azimuth, elevation) = (libm::atan2(y, x), libm::asin(z.clamp(-1.0, 1.0)));
+        let columns = f64::from(self.columns);
+        match &self.pattern {
+            Pattern::Raster { horizontal, vertical, .. }
+            | Pattern::Flash { horizontal, vertical } => {
+                let cell = |part: f64, count: u32| {
+                    let cell = (part * f64::from(count)).floor();
+                    (0.0..f64::from(count)).contains(&cell).then_some(cell as u16)
+                };
+                let row = cell(0.5 - elevation / vertical, self.rows)?;
+                Some((row, cell(0.5 - azimuth / horizontal, self.columns)?))
+            }
+            Pattern::Spinning { elevations, order, firing } => {
+                let row = nearest_row(elevations, elevation)?;
+                let turn = match firing {
+                    Firing::BlocksInTurn => order.iter().position(|&fired| fired == row)?,
+                    Firing::Together => 0,
+                };
+                let turned = (PI - azimuth) / TAU * columns - turn as f64 / order.len() as f64;
+                Some((row, turned.round().rem_euclid(columns) as u16))
+            }
+        }
+    }
+}
+
+/// The row, of those at `elevations` from the top down, whose cell holds `elevation`. The first
+/// and the last one reach as far outwards as inwards; one alone reaches everywhere.
+fn nearest_row(elevations: &[f64], elevation: f64) -> Option<u16> {
+    let below = elevations.partition_point(|other| *other > elevation);
+    let gap = |upper: usize| match (elevations.get(upper), elevations.get(upper + 1)) {
+        (Some(upper), Some(lower)) => upper - lower,
+        _ => TAU,
+    };
+    let row = match below.checked_sub(1) {
+        None => (elevation <= elevations[0] + gap(0) / 2.0).then_some(0),
+        Some(above) if below == elevations.len() => {
+            (elevation >= elevations[above] - gap(above.saturating_sub(1)) / 2.0).then_some(above)
+        }
+        Some(above) => {
+            Some(if elevations[above] - elevation < gap(above) / 2.0 { above } else { below })
+        }
+    };
+    row.map(|row| row as u16)
+}
+
 fn sine_cosine(angle: f64) -> [f64; 2] {
     [libm::sin(angle), libm::cos(angle)]
 }
@@ -124,6 +174,44 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn every_pixel_is_found_where_it_lies() {
+        let together = [("scan.spinning.firing".to_owned(), "together".to_owned())];
+        let sensors = [
+            ("kim-park-2016", &[][..]),
+            ("hdl-64e", &[]),
+            ("hdl-64e", &together),
+            ("peregrine", &[]),
+        ];
+        for (name, set) in sensors {
+            let design = Design::open(name, set).unwrap();
+            for row in 0..design.scan.rows as u16 {
+                for column in (0..design.scan.columns as u16).step_by(11) {
+                    let found = design.scan.pixel_at(design.directions().of(row, column));
+                    assert_eq!(found, Some((row, column)), "{name}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn outside_the_field_there_is_no_pixel() {
+        let seen = |name: &str, azimuth: f64, elevation: f64| {
+            let [a, e] = [azimuth, elevation].map(f64::to_radians);
+            let direction = [e.cos() * a.cos(), e.cos() * a.sin(), e.sin()];
+            Design::open(name, &[]).unwrap().scan.pixel_at(direction)
+        };
+        assert_eq!(seen("peregrine", 14.99, 3.74), Some((0, 0)));
+        assert_eq!(seen("peregrine", 15.01, 0.0), None);
+        assert_eq!(seen("peregrine", 0.0, -3.76), None);
+        // Behind a staring sensor, too, and above and below a spinning one.
+        assert_eq!(seen("kim-park-2016", 180.0, 0.0), None);
+        assert_eq!(seen("hdl-64e", 77.0, 2.16).map(|pixel| pixel.0), Some(0));
+        assert_eq!(seen("hdl-64e", 77.0, 2.17), None);
+        assert_eq!(seen("hdl-64e", 77.0, -24.5).map(|pixel| pixel.0), Some(63));
+        assert_eq!(seen("hdl-64e", 77.0, -24.6), None);
     }
 
     #[test]

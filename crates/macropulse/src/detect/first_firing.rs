@@ -6,7 +6,8 @@
 //!    probability F(t) = P(Γ_m ≤ Λ(t)), Γ_m the sum of m unit exponentials. For m = 1 this is the
 //!    1 − exp(−Λ(t)) of a Geiger detector.
 //! 3. Monte Carlo: draw Γ_m; no firing if Γ_m > n', else t = t₀ + σ·Φ⁻¹(Γ_m / n').
-//! 4. False firings are Poisson in time. The earliest firing in the range gate wins.
+//! 4. False firings are Poisson in time. The earliest firing in the range gate wins, whether its
+//!    light is ours or of another lidar.
 //! 5. A Gaussian sample of the temporal response is added. The converter quantises.
 //!
 //! \[KP16\] mixes two kinds of detector here: additive Gaussian noise belongs to a linear-mode
@@ -17,20 +18,21 @@
 
 use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 
+use super::others::{Flash, flashes};
 use super::{Band, Edges};
 use crate::design::FirstFiring;
-use crate::random::{Chance, Stage};
+use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
 /// rms length of a Gaussian pulse over its full width at half maximum.
-const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
+pub(super) const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
 
 /// The walk is calibrated up to this fraction of the pulse: an echo that only just fires does so
 /// on the falling flank.
 const LATEST: f64 = 0.99;
 
 /// A detector that never misses is given this much light.
-const PLENTY: f64 = 1e9;
+pub(super) const PLENTY: f64 = 1e9;
 
 pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges {
     let &Band { clock, design, log, echoes } = band;
@@ -41,7 +43,21 @@ pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges
     let rms_fs = design.light.pulse * RMS_OF_FWHM * FS_PER_S as f64;
     let needed = f64::from(firing.firing_photons);
     let Ok(gamma) = Gamma::new(needed, 1.0) else { return Edges::default() };
+    let fire = |delay_fs: i64, photons: f64, stream: &mut Stream| {
+        let noise: f64 = StandardNormal.sample(stream);
+        let photons = (photons.min(PLENTY) + firing.noise_photons * noise).max(0.0);
+        let draw: f64 = gamma.sample(stream);
+        (draw < photons).then(|| {
+            let early = quantile(draw / photons) - quantile((needed / photons).min(LATEST));
+            (delay_fs as f64 + rms_fs * early, photons)
+        })
+    };
+    let earlier = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
+        (Some(one), Some(other)) => Some(if other.0 < one.0 { other } else { one }),
+        (one, other) => one.or(other),
+    };
     let mut found: Vec<(u16, u32, f32)> = Vec::with_capacity(log.len());
+    let mut flashes = flashes(band).into_iter().peekable();
     let mut i = 0;
     for shot in 0..log.len() {
         let mut stream = chance.at(Stage::Firing, log.first + shot as u64);
@@ -52,17 +68,14 @@ pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges
             earliest = Some((delay, needed));
         }
         while i < echoes.shot.len() && echoes.shot[i] as usize == shot {
-            let noise: f64 = StandardNormal.sample(&mut stream);
-            let photons = (echoes.photons[i].min(PLENTY) + firing.noise_photons * noise).max(0.0);
-            let draw: f64 = gamma.sample(&mut stream);
-            if draw < photons {
-                let early = quantile(draw / photons) - quantile((needed / photons).min(LATEST));
-                let delay = echoes.delay_fs[i] as f64 + rms_fs * early;
-                if earliest.is_none_or(|(before, _)| delay < before) {
-                    earliest = Some((delay, photons));
-                }
-            }
+            earliest = earlier(earliest, fire(echoes.delay_fs[i], echoes.photons[i], &mut stream));
             i += 1;
+        }
+        let mut others = None;
+        while let Some(Flash { delay_fs, photons, .. }) = flashes.next_if(|f| f.shot == shot) {
+            let stream = others
+                .get_or_insert_with(|| chance.at(Stage::OtherFiring, log.first + shot as u64));
+            earliest = earlier(earliest, fire(delay_fs, photons, stream));
         }
         if let Some((delay, photons)) = earliest {
             let response: f64 = StandardNormal.sample(&mut stream);
@@ -103,7 +116,7 @@ pub fn photons_for(pd: f64, needed: u32, noise: f64) -> f64 {
 
 /// Quantile of the standard normal distribution, Φ⁻¹(p), from the rational approximation of
 /// \[Acklam03\] (relative error below 1.2e-9) without further refinement.
-fn quantile(p: f64) -> f64 {
+pub(super) fn quantile(p: f64) -> f64 {
     const A: [f64; 6] = [
         -3.969683028665376e1,
         2.209460984245205e2,
@@ -162,6 +175,7 @@ mod tests {
                     shot: (0..shots as u32).collect(),
                     delay_fs: vec![400_000_000; shots],
                     photons: vec![photons; shots],
+                    ..Echoes::default()
                 };
                 let edges = detectors.edges(&log, &echoes, &mut super::super::Memory::default());
                 (log, edges)

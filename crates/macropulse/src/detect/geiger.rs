@@ -16,7 +16,7 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 use super::noise::Noise;
 use super::{Band, Edges, Memory};
 use crate::design::{Design, Geiger};
-use crate::random::{Chance, Stage};
+use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s};
 
 /// So many photons for each cell fire all that are armed.
@@ -60,27 +60,41 @@ impl Cells {
     /// The photons of all marks: the time in the upper half, the cell in the lower half.
     fn photons(&self, band: &Band, chance: &Chance) -> Vec<u64> {
         let mut photons = Vec::new();
-        let cells = self.geiger.cells;
         band.each_shot_with_echoes(|shot, echoes| {
             let mut stream = chance.at(Stage::Photons, band.log.first + shot as u64);
             for echo in echoes {
-                let mean = band.echoes.photons[echo];
-                let flood = mean > FLOOD * f64::from(cells);
-                let poisson = Poisson::new(mean).ok();
-                for mark in band.marks(echo) {
-                    let time = (band.clock.time(mark) as u64) << 32;
-                    if flood {
-                        photons.push(time | u64::from(ALL));
-                        continue;
-                    }
-                    let count = poisson.map_or(0.0, |poisson| poisson.sample(&mut stream));
-                    for _ in 0..count as u64 {
-                        photons.push(time | u64::from(stream.random_range(0..cells)));
-                    }
-                }
+                let times = band.marks(echo).map(|mark| band.clock.time(mark));
+                self.fall(times, band.echoes.photons[echo], &mut stream, &mut photons);
             }
         });
+        band.each_foreign(chance, |mut stream, mean, marks| {
+            let times = marks.iter().map(|mark| band.clock.time(*mark));
+            self.fall(times, mean, &mut stream, &mut photons);
+        });
         photons
+    }
+
+    /// Adds the photons of marks that come at `times` and have `mean` of them each.
+    fn fall(
+        &self,
+        times: impl Iterator<Item = i64>,
+        mean: f64,
+        stream: &mut Stream,
+        photons: &mut Vec<u64>,
+    ) {
+        let cells = self.geiger.cells;
+        let flood = mean > FLOOD * f64::from(cells);
+        let poisson = Poisson::new(mean).ok();
+        for time in times.map(|time| (time as u64) << 32) {
+            if flood {
+                photons.push(time | u64::from(ALL));
+                continue;
+            }
+            let count = poisson.map_or(0.0, |poisson| poisson.sample(stream));
+            for _ in 0..count as u64 {
+                photons.push(time | u64::from(stream.random_range(0..cells)));
+            }
+        }
     }
 
     /// Calls `fired` with the time of every firing, in parts of a tick, ascending.

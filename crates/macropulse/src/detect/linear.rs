@@ -48,6 +48,15 @@ impl Thresholding {
                 }
             }
         });
+        band.each_foreign(chance, |mut stream, photons, marks| {
+            let photons = Poisson::new(photons.min(PLENTY)).ok();
+            for mark in marks {
+                let count = photons.map_or(0.0, |photons| photons.sample(&mut stream));
+                if let Some(late) = self.crossing(count, &mut stream) {
+                    time.push(band.clock.time(mark + late) as u32);
+                }
+            }
+        });
         if let Some(noise) = &self.noise {
             noise.edges(&band.clock, band.span(), chance, &mut memory.false_edges);
             time.extend_from_slice(&memory.false_edges);

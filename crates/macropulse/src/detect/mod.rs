@@ -9,6 +9,7 @@ mod geiger;
 mod jitter;
 mod linear;
 mod noise;
+mod others;
 mod photon_counting;
 mod shape;
 
@@ -26,7 +27,7 @@ use crate::channel::Echoes;
 use crate::design::{Design, Detector, FirstFiring};
 use crate::emit::ShotLog;
 use crate::kernels::GROUP;
-use crate::random::Chance;
+use crate::random::{Chance, Stage, Stream};
 
 /// What detectors put out: edges in time. Sorted by channel, then by time.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -59,6 +60,9 @@ enum Kind {
     Firing(FirstFiring),
 }
 
+/// Bits of the number of a way of foreign light.
+const WAY_BITS: u32 = 13;
+
 /// What the detectors are given of a band.
 struct Band<'a> {
     clock: Clock,
@@ -86,6 +90,22 @@ impl Band<'_> {
         marks.iter().map(move |mark| begins + i64::from(*mark) * coding.chip_fs)
     }
 
+    /// The marks of other lidars within the band: for each of their shots and ways of light, the
+    /// stream of its chance, the photons of a mark, and when the marks arrive, fs.
+    fn each_foreign(&self, chance: &Chance, mut visit: impl FnMut(Stream, f64, &[i64])) {
+        let foreign = &self.echoes.foreign;
+        let span = self.span();
+        let mut arrivals = Vec::new();
+        for entry in 0..foreign.len() {
+            let begins = foreign.arrives_fs[entry];
+            let arrives = foreign.marks_of(entry).iter().map(|mark| begins + mark);
+            arrivals.clear();
+            arrivals.extend(arrives.filter(|arrives| span.contains(&self.clock.time(*arrives))));
+            let address = foreign.shot[entry] << WAY_BITS | u64::from(foreign.way[entry]);
+            visit(chance.at(Stage::OtherPhotons, address), foreign.photons[entry], &arrivals);
+        }
+    }
+
     /// The time in which light of the band can arrive, in parts of a tick.
     fn span(&self) -> RangeInclusive<i64> {
         let fired = &self.log.fired_at_fs;
@@ -106,7 +126,7 @@ impl<'a> Detectors<'a> {
         Self { design, chance, shape: Shape::of(design), kind }
     }
 
-    /// The edges that the `echoes` of the shots in `log` make.
+    /// The edges that the `echoes` of the shots in `log` make, and the foreign light among them.
     pub fn edges(&self, log: &ShotLog, echoes: &Echoes, memory: &mut Memory) -> Edges {
         let Some(first) = log.fired_at_fs.first() else { return Edges::default() };
         let clock = Clock::new(self.design, *first);
@@ -132,6 +152,8 @@ pub struct Memory {
     later: Vec<u32>,
     order: Vec<u64>,
     numbers: Vec<[u32; GROUP]>,
+    foreign: Vec<u32>,
+    offsets: Vec<i64>,
 }
 
 impl Memory {

@@ -3,7 +3,8 @@
 //! 1. Every mark of every echo is seen with probability (1 − m)·(1 − exp(−n)), n the mean photons
 //!    detected per mark and m the fraction lost for other reasons (docs/physics.md#photon-counting).
 //! 2. A mark that is seen makes one edge at its arrival, displaced by Gaussian jitter.
-//! 3. Dark and background counts are Poisson in time.
+//! 3. Light of other lidars makes edges beside them.
+//! 4. Dark and background counts are Poisson in time.
 //!
 //! Marks that arrive within one tick make one edge in the end: the converters merge them, which is
 //! the hard limiter of the coding literature.
@@ -13,7 +14,7 @@
 
 use super::jitter::Jitter;
 use super::noise::Noise;
-use super::{Band, Edges, Memory};
+use super::{Band, Edges, Memory, others};
 use crate::design::{Design, PARTS_OF_TICK, PhotonCounting};
 use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
@@ -37,6 +38,8 @@ pub(super) struct Counting {
     kept: f64,
     jitter: Option<Jitter>,
     noise: Option<Noise>,
+    /// Length of a micropulse, s.
+    pulse: f64,
 }
 
 impl Counting {
@@ -65,6 +68,7 @@ impl Counting {
             kept: 1.0 - counting.missed_marks,
             jitter: Jitter::new(counting.jitter * parts),
             noise: Noise::new(counting.false_rate, design),
+            pulse: design.light.pulse,
         }
     }
 
@@ -77,6 +81,15 @@ impl Counting {
             self.add_echo(band, *arrival, chance, (&mut time, memory));
         }
         memory.order = order;
+        if !band.echoes.foreign.is_empty() {
+            let jitter = self.jitter.as_ref();
+            let counted = others::Counted { kept: self.kept, jitter, pulse: self.pulse };
+            counted.edges((&band.clock, &band.echoes.foreign), &band.span(), chance, memory);
+            time.extend(PAD);
+            memory.foreign.extend(PAD);
+            merge(&time, &memory.foreign, &mut memory.merged, 0);
+            std::mem::swap(&mut time, &mut memory.merged);
+        }
         if let Some(noise) = &self.noise {
             noise.edges(&band.clock, band.span(), chance, &mut memory.false_edges);
             if memory.false_edges.len() < time.len() / FEW {
@@ -244,6 +257,7 @@ mod tests {
             shot: (0..shots).collect(),
             delay_fs: vec![200_000_000; shots as usize],
             photons: vec![photons; shots as usize],
+            ..Echoes::default()
         };
         detect(design, &log, &echoes, seed)
     }
@@ -281,6 +295,7 @@ mod tests {
             shot: (0..500).flat_map(|shot| [shot, shot]).collect(),
             delay_fs: delays.collect(),
             photons: vec![f64::INFINITY; 1000],
+            ..Echoes::default()
         };
         let mut expected: Vec<i64> = (0..1000)
             .flat_map(|i| {
@@ -380,6 +395,7 @@ mod tests {
                     shot: (0..shots).collect(),
                     delay_fs: vec![1000; shots as usize],
                     photons: vec![1.0; shots as usize],
+                    ..Echoes::default()
                 };
                 absolute(&detect(&design, &log, &echoes, 3))
             })

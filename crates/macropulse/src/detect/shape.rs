@@ -37,7 +37,7 @@ impl Shape {
     /// Every echo as those of its slices, which are detected independently of each other: photons
     /// are.
     pub fn spread(&self, echoes: &Echoes) -> Echoes {
-        let mut spread = Echoes::default();
+        let mut spread = Echoes { foreign: echoes.foreign.clone(), ..Echoes::default() };
         for echo in 0..echoes.shot.len() {
             for &(late, share) in &self.slices {
                 spread.shot.push(echoes.shot[echo]);

@@ -101,8 +101,8 @@ fn with_halo(design: &Design, home: Range<u64>) -> Range<u64> {
     first..end
 }
 
-/// The log of `shots`, all of it home.
-fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
+/// The log of `shots`; its `home` is left open.
+pub(super) fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
     let count = (shots.end - shots.start) as usize;
     let mut log = ShotLog { first: shots.start, ..ShotLog::default() };
     let per_scan = design.shots_per_scan();

@@ -1,11 +1,13 @@
 //! What leaves the sensor: which pixel when, with which code, in which direction.
 
 mod band;
+mod clock;
 mod pattern;
 mod shot;
 mod shot_log;
 
 pub use band::{Band, bands};
+pub use clock::Clock;
 pub use pattern::beam_axes;
 pub use shot::{Shot, most_scans, shot_of_pixel};
 pub use shot_log::ShotLog;

@@ -2,6 +2,7 @@
 
 pub mod detection;
 mod forecast;
+pub mod interference;
 pub mod link;
 mod matched;
 pub mod multiple_access;

@@ -13,6 +13,7 @@ use super::error::Error;
 use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
 use super::material::{self, Material, plain};
 use super::mesh::Mesh;
+use super::other;
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
@@ -63,13 +64,16 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     if assembly.solids.is_empty() && assembly.placed.is_empty() {
         assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
     }
+    let pose = |stand: &Stand| assembly.pose(stand);
+    let (others, assumed) = other::others((source, base), &file.others, pose)?;
+    assembly.notes.extend(assumed);
     let Assembly { materials, objects, solids, placed, notes, .. } = assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Fnv::new();
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
     let world = placed::world(placed, solids, sensor.position);
-    Ok(Scene { name, materials, objects, sensor, notes, world, surfaces })
+    Ok(Scene { name, materials, objects, sensor, others, notes, world, surfaces })
 }
 
 impl Assembly<'_> {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use serde::Deserialize;
-use toml::Spanned;
+use toml::{Spanned, Table};
 
 use super::error::Error;
 use crate::names::{line_column, nearest};
@@ -24,6 +24,36 @@ pub(super) struct SceneFile {
     pub materials: Vec<Spanned<Defined>>,
     #[serde(default, rename = "object")]
     pub objects: Vec<Spanned<Thing>>,
+    #[serde(default)]
+    pub others: Vec<Spanned<OtherTyped>>,
+}
+
+/// `[[others]]`
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OtherTyped {
+    pub name: Option<String>,
+    pub sensor: Spanned<String>,
+    #[serde(default)]
+    pub set: Table,
+    pub position_m: Option<Spanned<[f64; 3]>>,
+    pub yaw_deg: Option<Spanned<f64>>,
+    pub pitch_deg: Option<Spanned<f64>>,
+    pub roll_deg: Option<Spanned<f64>>,
+    pub phase_ns: Option<Spanned<f64>>,
+    pub drift_ppm: Option<Spanned<f64>>,
+}
+
+impl OtherTyped {
+    /// Where the lidar stands.
+    pub(super) fn stand(&self) -> Stand {
+        Stand {
+            position_m: self.position_m.clone(),
+            yaw_deg: self.yaw_deg.clone(),
+            pitch_deg: self.pitch_deg.clone(),
+            roll_deg: self.roll_deg.clone(),
+        }
+    }
 }
 
 /// `[sensor]`, and each entry of `copies`.

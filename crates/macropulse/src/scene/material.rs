@@ -45,6 +45,22 @@ impl Material {
         (self.diffuse + self.retro) * cosine + lobe
     }
 
+    /// Effective reflectance towards a place that is not the source of the light: `cosine` of the
+    /// angle between the normal and that place, `half_cosine` of that between the normal and the
+    /// middle of both directions.
+    ///
+    /// `ρ_eff = ρ_d·cos o + ρ_s·cosᵍ h`: the Lambertian part falls with the angle it is seen at, and
+    /// the lobe is that of [`Material::backscatter`] \[Bli77\]. What a retroreflector sends back
+    /// goes to the source alone.
+    pub fn scatter(&self, cosine: f64, half_cosine: f64) -> f64 {
+        let [cosine, half_cosine] = [cosine, half_cosine].map(|cosine| cosine.abs().min(1.0));
+        let lobe = match self.specular > 0.0 {
+            true => self.specular * libm::pow(half_cosine, self.gloss),
+            false => 0.0,
+        };
+        self.diffuse * cosine + lobe
+    }
+
     /// Height of the lobe of a surface that mirrors the fraction `mirrored` of the light into a
     /// lobe of exponent `gloss`: `ρ_s = F·(g+2)/8`, that is `π·F·D/4` for the normal distribution
     /// `D = (g+2)/2π · cosᵍ` that keeps the energy \[WMLT07\].
@@ -130,6 +146,23 @@ mod tests {
         assert_eq!(white.backscatter(1.0), 1.0);
         assert_eq!(white.backscatter(0.25), 0.25);
         assert_eq!(white.backscatter(0.0), 0.0);
+    }
+
+    #[test]
+    fn seen_from_the_source_it_scatters_what_it_sends_back_but_for_retroreflectors() {
+        for material in library() {
+            for cosine in [0.0, 0.3, 1.0] {
+                let back = material.backscatter(cosine) - material.retro * cosine;
+                approx::assert_relative_eq!(
+                    material.scatter(cosine, cosine),
+                    back,
+                    epsilon = 1e-12
+                );
+            }
+        }
+        // A mirror 30° off both ways is bright; seen from 45° it is not.
+        let chrome = named("chrome").unwrap();
+        assert!(chrome.scatter(0.87, 1.0) > 100.0 * chrome.scatter(0.71, 0.97));
     }
 
     #[test]

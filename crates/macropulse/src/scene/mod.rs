@@ -11,8 +11,10 @@ mod digest;
 mod error;
 mod file;
 mod hits;
+mod lit;
 pub mod material;
 mod mesh;
+mod other;
 mod placed;
 mod pose;
 mod raycast;
@@ -28,8 +30,10 @@ pub use car::SIZE as CAR_SIZE;
 pub use closed_form::{Shape, Solid};
 pub use error::Error;
 pub use hits::{CastRays, Hit, Hits, Ray};
+pub use lit::{Lit, Look};
 pub use material::Material;
 pub use mesh::Mesh;
+pub use other::Other;
 pub use pose::{Pose, Transform};
 
 use crate::digest::Fnv;
@@ -49,6 +53,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Where the sensor stands and looks.
     pub sensor: Pose,
+    /// The other lidars that shine into it.
+    pub others: Vec<Other>,
     /// Every assumption made while reading: units, axes, materials. To be shown to the user.
     pub notes: Vec<String>,
     world: World,
@@ -146,7 +152,8 @@ impl Scene {
         self.world.triangles()
     }
 
-    /// A hash of everything that decides what light meets: surfaces, materials, sensor pose.
+    /// A hash of everything that decides what light meets, and which light there is beside that
+    /// of the sensor: surfaces, materials, sensor pose, other lidars.
     /// The same on every machine and run.
     pub fn digest(&self) -> String {
         let mut hash = self.surfaces;
@@ -162,6 +169,7 @@ impl Scene {
             hash.bytes(&[u8::from(object.is_target)]);
         }
         hash.pose(&self.sensor);
+        self.others.iter().for_each(|other| hash.other(other));
         hash.text()
     }
 }
@@ -173,6 +181,7 @@ impl fmt::Debug for Scene {
             .field("materials", &self.materials)
             .field("objects", &self.objects)
             .field("sensor", &self.sensor)
+            .field("others", &self.others)
             .field("notes", &self.notes)
             .field("triangles", &self.triangles())
             .finish_non_exhaustive()

@@ -27,14 +27,14 @@ impl Scene {
 }
 
 /// Offsets across the beam, as tangents, and the share of the energy each stands for.
-struct Footprint {
+pub(super) struct Footprint {
     offsets: Vec<([f64; 2], f32)>,
 }
 
 impl Footprint {
     /// One ray, or one at the centre and six around it at half the 1/e² angle, or another twelve
     /// at the full 1/e² angle. Irradiance falls as exp(−2θ²/θ₀²).
-    fn of(design: &Design) -> Self {
+    pub(super) fn of(design: &Design) -> Self {
         let edge = design.light.divergence / 2.0;
         let rings = match design.light.footprint_rays {
             1 => 0,
@@ -58,7 +58,7 @@ impl Footprint {
 
     /// Calls `cast` with the direction of each ray and its share of the energy.
     #[inline]
-    fn rays(&self, axis: [f64; 3], mut cast: impl FnMut([f64; 3], f32)) {
+    pub(super) fn rays(&self, axis: [f64; 3], mut cast: impl FnMut([f64; 3], f32)) {
         let [(_, centre), around @ ..] = self.offsets.as_slice() else { return };
         cast(axis, *centre);
         if around.is_empty() {

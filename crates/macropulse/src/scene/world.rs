@@ -102,8 +102,8 @@ impl World {
         packet.cast(&self.facets.triangles, &mut met.waiting);
     }
 
-    /// Fills in what the rays of `packet` have met.
-    pub(super) fn describe(&self, packet: &Packet, met: &mut Met) {
+    /// Fills in what the rays of `packet` have met. Gives normals, of any length.
+    pub(super) fn describe(&self, packet: &Packet, met: &mut Met) -> [Lanes<f64>; 3] {
         let mut across = [[0.0; LANES]; 3];
         if packet.leaf != [NONE; LANES] {
             across = normals(&self.facets.triangles, packet);
@@ -121,6 +121,7 @@ impl World {
             }
         }
         met.cosine = cosines(packet, &across);
+        across
     }
 
     /// Lets the rays of `set` meet a thing, and notes which they have met where.

@@ -1,8 +1,10 @@
 //! Measurement against truth: the only stage that sees both sides.
 
+mod ghosts;
 mod interval;
 mod range_error;
 
+pub use ghosts::ghosts;
 pub use interval::Estimate;
 pub use range_error::RangeError;
 
@@ -27,6 +29,8 @@ pub struct Score {
     pub samples_on_target: u64,
     /// Returns that come from a surface of the target object.
     pub points_on_target: u64,
+    /// Wrong and false returns that light of other lidars has made, as [`ghosts`] has it.
+    pub ghosts: u64,
 }
 
 impl Score {
@@ -52,6 +56,7 @@ impl Score {
         self.dark += other.dark;
         self.samples_on_target += other.samples_on_target;
         self.points_on_target += other.points_on_target;
+        self.ghosts += other.ghosts;
     }
 }
 

@@ -1,0 +1,367 @@
+//! Light of other lidars at the aperture (docs/physics.md#other-lidars).
+//!
+//! 1. The receiver listens from the firing of each shot to the end of its range gate. In that time
+//!    light arrives that others have fired up to two ways of the longer range gate before.
+//!    A detector of its own pixel listens to its own shot alone.
+//! 2. By reflection: from each point that a foreign ray meets and a listening detector looks at
+//!    ([`Lit`]), with the photons
+//!
+//!    n = K · ρ_eff · w · exp(−σ·(R₁ + R₂)) / R₂²
+//!
+//!    K those of white at one metre ([`Link::of_other`]), R₁ the way there and R₂ the way back.
+//! 3. Directly: a beam of 1/e² radius b whose axis passes the aperture, of radius a, at a distance
+//!    r brings
+//!
+//!    n = K · exp(−r²/s²) · exp(−σ·D) / s², s² = a² + b²/2
+//!
+//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ from D metres away. The edge of the
+//!    aperture is taken to be Gaussian, so that the formula holds for a beam that is narrower than
+//!    the aperture as for one that is wider.
+
+use std::ops::Range;
+
+use super::Link;
+use crate::design::Design;
+use crate::emit::ShotLog;
+use crate::scene::{Lit, Look, Material, Other, Scene};
+use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
+
+/// Radius of every aperture, m: what sensor files leave unsaid.
+pub const APERTURE_RADIUS: f64 = 12.5e-3;
+
+/// Light that brings fewer photons per mark is left out.
+const FAINTEST: f64 = 1e-6;
+
+/// Beams that pass the aperture by more than so many times s are left out.
+const FARTHEST_BY: f64 = 4.0;
+
+/// A micropulse ends so many times its length before and after its middle.
+const FLANKS: f64 = 4.0;
+
+/// Ways that light of one lidar can take: the rays of a footprint, and the direct one.
+const WAYS: u32 = 32;
+
+/// Number of the direct way.
+const DIRECT: u32 = WAYS - 1;
+
+/// Light of other lidars at the aperture, as columns; ordered by lidar, then by shot. One entry is
+/// what one foreign shot sends along one way. Truth: the receiver knows nothing of it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Foreign {
+    /// Absolute time at which its first chip arrives, fs.
+    pub arrives_fs: Vec<i64>,
+    /// Mean number of photons detected per mark; infinite for a detector that never misses.
+    pub photons: Vec<f64>,
+    /// Length of its micropulses (full width at half maximum), s.
+    pub pulse: Vec<f64>,
+    /// Row and column of our pixel in whose cell it comes from.
+    pub pixel: Vec<(u16, u16)>,
+    /// Where in `mark_fs` its marks are.
+    pub marks: Vec<Range<usize>>,
+    /// From the first chip to each mark by our clock, fs, ascending.
+    pub mark_fs: Vec<i64>,
+    /// Number of the shot by the other's own count: with `way` the address of its chance.
+    pub shot: Vec<u64>,
+    /// Which of the others, and which way, below 2¹³.
+    pub way: Vec<u32>,
+}
+
+impl Foreign {
+    /// Number of entries.
+    pub fn len(&self) -> usize {
+        self.arrives_fs.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.arrives_fs.is_empty()
+    }
+
+    /// The marks of an entry, from its first chip, fs.
+    pub fn marks_of(&self, entry: usize) -> &[i64] {
+        &self.mark_fs[self.marks[entry].clone()]
+    }
+}
+
+/// The light of the scene's other lidars that reaches the sensor `design` while it listens to the
+/// shots of `log`.
+pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
+    let mut foreign = Foreign::default();
+    for (number, other) in scene.others.iter().enumerate() {
+        let Some(link) = Link::of_other(design, &other.design) else { continue };
+        let around_fs = around_fs(other);
+        let farthest = design.scan.max_range.max(other.design.scan.max_range);
+        let direct = Direct::of(scene, other, 2.0 * farthest);
+        let longest_fs = fs_from_s(2.0 * farthest / SPEED_OF_LIGHT);
+        for open in listening(design, log, around_fs) {
+            let way = (number as u32) << WAYS.trailing_zeros();
+            let mut arrivals = Arrivals { other, way, link, foreign: &mut foreign };
+            for theirs in other.clock.shots(&other.design, open.start - longest_fs..open.end) {
+                let look = |shot: usize, direction, way: f64| {
+                    let arrives_fs = theirs.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
+                    if !open.contains(&arrives_fs) {
+                        return None;
+                    }
+                    let pixel = design.scan.pixel_at(direction)?;
+                    listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
+                };
+                let lit = scene.lit(other, &theirs, farthest, &look);
+                arrivals.add_reflected(&scene.materials, &theirs, &lit);
+                if let Some(direct) = &direct {
+                    arrivals.add_direct(direct, &theirs, &look);
+                }
+            }
+        }
+    }
+    foreign
+}
+
+/// How long light may arrive before and after the first chip of a shot, fs: the micropulse has some
+/// before it, and behind the last chip.
+fn around_fs(other: &Other) -> (i64, i64) {
+    let Design { coding, light, .. } = &other.design;
+    let chips = f64::from(coding.codebook.chips()) * coding.chip_fs as f64;
+    let micropulse = fs_from_s(FLANKS * light.pulse);
+    (micropulse, (chips * other.clock.stretch()) as i64 + micropulse)
+}
+
+/// When first chips may arrive that the receiver of `log` can see light of, fs, if there is light
+/// so long `before` and `after` them. Ascending, and apart.
+fn listening(design: &Design, log: &ShotLog, (before, after): (i64, i64)) -> Vec<Range<i64>> {
+    let jitter_fs = design.most_jitter_fs();
+    let reach_fs = design.reach_fs();
+    let mut open: Vec<Range<i64>> = Vec::new();
+    for fired_fs in &log.fired_at_fs {
+        let span = fired_fs - after - jitter_fs..fired_fs + reach_fs + before + jitter_fs;
+        match open.last_mut() {
+            Some(last) if span.start <= last.end => last.end = span.end,
+            _ => open.push(span),
+        }
+    }
+    open
+}
+
+/// Whether the detector of a pixel listens when light arrives that begins so long `before` and
+/// ends so long `after` that. One that all pixels share does, unless its field follows the beam and
+/// has not come to the pixel or has left it.
+fn listens(
+    design: &Design,
+    log: &ShotLog,
+    (arrives_fs, pixel): (i64, (u16, u16)),
+    (before, after): (i64, i64),
+) -> bool {
+    let opens = |shot: usize| log.fired_at_fs[shot] - after;
+    let closes = |shot: usize| log.fired_at_fs[shot] + design.reach_fs() + before;
+    let field = design.budget.as_ref().map(|budget| budget.field);
+    if let Some(field) = field.filter(|field| field.trailing.is_some()) {
+        return log.shot_at(design, pixel).is_some_and(|shot| {
+            let since_fs = arrives_fs - log.fired_at_fs[shot];
+            since_fs >= 0 && field.share(s_from_fs(since_fs)) > 0.0
+        });
+    }
+    design.channels() == 1
+        || log
+            .shot_at(design, pixel)
+            .is_some_and(|shot| (opens(shot)..closes(shot)).contains(&arrives_fs))
+}
+
+/// The aperture as another lidar sees it, with nothing in between.
+struct Direct {
+    /// Unit vector in the frame of the other.
+    direction: [f64; 3],
+    distance: f64,
+    /// Unit vector in our own frame, back to the other.
+    back: [f64; 3],
+    /// a² + b²/2, m².
+    spread: f64,
+}
+
+impl Direct {
+    /// `None` where something hides the other, or it is too far away.
+    fn of(scene: &Scene, other: &Other, farthest: f64) -> Option<Self> {
+        let way = [0, 1, 2].map(|axis| other.pose.position[axis] - scene.sensor.position[axis]);
+        let distance = way.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if !(APERTURE_RADIUS..=farthest).contains(&distance) {
+            return None;
+        }
+        let towards = way.map(|part| part / distance);
+        let back = scene.sensor.sensor_from_world().direction(towards);
+        if !scene.sees(towards, distance) {
+            return None;
+        }
+        let light = &other.design.light;
+        let radius = light.beam_diameter / 2.0 + distance * light.divergence / 2.0;
+        let direction = other.pose.sensor_from_world().direction(towards.map(|part| -part));
+        let spread = APERTURE_RADIUS.powi(2) + radius * radius / 2.0;
+        Some(Self { direction, distance, back, spread })
+    }
+
+    /// Photons per mark of a shot along the unit vector `axis`, in the frame of the other.
+    fn photons(&self, link: &Link, axis: [f64; 3]) -> f64 {
+        let [x, y, z] = axis;
+        let [u, v, w] = self.direction;
+        if x * u + y * v + z * w <= 0.0 {
+            return 0.0;
+        }
+        let across = [y * w - z * v, z * u - x * w, x * v - y * u];
+        let beside = across.iter().map(|part| part * part).sum::<f64>() * self.distance.powi(2);
+        if beside > FARTHEST_BY.powi(2) * self.spread {
+            return 0.0;
+        }
+        let share = libm::exp(-beside / self.spread) / self.spread;
+        link.photons_by((self.distance, 1.0), share)
+    }
+}
+
+/// Makes entries of the light of one lidar.
+struct Arrivals<'a> {
+    other: &'a Other,
+    /// Number of the first way of its light.
+    way: u32,
+    link: Link,
+    foreign: &'a mut Foreign,
+}
+
+impl Arrivals<'_> {
+    /// Adds light of the shots in `log` that surfaces of `materials` reflect.
+    fn add_reflected(&mut self, materials: &[Material], log: &ShotLog, lit: &Lit) {
+        for i in 0..lit.shot.len() {
+            let material = &materials[usize::from(lit.material[i])];
+            let cosines = [lit.cosine[i], lit.half_cosine[i]].map(f64::from);
+            let reflectance = material.scatter(cosines[0], cosines[1]) * f64::from(lit.weight[i]);
+            let way = lit.there[i] + lit.back[i];
+            let photons = self.link.photons_by((way, lit.back[i]), reflectance);
+            self.add((log, lit.shot[i] as usize), lit.ray[i], (way, photons), lit.pixel[i]);
+        }
+    }
+
+    /// Adds light of the shots in `log` that shine into the aperture while we `look` back.
+    fn add_direct(&mut self, direct: &Direct, log: &ShotLog, look: &Look) {
+        let directions = self.other.design.directions();
+        for shot in 0..log.len() {
+            let axis = directions.of(log.row[shot], log.column[shot]);
+            let photons = direct.photons(&self.link, axis);
+            if photons > 0.0
+                && let Some(pixel) = look(shot, direct.back, direct.distance)
+            {
+                self.add((log, shot), DIRECT, (direct.distance, photons), pixel);
+            }
+        }
+    }
+
+    /// Adds what arrives of a shot after a way of so many metres.
+    fn add(
+        &mut self,
+        (log, shot): (&ShotLog, usize),
+        ray: u32,
+        (way, photons): (f64, f64),
+        pixel: (u16, u16),
+    ) {
+        if photons < FAINTEST {
+            return;
+        }
+        let marks = self.marks(log, shot);
+        let foreign = &mut *self.foreign;
+        foreign.arrives_fs.push(log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT));
+        foreign.photons.push(photons);
+        foreign.pulse.push(self.other.design.light.pulse);
+        foreign.pixel.push(pixel);
+        foreign.marks.push(marks);
+        foreign.shot.push(log.first.wrapping_add(shot as u64));
+        foreign.way.push(self.way + ray);
+    }
+
+    /// Writes the marks of a shot down and tells where they are.
+    fn marks(&mut self, log: &ShotLog, shot: usize) -> Range<usize> {
+        let coding = &self.other.design.coding;
+        let stretched = coding.chip_fs as f64 * self.other.clock.stretch();
+        let marks = coding.codebook.marks(log.label[shot], log.word[shot]);
+        let mark_fs = &mut self.foreign.mark_fs;
+        let from = mark_fs.len();
+        mark_fs.extend(marks.iter().map(|mark| (f64::from(*mark) * stretched) as i64));
+        from..mark_fs.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
+    fn light(sensor: &str, more: &str) -> (Design, Foreign) {
+        let text = format!(
+            "version = 1\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
+             yaw_deg = 180\nset = {{ scan.scans_per_s = 1000, scan.raster = {{ rows = 5, \
+             columns = 5, horizontal_deg = 10, vertical_deg = 10 }} }}\n{more}"
+        );
+        let scene = Scene::from_toml(&text, "test", Path::new("")).unwrap();
+        let design = Design::open(sensor, &[]).unwrap();
+        // 20 lines: 0.7 ms, in which all but the last few of its shots are fired.
+        let log = crate::emit::Band { scan: 0, first: 0, shots: 20 * 848 }.shot_log(&design);
+        let foreign = foreign(&design, &scene, &log);
+        (design, foreign)
+    }
+
+    /// Known answer: shot 12 of 25 flies along the axis, is fired at 480 µs, and all of it enters
+    /// the aperture: K photons from white at one metre are K/a² in it.
+    #[test]
+    fn a_beam_that_meets_the_aperture_enters_it_as_a_whole() {
+        let (_, foreign) = light("kim-park-2016", "");
+        assert_eq!((foreign.len(), foreign.marks_of(0)), (1, &[0][..]));
+        assert_eq!(foreign.shot[0], 12);
+        let flight = fs_from_s(50.0 / SPEED_OF_LIGHT);
+        assert_eq!(foreign.arrives_fs[0], 480_000_000_000 + flight);
+        let hdl = Design::open("hdl-64e", &[]).unwrap();
+        let white = Link::of(&hdl).photons(1.0, 1.0);
+        approx::assert_relative_eq!(
+            foreign.photons[0],
+            white / APERTURE_RADIUS.powi(2),
+            max_relative = 1e-9
+        );
+    }
+
+    #[test]
+    fn a_beam_aside_or_behind_something_or_of_another_colour_does_not() {
+        let aside = "[[object]]\nname = \"pole\"\nshape = { box = { size_m = [0.1, 1, 1] } }\n";
+        let pole = |place: &str| format!("{aside}position_m = {place}\n");
+        assert_eq!(light("kim-park-2016", &pole("[30, 0, 0]")).1.len(), 0);
+        assert_eq!(light("kim-park-2016", &pole("[30, 9, 0]")).1.len(), 1);
+        // Turned by 2.5 degrees it passes us by 2 m; the sensor of 1570 nm has another filter.
+        assert_eq!(light("kim-park-2016", "pitch_deg = 1\n").1.len(), 0);
+        assert_eq!(light("peregrine", "").1.len(), 0);
+    }
+
+    #[test]
+    fn who_declares_no_energy_is_taken_to_be_like_us() {
+        let open = |name: &str, set: &[(&str, &str)]| {
+            let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+            Design::open(name, &set.iter().map(own).collect::<Vec<_>>()).unwrap()
+        };
+        let perfect = [("detector.photon-counting.sensitivity.pd", "1.0")];
+        let (seeing, all) = (open("kim-park-2016", &[]), open("kim-park-2016", &perfect));
+        let hdl = open("hdl-64e", &[]);
+        let photons = |ours: &Design, other: &Design| {
+            Link::of_other(ours, other).map(|link| link.photons_by((2.0, 1.0), 1.0))
+        };
+        let own = Link::of(&seeing).photons(1.0, 1.0);
+        assert_eq!(photons(&seeing, &seeing), Some(own));
+        assert_eq!(photons(&seeing, &all), Some(own));
+        assert_eq!(photons(&all, &seeing), Some(f64::INFINITY));
+        assert_eq!(photons(&seeing, &hdl), Some(Link::of(&hdl).photons(1.0, 1.0)));
+        assert_eq!(photons(&seeing, &open("peregrine", &[])), None);
+    }
+
+    #[test]
+    fn gates_far_apart_are_listened_to_one_by_one() {
+        let design =
+            Design::open("hdl-64e", &[("scan.scans_per_s".into(), "0.01".into())]).unwrap();
+        let log = crate::emit::Band { scan: 0, first: 0, shots: 3 }.shot_log(&design);
+        let open = listening(&design, &log, (5, 7));
+        assert_eq!(open.len(), 3);
+        assert!(open.iter().zip(&log.fired_at_fs).all(|(open, fired)| open.contains(fired)));
+        let close = Design::open("kim-park-2016", &[]).unwrap();
+        let log = crate::emit::Band { scan: 0, first: 0, shots: 3 }.shot_log(&close);
+        assert_eq!(listening(&close, &log, (5, 7)).len(), 1);
+    }
+}
