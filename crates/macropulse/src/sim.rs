@@ -157,8 +157,12 @@ fn measure(
     let log = band.shot_log(design);
     lap(&mut tally);
     let hits = scene.trace(design, &log);
+    let parts = scene.trace_parts(design, &log);
     lap(&mut tally);
-    let mut echoes = channel::echoes(design, &scene.materials, &hits);
+    let mut echoes = match parts.as_slice() {
+        [] => channel::echoes(design, &scene.materials, &hits),
+        parts => channel::echoes_of_parts(design, &scene.materials, parts),
+    };
     if !scene.others.is_empty() {
         echoes.foreign = channel::foreign(design, scene, &log);
     }

@@ -18,6 +18,7 @@ mod others;
 pub use others::{APERTURE_RADIUS, Foreign, foreign};
 
 use crate::design::{Design, Field};
+pub use crate::scene::PARTS;
 use crate::scene::{Hits, Material};
 use crate::units::{tof_from_range, tof_fs_from_ranges};
 
@@ -31,6 +32,9 @@ pub struct Echoes {
     pub delay_fs: Vec<i64>,
     /// Mean number of photons detected per mark; infinite for a detector that never misses.
     pub photons: Vec<f64>,
+    /// Which of the [`PARTS`] of the macropulse it is an echo of; empty where
+    /// all of it takes the same way.
+    pub part: Vec<u8>,
     /// Light of other lidars that arrives beside them.
     pub foreign: Foreign,
 }
@@ -46,12 +50,29 @@ pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
         })
         .collect();
     let delay_fs = tof_fs_from_ranges(&hits.range);
-    let mut echoes =
-        Echoes { shot: hits.shot.clone(), delay_fs, photons, foreign: Foreign::default() };
+    let mut echoes = Echoes { shot: hits.shot.clone(), delay_fs, photons, ..Echoes::default() };
     if !echoes.photons.iter().all(|&photons| photons > 0.0) {
         echoes.leave_out_the_dark();
     }
     echoes
+}
+
+/// The echoes of macropulses whose parts have met `hits` each, the first part first.
+pub fn echoes_of_parts(design: &Design, materials: &[Material], hits: &[Hits]) -> Echoes {
+    let parts: Vec<Echoes> = hits.iter().map(|hits| echoes(design, materials, hits)).collect();
+    let mut order: Vec<(u32, u8, usize)> = Vec::new();
+    for (part, echoes) in parts.iter().enumerate() {
+        order.extend(echoes.shot.iter().enumerate().map(|(i, shot)| (*shot, part as u8, i)));
+    }
+    order.sort_unstable();
+    let each = |&(_, part, i): &(u32, u8, usize)| (&parts[usize::from(part)], i);
+    Echoes {
+        shot: order.iter().map(|(shot, ..)| *shot).collect(),
+        delay_fs: order.iter().map(each).map(|(echoes, i)| echoes.delay_fs[i]).collect(),
+        photons: order.iter().map(each).map(|(echoes, i)| echoes.photons[i]).collect(),
+        part: order.iter().map(|(_, part, _)| *part).collect(),
+        foreign: Foreign::default(),
+    }
 }
 
 impl Echoes {

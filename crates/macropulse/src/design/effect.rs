@@ -66,9 +66,4 @@ impl Effect {
             Self::MirrorMotion => "the beam stands still during a macropulse",
         }
     }
-
-    /// Whether it can also be switched on. The others must be declared as idealised.
-    pub fn is_modelled(self) -> bool {
-        self != Self::MirrorMotion
-    }
 }

@@ -89,6 +89,8 @@ pub struct Scan {
     pub reach: f64,
     /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
     pub max_range: f64,
+    /// Whether the mirror moves on during a macropulse.
+    pub moves: bool,
     /// How directions follow each other.
     pub pattern: Pattern,
 }

@@ -23,7 +23,7 @@ use linear::Thresholding;
 use photon_counting::Counting;
 use shape::Shape;
 
-use crate::channel::Echoes;
+use crate::channel::{Echoes, PARTS};
 use crate::design::{Design, Detector, FirstFiring};
 use crate::emit::ShotLog;
 use crate::kernels::GROUP;
@@ -81,12 +81,22 @@ impl Band<'_> {
         }
     }
 
-    /// When the marks of an echo arrive, fs.
+    /// When the marks of an echo, or of the part it is of, arrive, fs.
     fn marks(&self, echo: usize) -> impl Iterator<Item = i64> {
         let shot = self.echoes.shot[echo] as usize;
         let begins = self.log.fired_at_fs[shot] + self.echoes.delay_fs[echo];
         let coding = &self.design.coding;
         let marks = coding.codebook.marks(self.log.label[shot], self.log.word[shot]);
+        let marks = match self.echoes.part.get(echo) {
+            None => marks,
+            Some(part) => {
+                let begins = |part: u8| {
+                    let chip = u32::from(part) * coding.codebook.chips() / u32::from(PARTS);
+                    marks.partition_point(|mark| u32::from(*mark) < chip)
+                };
+                &marks[begins(*part)..begins(part + 1)]
+            }
+        };
         marks.iter().map(move |mark| begins + i64::from(*mark) * coding.chip_fs)
     }
 

@@ -131,7 +131,11 @@ impl Counting {
             lit: self.lit[usize::from(log.label[shot])],
             start,
         };
-        append_train(&train, time);
+        if echoes.part.is_empty() {
+            append_train(&train, time);
+        } else {
+            time.extend(band.marks(echo).map(|mark| band.clock.time(mark) as u32));
+        }
         if !seen.is_certain() || self.jitter.is_some() {
             let earlier = echoes.shot[..echo].iter().rev();
             let part = earlier.take_while(|other| **other == echoes.shot[echo]).count() as u32;

@@ -43,6 +43,7 @@ impl Shape {
                 spread.shot.push(echoes.shot[echo]);
                 spread.delay_fs.push(echoes.delay_fs[echo] + late);
                 spread.photons.push(echoes.photons[echo] * share);
+                spread.part.extend(echoes.part.get(echo));
             }
         }
         spread

@@ -2,7 +2,9 @@
 //!
 //! 1. A beam without width is one ray. A beam with a width is a hexagonal set of rays, weighted
 //!    by the Gaussian irradiance at their place (docs/physics.md#footprint).
-//! 2. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
+//! 2. Where the mirror moves during a macropulse, its parts leave in different directions: each
+//!    has rays of its own (docs/physics.md#mirror-motion).
+//! 3. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
 
 use super::batch::Batch;
@@ -13,16 +15,71 @@ use crate::emit::{ShotLog, beam_axes};
 impl Scene {
     /// What the shots of `log` meet within the range gate, in the order of the log.
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Hits {
-        let footprint = Footprint::of(design);
         let directions = design.directions();
+        self.trace_along(design, log, |shot| directions.of(log.row[shot], log.column[shot]))
+    }
+
+    /// What each of the [`PARTS`] of the macropulses of `log` meets, the part sent first first;
+    /// nothing where the mirror stands still for a macropulse.
+    pub fn trace_parts(&self, design: &Design, log: &ShotLog) -> Vec<Hits> {
+        if !design.scan.moves {
+            return Vec::new();
+        }
+        let motion = Motion { design, log };
+        let trace = |part| self.trace_along(design, log, |shot| motion.axis(shot, part));
+        (0..PARTS).map(trace).collect()
+    }
+
+    fn trace_along(
+        &self,
+        design: &Design,
+        log: &ShotLog,
+        axis: impl Fn(usize) -> [f64; 3],
+    ) -> Hits {
+        let footprint = Footprint::of(design);
         let mut batch = Batch::new(self, design.scan.max_range);
         for shot in 0..log.len() {
-            let axis = directions.of(log.row[shot], log.column[shot]);
+            let axis = axis(shot);
             footprint.rays(axis, |aim, weight| {
                 batch.add(shot as u32, weight, aim);
             });
         }
         batch.finish()
+    }
+}
+
+/// Parts of a macropulse that leave in directions of their own where the mirror moves.
+pub const PARTS: u8 = 8;
+
+/// Where the beam points while the mirror moves on.
+struct Motion<'a> {
+    design: &'a Design,
+    log: &'a ShotLog,
+}
+
+impl Motion<'_> {
+    /// The direction in which the middle of a `part` of `shot` leaves. The middle of the macropulse
+    /// leaves towards the pixel; from there to the next pixel of the line the mirror takes the time
+    /// from shot to shot.
+    fn axis(&self, shot: usize, part: u8) -> [f64; 3] {
+        let log = self.log;
+        let directions = self.design.directions();
+        let of = |shot: usize| directions.of(log.row[shot], log.column[shot]);
+        let axis = of(shot);
+        let in_line = |other: &usize| *other < log.len() && log.row[*other] == log.row[shot];
+        // The last pixel of a line moves on as it came.
+        let next = Some(shot + 1).filter(in_line);
+        let before = shot.checked_sub(1).filter(in_line);
+        let Some(other) = next.or(before) else { return axis };
+        let macropulse =
+            i64::from(self.design.coding.codebook.chips()) * self.design.coding.chip_fs;
+        let apart = log.fired_at_fs[other] - log.fired_at_fs[shot];
+        let after = (f64::from(part) + 0.5) / f64::from(PARTS) - 0.5;
+        let pixels = after * macropulse as f64 / apart as f64;
+        let there = of(other);
+        let aim = [0, 1, 2].map(|i| axis[i] + pixels * (there[i] - axis[i]));
+        let length = aim.iter().map(|part| part * part).sum::<f64>().sqrt();
+        aim.map(|part| part / length)
     }
 }
 
@@ -75,5 +132,33 @@ impl Footprint {
             let length = (aim[0] * aim[0] + aim[1] * aim[1] + aim[2] * aim[2]).sqrt();
             cast([aim[0] / length, aim[1] / length, aim[2] / length], weight);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mirror moves by 0.67 pixel during a macropulse of the paper: an edge that crosses a
+    /// pixel is met by some of its parts, in the order in which they are sent.
+    #[test]
+    fn the_parts_of_a_macropulse_sweep_two_thirds_of_a_pixel() {
+        let design = Design::open("kim-park-2016-physical", &[]).unwrap();
+        let log = crate::emit::Band { scan: 0, first: 0, shots: 848 }.shot_log(&design);
+        let motion = Motion { design: &design, log: &log };
+        let pitch = (43.2_f64 / 848.0).to_radians();
+        let shot = log.home.start + 400;
+        let [first, last] = [0, PARTS - 1].map(|part| motion.axis(shot, part));
+        let angle =
+            |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+        let swept = angle(first, last) * f64::from(PARTS) / f64::from(PARTS - 1);
+        approx::assert_relative_eq!(swept / pitch, 0.6675, max_relative = 0.03);
+        let pixel = design.directions().of(log.row[shot], log.column[shot]);
+        approx::assert_relative_eq!(angle(first, pixel), angle(last, pixel), max_relative = 0.01);
+        let next = design.directions().of(log.row[shot + 1], log.column[shot + 1]);
+        assert!(angle(last, next) < angle(first, next), "it moves towards the next pixel");
+        // The last pixel of a line has none after it.
+        let end = log.home.end - 1;
+        assert!(angle(motion.axis(end, 0), motion.axis(end, PARTS - 1)) > 0.5 * pitch);
     }
 }

@@ -8,7 +8,7 @@ use crate::design::{Error, Pattern, Scan};
 const MOST_PIXELS: u64 = 1 << 25;
 
 impl Check<'_> {
-    pub(super) fn scan(&self, file: &ScanFile) -> Result<Scan, Error> {
+    pub(super) fn scan(&self, file: &ScanFile, moves: bool) -> Result<Scan, Error> {
         let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
         let reach = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
         let beyond = self.within("scan.gate_beyond_m", file.gate_beyond_m, 0.0, 1e5)?;
@@ -54,12 +54,19 @@ impl Check<'_> {
                 );
             }
         };
+        if moves && !matches!(pattern, Pattern::Raster { .. }) {
+            return self.refuse(
+                "idealised",
+                "the motion of the beam is modelled for a raster alone: add \"mirror-motion\" to \
+                 this list",
+            );
+        }
         if u64::from(rows) * u64::from(columns) > MOST_PIXELS {
             let message = format!("{rows} x {columns} pixels are more than {MOST_PIXELS}");
             return self.refuse("scan", message);
         }
         let rate_millihertz = (rate * 1e3).round() as u64;
-        Ok(Scan { rows, columns, rate_millihertz, min_range, reach, max_range, pattern })
+        Ok(Scan { rows, columns, rate_millihertz, min_range, reach, max_range, moves, pattern })
     }
 
     fn spinning(&self, file: &SpinningFile) -> Result<(u32, u32, Pattern), Error> {
