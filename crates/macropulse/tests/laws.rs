@@ -6,7 +6,7 @@
 use macropulse::code::correlation::{
     CrossCorrelation, Sidelobe, aperiodic, aperiodic_sidelobe, periodic, periodic_sidelobe,
 };
-use macropulse::code::{CodeWord, Codebook, Crc, Family, Payload, prime_sequence};
+use macropulse::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, prime_sequence};
 use macropulse::predict::multiple_access::{
     MultipleAccess, Words, bit_error_gaussian, bit_error_hard, bit_error_soft,
 };
@@ -232,12 +232,12 @@ mod payloads {
     #[test]
     fn the_codebook_of_the_paper_has_its_size_and_weights() {
         let prime = Family::prime(29).unwrap();
-        let book = Codebook::new(prime, Some(payload(0, false)), COLUMNS).unwrap();
+        let book = Codebook::new(prime, Some(payload(0, false)), COLUMNS, Keying::OnOff).unwrap();
         assert_eq!(book.chips(), 10_933);
         assert!(
             book.weights()
                 .zip(labels())
-                .all(|(marks, label)| { marks == 29 * payload(0, false).weight(label) as usize })
+                .all(|(marks, label)| { marks.0 == marks.1 && marks.1 == 29 * payload(0, false).weight(label) as usize })
         );
     }
 }

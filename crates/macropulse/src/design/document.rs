@@ -15,9 +15,22 @@ const LONGEST_CHAIN: usize = 16;
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
-const ALTERNATIVES: [(&str, &[&str]); 2] = [
+const ALTERNATIVES: [(&str, &[&str]); 3] = [
     ("scan", &["raster", "spinning", "flash"]),
     ("detector", &["photon-counting", "first-firing"]),
+    ("family", FAMILIES),
+];
+
+/// Code families by the names they have in a sensor file.
+pub(super) const FAMILIES: &[&str] = &[
+    "prime",
+    "extended-prime",
+    "quadratic-congruence",
+    "extended-quadratic-congruence",
+    "orthogonal",
+    "sparse",
+    "m-sequence",
+    "gold",
 ];
 
 /// One TOML text with its origin.
@@ -289,6 +302,13 @@ mod tests {
         let chain = chain("extends = \"kim-park-2016\"\n[scan]\nmax_range_m = 90.0\n");
         assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_float(), Some(90.0));
         assert_eq!(value_at(&chain.merged, "scan.raster.rows").unwrap().as_integer(), Some(480));
+    }
+
+    #[test]
+    fn another_code_family_replaces_the_parents() {
+        let chain = chain("extends = \"kim-park-2016\"\n[code]\nfamily = { gold = 7 }\n");
+        let family = value_at(&chain.merged, "code.family").unwrap().as_table().unwrap();
+        assert_eq!(family.keys().collect::<Vec<_>>(), ["gold"]);
     }
 
     #[test]

@@ -147,6 +147,16 @@ pub struct Coding {
     pub word_modulus: u32,
 }
 
+impl Coding {
+    /// The number that a shot to `column` carries; 0 where it carries none.
+    pub fn label_of(&self, column: u16) -> u16 {
+        match self.label {
+            Some(Label::Column) => column,
+            Some(Label::None) | None => 0,
+        }
+    }
+}
+
 /// Light to edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Detector {

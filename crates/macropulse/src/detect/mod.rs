@@ -64,7 +64,8 @@ impl<'a> Detectors<'a> {
         let clock = Clock::new(self.design, *first);
         match &self.kind {
             Kind::Counting(counting) => {
-                counting.edges(&photon_counting::Band { clock, log, echoes }, &self.chance, memory)
+                let band = photon_counting::Band { clock, design: self.design, log, echoes };
+                counting.edges(&band, &self.chance, memory)
             }
             Kind::Firing(firing) => {
                 let band = first_firing::Band { clock, design: self.design, log, echoes };

@@ -28,6 +28,7 @@ const FEW: usize = 64;
 /// What the detector is given of a band.
 pub(super) struct Band<'a> {
     pub clock: Clock,
+    pub design: &'a Design,
     pub log: &'a ShotLog,
     pub echoes: &'a Echoes,
 }
@@ -38,7 +39,10 @@ pub(super) struct Counting {
     /// Times of the marks of all code words, each padded to `padded` numbers.
     words: Vec<u32>,
     padded: usize,
-    weight: usize,
+    /// Marks of each code word.
+    weights: Vec<usize>,
+    /// Length of a chip, in parts of a tick.
+    chip: u32,
     /// Lit bits of each label, the one sent first the lowest.
     lit: Vec<u32>,
     /// Length of a bit, in parts of a tick.
@@ -54,8 +58,9 @@ impl Counting {
     pub fn new(counting: &PhotonCounting, design: &Design) -> Self {
         let codebook = &design.coding.codebook;
         let chip = (design.coding.chip_fs / design.tdc.tick_fs) as u32 * PARTS_OF_TICK;
-        let weight = codebook.word(0).weight();
-        let padded = weight.next_multiple_of(STEP);
+        let weights: Vec<usize> =
+            (0..codebook.words()).map(|word| codebook.word(word as u16).weight()).collect();
+        let padded = codebook.family().weight().next_multiple_of(STEP);
         let mut words = Vec::new();
         for word in 0..codebook.words() {
             let marks = codebook.word(word as u16).marks.iter();
@@ -70,7 +75,8 @@ impl Counting {
         Self {
             words,
             padded,
-            weight,
+            weights,
+            chip,
             lit: (0..codebook.labels()).map(lit).collect(),
             bit: codebook.family().length() * chip,
             kept: 1.0 - counting.missed_marks,
@@ -124,15 +130,22 @@ impl Counting {
             return;
         }
         let from = time.len();
-        let word = usize::from(log.word[shot]) * self.padded;
-        let train = Train {
-            word: &self.words[word..][..self.padded],
-            weight: self.weight,
-            bit: self.bit,
-            lit: self.lit[usize::from(log.label[shot])],
-            start,
-        };
-        append_train(&train, time);
+        let (label, word) = (log.label[shot], log.word[shot]);
+        let codebook = &band.design.coding.codebook;
+        if codebook.zeros_are_lit() {
+            let marks = codebook.marks(label, word).iter();
+            time.extend(marks.map(|mark| start.wrapping_add(u32::from(*mark) * self.chip)));
+        } else {
+            let word = usize::from(word);
+            let train = Train {
+                word: &self.words[word * self.padded..][..self.padded],
+                weight: self.weights[word],
+                bit: self.bit,
+                lit: self.lit[usize::from(label)],
+                start,
+            };
+            append_train(&train, time);
+        }
         if !seen.is_certain() || self.jitter.is_some() {
             let earlier = echoes.shot[..echo].iter().rev();
             let part = earlier.take_while(|other| **other == echoes.shot[echo]).count() as u32;

@@ -11,7 +11,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::super::{Receiver, ReceiverKind, Returns};
 use super::{Sent, decode};
-use crate::code::{Codebook, Crc, Family, Payload};
+use crate::code::{Codebook, Crc, Family, Keying, Payload};
 use crate::emit::ShotLog;
 use crate::tdc::Ticks;
 
@@ -38,7 +38,7 @@ struct Weather {
 
 pub(super) fn codebook() -> Codebook {
     let payload = Payload::new(4, Crc::default(), false).unwrap();
-    Codebook::new(Family::prime(11).unwrap(), Some(payload), 16).unwrap()
+    Codebook::new(Family::prime(11).unwrap(), Some(payload), 16, Keying::OnOff).unwrap()
 }
 
 pub(super) fn receiver(jitter_ticks: f64) -> Receiver {
