@@ -1,6 +1,7 @@
 //! The command line of Macropulse: one file per subcommand.
 
 mod check;
+mod codes;
 mod completions;
 mod encode;
 mod fault;
@@ -39,6 +40,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Sensors(sensors) => sensors::run(sensors),
         Command::Scenes(scenes) => scenes::run(scenes),
         Command::Check(check) => check::run(check, common),
+        Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),

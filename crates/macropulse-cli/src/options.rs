@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::fault::Fault;
-use crate::{check, completions, encode, paper, scenes, sensors, simulate, speed};
+use crate::{check, codes, completions, encode, paper, scenes, sensors, simulate, speed};
 
 /// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
 /// it, get a point cloud.
@@ -26,6 +26,7 @@ pub enum Command {
     Sensors(sensors::Sensors),
     Scenes(scenes::Scenes),
     Check(check::Check),
+    Codes(codes::Codes),
     Encode(encode::Encode),
     Speed(speed::Speed),
     Completions(completions::Completions),

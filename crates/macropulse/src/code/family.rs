@@ -6,6 +6,8 @@ mod prime;
 mod shift_register;
 mod sparse;
 
+use std::fmt;
+
 use super::{CodeWord, Error};
 pub use prime::prime_sequence;
 
@@ -207,6 +209,25 @@ impl Family {
             Self::Orthogonal { words, .. } | Self::Sparse { words, .. } => words as usize,
             Self::Gold { degree } => (1 << degree) + 1,
             Self::MSequence { .. } | Self::Single => 1,
+        }
+    }
+}
+
+impl fmt::Display for Family {
+    /// Its name and its numbers, as in `prime 29`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Prime { p } => write!(f, "prime {p}"),
+            Self::ExtendedPrime { p } => write!(f, "extended prime {p}"),
+            Self::QuadraticCongruence { p } => write!(f, "quadratic congruence {p}"),
+            Self::ExtendedQuadraticCongruence { p } => {
+                write!(f, "extended quadratic congruence {p}")
+            }
+            Self::Orthogonal { length, weight, .. } => write!(f, "orthogonal {length}, {weight}"),
+            Self::Sparse { length, weight, .. } => write!(f, "sparse {length}, {weight}"),
+            Self::MSequence { degree } => write!(f, "m-sequence {degree}"),
+            Self::Gold { degree } => write!(f, "Gold {degree}"),
+            Self::Single => write!(f, "single mark"),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One code word.
 
 /// One word of a family: which of its chips are lit.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub struct CodeWord {
     /// Number of chips.

@@ -279,10 +279,10 @@ mod tests {
     fn exhaustive(band: &Band, shot: usize) -> (i64, i32) {
         let marks = band.codebook.marks(band.log.label[shot], band.log.word[shot]);
         let scale = i64::from(band.receiver.ticks_per_chip);
-        let is_lit = |place: i64| {
-            band.ticks.iter().any(|&t| (place..=place + band.late).contains(&i64::from(t)))
-        };
-        let lit: Vec<bool> = (0..40_000).map(is_lit).collect();
+        let mut lit = vec![false; 1 << 16];
+        for tick in band.ticks.iter().map(|&tick| i64::from(tick)) {
+            ((tick - band.late).max(0)..=tick).for_each(|place| lit[place as usize] = true);
+        }
         let score = |lag: i64| -> i32 {
             let chips = 0..band.codebook.chips() as i64;
             let seen = chips.filter(|c| lit[(band.fired[shot] + lag + scale * c) as usize]);

@@ -13,6 +13,7 @@ mod derived;
 mod directions;
 mod document;
 mod effect;
+mod family;
 mod file;
 mod presets;
 pub mod safety;
@@ -24,6 +25,7 @@ pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use derived::Derived;
 pub use directions::Directions;
 pub use effect::Effect;
+pub use family::family_from_toml;
 pub use file::{Firing, Label, Mirror};
 pub use presets::{names as preset_names, text as preset_text};
 

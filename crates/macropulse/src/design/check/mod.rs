@@ -8,6 +8,8 @@ mod scan;
 
 use std::sync::OnceLock;
 
+pub(super) use code::family;
+
 use super::document::Chain;
 use super::file::SensorFile;
 use super::{Design, Effect, Error};
