@@ -9,9 +9,7 @@ use macropulse::code::correlation::{
     CrossCorrelation, aperiodic_sidelobe, balanced, bipolar, periodic, periodic_sidelobe,
 };
 use macropulse::code::{CodeWord, Family};
-use macropulse::predict::multiple_access::{
-    Hits, MultipleAccess, bit_error_hard, bit_error_soft,
-};
+use macropulse::predict::multiple_access::{Hits, MultipleAccess, bit_error_hard, bit_error_soft};
 
 const PRIMES: [u32; 8] = [5, 7, 11, 13, 17, 19, 23, 29];
 

@@ -234,11 +234,9 @@ mod payloads {
         let prime = Family::prime(29).unwrap();
         let book = Codebook::new(prime, Some(payload(0, false)), COLUMNS, Keying::OnOff).unwrap();
         assert_eq!(book.chips(), 10_933);
-        assert!(
-            book.weights()
-                .zip(labels())
-                .all(|(marks, label)| { marks.0 == marks.1 && marks.1 == 29 * payload(0, false).weight(label) as usize })
-        );
+        assert!(book.weights().zip(labels()).all(|(marks, label)| {
+            marks.0 == marks.1 && marks.1 == 29 * payload(0, false).weight(label) as usize
+        }));
     }
 }
 

@@ -100,7 +100,18 @@ impl Codebook {
             }
         }
         let lit = all_lit;
-        Ok(Self { family, payload, keying, labels, words, marks, starts, sidelobes, lit, lit_starts })
+        Ok(Self {
+            family,
+            payload,
+            keying,
+            labels,
+            words,
+            marks,
+            starts,
+            sidelobes,
+            lit,
+            lit_starts,
+        })
     }
 
     /// The codebook of a sensor that is not coded: a macropulse is one lit chip.
@@ -194,7 +205,8 @@ impl Codebook {
             weights.fold((usize::MAX, 0), |(fewest, most), w| (fewest.min(w), most.max(w)))
         };
         let words = self.words.len();
-        (0..self.labels as usize).map(move |label| of_label(&self.starts[label * words..][..=words]))
+        (0..self.labels as usize)
+            .map(move |label| of_label(&self.starts[label * words..][..=words]))
     }
 
     /// Marks of the macropulse that has the fewest.
@@ -400,8 +412,8 @@ mod tests {
              use a shorter code word or fewer payload bits"
         );
         let payload = Payload::new(16, Crc::default(), false).unwrap();
-        let large =
-            Codebook::new(Family::prime(53).unwrap(), Some(payload), 65_536, Keying::OnOff).unwrap_err();
+        let large = Codebook::new(Family::prime(53).unwrap(), Some(payload), 65_536, Keying::OnOff)
+            .unwrap_err();
         assert!(large.to_string().starts_with("the macropulses of 65536 labels with 53 words"));
     }
 }

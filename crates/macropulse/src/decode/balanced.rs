@@ -112,7 +112,7 @@ impl<'a> Band<'a> {
             tof: self.receiver.tof(fired_at_fs, start + self.epoch) + offset,
             peak: score,
             marks: weight,
-            margin: score - self.best_beside(start).clamp(0, peak.score()) as u16,
+            margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
             photons: photons_per_mark(
                 peak.found as u16,
                 weight,
@@ -162,19 +162,6 @@ impl<'a> Band<'a> {
         let dark = self.codebook.chips() - u32::from(marks);
         let on_dark = (f64::from(stray) + 1.0) / (f64::from(dark) + 1.0);
         self.thresholds.least(marks, in_gate.max(on_dark).min(1.0))
-    }
-
-    /// The highest balance beside `start`: less than a macropulse away by whole chips.
-    fn best_beside(&self, start: i64) -> i32 {
-        let scale = i64::from(self.receiver.ticks_per_chip);
-        let length = scale * i64::from(self.codebook.chips());
-        let own = (self.late / scale + 1) * scale;
-        let sides = [start - length + scale..start - own + scale, start + own..start + length];
-        let of_side = |side: std::ops::Range<i64>| {
-            let starts = side.step_by(scale as usize);
-            starts.filter_map(|start| self.grid.at(start, &self.chips)).map(Balance::score).max()
-        };
-        sides.into_iter().filter_map(of_side).max().unwrap_or(0)
     }
 
     /// By how many ticks the marks of a macropulse that begins at `start` are late on average. What

@@ -4,31 +4,36 @@ use std::ops::Range;
 
 use super::level::on_every_level;
 
+/// Places that are looked at side by side.
+const LANES: usize = 64;
+
 /// The chips of a macropulse, one bit each.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Chips {
-    /// Lit ones, the first chip in the lowest bit.
-    marks: Vec<u64>,
+    /// Dark ones, the first chip in the lowest bit.
+    dark: Vec<u64>,
     /// All there are.
     all: Vec<u64>,
+    /// Number of dark ones.
+    darkness: u32,
 }
 
 impl Chips {
     /// Makes it `chips` long, lit at `marks`.
     pub(crate) fn set(&mut self, chips: usize, marks: &[u16]) {
-        self.marks.clear();
-        self.marks.resize(chips.div_ceil(64), 0);
-        for &mark in marks {
-            self.marks[usize::from(mark) / 64] |= 1 << (mark % 64);
-        }
         self.all.clear();
         self.all.resize(chips / 64, u64::MAX);
         if !chips.is_multiple_of(64) {
             self.all.push((1 << (chips % 64)) - 1);
         }
+        self.dark.clone_from(&self.all);
+        for &mark in marks {
+            self.dark[usize::from(mark) / 64] &= !(1 << (mark % 64));
+        }
+        self.darkness = self.dark.iter().map(|word| word.count_ones()).sum();
     }
 
-    /// Machine words that a macropulse may touch, wherever it begins.
+    /// Machine words that a macropulse may touch, wherever it begins in the first one.
     pub(crate) fn reach(&self) -> usize {
         self.all.len() + 1
     }
@@ -62,28 +67,50 @@ on_every_level! {
         chips: &Chips,
         least: i32,
     ) -> Option<Balance> {
-        let mut wanted = least;
+        // Marks that are lit and dark chips that are not: the score, and all dark chips.
+        let darkness = chips.darkness as i32;
+        let mut wanted = i64::from(least) + i64::from(darkness);
         let mut best = None;
-        for place in places {
-            let (begin, shift) = (place / 64, place % 64);
+        for begin in places.start / LANES..places.end.div_ceil(LANES) {
             let at = |word: usize| words.get(begin + word).copied().unwrap_or(0);
-            let (mut found, mut lit, mut next) = (0, 0, at(0));
-            for word in 0..chips.all.len() {
+            let (mut agreed, mut next) = ([0_u64; LANES], at(0));
+            for (word, (dark, all)) in chips.dark.iter().zip(&chips.all).enumerate() {
                 let here = next;
                 next = at(word + 1);
-                // Two shifts, because a shift by 64 does not give 0.
-                let seen = here >> shift | next << 1 << (63 ^ shift);
-                found += (seen & chips.marks[word]).count_ones();
-                lit += (seen & chips.all[word]).count_ones();
+                for lane in 0..LANES {
+                    // Two shifts, because a shift by 64 does not give 0.
+                    let seen = here >> lane | next << 1 << (63 ^ lane);
+                    agreed[lane] += u64::from(((seen ^ dark) & all).count_ones());
+                }
             }
-            let score = 2 * found as i32 - lit as i32;
-            if score >= wanted {
-                best = Some(Balance { place, found, stray: lit - found });
-                wanted = score + 1;
+            let mut highest = 0;
+            for lane in 0..LANES {
+                highest = highest.max(agreed[lane]);
+            }
+            if (highest as i64) < wanted {
+                continue;
+            }
+            for (place, &agreed) in (LANES * begin..).zip(&agreed) {
+                if places.contains(&place) && agreed as i64 >= wanted {
+                    wanted = agreed as i64 + 1;
+                    best = Some((place, agreed as i32 - darkness));
+                }
             }
         }
-        best
+        best.map(|(place, score)| {
+            let stray = lit_in(words, place, &chips.dark);
+            Balance { place, found: (score + stray as i32) as u32, stray }
+        })
     }
+}
+
+/// How many bits of `pattern`, begun at bit `first`, are lit in `words`.
+#[inline(always)]
+fn lit_in(words: &[u64], first: usize, pattern: &[u64]) -> u32 {
+    let (begin, shift) = (first / 64, first % 64);
+    let at = |word: usize| words.get(begin + word).copied().unwrap_or(0);
+    let seen = |word: usize| at(word) >> shift | at(word + 1) << 1 << (63 ^ shift);
+    (0..).zip(pattern).map(|(word, pattern)| (seen(word) & pattern).count_ones()).sum()
 }
 
 #[cfg(test)]

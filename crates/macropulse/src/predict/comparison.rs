@@ -59,7 +59,16 @@ impl Comparison {
             }
         }
         let access = MultipleAccess::new(marks.0, 1, Hits::of_counts(&counts));
-        Self { family, marks, compared, sidelobes, crosses, spread: spread(&counts), matrix, access }
+        Self {
+            family,
+            marks,
+            compared,
+            sidelobes,
+            crosses,
+            spread: spread(&counts),
+            matrix,
+            access,
+        }
     }
 
     /// `users` of the family at once; `None` where it has not so many words. Where words differ in
@@ -79,7 +88,8 @@ impl Comparison {
 fn spread(counts: &[u64]) -> (f64, f64) {
     let all = counts.iter().sum::<u64>() as f64;
     let moment = |power: i32| {
-        let terms = (0..).zip(counts).map(|(met, &count)| f64::from(met).powi(power) * count as f64);
+        let terms =
+            (0..).zip(counts).map(|(met, &count)| f64::from(met).powi(power) * count as f64);
         terms.sum::<f64>() / all
     };
     (moment(1), moment(2) - moment(1).powi(2))

@@ -87,7 +87,8 @@ impl Sensor {
     fn with_payload(kind: ReceiverKind, payload: Payload) -> Self {
         let labels = COLUMNS;
         Self {
-            codebook: Codebook::new(Family::prime(29).unwrap(), Some(payload), 1024, Keying::OnOff).unwrap(),
+            codebook: Codebook::new(Family::prime(29).unwrap(), Some(payload), 1024, Keying::OnOff)
+                .unwrap(),
             receiver: Receiver {
                 kind,
                 gate_ticks: (0, GATE),

@@ -175,8 +175,7 @@ mod tests {
 
     #[test]
     fn refusals_name_the_bound() {
-        let refusal =
-            |n, w, words| Family::orthogonal(n, w, words).unwrap_err().to_string();
+        let refusal = |n, w, words| Family::orthogonal(n, w, words).unwrap_err().to_string();
         assert_eq!(
             refusal(1000, 5, Some(50)),
             "50 words of 5 marks in 1000 chips cannot be orthogonal; there are 49 at most \

@@ -52,8 +52,7 @@ pub(super) fn gold(degree: u32) -> Vec<CodeWord> {
     let length = u.len();
     let v: Vec<bool> = (0..length).map(|chip| u[DECIMATION * chip % length]).collect();
     let sum = |shift: usize| {
-        let sum: Vec<bool> =
-            (0..length).map(|chip| u[chip] ^ v[(chip + shift) % length]).collect();
+        let sum: Vec<bool> = (0..length).map(|chip| u[chip] ^ v[(chip + shift) % length]).collect();
         word(&sum)
     };
     [word(&u), word(&v)].into_iter().chain((0..length).map(sum)).collect()
@@ -139,10 +138,7 @@ mod tests {
     #[test]
     fn refusals_name_what_is_possible() {
         let refusal = Family::gold(8).unwrap_err().to_string();
-        assert_eq!(
-            refusal,
-            "a Gold code of degree 8 is not possible; use 5, 6, 7, 9, 10 or 11"
-        );
+        assert_eq!(refusal, "a Gold code of degree 8 is not possible; use 5, 6, 7, 9, 10 or 11");
         let refusal = Family::m_sequence(16).unwrap_err().to_string();
         assert_eq!(refusal, "an m-sequence of degree 16 is not possible; use 3 to 15");
     }

@@ -14,6 +14,8 @@ pub(super) struct Grid {
     origin: i64,
     /// Ticks per chip, that is phases.
     scale: i64,
+    /// How many ticks before another one a place is lit.
+    late: i64,
     /// Machine words of one phase.
     width: usize,
     words: Vec<u64>,
@@ -24,7 +26,11 @@ pub(super) struct Grid {
 impl Grid {
     /// The ticks of `lit` that lie in `span`, each of them with the `late` places before it, as a
     /// mark counts that is so late.
-    pub fn new(span: Range<i64>, (scale, late): (i64, i64), lit: impl Iterator<Item = i64>) -> Self {
+    pub fn new(
+        span: Range<i64>,
+        (scale, late): (i64, i64),
+        lit: impl Iterator<Item = i64>,
+    ) -> Self {
         let chips = (span.end - span.start).max(0) / scale + 2;
         let width = chips as usize / 64 + 1;
         let mut words = vec![0; width * scale as usize];
@@ -44,7 +50,7 @@ impl Grid {
                 sum
             }));
         }
-        Self { origin, scale, width, words, before }
+        Self { origin, scale, late, width, words, before }
     }
 
     /// What is lit if a macropulse begins at tick `start`.
@@ -64,7 +70,8 @@ impl Grid {
         let mut best = None;
         let (mut least, mut better) = (least, better);
         for phase in 0..self.scale {
-            let first = (starts.start - self.origin - phase + self.scale - 1).div_euclid(self.scale);
+            let first =
+                (starts.start - self.origin - phase + self.scale - 1).div_euclid(self.scale);
             let end = (starts.end - self.origin - phase + self.scale - 1).div_euclid(self.scale);
             let places = first.max(0) as usize..(end.max(0) as usize).min(64 * self.width);
             let Some(found) = self.best_of_phase(phase, places, (chips, least)) else { continue };
@@ -76,6 +83,16 @@ impl Grid {
             }
         }
         best
+    }
+
+    /// The highest score beside `start`: less than a macropulse away, by whole chips.
+    pub fn best_beside(&self, start: i64, chips: &Chips) -> i32 {
+        let Some((phase, chip)) = self.place(start) else { return 0 };
+        let (own, reach) = (1 + (self.late / self.scale) as usize, 64 * chips.reach());
+        let sides =
+            [chip.saturating_sub(reach)..(chip + 1).saturating_sub(own), chip + own..chip + reach];
+        let best = |side| best_balance(self.phase(phase), side, chips, 0);
+        sides.into_iter().filter_map(best).map(Balance::score).max().unwrap_or(0)
     }
 
     /// The best of some `places` of one phase. Runs of them with too few lit places are left out.

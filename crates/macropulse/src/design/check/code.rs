@@ -24,8 +24,8 @@ impl Check<'_> {
         if !matches!(scan.pattern, Pattern::Raster { .. }) {
             return self.refuse("code", "only a raster can be coded; leave [code] out");
         }
-        let family = family(file.family)
-            .or_else(|error| self.refuse("code.family", error.to_string()))?;
+        let family =
+            family(file.family).or_else(|error| self.refuse("code.family", error.to_string()))?;
         let chip_fs = self.whole_fs("code.chip_ps", file.chip_ps)?;
         if chip_fs % tdc.tick_fs != 0 {
             return self.refuse("code.chip_ps", "must be a whole number of TDC ticks");
