@@ -136,6 +136,11 @@ error     per bit among so many users, each counted mark by mark / limited to on
 "
 }
 
+/// A probability with two digits.
+fn error(probability: f64) -> String {
+    if probability == 0.0 { "0".to_owned() } else { format!("{probability:.1e}") }
+}
+
 fn row(of: &Comparison) -> Vec<String> {
     let (fewest, most) = of.marks;
     let alone = of.compared < 2;
@@ -152,7 +157,8 @@ fn row(of: &Comparison) -> Vec<String> {
     ];
     cells.extend(USERS.iter().map(|&users| match of.users(users) {
         Some(access) => {
-            format!("{:.1e} / {:.1e}", bit_error_soft(&access), bit_error_hard(&access))
+            let [soft, hard] = [bit_error_soft(&access), bit_error_hard(&access)].map(error);
+            format!("{soft} / {hard}")
         }
         None => none(),
     }));

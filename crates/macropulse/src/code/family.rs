@@ -29,7 +29,7 @@ pub enum Family {
         p: u32,
     },
     /// Quadratic congruence code: p − 1 words of length p² and weight p. A word meets itself in at
-    /// most 2 marks when shifted, another one in at most 4 \[TS90\]. Made by
+    /// most 2 marks when shifted, another one in at most 4 \[TS81\]. Made by
     /// [`Family::quadratic_congruence`].
     #[non_exhaustive]
     QuadraticCongruence {

@@ -7,7 +7,7 @@
 use super::super::CodeWord;
 use super::prime::one_mark_per_block;
 
-/// The sequence `s_k = a·k·(k+1)/2 mod p`, for k = 0 … p−1 \[TS90\].
+/// The sequence `s_k = a·k·(k+1)/2 mod p`, for k = 0 … p−1 \[TS81\].
 fn sequence(p: u32, a: u32) -> Vec<u32> {
     let (p, a) = (u64::from(p), u64::from(a));
     (0..p).map(|k| (a * (k * (k + 1) / 2) % p) as u32).collect()
