@@ -52,6 +52,8 @@ impl Check<'_> {
             );
         }
         self.can_read(kind, coding)?;
+        let (threshold, lightest) =
+            (file.receiver.bit_threshold, coding.codebook.lightest_word() as u32);
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         if gate.1 >= i64::from(u32::MAX / PARTS_OF_TICK) {
@@ -71,11 +73,10 @@ impl Check<'_> {
             )?,
             bit_threshold: match kind {
                 ReceiverKind::Literal | ReceiverKind::Blind => {
-                    let marks = coding.codebook.lightest_word() as u32;
-                    let threshold = file.receiver.bit_threshold;
-                    self.count("receiver.bit_threshold", threshold, 1, marks)? as u16
+                    self.count("receiver.bit_threshold", threshold, 1, lightest)? as u16
                 }
-                ReceiverKind::Matched | ReceiverKind::Balanced | ReceiverKind::Direct => 1,
+                // The others ask for none: a light word may have fewer marks than the default.
+                _ => threshold.clamp(1, lightest.max(1)) as u16,
             },
         })
     }
