@@ -171,7 +171,7 @@ fn what_does_not_fit_together_is_refused() {
         &["1000000000 chips", "1 to 65535"],
     );
     refused(&[(FAMILY, "{ golf = 7 }")], &["golf", "did you mean `gold`"]);
-    refused(&[(FAMILY, "{ prime = 29, gold = 7 }")], &["code.family"]);
+    refused(&[(FAMILY, "{ prime = 29, gold = 7 }")], &["code.family", "exactly one family"]);
     refused(
         &[(FAMILY, "{ quadratic-congruence = 29 }"), (WORD, "{ first = 0, modulus = 29 }")],
         &["code.word.modulus", "between 1 and 28"],

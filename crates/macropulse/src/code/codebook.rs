@@ -248,14 +248,14 @@ impl Shapes {
         };
         let bits = [zero, Some(word.clone())];
         let length = word.length as i32;
-        let shared = |first: &Option<CodeWord>, second: &Option<CodeWord>, apart: i32| {
-            let (Some(first), Some(second)) = (first, second) else { return Vec::new() };
-            let both = aperiodic(first, second);
+        let shared = |one: &Option<CodeWord>, other: &Option<CodeWord>, apart: i32| {
+            let (Some(one), Some(other)) = (one, other) else { return Vec::new() };
+            let both = aperiodic(one, other);
             (1..length).map(|lag| both.at(lag - apart)).collect()
         };
         let alone = [0, 1].map(|bit| shared(&bits[bit], &bits[bit], 0));
         let follower =
-            [0, 1].map(|first| [0, 1].map(|second| shared(&bits[first], &bits[second], length)));
+            [0, 1].map(|one| [0, 1].map(|other| shared(&bits[one], &bits[other], length)));
         Self { bits, alone, follower }
     }
 

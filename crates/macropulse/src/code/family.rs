@@ -1,5 +1,6 @@
 //! Code families: sets of code words that can be told apart when they overlap.
 
+mod chance;
 mod congruence;
 mod orthogonal;
 mod prime;

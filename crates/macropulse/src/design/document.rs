@@ -175,7 +175,9 @@ fn fill_in(strong: &mut Table, weak: &Table) {
             }
             Some(toml::Value::Table(inner)) => {
                 if let toml::Value::Table(below) = value {
-                    let chosen = alternatives(key).any(|kind| inner.contains_key(kind));
+                    // Of a family there is nothing but its kind, be it misspelt.
+                    let chosen =
+                        key == "family" || alternatives(key).any(|kind| inner.contains_key(kind));
                     let mut below = below.clone();
                     if chosen {
                         below.retain(|kind, _| {

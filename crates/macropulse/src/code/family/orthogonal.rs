@@ -10,10 +10,8 @@
 //! word is found; the best of some rounds is kept. That reaches the bound where marks are few, and
 //! else about nine tenths of it.
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-
 use super::super::{CodeWord, Error};
+use super::chance::Chance;
 
 /// Orders of the chips that are tried, the first one ascending.
 const ROUNDS: u64 = 24;
@@ -76,10 +74,9 @@ struct Round {
 impl Round {
     fn new(length: u32, round: u64) -> Self {
         let mut order: Vec<u32> = (1..length).collect();
-        let mut chance = ChaCha8Rng::seed_from_u64(round);
+        let mut chance = Chance::new(round, 0);
         for last in (1..if round == 0 { 0 } else { order.len() }).rev() {
-            let other = (u64::from(chance.next_u32()) * (last as u64 + 1)) >> 32;
-            order.swap(last, other as usize);
+            order.swap(last, chance.below(last as u32 + 1) as usize);
         }
         Self { length, order, taken: vec![false; length as usize], steps: STEPS }
     }
@@ -156,7 +153,7 @@ mod tests {
         let words = Family::orthogonal(7, 3, None).unwrap().words();
         assert_eq!(words.len(), 1);
         assert_eq!(words[0].marks, [0, 1, 3]);
-        // {0, 1, 3} leaves nothing for a second word, others do.
+        // {0, 1, 3} leaves nothing for another word, others do.
         assert_eq!(Family::orthogonal(13, 3, None).unwrap().count(), 2);
     }
 

@@ -6,10 +6,8 @@
 
 use std::collections::BTreeSet;
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-
 use super::super::{CodeWord, Error};
+use super::chance::Chance;
 
 /// Most words: their indices, and their number, have 16 bits.
 const MOST_WORDS: u32 = u16::MAX as u32;
@@ -26,22 +24,16 @@ pub(super) fn checked(length: u32, weight: u32, words: u32) -> Result<(), Error>
 /// Word number `index`: `weight` of `length` chips, all sets of them equally likely, drawn by the
 /// address (seed, index) and not in sequence.
 pub(super) fn word(length: u32, weight: u32, seed: u64, index: u32) -> CodeWord {
-    let mut chance = ChaCha8Rng::seed_from_u64(seed);
-    chance.set_stream(index.into());
+    let mut chance = Chance::new(seed, index.into());
     // After Floyd [BF87]: no chip is drawn twice, and none is thrown away.
     let mut marks = BTreeSet::new();
     for last in length - weight..length {
-        let drawn = below(last + 1, &mut chance) as u16;
+        let drawn = chance.below(last + 1) as u16;
         if !marks.insert(drawn) {
             marks.insert(last as u16);
         }
     }
     CodeWord { length, marks: marks.into_iter().collect() }
-}
-
-/// A number below `n`, every one equally likely to 2⁻⁴⁸.
-fn below(n: u32, chance: &mut ChaCha8Rng) -> u32 {
-    ((u128::from(chance.next_u64()) * u128::from(n)) >> 64) as u32
 }
 
 #[cfg(test)]
