@@ -2,6 +2,7 @@
 
 mod budget;
 mod check;
+mod codes;
 mod completions;
 mod encode;
 mod fault;
@@ -43,6 +44,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Scenes(scenes) => scenes::run(scenes),
         Command::Check(check) => check::run(check, common),
         Command::Budget(budget) => budget::run(budget, common),
+        Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),

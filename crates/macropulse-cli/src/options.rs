@@ -3,7 +3,9 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::fault::Fault;
-use crate::{budget, check, completions, encode, paper, scenes, sensors, simulate, speed, sweep};
+use crate::{
+    budget, check, codes, completions, encode, paper, scenes, sensors, simulate, speed, sweep,
+};
 
 /// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
 /// it, get a point cloud.
@@ -28,6 +30,7 @@ pub enum Command {
     Scenes(scenes::Scenes),
     Check(check::Check),
     Budget(budget::Budget),
+    Codes(codes::Codes),
     Encode(encode::Encode),
     Speed(speed::Speed),
     Completions(completions::Completions),

@@ -98,7 +98,10 @@ fn light(design: &Design, derived: &Derived) -> Columns {
         for marks in design.coding.codebook.weights() {
             *labels.entry(marks).or_insert(0_u64) += 1;
         }
-        let labels = labels.iter().map(|(marks, count)| format!("{count} with {marks}"));
+        let labels = labels.iter().map(|((fewest, most), count)| match fewest == most {
+            true => format!("{count} with {most}"),
+            false => format!("{count} with {fewest} to {most} by word"),
+        });
         columns.push("", format!("labels by marks: {}", labels.collect::<Vec<_>>().join(", ")));
     } else {
         let pulse = short(design.light.pulse * 1e12);
@@ -138,7 +141,7 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "marks_min": fewest,
         "marks_mean": mean,
         "marks_max": most,
-        "marks_per_label": design.coding.codebook.weights().collect::<Vec<_>>(),
+        "marks_per_label": design.coding.codebook.weights().map(|(_, most)| most).collect::<Vec<_>>(),
         "marks_per_scan": derived.marks_per_scan,
         "mean_overlap": derived.mean_overlap,
         "reference_photons": derived.reference_photons,

@@ -92,6 +92,8 @@ enum ReceiverName {
     Blind,
     /// Correlates the whole macropulse of every shot in flight
     Matched,
+    /// The same, what is lit where the macropulse is dark counted against it
+    Balanced,
 }
 
 impl Simulate {

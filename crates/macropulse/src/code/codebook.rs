@@ -6,15 +6,27 @@ use super::{CodeWord, Error, Family, Payload};
 /// Most marks a codebook may hold: half a gigabyte of them.
 const MOST_MARKS: u64 = 1 << 28;
 
+/// What a 0 bit is sent as; a 1 bit is the code word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Keying {
+    /// Darkness (NRZ-OOK, \[KP16 §2.2\]).
+    #[default]
+    OnOff,
+    /// The complement of the code word: sequence-inversion keying. For words of which about half
+    /// the chips are lit.
+    Inversion,
+}
+
 /// A family's words times a payload's labels: one template of marks for each pair.
 ///
 /// Bit b of the payload, counted from the one sent first, takes the chips b·length …
-/// (b+1)·length − 1 of the macropulse: a 1 bit is the code word, a 0 bit is dark (NRZ-OOK,
-/// \[KP16 §2.2\]). Both ends of the link own the same codebook.
+/// (b+1)·length − 1 of the macropulse: a 1 bit is the code word, a 0 bit what the [`Keying`] says.
+/// Both ends of the link own the same codebook.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Codebook {
     family: Family,
     payload: Option<Payload>,
+    keying: Keying,
     labels: u32,
     words: Vec<CodeWord>,
     /// Templates one behind the other: all words of label 0, all words of label 1, …
@@ -23,7 +35,7 @@ pub struct Codebook {
     starts: Vec<u32>,
     /// The highest sidelobe of each template.
     sidelobes: Vec<u16>,
-    /// First chip of each lit bit: those of label 0, those of label 1, …
+    /// First chip of each 1 bit: those of label 0, those of label 1, …
     lit: Vec<u32>,
     /// Where each label begins in `lit`, and where the last one ends.
     lit_starts: Vec<u32>,
@@ -36,7 +48,12 @@ impl Codebook {
     /// # Errors
     /// Where the payload cannot carry that many labels, or none is asked for; where a macropulse
     /// is longer than 65535 chips; where all templates together have more than 2²⁸ marks.
-    pub fn new(family: Family, payload: Option<Payload>, labels: u32) -> Result<Self, Error> {
+    pub fn new(
+        family: Family,
+        payload: Option<Payload>,
+        labels: u32,
+        keying: Keying,
+    ) -> Result<Self, Error> {
         let possible = payload.map_or(1, |payload| payload.possible_labels());
         if !(1..=possible).contains(&labels) {
             return Err(Error::Labels { labels, possible });
@@ -50,8 +67,14 @@ impl Codebook {
             payload.map_or(vec![0], |payload| payload.lit_bits(label as u16).collect())
         };
         let lit_in_all: u64 = (0..labels).map(|label| lit_bits(label).len() as u64).sum();
+        let dark_in_all = match keying {
+            Keying::OnOff => 0,
+            Keying::Inversion => u64::from(bits) * u64::from(labels) - lit_in_all,
+        };
         let words = family.words();
-        let total = lit_in_all * words.iter().map(|word| word.weight() as u64).sum::<u64>();
+        let in_words = words.iter().map(|word| word.weight() as u64).sum::<u64>();
+        let in_complements = words.len() as u64 * u64::from(length) - in_words;
+        let total = lit_in_all * in_words + dark_in_all * in_complements;
         if total > MOST_MARKS {
             let (words, possible) = (words.len(), MOST_MARKS);
             return Err(Error::CodebookTooLarge { labels, words, marks: total, possible });
@@ -61,22 +84,34 @@ impl Codebook {
         let mut starts = vec![0];
         let mut sidelobes = Vec::new();
         let (mut all_lit, mut lit_starts) = (Vec::new(), vec![0]);
-        let lobes: Vec<Lobes> = words.iter().map(Lobes::of).collect();
+        let shapes: Vec<Shapes> = words.iter().map(|word| Shapes::of(word, keying)).collect();
         for label in 0..labels {
             let lit = lit_bits(label);
-            sidelobes.extend(lobes.iter().map(|word| word.highest(&lit)));
+            let is_lit: Vec<bool> = (0..bits).map(|bit| lit.contains(&bit)).collect();
             all_lit.extend(lit.iter().map(|bit| bit * length));
             lit_starts.push(all_lit.len() as u32);
-            for word in &words {
-                for bit in &lit {
+            for shapes in &shapes {
+                sidelobes.push(shapes.highest_sidelobe(&is_lit));
+                for (bit, &is_lit) in (0..).zip(&is_lit) {
                     let first = (bit * length) as u16;
-                    marks.extend(word.marks.iter().map(|mark| first + mark));
+                    marks.extend(shapes.of_bit(is_lit).map(|mark| first + mark));
                 }
                 starts.push(marks.len() as u32);
             }
         }
         let lit = all_lit;
-        Ok(Self { family, payload, labels, words, marks, starts, sidelobes, lit, lit_starts })
+        Ok(Self {
+            family,
+            payload,
+            keying,
+            labels,
+            words,
+            marks,
+            starts,
+            sidelobes,
+            lit,
+            lit_starts,
+        })
     }
 
     /// The codebook of a sensor that is not coded: a macropulse is one lit chip.
@@ -84,6 +119,7 @@ impl Codebook {
         Self {
             family: Family::Single,
             payload: None,
+            keying: Keying::OnOff,
             labels: 1,
             words: Family::Single.words(),
             marks: vec![0],
@@ -105,7 +141,7 @@ impl Codebook {
         &self.marks[of_label[word] as usize..of_label[word + 1] as usize]
     }
 
-    /// The first chip of each lit bit of `label`, ascending: where its code words begin.
+    /// The first chip of each 1 bit of `label`, ascending: where its code words begin.
     ///
     /// # Panics
     /// Like a slice, where `label` is not in the book.
@@ -151,19 +187,31 @@ impl Codebook {
         self.payload.as_ref()
     }
 
+    /// Whether a 0 bit sends light, too: the complement of the code word.
+    pub fn zeros_are_lit(&self) -> bool {
+        self.keying == Keying::Inversion
+    }
+
     /// The family of the code words.
     pub fn family(&self) -> Family {
         self.family
     }
 
-    /// Marks of a macropulse, label by label; the same in whichever word.
-    pub fn weights(&self) -> impl Iterator<Item = usize> {
-        (0..self.labels).map(|label| self.marks(label as u16, 0).len())
+    /// Fewest and most marks of a macropulse, label by label: they differ where the words of the
+    /// family have different weights.
+    pub fn weights(&self) -> impl Iterator<Item = (usize, usize)> {
+        let of_label = |starts: &[u32]| {
+            let weights = starts.windows(2).map(|ends| (ends[1] - ends[0]) as usize);
+            weights.fold((usize::MAX, 0), |(fewest, most), w| (fewest.min(w), most.max(w)))
+        };
+        let words = self.words.len();
+        (0..self.labels as usize)
+            .map(move |label| of_label(&self.starts[label * words..][..=words]))
     }
 
     /// Marks of the macropulse that has the fewest.
     pub fn min_weight(&self) -> usize {
-        self.weights().min().unwrap_or(0)
+        self.weights().map(|(fewest, _)| fewest).min().unwrap_or(0)
     }
 
     /// Mean marks of a macropulse, all labels being sent equally often.
@@ -173,33 +221,65 @@ impl Codebook {
 
     /// Marks of the macropulse that has the most.
     pub fn max_weight(&self) -> usize {
-        self.weights().max().unwrap_or(0)
+        self.weights().map(|(_, most)| most).max().unwrap_or(0)
+    }
+
+    /// Marks of the code word that has the fewest.
+    pub fn lightest_word(&self) -> usize {
+        self.words.iter().map(CodeWord::weight).min().unwrap_or(0)
     }
 }
 
-/// What a code word shares with itself at each positive lag: the word alone, and with the same
-/// word before it.
-struct Lobes {
-    alone: Vec<u16>,
-    follower: Vec<u16>,
+/// What the bits of a macropulse look like in one code word.
+struct Shapes {
+    /// A 0 bit and a 1 bit; `None` where it is dark.
+    bits: [Option<CodeWord>; 2],
+    /// What each shares with itself at each positive lag, if it is not dark.
+    alone: [Vec<u16>; 2],
+    /// What each shares at each positive lag with each of them that follows it.
+    follower: [[Vec<u16>; 2]; 2],
 }
 
-impl Lobes {
-    fn of(word: &CodeWord) -> Self {
-        let own = aperiodic(word, word);
-        let lags = 1..word.length as i32;
-        Self {
-            alone: lags.clone().map(|lag| own.at(lag)).collect(),
-            follower: lags.map(|lag| own.at(lag - word.length as i32)).collect(),
+impl Shapes {
+    fn of(word: &CodeWord, keying: Keying) -> Self {
+        let zero = match keying {
+            Keying::OnOff => None,
+            Keying::Inversion => Some(word.complement()),
+        };
+        let bits = [zero, Some(word.clone())];
+        let length = word.length as i32;
+        let shared = |one: &Option<CodeWord>, other: &Option<CodeWord>, apart: i32| {
+            let (Some(one), Some(other)) = (one, other) else { return Vec::new() };
+            let both = aperiodic(one, other);
+            (1..length).map(|lag| both.at(lag - apart)).collect()
+        };
+        let alone = [0, 1].map(|bit| shared(&bits[bit], &bits[bit], 0));
+        let follower =
+            [0, 1].map(|one| [0, 1].map(|other| shared(&bits[one], &bits[other], length)));
+        Self { bits, alone, follower }
+    }
+
+    /// The marks of a bit, from its first chip on.
+    fn of_bit(&self, is_lit: bool) -> impl Iterator<Item = u16> {
+        self.bits[usize::from(is_lit)].iter().flat_map(|word| word.marks.iter().copied())
+    }
+
+    /// The highest sidelobe of a macropulse of these bits, shifted by less than a code word.
+    fn highest_sidelobe(&self, is_lit: &[bool]) -> u16 {
+        let mut counts = [0_u16; 2];
+        let mut pairs = [[0_u16; 2]; 2];
+        is_lit.iter().for_each(|&bit| counts[usize::from(bit)] += 1);
+        is_lit.windows(2).for_each(|pair| {
+            pairs[usize::from(pair[0])][usize::from(pair[1])] += 1;
+        });
+        let lobes = self.alone.iter().zip(counts);
+        let lobes = lobes.chain(self.follower.iter().flatten().zip(pairs.into_iter().flatten()));
+        let mut sums = Vec::new();
+        for (shared, count) in lobes.filter(|(shared, count)| !shared.is_empty() && *count > 0) {
+            sums.resize(shared.len(), 0);
+            sums.iter_mut().zip(shared).for_each(|(sum, shared)| *sum += count * shared);
         }
-    }
-
-    /// The highest sidelobe of a macropulse whose `lit` bits carry the word.
-    fn highest(&self, lit: &[u32]) -> u16 {
-        let in_a_row = lit.windows(2).filter(|pair| pair[1] == pair[0] + 1).count() as u16;
-        let lit = lit.len() as u16;
-        let lobes = self.alone.iter().zip(&self.follower);
-        lobes.map(|(alone, follower)| lit * alone + in_a_row * follower).max().unwrap_or(0)
+        sums.into_iter().max().unwrap_or(0)
     }
 }
 
@@ -210,7 +290,7 @@ mod tests {
 
     fn of_order(p: u32, labels: u32) -> Result<Codebook, Error> {
         let payload = Payload::new(10, Crc::default(), false)?;
-        Codebook::new(Family::prime(p)?, Some(payload), labels)
+        Codebook::new(Family::prime(p)?, Some(payload), labels, Keying::OnOff)
     }
 
     #[test]
@@ -247,7 +327,7 @@ mod tests {
         assert_eq!((book.chips(), book.words(), book.labels()), (10_933, 29, 848));
         assert_eq!((book.min_weight(), book.max_weight()), (0, 319));
         approx::assert_relative_eq!(book.mean_weight(), 5256.0 * 29.0 / 848.0);
-        assert_eq!(book.weights().nth(1), Some(3 * 29));
+        assert_eq!(book.weights().nth(1), Some((3 * 29, 3 * 29)));
     }
 
     #[test]
@@ -262,16 +342,58 @@ mod tests {
         }
     }
 
+    fn inverted(family: Family) -> Codebook {
+        let payload = Payload::new(4, Crc::default(), true).unwrap();
+        Codebook::new(family, Some(payload), 16, Keying::Inversion).unwrap()
+    }
+
+    #[test]
+    fn an_inverted_macropulse_is_the_complement_at_every_0_bit() {
+        let book = inverted(Family::gold(5).unwrap());
+        for (label, word) in [(0, 0), (5, 1), (15, 32)] {
+            let text = book.payload().unwrap().text(label);
+            let marks = &book.word(word).marks;
+            let is_lit = |chip: u16| {
+                let bit = text.as_bytes()[usize::from(chip / 31)] == b'1';
+                bit == marks.contains(&(chip % 31))
+            };
+            let expected = (0..book.chips() as u16).filter(|&chip| is_lit(chip));
+            assert!(expected.eq(book.marks(label, word).iter().copied()), "{label} {word}");
+        }
+        // Every bit sends light: 16 of 31 chips for a 1 of a balanced word, 15 for a 0.
+        assert!(book.min_weight() > 60, "{}", book.min_weight());
+    }
+
+    #[test]
+    fn an_inverted_sidelobe_is_the_most_marks_that_meet_when_shifted() {
+        let book = inverted(Family::gold(5).unwrap());
+        for (label, word) in [(0, 3), (7, 0), (12, 31)] {
+            let marks = book.marks(label, word);
+            let met =
+                |lag: u16| marks.iter().filter(|&&mark| marks.contains(&(mark + lag))).count();
+            let highest = (1..31).map(met).max().unwrap();
+            assert_eq!(usize::from(book.sidelobe(label, word)), highest, "{label}, {word}");
+        }
+    }
+
+    #[test]
+    fn words_of_one_family_may_differ_in_weight() {
+        let book = Codebook::new(Family::gold(7).unwrap(), None, 1, Keying::OnOff).unwrap();
+        assert_eq!(book.weights().collect::<Vec<_>>(), [(56, 72)]);
+        assert_eq!((book.min_weight(), book.max_weight(), book.lightest_word()), (56, 72, 56));
+        assert!((book.mean_weight() - 64.0).abs() < 1.0, "{}", book.mean_weight());
+    }
+
     #[test]
     fn an_uncoded_sensor_lights_its_only_chip() {
         let book = Codebook::single();
         assert_eq!((book.marks(0, 0), book.chips()), (&[0_u16][..], 1));
-        assert_eq!(Ok(book), Codebook::new(Family::Single, None, 1));
+        assert_eq!(Ok(book), Codebook::new(Family::Single, None, 1, Keying::OnOff));
     }
 
     #[test]
     fn a_bare_word_is_its_own_macropulse() {
-        let book = Codebook::new(Family::prime(7).unwrap(), None, 1).unwrap();
+        let book = Codebook::new(Family::prime(7).unwrap(), None, 1, Keying::OnOff).unwrap();
         assert_eq!(book.chips(), 49);
         assert_eq!(book.marks(0, 3), book.word(3).marks);
     }
@@ -290,7 +412,8 @@ mod tests {
              use a shorter code word or fewer payload bits"
         );
         let payload = Payload::new(16, Crc::default(), false).unwrap();
-        let large = Codebook::new(Family::prime(53).unwrap(), Some(payload), 65_536).unwrap_err();
+        let large = Codebook::new(Family::prime(53).unwrap(), Some(payload), 65_536, Keying::OnOff)
+            .unwrap_err();
         assert!(large.to_string().starts_with("the macropulses of 65536 labels with 53 words"));
     }
 }

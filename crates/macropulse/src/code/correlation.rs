@@ -28,6 +28,21 @@ pub fn periodic(a: &CodeWord, b: &CodeWord) -> Vec<u16> {
     coincidences
 }
 
+/// Balanced periodic correlation for l = 0 … N−1: what falls on marks of `b` less what falls on its
+/// dark chips when `a` is sent, `Σ_n a(n)·(2·b((n+l) mod N) − 1) = 2·Θ_ab(l) − w_a`.
+pub fn balanced(a: &CodeWord, b: &CodeWord) -> Vec<i32> {
+    let weight = a.weight() as i32;
+    periodic(a, b).into_iter().map(|met| 2 * i32::from(met) - weight).collect()
+}
+
+/// Bipolar periodic correlation for l = 0 … N−1, lit chips taken for −1 and dark ones for +1:
+/// `N − 2·(w_a + w_b) + 4·Θ_ab(l)`.
+pub fn bipolar(a: &CodeWord, b: &CodeWord) -> Vec<i32> {
+    let length = a.length.max(b.length) as i32;
+    let weights = (a.weight() + b.weight()) as i32;
+    periodic(a, b).into_iter().map(|met| length - 2 * weights + 4 * i32::from(met)).collect()
+}
+
 /// Aperiodic correlation C_ab(l).
 pub fn aperiodic(a: &CodeWord, b: &CodeWord) -> Aperiodic {
     let length = a.length.max(b.length) as i32;
@@ -175,6 +190,20 @@ mod tests {
             let by_definition: u16 =
                 (0..length).map(|n| chip(a, n) * chip(b, (n + lag) % length)).sum::<u16>();
             assert_eq!(counted[lag as usize], by_definition, "periodic, lag {lag}");
+        }
+    }
+
+    #[test]
+    fn signed_correlations_are_the_sums_over_chips() {
+        let words = Family::gold(5).unwrap().words();
+        let (a, b) = (&words[1], &words[7]);
+        let sign = |word: &CodeWord, n| 2 * i32::from(chip(word, n)) - 1;
+        for lag in 0..31 {
+            let of_chips = |sent: &dyn Fn(i32) -> i32| -> i32 {
+                (0..31).map(|n| sent(n) * sign(b, (n + lag) % 31)).sum()
+            };
+            assert_eq!(balanced(a, b)[lag as usize], of_chips(&|n| i32::from(chip(a, n))));
+            assert_eq!(bipolar(a, b)[lag as usize], of_chips(&|n| sign(a, n)));
         }
     }
 

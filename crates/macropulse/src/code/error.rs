@@ -12,11 +12,77 @@ pub enum Error {
         /// The odd primes next to it, as the end of the sentence.
         nearest: String,
     },
-    /// The order of a prime code is so large that a chip of one word has no 16-bit index.
-    #[error("a prime code of order {p} is too long; the largest possible prime is 251")]
+    /// The order of a code over GF(p) is so large that a chip of one word has no 16-bit index.
+    #[error("{code} of order {p} is too long; the largest possible prime is {largest}")]
     PrimeTooLarge {
+        /// Which code, with its article.
+        code: &'static str,
         /// What was asked for.
         p: u32,
+        /// The largest prime whose words fit.
+        largest: u32,
+    },
+    /// A shift register has no such degree, or no preferred pair of it.
+    #[error("{code} of degree {degree} is not possible; use {possible}")]
+    Degree {
+        /// Which code, with its article.
+        code: &'static str,
+        /// What was asked for.
+        degree: u32,
+        /// The degrees there are, as the end of the sentence.
+        possible: &'static str,
+    },
+    /// A word without chips, or with chips that have no 16-bit index.
+    #[error("a code word of {length} chips is not possible; use 1 to 65535")]
+    WordLength {
+        /// What was asked for.
+        length: u32,
+    },
+    /// A word without marks, or with more marks than chips.
+    #[error("{weight} marks in a code word of {length} chips are not possible; use 1 to {length}")]
+    Weight {
+        /// Marks asked for.
+        weight: u32,
+        /// Chips of the word.
+        length: u32,
+    },
+    /// More words than have an index, or none.
+    #[error("a family of {words} words is not possible; use 1 to {possible}")]
+    Words {
+        /// What was asked for.
+        words: u32,
+        /// Most words of a family.
+        possible: u32,
+    },
+    /// There are not so many orthogonal words, whoever looks for them.
+    #[error(
+        "{words} words of {weight} marks in {length} chips cannot be orthogonal; there are {bound} \
+         at most (Johnson bound): use longer words or fewer marks"
+    )]
+    JohnsonBound {
+        /// Words asked for.
+        words: u32,
+        /// Chips of a word.
+        length: u32,
+        /// Marks of a word.
+        weight: u32,
+        /// ⌊(n − 1)/(w·(w − 1))⌋
+        bound: u32,
+    },
+    /// There may be so many orthogonal words, but the search does not find them.
+    #[error(
+        "the search finds {found} of {words} orthogonal words of {weight} marks in {length} chips: \
+         ask for fewer, or use longer words or fewer marks"
+    )]
+    NotFound {
+        /// Words asked for.
+        words: u32,
+        /// Chips of a word.
+        length: u32,
+        /// Marks of a word.
+        weight: u32,
+        /// Words found.
+        found: u32,
     },
     /// A label must have between 1 and 16 bits.
     #[error("a label of {bits} bits is not possible; use 1 to 16 bits")]

@@ -1,9 +1,16 @@
 //! Code families: sets of code words that can be told apart when they overlap.
 
-use super::Error;
+mod chance;
+mod congruence;
+mod orthogonal;
+mod prime;
+mod shift_register;
+mod sparse;
 
-/// The largest prime whose square still has 16-bit chip indices.
-const LARGEST_PRIME: u32 = 251;
+use std::fmt;
+
+use super::{CodeWord, Error};
+pub use prime::prime_sequence;
 
 /// A set of code words. A family that exists is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -15,6 +22,65 @@ pub enum Family {
         /// Order of the field, an odd prime up to 251.
         p: u32,
     },
+    /// The same in blocks of 2p − 1 chips: any two words coincide in at most one mark \[YK13\].
+    /// Made by [`Family::extended_prime`].
+    #[non_exhaustive]
+    ExtendedPrime {
+        /// Order of the field, an odd prime up to 181.
+        p: u32,
+    },
+    /// Quadratic congruence code: p − 1 words of length p² and weight p. A word meets itself in at
+    /// most 2 marks when shifted, another one in at most 4 \[TS81\]. Made by
+    /// [`Family::quadratic_congruence`].
+    #[non_exhaustive]
+    QuadraticCongruence {
+        /// Order of the field, an odd prime up to 251.
+        p: u32,
+    },
+    /// The same in blocks of 2p − 1 chips: at most 1 and 2 marks. Made by
+    /// [`Family::extended_quadratic_congruence`].
+    #[non_exhaustive]
+    ExtendedQuadraticCongruence {
+        /// Order of the field, an odd prime up to 181.
+        p: u32,
+    },
+    /// Optical orthogonal code (n, w, 1): at most one mark, of itself and of others \[CSW89\].
+    /// Made by [`Family::orthogonal`].
+    #[non_exhaustive]
+    Orthogonal {
+        /// Chips of a word.
+        length: u32,
+        /// Marks of a word.
+        weight: u32,
+        /// Number of words.
+        words: u32,
+    },
+    /// Marks drawn at random for each word. Made by [`Family::sparse`].
+    #[non_exhaustive]
+    Sparse {
+        /// Chips of a word.
+        length: u32,
+        /// Marks of a word.
+        weight: u32,
+        /// Number of words.
+        words: u32,
+        /// Seed of what is drawn.
+        seed: u64,
+    },
+    /// A single word of 2ⁿ − 1 chips, half of them lit, that is dark at every shift to a receiver
+    /// that subtracts what falls on its dark chips. Made by [`Family::m_sequence`].
+    #[non_exhaustive]
+    MSequence {
+        /// n, 3 to 15.
+        degree: u32,
+    },
+    /// Gold code: 2ⁿ + 1 words of 2ⁿ − 1 chips, about half of them lit, of three different weights
+    /// \[Gold67\]. Made by [`Family::gold`].
+    #[non_exhaustive]
+    Gold {
+        /// n, one of 5, 6, 7, 9, 10, 11.
+        degree: u32,
+    },
     /// One word of one lit chip: a sensor that is not coded.
     Single,
 }
@@ -25,19 +91,86 @@ impl Family {
     /// # Errors
     /// Where `p` is not an odd prime, or greater than 251.
     pub fn prime(p: u32) -> Result<Self, Error> {
-        if p > LARGEST_PRIME {
-            return Err(Error::PrimeTooLarge { p });
-        }
-        if !is_odd_prime(p) {
-            return Err(Error::NotOddPrime { p, nearest: nearest_odd_primes(p) });
-        }
-        Ok(Self::Prime { p })
+        prime::checked(p, prime::LARGEST, "a prime code").map(|p| Self::Prime { p })
+    }
+
+    /// The extended prime code over GF(`p`), of length p·(2p − 1).
+    ///
+    /// # Errors
+    /// Where `p` is not an odd prime, or greater than 181.
+    pub fn extended_prime(p: u32) -> Result<Self, Error> {
+        prime::checked(p, prime::LARGEST_EXTENDED, "an extended prime code")
+            .map(|p| Self::ExtendedPrime { p })
+    }
+
+    /// The quadratic congruence code over GF(`p`).
+    ///
+    /// # Errors
+    /// Where `p` is not an odd prime, or greater than 251.
+    pub fn quadratic_congruence(p: u32) -> Result<Self, Error> {
+        prime::checked(p, prime::LARGEST, "a quadratic congruence code")
+            .map(|p| Self::QuadraticCongruence { p })
+    }
+
+    /// The extended quadratic congruence code over GF(`p`), of length p·(2p − 1).
+    ///
+    /// # Errors
+    /// Where `p` is not an odd prime, or greater than 181.
+    pub fn extended_quadratic_congruence(p: u32) -> Result<Self, Error> {
+        prime::checked(p, prime::LARGEST_EXTENDED, "an extended quadratic congruence code")
+            .map(|p| Self::ExtendedQuadraticCongruence { p })
+    }
+
+    /// An optical orthogonal code of `words` words, or of as many as a search finds: that is
+    /// [`Family::count`], and seldom as many as the Johnson bound ⌊(n − 1)/(w·(w − 1))⌋ allows.
+    ///
+    /// # Errors
+    /// Where the bound allows fewer words, or the search does not find so many, or none; where
+    /// `length` is not 1 to 65535 or `weight` not 1 to `length`.
+    pub fn orthogonal(length: u32, weight: u32, words: Option<u32>) -> Result<Self, Error> {
+        let words = orthogonal::found(length, weight, words)?;
+        Ok(Self::Orthogonal { length, weight, words })
+    }
+
+    /// `words` words of `weight` marks each, drawn at random from `length` chips by (`seed`, index
+    /// of the word).
+    ///
+    /// # Errors
+    /// Where `length` is not 1 to 65535, `weight` not 1 to `length`, or `words` not 1 to 65535.
+    pub fn sparse(length: u32, weight: u32, words: u32, seed: u64) -> Result<Self, Error> {
+        sparse::checked(length, weight, words)?;
+        Ok(Self::Sparse { length, weight, words, seed })
+    }
+
+    /// The m-sequence of `degree`. It is one word: its shifts cannot be told from delay.
+    ///
+    /// # Errors
+    /// Where `degree` is not 3 to 15.
+    pub fn m_sequence(degree: u32) -> Result<Self, Error> {
+        shift_register::checked_degree(degree).map(|degree| Self::MSequence { degree })
+    }
+
+    /// The Gold code of `degree`.
+    ///
+    /// # Errors
+    /// Where `degree` is not 5, 6, 7, 9, 10 or 11.
+    pub fn gold(degree: u32) -> Result<Self, Error> {
+        shift_register::checked_gold_degree(degree).map(|degree| Self::Gold { degree })
     }
 
     /// All words, in the order of their index.
     pub fn words(&self) -> Vec<CodeWord> {
         match *self {
-            Self::Prime { p } => (0..p).map(|i| prime_word(p, i)).collect(),
+            Self::Prime { p } => prime::words(p, p),
+            Self::ExtendedPrime { p } => prime::words(p, 2 * p - 1),
+            Self::QuadraticCongruence { p } => congruence::words(p, p),
+            Self::ExtendedQuadraticCongruence { p } => congruence::words(p, 2 * p - 1),
+            Self::Orthogonal { length, weight, words } => orthogonal::words(length, weight, words),
+            Self::Sparse { length, weight, words, seed } => {
+                (0..words).map(|index| sparse::word(length, weight, seed, index)).collect()
+            }
+            Self::MSequence { degree } => vec![shift_register::m_sequence(degree)],
+            Self::Gold { degree } => shift_register::gold(degree),
             Self::Single => vec![CodeWord { length: 1, marks: vec![0] }],
         }
     }
@@ -45,15 +178,24 @@ impl Family {
     /// Chips of a word.
     pub fn length(&self) -> u32 {
         match *self {
-            Self::Prime { p } => p * p,
+            Self::Prime { p } | Self::QuadraticCongruence { p } => p * p,
+            Self::ExtendedPrime { p } | Self::ExtendedQuadraticCongruence { p } => p * (2 * p - 1),
+            Self::Orthogonal { length, .. } | Self::Sparse { length, .. } => length,
+            Self::MSequence { degree } | Self::Gold { degree } => shift_register::length(degree),
             Self::Single => 1,
         }
     }
 
-    /// Marks of a word; the same for every word of a family.
+    /// Marks of the heaviest word; the same for every word of all families but the Gold codes.
     pub fn weight(&self) -> usize {
         match *self {
-            Self::Prime { p } => p as usize,
+            Self::Prime { p }
+            | Self::ExtendedPrime { p }
+            | Self::QuadraticCongruence { p }
+            | Self::ExtendedQuadraticCongruence { p } => p as usize,
+            Self::Orthogonal { weight, .. } | Self::Sparse { weight, .. } => weight as usize,
+            Self::MSequence { degree } => 1 << (degree - 1),
+            Self::Gold { degree } => shift_register::gold_weight(degree),
             Self::Single => 1,
         }
     }
@@ -61,112 +203,50 @@ impl Family {
     /// Number of words.
     pub fn count(&self) -> usize {
         match *self {
-            Self::Prime { p } => p as usize,
-            Self::Single => 1,
+            Self::Prime { p } | Self::ExtendedPrime { p } => p as usize,
+            Self::QuadraticCongruence { p } | Self::ExtendedQuadraticCongruence { p } => {
+                p as usize - 1
+            }
+            Self::Orthogonal { words, .. } | Self::Sparse { words, .. } => words as usize,
+            Self::Gold { degree } => (1 << degree) + 1,
+            Self::MSequence { .. } | Self::Single => 1,
         }
     }
 }
 
-/// One word of a family: which of its chips are lit.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub struct CodeWord {
-    /// Number of chips.
-    pub length: u32,
-    /// Indices of the lit chips, ascending, each below `length`.
-    pub marks: Vec<u16>,
-}
-
-impl CodeWord {
-    /// Number of marks.
-    pub fn weight(&self) -> usize {
-        self.marks.len()
-    }
-
-    /// The smallest cyclic shift, in chips, that maps the word to itself; `length` where only a
-    /// full turn does.
-    ///
-    /// A word whose period is shorter than its length, as C0 of every prime code, cannot time an
-    /// echo: it looks the same one period later.
-    pub fn period(&self) -> u32 {
-        (1..self.length)
-            .filter(|shift| self.length.is_multiple_of(*shift))
-            .find(|&shift| self.is_unchanged_by(shift))
-            .unwrap_or(self.length)
-    }
-
-    fn is_unchanged_by(&self, shift: u32) -> bool {
-        self.marks.iter().all(|&mark| {
-            let moved = (u32::from(mark) + shift) % self.length;
-            self.marks.binary_search_by_key(&moved, |&other| u32::from(other)).is_ok()
-        })
+impl fmt::Display for Family {
+    /// Its name and its numbers, as in `prime 29`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Prime { p } => write!(f, "prime {p}"),
+            Self::ExtendedPrime { p } => write!(f, "extended prime {p}"),
+            Self::QuadraticCongruence { p } => write!(f, "quadratic congruence {p}"),
+            Self::ExtendedQuadraticCongruence { p } => {
+                write!(f, "extended quadratic congruence {p}")
+            }
+            Self::Orthogonal { length, weight, .. } => write!(f, "orthogonal {length}, {weight}"),
+            Self::Sparse { length, weight, .. } => write!(f, "sparse {length}, {weight}"),
+            Self::MSequence { degree } => write!(f, "m-sequence {degree}"),
+            Self::Gold { degree } => write!(f, "Gold {degree}"),
+            Self::Single => write!(f, "single mark"),
+        }
     }
 }
 
-/// The prime sequence `s_ij = i·j mod p`, for j = 0 … p−1 \[KP16 Table 1\].
-pub fn prime_sequence(p: u32, i: u32) -> Vec<u32> {
-    (0..p).map(|j| ((u64::from(i) * u64::from(j)) % u64::from(p)) as u32).collect()
-}
-
-/// The code word of the prime sequence `i`: in block j of p chips the chip s_ij is lit, so the
-/// marks are `s_ij + p·j` \[KP16 eq. 2\].
-fn prime_word(p: u32, i: u32) -> CodeWord {
-    let marks = (0..p).zip(prime_sequence(p, i)).map(|(j, s)| (s + p * j) as u16).collect();
-    CodeWord { length: p * p, marks }
-}
-
-fn is_odd_prime(n: u32) -> bool {
-    n >= 3
-        && !n.is_multiple_of(2)
-        && (3..).step_by(2).take_while(|d| d * d <= n).all(|d| !n.is_multiple_of(d))
-}
-
-/// Names the odd primes on either side of `n`, which is not above the largest possible one.
-fn nearest_odd_primes(n: u32) -> String {
-    let below = (3..n).rev().find(|&p| is_odd_prime(p));
-    let above = (n..=LARGEST_PRIME).find(|&p| is_odd_prime(p));
-    match (below, above) {
-        (Some(below), Some(above)) => format!("the nearest are {below} and {above}"),
-        (Some(only), None) | (None, Some(only)) => format!("the nearest is {only}"),
-        (None, None) => String::from("the smallest is 3"),
+/// That a word may have so many chips, and so many marks in them.
+fn checked_length(length: u32, weight: u32) -> Result<(), Error> {
+    if !(1..=u32::from(u16::MAX)).contains(&length) {
+        return Err(Error::WordLength { length });
     }
+    if !(1..=length).contains(&weight) {
+        return Err(Error::Weight { weight, length });
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn gf_5_as_written_out_by_hand() {
-        assert_eq!(prime_sequence(5, 2), [0, 2, 4, 1, 3]);
-        let word = &Family::prime(5).unwrap().words()[2];
-        assert_eq!(word.length, 25);
-        assert_eq!(word.marks, [0, 7, 14, 16, 23]);
-    }
-
-    #[test]
-    fn the_paper_has_29_words_of_841_chips_and_29_marks() {
-        let family = Family::prime(29).unwrap();
-        assert_eq!((family.length(), family.weight(), family.count()), (841, 29, 29));
-        let words = family.words();
-        assert_eq!(words.len(), 29);
-        assert!(words.iter().all(|word| word.length == 841 && word.weight() == 29));
-    }
-
-    #[test]
-    fn the_largest_prime_still_fits_its_chip_indices() {
-        let words = Family::prime(251).unwrap().words();
-        assert_eq!(words[250].marks.last(), Some(&(250 * 251 + 1)));
-        assert!(words.iter().all(|word| word.marks.is_sorted_by(|a, b| a < b)));
-    }
-
-    #[test]
-    fn only_c0_is_periodic() {
-        let periods: Vec<_> =
-            Family::prime(7).unwrap().words().iter().map(CodeWord::period).collect();
-        assert_eq!(periods, [7, 49, 49, 49, 49, 49, 49]);
-        assert_eq!(Family::Single.words()[0].period(), 1);
-    }
 
     #[test]
     fn an_uncoded_sensor_has_one_word_of_one_mark() {
@@ -176,15 +256,26 @@ mod tests {
     }
 
     #[test]
-    fn refusals_name_the_way_out() {
-        let refusal = |p| Family::prime(p).unwrap_err().to_string();
-        assert_eq!(refusal(28), "28 is not an odd prime; the nearest are 23 and 29");
-        assert_eq!(refusal(2), "2 is not an odd prime; the nearest is 3");
-        assert_eq!(refusal(0), "0 is not an odd prime; the nearest is 3");
-        assert_eq!(refusal(9), "9 is not an odd prime; the nearest are 7 and 11");
-        assert_eq!(
-            refusal(257),
-            "a prime code of order 257 is too long; the largest possible prime is 251"
-        );
+    fn what_a_family_says_of_its_words_is_true_of_them() {
+        let families = [
+            Family::prime(7),
+            Family::extended_prime(7),
+            Family::quadratic_congruence(7),
+            Family::extended_quadratic_congruence(7),
+            Family::orthogonal(63, 3, None),
+            Family::sparse(100, 6, 9, 1),
+            Family::m_sequence(5),
+            Family::gold(5),
+        ];
+        for family in families.map(Result::unwrap) {
+            let words = family.words();
+            assert_eq!(words.len(), family.count(), "{family:?}");
+            assert_eq!(words.iter().map(CodeWord::weight).max(), Some(family.weight()));
+            for word in &words {
+                assert_eq!(word.length, family.length(), "{family:?}");
+                assert!(word.marks.is_sorted_by(|a, b| a < b), "{family:?}");
+                assert!(word.marks.iter().all(|&mark| u32::from(mark) < word.length));
+            }
+        }
     }
 }

@@ -7,8 +7,10 @@ pub mod correlation;
 mod error;
 mod family;
 mod payload;
+mod word;
 
-pub use codebook::Codebook;
+pub use codebook::{Codebook, Keying};
 pub use error::Error;
-pub use family::{CodeWord, Family, prime_sequence};
+pub use family::{Family, prime_sequence};
 pub use payload::{Crc, Payload, PayloadFault, ShiftAlias};
+pub use word::CodeWord;

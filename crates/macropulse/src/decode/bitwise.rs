@@ -2,7 +2,7 @@
 //!
 //! 1. The earliest unexplained tick opens a macropulse.
 //! 2. A tick at the place of mark 1, 2 or 3 of a code word proposes that word; the proposed word
-//!    of which most marks are there is taken, if they are enough for a 1 bit.
+//!    with the greatest share of its marks there is taken, if they are enough for a 1 bit.
 //! 3. Each further stretch of one word's length is a 1 bit if enough marks of the word are there.
 //! 4. The checksum must fit, and a shot with that label and that word must be in flight.
 //! 5. The ticks of the macropulse are taken off the queue, accepted or not.
@@ -168,8 +168,10 @@ impl<'a> Band<'a> {
             if !others.is_empty() && !is_proposed {
                 continue;
             }
+            // The greatest share of its marks: words need not have equally many.
             let found = self.found(index, start);
-            if found > best.0 {
+            let marks = |word: usize| self.words[word].len();
+            if usize::from(found) * marks(best.1) > usize::from(best.0) * marks(index) {
                 best = (found, index, start);
             }
         }
@@ -314,11 +316,11 @@ fn rank(reject: Reject) -> u8 {
 mod tests {
     use super::super::ReceiverKind;
     use super::*;
-    use crate::code::{Crc, Family, Payload};
+    use crate::code::{Crc, Family, Keying, Payload};
 
     fn codebook() -> Codebook {
         let payload = Payload::new(4, Crc::default(), false).unwrap();
-        Codebook::new(Family::prime(11).unwrap(), Some(payload), 16).unwrap()
+        Codebook::new(Family::prime(11).unwrap(), Some(payload), 16, Keying::OnOff).unwrap()
     }
 
     /// Eight shots with the labels 8 to 15, which begin with a lit bit, or 0 to 7, which do not.

@@ -1,5 +1,6 @@
 //! Ticks to returns: the receiver. It sees ticks and the shot log, never the scene.
 
+mod balanced;
 mod bitwise;
 mod correlator;
 mod direct;
@@ -31,6 +32,9 @@ pub enum ReceiverKind {
     Blind,
     /// Correlates the whole known macropulse of every shot in flight.
     Matched,
+    /// As `Matched`, but what falls on dark chips counts against it; for words of which about half
+    /// the chips are lit.
+    Balanced,
     /// One mark per shot, a detector of its own: the first tick in the range gate.
     Direct,
 }
@@ -63,7 +67,8 @@ pub struct Receiver {
     /// Standard deviation of the timing of one edge, in ticks: how far from its place a mark is
     /// looked for.
     pub jitter_ticks: f64,
-    /// False returns accepted per shot; the matched receiver derives its threshold from it.
+    /// False returns accepted per shot; the matched and the balanced receiver derive their
+    /// threshold from it.
     pub false_alarm: f64,
     /// Marks of a code word that make a 1 bit, for the literal and the blind receiver.
     pub bit_threshold: u16,
@@ -88,6 +93,7 @@ impl Receiver {
         match self.kind {
             ReceiverKind::Direct => direct::decode(self, log, ticks),
             ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
+            ReceiverKind::Balanced => balanced::decode(self, (codebook, log), ticks),
             ReceiverKind::Literal => {
                 bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
             }

@@ -94,6 +94,9 @@ pub(super) struct Search {
 /// What it takes to count the marks of a word in a block of places, in votes.
 const VOTES_PER_BLOCK: usize = 64;
 
+/// Votes that a place has room for.
+const MOST_VOTES: usize = u8::MAX as usize;
+
 /// If more than one in so many places is elected, all of them are looked at in order.
 const FEW: usize = 256;
 
@@ -114,9 +117,10 @@ impl Search {
         let needed = sought.in_one_word();
         let span = first..first + (sought.places() + sought.reach()) as i64 + i64::from(width);
         let votes = (unexplained.at_most(span) * width) as usize * sought.word.len();
-        if needed >= sought.stands_out {
+        let uncounted = sought.word.len() > MOST_VOTES;
+        if needed >= sought.stands_out || uncounted {
             self.choose_blocks(unexplained, at, sought);
-            if VOTES_PER_BLOCK * self.blocks.len() < votes {
+            if VOTES_PER_BLOCK * self.blocks.len() < votes || uncounted {
                 return self.by_words(unexplained, at, sought);
             }
         }

@@ -44,13 +44,43 @@ pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64)
     low
 }
 
-/// [`least_marks`] for fixed lags and false alarms, remembered.
+/// The fewest marks, less the dark chips that are lit, that chance does not reach: the smallest s
+/// with L · P(X − Y ≥ s) ≤ α, X ~ Bin(N, d) for the `marks` and Y ~ Bin(M, d) for the `dark`
+/// chips. N + 1 where no s will do.
+pub(super) fn least_balance(lags: f64, chips: (u16, u16), density: f64, false_alarm: f64) -> u16 {
+    let (marks, dark) = (binomial(chips.0, density), binomial(chips.1, density));
+    // P(X ≥ k), the last one beyond all.
+    let mut at_least = vec![0.0; marks.len() + 1];
+    for found in (0..marks.len()).rev() {
+        at_least[found] = at_least[found + 1] + marks[found];
+    }
+    let tail = |least: u16| -> f64 {
+        let beyond = at_least.iter().skip(least.into());
+        dark.iter().zip(beyond).map(|(stray, beyond)| stray * beyond).sum()
+    };
+    (1..=chips.0).find(|&least| lags * tail(least) <= false_alarm).unwrap_or(chips.0 + 1)
+}
+
+/// P(X = 0), P(X = 1) … P(X = n) of X ~ Bin(n, p).
+fn binomial(n: u16, p: f64) -> Vec<f64> {
+    let p = p.clamp(1e-12, 1.0 - 1e-12);
+    let all = lgamma(f64::from(n) + 1.0);
+    let term = |k: u16| {
+        let (k, rest) = (f64::from(k), f64::from(n - k));
+        exp(all - lgamma(k + 1.0) - lgamma(rest + 1.0) + k * log(p) + rest * log1p(-p))
+    };
+    (0..=n).map(term).collect()
+}
+
+/// [`least_marks`], or [`least_balance`], for fixed lags and false alarms, remembered.
 #[derive(Debug, Clone)]
 pub(super) struct Thresholds {
     lags: f64,
     false_alarm: f64,
     /// Whether densities are taken as they are.
     exact: bool,
+    /// Chips of a macropulse, if what falls on the dark ones is taken off.
+    balanced: Option<u16>,
     /// By marks, then by step of density; 0 where not yet known.
     known: Vec<[u16; STEPS]>,
 }
@@ -65,7 +95,12 @@ impl Thresholds {
     /// For `lags` tried places and `false_alarm` false answers accepted among them; densities are
     /// taken as they are, where they are to be `exact`.
     pub fn new(lags: f64, false_alarm: f64, exact: bool) -> Self {
-        Self { lags, false_alarm, exact, known: Vec::new() }
+        Self { lags, false_alarm, exact, balanced: None, known: Vec::new() }
+    }
+
+    /// The same for the balance of macropulses of so many `chips`, densities rounded.
+    pub fn balanced(lags: f64, false_alarm: f64, chips: u16) -> Self {
+        Self { balanced: Some(chips), ..Self::new(lags, false_alarm, false) }
     }
 
     /// Whether it gives what `other` gives.
@@ -90,7 +125,14 @@ impl Thresholds {
         let known = &mut self.known[usize::from(marks)][step as usize];
         if *known == 0 {
             let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
-            *known = least_marks(self.lags, marks, density, self.false_alarm);
+            let (lags, false_alarm) = (self.lags, self.false_alarm);
+            *known = match self.balanced {
+                None => least_marks(lags, marks, density, false_alarm),
+                Some(chips) => {
+                    let dark = chips.saturating_sub(marks);
+                    least_balance(lags, (marks, dark), density, false_alarm)
+                }
+            };
         }
         *known
     }
@@ -128,6 +170,29 @@ mod tests {
                 assert!((found - share).abs() < 0.012, "{density} {marks}: {found} not {share}");
             }
         }
+    }
+
+    #[test]
+    fn a_balance_is_reached_as_often_as_pairs_of_binomials_say() {
+        // Two coins against one: both heads and the other tails, one outcome in eight; at least
+        // one more is that and a head against a tail, 1/8 + 2/8.
+        let chance = |lags| least_balance(lags, (2, 1), 0.5, 1.0);
+        assert_eq!([7.9, 8.1].map(chance), [2, 3]);
+        // P(X − Y ≥ 1) = P(1, 0) + P(2, 0) + P(2, 1) = 1/4 + 1/8 + 1/8.
+        assert_eq!([1.9, 2.1].map(chance), [1, 2]);
+        // Where nothing counts against, it is the threshold of the marks.
+        for density in [0.01, 0.2] {
+            let marks = least_marks(4e5, 58, density, 1e-3);
+            assert_eq!(least_balance(4e5, (58, 0), density, 1e-3), marks);
+        }
+    }
+
+    #[test]
+    fn a_bright_sky_raises_a_balance_less_than_a_count() {
+        let [dim, bright] = [0.01, 0.3].map(|density| {
+            (least_balance(4e5, (64, 63), density, 1e-6), least_marks(4e5, 64, density, 1e-6))
+        });
+        assert!(bright.0 - dim.0 < bright.1 - dim.1, "{dim:?} {bright:?}");
     }
 
     #[test]

@@ -52,7 +52,7 @@ impl Derived {
             chips: codebook.chips(),
             macropulse,
             marks: (
-                codebook.weights().filter(|&weight| weight > 0).min().unwrap_or(0),
+                codebook.weights().map(|(fewest, _)| fewest).filter(|&w| w > 0).min().unwrap_or(0),
                 mean,
                 codebook.max_weight(),
             ),

@@ -15,9 +15,22 @@ const LONGEST_CHAIN: usize = 16;
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
-const ALTERNATIVES: [(&str, &[&str]); 2] = [
+const ALTERNATIVES: [(&str, &[&str]); 3] = [
     ("scan", &["raster", "spinning", "flash"]),
     ("detector", &["photon-counting", "geiger", "linear", "first-firing"]),
+    ("family", FAMILIES),
+];
+
+/// Code families by the names they have in a sensor file.
+pub(super) const FAMILIES: &[&str] = &[
+    "prime",
+    "extended-prime",
+    "quadratic-congruence",
+    "extended-quadratic-congruence",
+    "orthogonal",
+    "sparse",
+    "m-sequence",
+    "gold",
 ];
 
 /// One TOML text with its origin.
@@ -162,7 +175,9 @@ fn fill_in(strong: &mut Table, weak: &Table) {
             }
             Some(toml::Value::Table(inner)) => {
                 if let toml::Value::Table(below) = value {
-                    let chosen = alternatives(key).any(|kind| inner.contains_key(kind));
+                    // Of a family there is nothing but its kind, be it misspelt.
+                    let chosen =
+                        key == "family" || alternatives(key).any(|kind| inner.contains_key(kind));
                     let mut below = below.clone();
                     if chosen {
                         below.retain(|kind, _| {
@@ -293,6 +308,13 @@ mod tests {
         let chain = chain("extends = \"kim-park-2016\"\n[scan]\nmax_range_m = 90.0\n");
         assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_float(), Some(90.0));
         assert_eq!(value_at(&chain.merged, "scan.raster.rows").unwrap().as_integer(), Some(480));
+    }
+
+    #[test]
+    fn another_code_family_replaces_the_parents() {
+        let chain = chain("extends = \"kim-park-2016\"\n[code]\nfamily = { gold = 7 }\n");
+        let family = value_at(&chain.merged, "code.family").unwrap().as_table().unwrap();
+        assert_eq!(family.keys().collect::<Vec<_>>(), ["gold"]);
     }
 
     #[test]

@@ -161,6 +161,7 @@ pub(super) struct SafetyFile {
 pub(super) struct CodeFile {
     pub family: FamilyFile,
     pub chip_ps: f64,
+    pub keying: KeyingFile,
     pub label: Label,
     pub label_bits: u32,
     pub crc: CrcFile,
@@ -173,6 +174,37 @@ pub(super) struct CodeFile {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum FamilyFile {
     Prime(u32),
+    ExtendedPrime(u32),
+    QuadraticCongruence(u32),
+    ExtendedQuadraticCongruence(u32),
+    Orthogonal(OrthogonalFile),
+    Sparse(SparseFile),
+    MSequence(u32),
+    Gold(u32),
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OrthogonalFile {
+    pub length: u32,
+    pub weight: u32,
+    pub words: Option<u32>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SparseFile {
+    pub length: u32,
+    pub weight: u32,
+    pub words: u32,
+    pub seed: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum KeyingFile {
+    OnOff,
+    Inversion,
 }
 
 /// Which number a macropulse carries.
@@ -181,6 +213,8 @@ pub(super) enum FamilyFile {
 pub enum Label {
     /// The column of its pixel.
     Column,
+    /// None: a macropulse is one bare code word.
+    None,
 }
 
 #[derive(Debug, Deserialize)]
@@ -294,5 +328,6 @@ pub(super) enum ReceiverKindFile {
     Literal,
     Blind,
     Matched,
+    Balanced,
     Direct,
 }

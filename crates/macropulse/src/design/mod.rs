@@ -15,6 +15,7 @@ mod detector;
 mod directions;
 mod document;
 mod effect;
+mod family;
 mod file;
 mod linear;
 mod presets;
@@ -30,6 +31,7 @@ pub use derived::Derived;
 pub use detector::{Detector, FirstFiring, Geiger, Linear, PhotonCounting, Sensitivity};
 pub use directions::Directions;
 pub use effect::Effect;
+pub use family::family_from_toml;
 pub use file::{Firing, Label, Mirror};
 pub use presets::{names as preset_names, text as preset_text};
 
@@ -158,6 +160,16 @@ pub struct Coding {
     pub first_word: u32,
     /// See `first_word`.
     pub word_modulus: u32,
+}
+
+impl Coding {
+    /// The number that a shot to `column` carries; 0 where it carries none.
+    pub fn label_of(&self, column: u16) -> u16 {
+        match self.label {
+            Some(Label::Column) => column,
+            Some(Label::None) | None => 0,
+        }
+    }
 }
 
 /// The bank of time-to-digital converters.

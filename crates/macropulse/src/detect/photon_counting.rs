@@ -29,7 +29,8 @@ pub(super) struct Counting {
     /// Times of the marks of all code words, each padded to `padded` numbers.
     words: Vec<u32>,
     padded: usize,
-    weight: usize,
+    /// Marks of each code word.
+    weights: Vec<usize>,
     /// Lit bits of each label, the one sent first the lowest.
     lit: Vec<u32>,
     /// Length of a bit, in parts of a tick.
@@ -46,8 +47,9 @@ impl Counting {
     pub fn new(counting: &PhotonCounting, design: &Design) -> Self {
         let codebook = &design.coding.codebook;
         let chip = (design.coding.chip_fs / design.tdc.tick_fs) as u32 * PARTS_OF_TICK;
-        let weight = codebook.word(0).weight();
-        let padded = weight.next_multiple_of(STEP);
+        let weights: Vec<usize> =
+            (0..codebook.words()).map(|word| codebook.word(word as u16).weight()).collect();
+        let padded = codebook.family().weight().next_multiple_of(STEP);
         let mut words = Vec::new();
         for word in 0..codebook.words() {
             let marks = codebook.word(word as u16).marks.iter();
@@ -62,7 +64,7 @@ impl Counting {
         Self {
             words,
             padded,
-            weight,
+            weights,
             lit: (0..codebook.labels()).map(lit).collect(),
             bit: codebook.family().length() * chip,
             kept: 1.0 - counting.missed_marks,
@@ -123,18 +125,19 @@ impl Counting {
             return;
         }
         let from = time.len();
-        let word = usize::from(log.word[shot]) * self.padded;
-        let train = Train {
-            word: &self.words[word..][..self.padded],
-            weight: self.weight,
-            bit: self.bit,
-            lit: self.lit[usize::from(log.label[shot])],
-            start,
-        };
-        if echoes.part.is_empty() {
-            append_train(&train, time);
-        } else {
+        let (label, word) = (log.label[shot], log.word[shot]);
+        if !echoes.part.is_empty() || band.design.coding.codebook.zeros_are_lit() {
             time.extend(band.marks(echo).map(|mark| band.clock.time(mark) as u32));
+        } else {
+            let word = usize::from(word);
+            let train = Train {
+                word: &self.words[word * self.padded..][..self.padded],
+                weight: self.weights[word],
+                bit: self.bit,
+                lit: self.lit[usize::from(label)],
+                start,
+            };
+            append_train(&train, time);
         }
         if !seen.is_certain() || self.jitter.is_some() {
             let earlier = echoes.shot[..echo].iter().rev();

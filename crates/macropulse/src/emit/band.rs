@@ -133,11 +133,7 @@ fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
         let pixels = column..column + run as u16;
         log.row.extend(repeat_n(row, run));
         log.column.extend(pixels.clone());
-        if design.is_coded() {
-            log.label.extend(pixels);
-        } else {
-            log.label.extend(repeat_n(0, run));
-        }
+        log.label.extend(pixels.map(|column| design.coding.label_of(column)));
         let (first, modulus) = (design.coding.first_word as u16, design.coding.word_modulus as u16);
         let mut word = word(design, row, column);
         log.word.extend((0..run).map(|_| {
@@ -158,7 +154,7 @@ fn add_pixels(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
         let (row, column) = pixel(design, order);
         log.row.push(row);
         log.column.push(column);
-        log.label.push(if design.is_coded() { column } else { 0 });
+        log.label.push(design.coding.label_of(column));
         log.word.push(word(design, row, column));
         log.channel.push(match design.scan.pattern {
             Pattern::Raster { .. } => 0,

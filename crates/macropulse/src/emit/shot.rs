@@ -27,7 +27,7 @@ pub fn shot_of_pixel(design: &Design, scan: u64, row: u32, column: u32) -> Optio
     let (row, column) = (row as u16, column as u16);
     Some(Shot {
         fired_at_fs: fired_at_fs(design, scan, order_of_pixel(design, row, column)),
-        label: if design.is_coded() { column } else { 0 },
+        label: design.coding.label_of(column),
         word: word(design, row, column),
     })
 }

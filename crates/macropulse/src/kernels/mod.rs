@@ -11,6 +11,7 @@
 // Lanes of several arrays are walked in step, by their number.
 #![allow(clippy::needless_range_loop)]
 
+mod balance;
 mod ballot;
 mod correlate;
 mod delay;
@@ -33,6 +34,7 @@ mod waits;
 mod whole;
 mod wide;
 
+pub(crate) use balance::{Balance, Chips, best_balance};
 pub(crate) use ballot::{BALLOT, elect, highest_sum, vote};
 pub(crate) use correlate::{BLOCK_WORDS, Block, Marks, PLANES, count_marks, with_marks};
 pub(crate) use delay::{delay, drawn};

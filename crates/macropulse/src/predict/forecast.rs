@@ -16,7 +16,7 @@ use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 pub struct Forecaster<'a> {
     design: &'a Design,
     pixel_period: f64,
-    /// How many labels have so many marks, dark ones left out.
+    /// How many macropulses have so many marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
     mean_weight: f64,
     /// Factor on the light of the sensor.
@@ -62,7 +62,10 @@ impl<'a> Forecaster<'a> {
     pub fn new(design: &'a Design) -> Self {
         let codebook = &design.coding.codebook;
         let mut weights = BTreeMap::new();
-        for weight in codebook.weights().filter(|&weight| weight > 0) {
+        let sent = (0..codebook.labels() as u16)
+            .flat_map(|label| (0..codebook.words() as u16).map(move |word| (label, word)))
+            .map(|(label, word)| codebook.marks(label, word).len());
+        for weight in sent.filter(|&weight| weight > 0) {
             *weights.entry(weight).or_insert(0) += 1;
         }
         let pixel_period = design.scan_period() / design.shots_per_scan() as f64;

@@ -1,5 +1,6 @@
 //! Closed form: what theory says a simulation will measure.
 
+pub mod comparison;
 pub mod detection;
 mod forecast;
 pub mod interference;

@@ -119,7 +119,7 @@ pub fn judge(
             cloud.truth.material[pixel] = hits.material[i];
             cloud.truth.cosine[pixel] = hits.cosine[i];
         }
-        let is_dark = || design.coding.codebook.lit_bits(log.label[shot]).is_empty();
+        let is_dark = || design.coding.codebook.marks(log.label[shot], log.word[shot]).is_empty();
         score.dark += u64::from(outcome == Outcome::Missed && is_dark());
         cloud.truth.outcome[pixel] = outcome;
         score.pixels[outcome as usize] += 1;

@@ -176,13 +176,17 @@ impl OutcomePicture<'_> {
 }
 
 /// What explains the colours.
-enum Key {
+pub(super) enum Key {
     Bar { colour: fn(f64) -> Rgb, ends: [f32; 2], unit: &'static str },
     Legend(Vec<(Rgb, String)>),
 }
 
 /// Draws title, pixels, key and scale bar; `colour` gives the colour of a grid pixel.
-fn draw(layout: &Layout, colour: impl Fn(usize) -> Rgb, key: &Key) -> Result<Vec<u8>, Error> {
+pub(super) fn draw(
+    layout: &Layout,
+    colour: impl Fn(usize) -> Rgb,
+    key: &Key,
+) -> Result<Vec<u8>, Error> {
     let crop = layout.shown();
     let [zoom_x, zoom_y] = layout.zoom;
     let width = crop.columns.len().saturating_mul(zoom_x);

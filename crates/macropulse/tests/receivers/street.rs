@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use macropulse::code::{Codebook, Crc, Family, Payload};
+use macropulse::code::{Codebook, Crc, Family, Keying, Payload};
 use macropulse::decode::{Effort, Receiver, ReceiverKind, Returns};
 use macropulse::emit::ShotLog;
 use macropulse::tdc::Ticks;
@@ -87,7 +87,8 @@ impl Sensor {
     fn with_payload(kind: ReceiverKind, payload: Payload) -> Self {
         let labels = COLUMNS;
         Self {
-            codebook: Codebook::new(Family::prime(29).unwrap(), Some(payload), 1024).unwrap(),
+            codebook: Codebook::new(Family::prime(29).unwrap(), Some(payload), 1024, Keying::OnOff)
+                .unwrap(),
             receiver: Receiver {
                 kind,
                 effort: Effort::Quick,

@@ -9,6 +9,8 @@ mod scan;
 
 use std::sync::OnceLock;
 
+pub(super) use code::family;
+
 use super::document::Chain;
 use super::file::SensorFile;
 use super::{Design, Effect, Error};
@@ -96,6 +98,9 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
             (_, inside) => format!("{inside}.{wrong}"),
         };
         return chain.error(&place, format!("unknown {what} `{wrong}`{hint}"));
+    }
+    if path == "code.family" && said.starts_with("wanted exactly 1 element") {
+        return chain.error(&path, "needs exactly one family, as { prime = 29 }");
     }
     if said.starts_with("missing field") {
         return chain.error(&path, format!("the key `{}` is missing", quoted[0]));

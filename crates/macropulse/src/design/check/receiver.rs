@@ -3,7 +3,7 @@
 use super::{Check, TOO_FINE};
 use crate::decode::{Receiver, ReceiverKind};
 use crate::design::file::{ReceiverKindFile, SensorFile};
-use crate::design::{Coding, Error, PARTS_OF_TICK, Scan, Tdc};
+use crate::design::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
 
 impl Check<'_> {
@@ -42,6 +42,7 @@ impl Check<'_> {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
             ReceiverKindFile::Blind => ReceiverKind::Blind,
             ReceiverKindFile::Matched => ReceiverKind::Matched,
+            ReceiverKindFile::Balanced => ReceiverKind::Balanced,
             ReceiverKindFile::Direct => ReceiverKind::Direct,
         };
         if (kind == ReceiverKind::Direct) == coding.label.is_some() {
@@ -50,12 +51,14 @@ impl Check<'_> {
                 "`direct` is for shots without [code], the other receivers for shots with it",
             );
         }
+        self.can_read(kind, coding)?;
+        let (threshold, lightest) =
+            (file.receiver.bit_threshold, coding.codebook.lightest_word() as u32);
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         if gate.1 >= i64::from(u32::MAX / PARTS_OF_TICK) {
             return self.refuse("tdc.resolution_ps", TOO_FINE);
         }
-        let weight = coding.codebook.family().weight() as u32;
         Ok(Receiver {
             kind,
             effort: file.receiver.effort,
@@ -69,11 +72,32 @@ impl Check<'_> {
                 1e-30,
                 0.5,
             )?,
-            bit_threshold: if coding.label.is_some() {
-                self.count("receiver.bit_threshold", file.receiver.bit_threshold, 1, weight)? as u16
-            } else {
-                1
+            bit_threshold: match kind {
+                ReceiverKind::Literal | ReceiverKind::Blind => {
+                    self.count("receiver.bit_threshold", threshold, 1, lightest)? as u16
+                }
+                // The others ask for none: a light word may have fewer marks than the default.
+                _ => threshold.clamp(1, lightest.max(1)) as u16,
             },
         })
+    }
+
+    /// Whether a receiver of this kind understands what is sent.
+    fn can_read(&self, kind: ReceiverKind, coding: &Coding) -> Result<(), Error> {
+        let bit_by_bit = matches!(kind, ReceiverKind::Literal | ReceiverKind::Blind);
+        if bit_by_bit && coding.label == Some(Label::None) {
+            return self.refuse(
+                "receiver.kind",
+                "`literal` and `blind` read the bits of a label, but with code.label = \"none\" \
+                 there are none: use `matched` or `balanced`",
+            );
+        }
+        if coding.codebook.zeros_are_lit() && kind != ReceiverKind::Balanced {
+            return self.refuse(
+                "receiver.kind",
+                "only `balanced` understands code.keying = \"inversion\"; use it, or \"on-off\"",
+            );
+        }
+        Ok(())
     }
 }

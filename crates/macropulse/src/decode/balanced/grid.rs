@@ -1,0 +1,136 @@
+//! The lit places of a band, chip by chip at each phase of the chip clock.
+//!
+//! The marks of one macropulse lie whole chips apart. So all places that can hold them, begun at
+//! one tick, are side by side here, and a shift by a chip is a shift by one bit.
+
+use std::ops::Range;
+
+use crate::kernels::{Balance, Chips, best_balance};
+
+/// Which places are lit, by phase.
+#[derive(Debug)]
+pub(super) struct Grid {
+    /// Tick of the first bit of phase 0.
+    origin: i64,
+    /// Ticks per chip, that is phases.
+    scale: i64,
+    /// How many ticks before another one a place is lit.
+    late: i64,
+    /// Machine words of one phase.
+    width: usize,
+    words: Vec<u64>,
+    /// Lit places of the phase before each word, and before its end.
+    before: Vec<u32>,
+}
+
+impl Grid {
+    /// The ticks of `lit` that lie in `span`, each of them with the `late` places before it, as a
+    /// mark counts that is so late.
+    pub fn new(
+        span: Range<i64>,
+        (scale, late): (i64, i64),
+        lit: impl Iterator<Item = i64>,
+    ) -> Self {
+        let chips = (span.end - span.start).max(0) / scale + 2;
+        let width = chips as usize / 64 + 1;
+        let mut words = vec![0; width * scale as usize];
+        let origin = span.start;
+        for tick in lit.filter(|tick| span.contains(tick)) {
+            for place in (tick - late).max(origin)..=tick {
+                let (chip, phase) = ((place - origin) / scale, (place - origin) % scale);
+                words[phase as usize * width + chip as usize / 64] |= 1 << (chip % 64);
+            }
+        }
+        let mut before = Vec::with_capacity(words.len() + scale as usize);
+        for phase in words.chunks(width) {
+            let mut sum = 0;
+            before.push(0);
+            before.extend(phase.iter().map(|word: &u64| {
+                sum += word.count_ones();
+                sum
+            }));
+        }
+        Self { origin, scale, late, width, words, before }
+    }
+
+    /// What is lit if a macropulse begins at tick `start`.
+    pub fn at(&self, start: i64, chips: &Chips) -> Option<Balance> {
+        let (phase, chip) = self.place(start)?;
+        best_balance(self.phase(phase), chip..chip + 1, chips, i32::MIN)
+    }
+
+    /// The start in `starts` with the highest score, the earliest of several, and what is lit
+    /// there; `None` where none has `least`, or only `least` and not before tick `better`.
+    pub fn best(
+        &self,
+        starts: Range<i64>,
+        chips: &Chips,
+        (least, better): (i32, i64),
+    ) -> Option<(i64, Balance)> {
+        let mut best = None;
+        let (mut least, mut better) = (least, better);
+        for phase in 0..self.scale {
+            let first =
+                (starts.start - self.origin - phase + self.scale - 1).div_euclid(self.scale);
+            let end = (starts.end - self.origin - phase + self.scale - 1).div_euclid(self.scale);
+            let places = first.max(0) as usize..(end.max(0) as usize).min(64 * self.width);
+            let Some(found) = self.best_of_phase(phase, places, (chips, least)) else { continue };
+            let start = self.origin + self.scale * found.place as i64 + phase;
+            // Of equals the earliest counts, whichever phase it is at.
+            if found.score() > least || start < better {
+                (least, better) = (found.score(), start);
+                best = Some((start, found));
+            }
+        }
+        best
+    }
+
+    /// The highest score beside `start`: less than a macropulse away, by whole chips.
+    pub fn best_beside(&self, start: i64, chips: &Chips) -> i32 {
+        let Some((phase, chip)) = self.place(start) else { return 0 };
+        let (own, reach) = (1 + (self.late / self.scale) as usize, 64 * chips.reach());
+        let sides =
+            [chip.saturating_sub(reach)..(chip + 1).saturating_sub(own), chip + own..chip + reach];
+        let best = |side| best_balance(self.phase(phase), side, chips, 0);
+        sides.into_iter().filter_map(best).map(Balance::score).max().unwrap_or(0)
+    }
+
+    /// The best of some `places` of one phase. Runs of them with too few lit places are left out.
+    fn best_of_phase(
+        &self,
+        phase: i64,
+        places: Range<usize>,
+        (chips, least): (&Chips, i32),
+    ) -> Option<Balance> {
+        let before = &self.before[phase as usize * (self.width + 1)..][..=self.width];
+        let words = self.phase(phase);
+        let lit = |from: usize, to: usize| {
+            (before[to.min(self.width)] - before[from.min(self.width)]) as i32
+        };
+        let (first, last) = (places.start / 64, places.end.div_ceil(64));
+        if places.is_empty() || lit(first, last + chips.reach()) < least {
+            return None;
+        }
+        let mut best: Option<Balance> = None;
+        for word in first..last {
+            let wanted = best.map_or(least, |best| best.score() + 1);
+            if lit(word, word + chips.reach()) < wanted {
+                continue;
+            }
+            let run = (64 * word).max(places.start)..(64 * (word + 1)).min(places.end);
+            best = best_balance(words, run, chips, wanted).or(best);
+        }
+        best
+    }
+
+    fn phase(&self, phase: i64) -> &[u64] {
+        &self.words[phase as usize * self.width..][..self.width]
+    }
+
+    /// Phase and chip of a tick; `None` before the first one.
+    fn place(&self, tick: i64) -> Option<(i64, usize)> {
+        let since = tick - self.origin;
+        let chip = usize::try_from(since.div_euclid(self.scale)).ok()?;
+        Some((since.rem_euclid(self.scale), chip))
+    }
+}

@@ -1,0 +1,73 @@
+//! A code family on its own, as it would stand in a sensor file.
+
+use serde::Deserialize;
+
+use super::Error;
+use super::check::family;
+use super::document::FAMILIES;
+use super::file::FamilyFile;
+use crate::code::Family;
+use crate::names::nearest;
+
+/// The code family written as in a sensor file behind `code.family`, without the outer braces:
+/// `prime = 29`, or `orthogonal = { length = 1000, weight = 5 }`.
+///
+/// # Errors
+/// Says in one sentence what is wrong with the text, or why there is no such family.
+pub fn family_from_toml(text: &str) -> Result<Family, Error> {
+    let wrong = |message: String| Error::whole(text, message);
+    let table: toml::Table = text.parse().map_err(|_| {
+        wrong("write it as in a sensor file, as prime=29 or 'sparse={length=…, …}'".to_owned())
+    })?;
+    let [name] = table.keys().map(String::as_str).collect::<Vec<_>>()[..] else {
+        return Err(wrong("name one family at a time".to_owned()));
+    };
+    if !FAMILIES.contains(&name) {
+        let hint = nearest(name, FAMILIES.iter().copied())
+            .map(|near| format!("; did you mean `{near}`?"))
+            .unwrap_or_default();
+        let known = FAMILIES.join(", ");
+        return Err(wrong(format!("`{name}` is no code family{hint} Known are {known}")));
+    }
+    let file = FamilyFile::deserialize(toml::Value::Table(table.clone()))
+        .map_err(|error: toml::de::Error| wrong(error.message().to_owned()))?;
+    family(file).map_err(|error| wrong(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_family_can_be_written() {
+        let texts = [
+            ("prime=29", Family::prime(29)),
+            ("extended-prime = 7", Family::extended_prime(7)),
+            ("quadratic-congruence=7", Family::quadratic_congruence(7)),
+            ("extended-quadratic-congruence=7", Family::extended_quadratic_congruence(7)),
+            ("orthogonal={length=63,weight=3}", Family::orthogonal(63, 3, None)),
+            ("orthogonal={length=63,weight=3,words=2}", Family::orthogonal(63, 3, Some(2))),
+            ("sparse={length=99,weight=3,words=2,seed=4}", Family::sparse(99, 3, 2, 4)),
+            ("m-sequence=5", Family::m_sequence(5)),
+            ("gold=5", Family::gold(5)),
+        ];
+        for (text, family) in texts {
+            assert_eq!(family_from_toml(text).unwrap(), family.unwrap(), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_one_sentence() {
+        let refusal = |text| family_from_toml(text).unwrap_err().to_string();
+        assert_eq!(
+            refusal("prime=28"),
+            "prime=28: 28 is not an odd prime; the nearest are 23 and 29"
+        );
+        assert!(refusal("golf=7").contains("did you mean `gold`?"), "{}", refusal("golf=7"));
+        assert!(refusal("29").contains("as prime=29"));
+        assert!(refusal("prime=29\ngold=7").contains("one family at a time"));
+        assert!(refusal("gold='x'").contains("invalid type"), "{}", refusal("gold='x'"));
+        assert!(refusal("sparse={length=9}").contains("missing field"));
+        assert!(refusal("gold=99999999999").starts_with("gold=99999999999: "));
+    }
+}
