@@ -137,7 +137,7 @@ fn an_m_sequence_serves_a_sensor_that_waits() {
 /// Nine lines of the street through the example, at its own sensitivity and jitter.
 #[test]
 fn the_example_of_dense_words_sees_the_street() {
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/gold-127.toml");
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sensors/bipolar-gold.toml");
     let design = Design::open(example.to_str().unwrap(), &[]).unwrap();
     let street = Scene::open("street").unwrap();
     let lines: Vec<_> = macropulse::emit::bands(&design, 0)

@@ -3,10 +3,13 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 6] = [
+const PRESETS: [(&str, &str); 9] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
+    ("coded-practical", include_str!("../../../../sensors/coded-practical.toml")),
+    ("coded-360", include_str!("../../../../sensors/coded-360.toml")),
+    ("bipolar-gold", include_str!("../../../../sensors/bipolar-gold.toml")),
     ("hdl-64e", include_str!("../../../../sensors/hdl-64e.toml")),
     ("hdl-64e-equal-spacing", include_str!("../../../../sensors/hdl-64e-equal-spacing.toml")),
     ("peregrine", include_str!("../../../../sensors/peregrine.toml")),

@@ -105,7 +105,7 @@ impl<'a> Forecaster<'a> {
         let own = edge * mean_weight / pixel_period;
         let edges = -libm::expm1(-(false_edges + own) * tick) / tick;
         let loss = bank_loss(&design.tdc, edges);
-        let place = matched::Place::of(design);
+        let place = matched::Place::of(design, detected);
         // Where the bank is overrun, all is lit until the last converter is taken: what is lost
         // then makes the rest no clearer.
         let density = -libm::expm1(-(false_edges + own) * place.width);

@@ -34,14 +34,16 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A tick where edges are exact, else one more than four deviations, rounded up.
-    pub fn of(design: &Design) -> Self {
+    /// A tick where edges are exact, else one more than four deviations, rounded up; for marks of
+    /// which `detected` photons are detected, whose own deviation may be less than that.
+    pub fn of(design: &Design, detected: f64) -> Self {
         let tick = s_from_fs(design.tdc.tick_fs);
-        let sigma = design.receiver.jitter_ticks;
-        if !design.is_coded() || sigma <= 0.05 {
+        let looked_for = design.receiver.jitter_ticks;
+        if !design.is_coded() || looked_for <= 0.05 {
             return Self { width: tick, share: 1.0 };
         }
-        let ticks = 1.0 + (4.0 * sigma).ceil();
+        let ticks = 1.0 + (4.0 * looked_for).ceil();
+        let sigma = Timing::of(design, detected).sigma;
         let half = ticks / 2.0 / (sigma * std::f64::consts::SQRT_2);
         Self { width: ticks * tick, share: libm::erf(half) }
     }
@@ -110,7 +112,7 @@ impl Gate {
             s_from_fs(chips * design.coding.chip_fs) + AROUND * s_from_fs(design.tdc.tick_fs);
         Self {
             lags: f64::from(farthest - nearest) + 1.0,
-            own: Place::of(design).width / around,
+            own: Place::of(design, 1.0).width / around,
             false_alarm: design.receiver.false_alarm,
         }
     }

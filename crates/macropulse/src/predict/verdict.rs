@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_4;
 use super::forecast::{Forecast, Forecaster};
 use super::link::spot_depth;
 use crate::design::safety::strictest;
-use crate::design::{Design, Detector};
+use crate::design::{Design, Detector, Pattern};
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
 
 /// Share of converters' work that may be lost.
@@ -121,9 +121,12 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
 
 fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
     let bearable = day.background_bearable(wanted.pd, wanted.reflectance, wanted.range);
+    // In a linear detector the sun is noise: fewer false edges do not help, more light does.
+    let brighter = day.light_needed(wanted.pd, wanted.reflectance, wanted.range);
+    let shortfall = bearable.map(f64::recip).or(brighter).unwrap_or(f64::INFINITY);
     Check {
         name: "sunlight",
-        shortfall: bearable.map_or(f64::INFINITY, |bearable| bearable.recip()),
+        shortfall,
         finding: format!(
             "by day Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
             forecast.pd, forecast.density
@@ -152,7 +155,8 @@ fn slant(design: &Design, range: f64) -> Option<Check> {
         return None;
     }
     let spot = libm::hypot(design.light.beam_diameter, design.light.divergence * range);
-    let depth = spot_depth(spot, FRAC_PI_4);
+    let swept = swept(design) * range;
+    let depth = spot_depth(libm::hypot(spot, swept), FRAC_PI_4);
     let chip = match design.is_coded() {
         true => s_from_fs(design.coding.chip_fs),
         false => design.light.pulse,
@@ -166,13 +170,27 @@ fn slant(design: &Design, range: f64) -> Option<Check> {
         name: "slant",
         shortfall: depth / chip,
         finding: format!(
-            "a spot of {:.0} mm on a surface at 45° is {:.0} mm deep, a chip {:.2} mm",
+            "a spot of {:.0} mm that moves by {:.0} mm on a surface at 45° is {:.0} mm deep, a chip \
+             {:.2} mm",
             spot * 1e3,
+            swept * 1e3,
             depth * 1e3,
             chip * 1e3
         ),
-        remedy: "longer chips, or a wider beam that spreads less".into(),
+        remedy: "longer chips, a shorter macropulse, or a wider beam that spreads less".into(),
     })
+}
+
+/// Angle, rad, by which the mirror moves on during a macropulse.
+fn swept(design: &Design) -> f64 {
+    match design.scan.pattern {
+        Pattern::Raster { horizontal, .. } if design.scan.moves => {
+            let derived = design.derived();
+            let pixels = derived.macropulse / derived.pixel_period;
+            pixels * horizontal / f64::from(design.scan.columns)
+        }
+        _ => 0.0,
+    }
 }
 
 #[cfg(test)]
