@@ -14,6 +14,9 @@ pub const PLANCK: f64 = 6.626_070_15e-34;
 /// Elementary charge, C (exact, SI 2019).
 pub const ELEMENTARY_CHARGE: f64 = 1.602_176_634e-19;
 
+/// rms length of a Gaussian over its full width at half maximum: 1/(2·√(2·ln 2)).
+pub const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
+
 /// Femtoseconds in a second.
 pub const FS_PER_S: i64 = 1_000_000_000_000_000;
 

@@ -22,10 +22,7 @@ use super::others::{Flash, flashes};
 use super::{Band, Edges};
 use crate::design::FirstFiring;
 use crate::random::{Chance, Stage, Stream};
-use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
-
-/// rms length of a Gaussian pulse over its full width at half maximum.
-pub(super) const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
+use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
 
 /// The walk is calibrated up to this fraction of the pulse: an echo that only just fires does so
 /// on the falling flank.

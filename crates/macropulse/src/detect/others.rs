@@ -12,14 +12,14 @@
 use std::ops::RangeInclusive;
 
 use super::clock::Clock;
-use super::first_firing::{PLENTY, RMS_OF_FWHM, quantile};
+use super::first_firing::{PLENTY, quantile};
 use super::jitter::Jitter;
 use super::{Band, Memory};
 use crate::channel::Foreign;
 use crate::design::Design;
 use crate::emit::ShotLog;
 use crate::random::{Address, Chance, Stage};
-use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
 
 /// A detector that counts photons, as light of others meets it.
 #[derive(Debug)]

@@ -5,6 +5,7 @@ mod claim;
 mod claims_code;
 mod claims_experiment;
 mod claims_system;
+mod conclusion;
 mod experiment;
 mod geometry;
 mod pictures;

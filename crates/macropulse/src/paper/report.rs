@@ -1,7 +1,7 @@
 //! The report: one page with every table and figure of \[KP16\], made again from data.
 
 use super::claim::Verdict;
-use super::{Error, Findings, pictures, tables};
+use super::{Error, Findings, conclusion, pictures, tables};
 use crate::points::Outcome;
 use crate::view::{Block, Page, Section, Tone};
 
@@ -25,6 +25,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     .section(title(findings))
     .section(receivers(findings))
     .section(claims(findings))
+    .section(conclusion(findings)?)
     .section(idealisations(findings))
     .footer(&format!(
         "macropulse {}, seed {seed}. Every picture and number on this page was computed by the \
@@ -181,6 +182,14 @@ fn claims(findings: &Findings) -> Section {
              Assumed: it cannot be simulated from what is known, and is idealised.",
         )
         .table(tables::claims(&findings.claims))
+}
+
+fn conclusion(findings: &Findings) -> Result<Section, Error> {
+    let section = Section::new("The conclusion, sentence by sentence").paragraph(
+        "Whether each sentence of the paper's conclusion holds, what has to be idealised for it, \
+         and what replaces it among the ready sensors.",
+    );
+    Ok(section.table(conclusion::table(findings)?))
 }
 
 fn idealisations(findings: &Findings) -> Section {

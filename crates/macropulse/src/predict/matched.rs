@@ -10,10 +10,7 @@ use std::f64::consts::PI;
 
 use super::detection::{mark_pd, normal_tail};
 use crate::design::{Design, Detector, FirstFiring};
-use crate::units::{SPEED_OF_LIGHT, s_from_fs};
-
-/// rms length of a Gaussian over its full width at half maximum.
-const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
+use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
 
 /// The light around a macropulse is counted in stretches of so many ticks, and reaches beyond it by
 /// one of them on average.

@@ -13,6 +13,7 @@
 //! words but C0 it is exact for p = 5 and says 0.5 % too much for p = 7. The hard formula says 5 %
 //! and 13 % too much for p = 5, because real hits do not fall on random marks.
 
+use super::detection::normal_tail;
 use crate::code::correlation::periodic;
 use crate::code::{CodeWord, Error, Family};
 use crate::units::{range_from_tof, tof_from_range};
@@ -228,11 +229,6 @@ fn probability_of_filling(access: &MultipleAccess, raise: impl Fn(usize, usize) 
         }
     }
     chance[full]
-}
-
-/// `Q(x)`: probability that a standard normal variable exceeds `x`.
-fn normal_tail(x: f64) -> f64 {
-    0.5 * libm::erfc(x * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// Shots whose light may be under way at once: those fired while light goes to `max_range`

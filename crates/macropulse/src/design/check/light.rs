@@ -3,9 +3,7 @@
 use super::Check;
 use crate::design::file::SensorFile;
 use crate::design::{Effect, Error, Light};
-
-/// rms length of a Gaussian over its full width at half maximum.
-const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
+use crate::units::RMS_OF_FWHM;
 
 impl Check<'_> {
     pub(super) fn light(
