@@ -254,7 +254,10 @@ impl Tally {
             _ if self.surfaces == 0 => Some(
                 "no ray met a surface within the range gate: check where the sensor stands, which way it looks, and its max_range_m",
             ),
-            _ if self.echoes == 0 => Some("every surface met is black at this wavelength"),
+            _ if self.echoes == 0 => Some(
+                "every surface met is black at this wavelength, or no longer in the field of the \
+                 receiver when its light comes",
+            ),
             _ if self.edges == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")
             }

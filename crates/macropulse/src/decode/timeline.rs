@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::kernels::{Pattern, lit_in};
+use crate::kernels::{Pattern, lit_in, look_ahead};
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
 #[derive(Debug, Clone)]
@@ -36,17 +36,11 @@ impl Timeline {
         self.place(tick).is_some_and(|(word, bit)| self.words[word] & bit != 0)
     }
 
-    /// Darkens `tick`; the index of its word if it was lit.
-    fn darken(&mut self, tick: i64) -> Option<usize> {
-        let (word, bit) = self.place(tick)?;
-        let was_lit = self.words[word] & bit != 0;
-        self.words[word] &= !bit;
-        was_lit.then_some(word)
-    }
-
     /// Darkens `tick`.
     pub fn clear(&mut self, tick: i64) {
-        self.darken(tick);
+        if let Some((word, bit)) = self.place(tick) {
+            self.words[word] &= !bit;
+        }
     }
 
     /// How many ticks of `pattern` are lit if it begins at `tick`; `None` if that is before all.
@@ -73,17 +67,8 @@ impl Timeline {
     /// The timeline in which a tick is lit if one of the `before` ticks before it, itself or one
     /// of the `after` ticks behind it is lit here.
     pub fn dilated(&self, before: u32, after: u32) -> Self {
-        // Each round looks as far ahead again as all rounds before it.
         let mut dilated = self.clone();
-        let (mut reached, reach) = (0, i64::from(before) + i64::from(after));
-        while reached < reach {
-            let step = (reached + 1).min(reach - reached);
-            let words = (0..dilated.words.len()).map(|word| {
-                dilated.words[word] | dilated.from(dilated.origin + 64 * word as i64 + step)
-            });
-            dilated.words = words.collect();
-            reached += step;
-        }
+        look_ahead(&mut dilated.words, (before + after) as usize);
         // So far a tick sees only what comes after it.
         dilated.origin += i64::from(before);
         dilated

@@ -115,10 +115,11 @@ mod tests {
     use crate::random::Chance;
 
     /// Seven rays of a footprint with a seventh of the light each are one mark; 30 cm apart they
-    /// are seven. N = 10 marks of one shot, seed 1.
+    /// are seven. N = 8 marks of one shot, seed 1.
     #[test]
     fn light_that_comes_together_adds_up() {
-        let design = Design::open("coded-practical", &[]).unwrap();
+        let quiet = [("detector.linear.false_alarm_hz".to_owned(), "1.0".to_owned())];
+        let design = Design::open("coded-practical", &quiet).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
         let shot = log.home.start;
         let edges = |apart_fs: i64, photons: f64| {
@@ -131,9 +132,9 @@ mod tests {
             let detectors = Detectors::new(&design, Chance::new(1));
             detectors.edges(&log, &echoes, &mut Memory::default()).time.len()
         };
-        // The threshold is at some 130 photons.
-        assert_eq!(edges(10_000, 60.0), 10);
-        assert_eq!(edges(2_000_000, 60.0), 0);
-        assert_eq!(edges(2_000_000, 600.0), 70);
+        // The threshold is at some 300 photons.
+        assert_eq!(edges(10_000, 90.0), 8);
+        assert_eq!(edges(2_000_000, 90.0), 0);
+        assert_eq!(edges(2_000_000, 900.0), 56);
     }
 }

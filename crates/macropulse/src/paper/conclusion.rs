@@ -59,7 +59,10 @@ fn sentences(findings: &Findings) -> Result<Vec<Sentence>, Error> {
     let failing: Vec<String> = failing
         .iter()
         .filter(|check| !check.holds())
-        .map(|Check { name, shortfall, .. }| format!("{name} by a factor of {shortfall:.3e}"))
+        .map(|Check { name, shortfall, .. }| match *shortfall {
+            factor if factor >= 100.0 => format!("{name} fails by a factor of {factor:.0}"),
+            factor => format!("{name} by {factor:.2}"),
+        })
         .collect();
     let practical = Design::open("coded-practical", &[])?;
     let dark = Forecaster::new(&practical).forecast(0.1, range);
