@@ -60,6 +60,12 @@ impl Columns {
     }
 }
 
+/// Lines under a heading; nothing where there are none.
+pub fn section(heading: &str, columns: &Columns) -> String {
+    let lines = columns.text();
+    if lines.is_empty() { lines } else { format!("\n{heading}\n{lines}") }
+}
+
 /// `text` as lines of at most `width` characters where its blanks allow.
 fn broken(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];

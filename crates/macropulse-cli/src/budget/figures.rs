@@ -7,7 +7,7 @@ use macropulse::predict::{Forecast, Forecaster};
 use macropulse::units::s_from_fs;
 use serde_json::{Value, json};
 
-use crate::text::{Columns, short};
+use crate::text::{Columns, section, short};
 
 /// Reflectances that tables and curves show.
 pub const REFLECTANCES: [f64; 5] = [0.05, 0.1, 0.3, 0.8, 1.0];
@@ -17,44 +17,50 @@ pub struct Figures<'a> {
     pub day: &'a Design,
     pub night: &'a Design,
     pub wanted: Wanted,
-    pub checks: Vec<Check>,
+    checks: Vec<Check>,
     by_mark: Option<f64>,
+    /// What is to be expected of the target, by day.
+    there: Forecast,
+    /// How far each reflectance is seen.
+    reaches: Vec<Reach>,
 }
 
 /// By day or by night, and where each reflectance is seen.
-pub struct Reach {
-    pub reflectance: f64,
+struct Reach {
+    reflectance: f64,
     /// By day and by night, m.
-    pub ranges: [Option<f64>; 2],
+    ranges: [Option<f64>; 2],
     /// At the range wanted, by day.
-    pub there: Forecast,
+    there: Forecast,
 }
 
 impl<'a> Figures<'a> {
     pub fn of(day: &'a Design, night: &'a Design, wanted: Wanted) -> Self {
-        let checks = checks(day, night, &wanted);
-        Self { day, night, wanted, checks, by_mark: mark_by_mark(day, &wanted) }
+        let skies = [day, night].map(Forecaster::new);
+        let reach = |reflectance: f64| Reach {
+            reflectance,
+            ranges: skies.each_ref().map(|sky| sky.reach(wanted.pd, reflectance)),
+            there: skies[0].forecast(reflectance, wanted.range),
+        };
+        Self {
+            day,
+            night,
+            wanted,
+            checks: checks(day, night, &wanted),
+            by_mark: mark_by_mark(day, &wanted),
+            there: skies[0].forecast(wanted.reflectance, wanted.range),
+            reaches: REFLECTANCES.map(reach).into(),
+        }
     }
 
     /// Whether all that must hold holds.
-    pub fn closes(&self) -> bool {
+    fn closes(&self) -> bool {
         self.checks.iter().all(Check::holds)
     }
 
     /// The first thing that fails.
     pub fn first_failure(&self) -> Option<&Check> {
         self.checks.iter().find(|check| !check.holds())
-    }
-
-    /// How far each reflectance is seen.
-    pub fn reaches(&self) -> Vec<Reach> {
-        let skies = [self.day, self.night].map(Forecaster::new);
-        let reach = |reflectance: f64| Reach {
-            reflectance,
-            ranges: skies.each_ref().map(|sky| sky.reach(self.wanted.pd, reflectance)),
-            there: skies[0].forecast(reflectance, self.wanted.range),
-        };
-        REFLECTANCES.map(reach).into()
     }
 
     pub fn text(&self) -> String {
@@ -92,7 +98,7 @@ impl<'a> Figures<'a> {
 
     fn light(&self) -> Columns {
         let mut columns = Columns::default();
-        let there = self.there();
+        let there = &self.there;
         match &self.day.budget {
             None => {
                 columns.push("energy", "unknown: the sensor is declared by what it can see");
@@ -182,7 +188,7 @@ impl<'a> Figures<'a> {
             "by night"
         );
         let metres = |range: Option<f64>| range.map_or("-".to_owned(), |r| format!("{r:.1} m"));
-        for Reach { reflectance, ranges: [day, night], there } in self.reaches() {
+        for Reach { reflectance, ranges: [day, night], there } in &self.reaches {
             text += &format!(
                 "  {:>4.0} % {:>9} {:>9} {:>8} {:>8.4} {:>9.1e} {:>7.3} mm {:>9} {:>9}\n",
                 reflectance * 100.0,
@@ -192,8 +198,8 @@ impl<'a> Figures<'a> {
                 there.pd,
                 there.false_per_shot,
                 there.precision * 1e3,
-                metres(day),
-                metres(night)
+                metres(*day),
+                metres(*night)
             );
         }
         let pd = self.wanted.pd;
@@ -215,18 +221,13 @@ impl<'a> Figures<'a> {
         columns
     }
 
-    /// What is to be expected of the target, by day.
-    pub fn there(&self) -> Forecast {
-        Forecaster::new(self.day).forecast(self.wanted.reflectance, self.wanted.range)
-    }
-
     fn background_per_chip(&self) -> f64 {
         let chip = s_from_fs(self.day.coding.chip_fs);
         self.day.budget.as_ref().map_or(0.0, |budget| budget.background() * chip)
     }
 
     pub fn json(&self) -> Value {
-        let there = self.there();
+        let there = &self.there;
         let budget = self.day.budget.as_ref();
         let marks = self.day.coding.codebook.mean_weight();
         let class = Class1::at(self.day.light.wavelength);
@@ -259,7 +260,7 @@ impl<'a> Figures<'a> {
             "precision_bound_mm": there.bound * 1e3,
             "converter_loss": there.bank_loss,
             "mark_by_mark_shortfall": self.by_mark,
-            "by_reflectance": self.reaches().iter().map(reach_json).collect::<Vec<_>>(),
+            "by_reflectance": self.reaches.iter().map(reach_json).collect::<Vec<_>>(),
             "checks": self.checks.iter().map(check_json).collect::<Vec<_>>(),
             "first_failure": self.first_failure().map(check_json),
             "closes": self.closes(),
@@ -308,10 +309,4 @@ fn by(factor: f64) -> String {
         factor if factor.is_finite() => format!(" by a factor of {}", short(factor)),
         _ => " whatever the factor".to_owned(),
     }
-}
-
-/// Lines under a heading; nothing where there are none.
-fn section(heading: &str, columns: &Columns) -> String {
-    let lines = columns.text();
-    if lines.is_empty() { lines } else { format!("\n{heading}\n{lines}") }
 }

@@ -6,7 +6,7 @@ use macropulse::design::{Derived, Design};
 use serde_json::{Map, Value, json};
 
 use super::Report;
-use crate::text::{Columns, counted, grouped, short};
+use crate::text::{Columns, counted, grouped, section, short};
 
 /// What follows from a sensor, and what it takes for granted.
 pub fn report(design: &Design) -> Report {
@@ -29,12 +29,6 @@ pub fn report(design: &Design) -> Report {
     warnings.push_list("!", design.warnings.iter().cloned());
     text += &section("Warnings", &warnings);
     Report { text, json: json(design, &derived) }
-}
-
-/// Lines under a heading; nothing where there are none.
-fn section(heading: &str, columns: &Columns) -> String {
-    let lines = columns.text();
-    if lines.is_empty() { lines } else { format!("\n{heading}\n{lines}") }
 }
 
 fn times(design: &Design, derived: &Derived) -> Columns {

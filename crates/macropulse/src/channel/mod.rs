@@ -32,8 +32,8 @@ pub struct Echoes {
     pub delay_fs: Vec<i64>,
     /// Mean number of photons detected per mark; infinite for a detector that never misses.
     pub photons: Vec<f64>,
-    /// Which of the [`PARTS`] of the macropulse it is an echo of; empty where
-    /// all of it takes the same way.
+    /// Which of the [`PARTS`] of the macropulse it is an echo of; empty where all of it takes the
+    /// same way.
     pub part: Vec<u8>,
     /// Light of other lidars that arrives beside them.
     pub foreign: Foreign,
@@ -124,8 +124,9 @@ impl Link {
     ///
     /// What a foreign mark brings follows from the sensitivity that the other declares of itself,
     /// n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector like its
-    /// own, which ours are taken to be unless both have a link budget. A detector of ours that never misses sees every mark; of
-    /// another that never misses, by which its energy is left open, ours is assumed.
+    /// own, which ours are taken to be unless both have a link budget. A detector of ours that never
+    /// misses sees every mark; of another that never misses, by which its energy is left open, ours
+    /// is assumed.
     pub fn of_other(ours: &Design, other: &Design) -> Option<Self> {
         let filter = ours.budget.as_ref().map_or(FILTER, |budget| budget.filter / 2.0);
         if (ours.light.wavelength - other.light.wavelength).abs() > filter {
@@ -148,8 +149,7 @@ impl Link {
         if reflectance <= 0.0 || back <= 0.0 {
             return 0.0;
         }
-        let transmission = libm::exp(-self.extinction * way);
-        self.photons_at_one_metre * reflectance * transmission / (back * back)
+        self.photons_at_one_metre * reflectance * self.transmission(way) / (back * back)
     }
 
     /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which

@@ -155,8 +155,8 @@ mod tests {
         [cos_e * cos_a, cos_e * sin_a, sin_e]
     }
 
-    #[test]
-    fn every_pixel_has_the_direction_of_the_formula_to_the_last_bit() {
+    /// A sensor of every pattern, with its name.
+    fn of_every_pattern() -> [(&'static str, Design); 4] {
         let together = [("scan.spinning.firing".to_owned(), "together".to_owned())];
         let sensors = [
             ("kim-park-2016", &[][..]),
@@ -164,8 +164,12 @@ mod tests {
             ("hdl-64e", &together),
             ("peregrine", &[]),
         ];
-        for (name, set) in sensors {
-            let design = Design::open(name, set).unwrap();
+        sensors.map(|(name, set)| (name, Design::open(name, set).unwrap()))
+    }
+
+    #[test]
+    fn every_pixel_has_the_direction_of_the_formula_to_the_last_bit() {
+        for (name, design) in of_every_pattern() {
             for row in 0..design.scan.rows as u16 {
                 // Every column of a large image would take long.
                 for column in (0..design.scan.columns as u16).step_by(7) {
@@ -178,15 +182,7 @@ mod tests {
 
     #[test]
     fn every_pixel_is_found_where_it_lies() {
-        let together = [("scan.spinning.firing".to_owned(), "together".to_owned())];
-        let sensors = [
-            ("kim-park-2016", &[][..]),
-            ("hdl-64e", &[]),
-            ("hdl-64e", &together),
-            ("peregrine", &[]),
-        ];
-        for (name, set) in sensors {
-            let design = Design::open(name, set).unwrap();
+        for (name, design) in of_every_pattern() {
             for row in 0..design.scan.rows as u16 {
                 for column in (0..design.scan.columns as u16).step_by(11) {
                     let found = design.scan.pixel_at(design.directions().of(row, column));

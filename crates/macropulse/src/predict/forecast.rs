@@ -68,7 +68,7 @@ impl<'a> Forecaster<'a> {
         for weight in sent.filter(|&weight| weight > 0) {
             *weights.entry(weight).or_insert(0) += 1;
         }
-        let pixel_period = design.scan_period() / design.shots_per_scan() as f64;
+        let pixel_period = design.derived().pixel_period;
         let mean_weight = codebook.mean_weight();
         Self { design, pixel_period, weights, mean_weight, light: 1.0, background: 1.0 }
     }

@@ -59,31 +59,16 @@ pub(super) fn efficiency(file: &DetectorFile) -> (&'static str, Option<f64>) {
 
 impl Check<'_> {
     pub(super) fn detector(&self, file: &DetectorFile, before: &Before) -> Result<Detector, Error> {
-        let detector = match file {
-            DetectorFile {
-                photon_counting: Some(counting),
-                geiger: None,
-                linear: None,
-                first_firing: None,
-            } => Detector::PhotonCounting(self.photon_counting(counting, before)?),
-            DetectorFile {
-                photon_counting: None,
-                geiger: Some(geiger),
-                linear: None,
-                first_firing: None,
-            } => Detector::Geiger(self.geiger(geiger, before)?),
-            DetectorFile {
-                photon_counting: None,
-                geiger: None,
-                linear: Some(linear),
-                first_firing: None,
-            } => Detector::Linear(self.linear(linear, before)?),
-            DetectorFile {
-                photon_counting: None,
-                geiger: None,
-                linear: None,
-                first_firing: Some(firing),
-            } => Detector::FirstFiring(self.first_firing(firing, before)?),
+        let kinds = (&file.photon_counting, &file.geiger, &file.linear, &file.first_firing);
+        let detector = match kinds {
+            (Some(counting), None, None, None) => {
+                Detector::PhotonCounting(self.photon_counting(counting, before)?)
+            }
+            (None, Some(geiger), None, None) => Detector::Geiger(self.geiger(geiger, before)?),
+            (None, None, Some(linear), None) => Detector::Linear(self.linear(linear, before)?),
+            (None, None, None, Some(firing)) => {
+                Detector::FirstFiring(self.first_firing(firing, before)?)
+            }
             _ => {
                 return self.refuse(
                     "detector",
