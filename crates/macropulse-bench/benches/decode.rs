@@ -10,13 +10,14 @@ mod common;
 use std::hint::black_box;
 
 use common::{Met, SEED, clock, conditions, detector, spread};
-use macropulse::decode::Returns;
+use macropulse::codec::ShotLog;
+use macropulse::codec::Ticks;
+use macropulse::codec::decode::Returns;
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
-use macropulse::emit::{Band, ShotLog};
+use macropulse::emit::Band;
 use macropulse::random::Chance;
 use macropulse::scene::Hits;
-use macropulse::tdc::Ticks;
 use macropulse::units;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
@@ -67,7 +68,7 @@ impl<'a> Sample<'a> {
     }
 
     fn shots(&self) -> usize {
-        self.bands.iter().map(|(log, ..)| log.home.len()).sum()
+        self.bands.iter().map(|(log, ..)| log.owned.len()).sum()
     }
 
     fn ticks(&self) -> usize {
@@ -118,7 +119,7 @@ struct Score {
 impl Score {
     fn add(&mut self, design: &Design, log: &ShotLog, (hits, returns): (&Hits, &Returns)) {
         let gate = design.scan.min_range..=design.scan.max_range;
-        for shot in log.home.clone() {
+        for shot in log.owned.clone() {
             let own = hits.shot.partition_point(|&other| (other as usize) < shot)
                 ..hits.shot.partition_point(|&other| other as usize <= shot);
             let mut ranges = hits.range[own].iter().filter(|range| gate.contains(range)).peekable();

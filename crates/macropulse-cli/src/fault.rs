@@ -4,7 +4,8 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use macropulse::{design, formats, paper, record, scene, sweep};
+use macropulse::{design, formats, scene};
+use macropulse_study::{paper, record, sweep};
 
 /// Why a command did not do what was asked.
 #[derive(Debug)]

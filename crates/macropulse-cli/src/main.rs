@@ -28,10 +28,17 @@ use options::{Command, Options};
 
 fn main() -> ExitCode {
     let done = match Options::try_parse() {
-        Ok(options) => options.common.use_threads().and_then(|()| run(&options)),
+        Ok(options) => {
+            kernels().and_then(|()| options.common.use_threads()).and_then(|()| run(&options))
+        }
         Err(usage) => fault::usage(&usage),
     };
     done.map_or_else(|fault| fault.report(), |()| ExitCode::SUCCESS)
+}
+
+/// Refuses a set of instructions that is misspelt or that this machine does not have.
+fn kernels() -> Result<(), Fault> {
+    macropulse::codec::level::asked_for().map(|_| ()).map_err(Fault::Wrong)
 }
 
 fn run(options: &Options) -> Result<(), Fault> {

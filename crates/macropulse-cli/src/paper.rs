@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use macropulse::paper::{self, Findings, Verdict};
 use macropulse::sim::Watch;
+use macropulse_study::paper::{self, Findings, Verdict};
 use serde_json::json;
 
 use crate::fault::Fault;

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
-use macropulse::paper::PERFECT;
 use macropulse::scene::Scene;
 use macropulse::sim::{self, Scans, Tally, Watch};
+use macropulse_study::paper::PERFECT;
 use serde_json::json;
 
 use crate::fault::Fault;

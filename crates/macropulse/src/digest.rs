@@ -2,28 +2,34 @@
 
 /// The 64-bit FNV-1a hash \[FNV\] under way: the same on every machine and run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Fnv(u64);
+pub struct Fnv(u64);
+
+impl Default for Fnv {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 impl Fnv {
     /// The hash of nothing.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
 
     /// Takes in some bytes.
-    pub(crate) fn bytes(&mut self, bytes: &[u8]) {
+    pub fn bytes(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
         }
     }
 
     /// Takes in a number, to its last bit.
-    pub(crate) fn number(&mut self, value: f64) {
+    pub fn number(&mut self, value: f64) {
         self.bytes(&value.to_bits().to_le_bytes());
     }
 
     /// The hash as sixteen hexadecimal digits.
-    pub(crate) fn text(self) -> String {
+    pub fn text(self) -> String {
         format!("{:016x}", self.0)
     }
 }

@@ -21,26 +21,23 @@
 #![cfg_attr(test, allow(missing_docs))]
 
 pub mod design;
-pub mod code;
 pub mod emit;
 pub mod scene;
 pub mod channel;
 pub mod detect;
 pub mod tdc;
-pub mod decode;
 pub mod points;
 pub mod score;
 pub mod formats;
-pub mod view;
+
+/// What both ends of the link speak, and the receivers.
+pub use macropulse_codec as codec;
 
 pub mod sim;
-pub mod record;
-pub mod sweep;
-pub mod paper;
 
 pub mod predict;
 pub mod random;
 pub mod units;
 pub mod names;
-mod digest;
+pub mod digest;
 mod kernels;

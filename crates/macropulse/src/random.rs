@@ -2,7 +2,7 @@
 //!
 //! Every random number belongs to an address (seed, stage, index, part), where the index is a shot
 //! or a time window. Whoever computes that shot, in whatever order, on whatever thread, draws the
-//! same numbers; the overlap between neighbouring bands sees the same edges as their home band
+//! same numbers; the overlap between neighbouring bands sees the same edges as their owned band
 //! does. The numbers are a function of their address, Philox4x32-10 \[SMDS11\]; there is no state
 //! that a stage could leave behind.
 
@@ -158,7 +158,7 @@ mod tests {
             let mut numbers = Vec::new();
             Chance::new(seed).draw(Address { stage, index, part }, 100, &mut numbers).to_vec()
         };
-        let home = numbers(7, Stage::Marks, 12, 0);
+        let owned = numbers(7, Stage::Marks, 12, 0);
         let others = [
             numbers(8, Stage::Marks, 12, 0),
             numbers(7 | 1 << 40, Stage::Marks, 12, 0),
@@ -169,7 +169,7 @@ mod tests {
         ];
         for other in others {
             // Of a hundred numbers of 32 bits that are drawn at random hardly one is the same.
-            assert!(home.iter().zip(&other).filter(|(a, b)| a == b).count() < 2);
+            assert!(owned.iter().zip(&other).filter(|(a, b)| a == b).count() < 2);
         }
     }
 

@@ -7,15 +7,17 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::channel::Foreign;
-use crate::decode::{Reject, Returns};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
-use crate::emit::{Band, ShotLog, bands};
+use crate::emit::{Band, bands};
 use crate::points::PointCloud;
 use crate::random::Chance;
 use crate::scene::{Hits, Scene};
 use crate::score::{self, Score};
+use crate::tdc::Converted;
 use crate::{channel, tdc};
+use macropulse_codec::ShotLog;
+use macropulse_codec::decode::{Reject, Returns};
 
 /// One scan, measured.
 #[derive(Debug, Clone)]
@@ -170,19 +172,19 @@ fn measure(
     let edges = detectors.edges(&log, &echoes, memory);
     tally.edges = edges.time.len() as u64;
     lap(&mut tally);
-    let ticks = tdc::ticks(design, edges);
+    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, edges);
     lap(&mut tally);
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
     lap(&mut tally);
-    let home = |shot: &u32| log.home.contains(&(*shot as usize));
-    tally.shots = log.home.len() as u64;
-    tally.surfaces = hits.shot.iter().filter(|s| home(s)).count() as u64;
-    tally.echoes = echoes.shot.iter().filter(|s| home(s)).count() as u64;
+    let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
+    tally.shots = log.owned.len() as u64;
+    tally.surfaces = hits.shot.iter().filter(|s| owned(s)).count() as u64;
+    tally.echoes = echoes.shot.iter().filter(|s| owned(s)).count() as u64;
     tally.foreign = echoes.foreign.len() as u64;
     tally.ticks = ticks.tick.len() as u64;
-    tally.merged = ticks.merged;
-    tally.lost = ticks.lost;
-    tally.peak_busy = ticks.peak_busy;
+    tally.merged = merged;
+    tally.lost = lost;
+    tally.peak_busy = peak_busy;
     tally.returns = returns.shot.len() as u64;
     tally.rejects = returns.rejects;
     memory.take_back(ticks.tick);
@@ -192,8 +194,8 @@ fn measure(
 /// The last stage, after those of a band: its points and their score.
 const POINTS: usize = 6;
 
-/// Counts of a run, stage by stage. Foreign light, edges and ticks include the halos of the bands;
-/// the other counts are of home shots alone.
+/// Counts of a run, stage by stage. Foreign light, edges and ticks include the guard shots of the
+/// bands; the other counts are of owned shots alone.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
     /// Shots fired.

@@ -3,6 +3,8 @@
 //! Inside, every `f64` is in SI base units. Absolute time is an integer number of femtoseconds
 //! since the first scan began (`i64`, good for ±2.5 h); 1 fs is 0.15 µm of range.
 
+pub use macropulse_codec::time::{FS_PER_S, fs_from_s, s_from_fs};
+
 use crate::kernels::whole;
 
 /// Speed of light in vacuum, m/s (exact, SI 2019).
@@ -16,9 +18,6 @@ pub const ELEMENTARY_CHARGE: f64 = 1.602_176_634e-19;
 
 /// rms length of a Gaussian over its full width at half maximum: 1/(2·√(2·ln 2)).
 pub const RMS_OF_FWHM: f64 = 0.424_660_900_144_009_5;
-
-/// Femtoseconds in a second.
-pub const FS_PER_S: i64 = 1_000_000_000_000_000;
 
 /// One-way range in metres of an echo whose light was `tof` seconds under way, there and back.
 ///
@@ -39,16 +38,6 @@ pub fn tof_fs_from_ranges(ranges: &[f64]) -> Vec<i64> {
     let mut tof_fs = vec![0; ranges.len()];
     whole(ranges, 2.0, SPEED_OF_LIGHT, FS_PER_S as f64, &mut tof_fs);
     tof_fs
-}
-
-/// Seconds to whole femtoseconds, rounded to the nearest.
-pub fn fs_from_s(seconds: f64) -> i64 {
-    (seconds * FS_PER_S as f64).round() as i64
-}
-
-/// Femtoseconds to seconds.
-pub fn s_from_fs(fs: i64) -> f64 {
-    fs as f64 / FS_PER_S as f64
 }
 
 #[cfg(test)]

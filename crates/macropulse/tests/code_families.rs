@@ -5,17 +5,17 @@
 
 use std::collections::BTreeSet;
 
-use macropulse::code::correlation::{
+use macropulse::codec::code::correlation::{
     CrossCorrelation, aperiodic_sidelobe, balanced, bipolar, periodic, periodic_sidelobe,
 };
-use macropulse::code::{CodeWord, Family};
+use macropulse::codec::code::{CodeWord, Family};
 use macropulse::predict::multiple_access::{Hits, MultipleAccess, bit_error_hard, bit_error_soft};
 
 const PRIMES: [u32; 8] = [5, 7, 11, 13, 17, 19, 23, 29];
 
 /// Highest periodic and aperiodic sidelobe of any of the `words`.
 fn sidelobes(words: &[CodeWord]) -> (u16, u16) {
-    let highest = |of: fn(&CodeWord) -> Option<macropulse::code::correlation::Sidelobe>| {
+    let highest = |of: fn(&CodeWord) -> Option<macropulse::codec::code::correlation::Sidelobe>| {
         words.iter().filter_map(of).map(|lobe| lobe.height).max().unwrap()
     };
     (highest(periodic_sidelobe), highest(aperiodic_sidelobe))

@@ -235,12 +235,12 @@ fn other_words_are_not_found() {
     let echoes = macropulse::channel::echoes(&design, &scene.materials, &hits);
     let detectors = macropulse::detect::Detectors::new(&design, macropulse::random::Chance::new(1));
     let edges = detectors.edges(&log, &echoes, &mut Default::default());
-    let ticks = macropulse::tdc::ticks(&design, edges);
+    let ticks = macropulse::tdc::ticks(&design, edges).ticks;
     let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).len();
     let mut wrong = log.clone();
     wrong.word.iter_mut().for_each(|word| *word = (*word + 50) % 100);
-    assert!(found(&log) > log.home.len() * 9 / 10);
-    assert!(found(&wrong) < log.home.len() / 50, "{}", found(&wrong));
+    assert!(found(&log) > log.owned.len() * 9 / 10);
+    assert!(found(&wrong) < log.owned.len() / 50, "{}", found(&wrong));
 }
 
 /// Light that is always there: one place in five is lit, 78 GHz at 2.5 ps. The balance stands it.

@@ -289,7 +289,7 @@ fn neighbouring_bands_agree_where_they_overlap() {
             .map(|band| edges(&design, &scene, &band, false))
             .collect();
         let seam = Band { scan: 3, first: 121 * 1696, shots: 1 }.shot_log(&design);
-        let seam = seam.fired_at_fs[seam.home.start] / 2500 * 64;
+        let seam = seam.fired_at_fs[seam.owned.start] / 2500 * 64;
         let near = seam - 10 * 16_378 * 64..seam + 20 * 16_378 * 64;
         let within = |times: &[i64]| -> Vec<i64> {
             times.iter().copied().filter(|time| near.contains(time)).collect()

@@ -3,10 +3,10 @@
 // Refusals of what the tests themselves write are failures of the tests.
 #![allow(clippy::unwrap_used)]
 
-use macropulse::code::correlation::{
+use macropulse::codec::code::correlation::{
     CrossCorrelation, Sidelobe, aperiodic, aperiodic_sidelobe, periodic, periodic_sidelobe,
 };
-use macropulse::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, prime_sequence};
+use macropulse::codec::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, prime_sequence};
 use macropulse::predict::multiple_access::{
     Hits, MultipleAccess, Words, bit_error_gaussian, bit_error_hard, bit_error_soft,
 };

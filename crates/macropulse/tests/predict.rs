@@ -7,9 +7,10 @@
 use std::path::Path;
 
 use macropulse::channel::Echoes;
+use macropulse::codec::ShotLog;
 use macropulse::design::{Design, Detector};
 use macropulse::detect::{Detectors, Memory};
-use macropulse::emit::{Band, ShotLog, bands};
+use macropulse::emit::{Band, bands};
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
 use macropulse::predict::detection::{armed, bank_loss, mark_pd};
@@ -178,7 +179,7 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
             let detectors = Detectors::new(&design, Chance::new(2));
             let found = detectors.edges(&log, &echoes, &mut Memory::default());
             // Several photons of one mark are one tick.
-            let edges = tdc::ticks(&design, found).tick.len() as u64;
+            let edges = tdc::ticks(&design, found).ticks.tick.len() as u64;
             let predicted = mark_pd(&design.detector, photons, 0.0);
             assert!(
                 agrees(edges, marks, predicted),
@@ -238,7 +239,7 @@ fn a_small_bank_loses_what_erlang_says() {
             let detectors = Detectors::new(&design, Chance::new(4));
             let found = detectors.edges(&log, &Echoes::default(), &mut Memory::default());
             let ticks = tdc::ticks(&design, found);
-            edges += ticks.tick.len() as u64 + ticks.lost;
+            edges += ticks.ticks.tick.len() as u64 + ticks.lost;
             lost += ticks.lost;
         }
         let mut bank = design.tdc.clone();

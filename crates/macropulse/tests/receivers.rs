@@ -9,9 +9,9 @@
 #[path = "receivers/street.rs"]
 mod street;
 
-use macropulse::code::Codebook;
-use macropulse::decode::ReceiverKind::{Blind, Literal, Matched};
-use macropulse::decode::Reject;
+use macropulse::codec::code::Codebook;
+use macropulse::codec::decode::ReceiverKind::{Blind, Literal, Matched};
+use macropulse::codec::decode::Reject;
 use street::{CLEAR, Scene, Score, Sensor, Weather, car, random, sky, slope};
 
 const SCENES: [(&str, Scene); 3] = [("car", car), ("slope", slope), ("random", random)];
@@ -148,7 +148,7 @@ fn false_edges_alone_are_no_return() {
 }
 
 /// Decodes with the labels of a sensor that has been fired with other ones.
-fn decoded_with_other_labels(kind: macropulse::decode::ReceiverKind) -> (u32, u64, u64) {
+fn decoded_with_other_labels(kind: macropulse::codec::decode::ReceiverKind) -> (u32, u64, u64) {
     let sensor = Sensor::printed(kind);
     let mut log = sensor.log(0..4);
     let ticks = sensor.ticks(&log, slope, CLEAR);

@@ -104,7 +104,7 @@ fn the_flash() {
     assert_same_on_any_pool("peregrine", Part::Whole);
 }
 
-/// A band comes out the same alone as among others: halos draw what their neighbours draw.
+/// A band comes out the same alone as among others: guard shots draw what their neighbours draw.
 #[test]
 fn a_band_alone_and_among_its_neighbours() {
     let both = scan("kim-park-2016", Part::Road(2), (SEED, 2)).cloud;

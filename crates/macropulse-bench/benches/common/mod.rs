@@ -6,12 +6,14 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use macropulse::channel;
+use macropulse::codec::ShotLog;
+use macropulse::codec::Ticks;
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
-use macropulse::emit::{Band, ShotLog, bands};
+use macropulse::emit::{Band, bands};
 use macropulse::random::{Chance, Stage};
 use macropulse::scene::{Hits, Material, Scene};
-use macropulse::tdc::{self, Ticks};
+use macropulse::tdc;
 use rand::RngExt;
 
 /// Seed of all that is drawn.
@@ -85,13 +87,13 @@ impl Met {
     ) -> (ShotLog, Ticks) {
         let log = band.shot_log(design);
         let echoes = channel::echoes(design, &self.materials, hits);
-        let ticks = tdc::ticks(design, detectors.edges(&log, &echoes, memory));
-        (log, ticks)
+        let converted = tdc::ticks(design, detectors.edges(&log, &echoes, memory));
+        (log, converted.ticks)
     }
 }
 
 /// `count` bands spread evenly over a scan, or all of them. It is the second scan: its first band
-/// has a halo before it.
+/// has guard shots before it.
 pub fn spread(design: &Design, count: usize) -> Vec<Band> {
     let all: Vec<Band> = bands(design, 1).collect();
     let count = count.min(all.len());

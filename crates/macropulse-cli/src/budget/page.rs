@@ -2,7 +2,7 @@
 
 use macropulse::design::Design;
 use macropulse::predict::{Forecast, Forecaster};
-use macropulse::view::{Axis, Block, Chart, Figure, Hue, Line, Page, Section, Series, Style};
+use macropulse_study::view::{Axis, Block, Chart, Figure, Hue, Line, Page, Section, Series, Style};
 
 use super::figures::{Figures, REFLECTANCES};
 

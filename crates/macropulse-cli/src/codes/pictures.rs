@@ -5,7 +5,7 @@ use std::path::Path;
 use macropulse::formats::write_atomically;
 use macropulse::predict::comparison::Comparison;
 use macropulse::predict::multiple_access::{MultipleAccess, bit_error_hard, bit_error_soft};
-use macropulse::view::{Axis, Chart, MatrixPicture, Style, standalone};
+use macropulse_study::view::{Axis, Chart, MatrixPicture, Style, standalone};
 
 use crate::fault::Fault;
 

@@ -5,10 +5,10 @@ use std::time::Instant;
 use macropulse::design::Design;
 use macropulse::formats::{Format, Manifest};
 use macropulse::points::Truth;
-use macropulse::record::{self, COLOUR};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::{Scans, Tally, Watch};
+use macropulse_study::record::{self, COLOUR};
 
 use super::scenario::Scenario;
 use crate::fault::{Fault, complain};

@@ -1,6 +1,6 @@
 //! What is printed of a run.
 
-use macropulse::decode::Reject;
+use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
 use serde_json::{Map, Value, json};
 

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use macropulse::sim::Watch;
-use macropulse::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
+use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
 use crate::fault::{Fault, complain};
 use crate::interrupt::Interrupt;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use macropulse::score::Estimate;
-use macropulse::sweep::{Plan, Point, Shard, Table};
+use macropulse_study::sweep::{Plan, Point, Shard, Table};
 use serde_json::{Value, json};
 
 use crate::text::{NO_BREAK, counted, grouped, short};

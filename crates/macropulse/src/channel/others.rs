@@ -22,9 +22,10 @@ use std::ops::Range;
 
 use super::Link;
 use crate::design::Design;
-use crate::emit::ShotLog;
+use crate::emit::shot_at;
 use crate::scene::{Lit, Look, Material, Other, Scene};
 use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
+use macropulse_codec::ShotLog;
 
 /// Radius of every aperture, m: what sensor files leave unsaid.
 pub const APERTURE_RADIUS: f64 = 12.5e-3;
@@ -154,14 +155,13 @@ fn listens(
     let closes = |shot: usize| log.fired_at_fs[shot] + design.reach_fs() + before;
     let field = design.budget.as_ref().map(|budget| budget.field);
     if let Some(field) = field.filter(|field| field.trailing.is_some()) {
-        return log.shot_at(design, pixel).is_some_and(|shot| {
+        return shot_at(design, log, pixel).is_some_and(|shot| {
             let since_fs = arrives_fs - log.fired_at_fs[shot];
             since_fs >= 0 && field.share(s_from_fs(since_fs)) > 0.0
         });
     }
     design.channels() == 1
-        || log
-            .shot_at(design, pixel)
+        || shot_at(design, log, pixel)
             .is_some_and(|shot| (opens(shot)..closes(shot)).contains(&arrives_fs))
 }
 

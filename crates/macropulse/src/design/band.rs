@@ -1,7 +1,7 @@
 //! How long a stretch of time may be that is computed in one go.
 //!
 //! Edges are timed in 32 bits, in parts of a tick. What a band sees must lie within: its shots,
-//! those of its halo, and their echoes.
+//! its guard shots, and their echoes.
 
 use super::Design;
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
@@ -26,11 +26,11 @@ impl Design {
         (most * FS_PER_S as f64).ceil() as i64
     }
 
-    /// The longest time from the first to the last shot of a band without its halo, fs; negative
+    /// The longest time from the first to the last shot of a band without its guard shots, fs; negative
     /// where not even one shot has room.
     pub fn longest_band_fs(&self) -> i64 {
         let counted = i64::from(u32::MAX / PARTS_OF_TICK).saturating_mul(self.tdc.tick_fs);
-        // A halo on both sides, and the echoes of the last shot.
+        // Guard shots on both sides, and the echoes of the last shot.
         let reaches = if self.is_coded() { 3 } else { 1 };
         // The clock starts at one of its own periods, and jitter goes both ways.
         counted - reaches * self.reach_fs() - 2 * self.most_jitter_fs() - 2 * self.tdc.clock_fs

@@ -1,5 +1,7 @@
 //! What a detector is set to.
 
+use macropulse_codec::statistics::normal_quantile;
+
 /// Light to edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Detector {
@@ -127,4 +129,34 @@ pub struct Sensitivity {
     pub range: f64,
     /// Reflectance of the reference target.
     pub reflectance: f64,
+}
+
+/// Mean photons for which a detector that needs `needed` photons fires with probability `pd`,
+/// when white noise of `noise` photons rms is added.
+///
+/// One photon: n = −ln(1 − pd). More: the sum of Poisson and Gaussian fluctuation reaches the
+/// threshold, n − z·√(n + a²) = m with z = Φ⁻¹(pd).
+pub(super) fn photons_for(pd: f64, needed: u32, noise: f64) -> f64 {
+    if pd >= 1.0 {
+        return f64::INFINITY;
+    }
+    if needed == 1 && noise == 0.0 {
+        return -libm::log1p(-pd);
+    }
+    let (m, z) = (f64::from(needed), normal_quantile(pd));
+    // n² − (2m + z²)·n + m² − z²a² = 0
+    let half = m + z * z / 2.0;
+    let root = (half * half - (m * m - z * z * noise * noise)).max(0.0).sqrt();
+    (half + z.signum() * root).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_photon_without_noise_is_the_geiger_law() {
+        approx::assert_relative_eq!(photons_for(0.99, 1, 0.0), 4.605_170_186, max_relative = 1e-9);
+        assert_eq!(photons_for(1.0, 400, 20.0), f64::INFINITY);
+    }
 }

@@ -6,8 +6,8 @@ use super::Error;
 use super::check::family;
 use super::document::FAMILIES;
 use super::file::FamilyFile;
-use crate::code::Family;
 use crate::names::nearest;
+use macropulse_codec::code::Family;
 
 /// The code family written as in a sensor file behind `code.family`, without the outer braces:
 /// `prime = 29`, or `orthogonal = { length = 1000, weight = 5 }`.

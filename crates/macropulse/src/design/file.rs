@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::decode::Effort;
+use macropulse_codec::decode::Effort;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

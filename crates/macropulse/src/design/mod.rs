@@ -35,9 +35,9 @@ pub use family::family_from_toml;
 pub use file::{Firing, Label, Mirror};
 pub use presets::{names as preset_names, text as preset_text};
 
-use crate::code::Codebook;
-use crate::decode::Receiver;
 use crate::digest::Fnv;
+use macropulse_codec::code::Codebook;
+use macropulse_codec::decode::Receiver;
 
 /// A sensor, checked, in SI units.
 #[derive(Debug, Clone)]

@@ -16,6 +16,7 @@
 //! echo the more the stronger it is; as real sensors do, the mean of that walk is calibrated out
 //! with the amplitude measured.
 
+use macropulse_codec::statistics::normal_quantile;
 use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 
 use super::others::{Flash, flashes};
@@ -45,7 +46,8 @@ pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges
         let photons = (photons.min(PLENTY) + firing.noise_photons * noise).max(0.0);
         let draw: f64 = gamma.sample(stream);
         (draw < photons).then(|| {
-            let early = quantile(draw / photons) - quantile((needed / photons).min(LATEST));
+            let early =
+                normal_quantile(draw / photons) - normal_quantile((needed / photons).min(LATEST));
             (delay_fs as f64 + rms_fs * early, photons)
         })
     };
@@ -92,72 +94,12 @@ pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges
     }
 }
 
-/// Mean photons for which a detector that needs `needed` photons fires with probability `pd`,
-/// when white noise of `noise` photons rms is added.
-///
-/// One photon: n = −ln(1 − pd). More: the sum of Poisson and Gaussian fluctuation reaches the
-/// threshold, n − z·√(n + a²) = m with z = Φ⁻¹(pd).
-pub fn photons_for(pd: f64, needed: u32, noise: f64) -> f64 {
-    if pd >= 1.0 {
-        return f64::INFINITY;
-    }
-    if needed == 1 && noise == 0.0 {
-        return -libm::log1p(-pd);
-    }
-    let (m, z) = (f64::from(needed), quantile(pd));
-    // n² − (2m + z²)·n + m² − z²a² = 0
-    let half = m + z * z / 2.0;
-    let root = (half * half - (m * m - z * z * noise * noise)).max(0.0).sqrt();
-    (half + z.signum() * root).max(0.0)
-}
-
-/// Quantile of the standard normal distribution, Φ⁻¹(p), from the rational approximation of
-/// \[Acklam03\] (relative error below 1.2e-9) without further refinement.
-pub(super) fn quantile(p: f64) -> f64 {
-    const A: [f64; 6] = [
-        -3.969683028665376e1,
-        2.209460984245205e2,
-        -2.759285104469687e2,
-        1.38357751867269e2,
-        -3.066479806614716e1,
-        2.506628277459239,
-    ];
-    const B: [f64; 5] = [
-        -5.447609879822406e1,
-        1.615858368580409e2,
-        -1.556989798598866e2,
-        6.680131188771972e1,
-        -1.328068155288572e1,
-    ];
-    const C: [f64; 6] = [
-        -7.784894002430293e-3,
-        -3.223964580411365e-1,
-        -2.400758277161838,
-        -2.549732539343734,
-        4.374664141464968,
-        2.938163982698783,
-    ];
-    const D: [f64; 4] =
-        [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416];
-    let horner = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, a| sum * x + a);
-    let p = p.clamp(1e-300, 1.0 - 1e-16);
-    let tail = p.min(1.0 - p);
-    if tail < 0.02425 {
-        let q = libm::sqrt(-2.0 * libm::log(tail));
-        let x = horner(&C, q) / (horner(&D, q) * q + 1.0);
-        return if p < 0.5 { x } else { -x };
-    }
-    let q = p - 0.5;
-    let r = q * q;
-    horner(&A, r) * q / (horner(&B, r) * r + 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::channel::Echoes;
     use crate::design::Design;
-    use crate::emit::ShotLog;
+    use macropulse_codec::ShotLog;
 
     /// The edges of shots that all have an echo of so many photons, in the first nine bands or
     /// what the sensor has of them.
@@ -186,21 +128,6 @@ mod tests {
             .map(|(key, value)| (format!("detector.first-firing.{key}"), (*value).to_owned()))
             .collect();
         Design::open(name, &keys).unwrap()
-    }
-
-    #[test]
-    fn the_normal_quantile_is_right() {
-        for (p, x) in
-            [(0.5, 0.0), (0.975, 1.959_963_985), (1e-6, -4.753_424_309), (0.99, 2.326_347_874)]
-        {
-            approx::assert_abs_diff_eq!(quantile(p), x, epsilon = 1e-7);
-        }
-    }
-
-    #[test]
-    fn one_photon_without_noise_is_the_geiger_law() {
-        approx::assert_relative_eq!(photons_for(0.99, 1, 0.0), 4.605_170_186, max_relative = 1e-9);
-        assert_eq!(photons_for(1.0, 400, 20.0), f64::INFINITY);
     }
 
     /// H0: the reference target is detected with the Pd declared. N = 4096 + 8640 shots, seed 5,

@@ -8,7 +8,7 @@
 //! 3. Each firing makes an edge with Gaussian jitter. All cells share one output.
 //!
 //! A single cell with a dead time as long as the range gate is the detector that fires once per
-//! arm time. All cells are armed when a band begins, a range gate before its first home shot.
+//! arm time. All cells are armed when a band begins, a range gate before its first owned shot.
 
 use rand::RngExt;
 use rand_distr::{Distribution, Poisson, StandardNormal};

@@ -6,7 +6,7 @@
 //! by rounding first. Jitter of more than [`EXACT`] parts is drawn coarser and spread evenly
 //! within the cell.
 
-use std::f64::consts::FRAC_1_SQRT_2;
+use macropulse_codec::statistics::normal_tail;
 
 use crate::design::MOST_SIGMA;
 use crate::kernels::{delay, drawn};
@@ -77,7 +77,7 @@ impl Jitter {
 fn probability(value: i16, sigma: f64) -> f64 {
     // Where it is small it is the difference of small numbers, not of large ones.
     let from = f64::from(value).abs() - 0.5;
-    let beyond = |x: f64| 0.5 * libm::erfc(x / sigma * FRAC_1_SQRT_2);
+    let beyond = |x: f64| normal_tail(x / sigma);
     beyond(from) - beyond(from + 1.0)
 }
 

@@ -121,7 +121,7 @@ mod tests {
         let quiet = [("detector.linear.false_alarm_hz".to_owned(), "1.0".to_owned())];
         let design = Design::open("coded-practical", &quiet).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
-        let shot = log.home.start;
+        let shot = log.owned.start;
         let edges = |apart_fs: i64, photons: f64| {
             let echoes = Echoes {
                 shot: vec![shot as u32; 7],

@@ -13,8 +13,6 @@ mod others;
 mod photon_counting;
 mod shape;
 
-pub use first_firing::photons_for;
-
 use std::ops::{Range, RangeInclusive};
 
 use clock::Clock;
@@ -25,9 +23,9 @@ use shape::Shape;
 
 use crate::channel::{Echoes, PARTS};
 use crate::design::{Design, Detector, FirstFiring};
-use crate::emit::ShotLog;
 use crate::kernels::GROUP;
 use crate::random::{Chance, Stage, Stream};
+use macropulse_codec::ShotLog;
 
 /// What detectors put out: edges in time. Sorted by channel, then by time.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -11,15 +11,18 @@
 
 use std::ops::RangeInclusive;
 
+use macropulse_codec::statistics::normal_quantile;
+
 use super::clock::Clock;
-use super::first_firing::{PLENTY, quantile};
+use super::first_firing::PLENTY;
 use super::jitter::Jitter;
 use super::{Band, Memory};
 use crate::channel::Foreign;
 use crate::design::Design;
-use crate::emit::ShotLog;
+use crate::emit::shot_at;
 use crate::random::{Address, Chance, Stage};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
+use macropulse_codec::ShotLog;
 
 /// A detector that counts photons, as light of others meets it.
 #[derive(Debug)]
@@ -98,7 +101,7 @@ impl FirstPhoton {
         // Evenly drawn among those below the bound: seen with 1 − exp(−Λ) of all.
         let share = (f64::from(number) + 0.5) / bound as f64;
         let until = -libm::log1p(share * libm::expm1(-self.photons));
-        (self.rms_fs * quantile(until / self.photons)).round() as i64
+        (self.rms_fs * normal_quantile(until / self.photons)).round() as i64
     }
 }
 
@@ -152,7 +155,7 @@ fn listening(
     if design.channels() == 1 {
         return open;
     }
-    match log.shot_at(design, pixel) {
+    match shot_at(design, log, pixel) {
         Some(shot) if open.contains(&shot) => shot..shot + 1,
         _ => 0..0,
     }

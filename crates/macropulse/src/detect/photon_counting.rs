@@ -238,7 +238,7 @@ mod tests {
     use super::super::Detectors;
     use super::*;
     use crate::channel::Echoes;
-    use crate::emit::ShotLog;
+    use macropulse_codec::ShotLog;
 
     fn sensor(set: &[(&str, &str)]) -> Design {
         let set: Vec<(String, String)> = set
@@ -389,7 +389,7 @@ mod tests {
         }
     }
 
-    /// Light and jitter too: what falls into the halo of one band is home in the other.
+    /// Light and jitter too: what guard shots of one band get, owned shots of the other do.
     #[test]
     fn neighbouring_bands_see_the_same_marks() {
         let design = sensor(&[("missed_marks", "0.3"), ("dark_counts_hz", "1e8")]);

@@ -1,5 +1,7 @@
 //! The shape of a micropulse: its light reaches into the ticks, and the chips, around its own.
 
+use macropulse_codec::statistics::normal_tail;
+
 use crate::channel::Echoes;
 use crate::design::{Design, Detector};
 use crate::units::{FS_PER_S, fs_from_s};
@@ -27,7 +29,7 @@ impl Shape {
         }
         let width = (design.tdc.tick_fs as f64 / FS_PER_S as f64).max(FINEST * rms);
         let reach = (FARTHEST * rms / width).ceil() as i64;
-        let below = |place: f64| 0.5 * libm::erfc(-place * width / rms / std::f64::consts::SQRT_2);
+        let below = |place: f64| normal_tail(-place * width / rms);
         let share = |slice: i64| below(slice as f64 + 0.5) - below(slice as f64 - 0.5);
         let total: f64 = (-reach..=reach).map(share).sum();
         let slice = |slice: i64| (fs_from_s(slice as f64 * width), share(slice) / total);

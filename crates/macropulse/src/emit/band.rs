@@ -6,12 +6,12 @@
 use std::iter::repeat_n;
 use std::ops::Range;
 
-use super::ShotLog;
 use super::pattern::{EqualSteps, fired_at_fs, pixel};
 use crate::design::{Design, Mirror, Pattern};
+use macropulse_codec::ShotLog;
 
 /// A band holds about this many shots, in whole lines: few enough for the edges of a coded sensor
-/// to stay in the cache, enough for the halo to be a small part of it.
+/// to stay in the cache, enough for the guard shots to be a small part of it.
 const SHOTS: u64 = 1700;
 
 /// One band: consecutive shots of one scan.
@@ -59,49 +59,49 @@ fn shots_of_band(design: &Design) -> u64 {
 }
 
 impl Band {
-    /// The shots of the band and of its halo: everything whose light can arrive together with
+    /// The shots of the band and its guard shots: everything whose light can arrive together with
     /// light of the band's own shots.
     ///
-    /// A sensor whose shots each have a detector of their own needs no halo.
+    /// A sensor whose shots each have a detector of their own needs no guard shots.
     pub fn shot_log(&self, design: &Design) -> ShotLog {
-        let home_first = self.scan * design.shots_per_scan() + self.first;
-        let home_last = home_first + self.shots;
+        let owned_first = self.scan * design.shots_per_scan() + self.first;
+        let owned_last = owned_first + self.shots;
         let shots = match design.is_coded() {
-            true => with_halo(design, home_first..home_last),
-            false => home_first..home_last,
+            true => with_guard(design, owned_first..owned_last),
+            false => owned_first..owned_last,
         };
-        let home = (home_first - shots.start) as usize;
-        ShotLog { home: home..home + self.shots as usize, ..log_of(design, shots) }
+        let owned = (owned_first - shots.start) as usize;
+        ShotLog { owned: owned..owned + self.shots as usize, ..log_of(design, shots) }
     }
 }
 
-/// The shots `home` and those before and after them that are fired within one range gate and one
+/// The shots `owned` and those before and after them that are fired within one range gate and one
 /// macropulse.
-fn with_halo(design: &Design, home: Range<u64>) -> Range<u64> {
+fn with_guard(design: &Design, owned: Range<u64>) -> Range<u64> {
     let per_scan = design.shots_per_scan();
     let fired = |shot: u64| fired_at_fs(design, shot / per_scan, shot % per_scan);
     let reach = design.reach_fs();
-    let (opens, closes) = (fired(home.start) - reach, fired(home.end - 1) + reach);
+    let (opens, closes) = (fired(owned.start) - reach, fired(owned.end - 1) + reach);
     // As many as are fired in that time on average, and then one by one: a resonant mirror is
     // faster in the middle of a line, and slower at its ends.
     let mean = (reach as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
-    let (mut first, mut end) = (home.start.saturating_sub(mean), home.end + mean);
+    let (mut first, mut end) = (owned.start.saturating_sub(mean), owned.end + mean);
     while first > 0 && fired(first - 1) >= opens {
         first -= 1;
     }
-    while first < home.start && fired(first) < opens {
+    while first < owned.start && fired(first) < opens {
         first += 1;
     }
     while fired(end) <= closes {
         end += 1;
     }
-    while end > home.end && fired(end - 1) > closes {
+    while end > owned.end && fired(end - 1) > closes {
         end -= 1;
     }
     first..end
 }
 
-/// The log of `shots`; its `home` is left open.
+/// The log of `shots`; its `owned` is left open.
 pub(super) fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
     let count = (shots.end - shots.start) as usize;
     let mut log = ShotLog { first: shots.start, ..ShotLog::default() };
@@ -191,11 +191,11 @@ mod tests {
     fn the_halo_reaches_into_the_scan_before_and_is_absent_at_the_beginning() {
         let design = Design::open("kim-park-2016", &[]).unwrap();
         let log = bands(&design, 0).next().unwrap().shot_log(&design);
-        assert_eq!((log.first, log.home.start), (0, 0));
+        assert_eq!((log.first, log.owned.start), (0, 0));
         let log = bands(&design, 1).next().unwrap().shot_log(&design);
-        assert!(log.home.start >= 25);
-        assert_eq!(log.row[log.home.start - 1], 479);
-        assert_eq!(log.row[log.home.start], 0);
+        assert!(log.owned.start >= 25);
+        assert_eq!(log.row[log.owned.start - 1], 479);
+        assert_eq!(log.row[log.owned.start], 0);
     }
 
     #[test]

@@ -6,11 +6,11 @@
 
 use std::ops::Range;
 
-use super::ShotLog;
 use super::band::log_of;
 use super::pattern::fired_at_fs;
 use crate::design::Design;
 use crate::units::FS_PER_S;
+use macropulse_codec::ShotLog;
 
 /// Drift is counted in parts of 10¹².
 const WHOLE: i128 = 1_000_000_000_000;
@@ -48,7 +48,7 @@ impl Clock {
     }
 
     /// The shots that `design` fires by this clock in the `span` of our time, fs, in logs of some
-    /// thousand at most, all of them home.
+    /// thousand at most, all of them owned.
     ///
     /// Their times are ours. Shots are counted from reading 0; those before it wrap.
     pub fn shots<'a>(
@@ -69,7 +69,7 @@ impl Clock {
             let mut log = log_of(design, from..end.min(from + SHOTS));
             log.first = log.first.wrapping_add(before);
             log.fired_at_fs.iter_mut().for_each(|time| *time = ours(*time) as i64);
-            log.home = 0..log.len();
+            log.owned = 0..log.len();
             log
         })
     }
@@ -108,7 +108,7 @@ mod tests {
             all.word.extend(log.word);
             all.channel.extend(log.channel);
         }
-        all.home = 0..all.len();
+        all.owned = 0..all.len();
         all
     }
 
@@ -118,7 +118,7 @@ mod tests {
             let design = Design::open(name, &[]).unwrap();
             let band = bands(&design, 2).next().unwrap();
             let ours = ShotLog {
-                home: 0..band.shots as usize,
+                owned: 0..band.shots as usize,
                 ..log_of(&design, {
                     let first = 2 * design.shots_per_scan();
                     first..first + band.shots

@@ -4,10 +4,8 @@ mod band;
 mod clock;
 mod pattern;
 mod shot;
-mod shot_log;
 
 pub use band::{Band, bands};
 pub use clock::Clock;
 pub use pattern::beam_axes;
-pub use shot::{Shot, most_scans, shot_of_pixel};
-pub use shot_log::ShotLog;
+pub use shot::{Shot, most_scans, shot_at, shot_of_pixel};

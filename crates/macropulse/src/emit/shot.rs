@@ -1,5 +1,7 @@
 //! One shot on its own, asked for by pixel.
 
+use macropulse_codec::ShotLog;
+
 use super::band::word;
 use super::pattern::{fired_at_fs, order_of_pixel};
 use crate::design::Design;
@@ -37,6 +39,15 @@ pub fn most_scans(design: &Design) -> u64 {
     (LONGEST_RUN / design.scan_period()) as u64
 }
 
+/// The shot of `log` that `design` fires at the pixel at this row and column; the first one, if
+/// there are several.
+pub fn shot_at(design: &Design, log: &ShotLog, (row, column): (u16, u16)) -> Option<usize> {
+    let per_scan = design.shots_per_scan();
+    let order = order_of_pixel(design, row, column);
+    let after = (order + per_scan - log.first % per_scan) % per_scan;
+    usize::try_from(after).ok().filter(|shot| *shot < log.len())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,7 +68,7 @@ mod tests {
         {
             let design = Design::open(name, set).unwrap();
             let log = bands(&design, 1).nth(1).unwrap().shot_log(&design);
-            for i in log.home.clone() {
+            for i in log.owned.clone() {
                 let (row, column) = (u32::from(log.row[i]), u32::from(log.column[i]));
                 let shot = shot_of_pixel(&design, 1, row, column).unwrap();
                 assert_eq!(
@@ -77,5 +88,21 @@ mod tests {
         assert_eq!(most_scans(&design), 540_000);
         assert!(shot_of_pixel(&design, 539_999, 479, 847).unwrap().fired_at_fs > 0);
         assert_eq!(shot_of_pixel(&design, 540_000, 0, 0), None);
+    }
+
+    #[test]
+    fn every_shot_is_found_by_its_pixel() {
+        use crate::emit::bands;
+        for name in ["hdl-64e", "peregrine", "kim-park-2016"] {
+            let design = Design::open(name, &[]).unwrap();
+            let log = bands(&design, 1).next().unwrap().shot_log(&design);
+            for shot in 0..log.len() {
+                let pixel = (log.row[shot], log.column[shot]);
+                assert_eq!(shot_at(&design, &log, pixel), Some(shot), "{name}");
+            }
+        }
+        let design = Design::open("hdl-64e", &[]).unwrap();
+        let log = bands(&design, 1).next().unwrap().shot_log(&design);
+        assert_eq!(shot_at(&design, &log, (0, 4499)), None);
     }
 }

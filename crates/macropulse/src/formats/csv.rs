@@ -50,7 +50,7 @@ fn name(names: &[String], at: u16) -> String {
 }
 
 /// A name in quotes if it would otherwise end its cell \[RFC4180\].
-pub(crate) fn quoted(name: &str) -> String {
+pub fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", name.replace('"', "\"\""))
     } else {

@@ -14,7 +14,7 @@ mod ply;
 mod png16;
 
 pub use atomic::write_atomically;
-pub(crate) use csv::quoted;
+pub use csv::quoted;
 pub use error::Error;
 pub use manifest::{Entries, Manifest, Named};
 pub use pcd_reader::read_pcd;

@@ -1,6 +1,6 @@
 //! Times moved by random amounts that have been tabulated.
 
-use super::level::Level;
+use macropulse_codec::level::Level;
 
 /// Adds to each of `times` what the number in the same place draws from `cells`, of which there
 /// are 2 to the power of `bits`, 1 to 16, and tells how often a time is then below the one before
@@ -112,8 +112,8 @@ mod avx512 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     proptest! {

@@ -4,7 +4,7 @@
 //! the next vector of the row whose next number is the smaller one. Two sorted vectors are
 //! separated and sorted by a bitonic network \[Bat68\].
 
-use super::level::Level;
+use macropulse_codec::level::Level;
 
 /// Numbers taken at once.
 const STEP: usize = 16;
@@ -114,8 +114,8 @@ mod avx512 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     proptest! {

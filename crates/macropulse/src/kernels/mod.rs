@@ -1,8 +1,8 @@
 //! The few loops that are worth the widest instructions a processor has. All unsafe code of the
 //! library is in this folder.
 //!
-//! A loop is written once, in plain Rust, and compiled for each [`Level`]; [`on_every_level!`]
-//! calls the widest version that the processor at hand can run. The plain version is what other
+//! A loop is written once, in plain Rust, and compiled for each [`Level`](macropulse_codec::level::Level);
+//! [`on_every_level!`](macropulse_codec::on_every_level) calls the widest version that the processor at hand can run. The plain version is what other
 //! processors run and what the tests compare the others with. Where comparisons are to become sets
 //! of lanes, which compilers do poorly, [`wide`] spells out the few operations. Compilers never contract or
 //! reassociate floating-point arithmetic of Rust, so that every level gives the same bits.
@@ -11,20 +11,13 @@
 // Lanes of several arrays are walked in step, by their number.
 #![allow(clippy::needless_range_loop)]
 
-mod balance;
-mod ballot;
-mod correlate;
 mod delay;
-mod level;
-mod marks;
 mod merge;
 mod pack;
 mod packet;
 #[cfg(test)]
 mod packet_tests;
-mod pattern;
 mod philox;
-mod runs;
 mod shapes;
 mod spacing;
 mod train;
@@ -34,17 +27,11 @@ mod waits;
 mod whole;
 mod wide;
 
-pub(crate) use balance::{Balance, Chips, best_balance};
-pub(crate) use ballot::{BALLOT, elect, highest_sum, vote};
-pub(crate) use correlate::{BLOCK_WORDS, Block, Marks, PLANES, count_marks, with_marks};
 pub(crate) use delay::{delay, drawn};
-pub(crate) use marks::{WordTicks, begin_with};
 pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
-pub(crate) use pattern::{Pattern, lit_in, look_ahead, put_out};
 pub(crate) use philox::{GROUP, philox};
-pub(crate) use runs::lowest_and_highest_run;
 pub(crate) use shapes::{Form, meet, meet_packet, turned};
 pub(crate) use spacing::all_apart;
 pub(crate) use train::{STEP, Train, append_train};

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::level::Level;
+use macropulse_codec::level::Level;
 
 /// Keeps those of `times[from..]` whose number in `numbers` is below `bound`; the first one of
 /// both belong together, and there are as many numbers at least.
@@ -141,8 +141,8 @@ mod avx512 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     proptest! {

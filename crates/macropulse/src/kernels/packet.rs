@@ -5,7 +5,6 @@
 //! back. Rays of a packet that point into different octants, or have another main axis, descend
 //! one after the other. Each ray meets what it would have met alone, to the last bit.
 
-use super::level::Level;
 use super::tree::{
     Node, Pair, SLACK, Tree, across, inverse, main_axis, narrow_above, narrow_below,
 };
@@ -13,6 +12,7 @@ use super::triangles::{Plane, Triangles, passes_exactly};
 #[cfg(target_arch = "x86_64")]
 use super::wide::{Avx2, Avx512};
 use super::wide::{LANES, Plain, Wide};
+use macropulse_codec::level::Level;
 
 /// One number for each ray of a packet.
 pub(crate) type Lanes<T> = [T; LANES];

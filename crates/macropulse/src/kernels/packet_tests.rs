@@ -1,9 +1,9 @@
 //! A packet against its rays one by one, at every level.
 
-use super::level::forced::at_each_level;
 use super::packet::{NONE, Packet, Waiting};
 use super::triangles::{Corners, Met, Triangles};
 use super::wide::LANES;
+use macropulse_codec::level::forced::at_each_level;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

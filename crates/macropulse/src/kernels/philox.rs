@@ -6,7 +6,7 @@
 //! Loops count indices: what iterators call is not always inlined, and then is not widened.
 #![allow(clippy::needless_range_loop)]
 
-use super::level::on_every_level;
+use macropulse_codec::on_every_level;
 
 /// Counters worked on together.
 const BLOCKS: usize = 16;
@@ -59,8 +59,8 @@ on_every_level! {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     /// One block, as the authors write it.

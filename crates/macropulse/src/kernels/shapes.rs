@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::level::on_every_level;
 use super::packet::{Lanes, Packet};
 use super::wide::LANES;
+use macropulse_codec::on_every_level;
 
 /// Where a line enters a shape and where it leaves, as distances, nearest first; NaN or infinite
 /// if it does not. Beside each the face: 0…5 of a box (twice the axis, one more for the side of

@@ -1,7 +1,7 @@
 //! How far apart times are.
 #![allow(clippy::needless_range_loop)]
 
-use super::level::on_every_level;
+use macropulse_codec::on_every_level;
 
 on_every_level! {
     /// Whether each of `later` follows the one of `earlier` in the same place by `least` or more;
@@ -19,8 +19,8 @@ on_every_level! {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     proptest! {

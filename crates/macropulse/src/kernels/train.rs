@@ -2,7 +2,7 @@
 
 use std::mem::MaybeUninit;
 
-use super::level::Level;
+use macropulse_codec::level::Level;
 
 /// Marks written at once; code words are padded to a multiple of it.
 pub(crate) const STEP: usize = 16;
@@ -106,8 +106,8 @@ mod avx512 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     proptest! {

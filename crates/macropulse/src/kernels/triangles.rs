@@ -9,10 +9,10 @@
 use glam::{DVec3, Vec3A, Vec3Swizzles};
 use obvhs::triangle::Triangle;
 
-use super::level::on_every_level;
 use super::packet::{Lanes, Packet};
 use super::tree::{Aim, FARTHEST, Tree};
 use super::wide::LANES;
+use macropulse_codec::on_every_level;
 
 /// The corners of a triangle, m.
 pub(crate) type Corners = [[f64; 3]; 3];

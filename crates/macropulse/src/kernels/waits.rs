@@ -4,8 +4,9 @@
 //! times, in order.
 #![allow(clippy::needless_range_loop)]
 
-use super::level::{Level, on_every_level};
 use super::philox::GROUP;
+use macropulse_codec::level::Level;
+use macropulse_codec::on_every_level;
 
 /// Where the line ends. Waits are cut off there, so that the sum of sixteen stays in 32 bits.
 pub(crate) const END: u32 = 1 << 27;
@@ -142,8 +143,8 @@ fn ln(x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     #[test]

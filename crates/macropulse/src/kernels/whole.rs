@@ -1,7 +1,7 @@
 //! Real numbers to whole ones.
 #![allow(clippy::needless_range_loop)]
 
-use super::level::on_every_level;
+use macropulse_codec::on_every_level;
 
 on_every_level! {
     /// Puts `factor · value / divisor · scale`, in this order and rounded to the nearest whole
@@ -23,8 +23,8 @@ on_every_level! {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::forced::at_each_level;
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
     proptest! {

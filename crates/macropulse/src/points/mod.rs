@@ -1,10 +1,10 @@
 //! Returns to points: the organised cloud of one scan.
 
 use crate::channel::Link;
-use crate::decode::Returns;
 use crate::design::Design;
-use crate::emit::ShotLog;
 use crate::units::range_from_tof;
+use macropulse_codec::ShotLog;
+use macropulse_codec::decode::Returns;
 
 /// How a pixel came out, measured against truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -145,13 +145,13 @@ impl PointCloud {
         usize::from(log.row[shot]) * self.columns + usize::from(log.column[shot])
     }
 
-    /// Writes the returns of one band, and the firing times of its home shots, into the cloud.
+    /// Writes the returns of one band, and the firing times of its owned shots, into the cloud.
     ///
     /// Intensity is the photons a mark brought over the photons a white surface seen square on
     /// would have brought from the same range; 1 for a detector without a photon scale.
     pub fn add(&mut self, design: &Design, log: &ShotLog, returns: &Returns) {
         let scan_start = self.scan as f64 * design.scan_period() * 1e9;
-        for shot in log.home.clone() {
+        for shot in log.owned.clone() {
             let pixel = self.pixel(log, shot);
             self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
         }

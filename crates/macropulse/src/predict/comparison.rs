@@ -1,8 +1,10 @@
 //! How well the words of a code family can be told apart, in figures.
 
 use super::multiple_access::{Hits, MultipleAccess};
-use crate::code::correlation::{aperiodic, aperiodic_sidelobe, periodic, periodic_sidelobe};
-use crate::code::{CodeWord, Family};
+use macropulse_codec::code::correlation::{
+    aperiodic, aperiodic_sidelobe, periodic, periodic_sidelobe,
+};
+use macropulse_codec::code::{CodeWord, Family};
 
 /// Most steps of a comparison: of larger families only the first words are compared.
 const MOST_STEPS: usize = 1 << 27;
@@ -99,7 +101,7 @@ fn spread(counts: &[u64]) -> (f64, f64) {
 mod tests {
     use super::super::multiple_access::{Words, bit_error_soft};
     use super::*;
-    use crate::code::correlation::CrossCorrelation;
+    use macropulse_codec::code::correlation::CrossCorrelation;
 
     #[test]
     fn the_paper_in_figures() {

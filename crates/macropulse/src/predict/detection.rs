@@ -1,5 +1,7 @@
 //! What becomes of one mark: light to edges to ticks, in closed form.
 
+use macropulse_codec::statistics::{erlang_b, normal_tail, poisson};
+
 use crate::design::{Detector, FirstFiring, Geiger, Linear, Tdc};
 
 /// Terms of a Poisson sum that are less than this share of all are left out.
@@ -7,11 +9,6 @@ const NEGLIGIBLE: f64 = 1e-15;
 
 /// From so many photons on, their number passes for a normal variable.
 const MANY: f64 = 1e4;
-
-/// `Q(x)`: probability that a standard normal variable exceeds `x`.
-pub fn normal_tail(x: f64) -> f64 {
-    0.5 * libm::erfc(x * std::f64::consts::FRAC_1_SQRT_2)
-}
 
 /// Probability that a mark of which `photons` are detected on average makes an edge, where
 /// nothing else keeps the detector busy but `edges_per_s` false counts that fall on it.
@@ -50,11 +47,10 @@ pub fn crossing(linear: &Linear, photons: f64) -> f64 {
     if photons > MANY {
         return above(photons, photons * excess + noise * noise);
     }
-    let of = |k: f64| libm::exp(k * photons.ln() - photons - libm::lgamma(k + 1.0));
     let mut sum = 0.0;
     let mut k = 1.0;
     loop {
-        let share = of(k);
+        let share = poisson(photons, k);
         sum += share * above(k, k * (excess - 1.0) + noise * noise);
         if k > photons && share < NEGLIGIBLE {
             return sum;
@@ -75,18 +71,10 @@ pub fn firing(detector: &FirstFiring, photons: f64) -> f64 {
 }
 
 /// Share of edges that find all converters of the bank busy, where `edges_per_s` come at random
-/// and each keeps one busy for the dead time: Erlang's B, a^c/c! / Σ_k a^k/k! \[Erl17\], which does
-/// not depend on how the busy times are distributed.
+/// and each keeps one busy for the dead time: Erlang's B \[Erl17\].
 pub fn bank_loss(tdc: &Tdc, edges_per_s: f64) -> f64 {
     let offered = edges_per_s * crate::units::s_from_fs(tdc.dead_fs);
-    if offered <= 0.0 {
-        return 0.0;
-    }
-    // B(c) = a·B(c − 1)/(c + a·B(c − 1)), B(0) = 1.
-    (1..=tdc.converters).fold(1.0, |loss, converters| {
-        let carried = offered * loss;
-        carried / (f64::from(converters) + carried)
-    })
+    erlang_b(offered, tdc.converters)
 }
 
 #[cfg(test)]
@@ -137,20 +125,5 @@ mod tests {
         let detector = linear(MANY, 300.0, 4.0);
         let (below, above) = (crossing(&detector, MANY), crossing(&detector, MANY * (1.0 + 1e-9)));
         assert!((below - above).abs() < 2e-3, "{below}, {above}");
-    }
-
-    #[test]
-    fn erlang_has_the_published_values() {
-        let mut tdc = Design::open("kim-park-2016", &[]).unwrap().tdc;
-        let loss = |tdc: &Tdc, offered: f64| {
-            bank_loss(tdc, offered / crate::units::s_from_fs(tdc.dead_fs))
-        };
-        // 10 Erlang offered to 10 lines: 21.46 %; 1 to 1: one half.
-        tdc.converters = 10;
-        assert_relative_eq!(loss(&tdc, 10.0), 0.214_58, max_relative = 1e-4);
-        tdc.converters = 1;
-        assert_relative_eq!(loss(&tdc, 1.0), 0.5, max_relative = 1e-12);
-        tdc.converters = 1150;
-        assert_relative_eq!(loss(&tdc, 1e5), 1.0 - 1150.0 / 1e5, max_relative = 1e-3);
     }
 }

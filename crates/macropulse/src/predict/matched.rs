@@ -8,7 +8,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::detection::{mark_pd, normal_tail};
+use macropulse_codec::statistics::{binomial_tail, normal_quantile, normal_tail};
+
+use super::detection::mark_pd;
 use crate::design::{Design, Detector, FirstFiring};
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
 
@@ -63,9 +65,9 @@ impl Place {
 pub(super) fn edges(design: &Design, detected: f64, falling: f64) -> f64 {
     let lit = |photons: f64| mark_pd(&design.detector, photons, falling);
     let Some(spread) = design.light.spread else { return lit(detected) };
-    let width = spread * 2_f64.sqrt() / s_from_fs(design.tdc.tick_fs);
-    let below = |place: f64| 0.5 * libm::erfc(-place / width);
-    let farthest = (4.0 * width).ceil() as i32;
+    let width = spread / s_from_fs(design.tdc.tick_fs);
+    let below = |place: f64| normal_tail(-place / width);
+    let farthest = (4.0 * 2_f64.sqrt() * width).ceil() as i32;
     let share = |tick: i32| below(f64::from(tick) + 0.5) - below(f64::from(tick) - 0.5);
     (-farthest..=farthest).map(|tick| lit(detected * share(tick))).sum()
 }
@@ -131,34 +133,6 @@ impl Gate {
     }
 }
 
-/// P(Bin(`marks`, `share`) ≥ `least`), the incomplete beta function in disguise, summed from the
-/// smaller side.
-pub(super) fn binomial_tail(marks: usize, share: f64, least: usize) -> f64 {
-    if least == 0 || share >= 1.0 {
-        return if least <= marks { 1.0 } else { 0.0 };
-    }
-    if least > marks || share <= 0.0 {
-        return 0.0;
-    }
-    let n = marks as f64;
-    let (k, odds) = (least as f64, share / (1.0 - share));
-    let choose = libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
-    let first = libm::exp(choose + k * share.ln() + (n - k) * libm::log1p(-share));
-    // Each term by the one before it, away from the mean.
-    if k < n * share {
-        let below = (1..=least).rev().scan(first, |term, k| {
-            *term *= k as f64 / (n - k as f64 + 1.0) / odds;
-            Some(*term)
-        });
-        return 1.0 - below.sum::<f64>();
-    }
-    let above = (least..marks).scan(first, |term, k| {
-        *term *= odds * (n - k as f64) / (k as f64 + 1.0);
-        Some(*term)
-    });
-    first + above.sum::<f64>()
-}
-
 /// How well a mark is timed.
 pub(super) struct Timing {
     /// rms length of a micropulse with the jitter, s.
@@ -214,34 +188,15 @@ impl Timing {
 fn firing_time(firing: &FirstFiring, photons: f64) -> f64 {
     let needed = f64::from(firing.firing_photons);
     let share = (needed / photons).min(LATEST);
-    let z = quantile(share);
+    let z = normal_quantile(share);
     let density = libm::exp(-z * z / 2.0) / (2.0 * PI).sqrt();
     share / needed.sqrt() / density
-}
-
-/// Φ⁻¹(p), found by bisecting Q.
-fn quantile(p: f64) -> f64 {
-    let (mut low, mut high) = (-9.0, 9.0);
-    for _ in 0..50 {
-        let middle = (low + high) / 2.0;
-        if normal_tail(middle) > 1.0 - p { low = middle } else { high = middle }
-    }
-    low
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-
-    #[test]
-    fn the_tail_is_that_of_the_binomial() {
-        assert_relative_eq!(binomial_tail(10, 0.5, 7), 176.0 / 1024.0, max_relative = 1e-12);
-        assert_relative_eq!(binomial_tail(10, 0.5, 3), 968.0 / 1024.0, max_relative = 1e-12);
-        assert_eq!(binomial_tail(10, 0.5, 0), 1.0);
-        assert_eq!(binomial_tail(10, 0.5, 11), 0.0);
-        assert_eq!((binomial_tail(9, 1.0, 9), binomial_tail(9, 0.0, 1)), (1.0, 0.0));
-    }
 
     #[test]
     fn the_least_marks_are_rare_and_one_fewer_is_not() {

@@ -13,10 +13,10 @@
 //! words but C0 it is exact for p = 5 and says 0.5 % too much for p = 7. The hard formula says 5 %
 //! and 13 % too much for p = 5, because real hits do not fall on random marks.
 
-use super::detection::normal_tail;
-use crate::code::correlation::periodic;
-use crate::code::{CodeWord, Error, Family};
 use crate::units::{range_from_tof, tof_from_range};
+use macropulse_codec::code::correlation::periodic;
+use macropulse_codec::code::{CodeWord, Error, Family};
+use macropulse_codec::statistics::normal_tail;
 
 /// Which words of a prime code are in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

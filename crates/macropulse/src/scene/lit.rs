@@ -10,8 +10,8 @@ use glam::DVec3;
 use super::trace::Footprint;
 use super::world::Met;
 use super::{Other, Scene, Transform};
-use crate::emit::ShotLog;
 use crate::kernels::{LANES, Lanes, Packet};
+use macropulse_codec::ShotLog;
 
 /// A ray to a point ends this much before it, m: the surface does not hide itself.
 const BEFORE: f64 = 1e-3;

@@ -10,7 +10,8 @@
 use super::batch::Batch;
 use super::{Hits, Scene};
 use crate::design::Design;
-use crate::emit::{ShotLog, beam_axes};
+use crate::emit::beam_axes;
+use macropulse_codec::ShotLog;
 
 impl Scene {
     /// What the shots of `log` meet within the range gate, in the order of the log.
@@ -147,7 +148,7 @@ mod tests {
         let log = crate::emit::Band { scan: 0, first: 0, shots: 848 }.shot_log(&design);
         let motion = Motion { design: &design, log: &log };
         let pitch = (43.2_f64 / 848.0).to_radians();
-        let shot = log.home.start + 400;
+        let shot = log.owned.start + 400;
         let [first, last] = [0, PARTS - 1].map(|part| motion.axis(shot, part));
         let angle =
             |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
@@ -158,7 +159,7 @@ mod tests {
         let next = design.directions().of(log.row[shot + 1], log.column[shot + 1]);
         assert!(angle(last, next) < angle(first, next), "it moves towards the next pixel");
         // The last pixel of a line has none after it.
-        let end = log.home.end - 1;
+        let end = log.owned.end - 1;
         assert!(angle(motion.axis(end, 0), motion.axis(end, PARTS - 1)) > 0.5 * pitch);
     }
 }

@@ -9,11 +9,11 @@ use std::ops::Range;
 
 use crate::channel::Foreign;
 use crate::design::Design;
-use crate::emit::ShotLog;
 use crate::points::{Outcome, PointCloud};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+use macropulse_codec::ShotLog;
 
-/// Counts the ghosts among the home shots of `log`, whose returns in `cloud` are judged already,
+/// Counts the ghosts among the owned shots of `log`, whose returns in `cloud` are judged already,
 /// in the light of others that is `foreign`.
 pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, foreign: &Foreign) -> u64 {
     let light = Light::of(design, foreign);
@@ -30,7 +30,7 @@ pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, foreign: &Fore
         let met = light.met(own, (log.row[*shot], log.column[*shot]));
         2 * met >= u64::from(cloud.peak[pixel]).max(1)
     };
-    log.home.clone().filter(is_ghost).count() as u64
+    log.owned.clone().filter(is_ghost).count() as u64
 }
 
 /// Foreign light, in the order in which it arrives.

@@ -5,6 +5,8 @@
 //! seeds are. Every interval here therefore takes its scatter from seed to seed. It is conditional
 //! on the scene: other surfaces are not part of the chance.
 
+use macropulse_codec::statistics::student_95;
+
 /// Both tails of the standard normal distribution beyond this hold 5 %.
 const NORMAL: f64 = 1.959_963_984_540_054;
 
@@ -77,7 +79,7 @@ impl Estimate {
             return Self { value: mean, ..Self::NONE };
         }
         let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-        let half = student_t(values.len() as u32 - 1) * (squares / (count - 1.0) / count).sqrt();
+        let half = student_95(values.len() as u32 - 1) * (squares / (count - 1.0) / count).sqrt();
         Self { value: mean, low: mean - half, high: mean + half }
     }
 
@@ -99,7 +101,7 @@ fn effective_trials(counts: &[[f64; 2]], value: f64, trials: f64) -> f64 {
     let variance = seeds / (seeds - 1.0) * squares / trials.powi(2);
     let independent = value * (1.0 - value) / trials;
     let excess = if independent > 0.0 { (variance / independent).max(1.0) } else { 1.0 };
-    trials / excess * (NORMAL / student_t(counts.len() as u32 - 1)).powi(2)
+    trials / excess * (NORMAL / student_95(counts.len() as u32 - 1)).powi(2)
 }
 
 /// Wilson's interval for a share `p` of `n` independent trials, n not necessarily whole
@@ -112,38 +114,6 @@ fn wilson(p: f64, n: f64) -> [f64; 2] {
     [end(-half).clamp(0.0, p), end(half).clamp(p, 1.0)]
 }
 
-/// Both tails of Student's distribution with `degrees` of freedom, at least 1, beyond this hold
-/// 5 %.
-///
-/// Found by halving the angle θ = atan(t/√ν), in whose sine and cosine the distribution is a
-/// finite sum \[AS64, 26.7.3 and 26.7.4\].
-fn student_t(degrees: u32) -> f64 {
-    let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
-    // An angle has 53 bits.
-    for _ in 0..60 {
-        let middle = (low + high) / 2.0;
-        if within(middle, degrees) < 0.95 { low = middle } else { high = middle }
-    }
-    f64::from(degrees).sqrt() * libm::tan(low)
-}
-
-/// Probability that |t| < √ν·tan θ, where ν is `degrees`:
-///
-/// - ν odd: `2/π · (θ + sin θ·(cos θ + 2/3·cos³θ + … ))`, up to cos^(ν−2);
-/// - ν even: `sin θ·(1 + 1/2·cos²θ + 1·3/(2·4)·cos⁴θ + … )`, up to cos^(ν−2).
-fn within(angle: f64, degrees: u32) -> f64 {
-    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
-    let is_odd = degrees % 2 == 1;
-    let mut term = if is_odd { cosine } else { 1.0 };
-    let mut sum = 0.0;
-    let first = if is_odd { 3 } else { 2 };
-    for next in (first..=degrees).step_by(2) {
-        sum += term;
-        term *= cosine * cosine * f64::from(next - 1) / f64::from(next);
-    }
-    if is_odd { std::f64::consts::FRAC_2_PI * (angle + sine * sum) } else { sine * sum }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,23 +122,6 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     /// The tables of every textbook.
-    #[test]
-    fn quantiles_of_student() {
-        for (degrees, quantile) in [
-            (1, 12.706_204_736),
-            (2, 4.302_652_730),
-            (3, 3.182_446_305),
-            (4, 2.776_445_105),
-            (7, 2.364_624_252),
-            (10, 2.228_138_852),
-            (30, 2.042_272_456),
-            (120, 1.979_930_405),
-        ] {
-            assert_relative_eq!(student_t(degrees), quantile, max_relative = 1e-9);
-        }
-        assert_relative_eq!(student_t(1_000_000), NORMAL, max_relative = 1e-5);
-    }
-
     /// The examples by which seven methods were compared \[Newc98\], to their four digits.
     #[test]
     fn intervals_of_wilson() {
@@ -277,6 +230,6 @@ mod tests {
         };
         let z = covers(1.0);
         assert!(z.abs() < 4.9, "{z}");
-        assert!(covers(NORMAL / student_t(3)) < -4.9);
+        assert!(covers(NORMAL / student_95(3)) < -4.9);
     }
 }

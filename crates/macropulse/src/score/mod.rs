@@ -9,9 +9,9 @@ pub use interval::Estimate;
 pub use range_error::RangeError;
 
 use crate::design::Design;
-use crate::emit::ShotLog;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth};
 use crate::scene::{Hits, Scene};
+use macropulse_codec::ShotLog;
 
 /// A return this far from the truth still comes from the right macropulse, m: code sidelobes lie
 /// within one bit.
@@ -72,7 +72,7 @@ pub fn empty_truth(cloud: &PointCloud) -> Truth {
     }
 }
 
-/// Compares the returns already in `cloud` with what the home shots of a band met, and writes the
+/// Compares the returns already in `cloud` with what the owned shots of a band met, and writes the
 /// truth beside them.
 ///
 /// A return is right if any surface along its beam lies within the sensor's tolerance: behind
@@ -87,8 +87,8 @@ pub fn judge(
 ) -> Score {
     let mut score = Score::default();
     let gate = design.scan.min_range..=design.scan.max_range;
-    let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.home.start);
-    for shot in log.home.clone() {
+    let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
+    for shot in log.owned.clone() {
         let first = next;
         while next < hits.shot.len() && hits.shot[next] as usize == shot {
             next += 1;

@@ -10,22 +10,17 @@
 
 use std::ops::Range;
 
+use macropulse_codec::Ticks;
+
 use crate::design::{Design, PARTS_OF_TICK, Tdc};
 use crate::detect::Edges;
 use crate::kernels::{all_apart, distinct};
 
-/// What the time-to-digital converters hand to the decoder: integers. Sorted by channel, then by
-/// tick, no tick twice in a channel.
+/// What the bank of converters makes of the edges of a band.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Ticks {
-    /// Absolute time of tick 0, in ticks since the first scan began.
-    pub epoch: i64,
-    /// Ticks since the epoch.
-    pub tick: Vec<u32>,
-    /// Detector; empty where the sensor has a single one.
-    pub channel: Vec<u16>,
-    /// Measured pulse energy in detected photons; empty where not measured.
-    pub amplitude: Vec<f32>,
+pub struct Converted {
+    /// What the receiver is given.
+    pub ticks: Ticks,
     /// Most converters busy at once, in any one channel.
     pub peak_busy: u32,
     /// Edges that found every converter busy.
@@ -61,7 +56,7 @@ impl Reading {
 }
 
 /// The ticks of the `edges` of one band, in the memory that the edges had.
-pub fn ticks(design: &Design, edges: Edges) -> Ticks {
+pub fn ticks(design: &Design, edges: Edges) -> Converted {
     let tdc = &design.tdc;
     let Edges { epoch, mut time, mut channel, mut amplitude } = edges;
     let found = time.len();
@@ -76,11 +71,8 @@ pub fn ticks(design: &Design, edges: Edges) -> Ticks {
         bank.take_by_channel(&mut time, &mut channel, &mut amplitude)
     };
     let lost = (found - merged - time.len()) as u64;
-    Ticks {
-        epoch,
-        tick: time,
-        channel,
-        amplitude,
+    Converted {
+        ticks: Ticks { epoch, tick: time, channel, amplitude },
         peak_busy: bank.peak as u32,
         lost,
         merged: merged as u64,
@@ -204,15 +196,16 @@ mod tests {
         Design::open("kim-park-2016", &set).unwrap()
     }
 
-    fn timed(design: &Design, epoch: i64, time: Vec<u32>) -> Ticks {
+    fn timed(design: &Design, epoch: i64, time: Vec<u32>) -> Converted {
         ticks(design, Edges { epoch, time, ..Edges::default() })
     }
 
     #[test]
     fn edges_in_one_tick_are_one() {
-        let ticks = timed(&sensor(&[]), 4000, vec![64 * 400, 64 * 400 + 63, 64 * 401]);
+        let Converted { ticks, merged, lost, .. } =
+            timed(&sensor(&[]), 4000, vec![64 * 400, 64 * 400 + 63, 64 * 401]);
         assert_eq!((ticks.epoch, &ticks.tick[..]), (4000, &[400, 401][..]));
-        assert_eq!((ticks.merged, ticks.lost), (1, 0));
+        assert_eq!((merged, lost), (1, 0));
     }
 
     /// What the converters put out says the same as the time since the epoch, even if the counter
@@ -234,8 +227,8 @@ mod tests {
     fn a_bank_of_two_loses_the_third_edge_within_the_dead_time() {
         let design = sensor(&[("converters", "2"), ("dead_time_ns", "3.3")]);
         let ns = |t: f64| (t * 400.0 * 64.0) as u32;
-        let ticks = timed(&design, 0, vec![ns(10.0), ns(11.0), ns(12.0), ns(13.4), ns(13.5)]);
-        assert_eq!((ticks.tick.len(), ticks.lost, ticks.peak_busy), (3, 2, 2));
+        let found = timed(&design, 0, vec![ns(10.0), ns(11.0), ns(12.0), ns(13.4), ns(13.5)]);
+        assert_eq!((found.ticks.tick.len(), found.lost, found.peak_busy), (3, 2, 2));
     }
 
     #[test]
@@ -248,33 +241,33 @@ mod tests {
             channel: vec![0, 0, 1],
             amplitude: vec![1.0, 2.0, 3.0],
         };
-        let ticks = ticks(&design, edges);
-        assert_eq!((ticks.tick, ticks.lost), (vec![100, 100], 1));
+        let Converted { ticks, lost, .. } = ticks(&design, edges);
+        assert_eq!((ticks.tick, lost), (vec![100, 100], 1));
         assert_eq!((ticks.channel, ticks.amplitude), (vec![0, 1], vec![1.0, 3.0]));
     }
 
     /// The bank as one would tell it: every converter remembers when it is free again.
-    fn told(design: &Design, times: &[u32]) -> Ticks {
+    fn told(design: &Design, times: &[u32]) -> Converted {
         let dead = (design.tdc.dead_fs as u64).div_ceil(design.tdc.tick_fs as u64);
         let mut busy_until: VecDeque<u64> = VecDeque::new();
-        let (mut ticks, mut before) = (Ticks::default(), None);
+        let (mut found, mut before) = (Converted::default(), None);
         for tick in times.iter().map(|time| time / 64) {
             if before.replace(tick) == Some(tick) {
-                ticks.merged += 1;
+                found.merged += 1;
                 continue;
             }
             while busy_until.front().is_some_and(|until| *until <= u64::from(tick)) {
                 busy_until.pop_front();
             }
             if busy_until.len() == design.tdc.converters as usize {
-                ticks.lost += 1;
+                found.lost += 1;
                 continue;
             }
             busy_until.push_back(u64::from(tick) + dead);
-            ticks.peak_busy = ticks.peak_busy.max(busy_until.len() as u32);
-            ticks.tick.push(tick);
+            found.peak_busy = found.peak_busy.max(busy_until.len() as u32);
+            found.ticks.tick.push(tick);
         }
-        ticks
+        found
     }
 
     proptest! {
@@ -309,9 +302,10 @@ mod tests {
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
             let edges = Edges { time: times, amplitude, ..Edges::default() };
             let with = ticks(&design, edges);
-            let of_ticks: Vec<f32> = with.tick.iter().map(|tick| *tick as f32).collect();
-            prop_assert_eq!(&with.amplitude, &of_ticks);
-            prop_assert_eq!(Ticks { amplitude: Vec::new(), ..with }, without);
+            let of_ticks: Vec<f32> = with.ticks.tick.iter().map(|tick| *tick as f32).collect();
+            prop_assert_eq!(&with.ticks.amplitude, &of_ticks);
+            let ticks = Ticks { amplitude: Vec::new(), ..with.ticks.clone() };
+            prop_assert_eq!(Converted { ticks, ..with }, without);
         }
     }
 }

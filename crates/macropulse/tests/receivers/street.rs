@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use macropulse::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse::decode::{Effort, Receiver, ReceiverKind, Returns};
-use macropulse::emit::ShotLog;
-use macropulse::tdc::Ticks;
+use macropulse::codec::ShotLog;
+use macropulse::codec::Ticks;
+use macropulse::codec::code::{Codebook, Crc, Family, Keying, Payload};
+use macropulse::codec::decode::{Effort, Receiver, ReceiverKind, Returns};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -104,12 +104,12 @@ impl Sensor {
         }
     }
 
-    /// The shots of `rows`, with a halo of 26 shots at both ends.
+    /// The shots of `rows`, with 26 guard shots at both ends.
     pub fn log(&self, rows: Range<u32>) -> ShotLog {
         const HALO: u32 = 26;
         let first = (rows.start * COLUMNS).saturating_sub(HALO);
         let shots = first..rows.end * COLUMNS + HALO;
-        let home = (rows.start * COLUMNS - first) as usize..(rows.end * COLUMNS - first) as usize;
+        let owned = (rows.start * COLUMNS - first) as usize..(rows.end * COLUMNS - first) as usize;
         // 6 666 666 666⅔ chips a scan of 407 040 shots.
         let fired = |shot: u32| i64::from(shot) * 20_000_000_000 / (3 * 407_040) * TICK_FS;
         ShotLog {
@@ -120,7 +120,7 @@ impl Sensor {
             label: shots.clone().map(|shot| self.label(shot)).collect(),
             word: shots.clone().map(|shot| (shot % 29) as u16).collect(),
             channel: shots.map(|_| 0).collect(),
-            home,
+            owned,
         }
     }
 
@@ -196,11 +196,11 @@ impl Score {
         let (log, scene) = seen;
         let mut found = vec![None; log.len()];
         for (&shot, &tof) in returns.shot.iter().zip(&returns.tof) {
-            assert!(log.home.contains(&(shot as usize)), "shot {shot} is in the halo");
+            assert!(log.owned.contains(&(shot as usize)), "shot {shot} is in the guard");
             found[shot as usize] = Some(tof / (TICK_FS as f64 * 1e-15));
         }
         let mut score = Self::default();
-        for shot in log.home.clone() {
+        for shot in log.owned.clone() {
             let lag = scene(log.row[shot].into(), log.column[shot].into());
             let lit = !codebook.marks(log.label[shot], log.word[shot]).is_empty();
             match (lag.filter(|_| lit), found[shot]) {

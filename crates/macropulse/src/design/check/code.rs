@@ -1,9 +1,9 @@
 //! How shots are told apart.
 
 use super::Check;
-use crate::code::{self, Codebook, Crc, Family, Keying, Payload};
 use crate::design::file::{CodeFile, FamilyFile, KeyingFile, OrthogonalFile, SparseFile};
 use crate::design::{Coding, Error, Label, Pattern, Scan, Tdc};
+use macropulse_codec::code::{self, Codebook, Crc, Family, Keying, Payload};
 
 impl Check<'_> {
     pub(super) fn coding(

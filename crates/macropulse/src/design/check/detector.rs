@@ -2,6 +2,7 @@
 
 use super::Check;
 use crate::design::budget::Budget;
+use crate::design::detector::photons_for;
 use crate::design::file::{
     DetectorFile, FirstFiringFile, GeigerFile, LinearFile, PhotonCountingFile, SensitivityFile,
 };
@@ -199,7 +200,7 @@ impl Check<'_> {
         let at = |key: &str| format!("detector.first-firing.{key}");
         let needed = self.count(&at("firing_photons"), file.firing_photons, 1, 1 << 20)?;
         let noise = self.within(&at("noise_photons"), file.noise_photons, 0.0, 1e6)?;
-        let photons = |pd| crate::detect::photons_for(pd, needed, noise);
+        let photons = |pd| photons_for(pd, needed, noise);
         let path = at("false_firing_hz");
         Ok(FirstFiring {
             sensitivity: self.sensitivity(

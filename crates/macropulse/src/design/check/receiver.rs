@@ -1,10 +1,10 @@
 //! From edges to returns: converters and receiver.
 
 use super::{Check, TOO_FINE};
-use crate::decode::{Receiver, ReceiverKind};
 use crate::design::file::{ReceiverKindFile, SensorFile};
 use crate::design::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
+use macropulse_codec::decode::{Receiver, ReceiverKind};
 
 impl Check<'_> {
     pub(super) fn tdc(&self, file: &SensorFile) -> Result<Tdc, Error> {

@@ -1,0 +1,392 @@
+//! The balanced receiver: marks found, less what is lit where the macropulse is dark.
+//!
+//! 1. For every lag of the gate, the ticks that fall on marks of the known macropulse count for
+//!    it, those that fall on its dark chips against it. The highest balance is taken, the earliest
+//!    of several.
+//! 2. It is believed if chance would not reach it at any lag of the gate, see
+//!    [`super::threshold`]: the places are taken to be lit as often as in the whole gate, or as the
+//!    dark chips are, whichever is more.
+//!
+//! Light that is there all the time falls on marks and dark chips alike and cancels, where about
+//! half the chips are lit. So does the light of other shots, if their words are made for it.
+//!
+//! The maximum is exact. It is found soon because its light lies whole chips apart: see [`grid`].
+
+mod grid;
+
+use super::threshold::Thresholds;
+use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns, photons_per_mark};
+use crate::ShotLog;
+use crate::Ticks;
+use crate::code::Codebook;
+use crate::kernels::{Balance, Chips};
+use crate::time;
+use grid::Grid;
+
+/// How far from the lag of the shot before the beginning of the next macropulse is looked for
+/// first, in ticks.
+const NEAR: i64 = 1024;
+
+/// Decodes one band.
+pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
+    let mut band = Band::new(receiver, sent, ticks);
+    let owned = sent.1.owned.clone();
+    let mut returns = Returns::with_capacity(owned.len());
+    for shot in owned {
+        match band.found(shot) {
+            Some(found) => returns.push(found),
+            None => returns.reject(Reject::NoPeak),
+        }
+    }
+    returns
+}
+
+/// Where a macropulse begins, and what is lit there.
+type Peak = (i64, Balance);
+
+struct Band<'a> {
+    receiver: &'a Receiver,
+    codebook: &'a Codebook,
+    log: &'a ShotLog,
+    ticks: &'a [u32],
+    /// Absolute time of tick 0, in ticks.
+    epoch: i64,
+    /// Tick in which each shot was fired, from the epoch.
+    fired: Vec<i64>,
+    /// How many ticks late a mark still counts, from the earliest of its places on.
+    late: i64,
+    grid: Grid,
+    thresholds: Thresholds,
+    /// The chips of the shot at hand.
+    chips: Chips,
+    /// The lag of the last shot that was found.
+    last_lag: Option<i64>,
+}
+
+impl<'a> Band<'a> {
+    fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
+        let (codebook, log) = sent;
+        let fired: Vec<i64> =
+            receiver.all_fired(log).iter().map(|fired| fired - ticks.epoch).collect();
+        let late = late(receiver.jitter_ticks);
+        let scale = i64::from(receiver.ticks_per_chip);
+        let (nearest, farthest) = gate(receiver);
+        let of_home = |shot: Option<usize>| shot.and_then(|shot| fired.get(shot)).copied();
+        let first = of_home(Some(log.owned.start)).unwrap_or(0) + nearest;
+        let last = of_home(log.owned.end.checked_sub(1)).unwrap_or(0) + farthest;
+        let span = first..last + scale * i64::from(codebook.chips()) + late + 1;
+        let lags = (farthest - nearest).max(0) as f64 + 1.0;
+        Self {
+            receiver,
+            codebook,
+            log,
+            ticks: &ticks.tick,
+            epoch: ticks.epoch,
+            late,
+            grid: Grid::new(span, (scale, late), ticks.tick.iter().map(|&tick| i64::from(tick))),
+            thresholds: Thresholds::balanced(lags, receiver.false_alarm, codebook.chips() as u16),
+            fired,
+            chips: Chips::default(),
+            last_lag: None,
+        }
+    }
+
+    /// The return of `shot`, if its macropulse is there.
+    fn found(&mut self, shot: usize) -> Option<Return> {
+        let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]);
+        if marks.is_empty() {
+            return None;
+        }
+        self.chips.set(self.codebook.chips() as usize, marks);
+        let (start, peak) = self.peak(shot, marks)?;
+        let (weight, score) = (marks.len() as u16, peak.score() as u16);
+        if score < self.least(shot, (weight, peak.stray)) {
+            return None;
+        }
+        self.last_lag = Some(start - self.fired[shot]);
+        let dark = self.codebook.chips() - u32::from(weight);
+        let fired_at_fs = self.log.fired_at_fs[shot];
+        let offset = self.mean_offset(start, marks) * time::s_from_fs(self.receiver.tick_fs);
+        Some(Return {
+            shot,
+            tof: self.receiver.tof(fired_at_fs, start + self.epoch) + offset,
+            peak: score,
+            marks: weight,
+            margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
+            photons: photons_per_mark(
+                peak.found as u16,
+                weight,
+                f64::from(peak.stray) / f64::from(dark.max(1)) * 0.999,
+            ),
+        })
+    }
+
+    /// The highest balance in the gate of `shot`, the earliest of several, if it can be believed at
+    /// all.
+    fn peak(&mut self, shot: usize, marks: &[u16]) -> Option<Peak> {
+        let (nearest, farthest) = gate(self.receiver);
+        let fired = self.fired[shot];
+        let gate = fired + nearest..fired + farthest + 1;
+        let least = i32::from(self.least(shot, (marks.len() as u16, 0)));
+        // Whatever is known beforehand need not be searched for: only what is better.
+        let known = self.near_the_last(shot, marks).filter(|(_, known)| known.score() >= least);
+        let at_least = known.map_or((least, i64::MAX), |(start, known)| (known.score(), start));
+        self.grid.best(gate, &self.chips, at_least).or(known)
+    }
+
+    /// The best of the lags about that of the last shot at which the first mark is lit.
+    fn near_the_last(&self, shot: usize, marks: &[u16]) -> Option<Peak> {
+        let (nearest, farthest) = gate(self.receiver);
+        let fired = self.fired[shot];
+        let expected = fired + self.last_lag?;
+        let first = i64::from(self.receiver.ticks_per_chip) * i64::from(*marks.first()?);
+        let from = expected + first - NEAR;
+        let begin = self.ticks.partition_point(|&tick| i64::from(tick) < from);
+        let ticks = self.ticks[begin..].iter().map(|&tick| i64::from(tick) - first);
+        let starts = ticks.take_while(|&start| start <= expected + NEAR);
+        let starts = starts.filter(|start| (nearest..=farthest).contains(&(start - fired)));
+        let peaks = starts.filter_map(|start| Some((start, self.grid.at(start, &self.chips)?)));
+        peaks.reduce(|best, next| if next.1.score() > best.1.score() { next } else { best })
+    }
+
+    /// The balance that chance does not reach in the gate of `shot`, of so many `marks`, and where
+    /// so many dark chips are lit.
+    fn least(&mut self, shot: usize, (marks, stray): (u16, u32)) -> u16 {
+        let (nearest, farthest) = gate(self.receiver);
+        let length = i64::from(self.codebook.chips() * self.receiver.ticks_per_chip);
+        let gate = self.fired[shot] + nearest..self.fired[shot] + farthest + length;
+        let before = |end: i64| self.ticks.partition_point(|&tick| i64::from(tick) < end);
+        let ticks = (before(gate.end) - before(gate.start)) as f64;
+        let in_gate = ticks * (self.late + 1) as f64 / (gate.end - gate.start).max(1) as f64;
+        // One more of each, so that few dark chips do not tell that it is darker than can be known.
+        let dark = self.codebook.chips() - u32::from(marks);
+        let on_dark = (f64::from(stray) + 1.0) / (f64::from(dark) + 1.0);
+        self.thresholds.least(marks, in_gate.max(on_dark).min(1.0))
+    }
+
+    /// By how many ticks the marks of a macropulse that begins at `start` are late on average. What
+    /// is looked at is centred on them again, as otherwise one side would be cut off.
+    fn mean_offset(&self, start: i64, marks: &[u16]) -> f64 {
+        const ROUNDS: usize = 3;
+        if self.late == 0 {
+            return 0.0;
+        }
+        let scale = i64::from(self.receiver.ticks_per_chip);
+        let mut mean = self.late as f64 / 2.0;
+        for _ in 0..ROUNDS {
+            let middle = mean.round() as i64;
+            let (mut sum, mut count) = (0, 0);
+            for &mark in marks {
+                let place = start + scale * i64::from(mark);
+                let from = place + middle - self.late / 2;
+                let first = self.ticks.partition_point(|&tick| i64::from(tick) < from);
+                let ticks = self.ticks[first..].iter().map(|&tick| i64::from(tick));
+                for tick in ticks.take_while(|&tick| tick <= from + self.late) {
+                    (sum, count) = (sum + tick - place, count + 1);
+                }
+            }
+            mean = sum as f64 / f64::from(count.max(1));
+            if mean.round() as i64 == middle {
+                break;
+            }
+        }
+        mean
+    }
+}
+
+/// Nearest and farthest lag.
+fn gate(receiver: &Receiver) -> (i64, i64) {
+    (receiver.gate_ticks.0.into(), receiver.gate_ticks.1.into())
+}
+
+/// As the matched receiver: ±2 σ of the jitter, which hold 19 of 20 marks.
+fn late(jitter: f64) -> i64 {
+    if jitter > 0.05 { (4.0 * jitter).ceil().min(FARTHEST_JITTER) as i64 } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ReceiverKind;
+    use super::*;
+    use crate::code::{Crc, Family, Keying, Payload};
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    /// Farthest lag, ticks.
+    const GATE: u32 = 1500;
+
+    fn receiver(ticks_per_chip: u32, jitter_ticks: f64) -> Receiver {
+        Receiver {
+            kind: ReceiverKind::Balanced,
+            effort: crate::decode::Effort::Quick,
+            gate_ticks: (20, GATE),
+            ticks_per_chip,
+            tick_fs: 1000,
+            jitter_ticks,
+            false_alarm: 1e-2,
+            bit_threshold: 1,
+        }
+    }
+
+    fn log(shots: u16, (period, labels, words): (u32, u16, u16)) -> ShotLog {
+        ShotLog {
+            fired_at_fs: (0..i64::from(shots)).map(|s| s * i64::from(period) * 1000).collect(),
+            row: vec![0; shots.into()],
+            column: (0..shots).collect(),
+            label: (0..shots).map(|shot| shot % labels).collect(),
+            word: (0..shots).map(|shot| shot % words).collect(),
+            channel: vec![0; shots.into()],
+            owned: 0..shots.into(),
+            first: 0,
+        }
+    }
+
+    /// Every shot of `log` at a lag of its own near 600, some marks missed, some ticks false.
+    fn ticks(book: &Codebook, log: &ShotLog, weather: (u32, u32, u32), seed: u64) -> Ticks {
+        let ((missed, stray, scale), mut chance) = (weather, ChaCha8Rng::seed_from_u64(seed));
+        let period = if log.len() > 1 { (log.fired_at_fs[1] / 1000) as u32 } else { 0 };
+        let mut tick = Vec::new();
+        for shot in 0..log.len() {
+            let start = shot as u32 * period + 500 + chance.next_u32() % 200;
+            for &mark in book.marks(log.label[shot], log.word[shot]) {
+                if chance.next_u32() % 100 >= missed {
+                    tick.push(start + scale * u32::from(mark));
+                }
+            }
+        }
+        let end = log.len() as u32 * period + GATE;
+        tick.extend((0..end * stray / 1000).map(|_| chance.next_u32() % end));
+        tick.sort_unstable();
+        tick.dedup();
+        Ticks { tick, ..Ticks::default() }
+    }
+
+    /// The earliest lag with the highest balance, every lag and every chip by itself.
+    fn exhaustive(band: &Band, shot: usize) -> (i64, i32) {
+        let marks = band.codebook.marks(band.log.label[shot], band.log.word[shot]);
+        let scale = i64::from(band.receiver.ticks_per_chip);
+        let mut lit = vec![false; 1 << 16];
+        for tick in band.ticks.iter().map(|&tick| i64::from(tick)) {
+            ((tick - band.late).max(0)..=tick).for_each(|place| lit[place as usize] = true);
+        }
+        let score = |lag: i64| -> i32 {
+            let chips = 0..band.codebook.chips() as i64;
+            let seen = chips.filter(|c| lit[(band.fired[shot] + lag + scale * c) as usize]);
+            seen.map(|c| if marks.contains(&(c as u16)) { 1 } else { -1 }).sum()
+        };
+        let (nearest, farthest) = gate(band.receiver);
+        let best = (nearest..=farthest).rev().max_by_key(|&lag| score(lag)).unwrap();
+        (best, score(best))
+    }
+
+    fn books() -> Vec<Codebook> {
+        let payload = Payload::new(2, Crc::default(), true).unwrap();
+        let inverted = |family| Codebook::new(family, Some(payload), 4, Keying::Inversion);
+        let bare = |family| Codebook::new(family, None, 1, Keying::OnOff);
+        let books = [
+            bare(Family::gold(5).unwrap()),
+            bare(Family::gold(7).unwrap()),
+            bare(Family::m_sequence(6).unwrap()),
+            inverted(Family::gold(5).unwrap()),
+            Codebook::new(Family::prime(5).unwrap(), Some(payload), 4, Keying::OnOff),
+        ];
+        books.map(Result::unwrap).to_vec()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(40) })]
+
+        /// The return is the maximum, and a shot without one has a maximum below the threshold.
+        #[test]
+        fn it_is_the_exhaustive_maximum(
+            book in 0..5_usize,
+            scale in 1..6_u32,
+            missed in 0..60_u32,
+            stray in prop_oneof![Just(0), 1..100_u32],
+            jitter in prop_oneof![Just(0.0), 0.1..1.0],
+            seed in 0..u64::MAX,
+        ) {
+            let book = &books()[book];
+            let receiver = receiver(scale, jitter);
+            let log = log(6, (150, book.labels() as u16, book.words() as u16));
+            let ticks = ticks(book, &log, (missed, stray, scale), seed);
+            let mut band = Band::new(&receiver, (book, &log), &ticks);
+            for shot in 0..log.len() {
+                let (lag, score) = exhaustive(&band, shot);
+                let marks = book.marks(log.label[shot], log.word[shot]);
+                let found = band.found(shot);
+                if let Some(found) = found {
+                    prop_assert_eq!(i32::from(found.peak), score);
+                    band.chips.set(book.chips() as usize, marks);
+                    let (start, _) = band.peak(shot, marks).unwrap();
+                    prop_assert_eq!(start - band.fired[shot], lag);
+                } else {
+                    let least = band.least(shot, (marks.len() as u16, 0));
+                    let clear = i32::from(marks.len() as u16) * 9 / 10;
+                    prop_assert!(score < clear.max(least.into()), "{} of {}", score, marks.len());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn clear_shots_come_back_at_their_lag_with_all_their_marks() {
+        let book = &books()[1];
+        let (receiver, log) = (receiver(4, 0.0), log(20, (600, 1, 129)));
+        let mut tick: Vec<u32> = (0..20)
+            .flat_map(|shot| {
+                let marks = book.marks(0, shot as u16).iter();
+                marks.map(move |&mark| 600 * shot + 700 + 3 * shot + 4 * u32::from(mark))
+            })
+            .collect();
+        tick.sort_unstable();
+        let ticks = Ticks { tick, ..Ticks::default() };
+        let returns = receiver.decode(book, &log, &ticks);
+        assert_eq!(returns.len(), 20);
+        assert_eq!(returns.peak, returns.marks);
+        for (shot, tof) in returns.tof.iter().enumerate() {
+            let expected = (700.5 + 3.0 * shot as f64) * 1e-12;
+            approx::assert_relative_eq!(*tof, expected, max_relative = 1e-9);
+        }
+        assert!(returns.margin.iter().all(|&margin| margin > 30), "{:?}", returns.margin);
+    }
+
+    /// H0: where nothing is, light that is always there leaves the balance at the (marks − dark
+    /// chips)·d of its level d, which is next to nothing, while it lifts a count of marks by
+    /// marks·d. N = 400 shots of 127 chips, seed 5, d = 0.25; the balance has a standard error of
+    /// √(127·d·(1 − d)/400) = 0.24, the count one of 0.17; α = 10⁻⁴ is 3.9 of them. The count is
+    /// the negative control.
+    #[test]
+    fn a_constant_level_lifts_a_count_but_not_the_balance() {
+        let book = &books()[1];
+        let (receiver, log) = (receiver(1, 0.0), log(400, (300, 1, 129)));
+        let mut chance = ChaCha8Rng::seed_from_u64(5);
+        let tick = (0..400 * 300 + 2000).filter(|_| chance.next_u32().is_multiple_of(4)).collect();
+        let ticks = Ticks { tick, ..Ticks::default() };
+        let mut band = Band::new(&receiver, (book, &log), &ticks);
+        let [mut balance, mut count, mut marks] = [0.0; 3];
+        for shot in 0..400 {
+            let own = book.marks(0, log.word[shot]);
+            band.chips.set(127, own);
+            let seen = band.grid.at(band.fired[shot] + 100, &band.chips).unwrap();
+            balance += f64::from(seen.score()) / 400.0;
+            count += f64::from(seen.found) / 400.0;
+            marks += own.len() as f64 / 400.0;
+        }
+        let still = 0.25 * (2.0 * marks - 127.0);
+        assert!((balance - still).abs() < 3.9 * 0.24, "{balance} for {still}");
+        assert!((count - 0.25 * marks).abs() < 3.9 * 0.17, "{count} for {}", 0.25 * marks);
+        assert!(count - still > 3.9 * 0.24);
+    }
+
+    #[test]
+    fn an_empty_sky_and_an_empty_log_give_nothing() {
+        let book = &books()[0];
+        let (receiver, log) = (receiver(2, 0.0), log(3, (100, 1, 33)));
+        let returns = receiver.decode(book, &log, &Ticks::default());
+        assert_eq!((returns.len(), returns.rejected(Reject::NoPeak)), (0, 3));
+        assert!(receiver.decode(book, &ShotLog::default(), &Ticks::default()).is_empty());
+    }
+}

@@ -1,0 +1,208 @@
+//! Ticks to returns: the receiver. It sees ticks and the shot log, never the scene.
+
+mod balanced;
+mod bitwise;
+mod correlator;
+mod direct;
+mod field;
+mod matched;
+mod returns;
+mod search;
+mod threshold;
+mod timeline;
+mod unexplained;
+
+pub use returns::{Reject, Returns};
+
+use serde::Deserialize;
+
+use crate::ShotLog;
+use crate::Ticks;
+use crate::code::Codebook;
+use crate::time;
+use returns::Return;
+use timeline::Timeline;
+
+/// Which receiver decodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReceiverKind {
+    /// As printed in \[KP16\]: the first mark opens a macropulse, bit by bit, checksum, look-up.
+    Literal,
+    /// Bit by bit, but tries how many leading zero bits were dark.
+    Blind,
+    /// Correlates the whole known macropulse of every shot in flight.
+    Matched,
+    /// As `Matched`, but what falls on dark chips counts against it; for words of which about half
+    /// the chips are lit.
+    Balanced,
+    /// One mark per shot, a detector of its own: the first tick in the range gate.
+    Direct,
+}
+
+/// How much the matched receiver does for faint light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effort {
+    /// Searches for one shot in so many where light is faint, finds the others from there, and
+    /// passes by what lies evenly over everything: a target that is barely seen may be lost where
+    /// it stands alone or fills the whole field.
+    Quick,
+    /// Searches for every shot that is not found otherwise; takes many times as long in noise.
+    Thorough,
+}
+
+/// What the receiver is set to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Receiver {
+    /// Which receiver decodes.
+    pub kind: ReceiverKind,
+    /// How much the matched receiver does for faint light.
+    pub effort: Effort,
+    /// Nearest and farthest round trip accepted, in ticks.
+    pub gate_ticks: (u32, u32),
+    /// TDC ticks per chip.
+    pub ticks_per_chip: u32,
+    /// Length of a tick, fs.
+    pub tick_fs: i64,
+    /// Standard deviation of the timing of one edge, in ticks: how far from its place a mark is
+    /// looked for.
+    pub jitter_ticks: f64,
+    /// False returns accepted per shot; the matched and the balanced receiver derive their
+    /// threshold from it.
+    pub false_alarm: f64,
+    /// Marks of a code word that make a 1 bit, for the literal and the blind receiver.
+    pub bit_threshold: u16,
+}
+
+/// Dark ticks at both ends of a timeline, so that a mark may jitter off its end.
+const MARGIN: i64 = 2048;
+
+/// How far from its place a mark is looked for at most, in ticks.
+const FARTHEST_JITTER: f64 = 1023.0;
+
+impl Receiver {
+    /// A matched receiver of ticks of `tick_fs` femtoseconds, a chip to a tick, with edges exact to
+    /// the tick, a gate from 0 to 100 000 ticks, and one false return in a million shots accepted.
+    pub fn matched(tick_fs: i64) -> Self {
+        Self {
+            kind: ReceiverKind::Matched,
+            effort: Effort::Quick,
+            gate_ticks: (0, 100_000),
+            ticks_per_chip: 1,
+            tick_fs,
+            jitter_ticks: 0.0,
+            false_alarm: 1e-6,
+            bit_threshold: 1,
+        }
+    }
+
+    /// The returns of the owned shots of `log`, out of all the `ticks` of its band.
+    ///
+    /// `ticks` must cover the whole time in which light of a owned shot can arrive. The shots of
+    /// the guard shots are decoded too, as their light overlaps, and dropped. The ticks of a coded
+    /// sensor must be those of one detector; labels and words must be in the `codebook`.
+    ///
+    /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
+    /// does not bring everything nearer.
+    pub fn decode(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+        match self.kind {
+            ReceiverKind::Direct => direct::decode(self, log, ticks),
+            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
+            ReceiverKind::Balanced => balanced::decode(self, (codebook, log), ticks),
+            ReceiverKind::Literal => {
+                bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
+            }
+            ReceiverKind::Blind => {
+                bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::AnyBit))
+            }
+        }
+    }
+
+    /// The absolute tick in which `shot` was fired.
+    fn fired(&self, log: &ShotLog, shot: usize) -> i64 {
+        log.fired_at_fs[shot].div_euclid(self.tick_fs)
+    }
+
+    /// The absolute ticks in which the shots were fired.
+    fn all_fired(&self, log: &ShotLog) -> Vec<i64> {
+        // Whole numbers up to here are exact as floating-point ones, and a quotient of two is
+        // wrong by one at most; a division of whole numbers takes several times as long.
+        const EXACT: i64 = 1 << 52;
+        let Some(&first) = log.fired_at_fs.first() else { return Vec::new() };
+        let (start, rest) = (first.div_euclid(self.tick_fs), first.rem_euclid(self.tick_fs));
+        let ticks = |fired: &i64| {
+            let since = fired - first + rest;
+            if since.abs() >= EXACT {
+                return fired.div_euclid(self.tick_fs);
+            }
+            let about = (since as f64 / self.tick_fs as f64) as i64;
+            let over = since - about * self.tick_fs;
+            start + about + i64::from(over >= self.tick_fs) - i64::from(over < 0)
+        };
+        log.fired_at_fs.iter().map(ticks).collect()
+    }
+
+    /// The ticks in which light of shots that were `fired` can arrive.
+    fn timeline(&self, codebook: &Codebook, fired: &[i64], ticks: &Ticks) -> Timeline {
+        let absolute = |tick: Option<&u32>| ticks.epoch + i64::from(tick.copied().unwrap_or(0));
+        let (nearest, farthest) = self.gate_ticks;
+        let length = codebook.chips() * self.ticks_per_chip;
+        let (first, last) = (fired.first().unwrap_or(&0), fired.last().unwrap_or(&0));
+        let open = first + i64::from(nearest);
+        let closed = last + i64::from(farthest) + i64::from(length) + 1;
+        let span = open.max(absolute(ticks.tick.first())) - MARGIN
+            ..closed.min(absolute(ticks.tick.last()) + 1) + MARGIN;
+        Timeline::new(span, ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick)))
+    }
+
+    /// Two-way time of flight, s, of light that left at `fired_at_fs` and came in tick `tick`.
+    fn tof(&self, fired_at_fs: i64, tick: i64) -> f64 {
+        time::s_from_fs(tick * self.tick_fs - fired_at_fs) + 0.5 * time::s_from_fs(self.tick_fs)
+    }
+}
+
+/// Mean number of photons detected per mark, μ = −ln(1 − p), of which the share p of the marks
+/// shows at least one (Poisson); p = (k/N − d)/(1 − d) for k of N marks found where a share d of
+/// all places is lit anyway. All marks found is taken for N − ½: nobody can tell more.
+fn photons_per_mark(peak: u16, marks: u16, density: f64) -> f32 {
+    let (found, all) = (f64::from(peak), f64::from(marks));
+    let lit = found.min(all - 0.5) / all;
+    let share = ((lit - density) / (1.0 - density)).max(0.0);
+    -libm::log1p(-share) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shots_are_fired_in_the_tick_that_holds_their_time() {
+        let receiver = Receiver {
+            kind: ReceiverKind::Matched,
+            effort: Effort::Quick,
+            gate_ticks: (0, 1),
+            ticks_per_chip: 1,
+            tick_fs: 2497,
+            jitter_ticks: 0.0,
+            false_alarm: 0.1,
+            bit_threshold: 1,
+        };
+        for first in [0, 7, -2498, 10_i64.pow(17) + 1] {
+            let times = [0, 1, 2489, 2490, 2496, 2497, -1, -2497, 2497 * 2497, 1 << 51, 1 << 53];
+            let fired_at_fs: Vec<i64> = times.iter().map(|time| first + time).collect();
+            let expected: Vec<i64> = fired_at_fs.iter().map(|time| time.div_euclid(2497)).collect();
+            let log = ShotLog { fired_at_fs, ..ShotLog::default() };
+            assert_eq!(receiver.all_fired(&log), expected);
+        }
+    }
+
+    #[test]
+    fn photons_follow_from_the_share_of_marks_seen() {
+        approx::assert_relative_eq!(photons_per_mark(63, 100, 0.0), 0.994, max_relative = 1e-3);
+        // Half of the places are lit anyway: 75 of 100 lit are 50 of 100 seen.
+        let half_seen = photons_per_mark(75, 100, 0.5);
+        approx::assert_relative_eq!(half_seen, std::f32::consts::LN_2, max_relative = 1e-3);
+        assert!(photons_per_mark(100, 100, 0.0).is_finite());
+        assert_eq!(photons_per_mark(1, 100, 0.2), 0.0);
+    }
+}

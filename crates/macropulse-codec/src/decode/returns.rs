@@ -1,0 +1,123 @@
+//! What decoding gives: the seam between the receiver and the points.
+
+/// Why a shot or a found macropulse gave no return. Counted, never an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Reject {
+    /// No lag in the range gate reached the threshold.
+    NoPeak,
+    /// The checksum did not fit the label bits.
+    Crc,
+    /// The label is legal but no such shot was in flight.
+    UnknownShot,
+    /// The macropulse carries other bits than the shot it would belong to.
+    LabelMismatch,
+    /// The return lies outside the range gate.
+    OutsideGate,
+}
+
+impl Reject {
+    /// All kinds, in the order in which they are counted.
+    pub const ALL: [Self; 5] =
+        [Self::NoPeak, Self::Crc, Self::UnknownShot, Self::LabelMismatch, Self::OutsideGate];
+
+    /// Name used in manifests and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoPeak => "no_peak",
+            Self::Crc => "crc",
+            Self::UnknownShot => "unknown_shot",
+            Self::LabelMismatch => "label_mismatch",
+            Self::OutsideGate => "outside_gate",
+        }
+    }
+}
+
+/// Decoded measurements of the owned shots of a band, as columns, at most one per shot, ordered by
+/// shot; and the count of what was rejected.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Returns {
+    /// Index of the shot in the band's log.
+    pub shot: Vec<u32>,
+    /// Two-way time of flight, s.
+    pub tof: Vec<f64>,
+    /// Marks found at their place (correlation peak).
+    pub peak: Vec<u16>,
+    /// Marks the macropulse has.
+    pub marks: Vec<u16>,
+    /// Peak minus the best other lag the receiver looked at.
+    pub margin: Vec<u16>,
+    /// Energy as the receiver can tell it, in detected photons per mark.
+    pub photons: Vec<f32>,
+    /// Rejects by kind, in the order of [`Reject::ALL`].
+    pub rejects: [u64; Reject::ALL.len()],
+}
+
+/// One decoded measurement: a line of [`Returns`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Return {
+    pub shot: usize,
+    pub tof: f64,
+    pub peak: u16,
+    pub marks: u16,
+    pub margin: u16,
+    pub photons: f32,
+}
+
+impl Returns {
+    /// Number of returns.
+    pub fn len(&self) -> usize {
+        self.shot.len()
+    }
+
+    /// Whether there is no return at all.
+    pub fn is_empty(&self) -> bool {
+        self.shot.is_empty()
+    }
+
+    /// How often `reject` happened.
+    pub fn rejected(&self, reject: Reject) -> u64 {
+        self.rejects[reject as usize]
+    }
+
+    /// None yet, with room for `returns`.
+    pub(super) fn with_capacity(returns: usize) -> Self {
+        Self {
+            shot: Vec::with_capacity(returns),
+            tof: Vec::with_capacity(returns),
+            peak: Vec::with_capacity(returns),
+            marks: Vec::with_capacity(returns),
+            margin: Vec::with_capacity(returns),
+            photons: Vec::with_capacity(returns),
+            rejects: Default::default(),
+        }
+    }
+
+    pub(super) fn push(&mut self, found: Return) {
+        self.shot.push(found.shot as u32);
+        self.tof.push(found.tof);
+        self.peak.push(found.peak);
+        self.marks.push(found.marks);
+        self.margin.push(found.margin);
+        self.photons.push(found.photons);
+    }
+
+    pub(super) fn reject(&mut self, reject: Reject) {
+        self.rejects[reject as usize] += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rejects_are_counted_in_the_order_of_their_list() {
+        for (place, kind) in Reject::ALL.into_iter().enumerate() {
+            let mut returns = Returns::default();
+            returns.reject(kind);
+            assert_eq!(returns.rejects[place], 1, "{}", kind.name());
+            assert_eq!(returns.rejected(kind), 1);
+            assert!(returns.is_empty());
+        }
+    }
+}

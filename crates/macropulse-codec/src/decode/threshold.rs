@@ -1,0 +1,169 @@
+//! How many marks must be found together before a return is believed.
+
+use crate::statistics::{binomial, binomial_tail};
+
+/// The fewest marks that chance does not reach: the smallest k with
+/// L · P(Bin(N, d) ≥ k) ≤ α, where L is the number of `lags` tried, N the number of `marks`,
+/// d the `density` of lit places and α the false alarms accepted. N + 1 where no k will do.
+pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64) -> u16 {
+    let enough =
+        |least: u16| lags * binomial_tail(marks.into(), density, least.into()) <= false_alarm;
+    let (mut low, mut high) = (1, marks + 1);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if enough(middle) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
+}
+
+/// The fewest marks, less the dark chips that are lit, that chance does not reach: the smallest s
+/// with L · P(X − Y ≥ s) ≤ α, X ~ Bin(N, d) for the `marks` and Y ~ Bin(M, d) for the `dark`
+/// chips. N + 1 where no s will do.
+pub(super) fn least_balance(lags: f64, chips: (u16, u16), density: f64, false_alarm: f64) -> u16 {
+    let (marks, dark) = (binomial(chips.0.into(), density), binomial(chips.1.into(), density));
+    // P(X ≥ k), the last one beyond all.
+    let mut at_least = vec![0.0; marks.len() + 1];
+    for found in (0..marks.len()).rev() {
+        at_least[found] = at_least[found + 1] + marks[found];
+    }
+    let tail = |least: u16| -> f64 {
+        let beyond = at_least.iter().skip(least.into());
+        dark.iter().zip(beyond).map(|(stray, beyond)| stray * beyond).sum()
+    };
+    (1..=chips.0).find(|&least| lags * tail(least) <= false_alarm).unwrap_or(chips.0 + 1)
+}
+
+/// [`least_marks`], or [`least_balance`], for fixed lags and false alarms, remembered.
+#[derive(Debug, Clone)]
+pub(super) struct Thresholds {
+    lags: f64,
+    false_alarm: f64,
+    /// Whether densities are taken as they are.
+    exact: bool,
+    /// Chips of a macropulse, if what falls on the dark ones is taken off.
+    balanced: Option<u16>,
+    /// By marks, then by step of density; 0 where not yet known.
+    known: Vec<[u16; STEPS]>,
+}
+
+/// Steps of density, eight to an octave: the exponent and the first three bits of the fraction of
+/// a double. The first one is taken for everything below.
+const STEPS: usize = 8 * 24;
+const STEP_BITS: u32 = 49;
+const FIRST_STEP: u64 = (0x3FF_u64 << 3) - (STEPS as u64 - 1);
+
+impl Thresholds {
+    /// For `lags` tried places and `false_alarm` false answers accepted among them; densities are
+    /// taken as they are, where they are to be `exact`.
+    pub fn new(lags: f64, false_alarm: f64, exact: bool) -> Self {
+        Self { lags, false_alarm, exact, balanced: None, known: Vec::new() }
+    }
+
+    /// The same for the balance of macropulses of so many `chips`, densities rounded.
+    pub fn balanced(lags: f64, false_alarm: f64, chips: u16) -> Self {
+        Self { balanced: Some(chips), ..Self::new(lags, false_alarm, false) }
+    }
+
+    /// Whether it gives what `other` gives.
+    pub fn is_as(&self, other: &Self) -> bool {
+        (self.lags, self.false_alarm, self.exact) == (other.lags, other.false_alarm, other.exact)
+    }
+
+    /// The fewest of `marks` to believe at `density`; where that need not be exact, it is rounded
+    /// up by less than an eighth.
+    pub fn least(&mut self, marks: u16, density: f64) -> u16 {
+        if density <= 0.0 {
+            return 1;
+        }
+        if self.exact {
+            return least_marks(self.lags, marks, density, self.false_alarm);
+        }
+        let above = (density.min(1.0).to_bits() + (1 << STEP_BITS) - 1) >> STEP_BITS;
+        let step = above.saturating_sub(FIRST_STEP).min(STEPS as u64 - 1);
+        if self.known.len() <= usize::from(marks) {
+            self.known.resize(usize::from(marks) + 1, [0; STEPS]);
+        }
+        let known = &mut self.known[usize::from(marks)][step as usize];
+        if *known == 0 {
+            let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
+            let (lags, false_alarm) = (self.lags, self.false_alarm);
+            *known = match self.balanced {
+                None => least_marks(lags, marks, density, false_alarm),
+                Some(chips) => {
+                    let dark = chips.saturating_sub(marks);
+                    least_balance(lags, (marks, dark), density, false_alarm)
+                }
+            };
+        }
+        *known
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_denser_sky_asks_for_more_marks() {
+        // Share of marks asked for at 400 000 lags and one false alarm in 1000 gates.
+        let table = [
+            (0.0025, [0.12, 0.05, 0.04]),
+            (0.011, [0.17, 0.09, 0.07]),
+            (0.036, [0.26, 0.15, 0.13]),
+            (0.11, [0.43, 0.28, 0.25]),
+            (0.24, [0.62, 0.45, 0.42]),
+            (0.58, [0.93, 0.79, 0.77]),
+        ];
+        for (density, shares) in table {
+            for (marks, share) in [58_u16, 174, 232].into_iter().zip(shares) {
+                let least = least_marks(4e5, marks, density, 1e-3);
+                let found = f64::from(least) / f64::from(marks);
+                assert!((found - share).abs() < 0.012, "{density} {marks}: {found} not {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_balance_is_reached_as_often_as_pairs_of_binomials_say() {
+        // Two coins against one: both heads and the other tails, one outcome in eight; at least
+        // one more is that and a head against a tail, 1/8 + 2/8.
+        let chance = |lags| least_balance(lags, (2, 1), 0.5, 1.0);
+        assert_eq!([7.9, 8.1].map(chance), [2, 3]);
+        // P(X − Y ≥ 1) = P(1, 0) + P(2, 0) + P(2, 1) = 1/4 + 1/8 + 1/8.
+        assert_eq!([1.9, 2.1].map(chance), [1, 2]);
+        // Where nothing counts against, it is the threshold of the marks.
+        for density in [0.01, 0.2] {
+            let marks = least_marks(4e5, 58, density, 1e-3);
+            assert_eq!(least_balance(4e5, (58, 0), density, 1e-3), marks);
+        }
+    }
+
+    #[test]
+    fn a_bright_sky_raises_a_balance_less_than_a_count() {
+        let [dim, bright] = [0.01, 0.3].map(|density| {
+            (least_balance(4e5, (64, 63), density, 1e-6), least_marks(4e5, 64, density, 1e-6))
+        });
+        assert!(bright.0 - dim.0 < bright.1 - dim.1, "{dim:?} {bright:?}");
+    }
+
+    #[test]
+    fn what_chance_always_reaches_is_never_believed() {
+        assert_eq!(least_marks(4e5, 58, 1.0, 1e-3), 59);
+        assert_eq!(least_marks(4e5, 58, 0.99, 1e-3), 59);
+        assert_eq!(Thresholds::new(4e5, 1e-3, false).least(58, 0.0), 1);
+    }
+
+    #[test]
+    fn a_remembered_threshold_is_never_too_low() {
+        let mut thresholds = Thresholds::new(4e5, 1e-3, false);
+        for density in [1e-4, 0.003, 0.011, 0.2, 0.7] {
+            let exact = least_marks(4e5, 174, density, 1e-3);
+            let remembered = thresholds.least(174, density);
+            assert!((exact..=exact + exact / 8 + 1).contains(&remembered), "{density}");
+        }
+    }
+}

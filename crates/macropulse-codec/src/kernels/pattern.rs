@@ -1,0 +1,183 @@
+//! Bits that are set together, wherever they begin.
+
+use crate::on_every_level;
+
+/// Machine words that are shifted side by side.
+const LANES: usize = 8;
+
+/// Bits of a row, as long as whole blocks of words are, one dark word in front.
+#[derive(Debug, Clone)]
+pub(crate) struct Pattern {
+    words: Vec<u64>,
+}
+
+impl Pattern {
+    /// The pattern with the given `bits`, each of them `width` bits long.
+    pub(crate) fn new(bits: impl Iterator<Item = usize>, width: usize) -> Self {
+        let mut words = vec![0];
+        for bit in bits.flat_map(|bit| bit..bit + width) {
+            let word = 1 + bit / 64;
+            words.resize(words.len().max(word + 1), 0);
+            words[word] |= 1 << (bit % 64);
+        }
+        // What is shifted out of the last word goes into one more.
+        let blocks = words.len().div_ceil(LANES);
+        words.resize(1 + blocks * LANES, 0);
+        Self { words }
+    }
+
+    /// Words that have bits of the pattern, wherever in the first one of them it begins.
+    pub(crate) fn reach(&self) -> usize {
+        self.words.len() - 1
+    }
+}
+
+on_every_level! {
+    /// How many bits of `pattern`, begun at bit `first`, are lit in `words`. What reaches beyond
+    /// the end is dark.
+    pub(crate) fn lit_in(words: &[u64], first: usize, pattern: &Pattern) -> u32 {
+        let (begin, shift) = (first / 64, first % 64);
+        let mut sums = [0_u64; LANES];
+        for block in (0..pattern.reach()).step_by(LANES) {
+            let mask = shifted(&pattern.words[block..], shift);
+            let words = words.get(begin + block..).unwrap_or_default();
+            let words = match words.first_chunk::<LANES>() {
+                Some(words) => *words,
+                None => {
+                    let mut last = [0; LANES];
+                    last[..words.len()].copy_from_slice(words);
+                    last
+                }
+            };
+            for lane in 0..LANES {
+                sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
+            }
+        }
+        sums.iter().sum::<u64>() as u32
+    }
+}
+
+on_every_level! {
+    /// Puts the bits of `pattern`, begun at bit `first`, out in `words`, and calls them lit in
+    /// `were_lit`, one number for each of the [`Pattern::reach`] words from the first one on. What
+    /// reaches beyond the end is dark.
+    pub(crate) fn put_out(words: &mut [u64], first: usize, pattern: &Pattern, were_lit: &mut [u8]) {
+        let (begin, shift) = (first / 64, first % 64);
+        for block in (0..pattern.reach()).step_by(LANES) {
+            let mask = shifted(&pattern.words[block..], shift);
+            let words = words.get_mut(begin + block..).unwrap_or_default();
+            let were_lit = &mut were_lit[block..block + LANES];
+            match words.first_chunk_mut::<LANES>() {
+                Some(words) => {
+                    for lane in 0..LANES {
+                        were_lit[lane] = (words[lane] & mask[lane]).count_ones() as u8;
+                        words[lane] &= !mask[lane];
+                    }
+                }
+                None => {
+                    were_lit.fill(0);
+                    for (lane, word) in words.iter_mut().enumerate() {
+                        were_lit[lane] = (*word & mask[lane]).count_ones() as u8;
+                        *word &= !mask[lane];
+                    }
+                }
+            }
+        }
+    }
+}
+
+on_every_level! {
+    /// Lights the `reach` bits before each one that is lit.
+    pub(crate) fn look_ahead(words: &mut [u64], reach: usize) {
+        // Each round looks as far ahead again as all rounds before it.
+        let mut reached = 0;
+        while reached < reach {
+            let step = (reached + 1).min(reach - reached);
+            let (skip, shift) = (step / 64, step % 64);
+            for word in 0..words.len().saturating_sub(skip + 1) {
+                let (here, next) = (words[word + skip], words[word + skip + 1]);
+                words[word] |= here >> shift | next << 1 << (63 ^ shift);
+            }
+            if let Some(word) = words.len().checked_sub(skip + 1) {
+                words[word] |= words[word + skip] >> shift;
+            }
+            reached += step;
+        }
+    }
+}
+
+/// The block of words behind the first one of `pattern`, `shift` bits later.
+#[inline(always)]
+fn shifted(pattern: &[u64], shift: usize) -> [u64; LANES] {
+    let mut lanes = [0; LANES];
+    let Some(words) = pattern.first_chunk::<{ LANES + 1 }>() else { return lanes };
+    for lane in 0..LANES {
+        // Two shifts, because a shift by 64 does not give 0.
+        lanes[lane] = words[lane + 1] << shift | words[lane] >> 1 >> (63 ^ shift);
+    }
+    lanes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::level::forced::at_each_level;
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn every_level_looks_ahead(
+            lit in proptest::collection::btree_set(0..640_usize, 0..20),
+            reach in 0..200_usize,
+        ) {
+            let lit_at = |places: &mut dyn Iterator<Item = usize>| {
+                let mut words = vec![0_u64; 10];
+                places.for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
+                words
+            };
+            let before = |bit: &usize| bit.saturating_sub(reach)..=*bit;
+            let expected = lit_at(&mut lit.iter().flat_map(before));
+            let seen = at_each_level(|| {
+                let mut words = lit_at(&mut lit.iter().copied());
+                look_ahead(&mut words, reach);
+                words
+            });
+            for (level, words) in seen {
+                prop_assert_eq!(&words, &expected, "{:?}", level);
+            }
+        }
+
+        #[test]
+        fn every_level_counts_and_puts_out_the_bits_of_a_pattern(
+            bits in proptest::collection::btree_set(0..900_usize, 0..40),
+            width in 1..5_usize,
+            lit in proptest::collection::btree_set(0..1500_usize, 0..600),
+            first in 0..1600_usize,
+        ) {
+            let pattern = Pattern::new(bits.iter().copied(), width);
+            let within: BTreeSet<usize> = bits.iter().flat_map(|b| first + b..first + b + width).collect();
+            let mut words = vec![0_u64; 1500_usize.div_ceil(64)];
+            lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
+            let count = lit.intersection(&within).count() as u32;
+            let mut left = vec![0_u64; words.len()];
+            lit.difference(&within).for_each(|bit| left[bit / 64] |= 1 << (bit % 64));
+            for (level, found) in at_each_level(|| lit_in(&words, first, &pattern)) {
+                prop_assert_eq!(found, count, "{:?}", level);
+            }
+            let rest = at_each_level(|| {
+                let (mut rest, mut were_lit) = (words.clone(), vec![7; pattern.reach()]);
+                put_out(&mut rest, first, &pattern, &mut were_lit);
+                (rest, were_lit)
+            });
+            for (level, (rest, were_lit)) in rest {
+                prop_assert_eq!(&rest, &left, "{:?}", level);
+                for (word, count) in were_lit.iter().enumerate() {
+                    let word = first / 64 + word;
+                    let lit_in = |words: &[u64]| words.get(word).map_or(0, |word| word.count_ones());
+                    prop_assert_eq!(u32::from(*count), lit_in(&words) - lit_in(&left));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! The codec of Macropulse: what both ends of a pulse-coded lidar link speak, and the receivers.
+//!
+//! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word in a frame
+//! of chips. A receiver is given the **ticks** at which its converters saw light and the **shot
+//! log** of what was sent when, and finds the delay of every shot. Nothing here knows a scene,
+//! light, a file system or a thread pool.
+//!
+//! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
+//! * [`ShotLog`] and [`Ticks`]: what a receiver is given, as columns.
+//! * [`decode`]: the receivers, from ticks to returns.
+//! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
+//! * [`level`]: which instructions the wide loops use.
+
+#![cfg_attr(test, allow(missing_docs))]
+
+pub mod code;
+pub mod decode;
+pub mod statistics;
+pub mod time;
+
+mod kernels;
+mod shot_log;
+mod ticks;
+
+pub use kernels::level;
+pub use shot_log::ShotLog;
+pub use ticks::Ticks;

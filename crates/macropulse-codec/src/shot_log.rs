@@ -1,0 +1,56 @@
+//! The shot log: what the sensor itself knows of what it sent.
+
+use std::ops::Range;
+
+/// A run of consecutive shots, as columns. Shot `i` of the log has the absolute id `first + i`.
+///
+/// This is everything the receiver may know of the transmitter: where and when each shot was
+/// fired and with which code. It holds nothing of the scene.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ShotLog {
+    /// Absolute id of the first shot here, counted from the first shot of the first scan.
+    pub first: u64,
+    /// Absolute time at which the first chip leaves, fs; never decreasing.
+    pub fired_at_fs: Vec<i64>,
+    /// Row of the pixel, 0 at the top.
+    pub row: Vec<u16>,
+    /// Column of the pixel, 0 at the left.
+    pub column: Vec<u16>,
+    /// The number the macropulse carries; 0 where shots carry none.
+    pub label: Vec<u16>,
+    /// Index of the code word in its family; 0 where shots are not coded.
+    pub word: Vec<u16>,
+    /// The detector that listens to this shot.
+    pub channel: Vec<u16>,
+    /// The owned shots, whose returns are wanted. The others are guard shots: they are decoded
+    /// too, because their light overlaps, and their results dropped.
+    pub owned: Range<usize>,
+}
+
+impl ShotLog {
+    /// The log of shots that a single detector listens to, without labels: when each was fired, fs,
+    /// ascending, and in which code word. Shot `n` goes to column `n` of row 0, and all are owned.
+    pub fn of_one_channel(fired_at_fs: &[i64], words: &[u16]) -> Self {
+        let shots = fired_at_fs.len().min(words.len());
+        Self {
+            first: 0,
+            fired_at_fs: fired_at_fs[..shots].to_vec(),
+            row: vec![0; shots],
+            column: (0..shots).map(|shot| shot as u16).collect(),
+            label: vec![0; shots],
+            word: words[..shots].to_vec(),
+            channel: vec![0; shots],
+            owned: 0..shots,
+        }
+    }
+
+    /// Number of shots, guard shots included.
+    pub fn len(&self) -> usize {
+        self.fired_at_fs.len()
+    }
+
+    /// Whether there is no shot at all.
+    pub fn is_empty(&self) -> bool {
+        self.fired_at_fs.is_empty()
+    }
+}

@@ -1,0 +1,215 @@
+//! The distributions that thresholds and forecasts are derived from, each with one owned here.
+//!
+//! Sums and rational approximations of elementary functions from `libm`, so that every machine
+//! gives the same bits. Tests compare them with `statrs`.
+
+use libm::{erfc, exp, lgamma, log, log1p};
+
+/// Terms of a sum that are less than this share of it are left out.
+const NEGLIGIBLE: f64 = 1e-17;
+
+/// `Q(x) = ½·erfc(x/√2)`: probability that a standard normal variable exceeds `x`.
+pub fn normal_tail(x: f64) -> f64 {
+    0.5 * erfc(x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// Quantile of the standard normal distribution, Φ⁻¹(p), from the rational approximation of
+/// \[Acklam03\] (relative error below 1.2e-9); `p` is held within \[1e-300, 1 − 1e-16\].
+pub fn normal_quantile(p: f64) -> f64 {
+    const A: [f64; 6] = [
+        -3.969683028665376e1,
+        2.209460984245205e2,
+        -2.759285104469687e2,
+        1.38357751867269e2,
+        -3.066479806614716e1,
+        2.506628277459239,
+    ];
+    const B: [f64; 5] = [
+        -5.447609879822406e1,
+        1.615858368580409e2,
+        -1.556989798598866e2,
+        6.680131188771972e1,
+        -1.328068155288572e1,
+    ];
+    const C: [f64; 6] = [
+        -7.784894002430293e-3,
+        -3.223964580411365e-1,
+        -2.400758277161838,
+        -2.549732539343734,
+        4.374664141464968,
+        2.938163982698783,
+    ];
+    const D: [f64; 4] =
+        [7.784695709041462e-3, 3.224671290700398e-1, 2.445134137142996, 3.754408661907416];
+    let horner = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, a| sum * x + a);
+    let p = p.clamp(1e-300, 1.0 - 1e-16);
+    let tail = p.min(1.0 - p);
+    if tail < 0.02425 {
+        let q = libm::sqrt(-2.0 * log(tail));
+        let x = horner(&C, q) / (horner(&D, q) * q + 1.0);
+        return if p < 0.5 { x } else { -x };
+    }
+    let q = p - 0.5;
+    let r = q * q;
+    horner(&A, r) * q / (horner(&B, r) * r + 1.0)
+}
+
+/// P(X ≥ k) of X ~ Bin(n, p): the chance that `least` or more of `trials` succeed, each with
+/// probability `p`. Summed from the smaller side.
+pub fn binomial_tail(trials: usize, p: f64, least: usize) -> f64 {
+    if least == 0 || p >= 1.0 {
+        return if least <= trials { 1.0 } else { 0.0 };
+    }
+    if least > trials || p <= 0.0 {
+        return 0.0;
+    }
+    let (n, k, odds) = (trials as f64, least as f64, p / (1.0 - p));
+    let choose = lgamma(n + 1.0) - lgamma(k + 1.0) - lgamma(n - k + 1.0);
+    let first = exp(choose + k * log(p) + (n - k) * log1p(-p));
+    // Away from the mean each term is smaller than the one before it.
+    let (mut sum, mut term) = (0.0, first);
+    if k < n * p {
+        for k in (1..=least).rev() {
+            term *= k as f64 / (n - k as f64 + 1.0) / odds;
+            sum += term;
+            if term < sum * NEGLIGIBLE {
+                break;
+            }
+        }
+        return (1.0 - sum).max(0.0);
+    }
+    for k in least..=trials {
+        sum += term;
+        if term < sum * NEGLIGIBLE {
+            break;
+        }
+        term *= odds * (n - k as f64) / (k as f64 + 1.0);
+    }
+    sum.min(1.0)
+}
+
+/// P(X = 0), P(X = 1) … P(X = n) of X ~ Bin(n, p), n being `trials`; `p` is held within
+/// \[1e-12, 1 − 1e-12\].
+pub fn binomial(trials: usize, p: f64) -> Vec<f64> {
+    let p = p.clamp(1e-12, 1.0 - 1e-12);
+    let all = lgamma(trials as f64 + 1.0);
+    let term = |k: usize| {
+        let (k, rest) = (k as f64, (trials - k) as f64);
+        exp(all - lgamma(k + 1.0) - lgamma(rest + 1.0) + k * log(p) + rest * log1p(-p))
+    };
+    (0..=trials).map(term).collect()
+}
+
+/// P(X = k) of a Poisson variable with the given `mean`, e^(−n)·n^k/k!.
+pub fn poisson(mean: f64, k: f64) -> f64 {
+    exp(k * log(mean) - mean - lgamma(k + 1.0))
+}
+
+/// Erlang's B, a^c/c! / Σ_k a^k/k! \[Erl17\]: the share of calls that find all of `servers` busy
+/// where `offered` is the mean number of calls that come within the time one takes. It does not
+/// depend on how the times are distributed.
+pub fn erlang_b(offered: f64, servers: u32) -> f64 {
+    if offered <= 0.0 {
+        return 0.0;
+    }
+    // B(c) = a·B(c − 1)/(c + a·B(c − 1)), B(0) = 1.
+    (1..=servers).fold(1.0, |loss, servers| {
+        let carried = offered * loss;
+        carried / (f64::from(servers) + carried)
+    })
+}
+
+/// The bound that |t| exceeds with probability 0.05, t of Student's distribution with `degrees` of
+/// freedom, at least 1.
+///
+/// Found by halving the angle θ = atan(t/√ν), in whose sine and cosine the distribution is a
+/// finite sum \[AS64, 26.7.3 and 26.7.4\].
+pub fn student_95(degrees: u32) -> f64 {
+    let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
+    // An angle has 53 bits.
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if student_within(middle, degrees) < 0.95 { low = middle } else { high = middle }
+    }
+    f64::from(degrees).sqrt() * libm::tan(low)
+}
+
+/// Probability that |t| < √ν·tan θ, where ν is `degrees`:
+///
+/// - ν odd: `2/π · (θ + sin θ·(cos θ + 2/3·cos³θ + … ))`, up to cos^(ν−2);
+/// - ν even: `sin θ·(1 + 1/2·cos²θ + 1·3/(2·4)·cos⁴θ + … )`, up to cos^(ν−2).
+fn student_within(angle: f64, degrees: u32) -> f64 {
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    let is_odd = degrees % 2 == 1;
+    let mut term = if is_odd { cosine } else { 1.0 };
+    let mut sum = 0.0;
+    let first = if is_odd { 3 } else { 2 };
+    for next in (first..=degrees).step_by(2) {
+        sum += term;
+        term *= cosine * cosine * f64::from(next - 1) / f64::from(next);
+    }
+    if is_odd { std::f64::consts::FRAC_2_PI * (angle + sine * sum) } else { sine * sum }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use statrs::distribution::{
+        Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal, Poisson, StudentsT,
+    };
+
+    #[test]
+    fn the_normal_distribution_is_that_of_a_reference() {
+        let normal = Normal::standard();
+        for x in [-6.0, -2.5, -0.3, 0.0, 0.7, 1.96, 5.0] {
+            assert_relative_eq!(normal_tail(x), normal.sf(x), max_relative = 1e-9);
+            let p = normal.cdf(x);
+            assert_abs_diff_eq!(normal_quantile(p), x, epsilon = 1e-7);
+        }
+        assert_eq!(normal_quantile(0.5), 0.0);
+        assert!(normal_quantile(0.0).is_finite() && normal_quantile(1.0).is_finite());
+    }
+
+    #[test]
+    fn the_binomial_is_that_of_a_reference() {
+        for (n, p) in [(10, 0.5), (180, 0.01), (29, 0.66), (8000, 0.3), (3, 0.999)] {
+            let reference = Binomial::new(p, n).unwrap();
+            let mut points = vec![1, 2, n / 3, (n as f64 * p) as u64, n / 2, n - 1, n];
+            points.retain(|k| *k > 0);
+            for k in points {
+                let tail = reference.sf(k - 1);
+                let found = binomial_tail(n as usize, p, k as usize);
+                assert_abs_diff_eq!(found, tail, epsilon = 1e-9 * tail + 1e-14);
+                let mass = binomial(n as usize, p)[k as usize];
+                assert_abs_diff_eq!(mass, reference.pmf(k), epsilon = 1e-9 * mass + 1e-15);
+            }
+        }
+        assert_relative_eq!(binomial_tail(10, 0.5, 7), 176.0 / 1024.0, max_relative = 1e-12);
+        assert_eq!((binomial_tail(10, 0.5, 0), binomial_tail(10, 0.5, 11)), (1.0, 0.0));
+        assert_eq!((binomial_tail(9, 1.0, 9), binomial_tail(9, 0.0, 1)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn poisson_and_student_are_those_of_a_reference() {
+        let reference = Poisson::new(4.6).unwrap();
+        for k in [0, 1, 4, 20] {
+            let mass = reference.pmf(k);
+            assert_relative_eq!(poisson(4.6, k as f64), mass, max_relative = 1e-9);
+        }
+        for degrees in [1, 2, 5, 30, 199] {
+            let reference = StudentsT::new(0.0, 1.0, f64::from(degrees)).unwrap();
+            let bound = student_95(degrees);
+            assert_relative_eq!(reference.sf(bound), 0.025, max_relative = 1e-7);
+        }
+    }
+
+    /// 10 Erlang offered to 10 lines: 21.46 %; 1 to 1: one half; far too many: what is not served.
+    #[test]
+    fn erlang_has_the_published_values() {
+        assert_relative_eq!(erlang_b(10.0, 10), 0.214_58, max_relative = 1e-4);
+        assert_relative_eq!(erlang_b(1.0, 1), 0.5, max_relative = 1e-12);
+        assert_relative_eq!(erlang_b(1e5, 1150), 1.0 - 1150.0 / 1e5, max_relative = 1e-3);
+        assert_eq!(erlang_b(0.0, 3), 0.0);
+    }
+}

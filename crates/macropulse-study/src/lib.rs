@@ -1,0 +1,9 @@
+//! What is done with the simulator: the experiment of Kim & Park (2016), sweeps, records of runs,
+//! and the pictures, charts and pages that show them.
+
+#![cfg_attr(test, allow(missing_docs))]
+
+pub mod paper;
+pub mod record;
+pub mod sweep;
+pub mod view;

@@ -1,0 +1,138 @@
+//! Three lidars, one car, four distances \[KP16 §3\].
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::Error;
+use super::geometry::{self, Prediction};
+use crate::record;
+use macropulse::design::Design;
+use macropulse::formats::Format;
+use macropulse::points::{Outcome, PointCloud};
+use macropulse::scene::{Ray, Scene};
+use macropulse::score::Score;
+use macropulse::sim::{self, Tally, Watch};
+
+/// The sensors compared.
+pub const SENSORS: [&str; 3] = ["kim-park-2016", "hdl-64e", "peregrine"];
+
+/// Distances of the car's front, m.
+pub const DISTANCES: [u32; 4] = [30, 50, 70, 120];
+
+/// One sensor looking at the car at one distance.
+#[derive(Debug)]
+pub struct Trial {
+    /// The sensor.
+    pub sensor: &'static str,
+    /// Distance of the car's front, m.
+    pub distance: u32,
+    /// Its points, with truth.
+    pub cloud: PointCloud,
+    /// How the pixels came out.
+    pub score: Score,
+    /// What was counted on the way.
+    pub tally: Tally,
+    /// The samples that geometry predicts on the car.
+    pub predicted: Prediction,
+    /// Samples on the car without a point, by material, most first.
+    pub lost: Vec<(String, u64)>,
+    /// Rows that have a point on the car.
+    pub rows_on_car: usize,
+    /// Height above ground of the lowest sample on the car, m; NaN without one.
+    pub lowest_sample: f64,
+}
+
+/// Runs one trial and writes its cloud, pictures and manifest into `folder`.
+pub(super) fn trial(
+    design: &Design,
+    (sensor, distance): (&'static str, u32),
+    seed: u64,
+    folder: &Path,
+    watch: &Watch,
+) -> Result<Trial, Error> {
+    let scene = Scene::open(&format!("car-{distance}m"))?;
+    let began = Instant::now();
+    let scan = sim::scan_watched(design, &scene, seed, 0, watch).ok_or(Error::Stopped)?;
+    let elapsed = began.elapsed().as_secs_f64();
+    let folder = folder.join(format!("{sensor}-{distance}m"));
+    std::fs::create_dir_all(&folder)
+        .map_err(|source| Error::Folder { path: folder.clone(), source })?;
+    let formats = [Format::Pcd, Format::Png];
+    let writing = Instant::now();
+    let files = record::write_scan(&folder, &formats, &scan.cloud, (design, &scene))?;
+    let writing = writing.elapsed().as_secs_f64();
+    let warnings: Vec<String> =
+        scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
+    let run = record::Run {
+        design,
+        scene: &scene,
+        seed,
+        scans: 1,
+        tally: &scan.tally,
+        score: &scan.score,
+        files: &files,
+        warnings: &warnings,
+        writing,
+        elapsed,
+    };
+    record::manifest(&run).write(&folder)?;
+    let samples = samples_on_car(design, &scene);
+    let found = |sample: &Sample| {
+        let truth = &scan.cloud.truth;
+        matches!(truth.outcome[sample.pixel], Outcome::Right | Outcome::Near)
+            && is_target(&scene, truth.object[sample.pixel])
+    };
+    let mut rows: Vec<usize> =
+        samples.iter().filter(|s| found(s)).map(|s| s.pixel / scan.cloud.columns).collect();
+    rows.dedup();
+    let lost = samples.iter().filter(|sample| !found(sample));
+    Ok(Trial {
+        sensor,
+        distance,
+        lost: by_material(&scene, lost),
+        rows_on_car: rows.len(),
+        lowest_sample: samples.iter().map(|sample| sample.height).fold(f64::NAN, f64::min),
+        predicted: geometry::predict(design, &scene),
+        score: scan.score,
+        tally: scan.tally,
+        cloud: scan.cloud,
+    })
+}
+
+/// A ray that meets the car first.
+struct Sample {
+    pixel: usize,
+    material: u16,
+    /// Height of the surface above the ground, m.
+    height: f64,
+}
+
+fn is_target(scene: &Scene, object: u16) -> bool {
+    scene.objects.get(usize::from(object)).is_some_and(|object| object.is_target)
+}
+
+/// The rays of the sensor that meet the car first, in the order of the cloud.
+fn samples_on_car(design: &Design, scene: &Scene) -> Vec<Sample> {
+    let world_from_sensor = scene.sensor.world_from_sensor();
+    let columns = design.scan.columns as usize;
+    let sample = |pixel: usize| {
+        let aim = design.directions().of((pixel / columns) as u16, (pixel % columns) as u16);
+        let ray =
+            Ray { origin: scene.sensor.position, direction: world_from_sensor.direction(aim) };
+        let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range)?;
+        let height = ray.origin[2] + ray.direction[2] * hit.range;
+        is_target(scene, hit.object).then_some(Sample { pixel, material: hit.material, height })
+    };
+    (0..design.shots_per_scan() as usize).filter_map(sample).collect()
+}
+
+/// Samples counted by material, most first.
+fn by_material<'a>(scene: &Scene, samples: impl Iterator<Item = &'a Sample>) -> Vec<(String, u64)> {
+    let mut counts = vec![0_u64; scene.materials.len()];
+    samples.for_each(|sample| counts[usize::from(sample.material)] += 1);
+    let named = scene.materials.iter().zip(counts).filter(|(_, count)| *count > 0);
+    let mut counted: Vec<(String, u64)> =
+        named.map(|(material, count)| (material.name.clone(), count)).collect();
+    counted.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    counted
+}

@@ -1,0 +1,145 @@
+//! The experiment of \[KP16\], from presets to report: every table and figure made again from data,
+//! every claim confirmed or refuted.
+
+mod claim;
+mod claims_code;
+mod claims_experiment;
+mod claims_system;
+mod conclusion;
+mod experiment;
+mod geometry;
+mod pictures;
+mod receivers;
+mod report;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+pub use claim::{Claim, Verdict};
+pub use experiment::{DISTANCES, SENSORS, Trial};
+pub use geometry::{Prediction, predict};
+pub use receivers::{Comparison, PERFECT};
+
+use macropulse::design::Design;
+use macropulse::formats::write_atomically;
+use macropulse::sim::Watch;
+
+/// Why the experiment could not be run or written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A folder could not be made.
+    #[error("cannot make the folder {}: {source}; choose another one with -o", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It was asked to stop.
+    #[error("stopped before the end")]
+    Stopped,
+    /// A ready sensor was refused.
+    #[error(transparent)]
+    Design(#[from] macropulse::design::Error),
+    /// A ready scene was refused.
+    #[error(transparent)]
+    Scene(#[from] macropulse::scene::Error),
+    /// A code was refused.
+    #[error(transparent)]
+    Code(macropulse::codec::code::Error),
+    /// A result could not be written.
+    #[error(transparent)]
+    Record(#[from] crate::record::Error),
+    /// A file could not be written.
+    #[error(transparent)]
+    Formats(#[from] macropulse::formats::Error),
+    /// A picture could not be drawn.
+    #[error(transparent)]
+    View(#[from] crate::view::Error),
+}
+
+/// Everything that was measured.
+#[derive(Debug)]
+pub struct Findings {
+    /// The sensors, in the order of [`SENSORS`].
+    pub designs: Vec<Design>,
+    /// Every sensor at every distance.
+    pub trials: Vec<Trial>,
+    /// The receivers compared.
+    pub comparisons: Vec<Comparison>,
+    /// What the paper says, and whether it holds.
+    pub claims: Vec<Claim>,
+}
+
+/// Shots that [`run`] tells its watch of.
+///
+/// # Errors
+/// None of the ready sensors is refused, unless the program is broken.
+pub fn shots() -> Result<u64, Error> {
+    let trials: u64 = designs()?.iter().map(Design::shots_per_scan).sum();
+    Ok(trials * DISTANCES.len() as u64 + receivers::shots()?)
+}
+
+fn designs() -> Result<Vec<Design>, Error> {
+    SENSORS.iter().map(|name| Ok(Design::open(name, &[])?)).collect()
+}
+
+/// Runs the whole experiment and writes into `folder`: one folder per sensor and distance,
+/// `points.csv`, `claims.json`, and `index.html` last.
+///
+/// # Errors
+/// If something cannot be written, or the watch says stop.
+pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
+    let designs = designs()?;
+    let sensors: Vec<_> = designs.iter().zip(SENSORS).collect();
+    let trials = sensors.par_iter().flat_map(|(design, sensor)| {
+        DISTANCES.par_iter().map(move |&distance| {
+            experiment::trial(design, (sensor, distance), seed, folder, watch)
+        })
+    });
+    let trials = trials.collect::<Result<Vec<_>, Error>>()?;
+    let comparisons = receivers::compare(seed, watch)?;
+    let claims = claims(&designs[0], &trials, &comparisons)?;
+    let findings = Findings { designs, trials, comparisons, claims };
+    write_atomically(&folder.join("points.csv"), |out| {
+        out.write_all(tables::points_csv(&findings.trials).as_bytes())
+    })?;
+    write_atomically(&folder.join("claims.json"), |out| {
+        serde_json::to_writer_pretty(&mut *out, &findings.claims)?;
+        out.write_all(b"\n")
+    })?;
+    let html = report::page(&findings, seed)?.html();
+    write_atomically(&folder.join("index.html"), |out| out.write_all(html.as_bytes()))?;
+    Ok(findings)
+}
+
+/// The claims that need no experiment, on the sensor of the paper.
+///
+/// # Errors
+/// If the sensor's code has no closed form; none of the ready sensors is refused, unless the
+/// program is broken.
+pub fn claims_on_paper(design: &Design) -> Result<Vec<Claim>, Error> {
+    let mut claims = claims_code::words(design)?;
+    claims.extend(claims_code::payload(design));
+    claims.extend(claims_system::timing(design));
+    let honest = [false, true].map(|counted| {
+        let set = [("safety.count_lines".to_owned(), counted.to_string())];
+        Design::open("kim-park-2016-physical", &set)
+    });
+    let [lax, strict] = honest;
+    claims.extend(claims_system::light(design, &lax?, &strict?));
+    claims.extend(claims_system::elevations(&Design::open("hdl-64e", &[])?));
+    Ok(claims)
+}
+
+fn claims(
+    design: &Design,
+    trials: &[Trial],
+    comparisons: &[Comparison],
+) -> Result<Vec<Claim>, Error> {
+    let mut claims = claims_on_paper(design)?;
+    claims.extend(claims_experiment::claims(trials, comparisons));
+    Ok(claims)
+}

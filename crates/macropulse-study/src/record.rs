@@ -1,0 +1,147 @@
+//! What a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
+
+use std::path::Path;
+
+use crate::view::{Layout, RangePicture};
+use macropulse::codec::decode::Reject;
+use macropulse::design::Design;
+use macropulse::formats::{
+    self, Entries, Format, Manifest, Named, Names, write_atomically, write_cloud,
+};
+use macropulse::points::{Outcome, PointCloud};
+use macropulse::scene::Scene;
+use macropulse::score::Score;
+use macropulse::sim::Tally;
+
+/// How the names of range images in colour end.
+pub const COLOUR: &str = "-colour.png";
+
+/// Why a result could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file could not be written.
+    #[error(transparent)]
+    Formats(#[from] formats::Error),
+    /// A picture could not be drawn.
+    #[error(transparent)]
+    View(#[from] crate::view::Error),
+}
+
+/// Writes the files of scan number `cloud.scan` into `folder` and gives their names.
+///
+/// # Errors
+/// If a file cannot be written; files written before it stay.
+pub fn write_scan(
+    folder: &Path,
+    formats: &[Format],
+    cloud: &PointCloud,
+    (design, scene): (&Design, &Scene),
+) -> Result<Vec<String>, Error> {
+    let objects: Vec<String> = scene.objects.iter().map(|object| object.name.clone()).collect();
+    let materials: Vec<String> = scene.materials.iter().map(|m| m.name.clone()).collect();
+    let names = Names { objects: &objects, materials: &materials };
+    let mut files = Vec::new();
+    for &format in formats {
+        let kind = if format == Format::Png { "range" } else { "scan" };
+        let file = format!("{kind}-{:06}.{}", cloud.scan, format.name());
+        write_cloud(format, cloud, &names, &folder.join(&file))?;
+        files.push(file);
+        if format == Format::Png {
+            // Some grids are too large for a picture in colour; the 16-bit one is there.
+            let picture = match colour_picture(cloud, design) {
+                Err(crate::view::Error::Size { .. }) => continue,
+                picture => picture?,
+            };
+            let file = format!("range-{:06}{COLOUR}", cloud.scan);
+            write_atomically(&folder.join(&file), |out| out.write_all(&picture))?;
+            files.push(file);
+        }
+    }
+    Ok(files)
+}
+
+/// The range image for people, large enough to see something in.
+fn colour_picture(cloud: &PointCloud, design: &Design) -> Result<Vec<u8>, crate::view::Error> {
+    let zoom = |pixels: usize, wanted: usize| (wanted / pixels.max(1)).clamp(1, 8);
+    let even = zoom(cloud.columns, 1024);
+    let mut layout = Layout::new(cloud.rows, cloud.columns);
+    layout.zoom = [even, even.max(zoom(cloud.rows, 256))];
+    let picture = RangePicture {
+        layout,
+        range: &cloud.range,
+        near: design.scan.min_range as f32,
+        far: design.scan.max_range as f32,
+    };
+    picture.png()
+}
+
+/// A run of one sensor in one scene, finished or broken off.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// The sensor.
+    pub design: &'a Design,
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Seed of all chance.
+    pub seed: u64,
+    /// Scans that are complete.
+    pub scans: u64,
+    /// What was counted on the way.
+    pub tally: &'a Tally,
+    /// How the pixels came out.
+    pub score: &'a Score,
+    /// Names of the files written.
+    pub files: &'a [String],
+    /// Remarks beyond those of the scene.
+    pub warnings: &'a [String],
+    /// Time spent writing files, s.
+    pub writing: f64,
+    /// Wall-clock time, s.
+    pub elapsed: f64,
+}
+
+/// The manifest of a run.
+pub fn manifest(run: &Run) -> Manifest {
+    let Run { design, scene, tally, .. } = *run;
+    let mut manifest = Manifest {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: run.seed,
+        sensor: Named { name: design.name.clone(), digest: design.digest() },
+        scene: Named { name: scene.name.clone(), digest: scene.digest() },
+        defaults: Entries(design.defaults.clone()),
+        idealisations: design.idealised.iter().map(|effect| effect.name().to_owned()).collect(),
+        notes: scene.notes.iter().chain(run.warnings).cloned().collect(),
+        files: run.files.to_vec(),
+        ..Manifest::default()
+    };
+    for (name, count) in [
+        ("scans", run.scans),
+        ("shots", tally.shots),
+        ("surfaces", tally.surfaces),
+        ("echoes", tally.echoes),
+        ("edges", tally.edges),
+        ("ticks", tally.ticks),
+        ("returns", tally.returns),
+    ] {
+        manifest.counts.push(name, count);
+    }
+    if !scene.others.is_empty() {
+        manifest.counts.push("foreign", tally.foreign);
+        manifest.counts.push("ghosts", run.score.ghosts);
+    }
+    for (kind, count) in Reject::ALL.into_iter().zip(tally.rejects) {
+        manifest.rejects.push(kind.name(), count);
+    }
+    manifest.tdc.push("peak_busy", u64::from(tally.peak_busy));
+    manifest.tdc.push("lost", tally.lost);
+    manifest.tdc.push("merged", tally.merged);
+    for outcome in Outcome::ALL {
+        manifest.outcomes.push(outcome.name(), run.score.count(outcome));
+    }
+    for (stage, seconds) in Tally::STAGES.into_iter().zip(tally.seconds) {
+        manifest.stage_times_s.push(stage, seconds);
+    }
+    manifest.stage_times_s.push("write", run.writing);
+    manifest.stage_times_s.push("elapsed", run.elapsed);
+    manifest
+}

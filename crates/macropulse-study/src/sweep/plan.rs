@@ -1,0 +1,393 @@
+//! From what is asked for to points and jobs, all of them checked.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::{Axis, Error, Job};
+use macropulse::design::Design;
+use macropulse::emit::{Band, bands};
+use macropulse::formats::Named;
+use macropulse::scene::Scene;
+
+/// More jobs than this are taken for a slip.
+const MOST_JOBS: u64 = 100_000;
+
+/// Keys of the scene stand behind this.
+const OF_SCENE: &str = "scene:";
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Ready sensors or files; several of them are varied like a key.
+    pub sensors: Vec<String>,
+    /// Ready scene or file.
+    pub scene: String,
+    /// What is changed of all sensors, and behind `scene:` of the scene: dotted keys and values.
+    pub set: Vec<(String, String)>,
+    /// What is varied.
+    pub vary: Vec<Axis>,
+    /// The seeds with which every point is measured.
+    pub seeds: Range<u64>,
+    /// About how many shots of a scan are measured, in whole bands; all if `None`.
+    pub shots: Option<u64>,
+}
+
+/// Every combination of the values that are varied, with every seed. All of it is valid.
+#[derive(Debug)]
+pub struct Plan {
+    /// What is varied: along x, and from curve to curve.
+    pub axes: Vec<Axis>,
+    /// All combinations; the values of the last axis change fastest.
+    pub points: Vec<Point>,
+    /// The seeds.
+    pub seeds: Range<u64>,
+    /// Ready scene or file, as typed.
+    pub scene: String,
+    set: Vec<(String, String)>,
+    scenes: Vec<(Changes, Scene)>,
+}
+
+/// A sensor in a scene: one combination of values.
+#[derive(Debug)]
+pub struct Point {
+    /// A value of each axis.
+    pub values: Vec<String>,
+    /// The sensor.
+    pub sensor: Named,
+    /// The scene.
+    pub scene: Named,
+    /// Pixels measured with each seed.
+    pub shots: u64,
+    /// Pixels of a whole scan.
+    pub shots_per_scan: u64,
+    /// Effects that are left out.
+    pub idealisations: Vec<String>,
+    /// Values nobody wrote: dotted key and value.
+    pub defaults: Vec<(String, String)>,
+    /// Assumptions of the scene and warnings of the sensor.
+    pub notes: Vec<String>,
+    /// The whole sensor as TOML.
+    pub(super) text: String,
+    /// What is measured of a scan.
+    pub(super) bands: Vec<Band>,
+    /// Number of its scene.
+    scene_index: usize,
+}
+
+/// Keys and values.
+type Changes = Vec<(String, String)>;
+
+impl Plan {
+    /// The sweep that is asked for.
+    ///
+    /// # Errors
+    /// If a sensor, the scene, a key or a value is wrong, nothing is varied, or more than two
+    /// things are, or there would be too many jobs.
+    pub fn of(request: &Request) -> Result<Self, Error> {
+        let axes = axes(request)?;
+        let count = axes.iter().map(|axis| axis.values.len() as u64).product::<u64>();
+        let seeds = request.seeds.end.saturating_sub(request.seeds.start);
+        if seeds == 0 {
+            return Error::asked("0 seeds are none; ask for at least 1");
+        }
+        if count.saturating_mul(seeds) > MOST_JOBS {
+            return Error::asked(format!(
+                "{count} values with {seeds} seeds each are too many; {MOST_JOBS} scans at most"
+            ));
+        }
+        let mut scenes: Vec<(Changes, Scene)> = Vec::new();
+        let combinations = combinations(&axes);
+        for values in &combinations {
+            let (changes, _) = changes(request, &axes, values);
+            if scenes.iter().all(|(known, _)| *known != changes) {
+                let scene = Scene::open_changed(&request.scene, &changes).map_err(|error| {
+                    match axes.iter().any(|axis| axis.key.starts_with(OF_SCENE)) {
+                        true => at(&axes, values, &error.to_string()),
+                        false => error.into(),
+                    }
+                })?;
+                scenes.push((changes, scene));
+            }
+        }
+        let point = |values: &Vec<String>| Point::new(request, &axes, values, &scenes);
+        // One after the other, so that the first one that is wrong is told.
+        let points: Vec<Result<Point, Error>> = combinations.par_iter().map(point).collect();
+        Ok(Self {
+            points: points.into_iter().collect::<Result<_, _>>()?,
+            axes,
+            seeds: request.seeds.clone(),
+            scene: request.scene.clone(),
+            set: request.set.clone(),
+            scenes,
+        })
+    }
+
+    /// Number of jobs.
+    pub fn count(&self) -> usize {
+        self.points.len() * (self.seeds.end - self.seeds.start) as usize
+    }
+
+    /// Every point with every seed; the seed changes fastest.
+    pub fn jobs(&self) -> impl Iterator<Item = Job<'_>> {
+        self.points.iter().flat_map(|point| self.jobs_of(point))
+    }
+
+    /// One point with every seed.
+    pub(super) fn jobs_of<'a>(&'a self, point: &'a Point) -> impl Iterator<Item = Job<'a>> {
+        let (_, scene) = &self.scenes[point.scene_index];
+        self.seeds.clone().map(move |seed| Job { point, scene, seed })
+    }
+
+    /// What makes the sweep another one if it changes, scores apart; part of the manifest.
+    pub(super) fn description(&self) -> Value {
+        let named = |named: &Named| json!({ "name": named.name, "digest": named.digest });
+        let points: Vec<Value> = self
+            .points
+            .iter()
+            .map(|point| {
+                json!({
+                    "values": point.values,
+                    "sensor": named(&point.sensor),
+                    "scene": named(&point.scene),
+                    "pixels": point.shots,
+                    "pixels_per_scan": point.shots_per_scan,
+                })
+            })
+            .collect();
+        let set: Vec<String> =
+            self.set.iter().map(|(key, value)| format!("{key}={value}")).collect();
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "scene": self.scene,
+            "set": set,
+            "vary": self.axes.iter().map(|axis| &axis.key).collect::<Vec<_>>(),
+            "first_seed": self.seeds.start,
+            "seeds": self.seeds.end - self.seeds.start,
+            "points": points,
+        })
+    }
+}
+
+impl Point {
+    fn new(
+        request: &Request,
+        axes: &[Axis],
+        values: &[String],
+        scenes: &[(Changes, Scene)],
+    ) -> Result<Self, Error> {
+        let (of_scene, of_sensor) = changes(request, axes, values);
+        let scene_index = scenes.iter().position(|(known, _)| *known == of_scene).unwrap_or(0);
+        let scene = &scenes[scene_index].1;
+        let varied = axes.iter().zip(values).find(|(axis, _)| is_sensor(request, axis));
+        let sensor = varied.map(|(_, name)| name).or(request.sensors.first());
+        let sensor = sensor.map_or("", String::as_str);
+        let design = Design::open(sensor, &of_sensor).map_err(|error| {
+            // What is wrong as well without what is varied is said as such.
+            match Design::open(sensor, &split(&request.set).1) {
+                Err(plain) if plain == error => plain.into(),
+                _ => at(axes, values, &error.to_string()),
+            }
+        })?;
+        let bands = spread(&design, request.shots);
+        Ok(Self {
+            values: values.to_vec(),
+            sensor: Named { name: design.name.clone(), digest: design.digest() },
+            scene: Named { name: scene.name.clone(), digest: scene.digest() },
+            shots: bands.iter().map(|band| band.shots).sum(),
+            shots_per_scan: design.shots_per_scan(),
+            idealisations: design.idealised.iter().map(|e| e.name().to_owned()).collect(),
+            notes: scene.notes.iter().chain(&design.warnings).cloned().collect(),
+            defaults: design.defaults,
+            text: design.text,
+            bands,
+            scene_index,
+        })
+    }
+
+    /// The sensor once more: a design is too large to keep one for every point.
+    pub(super) fn design(&self) -> Result<Design, Error> {
+        Ok(Design::from_toml(&self.text, &self.sensor.name, &PathBuf::new(), &[])?)
+    }
+}
+
+/// What is varied: the keys, and then the sensors if there are several.
+fn axes(request: &Request) -> Result<Vec<Axis>, Error> {
+    let mut axes = request.vary.clone();
+    if request.sensors.is_empty() {
+        return Error::asked("there is no sensor; name one at least");
+    }
+    if request.sensors.len() > 1 {
+        axes.push(Axis::of_sensors(&request.sensors)?);
+    }
+    if let Some(axis) = axes.iter().find(|axis| axis.values.is_empty()) {
+        return Error::asked(format!("{} has no values", axis.key));
+    }
+    if let [one, other, ..] = axes.as_slice()
+        && one.key == other.key
+    {
+        return Error::asked(format!("{} is varied twice", one.key));
+    }
+    if let Some((key, _)) = request.set.iter().find(|(key, _)| axes.iter().any(|a| a.key == *key)) {
+        return Error::asked(format!("{key} is varied and set; leave one out"));
+    }
+    match axes.len() {
+        0 => Error::asked("nothing is varied; give a key with its values, or several sensors"),
+        1 | 2 => Ok(axes),
+        _ => Error::asked("more than two things are varied; two make a grid, and no more can be"),
+    }
+}
+
+fn is_sensor(request: &Request, axis: &Axis) -> bool {
+    request.sensors.len() > 1 && axis.key == "sensor"
+}
+
+/// Every combination of values, those of the last axis changing fastest.
+fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
+    axes.iter().fold(vec![Vec::new()], |begun, axis| {
+        let with_each = |start: &Vec<String>| {
+            let longer = |value: &String| start.iter().chain([value]).cloned().collect::<Vec<_>>();
+            axis.values.iter().map(longer).collect::<Vec<_>>()
+        };
+        begun.iter().flat_map(with_each).collect()
+    })
+}
+
+/// The changes of the scene and of the sensor where the axes have these `values`.
+fn changes(request: &Request, axes: &[Axis], values: &[String]) -> (Changes, Changes) {
+    let keys = axes.iter().zip(values).filter(|(axis, _)| !is_sensor(request, axis));
+    let varied = keys.map(|(axis, value)| (axis.key.clone(), value.clone()));
+    split(&request.set.iter().cloned().chain(varied).collect::<Vec<_>>())
+}
+
+/// Changes of the scene apart from those of the sensor.
+fn split(all: &[(String, String)]) -> (Changes, Changes) {
+    let (mut of_scene, mut of_sensor) = (Vec::new(), Vec::new());
+    for (key, value) in all {
+        match key.strip_prefix(OF_SCENE) {
+            Some(key) => of_scene.push((key.to_owned(), value.clone())),
+            None => of_sensor.push((key.clone(), value.clone())),
+        }
+    }
+    (of_scene, of_sensor)
+}
+
+/// What is wrong with one combination of values.
+fn at(axes: &[Axis], values: &[String], message: &str) -> Error {
+    let keys = axes.iter().zip(values).map(|(axis, value)| format!("{} = {value}", axis.key));
+    // Designs know changes by the option of other commands.
+    let message = message.strip_prefix("--set: ").unwrap_or(message);
+    Error::Asked(format!("with {}: {message}", keys.collect::<Vec<_>>().join(", ")))
+}
+
+/// As many whole bands of the first scan as it takes for `shots`, evenly over the scan; all of
+/// them if `None`.
+fn spread(design: &Design, shots: Option<u64>) -> Vec<Band> {
+    let all: Vec<Band> = bands(design, 0).collect();
+    let longest = all.first().map_or(1, |band| band.shots.max(1));
+    let wanted = shots.map_or(all.len(), |shots| shots.div_ceil(longest).max(1) as usize);
+    let wanted = wanted.min(all.len());
+    // The middle of each of as many equal parts.
+    (0..wanted).map(|part| all[(2 * part + 1) * all.len() / (2 * wanted)]).collect()
+}
+
+/// The folder of the jobs of a sweep in `folder`.
+pub(super) fn folder_of_jobs(folder: &Path) -> PathBuf {
+    folder.join("jobs")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::str::FromStr;
+
+    fn request(sensors: &[&str], vary: &[&str]) -> Request {
+        Request {
+            sensors: sensors.iter().map(|name| (*name).to_owned()).collect(),
+            scene: "wall".to_owned(),
+            set: vec![],
+            vary: vary.iter().map(|typed| Axis::from_str(typed).unwrap()).collect(),
+            seeds: 1..3,
+            shots: None,
+        }
+    }
+
+    fn told(request: &Request) -> String {
+        Plan::of(request).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_grid_has_every_combination_with_every_seed() {
+        let vary = ["scan.max_range_m=60,70", "scene:object.wall.position_m.x=20,30,40"];
+        let plan = Plan::of(&request(&["peregrine"], &vary)).unwrap();
+        let values: Vec<String> = plan.points.iter().map(|point| point.values.join(" ")).collect();
+        assert_eq!(values, ["60 20", "60 30", "60 40", "70 20", "70 30", "70 40"]);
+        assert_eq!((plan.count(), plan.jobs().count()), (12, 12));
+        let names: std::collections::BTreeSet<String> = plan.jobs().map(|job| job.name()).collect();
+        assert_eq!(names.len(), 12);
+        assert_eq!(plan.scenes.len(), 3);
+        assert_eq!(plan.points[0].scene.digest, plan.points[3].scene.digest);
+    }
+
+    #[test]
+    fn several_sensors_are_an_axis_and_curves_beside_a_key() {
+        let two = ["peregrine", "hdl-64e"];
+        let alone = Plan::of(&request(&two, &[])).unwrap();
+        assert_eq!(alone.points[1].sensor.name, "hdl-64e");
+        let both = Plan::of(&request(&two, &["scan.max_range_m=60,70"])).unwrap();
+        assert_eq!(both.axes[1].key, "sensor");
+        assert_eq!(both.points[2].values, ["70", "peregrine"]);
+    }
+
+    #[test]
+    fn a_part_of_a_scan_is_whole_bands_spread_evenly() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        let all: Vec<Band> = bands(&design, 0).collect();
+        assert_eq!(spread(&design, None), all);
+        assert_eq!(spread(&design, Some(u64::MAX)), all);
+        assert_eq!(spread(&design, Some(1)), [all[all.len() / 2]]);
+        let four = spread(&design, Some(4 * all[0].shots));
+        assert_eq!(four.len(), 4);
+        let gaps: Vec<u64> = four.windows(2).map(|two| two[1].first - two[0].first).collect();
+        let quarter = design.shots_per_scan() / 4;
+        assert!(gaps.iter().all(|gap| gap.abs_diff(quarter) <= all[0].shots), "{gaps:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let one = ["peregrine"];
+        assert!(told(&request(&one, &[])).contains("nothing is varied"));
+        assert!(told(&request(&[], &["a=1,2"])).contains("no sensor"));
+        assert!(told(&request(&one, &["a=1,2", "b=1,2", "c=1,2"])).contains("more than two"));
+        assert!(told(&request(&one, &["a=1,2", "a=3,4"])).contains("a is varied twice"));
+        assert_eq!(
+            told(&request(&one, &["scan.max_rnage_m=60,70"])),
+            "with scan.max_rnage_m = 60: scan.max_rnage_m: unknown key `max_rnage_m`; did you mean `max_range_m`?"
+        );
+        let both = told(&request(&one, &["scan.max_range_m=60,-1"]));
+        assert!(
+            both.starts_with("with scan.max_range_m = -1: scan.max_range_m: is -1, but"),
+            "{both}"
+        );
+        let scene = told(&request(&one, &["scene:object.wal.position_m.x=1,2"]));
+        assert!(scene.contains("did you mean `wall`"), "{scene}");
+        let mut without = request(&one, &["scan.max_range_m=60,70"]);
+        without.vary[0].values.clear();
+        assert!(told(&without).contains("has no values"));
+        let mut set = request(&one, &["scan.max_range_m=60,70"]);
+        set.set.push(("scan.max_range_m".to_owned(), "3".to_owned()));
+        assert!(told(&set).contains("varied and set"));
+        set.set[0].0 = "scan.max_rnage_m".to_owned();
+        assert!(told(&set).starts_with("--set: scan.max_rnage_m"));
+        let misspelt = told(&request(&["perigrine"], &["scan.max_range_m=60,70"]));
+        assert!(misspelt.starts_with("perigrine: no such sensor; did you mean"), "{misspelt}");
+        let scene = Request { scene: "wal".to_owned(), ..request(&one, &["tdc.bits=8,9"]) };
+        assert!(told(&scene).starts_with("there is no scene"));
+        let many = Request { seeds: 0..60_000, ..request(&one, &["scan.max_range_m=60,70"]) };
+        assert!(told(&many).contains("100000 scans at most"));
+        let none = Request { seeds: 3..3, ..request(&one, &["scan.max_range_m=60,70"]) };
+        assert!(told(&none).contains("at least 1"));
+    }
+}
