@@ -49,6 +49,28 @@ impl ShotLog {
         self.fired_at_fs.len()
     }
 
+    /// The log of each channel by itself, and which of the shots here are in it, ascending.
+    pub fn each_channel(&self) -> Vec<(Vec<usize>, Self)> {
+        let mut shots: Vec<usize> = (0..self.len()).collect();
+        shots.sort_by_key(|shot| self.channel[*shot]);
+        let of_channel = |shots: &[usize]| {
+            let column = |column: &[u16]| shots.iter().map(|shot| column[*shot]).collect();
+            let before = |shot: usize| shots.partition_point(|other| *other < shot);
+            Self {
+                first: self.first + shots[0] as u64,
+                fired_at_fs: shots.iter().map(|shot| self.fired_at_fs[*shot]).collect(),
+                row: column(&self.row),
+                column: column(&self.column),
+                label: column(&self.label),
+                word: column(&self.word),
+                channel: column(&self.channel),
+                owned: before(self.owned.start)..before(self.owned.end),
+            }
+        };
+        let channels = shots.chunk_by(|one, next| self.channel[*one] == self.channel[*next]);
+        channels.map(|shots| (shots.to_vec(), of_channel(shots))).collect()
+    }
+
     /// Whether there is no shot at all.
     pub fn is_empty(&self) -> bool {
         self.fired_at_fs.is_empty()

@@ -79,7 +79,7 @@ fn samples_on_car(design: &Design, scene: &Scene) -> u64 {
     cloud.truth = score::empty_truth(&cloud);
     let judged = bands(design, 0).map(|band| {
         let log = band.shot_log(design);
-        let hits = scene.trace(design, &log);
+        let hits = scene.trace(design, &log).middle;
         score::judge(&mut cloud, design, scene, &log, &hits).samples_on_target
     });
     judged.sum()

@@ -15,29 +15,25 @@ use crate::kernels::{GROUP, philox};
 /// Which question chance is asked. Each stage has numbers of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Is this mark seen? Indexed by shot, a part for each of its echoes.
+    /// Is this mark seen? Indexed by pulse train.
     Marks = 1,
-    /// Dark counts and background. Indexed by time window.
+    /// Dark counts and background. Indexed by time window, parts by channel.
     FalseEdges = 2,
-    /// The firing of a one-mark detector. Indexed by shot.
+    /// The firing of a detector that fires once per shot. Indexed by shot.
     Firing = 3,
-    /// How late is a mark that is seen? Indexed by shot, a part for each of its echoes.
+    /// How late is a mark that is seen? Indexed by pulse train.
     Jitter = 4,
-    /// The photons of the marks of one shot, and what a detector makes of each. Indexed by shot.
+    /// The photons of the marks of a pulse train, and what a detector makes of each. Indexed by
+    /// pulse train.
     Photons = 5,
-    /// Which cell a false count falls on. Indexed by the time of the count.
+    /// Which cell a count of the background falls on. Indexed by its time, parts by channel.
     Cell = 6,
-    /// How late does a cell answer? Indexed by the time of the photon.
+    /// How late does a cell answer? Indexed by the time of the photon, parts by channel.
     Answer = 7,
-    /// Is this mark of another lidar seen? Indexed by its shot, a part for each way of its light.
-    OtherMarks = 8,
-    /// How late is such a mark? Indexed likewise.
-    OtherJitter = 9,
-    /// The firing of a one-mark detector in the light of others. Indexed by our own shot.
-    OtherFiring = 10,
-    /// The photons of a mark of another lidar, and what a detector makes of each. Indexed by its
-    /// shot and the way of its light.
-    OtherPhotons = 11,
+    /// Which cells are blind at the beginning. Indexed by time, parts by channel.
+    Blind = 8,
+    /// Background that lasts for a stretch of time. Indexed by its beginning, parts by channel.
+    Stretch = 9,
 }
 
 /// Where a run of random numbers stands.
@@ -86,12 +82,12 @@ impl Chance {
 
     /// The numbers at (`stage`, `index`) as a stream without end.
     pub fn at(&self, stage: Stage, index: u64) -> Stream {
-        let mut stream = Stream {
-            chance: *self,
-            address: Address { stage, index, part: 0 },
-            numbers: [[0; GROUP]],
-            next: 0,
-        };
+        self.stream(Address { stage, index, part: 0 })
+    }
+
+    /// The numbers from `address` on, part after part, as a stream without end.
+    pub(crate) fn stream(&self, address: Address) -> Stream {
+        let mut stream = Stream { chance: *self, address, numbers: [[0; GROUP]], next: 0 };
         stream.fill();
         stream
     }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::channel::Foreign;
+use crate::channel::Light;
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands};
@@ -124,9 +124,7 @@ impl Scan {
         let clock = Instant::now();
         self.cloud.add(design, &band.log, &band.returns);
         let mut score = score::judge(&mut self.cloud, design, scene, &band.log, &band.hits);
-        if !band.foreign.is_empty() {
-            score.ghosts = score::ghosts(&self.cloud, design, &band.log, &band.foreign);
-        }
+        score.ghosts = score::ghosts(&self.cloud, design, &band.log, &band.light);
         self.score.add(&score);
         self.tally.add(&band.tally);
         self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
@@ -134,20 +132,20 @@ impl Scan {
 }
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
-struct Measured {
+struct Measured<'a> {
     log: ShotLog,
     hits: Hits,
-    foreign: Foreign,
+    light: Light<'a>,
     returns: Returns,
     tally: Tally,
 }
 
-fn measure(
-    (design, scene): (&Design, &Scene),
+fn measure<'a>(
+    (design, scene): (&'a Design, &'a Scene),
     detectors: &Detectors,
     memory: &mut Memory,
     band: &Band,
-) -> Measured {
+) -> Measured<'a> {
     let mut tally = Tally::default();
     let mut clock = Instant::now();
     let mut stages = 0..POINTS;
@@ -158,29 +156,31 @@ fn measure(
     };
     let log = band.shot_log(design);
     lap(&mut tally);
-    let hits = scene.trace(design, &log);
-    let parts = scene.trace_parts(design, &log);
+    let traced = scene.trace(design, &log);
     lap(&mut tally);
-    let mut echoes = match parts.as_slice() {
-        [] => channel::echoes(design, &scene.materials, &hits),
-        parts => channel::echoes_of_parts(design, &scene.materials, parts),
-    };
-    if !scene.others.is_empty() {
-        echoes.foreign = channel::foreign(design, scene, &log);
-    }
+    let light = channel::light(design, scene, &log, &traced);
     lap(&mut tally);
-    let edges = detectors.edges(&log, &echoes, memory);
-    tally.edges = edges.time.len() as u64;
+    let detections = detectors.detections(&log, &light, memory);
+    tally.edges = detections.time.len() as u64;
     lap(&mut tally);
-    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, edges);
+    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, detections);
     lap(&mut tally);
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
     lap(&mut tally);
     let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
+    let hits = traced.middle;
+    let in_gate =
+        |i: &usize| (design.scan.min_range..=design.scan.max_range).contains(&hits.range[*i]);
     tally.shots = log.owned.len() as u64;
-    tally.surfaces = hits.shot.iter().filter(|s| owned(s)).count() as u64;
-    tally.echoes = echoes.shot.iter().filter(|s| owned(s)).count() as u64;
-    tally.foreign = echoes.foreign.len() as u64;
+    let surfaces = (0..hits.shot.len()).filter(|i| owned(&hits.shot[*i]));
+    tally.surfaces = surfaces.filter(in_gate).count() as u64;
+    let owned = log.first + log.owned.start as u64..log.first + log.owned.end as u64;
+    for (transmitter, shot) in light.trains.transmitter.iter().zip(&light.trains.shot) {
+        match transmitter {
+            0 => tally.echoes += u64::from(owned.contains(shot)),
+            _ => tally.foreign += 1,
+        }
+    }
     tally.ticks = ticks.tick.len() as u64;
     tally.merged = merged;
     tally.lost = lost;
@@ -188,7 +188,7 @@ fn measure(
     tally.returns = returns.shot.len() as u64;
     tally.rejects = returns.rejects;
     memory.take_back(ticks.tick);
-    Measured { log, hits, foreign: echoes.foreign, returns, tally }
+    Measured { log, hits, light, returns, tally }
 }
 
 /// The last stage, after those of a band: its points and their score.

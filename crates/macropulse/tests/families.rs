@@ -231,11 +231,10 @@ fn other_words_are_not_found() {
     design.coding.codebook = other.coding.codebook.clone();
     let scene = Scene::from_toml(SCENE, "steps.toml", Path::new("")).unwrap();
     let log = macropulse::emit::bands(&design, 0).next().unwrap().shot_log(&design);
-    let hits = scene.trace(&design, &log);
-    let echoes = macropulse::channel::echoes(&design, &scene.materials, &hits);
+    let light = macropulse::channel::light(&design, &scene, &log, &scene.trace(&design, &log));
     let detectors = macropulse::detect::Detectors::new(&design, macropulse::random::Chance::new(1));
-    let edges = detectors.edges(&log, &echoes, &mut Default::default());
-    let ticks = macropulse::tdc::ticks(&design, edges).ticks;
+    let detections = detectors.detections(&log, &light, &mut Default::default());
+    let ticks = macropulse::tdc::ticks(&design, detections).ticks;
     let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).len();
     let mut wrong = log.clone();
     wrong.word.iter_mut().for_each(|word| *word = (*word + 50) % 100);

@@ -4,14 +4,14 @@
 
 use std::path::{Path, PathBuf};
 
-use macropulse::channel::{Echoes, foreign};
+use macropulse::channel;
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
 use macropulse::points::{FAINT, Outcome};
 use macropulse::predict::interference::{edges_per_second, ghost_of_single_pulses, walk_per_scan};
 use macropulse::random::Chance;
-use macropulse::scene::Scene;
+use macropulse::scene::{Scene, Traced};
 use macropulse::score::Score;
 use macropulse::sim::{self, Scan};
 
@@ -124,11 +124,12 @@ fn other_words_of_the_family_are_nearly_as_good_as_silence() {
 /// Out of step the other still sends one of the words of the shots in flight, with another label.
 /// The literal receiver reads every bit and finds the label wrong. The matched one must allow for
 /// missed marks: to it a macropulse that shares the word and some lit bits is a faint echo of ours.
+/// Most of them it takes for complete echoes of earlier shots, from beyond the gate, and cancels.
 #[test]
 fn an_identical_lidar_out_of_step_looks_like_faint_echoes() {
     assert!(score("coded", &[LITERAL], 0).ghosts <= 5);
     let scan = part("coded", &[], 0);
-    assert!((100..1000).contains(&scan.score.ghosts), "{:?}", scan.score);
+    assert!((5..100).contains(&scan.score.ghosts), "{:?}", scan.score);
     let found = |outcome: Outcome| {
         let cloud = &scan.cloud;
         let of = (0..cloud.range.len()).filter(|&at| cloud.truth.outcome[at] == outcome);
@@ -193,13 +194,10 @@ fn wall(keys: &str) -> Scene {
 /// Foreign light alone in the detector of `design`: edges by absolute time, in parts of a tick.
 fn edges(design: &Design, scene: &Scene, band: &Band, is_alone: bool) -> Vec<i64> {
     let log = band.shot_log(design);
-    let mut echoes = Echoes::default();
-    if !is_alone {
-        echoes = macropulse::channel::echoes(design, &scene.materials, &scene.trace(design, &log));
-    }
-    echoes.foreign = foreign(design, scene, &log);
+    let traced = if is_alone { Traced::default() } else { scene.trace(design, &log) };
+    let light = channel::light(design, scene, &log, &traced);
     let detectors = Detectors::new(design, Chance::new(SEED));
-    let edges = detectors.edges(&log, &echoes, &mut Memory::default());
+    let edges = detectors.detections(&log, &light, &mut Memory::default());
     edges.time.iter().map(|time| edges.epoch * 64 + i64::from(*time)).collect()
 }
 

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use macropulse::channel::Echoes;
+use macropulse::channel::{Echo, Light, light_of_echoes};
 use macropulse::codec::ShotLog;
 use macropulse::design::{Design, Detector};
 use macropulse::detect::{Detectors, Memory};
@@ -128,15 +128,11 @@ fn in_dense_light_the_forecast_is_a_bound() {
 }
 
 /// The first band of a sensor, an echo of `photons` detected per mark from 20 m for every shot.
-fn lit(design: &Design, photons: f64) -> (ShotLog, Echoes) {
+fn lit(design: &Design, photons: f64) -> (ShotLog, Light<'_>) {
     let log = bands(design, 0).next().unwrap().shot_log(design);
-    let echoes = Echoes {
-        shot: (0..log.len() as u32).collect(),
-        delay_fs: vec![133_426_000; log.len()],
-        photons: vec![photons; log.len()],
-        ..Echoes::default()
-    };
-    (log, echoes)
+    let echo = |shot| Echo { shot, delay_fs: 133_426_000, photons };
+    let light = light_of_echoes(design, &log, (0..log.len()).map(echo));
+    (log, light)
 }
 
 /// A sensor with the detector written in `lines`, without any false edge worth the name.
@@ -169,7 +165,7 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
         let (mut told_apart, mut some) = (0, 0);
         for step in 0..9 {
             let photons = unit * 10_f64.powf(-3.0 + 0.5 * f64::from(step));
-            let (log, echoes) = lit(&design, photons);
+            let (log, light) = lit(&design, photons);
             let marks: u64 = log
                 .label
                 .iter()
@@ -177,7 +173,7 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
                 .map(|(&label, &word)| design.coding.codebook.marks(label, word).len() as u64)
                 .sum();
             let detectors = Detectors::new(&design, Chance::new(2));
-            let found = detectors.edges(&log, &echoes, &mut Memory::default());
+            let found = detectors.detections(&log, &light, &mut Memory::default());
             // Several photons of one mark are one tick.
             let edges = tdc::ticks(&design, found).ticks.tick.len() as u64;
             let predicted = mark_pd(&design.detector, photons, 0.0);
@@ -207,9 +203,9 @@ fn blind_cells_lose_what_is_predicted() {
         for band in bands(&design, 0).take(8) {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, Chance::new(3));
-            let found = detectors.edges(&log, &Echoes::default(), &mut Memory::default());
+            let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
             edges += found.time.len();
-            let lasts = log.fired_at_fs[log.len() - 1] - log.fired_at_fs[0] + design.reach_fs();
+            let lasts = log.fired_at_fs[log.len() - 1] - log.fired_at_fs[0] + design.listening_fs();
             seconds += lasts as f64 * 1e-15;
         }
         let predicted = rate * armed(geiger, rate) * seconds;
@@ -237,7 +233,7 @@ fn a_small_bank_loses_what_erlang_says() {
         for band in bands(&design, 0).take(4) {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, Chance::new(4));
-            let found = detectors.edges(&log, &Echoes::default(), &mut Memory::default());
+            let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
             let ticks = tdc::ticks(&design, found);
             edges += ticks.ticks.tick.len() as u64 + ticks.lost;
             lost += ticks.lost;

@@ -5,7 +5,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use macropulse::channel;
+use macropulse::channel::{self, light_of_echoes};
 use macropulse::codec::ShotLog;
 use macropulse::codec::Ticks;
 use macropulse::design::Design;
@@ -56,7 +56,9 @@ impl Met {
     /// What `bands` meet in the ready scene `name`; `None` if there is no such scene.
     pub fn in_scene(design: &Design, bands: &[Band], name: &str) -> Option<Self> {
         let scene = Scene::open(name).ok()?;
-        Some(Self::by(design, bands, scene.materials.clone(), |log| scene.trace(design, log)))
+        Some(Self::by(design, bands, scene.materials.clone(), |log| {
+            scene.trace(design, log).middle
+        }))
     }
 
     /// One white target for every shot, anywhere in the gate: as much overlap as there can be.
@@ -86,8 +88,9 @@ impl Met {
         (detectors, memory): (&Detectors, &mut Memory),
     ) -> (ShotLog, Ticks) {
         let log = band.shot_log(design);
-        let echoes = channel::echoes(design, &self.materials, hits);
-        let converted = tdc::ticks(design, detectors.edges(&log, &echoes, memory));
+        let mut light = light_of_echoes(design, &log, []);
+        channel::echoes(&mut light.trains, (design, &self.materials), &log, hits);
+        let converted = tdc::ticks(design, detectors.detections(&log, &light, memory));
         (log, converted.ticks)
     }
 }

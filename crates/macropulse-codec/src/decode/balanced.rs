@@ -222,6 +222,7 @@ mod tests {
             kind: ReceiverKind::Balanced,
             effort: crate::decode::Effort::Quick,
             gate_ticks: (20, GATE),
+            light_ticks: GATE,
             ticks_per_chip,
             tick_fs: 1000,
             jitter_ticks,

@@ -354,6 +354,7 @@ mod tests {
             kind,
             effort: crate::decode::Effort::Quick,
             gate_ticks: (0, 3000),
+            light_ticks: 3000,
             ticks_per_chip: 1,
             tick_fs: 2500,
             jitter_ticks: 0.0,

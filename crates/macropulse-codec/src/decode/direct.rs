@@ -52,6 +52,7 @@ mod tests {
             kind: ReceiverKind::Direct,
             effort: crate::decode::Effort::Quick,
             gate_ticks: (10, 500),
+            light_ticks: 500,
             ticks_per_chip: 1,
             tick_fs: 1_000_000,
             jitter_ticks: 0.0,

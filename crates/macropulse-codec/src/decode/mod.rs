@@ -1,6 +1,7 @@
 //! Ticks to returns: the receiver. It sees ticks and the shot log, never the scene.
 
 mod balanced;
+mod beyond;
 mod bitwise;
 mod correlator;
 mod direct;
@@ -60,6 +61,9 @@ pub struct Receiver {
     pub effort: Effort,
     /// Nearest and farthest round trip accepted, in ticks.
     pub gate_ticks: (u32, u32),
+    /// Farthest round trip from which light of the shots may come although it is not accepted, in
+    /// ticks: the matched receiver cancels complete macropulses up to there.
+    pub light_ticks: u32,
     /// TDC ticks per chip.
     pub ticks_per_chip: u32,
     /// Length of a tick, fs.
@@ -88,6 +92,7 @@ impl Receiver {
             kind: ReceiverKind::Matched,
             effort: Effort::Quick,
             gate_ticks: (0, 100_000),
+            light_ticks: 100_000,
             ticks_per_chip: 1,
             tick_fs,
             jitter_ticks: 0.0,
@@ -105,10 +110,12 @@ impl Receiver {
     /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
     /// does not bring everything nearer.
     pub fn decode(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+        if self.kind != ReceiverKind::Direct && !ticks.channel.is_empty() {
+            return self.decode_each_channel(codebook, log, ticks);
+        }
         match self.kind {
             ReceiverKind::Direct => direct::decode(self, log, ticks),
-            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
-            ReceiverKind::Balanced => balanced::decode(self, (codebook, log), ticks),
+            ReceiverKind::Matched | ReceiverKind::Balanced => self.correlate(codebook, log, ticks),
             ReceiverKind::Literal => {
                 bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
             }
@@ -116,6 +123,49 @@ impl Receiver {
                 bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::AnyBit))
             }
         }
+    }
+
+    /// The returns of a sensor whose shots do not all have the same detector.
+    fn decode_each_channel(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+        let mut found: Vec<Return> = Vec::new();
+        let mut returns = Returns::default();
+        for (shots, log) in log.each_channel() {
+            let channel = log.channel[0];
+            let from = ticks.channel.partition_point(|other| *other < channel);
+            let to = ticks.channel.partition_point(|other| *other <= channel);
+            let seen = Ticks {
+                epoch: ticks.epoch,
+                tick: ticks.tick[from..to].to_vec(),
+                channel: Vec::new(),
+                amplitude: ticks.amplitude.get(from..to).map(<[f32]>::to_vec).unwrap_or_default(),
+            };
+            let of_channel = self.decode(codebook, &log, &seen);
+            found.extend(of_channel.each().map(|one| Return { shot: shots[one.shot], ..one }));
+            returns.add_rejects(&of_channel);
+        }
+        found.sort_by_key(|one| one.shot);
+        found.into_iter().for_each(|one| returns.push(one));
+        returns
+    }
+
+    /// The returns of a receiver that correlates whole macropulses.
+    ///
+    /// It looks beyond the end of the gate by the length of a macropulse: what stands there has
+    /// sidelobes within the gate, and is told from them by being higher. Only then is it refused.
+    fn correlate(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+        let (nearest, farthest) = self.gate_ticks;
+        let length = codebook.chips() * self.ticks_per_chip;
+        let gate_ticks = (nearest, farthest.saturating_add(length));
+        let wide =
+            Self { gate_ticks, light_ticks: self.light_ticks.max(gate_ticks.1), ..self.clone() };
+        let mut returns = match self.kind {
+            ReceiverKind::Balanced => balanced::decode(&wide, (codebook, log), ticks),
+            _ => matched::decode(&wide, (codebook, log), ticks),
+        };
+        let closes = time::s_from_fs((i64::from(farthest) + 1) * self.tick_fs);
+        returns.refuse_beyond(closes);
+        beyond::exclude(self, (codebook, log), ticks, &mut returns);
+        returns
     }
 
     /// The absolute tick in which `shot` was fired.
@@ -181,6 +231,7 @@ mod tests {
             kind: ReceiverKind::Matched,
             effort: Effort::Quick,
             gate_ticks: (0, 1),
+            light_ticks: 1,
             ticks_per_chip: 1,
             tick_fs: 2497,
             jitter_ticks: 0.0,

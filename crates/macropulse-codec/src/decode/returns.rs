@@ -92,6 +92,23 @@ impl Returns {
         }
     }
 
+    /// The returns, one after another.
+    pub(super) fn each(&self) -> impl Iterator<Item = Return> {
+        (0..self.len()).map(|at| Return {
+            shot: self.shot[at] as usize,
+            tof: self.tof[at],
+            peak: self.peak[at],
+            marks: self.marks[at],
+            margin: self.margin[at],
+            photons: self.photons[at],
+        })
+    }
+
+    /// Counts the rejects of `other` as well.
+    pub(super) fn add_rejects(&mut self, other: &Self) {
+        self.rejects.iter_mut().zip(other.rejects).for_each(|(sum, more)| *sum += more);
+    }
+
     pub(super) fn push(&mut self, found: Return) {
         self.shot.push(found.shot as u32);
         self.tof.push(found.tof);
@@ -99,6 +116,21 @@ impl Returns {
         self.marks.push(found.marks);
         self.margin.push(found.margin);
         self.photons.push(found.photons);
+    }
+
+    /// Takes out those whose light came `closes` seconds after firing or later.
+    pub(super) fn refuse_beyond(&mut self, closes: f64) {
+        if self.tof.iter().all(|tof| *tof < closes) {
+            return;
+        }
+        let mut within = Self { rejects: self.rejects, ..Self::with_capacity(self.len()) };
+        for one in self.each() {
+            match one.tof < closes {
+                true => within.push(one),
+                false => within.reject(Reject::OutsideGate),
+            }
+        }
+        *self = within;
     }
 
     pub(super) fn reject(&mut self, reject: Reject) {

@@ -1,4 +1,4 @@
-//! What reaches the aperture: surfaces become echoes.
+//! What reaches the aperture: surfaces and interferers become light.
 //!
 //! For an extended Lambertian target that the beam does not overfill, the energy received is
 //!
@@ -13,184 +13,171 @@
 //! with a link budget has n₀ from it, for a white target at its reach. Where its field follows the
 //! beam, the share of the spot that is still in the field when the echo arrives is a factor too.
 
-mod others;
+mod interferers;
+mod light;
+mod link;
 
-pub use others::{APERTURE_RADIUS, Foreign, foreign};
+pub use interferers::APERTURE_RADIUS;
+pub use light::{ALL_MARKS, Background, Light, PulseTrain, Trains, Transmitter};
+pub use link::{FILTER, Link, extinction};
 
-use crate::design::{Design, Field};
-pub use crate::scene::PARTS;
-use crate::scene::{Hits, Material};
-use crate::units::{tof_from_range, tof_fs_from_ranges};
+use macropulse_codec::ShotLog;
 
-/// Echoes of a band of shots, as columns, ordered by shot. Truth: the light itself, before any
-/// detector.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Echoes {
-    /// Index of the shot in the band's log.
-    pub shot: Vec<u32>,
-    /// Time from firing to the arrival of the same chip, fs.
-    pub delay_fs: Vec<i64>,
-    /// Mean number of photons detected per mark; infinite for a detector that never misses.
-    pub photons: Vec<f64>,
-    /// Which of the [`PARTS`] of the macropulse it is an echo of; empty where all of it takes the
-    /// same way.
-    pub part: Vec<u8>,
-    /// Light of other lidars that arrives beside them.
-    pub foreign: Foreign,
-}
+use crate::design::Design;
+use crate::scene::{Hits, Material, PARTS, Scene, Traced};
+use crate::units::tof_fs_from_ranges;
 
-/// The echoes of `hits` at the sensor `design`, whose scene has `materials`.
-pub fn echoes(design: &Design, materials: &[Material], hits: &Hits) -> Echoes {
-    let link = Link::of(design);
-    let photons: Vec<f64> = (0..hits.shot.len())
-        .map(|i| {
-            let material = &materials[usize::from(hits.material[i])];
-            let reflectance = material.backscatter(f64::from(hits.cosine[i]));
-            link.photons(reflectance * f64::from(hits.weight[i]), hits.range[i])
-        })
-        .collect();
-    let delay_fs = tof_fs_from_ranges(&hits.range);
-    let mut echoes = Echoes { shot: hits.shot.clone(), delay_fs, photons, ..Echoes::default() };
-    if !echoes.photons.iter().all(|&photons| photons > 0.0) {
-        echoes.leave_out_the_dark();
+/// The light that reaches the sensor `design` while it listens to the shots of `log`, which have
+/// met `traced` in `scene`.
+pub fn light<'a>(
+    design: &'a Design,
+    scene: &'a Scene,
+    log: &ShotLog,
+    traced: &Traced,
+) -> Light<'a> {
+    let mut light = Light { transmitters: vec![Transmitter::of(design, 1.0)], ..Light::default() };
+    match traced.parts.as_slice() {
+        [] => echoes(&mut light.trains, (design, &scene.materials), log, &traced.middle),
+        parts => echoes_of_parts(&mut light.trains, (design, &scene.materials), log, parts),
     }
-    echoes
+    interferers::add(&mut light, design, scene, log);
+    light
 }
 
-/// The echoes of macropulses whose parts have met `hits` each, the first part first.
-pub fn echoes_of_parts(design: &Design, materials: &[Material], hits: &[Hits]) -> Echoes {
-    let parts: Vec<Echoes> = hits.iter().map(|hits| echoes(design, materials, hits)).collect();
+/// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out.
+pub fn echoes(
+    trains: &mut Trains,
+    (design, materials): (&Design, &[Material]),
+    log: &ShotLog,
+    hits: &Hits,
+) {
+    let link = Link::of(design);
+    let delay_fs = tof_fs_from_ranges(&hits.range);
+    let from = trains.photons.len();
+    trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(materials, hits, i)));
+    let lit = &trains.photons[from..];
+    // Nearly always all of them.
+    let dark = lit.iter().any(|&photons| photons <= 0.0);
+    let kept: Vec<u32> = match dark {
+        true => (0..).zip(lit).filter(|(_, photons)| **photons > 0.0).map(|(i, _)| i).collect(),
+        false => (0..hits.shot.len() as u32).collect(),
+    };
+    if dark {
+        let photons: Vec<f64> = kept.iter().map(|i| lit[*i as usize]).collect();
+        trains.photons.truncate(from);
+        trains.photons.extend(photons);
+    }
+    // Column by column: rows would take three times as long.
+    let shots = || kept.iter().map(|i| hits.shot[*i as usize] as usize);
+    trains.transmitter.resize(from + kept.len(), 0);
+    trains.marks.resize(from + kept.len(), ALL_MARKS);
+    trains.channel.extend(shots().map(|shot| log.channel[shot]));
+    trains.label.extend(shots().map(|shot| log.label[shot]));
+    trains.word.extend(shots().map(|shot| log.word[shot]));
+    trains.shot.extend(shots().map(|shot| log.first + shot as u64));
+    let arrives_fs = |(shot, i): (usize, &u32)| log.fired_at_fs[shot] + delay_fs[*i as usize];
+    trains.arrives_fs.extend(shots().zip(&kept).map(arrives_fs));
+    let (mut way, mut before) = (0, usize::MAX);
+    trains.way.extend(shots().map(|shot| {
+        way = if shot == before { way + 1 } else { 0 };
+        before = shot;
+        way
+    }));
+}
+
+/// Adds the echoes of macropulses whose parts have met `hits` each, the part sent first first;
+/// ordered by shot.
+fn echoes_of_parts(
+    trains: &mut Trains,
+    (design, materials): (&Design, &[Material]),
+    log: &ShotLog,
+    parts: &[Hits],
+) {
+    let link = Link::of(design);
+    let codebook = &design.coding.codebook;
     let mut order: Vec<(u32, u8, usize)> = Vec::new();
-    for (part, echoes) in parts.iter().enumerate() {
-        order.extend(echoes.shot.iter().enumerate().map(|(i, shot)| (*shot, part as u8, i)));
+    for (part, hits) in parts.iter().enumerate() {
+        order.extend(hits.shot.iter().enumerate().map(|(i, shot)| (*shot, part as u8, i)));
     }
     order.sort_unstable();
-    let each = |&(_, part, i): &(u32, u8, usize)| (&parts[usize::from(part)], i);
-    Echoes {
-        shot: order.iter().map(|(shot, ..)| *shot).collect(),
-        delay_fs: order.iter().map(each).map(|(echoes, i)| echoes.delay_fs[i]).collect(),
-        photons: order.iter().map(each).map(|(echoes, i)| echoes.photons[i]).collect(),
-        part: order.iter().map(|(_, part, _)| *part).collect(),
-        foreign: Foreign::default(),
+    for met in order.chunk_by(|one, next| one.0 == next.0) {
+        for (way, &(shot, part, i)) in met.iter().enumerate() {
+            let hits = &parts[usize::from(part)];
+            let photons = link.echo(materials, hits, i);
+            if photons <= 0.0 {
+                continue;
+            }
+            let shot = shot as usize;
+            let marks = codebook.marks(log.label[shot], log.word[shot]);
+            let begins = |part: u8| {
+                let chip = u32::from(part) * codebook.chips() / u32::from(PARTS);
+                marks.partition_point(|mark| u32::from(*mark) < chip) as u16
+            };
+            let delay_fs = tof_fs_from_ranges(&hits.range[i..=i])[0];
+            let marks = [begins(part), begins(part + 1)];
+            let train = PulseTrain { photons, marks, way: way as u16, ..WHOLE };
+            trains.push(echo(log, shot, delay_fs, train));
+        }
     }
 }
 
-impl Echoes {
-    /// What has no light is no echo.
-    fn leave_out_the_dark(&mut self) {
-        let is_lit: Vec<bool> = self.photons.iter().map(|&photons| photons > 0.0).collect();
-        let mut of_shots = is_lit.iter();
-        self.shot.retain(|_| of_shots.next() == Some(&true));
-        let mut of_delays = is_lit.iter();
-        self.delay_fs.retain(|_| of_delays.next() == Some(&true));
-        self.photons.retain(|&photons| photons > 0.0);
-    }
-}
-
-/// Half of the width of a receiver's filter, m: what sensor files leave unsaid.
-pub const FILTER: f64 = 15e-9;
-
-/// The link equation with everything that does not depend on the target multiplied out.
+/// An echo without a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Link {
-    photons_at_one_metre: f64,
-    extinction: f64,
-    field: Option<Field>,
+pub struct Echo {
+    /// Index of the shot in its log.
+    pub shot: usize,
+    /// From its firing to the arrival of the same chip, fs.
+    pub delay_fs: i64,
+    /// Mean photons detected per mark.
+    pub photons: f64,
 }
 
-impl Link {
-    /// The link of a sensor through its air.
-    pub fn of(design: &Design) -> Self {
-        let sensitivity = design.detector.sensitivity();
-        let extinction = design.visibility.map_or(0.0, |v| extinction(v, design.light.wavelength));
-        Self {
-            photons_at_one_metre: sensitivity.photons * sensitivity.range.powi(2)
-                / sensitivity.reflectance,
-            extinction,
-            field: design.budget.as_ref().map(|b| b.field).filter(|f| f.trailing.is_some()),
-        }
+/// The light of `echoes` of the shots of `log`, ordered by shot: for studies of detectors and
+/// receivers without a scene.
+pub fn light_of_echoes<'a>(
+    design: &'a Design,
+    log: &ShotLog,
+    echoes: impl IntoIterator<Item = Echo>,
+) -> Light<'a> {
+    let mut light = Light { transmitters: vec![Transmitter::of(design, 1.0)], ..Light::default() };
+    let (mut way, mut before) = (0, usize::MAX);
+    for Echo { shot, delay_fs, photons } in echoes {
+        way = if shot == before { way + 1 } else { 0 };
+        before = shot;
+        light.trains.push(echo(log, shot, delay_fs, PulseTrain { photons, way, ..WHOLE }));
     }
-
-    /// One-way transmission of the air over `range` metres: exp(−σ·R).
-    pub fn transmission(&self, range: f64) -> f64 {
-        match self.extinction == 0.0 {
-            true => 1.0,
-            false => libm::exp(-self.extinction * range),
-        }
-    }
-
-    /// The link from the lidar `other` into the receiver of `ours`; `None` where the filter of the
-    /// receiver stops the light: ±[`FILTER`] about its own wavelength, unless it is known.
-    ///
-    /// What a foreign mark brings follows from the sensitivity that the other declares of itself,
-    /// n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector like its
-    /// own, which ours are taken to be unless both have a link budget. A detector of ours that never
-    /// misses sees every mark; of another that never misses, by which its energy is left open, ours
-    /// is assumed.
-    pub fn of_other(ours: &Design, other: &Design) -> Option<Self> {
-        let filter = ours.budget.as_ref().map_or(FILTER, |budget| budget.filter / 2.0);
-        if (ours.light.wavelength - other.light.wavelength).abs() > filter {
-            return None;
-        }
-        let [own, its] = [ours, other].map(|design| Self::of(design).photons_at_one_metre);
-        let receivers = match (&ours.budget, &other.budget) {
-            (Some(ours), Some(other)) => ours.receiver() / other.receiver(),
-            _ => 1.0,
-        };
-        let its = its * receivers;
-        let photons_at_one_metre = if own.is_infinite() || its.is_infinite() { own } else { its };
-        let extinction = ours.visibility.map_or(0.0, |v| extinction(v, other.light.wavelength));
-        Some(Self { photons_at_one_metre, extinction, field: None })
-    }
-
-    /// Mean photons detected per mark of light that has gone `way` metres through air, the last
-    /// `back` of them from a target of effective reflectance `reflectance`.
-    pub fn photons_by(&self, (way, back): (f64, f64), reflectance: f64) -> f64 {
-        if reflectance <= 0.0 || back <= 0.0 {
-            return 0.0;
-        }
-        self.photons_at_one_metre * reflectance * self.transmission(way) / (back * back)
-    }
-
-    /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which
-    /// includes the cosine) at `range` metres.
-    pub fn photons(&self, reflectance: f64, range: f64) -> f64 {
-        if reflectance <= 0.0 || range <= 0.0 {
-            return 0.0;
-        }
-        let share = self.field.map_or(1.0, |field| field.share(tof_from_range(range)));
-        let light = self.photons_at_one_metre * reflectance * share;
-        light * self.transmission(range).powi(2) / range.powi(2)
-    }
+    light
 }
 
-/// Extinction of air in 1/m for a meteorological `visibility` V in m at a `wavelength` λ in m.
-///
-/// σ = 3.912/V · (λ/550 nm)^−q, natural units, with q after Kim: 1.6 (V > 50 km), 1.3 (6–50 km),
-/// 0.16·V + 0.34 (1–6 km), V − 0.5 (0.5–1 km), 0 below \[Kim01\].
-pub fn extinction(visibility: f64, wavelength: f64) -> f64 {
-    let km = visibility * 1e-3;
-    let q = match km {
-        _ if km > 50.0 => 1.6,
-        _ if km > 6.0 => 1.3,
-        _ if km > 1.0 => 0.16 * km + 0.34,
-        _ if km > 0.5 => km - 0.5,
-        _ => 0.0,
-    };
-    3.912 / visibility * libm::pow(wavelength / 550e-9, -q)
+/// A whole macropulse of the sensor itself.
+const WHOLE: PulseTrain = PulseTrain {
+    transmitter: 0,
+    channel: 0,
+    arrives_fs: 0,
+    photons: 0.0,
+    label: 0,
+    word: 0,
+    marks: ALL_MARKS,
+    shot: 0,
+    way: 0,
+};
+
+/// `train` as the echo of a shot of the log, so long after it was fired.
+#[inline]
+fn echo(log: &ShotLog, shot: usize, delay_fs: i64, train: PulseTrain) -> PulseTrain {
+    PulseTrain {
+        channel: log.channel[shot],
+        arrives_fs: log.fired_at_fs[shot] + delay_fs,
+        label: log.label[shot],
+        word: log.word[shot],
+        shot: log.first + shot as u64,
+        ..train
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn extinction_has_the_published_values() {
-        approx::assert_relative_eq!(extinction(23e3, 550e-9), 0.170e-3, max_relative = 1e-3);
-        approx::assert_relative_eq!(extinction(23e3, 905e-9), 0.0890e-3, max_relative = 2e-3);
-        // In dense fog the wavelength does not matter.
-        assert_eq!(extinction(400.0, 905e-9), extinction(400.0, 1550e-9));
-    }
 
     #[test]
     fn what_has_no_light_is_no_echo() {
@@ -204,26 +191,12 @@ mod tests {
             material: vec![0, 1, 0, 0],
             object: vec![0; 4],
         };
-        let echoes = echoes(&design, &materials, &hits);
-        assert_eq!(echoes.shot, [3, 5]);
-        assert_eq!(echoes.delay_fs[1], crate::units::fs_from_s(crate::units::tof_from_range(30.0)));
-        assert_eq!(echoes.photons[1], Link::of(&design).photons(0.5, 30.0));
-    }
-
-    #[test]
-    fn the_reference_target_gives_the_reference_photons() {
-        let design = Design::open("kim-park-2016", &[]).unwrap();
-        let link = Link::of(&design);
-        // Pd = 0.99 per mark means −ln 0.01 photons.
-        approx::assert_relative_eq!(link.photons(1.0, 150.0), 4.605_170, max_relative = 1e-6);
-        approx::assert_relative_eq!(link.photons(0.5, 75.0), 2.0 * 4.605_170, max_relative = 1e-6);
-    }
-
-    #[test]
-    fn black_gives_nothing_even_to_a_perfect_detector() {
-        let perfect = [("detector.photon-counting.sensitivity.pd".into(), "1.0".into())];
-        let design = Design::open("kim-park-2016", &perfect).unwrap();
-        assert_eq!(Link::of(&design).photons(0.0, 10.0), 0.0);
-        assert_eq!(Link::of(&design).photons(1e-3, 10.0), f64::INFINITY);
+        let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
+        let mut trains = Trains::default();
+        echoes(&mut trains, (&design, &materials), &log, &hits);
+        assert_eq!((&trains.shot[..], &trains.way[..]), (&[3, 5][..], &[0, 0][..]));
+        let delay_fs = crate::units::fs_from_s(crate::units::tof_from_range(30.0));
+        assert_eq!(trains.arrives_fs[1], log.fired_at_fs[5] + delay_fs);
+        assert_eq!(trains.photons[1], Link::of(&design).photons(0.5, 30.0));
     }
 }

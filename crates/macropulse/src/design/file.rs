@@ -31,6 +31,7 @@ pub(super) struct ScanFile {
     pub min_range_m: f64,
     pub max_range_m: f64,
     pub gate_beyond_m: f64,
+    pub light_range_m: Option<f64>,
     pub raster: Option<RasterFile>,
     pub spinning: Option<SpinningFile>,
     pub flash: Option<FlashFile>,

@@ -91,6 +91,9 @@ pub struct Scan {
     pub reach: f64,
     /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
     pub max_range: f64,
+    /// Range to which the light of a shot is followed, m: beyond the gate, because what returns
+    /// from there arrives in the gates of later shots.
+    pub light_range: f64,
     /// Whether the mirror moves on during a macropulse.
     pub moves: bool,
     /// How directions follow each other.

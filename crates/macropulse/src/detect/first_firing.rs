@@ -6,8 +6,10 @@
 //!    probability F(t) = P(Γ_m ≤ Λ(t)), Γ_m the sum of m unit exponentials. For m = 1 this is the
 //!    1 − exp(−Λ(t)) of a Geiger detector.
 //! 3. Monte Carlo: draw Γ_m; no firing if Γ_m > n', else t = t₀ + σ·Φ⁻¹(Γ_m / n').
-//! 4. False firings are Poisson in time. The earliest firing in the range gate wins, whether its
-//!    light is ours or of another lidar.
+//! 4. False firings are Poisson in time. The earliest firing in the range gate wins, whatever its
+//!    light is: an echo of this shot, one of an earlier shot from beyond the gate, an interferer.
+//!    An interferer's marks that come within one micropulse of the detector's own are one flash, in
+//!    the middle of them.
 //! 5. A Gaussian sample of the temporal response is added. The converter quantises.
 //!
 //! \[KP16\] mixes two kinds of detector here: additive Gaussian noise belongs to a linear-mode
@@ -16,11 +18,14 @@
 //! echo the more the stronger it is; as real sensors do, the mean of that walk is calibrated out
 //! with the amplitude measured.
 
+use std::ops::RangeInclusive;
+
 use macropulse_codec::statistics::normal_quantile;
 use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 
-use super::others::{Flash, flashes};
-use super::{Band, Edges};
+use super::Detections;
+use super::channel::Channel;
+use super::noise::stretches;
 use crate::design::FirstFiring;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
@@ -32,91 +37,158 @@ const LATEST: f64 = 0.99;
 /// A detector that never misses is given this much light.
 pub(super) const PLENTY: f64 = 1e9;
 
-pub(super) fn edges(firing: &FirstFiring, band: &Band, chance: &Chance) -> Edges {
-    let &Band { clock, design, log, echoes } = band;
-    let gate = (
-        fs_from_s(tof_from_range(design.scan.min_range)),
-        fs_from_s(tof_from_range(design.scan.max_range)),
-    );
-    let rms_fs = design.light.pulse * RMS_OF_FWHM * FS_PER_S as f64;
-    let needed = f64::from(firing.firing_photons);
-    let Ok(gamma) = Gamma::new(needed, 1.0) else { return Edges::default() };
-    let fire = |delay_fs: i64, photons: f64, stream: &mut Stream| {
-        let noise: f64 = StandardNormal.sample(stream);
-        let photons = (photons.min(PLENTY) + firing.noise_photons * noise).max(0.0);
-        let draw: f64 = gamma.sample(stream);
-        (draw < photons).then(|| {
-            let early =
-                normal_quantile(draw / photons) - normal_quantile((needed / photons).min(LATEST));
-            (delay_fs as f64 + rms_fs * early, photons)
-        })
-    };
-    let earlier = |one: Option<(f64, f64)>, other: Option<(f64, f64)>| match (one, other) {
-        (Some(one), Some(other)) => Some(if other.0 < one.0 { other } else { one }),
-        (one, other) => one.or(other),
-    };
-    let mut found: Vec<(u16, u32, f32)> = Vec::with_capacity(log.len());
-    let mut flashes = flashes(band).into_iter().peekable();
-    let mut i = 0;
-    for shot in 0..log.len() {
-        let mut stream = chance.at(Stage::Firing, log.first + shot as u64);
-        let mut earliest: Option<(f64, f64)> = None;
-        if firing.false_rate > 0.0 {
-            let wait: f64 = Exp1.sample(&mut stream);
-            let delay = gate.0 as f64 + wait / firing.false_rate * FS_PER_S as f64;
-            earliest = Some((delay, needed));
+/// Light that the detector adds up: marks of one pulse train within one micropulse of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Flash {
+    /// Absolute time of the middle of the marks, fs.
+    arrives_fs: i64,
+    photons: f64,
+}
+
+/// Adds the events of a channel to those found: for each shot, while its gate is open, the first
+/// firing.
+pub(super) fn add(
+    firing: &FirstFiring,
+    channel: &Channel,
+    chance: &Chance,
+    found: &mut Detections,
+) {
+    let &Channel { clock, design, log, .. } = channel;
+    let scan = &design.scan;
+    let [opens, closes] =
+        [scan.min_range, scan.max_range].map(|range| fs_from_s(tof_from_range(range)));
+    let Some(flash) = Firing::of(firing, channel) else { return };
+    let flashes = flashes(channel);
+    let mut events: Vec<(u32, f32)> = Vec::with_capacity(channel.shots.len());
+    for &shot in &channel.shots {
+        let fired_fs = log.fired_at_fs[shot as usize];
+        let gate = fired_fs + opens..=fired_fs + closes;
+        let mut stream = chance.at(Stage::Firing, log.first + u64::from(shot));
+        let mut earliest = flash.by_itself(&gate, channel, &mut stream);
+        // Light that arrives just before the gate opens may fire the detector just after.
+        let early_fs = fs_from_s(design.light.pulse);
+        let first = flashes.partition_point(|flash| flash.arrives_fs < *gate.start() - early_fs);
+        let open = flashes[first..].iter().take_while(|flash| flash.arrives_fs <= *gate.end());
+        for candidate in open {
+            if let Some(fired) = flash.fires(candidate, &mut stream)
+                && earliest.is_none_or(|earliest| fired.0 < earliest.0)
+            {
+                earliest = Some(fired);
+            }
         }
-        while i < echoes.shot.len() && echoes.shot[i] as usize == shot {
-            earliest = earlier(earliest, fire(echoes.delay_fs[i], echoes.photons[i], &mut stream));
-            i += 1;
-        }
-        let mut others = None;
-        while let Some(Flash { delay_fs, photons, .. }) = flashes.next_if(|f| f.shot == shot) {
-            let stream = others
-                .get_or_insert_with(|| chance.at(Stage::OtherFiring, log.first + shot as u64));
-            earliest = earlier(earliest, fire(delay_fs, photons, stream));
-        }
-        if let Some((delay, photons)) = earliest {
+        if let Some((time_fs, photons)) = earliest {
             let response: f64 = StandardNormal.sample(&mut stream);
-            let delay = (delay + response * firing.jitter * FS_PER_S as f64).round() as i64;
-            if (gate.0..=gate.1).contains(&delay) {
-                let time = clock.time(log.fired_at_fs[shot] + delay) as u32;
-                found.push((log.channel[shot], time, photons as f32));
+            let time_fs = time_fs + fs_from_s(response * firing.jitter);
+            if gate.contains(&time_fs) {
+                events.push((clock.time(time_fs) as u32, photons as f32));
             }
         }
     }
-    found.sort_by_key(|&(channel, time, _)| (channel, time));
-    Edges {
-        epoch: clock.epoch,
-        time: found.iter().map(|f| f.1).collect(),
-        channel: found.iter().map(|f| f.0).collect(),
-        amplitude: found.iter().map(|f| f.2).collect(),
+    events.sort_by_key(|event| event.0);
+    found.time.extend(events.iter().map(|event| event.0));
+    found.amplitude.extend(events.iter().map(|event| event.1));
+}
+
+/// How the detector fires.
+struct Firing<'a> {
+    firing: &'a FirstFiring,
+    /// Photons needed, and their sum of unit exponentials.
+    needed: f64,
+    gamma: Gamma<f64>,
+    /// rms length of a micropulse, fs.
+    rms_fs: f64,
+}
+
+impl<'a> Firing<'a> {
+    fn of(firing: &'a FirstFiring, channel: &Channel) -> Option<Self> {
+        let needed = f64::from(firing.firing_photons);
+        let gamma = Gamma::new(needed, 1.0).ok()?;
+        let rms_fs = channel.design.light.pulse * RMS_OF_FWHM * FS_PER_S as f64;
+        Some(Self { firing, needed, gamma, rms_fs })
     }
+
+    /// When it fires in the light of a flash, fs, and the photons that it measures; `None` if it
+    /// does not.
+    fn fires(&self, flash: &Flash, stream: &mut Stream) -> Option<(i64, f64)> {
+        let noise: f64 = StandardNormal.sample(stream);
+        let photons = (flash.photons.min(PLENTY) + self.firing.noise_photons * noise).max(0.0);
+        let draw: f64 = self.gamma.sample(stream);
+        (draw < photons).then(|| {
+            let early = normal_quantile(draw / photons)
+                - normal_quantile((self.needed / photons).min(LATEST));
+            (flash.arrives_fs + (self.rms_fs * early).round() as i64, photons)
+        })
+    }
+
+    /// When it first fires without a pulse while `gate` is open, fs, and what it takes that for.
+    fn by_itself(
+        &self,
+        gate: &RangeInclusive<i64>,
+        channel: &Channel,
+        stream: &mut Stream,
+    ) -> Option<(i64, f64)> {
+        let mut wait_fs = |per_s: f64| -> i64 {
+            let wait: f64 = Exp1.sample(stream);
+            (wait / per_s * FS_PER_S as f64) as i64
+        };
+        let steady = (self.firing.false_rate > 0.0)
+            .then(|| gate.start().saturating_add(wait_fs(self.firing.false_rate)));
+        let others = stretches(channel).filter_map(|stretch| {
+            let from_fs = stretch.from_fs.max(*gate.start());
+            let until_fs = stretch.until_fs.min(*gate.end());
+            let first_fs = (from_fs < until_fs).then(|| from_fs + wait_fs(stretch.per_s))?;
+            (first_fs < until_fs).then_some(first_fs)
+        });
+        let earliest = others.collect::<Vec<i64>>().into_iter().chain(steady).min()?;
+        Some((earliest, self.needed))
+    }
+}
+
+/// The flashes that the pulse trains of a channel make, in the order of time.
+fn flashes(channel: &Channel) -> Vec<Flash> {
+    let pulse_fs = fs_from_s(channel.design.light.pulse);
+    let trains = &channel.light.trains;
+    let mut flashes = Vec::new();
+    let mut marks_fs: Vec<i64> = Vec::new();
+    for arrival in channel.order.iter() {
+        let index = *arrival as u32 as usize;
+        let begins = trains.arrives_fs[index];
+        marks_fs.clear();
+        marks_fs.extend(channel.light.arrivals_fs(index));
+        let is_with =
+            |one: &i64, next: &i64| (one - begins) / pulse_fs == (next - begins) / pulse_fs;
+        for marks in marks_fs.chunk_by(is_with) {
+            flashes.push(Flash {
+                arrives_fs: marks[0] + (marks[marks.len() - 1] - marks[0]) / 2,
+                photons: trains.photons[index] * marks.len() as f64,
+            });
+        }
+    }
+    if !flashes.is_sorted_by_key(|flash| flash.arrives_fs) {
+        flashes.sort_by_key(|flash| flash.arrives_fs);
+    }
+    flashes
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::channel::Echoes;
+    use crate::channel::{Echo, Light, PulseTrain, Transmitter, light_of_echoes};
     use crate::design::Design;
     use macropulse_codec::ShotLog;
 
     /// The edges of shots that all have an echo of so many photons, in the first nine bands or
     /// what the sensor has of them.
-    fn run(design: &Design, photons: f64, seed: u64) -> Vec<(ShotLog, Edges)> {
+    fn run(design: &Design, photons: f64, seed: u64) -> Vec<(ShotLog, Detections)> {
         let detectors = super::super::Detectors::new(design, Chance::new(seed));
         let bands = crate::emit::bands(design, 0).take(9);
         bands
             .map(|band| {
                 let log = band.shot_log(design);
-                let shots = log.len();
-                let echoes = Echoes {
-                    shot: (0..shots as u32).collect(),
-                    delay_fs: vec![400_000_000; shots],
-                    photons: vec![photons; shots],
-                    ..Echoes::default()
-                };
-                let edges = detectors.edges(&log, &echoes, &mut super::super::Memory::default());
+                let echo = |shot| Echo { shot, delay_fs: 400_000_000, photons };
+                let light = light_of_echoes(design, &log, (0..log.len()).map(echo));
+                let edges =
+                    detectors.detections(&log, &light, &mut super::super::Memory::default());
                 (log, edges)
             })
             .collect()
@@ -184,5 +256,70 @@ mod tests {
     fn nothing_comes_from_nothing() {
         let design = set("peregrine", &[("false_firing_hz", "0")]);
         assert!(run(&design, 0.0, 1).iter().all(|(_, edges)| edges.time.is_empty()));
+    }
+
+    /// A macropulse of 27 ns falls on a detector that adds up over 5 ns: six flashes at most, with
+    /// all its photons.
+    #[test]
+    fn marks_within_a_micropulse_are_one_flash() {
+        let design = Design::open("hdl-64e", &[]).unwrap();
+        let coded = Design::open("kim-park-2016-fixed", &[]).unwrap();
+        let log = crate::emit::Band { scan: 0, first: 0, shots: 64 }.shot_log(&design);
+        let transmitters = vec![Transmitter::of(&design, 1.0), Transmitter::of(&coded, 1.0)];
+        let mut light = Light { transmitters, ..Light::default() };
+        let arrives_fs = log.fired_at_fs[5] + 300_000_000;
+        light.trains.push(PulseTrain {
+            transmitter: 1,
+            channel: log.channel[5],
+            arrives_fs,
+            photons: 2.0,
+            label: 5,
+            word: 3,
+            marks: crate::channel::ALL_MARKS,
+            shot: 0,
+            way: 0,
+        });
+        let clock = super::super::clock::Clock::new(&design, log.fired_at_fs[0]);
+        let mut arrangement = super::super::channel::Arrangement::default();
+        arrangement.fill(&design, &clock, &log, &light);
+        let marks = light.marks(0).len() as f64;
+        let mut seen = 0;
+        for channel in arrangement.channels(&design, clock, &log, &light) {
+            let flashes = flashes(&channel);
+            if channel.number != log.channel[5] {
+                assert!(flashes.is_empty());
+                continue;
+            }
+            seen += 1;
+            assert!((2..=6).contains(&flashes.len()), "{}", flashes.len());
+            assert_eq!(flashes.iter().map(|flash| flash.photons).sum::<f64>(), 2.0 * marks);
+            assert!(flashes.is_sorted_by_key(|flash| flash.arrives_fs));
+            assert!(flashes.iter().all(|flash| flash.arrives_fs >= arrives_fs));
+        }
+        assert_eq!(seen, 1);
+    }
+
+    /// What comes back from beyond the gate of one shot fires the detector in the gate of the next:
+    /// the second time around. Control: with more time between the shots it does not.
+    #[test]
+    fn light_of_an_earlier_shot_fires_the_detector_again() {
+        let open = |rate: &str| {
+            let text = "version = 1\nextends = \"hdl-64e\"\nname = \"mine\"\n\
+                        [scan]\nmax_range_m = 100.0\ngate_beyond_m = 0.0\n\
+                        [scan.raster]\nrows = 10\ncolumns = 100\nhorizontal_deg = 10.0\n\
+                        vertical_deg = 1.0\n[detector.first-firing]\nfalse_firing_hz = 0.0\n";
+            let set = [("scan.scans_per_s".to_owned(), rate.to_owned())];
+            Design::from_toml(text, "mine", std::path::Path::new(""), &set).unwrap()
+        };
+        for (rate, expected) in [("1000", 9), ("500", 0)] {
+            let design = open(rate);
+            let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
+            // 165 m away: 1.1 µs. Shots follow each other after 1 µs, or after 2 µs.
+            let echo = |shot| Echo { shot, delay_fs: 1_100_000_000, photons: 1e6 };
+            let light = light_of_echoes(&design, &log, (0..10).map(echo));
+            let detectors = super::super::Detectors::new(&design, Chance::new(1));
+            let found = detectors.detections(&log, &light, &mut super::super::Memory::default());
+            assert_eq!(found.time.len(), expected, "{rate} scans per second");
+        }
     }
 }

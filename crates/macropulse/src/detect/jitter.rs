@@ -57,14 +57,6 @@ impl Jitter {
         times.sort_unstable();
     }
 
-    /// The delay that `number` draws, in parts of a tick.
-    pub fn drawn(&self, number: u32) -> i32 {
-        match self.step == 1.0 {
-            true => drawn(number, &self.cells, self.bits),
-            false => self.coarse(number),
-        }
-    }
-
     fn coarse(&self, number: u32) -> i32 {
         let all = f64::from(1_u32 << PLACE_BITS);
         let place = (f64::from(number % (1 << PLACE_BITS)) + 0.5) / all - 0.5;

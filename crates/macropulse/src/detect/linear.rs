@@ -3,7 +3,7 @@
 //! 1. A mark of mean n detected photons brings k of them, Poisson.
 //! 2. Multiplication spreads their number: a = k + √(k·(F − 1))·g, F the excess noise factor.
 //! 3. Shot noise of steady currents and the amplifier add their own: a + noise·g'.
-//! 4. An amplitude above the threshold makes an edge at the arrival of the mark, displaced by what
+//! 4. An amplitude above the threshold makes an event at the arrival of the mark, displaced by what
 //!    the noise does to the slope.
 //! 5. Between marks, noise crosses the threshold at the rate the threshold was set for.
 //!
@@ -11,105 +11,124 @@
 //! shots does not, and the walk of the crossing with the amplitude is taken to be calibrated out
 //! (docs/physics.md#linear).
 
-use std::ops::Range;
-
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
-use super::noise::Noise;
-use super::{Band, Edges, Memory};
+use super::channel::Channel;
+use super::noise::{Noise, counts};
+use super::{Detections, Memory};
 use crate::design::{Design, Linear};
-use crate::random::{Chance, Stage};
+use crate::random::{Chance, Stage, Stream};
 use crate::units::fs_from_s;
 
 /// A mark of more photons than this is never below a threshold.
 const PLENTY: f64 = 1e12;
 
-/// A linear detector and the false edges of its noise.
+/// A linear detector and the crossings that its noise makes.
 #[derive(Debug)]
 pub(super) struct Thresholding {
     linear: Linear,
     noise: Option<Noise>,
+    /// Whether the height of a pulse is measured: by the receiver of single pulses, which tells
+    /// reflectance from it.
+    measures: bool,
+}
+
+/// Light of one shot that comes within the response of the amplifier.
+struct Together {
+    /// The first of the pulse trains.
+    train: usize,
+    /// How much later the mean of their light comes, fs.
+    later_fs: i64,
+    /// Photons of all of them, per mark.
+    photons: f64,
 }
 
 impl Thresholding {
     pub fn new(linear: &Linear, design: &Design) -> Self {
-        Self { linear: *linear, noise: Noise::new(linear.false_rate, design) }
+        let noise = Noise::new(linear.false_rate, design);
+        Self { linear: *linear, noise, measures: !design.is_coded() }
     }
 
-    pub fn edges(&self, band: &Band, chance: &Chance, memory: &mut Memory) -> Edges {
-        let mut time = std::mem::take(&mut memory.edges);
-        time.clear();
-        let mut together = Vec::new();
-        band.each_shot_with_echoes(|shot, echoes| {
-            let mut stream = chance.at(Stage::Photons, band.log.first + shot as u64);
-            self.gather(band, echoes, &mut together);
-            for (echo, later_fs, photons) in together.drain(..) {
-                let photons = Poisson::new(photons.min(PLENTY)).ok();
-                for mark in band.marks(echo) {
-                    let count = photons.map_or(0.0, |photons| photons.sample(&mut stream));
-                    if let Some(late) = self.crossing(count, &mut stream) {
-                        time.push(band.clock.time(mark + later_fs + late) as u32);
+    /// Adds the events of a channel to those found.
+    pub fn add(
+        &self,
+        channel: &Channel,
+        chance: &Chance,
+        (found, memory): (&mut Detections, &mut Memory),
+    ) {
+        let mut events: Vec<(u32, f32)> = Vec::new();
+        let span = channel.whole_span();
+        for Together { train, later_fs, photons } in self.gather(channel) {
+            let mut stream = chance.at(Stage::Photons, channel.light.trains.address(train));
+            let photons = Poisson::new(photons.min(PLENTY)).ok();
+            for mark_fs in channel.light.arrivals_fs(train) {
+                let count = photons.map_or(0.0, |photons| photons.sample(&mut stream));
+                if let Some((late_fs, amplitude)) = self.crossing(count, &mut stream) {
+                    let time = channel.clock.time(mark_fs + later_fs + late_fs);
+                    if span.contains(&time) {
+                        events.push((time as u32, amplitude as f32));
                     }
                 }
             }
-        });
-        band.each_foreign(chance, |mut stream, photons, marks| {
-            let photons = Poisson::new(photons.min(PLENTY)).ok();
-            for mark in marks {
-                let count = photons.map_or(0.0, |photons| photons.sample(&mut stream));
-                if let Some(late) = self.crossing(count, &mut stream) {
-                    time.push(band.clock.time(mark + late) as u32);
-                }
-            }
-        });
-        if let Some(noise) = &self.noise {
-            noise.edges(&band.clock, band.span(), chance, &mut memory.false_edges);
-            time.extend_from_slice(&memory.false_edges);
         }
-        time.sort_unstable();
-        Edges { epoch: band.clock.epoch, time, ..Edges::default() }
+        counts(self.noise.as_ref(), channel, chance, &mut memory.noise);
+        let noise = memory.noise.iter();
+        events.extend(noise.map(|time| (*time, self.linear.threshold as f32)));
+        events.sort_unstable_by_key(|event| event.0);
+        found.time.extend(events.iter().map(|event| event.0));
+        if self.measures {
+            found.amplitude.extend(events.iter().map(|event| event.1));
+        }
     }
 
-    /// The `echoes` of a shot that the amplifier cannot tell apart, as one each: the first of them,
-    /// how much later, fs, the mean of their light comes, and the photons of all.
-    fn gather(&self, band: &Band, echoes: Range<usize>, together: &mut Vec<(usize, i64, f64)>) {
-        let of = |echo: usize| (band.echoes.part.get(echo), band.echoes.delay_fs[echo]);
-        let mut order: Vec<usize> = echoes.collect();
-        order.sort_by_key(|&echo| of(echo));
+    /// The pulse trains of a channel, those of one shot that the amplifier cannot tell apart as
+    /// one.
+    fn gather(&self, channel: &Channel) -> Vec<Together> {
+        let trains = &channel.light.trains;
+        let mut order: Vec<usize> =
+            channel.order.iter().map(|arrival| *arrival as u32 as usize).collect();
+        let whose =
+            |train: usize| (trains.transmitter[train], trains.shot[train], trains.marks[train]);
+        let begins = |train: usize| trains.arrives_fs[train];
+        order.sort_by_key(|&train| (whose(train), begins(train)));
         let response_fs = fs_from_s(self.linear.response);
+        let mut together = Vec::new();
         let mut rest = order.as_slice();
         while let Some(&first) = rest.first() {
-            let (part, begins) = of(first);
-            let is_with = |echo: &usize| of(*echo).0 == part && of(*echo).1 <= begins + response_fs;
-            let count = rest.iter().take_while(|echo| is_with(echo)).count();
+            let is_with = |train: &usize| {
+                whose(*train) == whose(first) && begins(*train) <= begins(first) + response_fs
+            };
+            let count = rest.iter().take_while(|train| is_with(train)).count();
             let (one, others) = rest.split_at(count);
-            let photons: f64 = one.iter().map(|&echo| band.echoes.photons[echo]).sum();
-            let later = |&echo: &usize| {
-                (of(echo).1 - begins) as f64 * (band.echoes.photons[echo] / photons)
+            let photons: f64 = one.iter().map(|&train| trains.photons[train]).sum();
+            let later = |&train: &usize| {
+                (begins(train) - begins(first)) as f64 * (trains.photons[train] / photons)
             };
             // A detector that never misses has no end of photons.
             let later: f64 = one.iter().map(later).sum();
-            together.push((first, if later.is_finite() { later as i64 } else { 0 }, photons));
+            let later_fs = if later.is_finite() { later as i64 } else { 0 };
+            together.push(Together { train: first, later_fs, photons });
             rest = others;
         }
+        together
     }
 
-    /// How late, fs, a mark of `count` detected photons crosses the threshold; `None` if it does
-    /// not.
-    fn crossing(&self, count: f64, stream: &mut crate::random::Stream) -> Option<i64> {
+    /// How late, fs, a mark of `count` detected photons crosses the threshold, and its amplitude;
+    /// `None` if it does not.
+    fn crossing(&self, count: f64, stream: &mut Stream) -> Option<(i64, f64)> {
         let Linear { threshold, noise, excess, .. } = self.linear;
         let spread = (count * (excess - 1.0) + noise * noise).sqrt();
         let draw = |stream: &mut _| -> f64 { StandardNormal.sample(stream) };
         let amplitude = count + spread * draw(stream);
         let late = draw(stream);
         (count > 0.0 && amplitude > threshold)
-            .then(|| fs_from_s(late * self.linear.timing(amplitude)))
+            .then(|| (fs_from_s(late * self.linear.timing(amplitude)), amplitude))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::channel::Echoes;
+    use crate::channel::{Echo, light_of_echoes};
     use crate::design::Design;
     use crate::detect::{Detectors, Memory};
     use crate::random::Chance;
@@ -123,14 +142,10 @@ mod tests {
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
         let shot = log.owned.start;
         let edges = |apart_fs: i64, photons: f64| {
-            let echoes = Echoes {
-                shot: vec![shot as u32; 7],
-                delay_fs: (0..7).map(|ray| 500_000_000 + ray * apart_fs).collect(),
-                photons: vec![photons; 7],
-                ..Echoes::default()
-            };
+            let echo = |ray| Echo { shot, delay_fs: 500_000_000 + ray * apart_fs, photons };
+            let light = light_of_echoes(&design, &log, (0..7).map(echo));
             let detectors = Detectors::new(&design, Chance::new(1));
-            detectors.edges(&log, &echoes, &mut Memory::default()).time.len()
+            detectors.detections(&log, &light, &mut Memory::default()).time.len()
         };
         // The threshold is at some 300 photons.
         assert_eq!(edges(10_000, 90.0), 8);

@@ -1,14 +1,19 @@
-//! False edges: dark counts and background, Poisson in time.
+//! Dark and background counts: Poisson in time, with a rate λ(t).
 //!
-//! Time is cut into windows, and the edges of each are drawn from its own address: neighbouring
-//! bands see the same ones where they overlap. Within a window the waits from one edge to the next
-//! are exponential. A process without memory may start anew with every window.
+//! The steady part of the rate: time is cut into windows, and the counts of each are drawn from its
+//! own address, so that neighbouring bands see the same ones where they overlap. Within a window
+//! the waits from one count to the next are exponential. A process without memory may start anew
+//! with every window. Stretches of time with a rate of their own are windows of their own: counts
+//! of independent Poisson processes add up to one of the summed rate.
 //!
 //! Where there are so many that most would fall into the tick of another one, which the converters
 //! make one of, it is drawn tick by tick whether there is any.
 
 use std::ops::RangeInclusive;
 
+use rand_distr::{Distribution, Exp1};
+
+use super::channel::Channel;
 use super::clock::Clock;
 use crate::design::{Design, PARTS_OF_TICK};
 use crate::kernels::{END, Events, GROUP};
@@ -24,7 +29,7 @@ const CROWDED: f64 = 0.5;
 /// Ticks of a window that is drawn tick by tick.
 const TICKS: i64 = 1 << 14;
 
-/// False edges at a steady rate.
+/// Counts at a steady rate.
 #[derive(Debug)]
 pub(super) enum Noise {
     /// Drawn one after the other.
@@ -36,7 +41,7 @@ pub(super) enum Noise {
     },
 }
 
-/// Waits from one false edge to the next.
+/// Waits from one count to the next.
 #[derive(Debug)]
 pub(super) struct Waits {
     /// Mean wait, in fractions of a part of a tick.
@@ -46,7 +51,7 @@ pub(super) struct Waits {
 }
 
 impl Noise {
-    /// False edges at `rate` per second; `None` where there are none.
+    /// Counts at `rate` per second; `None` where there are none.
     pub fn new(rate: f64, design: &Design) -> Option<Self> {
         if rate <= 0.0 {
             return None;
@@ -64,31 +69,108 @@ impl Noise {
         Some(Self::Apart(Waits { mean: (mean * f64::from(1_u32 << shift)) as f32, shift }))
     }
 
-    /// The false edges in `span`, which is in parts of a tick from the epoch of `clock` on; in
-    /// `times`, in place of what was there.
-    pub fn edges(
-        &self,
-        clock: &Clock,
-        span: RangeInclusive<i64>,
-        chance: &Chance,
-        times: &mut Vec<u32>,
-    ) {
-        times.clear();
-        match self {
-            Self::Apart(waits) => waits.edges(clock, span, chance, times),
-            Self::Crowded { dark } => lit_ticks(*dark, (clock, span), chance, times),
+    /// Appends the counts while `channel` listens, ascending.
+    fn times(&self, channel: &Channel, chance: &Chance, times: &mut Vec<u32>) {
+        for span in &channel.spans {
+            let source = Source {
+                clock: &channel.clock,
+                span: span.clone(),
+                chance,
+                channel: channel.number,
+            };
+            match self {
+                Self::Apart(waits) => waits.counts(&source, times),
+                Self::Crowded { dark } => lit_ticks(*dark, &source, times),
+            }
         }
     }
 }
 
-/// The ticks in `span` that are lit, each in its middle, where one is dark with probability
-/// `dark` · 2⁻³².
-fn lit_ticks(
-    dark: u32,
-    (clock, span): (&Clock, RangeInclusive<i64>),
+/// The counts of the background while `channel` listens, ascending: the `steady` ones and those of
+/// stretches with a rate of their own; in `times`, in place of what was there.
+pub(super) fn counts(
+    steady: Option<&Noise>,
+    channel: &Channel,
     chance: &Chance,
     times: &mut Vec<u32>,
 ) {
+    times.clear();
+    if let Some(steady) = steady {
+        steady.times(channel, chance, times);
+    }
+    let from = times.len();
+    for stretch in stretches(channel) {
+        let span = channel.whole_span();
+        let mut stream = chance.stream(stretch.address);
+        let mut passed_fs = 0.0;
+        loop {
+            let wait: f64 = Exp1.sample(&mut stream);
+            passed_fs += wait / stretch.per_s * FS_PER_S as f64;
+            let now_fs = stretch.from_fs + passed_fs as i64;
+            if now_fs >= stretch.until_fs {
+                break;
+            }
+            let time = channel.clock.time(now_fs);
+            times.extend(span.contains(&time).then_some(time as u32));
+        }
+    }
+    if times.len() > from {
+        times.sort_unstable();
+    }
+}
+
+/// Background that lasts for a stretch of time.
+pub(super) struct Stretch {
+    pub from_fs: i64,
+    pub until_fs: i64,
+    pub per_s: f64,
+    /// Where its random numbers stand.
+    pub address: Address,
+}
+
+/// The stretches that `channel` sees, those without light left out.
+pub(super) fn stretches(channel: &Channel) -> impl Iterator<Item = Stretch> {
+    let background = &channel.light.background;
+    let seen =
+        move |i: &usize| background.channel[*i] == channel.number && background.per_s[*i] > 0.0;
+    (0..background.channel.len()).filter(seen).map(move |i| {
+        let (from_fs, until_fs) = (background.from_fs[i], background.until_fs[i]);
+        let per_s = background.per_s[i];
+        // Stretches that begin at once differ in their end or in their rate.
+        let others = (until_fs as u64).rotate_left(21) ^ per_s.to_bits().rotate_left(42);
+        let address = Address {
+            stage: Stage::Stretch,
+            index: from_fs as u64 ^ others,
+            part: u32::from(channel.number) << PART_BITS,
+        };
+        Stretch { from_fs, until_fs, per_s, address }
+    })
+}
+
+/// Where counts are drawn.
+struct Source<'a> {
+    clock: &'a Clock,
+    /// In parts of a tick from the epoch of the clock on.
+    span: RangeInclusive<i64>,
+    chance: &'a Chance,
+    channel: u16,
+}
+
+impl Source<'_> {
+    /// The address of the counts of window `index`.
+    fn address(&self, index: i64) -> Address {
+        let part = u32::from(self.channel) << PART_BITS;
+        Address { stage: Stage::FalseEdges, index: index as u64, part }
+    }
+}
+
+/// Bits of a part that are left for the runs of numbers of one window.
+pub(super) const PART_BITS: u32 = 8;
+
+/// The ticks in `span` that are lit, each in its middle, where one is dark with probability
+/// `dark` · 2⁻³².
+fn lit_ticks(dark: u32, source: &Source, times: &mut Vec<u32>) {
+    let Source { clock, span, chance, .. } = source;
     let parts = i64::from(PARTS_OF_TICK);
     let (first, last) = (
         (span.start() + clock.epoch_parts()).div_euclid(parts),
@@ -96,8 +178,7 @@ fn lit_ticks(
     );
     let mut numbers = Vec::new();
     for window in first.div_euclid(TICKS)..=last.div_euclid(TICKS) {
-        let address = Address { stage: Stage::FalseEdges, index: window as u64, part: 0 };
-        let numbers = chance.draw(address, TICKS as usize, &mut numbers);
+        let numbers = chance.draw(source.address(window), TICKS as usize, &mut numbers);
         for (tick, number) in (window * TICKS..).zip(&numbers[..TICKS as usize]) {
             // The clock starts at a whole tick.
             let time = tick * parts + parts / 2 - clock.epoch_parts();
@@ -109,13 +190,8 @@ fn lit_ticks(
 }
 
 impl Waits {
-    fn edges(
-        &self,
-        clock: &Clock,
-        span: RangeInclusive<i64>,
-        chance: &Chance,
-        times: &mut Vec<u32>,
-    ) {
+    fn counts(&self, source: &Source, times: &mut Vec<u32>) {
+        let Source { clock, span, chance, .. } = source;
         let window = i64::from(END >> self.shift);
         let number_of = |time: &i64| (time + clock.epoch_parts()).div_euclid(window);
         let mut numbers = Vec::new();
@@ -123,8 +199,7 @@ impl Waits {
             let from = times.len();
             let start = number * window - clock.epoch_parts();
             let events = Events { mean: self.mean, shift: self.shift, start: start as u32 };
-            let address = Address { stage: Stage::FalseEdges, index: number as u64, part: 0 };
-            draw(events, address, chance, (times, &mut numbers));
+            draw(events, source.address(number), chance, (times, &mut numbers));
             if *span.start() <= start && start + window <= *span.end() {
                 continue;
             }

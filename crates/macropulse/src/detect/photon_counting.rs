@@ -1,10 +1,9 @@
 //! A detector that counts photons chip by chip.
 //!
-//! 1. Every mark of every echo is seen with probability (1 − m)·(1 − exp(−n)), n the mean photons
+//! 1. Every mark of every pulse train is seen with probability (1 − m)·(1 − exp(−n)), n the mean photons
 //!    detected per mark and m the fraction lost for other reasons (docs/physics.md#photon-counting).
 //! 2. A mark that is seen makes one edge at its arrival, displaced by Gaussian jitter.
-//! 3. Light of other lidars makes edges beside them.
-//! 4. Dark and background counts are Poisson in time.
+//! 3. Dark and background counts are Poisson in time.
 //!
 //! Marks that arrive within one tick make one edge in the end: the converters merge them, which is
 //! the hard limiter of the coding literature.
@@ -12,9 +11,12 @@
 //! Echoes are taken in the order in which they begin to arrive, so that the edges of one follow
 //! those of all before it, or are merged with the last few of them.
 
+use super::channel::Channel;
+use super::first_photon::FirstPhoton;
 use super::jitter::Jitter;
-use super::noise::Noise;
-use super::{Band, Edges, Memory, others};
+use super::noise::{Noise, counts};
+use super::{Detections, Memory};
+use crate::channel::ALL_MARKS;
 use crate::design::{Design, PARTS_OF_TICK, PhotonCounting};
 use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
@@ -74,50 +76,48 @@ impl Counting {
         }
     }
 
-    pub fn edges(&self, band: &Band, chance: &Chance, memory: &mut Memory) -> Edges {
-        let mut time = std::mem::take(&mut memory.edges);
-        time.clear();
-        let mut order = std::mem::take(&mut memory.order);
-        in_order_of_arrival(band, &mut order);
-        for arrival in &order {
-            self.add_echo(band, *arrival, chance, (&mut time, memory));
+    /// Adds the events of a channel to those found.
+    pub fn add(
+        &self,
+        channel: &Channel,
+        chance: &Chance,
+        (found, memory): (&mut Detections, &mut Memory),
+    ) {
+        // The times of the channel alone, so that what is merged is no other channel's.
+        let mut before = std::mem::take(&mut found.time);
+        let alone = before.is_empty();
+        let mut time = if alone { std::mem::take(&mut before) } else { Vec::new() };
+        for arrival in channel.order.iter() {
+            self.add_train(channel, *arrival, chance, (&mut time, memory));
         }
-        memory.order = order;
-        if !band.echoes.foreign.is_empty() {
-            let jitter = self.jitter.as_ref();
-            let counted = others::Counted { kept: self.kept, jitter, pulse: self.pulse };
-            counted.edges((&band.clock, &band.echoes.foreign), &band.span(), chance, memory);
+        counts(self.noise.as_ref(), channel, chance, &mut memory.noise);
+        if memory.noise.len() < time.len() / FEW {
+            insert(&mut time, &memory.noise);
+        } else if !memory.noise.is_empty() {
             time.extend(PAD);
-            memory.foreign.extend(PAD);
-            merge(&time, &memory.foreign, &mut memory.merged, 0);
+            memory.noise.extend(PAD);
+            merge(&time, &memory.noise, &mut memory.merged, 0);
             std::mem::swap(&mut time, &mut memory.merged);
         }
-        if let Some(noise) = &self.noise {
-            noise.edges(&band.clock, band.span(), chance, &mut memory.false_edges);
-            if memory.false_edges.len() < time.len() / FEW {
-                insert(&mut time, &memory.false_edges);
-            } else {
-                time.extend(PAD);
-                memory.false_edges.extend(PAD);
-                merge(&time, &memory.false_edges, &mut memory.merged, 0);
-                std::mem::swap(&mut time, &mut memory.merged);
-            }
+        if alone {
+            found.time = time;
+        } else {
+            before.extend_from_slice(&time);
+            found.time = before;
         }
-        Edges { epoch: band.clock.epoch, time, ..Edges::default() }
     }
 
-    /// Adds the edges of one echo to `time`.
-    fn add_echo(
+    /// Adds the events of one pulse train to `time`.
+    fn add_train(
         &self,
-        band: &Band,
+        channel: &Channel,
         arrival: u64,
         chance: &Chance,
         (time, memory): (&mut Vec<u32>, &mut Memory),
     ) {
-        let (start, echo) = ((arrival >> 32) as u32, arrival as u32 as usize);
-        let (log, echoes) = (band.log, band.echoes);
-        let shot = echoes.shot[echo] as usize;
-        let photons = echoes.photons[echo];
+        let (start, index) = ((arrival >> 32) as u32, arrival as u32 as usize);
+        let (light, trains) = (channel.light, &channel.light.trains);
+        let photons = trains.photons[index];
         // What is lost beside 1 is far below the 2⁻³² that is drawn with.
         let detected = if photons.is_infinite() { 1.0 } else { 1.0 - libm::exp(-photons) };
         let seen = Bernoulli::new(self.kept * detected);
@@ -125,54 +125,53 @@ impl Counting {
             return;
         }
         let from = time.len();
-        let (label, word) = (log.label[shot], log.word[shot]);
-        if !echoes.part.is_empty() || band.design.coding.codebook.zeros_are_lit() {
-            time.extend(band.marks(echo).map(|mark| band.clock.time(mark) as u32));
-        } else {
-            let word = usize::from(word);
+        let transmitter = usize::from(trains.transmitter[index]);
+        let is_own = transmitter == 0;
+        let is_whole = trains.marks[index] == ALL_MARKS;
+        if is_own && is_whole && !channel.design.coding.codebook.zeros_are_lit() {
+            let word = usize::from(trains.word[index]);
             let train = Train {
                 word: &self.words[word * self.padded..][..self.padded],
                 weight: self.weights[word],
                 bit: self.bit,
-                lit: self.lit[usize::from(label)],
+                lit: self.lit[usize::from(trains.label[index])],
                 start,
             };
             append_train(&train, time);
+        } else {
+            let span = channel.whole_span();
+            let counted = channel.marks(index).filter(|time| span.contains(time));
+            time.extend(counted.map(|time| time as u32));
         }
-        if !seen.is_certain() || self.jitter.is_some() {
-            let earlier = echoes.shot[..echo].iter().rev();
-            let part = earlier.take_while(|other| **other == echoes.shot[echo]).count() as u32;
-            let index = log.first + shot as u64;
-            let numbers = &mut memory.numbers;
-            if !seen.is_certain() {
-                let address = Address { stage: Stage::Marks, index, part };
-                let numbers = chance.draw(address, time.len() - from, numbers);
-                keep_below(time, from, numbers, seen.threshold as u32);
+        let first = FirstPhoton::of(photons, light.transmitters[transmitter].pulse, self.pulse);
+        if seen.is_certain() && self.jitter.is_none() && first.is_none() {
+            return join(time, from, memory);
+        }
+        let index = trains.address(index);
+        let address = |stage| Address { stage, index, part: 0 };
+        let numbers = &mut memory.numbers;
+        if let Some(first) = first {
+            let numbers = chance.draw(address(Stage::Marks), time.len() - from, numbers);
+            let mut kept = from;
+            for place in from..time.len() {
+                let number = numbers[place - from];
+                if u64::from(number) < seen.threshold {
+                    let late = channel.clock.parts(first.late_fs(number, seen.threshold));
+                    time[kept] = (i64::from(time[place]) + late).max(0) as u32;
+                    kept += 1;
+                }
             }
-            if let Some(jitter) = &self.jitter {
-                let address = Address { stage: Stage::Jitter, index, part };
-                let numbers = chance.draw(address, time.len() - from, numbers);
-                jitter.delay(&mut time[from..], numbers);
-            }
+            time.truncate(kept);
+            time[from..].sort_unstable();
+        } else if !seen.is_certain() {
+            let numbers = chance.draw(address(Stage::Marks), time.len() - from, numbers);
+            keep_below(time, from, numbers, seen.threshold as u32);
+        }
+        if let Some(jitter) = &self.jitter {
+            let numbers = chance.draw(address(Stage::Jitter), time.len() - from, numbers);
+            jitter.delay(&mut time[from..], numbers);
         }
         join(time, from, memory);
-    }
-}
-
-/// The echoes of `band` in the order of arrival: the time in the upper half of each number, the
-/// index of the echo in the lower half.
-fn in_order_of_arrival(band: &Band, order: &mut Vec<u64>) {
-    let (log, echoes) = (band.log, band.echoes);
-    order.clear();
-    order.extend(echoes.shot.iter().zip(&echoes.delay_fs).enumerate().map(
-        |(echo, (shot, delay_fs))| {
-            let time = band.clock.time(log.fired_at_fs[*shot as usize] + delay_fs);
-            (time as u64) << 32 | echo as u64
-        },
-    ));
-    if !order.is_sorted() {
-        // Made of few runs, which a merging sort makes use of.
-        order.sort();
     }
 }
 
@@ -237,7 +236,7 @@ impl Bernoulli {
 mod tests {
     use super::super::Detectors;
     use super::*;
-    use crate::channel::Echoes;
+    use crate::channel::{Echo, Light, light_of_echoes};
     use macropulse_codec::ShotLog;
 
     fn sensor(set: &[(&str, &str)]) -> Design {
@@ -253,20 +252,19 @@ mod tests {
         crate::emit::Band { scan: 0, first: 0, shots: 4 * 848 }.shot_log(design)
     }
 
-    fn detect(design: &Design, log: &ShotLog, echoes: &Echoes, seed: u64) -> Edges {
-        Detectors::new(design, Chance::new(seed)).edges(log, echoes, &mut Memory::default())
+    fn detect(design: &Design, log: &ShotLog, light: &Light, seed: u64) -> Detections {
+        Detectors::new(design, Chance::new(seed)).detections(log, light, &mut Memory::default())
     }
 
-    fn run(design: &Design, photons: f64, seed: u64) -> Edges {
+    /// An echo of each shot of `log`.
+    fn all<'a>(design: &'a Design, log: &ShotLog, delay_fs: i64, photons: f64) -> Light<'a> {
+        let echo = |shot| Echo { shot, delay_fs, photons };
+        light_of_echoes(design, log, (0..log.len()).map(echo))
+    }
+
+    fn run(design: &Design, photons: f64, seed: u64) -> Detections {
         let log = four_lines(design);
-        let shots = log.len() as u32;
-        let echoes = Echoes {
-            shot: (0..shots).collect(),
-            delay_fs: vec![200_000_000; shots as usize],
-            photons: vec![photons; shots as usize],
-            ..Echoes::default()
-        };
-        detect(design, &log, &echoes, seed)
+        detect(design, &log, &all(design, &log, 200_000_000, photons), seed)
     }
 
     fn marks(design: &Design) -> usize {
@@ -274,7 +272,7 @@ mod tests {
         (0..log.len()).map(|i| design.coding.codebook.marks(log.label[i], log.word[i]).len()).sum()
     }
 
-    fn absolute(edges: &Edges) -> Vec<i64> {
+    fn absolute(edges: &Detections) -> Vec<i64> {
         edges.time.iter().map(|time| edges.epoch * 64 + i64::from(*time)).collect()
     }
 
@@ -296,24 +294,21 @@ mod tests {
     fn echoes_in_any_order_and_overlap_make_the_edges_of_their_marks() {
         let design = sensor(&CLEAN);
         let log = four_lines(&design);
-        let delays =
-            (0..2 * 500_u64).map(|i| (i.wrapping_mul(0x9E37_79B9) % 1_000_000) as i64 * 1000);
-        let echoes = Echoes {
-            shot: (0..500).flat_map(|shot| [shot, shot]).collect(),
-            delay_fs: delays.collect(),
-            photons: vec![f64::INFINITY; 1000],
-            ..Echoes::default()
-        };
+        let delay_fs = |i: u64| (i.wrapping_mul(0x9E37_79B9) % 1_000_000) as i64 * 1000;
+        let echoes: Vec<Echo> = (0..2 * 500)
+            .map(|i| Echo { shot: i as usize / 2, delay_fs: delay_fs(i), photons: f64::INFINITY })
+            .collect();
         let mut expected: Vec<i64> = (0..1000)
             .flat_map(|i| {
-                let shot = echoes.shot[i] as usize;
-                let arrival = (log.fired_at_fs[shot] + echoes.delay_fs[i]) * 64 / 2500;
+                let Echo { shot, delay_fs, .. } = echoes[i];
+                let arrival = (log.fired_at_fs[shot] + delay_fs) * 64 / 2500;
                 let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
                 marks.iter().map(move |mark| arrival + i64::from(*mark) * 64)
             })
             .collect();
         expected.sort_unstable();
-        assert_eq!(absolute(&detect(&design, &log, &echoes, 1)), expected);
+        let light = light_of_echoes(&design, &log, echoes.iter().copied());
+        assert_eq!(absolute(&detect(&design, &log, &light, 1)), expected);
     }
 
     #[test]
@@ -351,9 +346,9 @@ mod tests {
             let shots = (1e9 / rate.parse::<f64>().unwrap() * 3392.0) as u64;
             let log = crate::emit::Band { scan: 0, first: 848, shots: shots.min(4 * 848) }
                 .shot_log(&design);
-            let edges = detect(&design, &log, &Echoes::default(), 3);
-            let span =
-                (log.fired_at_fs[log.len() - 1] + design.reach_fs() - log.fired_at_fs[0]) as f64;
+            let edges = detect(&design, &log, &Light::default(), 3);
+            let span = (log.fired_at_fs[log.len() - 1] + design.listening_fs() - log.fired_at_fs[0])
+                as f64;
             let expected = span * 1e-15 * rate.parse::<f64>().unwrap();
             let z = |mean: f64| (edges.time.len() as f64 - mean) / mean.sqrt();
             assert!(z(expected).abs() < 4.9, "{} against {expected}", edges.time.len());
@@ -377,9 +372,9 @@ mod tests {
                 crate::emit::bands(&design, 0).take(2).map(|b| b.shot_log(&design)).collect();
             let times: Vec<Vec<i64>> = logs
                 .iter()
-                .map(|log| absolute(&detect(&design, log, &Echoes::default(), 3)))
+                .map(|log| absolute(&detect(&design, log, &Light::default(), 3)))
                 .collect();
-            let last = logs[0].fired_at_fs[logs[0].len() - 1] + design.reach_fs();
+            let last = logs[0].fired_at_fs[logs[0].len() - 1] + design.listening_fs();
             let (from, to) = (logs[1].fired_at_fs[0] * 64 / 2500, last * 64 / 2500);
             let within = |times: &[i64]| -> Vec<i64> {
                 times.iter().copied().filter(|t| (from..=to).contains(t)).collect()
@@ -397,14 +392,7 @@ mod tests {
             .take(2)
             .map(|band| {
                 let log = band.shot_log(&design);
-                let shots = log.len() as u32;
-                let echoes = Echoes {
-                    shot: (0..shots).collect(),
-                    delay_fs: vec![1000; shots as usize],
-                    photons: vec![1.0; shots as usize],
-                    ..Echoes::default()
-                };
-                absolute(&detect(&design, &log, &echoes, 3))
+                absolute(&detect(&design, &log, &all(&design, &log, 1000, 1.0), 3))
             })
             .collect();
         let seam = 2 * 848 * 16_378 * 64;

@@ -2,7 +2,7 @@
 
 use macropulse_codec::statistics::normal_tail;
 
-use crate::channel::Echoes;
+use crate::channel::{Light, PulseTrain, Trains};
 use crate::design::{Design, Detector};
 use crate::units::{FS_PER_S, fs_from_s};
 
@@ -36,16 +36,23 @@ impl Shape {
         Some(Self { slices: (-reach..=reach).map(slice).collect() })
     }
 
-    /// Every echo as those of its slices, which are detected independently of each other: photons
-    /// are.
-    pub fn spread(&self, echoes: &Echoes) -> Echoes {
-        let mut spread = Echoes { foreign: echoes.foreign.clone(), ..Echoes::default() };
-        for echo in 0..echoes.shot.len() {
-            for &(late, share) in &self.slices {
-                spread.shot.push(echoes.shot[echo]);
-                spread.delay_fs.push(echoes.delay_fs[echo] + late);
-                spread.photons.push(echoes.photons[echo] * share);
-                spread.part.extend(echoes.part.get(echo));
+    /// Light with every pulse train of the sensor's own as those of its slices, which are detected
+    /// independently of each other: photons are.
+    pub fn spread<'a>(&self, light: &Light<'a>) -> Light<'a> {
+        let mut spread = Light { trains: Trains::default(), ..light.clone() };
+        for index in 0..light.trains.len() {
+            let train = light.trains.at(index);
+            if train.transmitter != 0 {
+                spread.trains.push(train);
+                continue;
+            }
+            for (slice, &(late_fs, share)) in (0..).zip(&self.slices) {
+                spread.trains.push(PulseTrain {
+                    arrives_fs: train.arrives_fs + late_fs,
+                    photons: train.photons * share,
+                    way: train.way * self.slices.len() as u16 + slice,
+                    ..train
+                });
             }
         }
         spread

@@ -59,32 +59,28 @@ fn shots_of_band(design: &Design) -> u64 {
 }
 
 impl Band {
-    /// The shots of the band and its guard shots: everything whose light can arrive together with
-    /// light of the band's own shots.
-    ///
-    /// A sensor whose shots each have a detector of their own needs no guard shots.
+    /// The shots of the band and its guard shots: all whose light can arrive while the receiver
+    /// listens to the band's own shots, be it from beyond the range gate.
     pub fn shot_log(&self, design: &Design) -> ShotLog {
         let owned_first = self.scan * design.shots_per_scan() + self.first;
         let owned_last = owned_first + self.shots;
-        let shots = match design.is_coded() {
-            true => with_guard(design, owned_first..owned_last),
-            false => owned_first..owned_last,
-        };
+        let shots = with_guard(design, owned_first..owned_last);
         let owned = (owned_first - shots.start) as usize;
         ShotLog { owned: owned..owned + self.shots as usize, ..log_of(design, shots) }
     }
 }
 
-/// The shots `owned` and those before and after them that are fired within one range gate and one
-/// macropulse.
+/// The shots `owned`, those before them whose light is still under way, and those after them that
+/// are fired while the receiver still listens to the last of them.
 fn with_guard(design: &Design, owned: Range<u64>) -> Range<u64> {
     let per_scan = design.shots_per_scan();
     let fired = |shot: u64| fired_at_fs(design, shot / per_scan, shot % per_scan);
-    let reach = design.reach_fs();
-    let (opens, closes) = (fired(owned.start) - reach, fired(owned.end - 1) + reach);
+    let (opens, closes) =
+        (fired(owned.start) - design.history_fs(), fired(owned.end - 1) + design.listening_fs());
     // As many as are fired in that time on average, and then one by one: a resonant mirror is
     // faster in the middle of a line, and slower at its ends.
-    let mean = (reach as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
+    let mean =
+        (design.history_fs() as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
     let (mut first, mut end) = (owned.start.saturating_sub(mean), owned.end + mean);
     while first > 0 && fired(first - 1) >= opens {
         first -= 1;

@@ -35,7 +35,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use other::Other;
 pub use pose::{Pose, Transform};
-pub use trace::PARTS;
+pub use trace::{PARTS, Traced};
 
 use crate::digest::Fnv;
 use crate::kernels::{LANES, Packet};

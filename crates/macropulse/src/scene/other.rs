@@ -11,8 +11,8 @@ use crate::design::{Design, preset_text};
 use crate::digest::Fnv;
 use crate::emit::Clock;
 
-/// Most lidars beside the sensor.
-pub(super) const MOST: usize = 256;
+/// Most lidars beside the sensor: their numbers have eight bits in addresses of random numbers.
+pub(super) const MOST: usize = 255;
 
 /// Farthest a clock may be ahead or behind, s.
 const MOST_PHASE: f64 = 1000.0;
@@ -167,7 +167,7 @@ mod tests {
         assert!(told("[[others]]\nyaw_deg = 3\n").contains("missing field `sensor`"));
         assert!(told("[[other]]\nsensor = \"a\"\n").contains("did you mean `others`?"));
         let many = "[[others]]\nsensor = \"peregrine\"\n".repeat(MOST + 1);
-        assert!(told(&many).contains("at most 256 other lidars"));
+        assert!(told(&many).contains("at most 255 other lidars"));
     }
 
     #[test]

@@ -14,21 +14,17 @@ use crate::emit::beam_axes;
 use macropulse_codec::ShotLog;
 
 impl Scene {
-    /// What the shots of `log` meet within the range gate, in the order of the log.
-    pub fn trace(&self, design: &Design, log: &ShotLog) -> Hits {
+    /// What the shots of `log` meet, as far as light is followed, in the order of the log.
+    pub fn trace(&self, design: &Design, log: &ShotLog) -> Traced {
         let directions = design.directions();
-        self.trace_along(design, log, |shot| directions.of(log.row[shot], log.column[shot]))
-    }
-
-    /// What each of the [`PARTS`] of the macropulses of `log` meets, the part sent first first;
-    /// nothing where the mirror stands still for a macropulse.
-    pub fn trace_parts(&self, design: &Design, log: &ShotLog) -> Vec<Hits> {
+        let along = |shot: usize| directions.of(log.row[shot], log.column[shot]);
+        let middle = self.trace_along(design, log, along);
         if !design.scan.moves {
-            return Vec::new();
+            return Traced { middle, parts: Vec::new() };
         }
         let motion = Motion { design, log };
-        let trace = |part| self.trace_along(design, log, |shot| motion.axis(shot, part));
-        (0..PARTS).map(trace).collect()
+        let part = |part| self.trace_along(design, log, |shot| motion.axis(shot, part));
+        Traced { middle, parts: (0..PARTS).map(part).collect() }
     }
 
     fn trace_along(
@@ -38,7 +34,7 @@ impl Scene {
         axis: impl Fn(usize) -> [f64; 3],
     ) -> Hits {
         let footprint = Footprint::of(design);
-        let mut batch = Batch::new(self, design.scan.max_range);
+        let mut batch = Batch::new(self, design.scan.light_range);
         for shot in 0..log.len() {
             let axis = axis(shot);
             footprint.rays(axis, |aim, weight| {
@@ -47,6 +43,17 @@ impl Scene {
         }
         batch.finish()
     }
+}
+
+/// What the shots of a log have met.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Traced {
+    /// What lies in the direction of each pixel. Its light, where the mirror stands still for a
+    /// macropulse; the truth to judge points by, where it moves.
+    pub middle: Hits,
+    /// What each of the [`PARTS`] of the macropulses meets, the part sent first first; empty where
+    /// the mirror stands still.
+    pub parts: Vec<Hits>,
 }
 
 /// Parts of a macropulse that leave in directions of their own where the mirror moves.

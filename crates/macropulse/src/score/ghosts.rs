@@ -1,22 +1,26 @@
-//! Ghosts: returns that light of other lidars has made.
+//! Ghosts: returns that interferers have made.
 //!
 //! A **ghost** is a return that came out wrong or false, and of whose marks, as many as were found
-//! at their place, at least half are places where a mark of another lidar arrives. A place and a
+//! at their place, at least half are places where a mark of an interferer arrives. A place and a
 //! mark are the same if they lie within one tick, three standard deviations of the jitter and the
 //! longer micropulse of both.
 
 use std::ops::Range;
 
-use crate::channel::Foreign;
+use macropulse_codec::ShotLog;
+
+use crate::channel::Light;
 use crate::design::Design;
 use crate::points::{Outcome, PointCloud};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
-use macropulse_codec::ShotLog;
 
 /// Counts the ghosts among the owned shots of `log`, whose returns in `cloud` are judged already,
-/// in the light of others that is `foreign`.
-pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, foreign: &Foreign) -> u64 {
-    let light = Light::of(design, foreign);
+/// in `light`.
+pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, light: &Light) -> u64 {
+    let interference = Interference::of(design, light);
+    if interference.order.is_empty() {
+        return 0;
+    }
     let is_ghost = |shot: &usize| {
         let pixel = cloud.pixel(log, *shot);
         let outcome = cloud.truth.outcome[pixel];
@@ -27,49 +31,46 @@ pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, foreign: &Fore
         let begins_fs = log.fired_at_fs[*shot] + tof_fs;
         let own = design.coding.codebook.marks(log.label[*shot], log.word[*shot]);
         let own = own.iter().map(|mark| begins_fs + i64::from(*mark) * design.coding.chip_fs);
-        let met = light.met(own, (log.row[*shot], log.column[*shot]));
-        2 * met >= u64::from(cloud.peak[pixel]).max(1)
+        2 * interference.met(own, log.channel[*shot]) >= u64::from(cloud.peak[pixel]).max(1)
     };
     log.owned.clone().filter(is_ghost).count() as u64
 }
 
-/// Foreign light, in the order in which it arrives.
-struct Light<'a> {
-    design: &'a Design,
-    foreign: &'a Foreign,
-    /// Entries by time.
+/// Pulse trains of interferers, in the order in which they arrive.
+struct Interference<'a> {
+    light: &'a Light<'a>,
+    /// Trains by time.
     order: Vec<usize>,
     /// From the first chip to the last mark, at most, fs.
     longest_fs: i64,
     tolerance_fs: i64,
 }
 
-impl<'a> Light<'a> {
-    fn of(design: &'a Design, foreign: &'a Foreign) -> Self {
-        let mut order: Vec<usize> = (0..foreign.len()).collect();
-        order.sort_by_key(|entry| foreign.arrives_fs[*entry]);
-        let pulse = foreign.pulse.iter().fold(design.light.pulse, |most, pulse| most.max(*pulse));
+impl<'a> Interference<'a> {
+    fn of(design: &Design, light: &'a Light) -> Self {
+        let trains = &light.trains;
+        let is_foreign = |train: &usize| trains.transmitter[*train] > 0;
+        let mut order: Vec<usize> = (0..trains.len()).filter(is_foreign).collect();
+        order.sort_by_key(|train| trains.arrives_fs[*train]);
+        let transmitters = light.transmitters.iter();
+        let pulse = transmitters.fold(design.light.pulse, |most, from| most.max(from.pulse));
         let jitter_fs = 3.0 * design.detector.jitter() * FS_PER_S as f64;
-        Self {
-            design,
-            foreign,
-            order,
-            longest_fs: foreign.mark_fs.iter().copied().max().unwrap_or(0),
-            tolerance_fs: design.tdc.tick_fs + jitter_fs as i64 + fs_from_s(pulse),
-        }
+        let lasts = |train: &usize| {
+            light.arrivals_fs(*train).last().map_or(0, |last| last - trains.arrives_fs[*train])
+        };
+        let longest_fs = order.iter().map(lasts).max().unwrap_or(0);
+        let tolerance_fs = design.tdc.tick_fs + jitter_fs as i64 + fs_from_s(pulse);
+        Self { light, order, longest_fs, tolerance_fs }
     }
 
-    /// How many of the places `own`, ascending, a foreign mark meets that the detector of `pixel`
-    /// sees.
-    fn met(&self, own: impl Iterator<Item = i64> + Clone, pixel: (u16, u16)) -> u64 {
+    /// How many of the places `own`, ascending, a mark meets that the detector of `channel` sees.
+    fn met(&self, own: impl Iterator<Item = i64> + Clone, channel: u16) -> u64 {
         let (Some(first), Some(last)) = (own.clone().next(), own.clone().last()) else { return 0 };
         let near = first - self.longest_fs - self.tolerance_fs..last + self.tolerance_fs + 1;
         let mut marks = Vec::new();
-        for &entry in &self.order[self.within(near)] {
-            if self.design.channels() == 1 || self.foreign.pixel[entry] == pixel {
-                let arrives_fs = self.foreign.arrives_fs[entry];
-                let offsets = self.foreign.marks_of(entry).iter();
-                marks.extend(offsets.map(|offset_fs| arrives_fs + offset_fs));
+        for &train in &self.order[self.within(near)] {
+            if self.light.trains.channel[train] == channel {
+                marks.extend(self.light.arrivals_fs(train));
             }
         }
         marks.sort_unstable();
@@ -80,10 +81,10 @@ impl<'a> Light<'a> {
         own.filter(is_met).count() as u64
     }
 
-    /// The entries, by order, whose first chips arrive in `span`.
+    /// The trains, by order, whose first chips arrive in `span`.
     fn within(&self, span: Range<i64>) -> Range<usize> {
-        let before =
-            |time: i64| self.order.partition_point(|entry| self.foreign.arrives_fs[*entry] < time);
+        let arrives_fs = &self.light.trains.arrives_fs;
+        let before = |time: i64| self.order.partition_point(|train| arrives_fs[*train] < time);
         before(span.start)..before(span.end)
     }
 }
@@ -91,6 +92,7 @@ impl<'a> Light<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::channel::{PulseTrain, Transmitter};
 
     /// One shot of the coded sensor that was answered from 30 m, with `outcome`; foreign light has
     /// the same marks, `late_fs` behind them.
@@ -101,22 +103,22 @@ mod tests {
         cloud.truth = crate::score::empty_truth(&cloud);
         cloud.truth.outcome[0] = outcome;
         (cloud.range[0], cloud.peak[0]) = (30.0, 40);
-        let chip_fs = design.coding.chip_fs;
-        let marks = design.coding.codebook.marks(log.label[0], log.word[0]);
-        let mark_fs: Vec<i64> =
-            marks[..kept].iter().map(|mark| i64::from(*mark) * chip_fs).collect();
         let tof_fs = fs_from_s(tof_from_range(30.0));
-        let foreign = Foreign {
-            arrives_fs: vec![tof_fs + late_fs],
-            photons: vec![5.0],
-            pulse: vec![2.5e-12],
-            pixel: vec![(7, 7)],
-            marks: std::iter::once(0..mark_fs.len()).collect(),
-            mark_fs,
-            shot: vec![0],
-            way: vec![0],
-        };
-        ghosts(&cloud, &design, &log, &foreign)
+        // What the interferer sends is what we send, without its last marks.
+        let transmitters = vec![Transmitter::of(&design, 1.0); 2];
+        let mut light = Light { transmitters, ..Light::default() };
+        light.trains.push(PulseTrain {
+            transmitter: 1,
+            channel: 0,
+            arrives_fs: tof_fs + late_fs,
+            photons: 5.0,
+            label: log.label[0],
+            word: log.word[0],
+            marks: [0, kept as u16],
+            shot: 0,
+            way: 0,
+        });
+        ghosts(&cloud, &design, &log, &light)
     }
 
     #[test]

@@ -13,7 +13,7 @@ use std::ops::Range;
 use macropulse_codec::Ticks;
 
 use crate::design::{Design, PARTS_OF_TICK, Tdc};
-use crate::detect::Edges;
+use crate::detect::Detections;
 use crate::kernels::{all_apart, distinct};
 
 /// What the bank of converters makes of the edges of a band.
@@ -55,10 +55,10 @@ impl Reading {
     }
 }
 
-/// The ticks of the `edges` of one band, in the memory that the edges had.
-pub fn ticks(design: &Design, edges: Edges) -> Converted {
+/// The ticks of the `detections` of one band, in the memory that those had.
+pub fn ticks(design: &Design, detections: Detections) -> Converted {
     let tdc = &design.tdc;
-    let Edges { epoch, mut time, mut channel, mut amplitude } = edges;
+    let Detections { epoch, mut time, mut channel, mut amplitude } = detections;
     let found = time.len();
     let mut bank = Bank {
         converters: (tdc.converters / design.channels()).max(1) as usize,
@@ -197,7 +197,7 @@ mod tests {
     }
 
     fn timed(design: &Design, epoch: i64, time: Vec<u32>) -> Converted {
-        ticks(design, Edges { epoch, time, ..Edges::default() })
+        ticks(design, Detections { epoch, time, ..Detections::default() })
     }
 
     #[test]
@@ -235,7 +235,7 @@ mod tests {
     fn each_channel_has_its_share_of_the_bank() {
         let design =
             Design::open("peregrine", &[("tdc.dead_time_ns".into(), "100".into())]).unwrap();
-        let edges = Edges {
+        let edges = Detections {
             epoch: 0,
             time: vec![6400, 12_800, 6400],
             channel: vec![0, 0, 1],
@@ -300,7 +300,7 @@ mod tests {
             let design = sensor(&[("converters", &converters.to_string())]);
             let without = timed(&design, 0, times.clone());
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
-            let edges = Edges { time: times, amplitude, ..Edges::default() };
+            let edges = Detections { time: times, amplitude, ..Detections::default() };
             let with = ticks(&design, edges);
             let of_ticks: Vec<f32> = with.ticks.tick.iter().map(|tick| *tick as f32).collect();
             prop_assert_eq!(&with.ticks.amplitude, &of_ticks);

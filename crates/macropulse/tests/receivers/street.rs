@@ -93,6 +93,7 @@ impl Sensor {
                 kind,
                 effort: Effort::Quick,
                 gate_ticks: (0, GATE),
+                light_ticks: GATE,
                 ticks_per_chip: 1,
                 tick_fs: TICK_FS,
                 jitter_ticks: 0.0,

@@ -50,6 +50,7 @@ pub(super) fn receiver(jitter_ticks: f64) -> Receiver {
         kind: ReceiverKind::Matched,
         effort: crate::decode::Effort::Quick,
         gate_ticks: (50, GATE),
+        light_ticks: GATE,
         ticks_per_chip: 1,
         tick_fs: 2500,
         jitter_ticks,

@@ -9,6 +9,9 @@
 //! 4. Marks of one macropulse may be those of another one, too: the first tick that is not
 //!    explained may be the second mark.
 //!
+//! Light from beyond the gate is peeled off, too, as far as it may come from: it is no return, but
+//! would pass for noise.
+//!
 //! A tick of which no macropulse without a gap can begin is left for the receivers that follow.
 //! Where marks are missed everywhere nothing can be peeled: this is soon noticed.
 
@@ -37,12 +40,13 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
         sent,
         ticks,
         gate: sent.gate(),
+        light: sent.receiver.light_ticks.into(),
         scale: sent.receiver.ticks_per_chip,
-        reach: sent.gate().1 + sent.length(),
         least: fewest_without_a_gap(sent, ticks),
         explained: Explained::new(ticks.len()),
         locks: vec![None; sent.fired.len()],
         oldest: 0,
+        oldest_beyond: 0,
         next: 0,
         places: Vec::new(),
     };
@@ -55,7 +59,7 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
         }
         place = peeler.explained.next_without(place + 1);
     }
-    let found_any = ticks.is_empty() || peeler.locks.iter().any(Option::is_some);
+    let found_any = ticks.is_empty() || peeler.explained.any();
     let left = found_any.then(|| peeler.explained.left(ticks));
     Peeled { locks: peeler.locks, left }
 }
@@ -73,15 +77,17 @@ struct Peeler<'a> {
     sent: &'a Sent<'a>,
     ticks: &'a [u32],
     gate: (i64, i64),
+    /// Farthest lag from which light may come: beyond the gate it is explained, and no return.
+    light: i64,
     scale: u32,
-    /// The last mark of the farthest echo comes no later than this after firing.
-    reach: i64,
     /// Fewest marks with which a shot can be told from chance.
     least: usize,
     explained: Explained,
     locks: Vec<Option<Lock>>,
-    /// No shot before this one is in flight any more.
+    /// Light of no shot before this one can come from within the gate any more.
     oldest: usize,
+    /// Light of no shot before this one can come any more.
+    oldest_beyond: usize,
     /// The shot after the last one found.
     next: usize,
     /// Where the marks of a shot were found.
@@ -97,14 +103,26 @@ impl Peeler<'_> {
         let tick = i64::from(self.ticks[place]);
         let (sent, nearest) = (self.sent, self.gate.0);
         let fired = &sent.fired;
-        while self.oldest < fired.len() && fired[self.oldest] + self.reach < tick {
-            self.oldest += 1;
-        }
-        let in_flight = self.oldest..fired.len();
-        let in_flight = in_flight.take_while(|&shot| fired[shot] + nearest <= tick);
+        let advance = |oldest: &mut usize, farthest: i64| {
+            while *oldest < fired.len() && fired[*oldest] + farthest < tick {
+                *oldest += 1;
+            }
+        };
+        advance(&mut self.oldest, self.gate.1 + sent.length());
+        advance(&mut self.oldest_beyond, self.light + sent.length());
+        let in_gate = self.oldest..fired.len();
+        let in_gate = in_gate.take_while(|&shot| fired[shot] + nearest <= tick);
         // Its first marks may lie under those of a macropulse that was peeled off before.
         for hidden in 0..=MOST_HIDDEN {
-            for shot in in_flight.clone() {
+            for shot in in_gate.clone() {
+                if self.fits(shot, place, hidden) {
+                    return Some(());
+                }
+            }
+        }
+        // Light from beyond the gate is rare: it is thought of last.
+        for hidden in 0..=MOST_HIDDEN {
+            for shot in self.oldest_beyond..self.oldest {
                 if self.fits(shot, place, hidden) {
                     return Some(());
                 }
@@ -132,7 +150,7 @@ impl Peeler<'_> {
     /// The lag of `shot` if its macropulse begins at `start` and could be told from chance.
     fn lag(&self, shot: usize, start: i64, marks: usize) -> Option<i64> {
         let lag = start - self.sent.fired[shot];
-        let possible = marks >= self.least && (self.gate.0..=self.gate.1).contains(&lag);
+        let possible = marks >= self.least && (self.gate.0..=self.light).contains(&lag);
         possible.then_some(lag)
     }
 
@@ -174,10 +192,13 @@ impl Peeler<'_> {
     /// Keeps `lag` unless the shot was found before: of several surfaces the first one counts.
     fn lock(&mut self, shot: usize, lag: i64, count: usize) {
         let count = count as u16;
+        self.next = shot + 1;
+        if lag > self.gate.1 {
+            return;
+        }
         let margin = count
             - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
         self.locks[shot].get_or_insert(Lock { lag, count, margin });
-        self.next = shot + 1;
     }
 }
 
@@ -191,6 +212,11 @@ struct Explained {
 impl Explained {
     fn new(ticks: usize) -> Self {
         Self { words: vec![0; ticks / 64 + 1], ticks }
+    }
+
+    /// Whether any tick is explained.
+    fn any(&self) -> bool {
+        self.words.iter().any(|word| *word != 0)
     }
 
     /// Explains `count` ticks from `first` on.

@@ -56,13 +56,15 @@ impl Check<'_> {
             (file.receiver.bit_threshold, coding.codebook.lightest_word() as u32);
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
-        if gate.1 >= i64::from(u32::MAX / PARTS_OF_TICK) {
+        let light = ticks(scan.light_range);
+        if light >= i64::from(u32::MAX / PARTS_OF_TICK) {
             return self.refuse("tdc.resolution_ps", TOO_FINE);
         }
         Ok(Receiver {
             kind,
             effort: file.receiver.effort,
             gate_ticks: (gate.0 as u32, gate.1 as u32),
+            light_ticks: light as u32,
             ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
             tick_fs: tdc.tick_fs,
             jitter_ticks: timing * 1e15 / tdc.tick_fs as f64,

@@ -7,12 +7,21 @@ use crate::design::{Error, Pattern, Scan};
 /// Pixels of the largest range image: a scan of it takes some 4 GB.
 const MOST_PIXELS: u64 = 1 << 25;
 
+/// Light is followed to so many times the end of the range gate, unless the file says how far: to
+/// all second-time-around returns that fall into the gate of the shot fired one gate later. From
+/// twice the range a surface brings a quarter of the light at most.
+const LIGHT_BEYOND_GATE: f64 = 2.0;
+
 impl Check<'_> {
     pub(super) fn scan(&self, file: &ScanFile, moves: bool) -> Result<Scan, Error> {
         let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
         let reach = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
         let beyond = self.within("scan.gate_beyond_m", file.gate_beyond_m, 0.0, 1e5)?;
         let max_range = reach + beyond;
+        let light_range = match file.light_range_m {
+            Some(typed) => self.within("scan.light_range_m", typed, max_range, 1e5)?,
+            None => LIGHT_BEYOND_GATE * max_range,
+        };
         let min_range = self.within("scan.min_range_m", file.min_range_m, 0.0, max_range)?;
         let pixels = |kind: &str, rows, columns| -> Result<(u32, u32), Error> {
             Ok((
@@ -66,7 +75,17 @@ impl Check<'_> {
             return self.refuse("scan", message);
         }
         let rate_millihertz = (rate * 1e3).round() as u64;
-        Ok(Scan { rows, columns, rate_millihertz, min_range, reach, max_range, moves, pattern })
+        Ok(Scan {
+            rows,
+            columns,
+            rate_millihertz,
+            min_range,
+            reach,
+            max_range,
+            light_range,
+            moves,
+            pattern,
+        })
     }
 
     fn spinning(&self, file: &SpinningFile) -> Result<(u32, u32, Pattern), Error> {

@@ -1,14 +1,14 @@
-//! Light of other lidars at the aperture (docs/physics.md#other-lidars).
+//! Pulse trains of interferers at the aperture (docs/physics.md#other-lidars).
 //!
 //! 1. The receiver listens from the firing of each shot to the end of its range gate. In that time
-//!    light arrives that others have fired up to two ways of the longer range gate before.
-//!    A detector of its own pixel listens to its own shot alone.
-//! 2. By reflection: from each point that a foreign ray meets and a listening detector looks at
-//!    ([`Lit`]), with the photons
+//!    light arrives that interferers have fired as long before as light is followed, there and
+//!    back. A detector of its own pixel listens to its own shot alone.
+//! 2. By reflection: from each point that a ray of an interferer meets and a listening detector
+//!    looks at ([`Lit`]), with the photons
 //!
 //!    n = K · ρ_eff · w · exp(−σ·(R₁ + R₂)) / R₂²
 //!
-//!    K those of white at one metre ([`Link::of_other`]), R₁ the way there and R₂ the way back.
+//!    K those of white at one metre ([`Link::of_interferer`]), R₁ the way there and R₂ the way back.
 //! 3. Directly: a beam of 1/e² radius b whose axis passes the aperture, of radius a, at a distance
 //!    r brings
 //!
@@ -20,7 +20,7 @@
 
 use std::ops::Range;
 
-use super::Link;
+use super::{ALL_MARKS, Light, Link, PulseTrain, Trains, Transmitter};
 use crate::design::Design;
 use crate::emit::shot_at;
 use crate::scene::{Lit, Look, Material, Other, Scene};
@@ -39,64 +39,23 @@ const FARTHEST_BY: f64 = 4.0;
 /// A micropulse ends so many times its length before and after its middle.
 const FLANKS: f64 = 4.0;
 
-/// Ways that light of one lidar can take: the rays of a footprint, and the direct one.
-const WAYS: u32 = 32;
+/// Number of the direct way; those before it are the rays of a footprint.
+const DIRECT: u32 = 31;
 
-/// Number of the direct way.
-const DIRECT: u32 = WAYS - 1;
-
-/// Light of other lidars at the aperture, as columns; ordered by lidar, then by shot. One entry is
-/// what one foreign shot sends along one way. Truth: the receiver knows nothing of it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Foreign {
-    /// Absolute time at which its first chip arrives, fs.
-    pub arrives_fs: Vec<i64>,
-    /// Mean number of photons detected per mark; infinite for a detector that never misses.
-    pub photons: Vec<f64>,
-    /// Length of its micropulses (full width at half maximum), s.
-    pub pulse: Vec<f64>,
-    /// Row and column of our pixel in whose cell it comes from.
-    pub pixel: Vec<(u16, u16)>,
-    /// Where in `mark_fs` its marks are.
-    pub marks: Vec<Range<usize>>,
-    /// From the first chip to each mark by our clock, fs, ascending.
-    pub mark_fs: Vec<i64>,
-    /// Number of the shot by the other's own count: with `way` the address of its chance.
-    pub shot: Vec<u64>,
-    /// Which of the others, and which way, below 2¹³.
-    pub way: Vec<u32>,
-}
-
-impl Foreign {
-    /// Number of entries.
-    pub fn len(&self) -> usize {
-        self.arrives_fs.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.arrives_fs.is_empty()
-    }
-
-    /// The marks of an entry, from its first chip, fs.
-    pub fn marks_of(&self, entry: usize) -> &[i64] {
-        &self.mark_fs[self.marks[entry].clone()]
-    }
-}
-
-/// The light of the scene's other lidars that reaches the sensor `design` while it listens to the
-/// shots of `log`.
-pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
-    let mut foreign = Foreign::default();
+/// Adds the light of the scene's interferers that reaches the sensor `design` while it listens to
+/// the shots of `log`.
+pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, log: &ShotLog) {
     for (number, other) in scene.others.iter().enumerate() {
-        let Some(link) = Link::of_other(design, &other.design) else { continue };
+        light.transmitters.push(Transmitter::of(&other.design, other.clock.stretch()));
+        let Some(link) = Link::of_interferer(design, &other.design) else { continue };
         let around_fs = around_fs(other);
-        let farthest = design.scan.max_range.max(other.design.scan.max_range);
+        let farthest = design.scan.light_range.max(other.design.scan.light_range);
         let direct = Direct::of(scene, other, 2.0 * farthest);
         let longest_fs = fs_from_s(2.0 * farthest / SPEED_OF_LIGHT);
         for open in listening(design, log, around_fs) {
-            let way = (number as u32) << WAYS.trailing_zeros();
-            let mut arrivals = Arrivals { other, way, link, foreign: &mut foreign };
+            let channel = |pixel| channel_of(design, log, pixel);
+            let (transmitter, trains) = (number as u16 + 1, &mut light.trains);
+            let mut arrivals = Arrivals { transmitter, link, channel: &channel, trains };
             for theirs in other.clock.shots(&other.design, open.start - longest_fs..open.end) {
                 let look = |shot: usize, direction, way: f64| {
                     let arrives_fs = theirs.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
@@ -109,12 +68,11 @@ pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
                 let lit = scene.lit(other, &theirs, farthest, &look);
                 arrivals.add_reflected(&scene.materials, &theirs, &lit);
                 if let Some(direct) = &direct {
-                    arrivals.add_direct(direct, &theirs, &look);
+                    arrivals.add_direct((other, direct), &theirs, &look);
                 }
             }
         }
     }
-    foreign
 }
 
 /// How long light may arrive before and after the first chip of a shot, fs: the micropulse has some
@@ -130,10 +88,10 @@ fn around_fs(other: &Other) -> (i64, i64) {
 /// so long `before` and `after` them. Ascending, and apart.
 fn listening(design: &Design, log: &ShotLog, (before, after): (i64, i64)) -> Vec<Range<i64>> {
     let jitter_fs = design.most_jitter_fs();
-    let reach_fs = design.reach_fs();
+    let listening_fs = design.listening_fs();
     let mut open: Vec<Range<i64>> = Vec::new();
     for fired_fs in &log.fired_at_fs {
-        let span = fired_fs - after - jitter_fs..fired_fs + reach_fs + before + jitter_fs;
+        let span = fired_fs - after - jitter_fs..fired_fs + listening_fs + before + jitter_fs;
         match open.last_mut() {
             Some(last) if span.start <= last.end => last.end = span.end,
             _ => open.push(span),
@@ -152,7 +110,7 @@ fn listens(
     (before, after): (i64, i64),
 ) -> bool {
     let opens = |shot: usize| log.fired_at_fs[shot] - after;
-    let closes = |shot: usize| log.fired_at_fs[shot] + design.reach_fs() + before;
+    let closes = |shot: usize| log.fired_at_fs[shot] + design.listening_fs() + before;
     let field = design.budget.as_ref().map(|budget| budget.field);
     if let Some(field) = field.filter(|field| field.trailing.is_some()) {
         return shot_at(design, log, pixel).is_some_and(|shot| {
@@ -163,6 +121,14 @@ fn listens(
     design.channels() == 1
         || shot_at(design, log, pixel)
             .is_some_and(|shot| (opens(shot)..closes(shot)).contains(&arrives_fs))
+}
+
+/// The channel whose detector looks at the cell of `pixel`.
+fn channel_of(design: &Design, log: &ShotLog, pixel: (u16, u16)) -> u16 {
+    match design.channels() {
+        1 => 0,
+        _ => shot_at(design, log, pixel).map_or(0, |shot| log.channel[shot]),
+    }
 }
 
 /// The aperture as another lidar sees it, with nothing in between.
@@ -213,13 +179,13 @@ impl Direct {
     }
 }
 
-/// Makes entries of the light of one lidar.
+/// Makes pulse trains of the light of one interferer.
 struct Arrivals<'a> {
-    other: &'a Other,
-    /// Number of the first way of its light.
-    way: u32,
+    transmitter: u16,
     link: Link,
-    foreign: &'a mut Foreign,
+    /// The channel that looks at a pixel.
+    channel: &'a dyn Fn((u16, u16)) -> u16,
+    trains: &'a mut Trains,
 }
 
 impl Arrivals<'_> {
@@ -236,8 +202,8 @@ impl Arrivals<'_> {
     }
 
     /// Adds light of the shots in `log` that shine into the aperture while we `look` back.
-    fn add_direct(&mut self, direct: &Direct, log: &ShotLog, look: &Look) {
-        let directions = self.other.design.directions();
+    fn add_direct(&mut self, (other, direct): (&Other, &Direct), log: &ShotLog, look: &Look) {
+        let directions = other.design.directions();
         for shot in 0..log.len() {
             let axis = directions.of(log.row[shot], log.column[shot]);
             let photons = direct.photons(&self.link, axis);
@@ -260,26 +226,17 @@ impl Arrivals<'_> {
         if photons < FAINTEST {
             return;
         }
-        let marks = self.marks(log, shot);
-        let foreign = &mut *self.foreign;
-        foreign.arrives_fs.push(log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT));
-        foreign.photons.push(photons);
-        foreign.pulse.push(self.other.design.light.pulse);
-        foreign.pixel.push(pixel);
-        foreign.marks.push(marks);
-        foreign.shot.push(log.first.wrapping_add(shot as u64));
-        foreign.way.push(self.way + ray);
-    }
-
-    /// Writes the marks of a shot down and tells where they are.
-    fn marks(&mut self, log: &ShotLog, shot: usize) -> Range<usize> {
-        let coding = &self.other.design.coding;
-        let stretched = coding.chip_fs as f64 * self.other.clock.stretch();
-        let marks = coding.codebook.marks(log.label[shot], log.word[shot]);
-        let mark_fs = &mut self.foreign.mark_fs;
-        let from = mark_fs.len();
-        mark_fs.extend(marks.iter().map(|mark| (f64::from(*mark) * stretched) as i64));
-        from..mark_fs.len()
+        self.trains.push(PulseTrain {
+            transmitter: self.transmitter,
+            channel: (self.channel)(pixel),
+            arrives_fs: log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT),
+            photons,
+            label: log.label[shot],
+            word: log.word[shot],
+            marks: ALL_MARKS,
+            shot: log.first.wrapping_add(shot as u64),
+            way: ray as u16,
+        });
     }
 }
 
@@ -289,7 +246,7 @@ mod tests {
     use std::path::Path;
 
     /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
-    fn light(sensor: &str, more: &str) -> (Design, Foreign) {
+    fn light(sensor: &str, more: &str) -> Trains {
         let text = format!(
             "version = 1\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
              yaw_deg = 180\nset = {{ scan.scans_per_s = 1000, scan.raster = {{ rows = 5, \
@@ -299,16 +256,18 @@ mod tests {
         let design = Design::open(sensor, &[]).unwrap();
         // 20 lines: 0.7 ms, in which all but the last few of its shots are fired.
         let log = crate::emit::Band { scan: 0, first: 0, shots: 20 * 848 }.shot_log(&design);
-        let foreign = foreign(&design, &scene, &log);
-        (design, foreign)
+        let mut light = Light::default();
+        add(&mut light, &design, &scene, &log);
+        assert!(light.trains.transmitter.iter().all(|transmitter| *transmitter == 1));
+        light.trains
     }
 
     /// Known answer: shot 12 of 25 flies along the axis, is fired at 480 µs, and all of it enters
     /// the aperture: K photons from white at one metre are K/a² in it.
     #[test]
     fn a_beam_that_meets_the_aperture_enters_it_as_a_whole() {
-        let (_, foreign) = light("kim-park-2016", "");
-        assert_eq!((foreign.len(), foreign.marks_of(0)), (1, &[0][..]));
+        let foreign = light("kim-park-2016", "");
+        assert_eq!((foreign.len(), foreign.marks[0]), (1, ALL_MARKS));
         assert_eq!(foreign.shot[0], 12);
         let flight = fs_from_s(50.0 / SPEED_OF_LIGHT);
         assert_eq!(foreign.arrives_fs[0], 480_000_000_000 + flight);
@@ -325,11 +284,11 @@ mod tests {
     fn a_beam_aside_or_behind_something_or_of_another_colour_does_not() {
         let aside = "[[object]]\nname = \"pole\"\nshape = { box = { size_m = [0.1, 1, 1] } }\n";
         let pole = |place: &str| format!("{aside}position_m = {place}\n");
-        assert_eq!(light("kim-park-2016", &pole("[30, 0, 0]")).1.len(), 0);
-        assert_eq!(light("kim-park-2016", &pole("[30, 9, 0]")).1.len(), 1);
+        assert_eq!(light("kim-park-2016", &pole("[30, 0, 0]")).len(), 0);
+        assert_eq!(light("kim-park-2016", &pole("[30, 9, 0]")).len(), 1);
         // Turned by 2.5 degrees it passes us by 2 m; the sensor of 1570 nm has another filter.
-        assert_eq!(light("kim-park-2016", "pitch_deg = 1\n").1.len(), 0);
-        assert_eq!(light("peregrine", "").1.len(), 0);
+        assert_eq!(light("kim-park-2016", "pitch_deg = 1\n").len(), 0);
+        assert_eq!(light("peregrine", "").len(), 0);
     }
 
     #[test]
@@ -342,7 +301,7 @@ mod tests {
         let (seeing, all) = (open("kim-park-2016", &[]), open("kim-park-2016", &perfect));
         let hdl = open("hdl-64e", &[]);
         let photons = |ours: &Design, other: &Design| {
-            Link::of_other(ours, other).map(|link| link.photons_by((2.0, 1.0), 1.0))
+            Link::of_interferer(ours, other).map(|link| link.photons_by((2.0, 1.0), 1.0))
         };
         let own = Link::of(&seeing).photons(1.0, 1.0);
         assert_eq!(photons(&seeing, &seeing), Some(own));

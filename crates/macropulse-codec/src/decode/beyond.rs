@@ -1,0 +1,207 @@
+//! Light from beyond the gate that passes for an echo within it.
+//!
+//! Code words repeat after some shots. An echo from beyond the gate, of an earlier shot in the same
+//! word, arrives while a later one is listened to; where both payloads have bits in common, it
+//! looks like a faint echo of the later shot. The receiver knows what it has sent, and holds the
+//! two against each other at the same place, or whole bits beside it. Some marks both have; of
+//! these a share c is lit. If the earlier shot alone had sent, its other marks are lit as often,
+//! and the other marks of the later shot are dark: half of c divides the two.
+
+use std::ops::Range;
+
+use super::timeline::Timeline;
+use super::{Receiver, Reject, Return, Returns};
+use crate::code::Codebook;
+use crate::{ShotLog, Ticks};
+
+/// Takes the returns out of `returns` that light from beyond the gate accounts for better.
+pub(super) fn exclude(
+    receiver: &Receiver,
+    (codebook, log): (&Codebook, &ShotLog),
+    ticks: &Ticks,
+    returns: &mut Returns,
+) {
+    let is_doubtful = |one: &Return| one.peak < one.marks;
+    if receiver.light_ticks <= receiver.gate_ticks.1 || !returns.each().any(|one| is_doubtful(&one))
+    {
+        return;
+    }
+    let fired = receiver.all_fired(log);
+    // Half of the window in which a mark is looked for, and rounding.
+    let slack = 1 + (2.0 * receiver.jitter_ticks).ceil().min(super::FARTHEST_JITTER / 2.0) as u32;
+    let timeline = receiver.timeline(codebook, &fired, ticks).dilated(slack, slack);
+    let bench = Bench { receiver, codebook, log, fired, timeline };
+    let mut kept = Returns::with_capacity(returns.len());
+    kept.add_rejects(returns);
+    for one in returns.each() {
+        match is_doubtful(&one) && bench.is_of_an_earlier_shot(&one) {
+            true => kept.reject(Reject::OutsideGate),
+            false => kept.push(one),
+        }
+    }
+    *returns = kept;
+}
+
+/// What a return is held against.
+struct Bench<'a> {
+    receiver: &'a Receiver,
+    codebook: &'a Codebook,
+    log: &'a ShotLog,
+    fired: Vec<i64>,
+    /// A tick is lit if light came about then.
+    timeline: Timeline,
+}
+
+impl Bench<'_> {
+    /// Whether an earlier shot, with an echo from beyond the gate, accounts for the light of `one`
+    /// better than the shot it was taken for.
+    fn is_of_an_earlier_shot(&self, one: &Return) -> bool {
+        let lag = (one.tof * 1e15 / self.receiver.tick_fs as f64) as i64;
+        let arrives = self.fired[one.shot] + lag;
+        let bit = i64::from(self.codebook.family().length() * self.receiver.ticks_per_chip);
+        let bits = self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
+        let beyond =
+            i64::from(self.receiver.gate_ticks.1) + 1..=i64::from(self.receiver.light_ticks);
+        self.earlier(one.shot, arrives, bits * bit).any(|shot| {
+            (1 - bits..bits).any(|shift| {
+                let begins = arrives + shift * bit;
+                beyond.contains(&(begins - self.fired[shot]))
+                    && self.begins_like(shot, begins, one)
+                    && self
+                        .is_rather(Sent { shot, begins }, Sent { shot: one.shot, begins: arrives })
+            })
+        })
+    }
+
+    /// Whether the first bit of `shot`, begun at tick `begins`, is lit at least half as much as the
+    /// marks of `one` are. Nearly every shot is refused here.
+    fn begins_like(&self, shot: usize, begins: i64, one: &Return) -> bool {
+        let marks = self.marks(shot);
+        let first = &marks[..marks.len().min(self.codebook.family().weight())];
+        let lit = first.iter().filter(|mark| self.is_lit(begins, **mark)).count();
+        2 * lit * usize::from(one.marks) >= first.len() * usize::from(one.peak)
+    }
+
+    /// Whether light is rather of the `earlier` macropulse than of the `later` one.
+    fn is_rather(&self, earlier: Sent, later: Sent) -> bool {
+        let scale = i64::from(self.receiver.ticks_per_chip);
+        let places = |sent: Sent| {
+            self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
+        };
+        let (mut both, mut of_earlier, mut of_later) = ([0; 2], [0; 2], [0; 2]);
+        let mut count = |counts: &mut [usize; 2], place: i64| {
+            counts[0] += usize::from(self.timeline.has(place));
+            counts[1] += 1;
+        };
+        let (mut earlier, mut later) = (places(earlier).peekable(), places(later).peekable());
+        loop {
+            match (earlier.peek().copied(), later.peek().copied()) {
+                (None, None) => break,
+                (Some(one), Some(other)) if one == other => {
+                    count(&mut both, one);
+                    (earlier.next(), later.next());
+                }
+                (Some(one), other) if other.is_none_or(|other| one < other) => {
+                    count(&mut of_earlier, one);
+                    earlier.next();
+                }
+                (_, Some(other)) => {
+                    count(&mut of_later, other);
+                    later.next();
+                }
+                (Some(_), None) => break,
+            }
+        }
+        // found/all < c/2, without a division by nothing.
+        let is_dark = |counts: [usize; 2]| 2 * counts[0] * both[1] < counts[1] * both[0];
+        let differ = of_earlier[1] + of_later[1] > 0;
+        both[0] > 0 && differ && !is_dark(of_earlier) && (of_later[1] == 0 || is_dark(of_later))
+    }
+
+    /// The shots before `shot`, in the same word, of which light from beyond the gate can arrive
+    /// within `about` ticks of `arrives`.
+    fn earlier(&self, shot: usize, arrives: i64, about: i64) -> impl Iterator<Item = usize> {
+        let (_, farthest) = self.receiver.gate_ticks;
+        let opened = arrives - about - i64::from(self.receiver.light_ticks);
+        let closed = arrives + about - i64::from(farthest);
+        let range: Range<usize> = self.fired.partition_point(|fired| *fired < opened)
+            ..self.fired.partition_point(|fired| *fired < closed).min(shot);
+        range.filter(move |other| self.log.word[*other] == self.log.word[shot])
+    }
+
+    fn marks(&self, shot: usize) -> &[u16] {
+        self.codebook.marks(self.log.label[shot], self.log.word[shot])
+    }
+
+    /// Whether light came about where a mark is, of a macropulse begun at tick `begins`.
+    fn is_lit(&self, begins: i64, mark: u16) -> bool {
+        self.timeline.has(begins + i64::from(self.receiver.ticks_per_chip) * i64::from(mark))
+    }
+}
+
+/// A macropulse: of which shot, and when it begins to arrive, in ticks.
+#[derive(Clone, Copy)]
+struct Sent {
+    shot: usize,
+    begins: i64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::{Crc, Family, Keying, Payload};
+
+    /// Twenty shots in four words, 200 ticks apart; a gate of 700 ticks, light from 1500.
+    fn bench() -> (Receiver, Codebook, ShotLog) {
+        let payload = Payload::new(4, Crc::default(), true).unwrap();
+        let codebook =
+            Codebook::new(Family::prime(5).unwrap(), Some(payload), 16, Keying::OnOff).unwrap();
+        let receiver = Receiver {
+            gate_ticks: (10, 700),
+            light_ticks: 1500,
+            false_alarm: 1e-3,
+            ..Receiver::matched(1000)
+        };
+        let fired: Vec<i64> = (0..20).map(|shot| shot * 200_000).collect();
+        let words: Vec<u16> = (0..20).map(|shot| 1 + shot % 4).collect();
+        let mut log = ShotLog::of_one_channel(&fired, &words);
+        log.label = (0..20).map(|shot| shot % 16).collect();
+        (receiver, codebook, log)
+    }
+
+    fn ticks(codebook: &Codebook, log: &ShotLog, shot: usize, lag: u32) -> Ticks {
+        let begins = shot as u32 * 200 + lag;
+        let marks = codebook.marks(log.label[shot], log.word[shot]);
+        let tick = marks.iter().map(|mark| begins + u32::from(*mark)).collect();
+        Ticks { tick, ..Ticks::default() }
+    }
+
+    /// A faint return of shot 8 at the place where shot 4 has all of its marks.
+    #[test]
+    fn an_earlier_shot_that_fits_better_is_believed() {
+        let (receiver, codebook, log) = bench();
+        let sent = (&codebook, &log);
+        let seen = ticks(&codebook, &log, 4, 900);
+        let marks = codebook.marks(log.label[8], log.word[8]).len() as u16;
+        let faint = Return {
+            shot: 8,
+            tof: (900.5 - 800.0) * 1e-12,
+            peak: marks / 2,
+            marks,
+            margin: 0,
+            photons: 1.0,
+        };
+        let judge = |receiver: &Receiver, seen: &Ticks, one: Return| {
+            let mut returns = Returns::default();
+            returns.push(one);
+            exclude(receiver, sent, seen, &mut returns);
+            (returns.len(), returns.rejected(Reject::OutsideGate))
+        };
+        assert_eq!(judge(&receiver, &seen, faint), (0, 1));
+        // Controls: light that is not followed so far, and light of the shot itself.
+        let near = Receiver { light_ticks: 700, ..receiver.clone() };
+        assert_eq!(judge(&near, &seen, faint), (1, 0));
+        let own = ticks(&codebook, &log, 8, 100);
+        assert_eq!(judge(&receiver, &own, faint), (1, 0));
+    }
+}

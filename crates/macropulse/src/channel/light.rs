@@ -1,0 +1,171 @@
+//! Light at the aperture of a sensor while it measures a band: the one seam between everything
+//! that shines and the detectors.
+//!
+//! Light is pulse trains and background. A **pulse train** is what one shot of one lidar brings
+//! along one way: the marks of a macropulse, or of a part of it, from a surface or straight from
+//! an interferer. The **background** is a rate λ(t): light without pulses, as sunlight. A detector
+//! is a function of both and never asks whose light it is.
+
+use macropulse_codec::code::Codebook;
+
+use crate::design::Design;
+
+/// What a lidar sends: how the marks of its pulse trains follow each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Transmitter<'a> {
+    /// The marks of its macropulses.
+    pub codebook: &'a Codebook,
+    /// Length of a chip by the clock of the sensor that receives, fs.
+    pub chip_fs: f64,
+    /// Length of a micropulse (full width at half maximum), s.
+    pub pulse: f64,
+}
+
+impl<'a> Transmitter<'a> {
+    /// The transmitter of `design`, whose clock runs `stretch` times slower than the receiver's.
+    pub fn of(design: &'a Design, stretch: f64) -> Self {
+        let coding = &design.coding;
+        Self {
+            codebook: &coding.codebook,
+            chip_fs: coding.chip_fs as f64 * stretch,
+            pulse: design.light.pulse,
+        }
+    }
+}
+
+/// Light at the aperture, before any detector. Truth: the receiver knows nothing of it.
+#[derive(Debug, Clone, Default)]
+pub struct Light<'a> {
+    /// Whose light it is: the sensor itself first, then the interferers.
+    pub transmitters: Vec<Transmitter<'a>>,
+    /// The pulse trains of all of them, in no particular order.
+    pub trains: Trains,
+    /// What shines without pulses.
+    pub background: Background,
+}
+
+/// Pulse trains, as columns: one entry for what one shot sends along one way.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trains {
+    /// Index of the transmitter.
+    pub transmitter: Vec<u16>,
+    /// Channel of the detector that sees it.
+    pub channel: Vec<u16>,
+    /// Absolute time at which the first chip of the macropulse arrives, or would, fs.
+    pub arrives_fs: Vec<i64>,
+    /// Mean number of photons detected per mark; infinite for a detector that never misses.
+    pub photons: Vec<f64>,
+    /// Label of the macropulse.
+    pub label: Vec<u16>,
+    /// Code word of the macropulse.
+    pub word: Vec<u16>,
+    /// First mark that takes this way and the one behind the last, by their place in the list of
+    /// the macropulse; [`ALL_MARKS`] where all of them do.
+    pub marks: Vec<[u16; 2]>,
+    /// Number of the shot by its transmitter's own count.
+    pub shot: Vec<u64>,
+    /// Which of the ways that light of this shot takes: with transmitter and shot the address of
+    /// its random numbers.
+    pub way: Vec<u16>,
+}
+
+/// Stands in [`Trains::marks`] for a whole macropulse.
+pub const ALL_MARKS: [u16; 2] = [0, u16::MAX];
+
+/// One line of [`Trains`]; fields as there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the columns say it")]
+pub struct PulseTrain {
+    pub transmitter: u16,
+    pub channel: u16,
+    pub arrives_fs: i64,
+    pub photons: f64,
+    pub label: u16,
+    pub word: u16,
+    pub marks: [u16; 2],
+    pub shot: u64,
+    pub way: u16,
+}
+
+impl Trains {
+    /// Number of trains.
+    pub fn len(&self) -> usize {
+        self.arrives_fs.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.arrives_fs.is_empty()
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, train: PulseTrain) {
+        self.transmitter.push(train.transmitter);
+        self.channel.push(train.channel);
+        self.arrives_fs.push(train.arrives_fs);
+        self.photons.push(train.photons);
+        self.label.push(train.label);
+        self.word.push(train.word);
+        self.marks.push(train.marks);
+        self.shot.push(train.shot);
+        self.way.push(train.way);
+    }
+
+    /// Which random numbers belong to train `index`, as the index of an address: the way in the
+    /// highest bits, then the transmitter, and the shot, of which 2⁴⁰ are told apart.
+    pub fn address(&self, index: usize) -> u64 {
+        let (way, transmitter) = (u64::from(self.way[index]), u64::from(self.transmitter[index]));
+        way << 48 | transmitter << 40 | self.shot[index] & ((1 << 40) - 1)
+    }
+
+    /// The train at `index`.
+    pub fn at(&self, index: usize) -> PulseTrain {
+        PulseTrain {
+            transmitter: self.transmitter[index],
+            channel: self.channel[index],
+            arrives_fs: self.arrives_fs[index],
+            photons: self.photons[index],
+            label: self.label[index],
+            word: self.word[index],
+            marks: self.marks[index],
+            shot: self.shot[index],
+            way: self.way[index],
+        }
+    }
+}
+
+impl Light<'_> {
+    /// The marks of train `index`, in chips from its first one.
+    pub fn marks(&self, index: usize) -> &[u16] {
+        let trains = &self.trains;
+        let codebook = self.transmitters[usize::from(trains.transmitter[index])].codebook;
+        let marks = codebook.marks(trains.label[index], trains.word[index]);
+        let [first, end] = trains.marks[index].map(usize::from);
+        &marks[first.min(marks.len())..end.min(marks.len())]
+    }
+
+    /// When the marks of train `index` arrive, fs, ascending.
+    pub fn arrivals_fs(&self, index: usize) -> impl Iterator<Item = i64> {
+        let chip_fs = self.transmitters[usize::from(self.trains.transmitter[index])].chip_fs;
+        let begins = self.trains.arrives_fs[index];
+        self.marks(index).iter().map(move |mark| begins + (f64::from(*mark) * chip_fs) as i64)
+    }
+}
+
+/// Light without pulses: a rate λ(t) for each channel.
+///
+/// In every channel and at any time there is `steady`; beside it, what the other columns say, one
+/// entry for a stretch of time in one channel. Stretches may overlap: their rates add up.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Background {
+    /// Detections per second in each channel, all the time.
+    pub steady: f64,
+    /// Channel of a stretch.
+    pub channel: Vec<u16>,
+    /// Absolute time at which it begins, fs.
+    pub from_fs: Vec<i64>,
+    /// Absolute time at which it ends, fs.
+    pub until_fs: Vec<i64>,
+    /// Detections per second meanwhile.
+    pub per_s: Vec<f64>,
+}

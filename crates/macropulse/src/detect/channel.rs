@@ -1,0 +1,156 @@
+//! What the detector of one channel sees of a band, and when it listens.
+
+use std::borrow::Cow;
+use std::ops::RangeInclusive;
+
+use macropulse_codec::ShotLog;
+
+use super::Detections;
+use super::clock::Clock;
+use crate::channel::Light;
+use crate::design::Design;
+
+/// The light and the shots of a band in the order of their channels; kept from band to band.
+#[derive(Debug, Default)]
+pub(super) struct Arrangement {
+    /// Channel of each pulse train, and with it the train, see [`Channel::order`].
+    trains: Vec<(u16, u64)>,
+    /// The same of a sensor with a single channel.
+    order: Vec<u64>,
+    /// Channel of each shot, and the shot, in the order of channels, then of time.
+    shots: Vec<(u16, u32)>,
+}
+
+/// What the detector of one channel is given of a band.
+pub(super) struct Channel<'a> {
+    pub number: u16,
+    pub clock: Clock,
+    pub design: &'a Design,
+    pub log: &'a ShotLog,
+    pub light: &'a Light<'a>,
+    /// The pulse trains that it sees, in the order in which they begin to arrive: the time in the
+    /// upper half of each number, 0 where it lies before the epoch, the index in the lower half.
+    pub order: Cow<'a, [u64]>,
+    /// The shots that it listens to, in the order of time.
+    pub shots: Vec<u32>,
+    /// When it listens, in parts of a tick from the epoch on; ascending, and apart.
+    pub spans: Vec<RangeInclusive<i64>>,
+}
+
+impl Arrangement {
+    /// Puts the pulse trains of `light` and the shots of `log` in the order of their channels.
+    pub fn fill(&mut self, design: &Design, clock: &Clock, log: &ShotLog, light: &Light) {
+        // What arrives later than a band is counted arrives when nobody listens.
+        let arrival = |(index, arrives_fs): (usize, &i64)| {
+            let time = u32::try_from(clock.time(*arrives_fs).max(0)).ok()?;
+            Some(u64::from(time) << 32 | index as u64)
+        };
+        self.order.clear();
+        self.order.extend(light.trains.arrives_fs.iter().enumerate().filter_map(arrival));
+        self.trains.clear();
+        self.shots.clear();
+        if design.channels() == 1 {
+            if !self.order.is_sorted() {
+                // Made of few runs, which a merging sort makes use of.
+                self.order.sort();
+            }
+            return;
+        }
+        let channel = |order: &u64| (light.trains.channel[*order as u32 as usize], *order);
+        self.trains.extend(self.order.iter().map(channel));
+        self.trains.sort_unstable();
+        self.shots.extend(log.channel.iter().zip(0..).map(|(channel, shot)| (*channel, shot)));
+        self.shots.sort();
+    }
+
+    /// The channels that listen, in their order.
+    pub fn channels<'a>(
+        &'a self,
+        design: &'a Design,
+        clock: Clock,
+        log: &'a ShotLog,
+        light: &'a Light<'a>,
+    ) -> impl Iterator<Item = Channel<'a>> {
+        let single = (design.channels() == 1).then(|| Channel {
+            number: 0,
+            clock,
+            design,
+            log,
+            light,
+            order: Cow::Borrowed(&self.order),
+            shots: (0..log.len() as u32).collect(),
+            spans: spans(design, &clock, log, 0..log.len() as u32),
+        });
+        let several = self.shots.chunk_by(|one, next| one.0 == next.0).map(move |shots| {
+            let number = shots[0].0;
+            let first = self.trains.partition_point(|train| train.0 < number);
+            let trains = self.trains[first..].iter().take_while(|train| train.0 == number);
+            let shots: Vec<u32> = shots.iter().map(|shot| shot.1).collect();
+            Channel {
+                number,
+                clock,
+                design,
+                log,
+                light,
+                order: Cow::Owned(trains.map(|train| train.1).collect()),
+                spans: spans(design, &clock, log, shots.iter().copied()),
+                shots,
+            }
+        });
+        single.into_iter().chain(several)
+    }
+}
+
+/// When a detector listens to `shots`: from the firing of each to the end of a macropulse that
+/// begins at the end of the gate.
+fn spans(
+    design: &Design,
+    clock: &Clock,
+    log: &ShotLog,
+    shots: impl Iterator<Item = u32>,
+) -> Vec<RangeInclusive<i64>> {
+    let mut spans: Vec<(i64, i64)> = Vec::new();
+    for shot in shots {
+        let fired_fs = log.fired_at_fs[shot as usize];
+        let closes_fs = fired_fs + design.listening_fs();
+        match spans.last_mut() {
+            Some(last) if fired_fs <= last.1 => last.1 = closes_fs,
+            _ => spans.push((fired_fs, closes_fs)),
+        }
+    }
+    spans.iter().map(|(from, to)| clock.time(*from)..=clock.time(*to)).collect()
+}
+
+impl Channel<'_> {
+    /// When it begins and ceases to listen, in parts of a tick.
+    pub fn whole_span(&self) -> RangeInclusive<i64> {
+        let first = self.spans.first().map_or(0, |span| *span.start());
+        first..=self.spans.last().map_or(-1, |span| *span.end())
+    }
+
+    /// When the marks of train `index` arrive, in parts of a tick from the epoch on.
+    pub fn marks(&self, index: usize) -> impl Iterator<Item = i64> {
+        self.light.arrivals_fs(index).map(|arrives_fs| self.clock.time(arrives_fs))
+    }
+
+    /// Takes those of the last events of `found`, from place `from` on, out that came while nobody
+    /// listened.
+    pub fn keep_what_is_listened_to(&self, found: &mut Detections, from: usize) {
+        let mut spans = self.spans.iter().peekable();
+        let mut kept = from;
+        for place in from..found.time.len() {
+            let time = i64::from(found.time[place]);
+            while spans.next_if(|span| *span.end() < time).is_some() {}
+            if spans.peek().is_some_and(|span| span.contains(&time)) {
+                found.time[kept] = found.time[place];
+                if place < found.amplitude.len() {
+                    found.amplitude[kept] = found.amplitude[place];
+                }
+                kept += 1;
+            }
+        }
+        found.time.truncate(kept);
+        found.channel.truncate(kept);
+        found.amplitude.truncate(kept);
+    }
+}
