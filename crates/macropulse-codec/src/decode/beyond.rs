@@ -89,7 +89,7 @@ impl Bench<'_> {
             self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
         };
         let (mut both, mut of_earlier, mut of_later) = ([0; 2], [0; 2], [0; 2]);
-        let mut count = |counts: &mut [usize; 2], place: i64| {
+        let count = |counts: &mut [usize; 2], place: i64| {
             counts[0] += usize::from(self.timeline.has(place));
             counts[1] += 1;
         };
@@ -99,7 +99,8 @@ impl Bench<'_> {
                 (None, None) => break,
                 (Some(one), Some(other)) if one == other => {
                     count(&mut both, one);
-                    (earlier.next(), later.next());
+                    earlier.next();
+                    later.next();
                 }
                 (Some(one), other) if other.is_none_or(|other| one < other) => {
                     count(&mut of_earlier, one);
