@@ -31,6 +31,8 @@ struct Assembly<'a> {
     solids: Vec<Solid>,
     placed: Vec<Placed>,
     notes: Vec<String>,
+    /// The mesh of the car, once there is one.
+    car: Option<Rc<Mesh>>,
 }
 
 /// Makes the scene that `source` describes; meshes are looked for in `base`.
@@ -49,6 +51,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         solids: vec![],
         placed: vec![],
         notes: vec![],
+        car: None,
     };
     assembly.define(&file)?;
     let sensor = assembly.pose(&file.sensor)?;
@@ -149,7 +152,7 @@ impl Assembly<'_> {
             }
             return Ok(());
         }
-        let mesh = Rc::new(self.mesh(&name, thing)?);
+        let mesh = self.mesh(&name, thing)?;
         let paints = self.paints(&name, thing, &mesh)?;
         let stand = |pose: &Pose| stand(&mesh, pose, thing.rest_on_ground);
         let at = poses.iter().map(stand).collect();
@@ -158,10 +161,14 @@ impl Assembly<'_> {
     }
 
     /// The mesh of an object in metres, x forward, z up.
-    fn mesh(&mut self, name: &str, thing: &Thing) -> Result<Mesh, Error> {
+    fn mesh(&mut self, name: &str, thing: &Thing) -> Result<Rc<Mesh>, Error> {
         let Some(path) = &thing.mesh else {
             self.refuse_mesh_keys(thing)?;
-            return Ok(car::mesh());
+            let car = match self.car.take() {
+                Some(car) => car,
+                None => Rc::new(car::mesh()?),
+            };
+            return Ok(Rc::clone(self.car.insert(car)));
         };
         let without = match thing.material {
             Some(_) => WithoutMaterials::Fine,
@@ -184,7 +191,7 @@ impl Assembly<'_> {
                 "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
             ));
         }
-        Ok(mesh)
+        Ok(Rc::new(mesh))
     }
 
     fn metres_per_unit(&mut self, name: &str, thing: &Thing) -> Result<f64, Error> {

@@ -4,7 +4,6 @@ mod assemble;
 mod batch;
 mod builtin;
 mod car;
-mod car_parts;
 mod change;
 mod closed_form;
 mod digest;
