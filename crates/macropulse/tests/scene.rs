@@ -317,6 +317,26 @@ fn wrong_scene_files_are_refused_at_their_place() {
 }
 
 #[test]
+fn two_objects_of_one_name_are_refused_with_both_places() {
+    let named = |names: [&str; 2]| {
+        let ball = |name| format!("[[object]]\nname = {name:?}\nshape.sphere.radius_m = 1\n");
+        let text = format!(
+            "version = 1\nground = {{ material = \"asphalt\" }}\n{}",
+            names.map(ball).concat()
+        );
+        Scene::from_toml(&text, "test.toml", Path::new("")).map_err(|fault| fault.to_string())
+    };
+    assert_eq!(
+        named(["ball", "ball"]).unwrap_err(),
+        "test.toml:7:8: another object is called \"ball\" at line 4, column 8; give one of them \
+         another name"
+    );
+    let told = named(["ball", "ground"]).unwrap_err();
+    assert!(told.contains("called \"ground\" at line 2, column 23"), "{told}");
+    assert!(named(["ball", "Ball"]).is_ok());
+}
+
+#[test]
 fn built_in_scenes_give_their_known_answers() {
     let ahead = |scene: &Scene, y: f64, z: f64| {
         let ray = Ray { origin: [0.0, y, z], direction: [1.0, 0.0, 0.0] };

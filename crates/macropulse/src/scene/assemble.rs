@@ -1,5 +1,6 @@
 //! From a scene file as typed to a scene that can be hit by rays.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
@@ -10,7 +11,8 @@ use toml::Spanned;
 use super::car;
 use super::closed_form::{Shape, Solid};
 use super::error::Error;
-use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
+use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit, object_names};
+use super::inside;
 use super::material::{self, Material, plain};
 use super::mesh::Mesh;
 use super::other;
@@ -19,6 +21,7 @@ use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
 use super::{Object, Scene};
 use crate::digest::Fnv;
+use crate::names::line_column;
 
 /// What has been put together so far.
 struct Assembly<'a> {
@@ -59,10 +62,17 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
     }
     if let Some(ground) = &file.ground {
-        assembly.ground(ground)?;
+        let height = assembly.ground(ground)?;
+        let below = height - sensor.position[2];
+        if below > 0.0 {
+            let note = format!(
+                "sensor: it stands {below:.2} m below the ground; lift it, unless that is meant"
+            );
+            assembly.notes.push(note);
+        }
     }
-    for (index, thing) in file.objects.iter().enumerate() {
-        assembly.thing(index, thing)?;
+    for (name, thing) in assembly.names(&file)?.into_iter().zip(&file.objects) {
+        assembly.thing(name, thing)?;
     }
     if assembly.solids.is_empty() && assembly.placed.is_empty() {
         assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
@@ -70,12 +80,23 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     let pose = |stand: &Stand| assembly.pose(stand);
     let (others, assumed) = other::others((source, base), &file.others, pose)?;
     assembly.notes.extend(assumed);
-    let Assembly { materials, objects, solids, placed, notes, .. } = assembly;
+    let Assembly { materials, objects, solids, placed, mut notes, .. } = assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Fnv::new();
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
+    let mut around: Vec<u16> =
+        solids.iter().filter(|solid| solid.holds(sensor.position)).map(Solid::object).collect();
+    let meshes: Vec<u16> = placed.iter().map(|placed| placed.object).collect();
     let world = placed::world(placed, solids, sensor.position);
+    around.extend(
+        inside::enclosing(&world, sensor.position).iter().filter(|object| meshes.contains(object)),
+    );
+    around.dedup();
+    notes.extend(around.iter().map(|object| {
+        let name = &objects[usize::from(*object)].name;
+        format!("sensor: it stands inside {name}, which encloses it; move one of them, unless that is meant")
+    }));
     Ok(Scene { name, materials, objects, sensor, others, notes, world, surfaces })
 }
 
@@ -116,23 +137,45 @@ impl Assembly<'_> {
         Ok(())
     }
 
-    fn ground(&mut self, ground: &Ground) -> Result<(), Error> {
+    /// Adds the ground; gives its height, m.
+    fn ground(&mut self, ground: &Ground) -> Result<f64, Error> {
         let material = self.material_typed(&ground.material)?;
         let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.finite(z, "z_m"))?;
         let object = self.object("ground".to_owned(), false, 0..0)?;
         let shape = Shape::Plane { normal: [0.0, 0.0, 1.0] };
         self.solids.push(Solid::new(shape, Pose::at([0.0, 0.0, height]), material, object));
-        Ok(())
+        Ok(height)
     }
 
-    fn thing(&mut self, index: usize, spanned: &Spanned<Thing>) -> Result<(), Error> {
+    /// What the objects of the file are called; refuses two of one name.
+    fn names(&self, file: &SceneFile) -> Result<Vec<String>, Error> {
+        let typed: Vec<Option<&Spanned<String>>> =
+            file.objects.iter().map(|object| object.get_ref().name.as_ref()).collect();
+        let ground = file.ground.as_ref().map(|ground| ("ground", ground.material.span()));
+        let mut taken: HashMap<&str, Range<usize>> = ground.into_iter().collect();
+        for name in typed.iter().flatten() {
+            if let Some(first) = taken.insert(name.get_ref(), name.span()) {
+                let (line, column) = line_column(self.source.text, first.start);
+                let message = format!(
+                    "another object is called {:?} at line {line}, column {column}; give one of \
+                     them another name",
+                    name.get_ref()
+                );
+                return Err(self.source.fault(name.span(), message));
+            }
+        }
+        let typed: Vec<Option<&str>> =
+            typed.iter().map(|name| name.map(|name| name.get_ref().as_str())).collect();
+        Ok(object_names(&typed))
+    }
+
+    fn thing(&mut self, name: String, spanned: &Spanned<Thing>) -> Result<(), Error> {
         let thing = spanned.get_ref();
         let kinds = [thing.mesh.is_some(), thing.car.is_some(), thing.shape.is_some()];
         if kinds.iter().filter(|given| **given).count() != 1 {
             let message = "an object needs exactly one of `mesh`, `car` and `shape`";
             return Err(self.source.fault(spanned.span(), message));
         }
-        let name = thing.name.clone().unwrap_or_else(|| format!("object-{}", index + 1));
         let mut stands = vec![thing.stand()];
         stands.extend(thing.copies.iter().cloned());
         let poses = stands.iter().map(|stand| self.pose(stand)).collect::<Result<Vec<_>, _>>()?;

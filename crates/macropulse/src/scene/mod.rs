@@ -10,6 +10,7 @@ mod digest;
 mod error;
 mod file;
 mod hits;
+mod inside;
 mod lit;
 pub mod material;
 mod mesh;
