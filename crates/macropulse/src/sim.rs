@@ -163,7 +163,7 @@ fn measure(
         [] => channel::echoes(design, &scene.materials, &hits),
         parts => channel::echoes_of_parts(design, &scene.materials, parts),
     };
-    if !scene.others.is_empty() {
+    if !scene.interferers.is_empty() {
         echoes.foreign = channel::foreign(design, scene, &log);
     }
     lap(&mut tally);

@@ -4,7 +4,7 @@
 //!    light arrives that others have fired up to two ways of the longer range gate before.
 //!    A detector of its own pixel listens to its own shot alone.
 //! 2. By reflection: from each point that a foreign ray meets and a listening detector looks at
-//!    ([`Lit`]), with the photons
+//!    ([`Illuminated`]), with the photons
 //!
 //!    n = K · ρ_eff · w · exp(−σ·(R₁ + R₂)) / R₂²
 //!
@@ -23,7 +23,7 @@ use std::ops::Range;
 use super::Link;
 use crate::design::Design;
 use crate::emit::ShotLog;
-use crate::scene::{Lit, Look, Material, Other, Scene};
+use crate::scene::{Illuminated, Interferer, LineOfSight, Material, Scene};
 use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
 
 /// Radius of every aperture, m: what sensor files leave unsaid.
@@ -87,7 +87,7 @@ impl Foreign {
 /// shots of `log`.
 pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
     let mut foreign = Foreign::default();
-    for (number, other) in scene.others.iter().enumerate() {
+    for (number, other) in scene.interferers.iter().enumerate() {
         let Some(link) = Link::of_other(design, &other.design) else { continue };
         let around_fs = around_fs(other);
         let farthest = design.scan.max_range.max(other.design.scan.max_range);
@@ -105,7 +105,7 @@ pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
                     let pixel = design.scan.pixel_at(direction)?;
                     listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
                 };
-                let lit = scene.lit(other, &theirs, farthest, &look);
+                let lit = scene.illuminated(other, &theirs, farthest, &look);
                 arrivals.add_reflected(&scene.materials, &theirs, &lit);
                 if let Some(direct) = &direct {
                     arrivals.add_direct(direct, &theirs, &look);
@@ -118,7 +118,7 @@ pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
 
 /// How long light may arrive before and after the first chip of a shot, fs: the micropulse has some
 /// before it, and behind the last chip.
-fn around_fs(other: &Other) -> (i64, i64) {
+fn around_fs(other: &Interferer) -> (i64, i64) {
     let Design { coding, light, .. } = &other.design;
     let chips = f64::from(coding.codebook.chips()) * coding.chip_fs as f64;
     let micropulse = fs_from_s(FLANKS * light.pulse);
@@ -178,7 +178,7 @@ struct Direct {
 
 impl Direct {
     /// `None` where something hides the other, or it is too far away.
-    fn of(scene: &Scene, other: &Other, farthest: f64) -> Option<Self> {
+    fn of(scene: &Scene, other: &Interferer, farthest: f64) -> Option<Self> {
         let way = [0, 1, 2].map(|axis| other.pose.position[axis] - scene.sensor.position[axis]);
         let distance = way.iter().map(|part| part * part).sum::<f64>().sqrt();
         if !(APERTURE_RADIUS..=farthest).contains(&distance) {
@@ -215,7 +215,7 @@ impl Direct {
 
 /// Makes entries of the light of one lidar.
 struct Arrivals<'a> {
-    other: &'a Other,
+    other: &'a Interferer,
     /// Number of the first way of its light.
     way: u32,
     link: Link,
@@ -224,7 +224,7 @@ struct Arrivals<'a> {
 
 impl Arrivals<'_> {
     /// Adds light of the shots in `log` that surfaces of `materials` reflect.
-    fn add_reflected(&mut self, materials: &[Material], log: &ShotLog, lit: &Lit) {
+    fn add_reflected(&mut self, materials: &[Material], log: &ShotLog, lit: &Illuminated) {
         for i in 0..lit.shot.len() {
             let material = &materials[usize::from(lit.material[i])];
             let cosines = [lit.cosine[i], lit.half_cosine[i]].map(f64::from);
@@ -236,7 +236,7 @@ impl Arrivals<'_> {
     }
 
     /// Adds light of the shots in `log` that shine into the aperture while we `look` back.
-    fn add_direct(&mut self, direct: &Direct, log: &ShotLog, look: &Look) {
+    fn add_direct(&mut self, direct: &Direct, log: &ShotLog, look: &LineOfSight) {
         let directions = self.other.design.directions();
         for shot in 0..log.len() {
             let axis = directions.of(log.row[shot], log.column[shot]);
@@ -291,7 +291,7 @@ mod tests {
     /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
     fn light(sensor: &str, more: &str) -> (Design, Foreign) {
         let text = format!(
-            "version = 1\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
+            "version = 1\n[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
              yaw_deg = 180\nset = {{ scan.scans_per_s = 1000, scan.raster = {{ rows = 5, \
              columns = 5, horizontal_deg = 10, vertical_deg = 10 }} }}\n{more}"
         );

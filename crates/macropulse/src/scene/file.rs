@@ -23,15 +23,15 @@ pub(super) struct SceneFile {
     #[serde(default, rename = "material")]
     pub materials: Vec<Spanned<Defined>>,
     #[serde(default, rename = "object")]
-    pub objects: Vec<Spanned<Thing>>,
+    pub objects: Vec<Spanned<ObjectTyped>>,
     #[serde(default)]
-    pub others: Vec<Spanned<OtherTyped>>,
+    pub interferers: Vec<Spanned<InterfererTyped>>,
 }
 
-/// `[[others]]`
+/// `[[interferers]]`
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct OtherTyped {
+pub(super) struct InterfererTyped {
     pub name: Option<String>,
     pub sensor: Spanned<String>,
     #[serde(default)]
@@ -44,7 +44,7 @@ pub(super) struct OtherTyped {
     pub drift_ppm: Option<Spanned<f64>>,
 }
 
-impl OtherTyped {
+impl InterfererTyped {
     /// Where the lidar stands.
     pub(super) fn stand(&self) -> Stand {
         Stand {
@@ -89,7 +89,7 @@ pub(super) struct Defined {
 /// `[[object]]`
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Thing {
+pub(super) struct ObjectTyped {
     pub name: Option<Spanned<String>>,
     pub mesh: Option<Spanned<String>>,
     pub car: Option<Car>,
@@ -113,7 +113,7 @@ pub(super) struct Thing {
     pub copies: Vec<Stand>,
 }
 
-impl Thing {
+impl ObjectTyped {
     /// Where the object itself stands.
     pub(super) fn stand(&self) -> Stand {
         Stand {
@@ -225,7 +225,7 @@ pub(super) fn object_names(typed: &[Option<&str>]) -> Vec<String> {
     typed.iter().enumerate().map(name).collect()
 }
 
-/// The text of a scene file and its name: turns spans into places.
+/// The text of a scene file and its name: finds line and column of what is wrong.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub text: &'a str,
