@@ -87,17 +87,13 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     let mut surfaces = Fnv::new();
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
-    let mut around: Vec<u16> =
-        solids.iter().filter(|solid| solid.holds(sensor.position)).map(Solid::object).collect();
+    let shapes = inside::shapes_around(&solids, sensor.position);
     let meshes: Vec<u16> = placed.iter().map(|placed| placed.object).collect();
     let world = placed::world(placed, solids, sensor.position);
-    around.extend(
-        inside::enclosing(&world, sensor.position).iter().filter(|object| meshes.contains(object)),
-    );
-    around.dedup();
-    notes.extend(around.iter().map(|object| {
+    let meshes = inside::meshes_around(&world, &meshes, sensor.position);
+    notes.extend(shapes.iter().chain(&meshes).map(|object| {
         let name = &objects[usize::from(*object)].name;
-        format!("sensor: it stands inside {name}, which encloses it; move one of them, unless that is meant")
+        format!("sensor: it stands inside {name}; move one of them, unless that is meant")
     }));
     Ok(Scene { name, materials, objects, sensor, interferers, notes, world, surfaces })
 }

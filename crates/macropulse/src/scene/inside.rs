@@ -13,7 +13,7 @@ const MOST_SURFACES: usize = 1000;
 
 impl Solid {
     /// Whether `point`, in the world, lies inside. Nothing lies inside a plane.
-    pub(super) fn holds(&self, point: [f64; 3]) -> bool {
+    fn holds(&self, point: [f64; 3]) -> bool {
         let local = DVec3::from(self.pose().sensor_from_world().point(point));
         match self.shape() {
             Shape::Plane { .. } => false,
@@ -23,16 +23,26 @@ impl Solid {
     }
 }
 
-/// The objects that are met from `point`, in the world, in every one of 64 directions spread
-/// evenly over the sphere. A mesh need not be free of gaps for that, nor its triangles turned the
-/// same way: a car is made of many sheets, so counting how often a ray crosses it says nothing.
-pub(super) fn enclosing(world: &impl CastRays, point: [f64; 3]) -> Vec<u16> {
+/// The objects of the shapes that `point`, in the world, lies inside, each once.
+pub(super) fn shapes_around(solids: &[Solid], point: [f64; 3]) -> Vec<u16> {
+    let around = solids.iter().filter(|solid| solid.holds(point));
+    let mut objects: Vec<u16> = around.map(Solid::object).collect();
+    objects.dedup();
+    objects
+}
+
+/// The objects among `meshes` that are met from `point`, in the world, in every one of 64
+/// directions spread evenly over the sphere. A mesh need not be free of gaps for that, nor its
+/// triangles turned the same way: a car is made of many sheets, so counting how often a ray
+/// crosses it says nothing.
+pub(super) fn meshes_around(world: &impl CastRays, meshes: &[u16], point: [f64; 3]) -> Vec<u16> {
     let mut around: Option<Vec<u16>> = None;
     // The first points up, where most sensors see the sky.
     for index in 0..DIRECTIONS {
         let ray = Ray { origin: point, direction: direction(index) };
         let met = along(world, &ray);
-        let around = around.get_or_insert_with(|| met.clone());
+        let around = around
+            .get_or_insert_with(|| met.iter().copied().filter(|o| meshes.contains(o)).collect());
         around.retain(|object| met.contains(object));
         if around.is_empty() {
             break;

@@ -43,7 +43,7 @@ impl Fnv {
     }
 }
 
-/// Reads `[[interferers]]`; `pose` reads where one stands, and sensor files are looked for in `base`.
+/// Reads `[[interferers]]`; `pose` reads where one stands, sensor files are looked for in `base`.
 /// Gives what was assumed, too.
 pub(super) fn interferers(
     (source, base): (Source<'_>, &Path),
