@@ -75,8 +75,8 @@ fn completions_know_the_commands() {
 #[test]
 fn the_other_lidars_of_a_scene_are_listed_and_their_ghosts_counted() {
     let desk = Desk::new();
-    let others = "[[others]]\nsensor = \"hdl-64e\"\nposition_m = [3, 1, 2]\nphase_ns = 1234.5\n\
-                  [[others]]\nsensor = \"mine.toml\"\nname = \"van\"\ndrift_ppm = -20\n";
+    let others = "[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [3, 1, 2]\nphase_ns = 1234.5\n\
+                  [[interferers]]\nsensor = \"mine.toml\"\nname = \"van\"\ndrift_ppm = -20\n";
     desk.put("mine.toml", "version = 1\nname = \"mine\"\nextends = \"peregrine\"\n");
     desk.put("a.toml", &format!("version = 1\nground = {{ material = \"white\" }}\n{others}"));
     let text = desk.run("check a.toml").out;
@@ -103,8 +103,8 @@ fn the_other_lidars_of_a_scene_are_listed_and_their_ghosts_counted() {
 #[test]
 fn a_wrong_other_lidar_is_told_with_its_place() {
     let desk = Desk::new();
-    desk.put("a.toml", "version = 1\n[[others]]\nsensor = \"hdl64e\"\n");
+    desk.put("a.toml", "version = 1\n[[interferers]]\nsensor = \"hdl64e\"\n");
     desk.refused("check a.toml", &["a.toml:3:10:", "did you mean `hdl-64e`?"]);
-    desk.put("a.toml", "version = 1\n[[others]]\nsensor = \"hdl-64e\"\ndrift_ppm = nan\n");
+    desk.put("a.toml", "version = 1\n[[interferers]]\nsensor = \"hdl-64e\"\ndrift_ppm = nan\n");
     desk.refused("simulate --sensor peregrine --scene a.toml -o out", &["a.toml:4:13:", "-1000"]);
 }

@@ -125,7 +125,7 @@ pub fn manifest(run: &Run) -> Manifest {
     ] {
         manifest.counts.push(name, count);
     }
-    if !scene.others.is_empty() {
+    if !scene.interferers.is_empty() {
         manifest.counts.push("foreign", tally.foreign);
         manifest.counts.push("ghosts", run.score.ghosts);
     }

@@ -62,8 +62,8 @@ fn without_others_nothing_changes() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/interference");
     let text = std::fs::read_to_string(folder.join("none.toml")).unwrap();
     // None at all, and one that looks into the sky behind us.
-    let away = "\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [0, 0, 1e4]\n";
-    let empty = text.replacen("version = 1", "version = 1\nothers = []", 1);
+    let away = "\n[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [0, 0, 1e4]\n";
+    let empty = text.replacen("version = 1", "version = 1\ninterferers = []", 1);
     for (text, is_same_scene) in [(empty, true), (format!("{text}{away}"), false)] {
         let scene = Scene::from_toml(&text, "none", Path::new("")).unwrap();
         assert_eq!(scene.digest() == scenario("none").digest(), is_same_scene);
@@ -206,7 +206,7 @@ fn edges(design: &Design, scene: &Scene, band: &Band, is_alone: bool) -> Vec<i64
 fn foreign_edges_come_at_the_rate_that_theory_says() {
     let design = open("kim-park-2016-fixed", &[("detector.photon-counting.dark_counts_hz", "0")]);
     let scene = wall(
-        "diffuse = 0.02\n[[others]]\nsensor = \"kim-park-2016-fixed\"\n\
+        "diffuse = 0.02\n[[interferers]]\nsensor = \"kim-park-2016-fixed\"\n\
          position_m = [0, 0.001, 0]\nphase_ns = 5e5\ndrift_ppm = -11",
     );
     // Exactly two lines of the other, whatever the phase.
@@ -244,7 +244,7 @@ fn single_pulses_make_ghosts_as_often_as_theory_says() {
         )
     };
     let scene = wall(&format!(
-        "diffuse = 1\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [0, 0.001, 0]\n\
+        "diffuse = 1\n[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [0, 0.001, 0]\n\
          drift_ppm = 13.7\nset = {}",
         raster(100, 100, 31.3)
     ));

@@ -184,6 +184,27 @@ fn an_obj_keeps_its_materials_and_they_can_be_mapped() {
 }
 
 #[test]
+fn a_ply_names_its_materials_by_an_index_of_each_face() {
+    let text = String::from_utf8(ascii_ply()).unwrap();
+    let text = text
+        .replace("element vertex", "comment material wood\ncomment material brick\nelement vertex");
+    let text = text.replace("end_header", "property uchar material_index\nend_header");
+    let [head, faces] = text.split_once("3 1 2 3\n").map(|(head, rest)| [head, rest]).unwrap();
+    let faces = faces.replace('\n', " 1\n");
+    let of = |name: &str, index: &str| {
+        let text = format!("{head}3 1 2 3 {index}\n{faces}");
+        let files = folder(&[(name, text.as_bytes())]);
+        let scene = object(files.path(), &format!("mesh = {name:?}")).unwrap();
+        // Aimed at the slanting face alone, from beyond it.
+        let ray = Ray { origin: [9.0, 0.1, 0.2], direction: [-1.0, 0.0, 0.0] };
+        let hit = scene.cast(&ray, 0.0, 100.0).unwrap();
+        scene.materials[usize::from(hit.material)].name.clone()
+    };
+    assert_eq!((of("a.ply", "0").as_str(), of("a.ply", "1").as_str()), ("wood", "brick"));
+    assert_eq!(of("a.ply", "7"), "unnamed", "an index beyond the names");
+}
+
+#[test]
 fn an_obj_without_its_mtl_needs_a_material() {
     let files = folder(&[("tetra.obj", OBJ.as_bytes())]);
     let told = refusal(files.path(), "mesh = \"tetra.obj\"");
@@ -293,6 +314,26 @@ fn wrong_scene_files_are_refused_at_their_place() {
     assert!(told.contains("same axis"), "{told}");
     let told = Scene::from_toml("version = 2\n", "test.toml", nowhere).unwrap_err().to_string();
     assert!(told.contains("write version = 1"), "{told}");
+}
+
+#[test]
+fn two_objects_of_one_name_are_refused_with_both_places() {
+    let named = |names: [&str; 2]| {
+        let ball = |name| format!("[[object]]\nname = {name:?}\nshape.sphere.radius_m = 1\n");
+        let text = format!(
+            "version = 1\nground = {{ material = \"asphalt\" }}\n{}",
+            names.map(ball).concat()
+        );
+        Scene::from_toml(&text, "test.toml", Path::new("")).map_err(|fault| fault.to_string())
+    };
+    assert_eq!(
+        named(["ball", "ball"]).unwrap_err(),
+        "test.toml:7:8: another object is called \"ball\" at line 4, column 8; give one of them \
+         another name"
+    );
+    let told = named(["ball", "ground"]).unwrap_err();
+    assert!(told.contains("called \"ground\" at line 2, column 23"), "{told}");
+    assert!(named(["ball", "Ball"]).is_ok());
 }
 
 #[test]

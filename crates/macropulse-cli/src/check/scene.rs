@@ -1,6 +1,6 @@
 //! The report on a scene.
 
-use macropulse::scene::{Other, Pose, Scene};
+use macropulse::scene::{Interferer, Pose, Scene};
 use serde_json::{Value, json};
 
 use super::Report;
@@ -19,7 +19,7 @@ pub fn report(scene: &Scene) -> Report {
         .push("targets", if targets.is_empty() { "none".to_owned() } else { targets.join(", ") });
     columns.push("materials", materials.join(", "));
     columns.push("sensor", stands(&scene.sensor));
-    columns.push_list("others", scene.others.iter().map(told));
+    columns.push_list("others", scene.interferers.iter().map(told));
     columns.push("digest", scene.digest());
     let notes = scene.notes.iter().cloned();
     columns.push_list(
@@ -39,7 +39,7 @@ pub fn report(scene: &Scene) -> Report {
             "sensor_yaw_deg": scene.sensor.yaw.to_degrees(),
             "sensor_pitch_deg": scene.sensor.pitch.to_degrees(),
             "sensor_roll_deg": scene.sensor.roll.to_degrees(),
-            "others": scene.others.iter().map(json).collect::<Vec<_>>(),
+            "others": scene.interferers.iter().map(json).collect::<Vec<_>>(),
             "digest": scene.digest(),
             "assumed": scene.notes,
         }),
@@ -54,14 +54,14 @@ fn stands(pose: &Pose) -> String {
 }
 
 /// One of the other lidars: what, where, when.
-fn told(other: &Other) -> String {
+fn told(other: &Interferer) -> String {
     let (phase, drift) = (phase_ns(other), short(drift_ppm(other)));
     let (name, sensor) = (&other.name, &other.design.name);
     let stands = stands(&other.pose);
     format!("{name}: {sensor}, {stands}; reads 0 at {phase} ns of ours, {drift} ppm fast")
 }
 
-fn json(other: &Other) -> Value {
+fn json(other: &Interferer) -> Value {
     json!({
         "name": other.name,
         "sensor": other.design.name,
@@ -74,10 +74,10 @@ fn json(other: &Other) -> Value {
     })
 }
 
-fn phase_ns(other: &Other) -> f64 {
+fn phase_ns(other: &Interferer) -> f64 {
     other.clock.phase_fs as f64 / 1e6
 }
 
-fn drift_ppm(other: &Other) -> f64 {
+fn drift_ppm(other: &Interferer) -> f64 {
     other.clock.drift as f64 / 1e6
 }

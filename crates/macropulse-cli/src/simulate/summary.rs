@@ -14,7 +14,7 @@ impl Run<'_> {
         let mut columns = Columns::default();
         columns.push("shots", grouped(tally.shots));
         columns.push("light", self.light());
-        if !self.scene.others.is_empty() {
+        if !self.scene.interferers.is_empty() {
             columns.push("others", self.others());
         }
         columns.push("returns", grouped(tally.returns));
@@ -74,7 +74,7 @@ impl Run<'_> {
     }
 
     fn others(&self) -> String {
-        let lidars = counted(self.scene.others.len() as u64, "other lidar");
+        let lidars = counted(self.scene.interferers.len() as u64, "other lidar");
         let shots = counted(self.tally.foreign, "shot");
         let ghosts = counted(self.score.ghosts, "ghost");
         format!("{lidars}, {shots} of theirs seen, {ghosts}")
@@ -164,7 +164,7 @@ impl Run<'_> {
             "folder": (!self.folder.is_empty()).then_some(&self.folder),
             "files": self.files,
         });
-        if !self.scene.others.is_empty() {
+        if !self.scene.interferers.is_empty() {
             json["foreign"] = tally.foreign.into();
             json["ghosts"] = self.score.ghosts.into();
         }

@@ -4,7 +4,7 @@
 //!    light arrives that interferers have fired as long before as light is followed, there and
 //!    back. A detector of its own pixel listens to its own shot alone.
 //! 2. By reflection: from each point that a ray of an interferer meets and a listening detector
-//!    looks at ([`Lit`]), with the photons
+//!    looks at ([`Illuminated`]), with the photons
 //!
 //!    n = K · ρ_eff · w · exp(−σ·(R₁ + R₂)) / R₂²
 //!
@@ -23,7 +23,7 @@ use std::ops::Range;
 use super::{ALL_MARKS, Light, Link, PulseTrain, Trains, Transmitter};
 use crate::design::Design;
 use crate::emit::shot_at;
-use crate::scene::{Lit, Look, Material, Other, Scene};
+use crate::scene::{Illuminated, Interferer, LineOfSight, Material, Scene};
 use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
 use macropulse_codec::ShotLog;
 
@@ -45,7 +45,7 @@ const DIRECT: u32 = 31;
 /// Adds the light of the scene's interferers that reaches the sensor `design` while it listens to
 /// the shots of `log`.
 pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, log: &ShotLog) {
-    for (number, other) in scene.others.iter().enumerate() {
+    for (number, other) in scene.interferers.iter().enumerate() {
         light.transmitters.push(Transmitter::of(&other.design, other.clock.stretch()));
         let Some(link) = Link::of_interferer(design, &other.design) else { continue };
         let around_fs = around_fs(other);
@@ -65,7 +65,7 @@ pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, 
                     let pixel = design.scan.pixel_at(direction)?;
                     listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
                 };
-                let lit = scene.lit(other, &theirs, farthest, &look);
+                let lit = scene.illuminated(other, &theirs, farthest, &look);
                 arrivals.add_reflected(&scene.materials, &theirs, &lit);
                 if let Some(direct) = &direct {
                     arrivals.add_direct((other, direct), &theirs, &look);
@@ -77,7 +77,7 @@ pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, 
 
 /// How long light may arrive before and after the first chip of a shot, fs: the micropulse has some
 /// before it, and behind the last chip.
-fn around_fs(other: &Other) -> (i64, i64) {
+fn around_fs(other: &Interferer) -> (i64, i64) {
     let Design { coding, light, .. } = &other.design;
     let chips = f64::from(coding.codebook.chips()) * coding.chip_fs as f64;
     let micropulse = fs_from_s(FLANKS * light.pulse);
@@ -144,7 +144,7 @@ struct Direct {
 
 impl Direct {
     /// `None` where something hides the other, or it is too far away.
-    fn of(scene: &Scene, other: &Other, farthest: f64) -> Option<Self> {
+    fn of(scene: &Scene, other: &Interferer, farthest: f64) -> Option<Self> {
         let way = [0, 1, 2].map(|axis| other.pose.position[axis] - scene.sensor.position[axis]);
         let distance = way.iter().map(|part| part * part).sum::<f64>().sqrt();
         if !(APERTURE_RADIUS..=farthest).contains(&distance) {
@@ -190,7 +190,7 @@ struct Arrivals<'a> {
 
 impl Arrivals<'_> {
     /// Adds light of the shots in `log` that surfaces of `materials` reflect.
-    fn add_reflected(&mut self, materials: &[Material], log: &ShotLog, lit: &Lit) {
+    fn add_reflected(&mut self, materials: &[Material], log: &ShotLog, lit: &Illuminated) {
         for i in 0..lit.shot.len() {
             let material = &materials[usize::from(lit.material[i])];
             let cosines = [lit.cosine[i], lit.half_cosine[i]].map(f64::from);
@@ -202,7 +202,12 @@ impl Arrivals<'_> {
     }
 
     /// Adds light of the shots in `log` that shine into the aperture while we `look` back.
-    fn add_direct(&mut self, (other, direct): (&Other, &Direct), log: &ShotLog, look: &Look) {
+    fn add_direct(
+        &mut self,
+        (other, direct): (&Interferer, &Direct),
+        log: &ShotLog,
+        look: &LineOfSight,
+    ) {
         let directions = other.design.directions();
         for shot in 0..log.len() {
             let axis = directions.of(log.row[shot], log.column[shot]);
@@ -248,7 +253,7 @@ mod tests {
     /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
     fn light(sensor: &str, more: &str) -> Trains {
         let text = format!(
-            "version = 1\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
+            "version = 1\n[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
              yaw_deg = 180\nset = {{ scan.scans_per_s = 1000, scan.raster = {{ rows = 5, \
              columns = 5, horizontal_deg = 10, vertical_deg = 10 }} }}\n{more}"
         );

@@ -1,5 +1,6 @@
 //! From a scene file as typed to a scene that can be hit by rays.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
@@ -10,15 +11,19 @@ use toml::Spanned;
 use super::car;
 use super::closed_form::{Shape, Solid};
 use super::error::Error;
-use super::file::{Axis, Ground, SceneFile, ShapeTyped, Source, Stand, Thing, Unit};
+use super::file::{
+    Axis, Ground, ObjectTyped, SceneFile, ShapeTyped, Source, Stand, Unit, object_names,
+};
+use super::inside;
+use super::interferer;
 use super::material::{self, Material, plain};
 use super::mesh::Mesh;
-use super::other;
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
 use super::{Object, Scene};
 use crate::digest::Fnv;
+use crate::names::line_column;
 
 /// What has been put together so far.
 struct Assembly<'a> {
@@ -31,6 +36,8 @@ struct Assembly<'a> {
     solids: Vec<Solid>,
     placed: Vec<Placed>,
     notes: Vec<String>,
+    /// The mesh of the car, once there is one.
+    car: Option<Rc<Mesh>>,
 }
 
 /// Makes the scene that `source` describes; meshes are looked for in `base`.
@@ -49,6 +56,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         solids: vec![],
         placed: vec![],
         notes: vec![],
+        car: None,
     };
     assembly.define(&file)?;
     let sensor = assembly.pose(&file.sensor)?;
@@ -56,24 +64,38 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
     }
     if let Some(ground) = &file.ground {
-        assembly.ground(ground)?;
+        let height = assembly.ground(ground)?;
+        let below = height - sensor.position[2];
+        if below > 0.0 {
+            let note = format!(
+                "sensor: it stands {below:.2} m below the ground; lift it, unless that is meant"
+            );
+            assembly.notes.push(note);
+        }
     }
-    for (index, thing) in file.objects.iter().enumerate() {
-        assembly.thing(index, thing)?;
+    for (name, written) in assembly.names(&file)?.into_iter().zip(&file.objects) {
+        assembly.add_object(name, written)?;
     }
     if assembly.solids.is_empty() && assembly.placed.is_empty() {
         assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
     }
     let pose = |stand: &Stand| assembly.pose(stand);
-    let (others, assumed) = other::others((source, base), &file.others, pose)?;
+    let (interferers, assumed) = interferer::interferers((source, base), &file.interferers, pose)?;
     assembly.notes.extend(assumed);
-    let Assembly { materials, objects, solids, placed, notes, .. } = assembly;
+    let Assembly { materials, objects, solids, placed, mut notes, .. } = assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Fnv::new();
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
+    let shapes = inside::shapes_around(&solids, sensor.position);
+    let meshes: Vec<u16> = placed.iter().map(|placed| placed.object).collect();
     let world = placed::world(placed, solids, sensor.position);
-    Ok(Scene { name, materials, objects, sensor, others, notes, world, surfaces })
+    let meshes = inside::meshes_around(&world, &meshes, sensor.position);
+    notes.extend(shapes.iter().chain(&meshes).map(|object| {
+        let name = &objects[usize::from(*object)].name;
+        format!("sensor: it stands inside {name}; move one of them, unless that is meant")
+    }));
+    Ok(Scene { name, materials, objects, sensor, interferers, notes, world, surfaces })
 }
 
 impl Assembly<'_> {
@@ -113,65 +135,91 @@ impl Assembly<'_> {
         Ok(())
     }
 
-    fn ground(&mut self, ground: &Ground) -> Result<(), Error> {
+    /// Adds the ground; gives its height, m.
+    fn ground(&mut self, ground: &Ground) -> Result<f64, Error> {
         let material = self.material_typed(&ground.material)?;
         let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.finite(z, "z_m"))?;
         let object = self.object("ground".to_owned(), false, 0..0)?;
         let shape = Shape::Plane { normal: [0.0, 0.0, 1.0] };
         self.solids.push(Solid::new(shape, Pose::at([0.0, 0.0, height]), material, object));
-        Ok(())
+        Ok(height)
     }
 
-    fn thing(&mut self, index: usize, spanned: &Spanned<Thing>) -> Result<(), Error> {
-        let thing = spanned.get_ref();
-        let kinds = [thing.mesh.is_some(), thing.car.is_some(), thing.shape.is_some()];
+    /// What the objects of the file are called; refuses two of one name.
+    fn names(&self, file: &SceneFile) -> Result<Vec<String>, Error> {
+        let typed: Vec<Option<&Spanned<String>>> =
+            file.objects.iter().map(|object| object.get_ref().name.as_ref()).collect();
+        let ground = file.ground.as_ref().map(|ground| ("ground", ground.material.span()));
+        let mut taken: HashMap<&str, Range<usize>> = ground.into_iter().collect();
+        for name in typed.iter().flatten() {
+            if let Some(first) = taken.insert(name.get_ref(), name.span()) {
+                let (line, column) = line_column(self.source.text, first.start);
+                let message = format!(
+                    "another object is called {:?} at line {line}, column {column}; give one of \
+                     them another name",
+                    name.get_ref()
+                );
+                return Err(self.source.fault(name.span(), message));
+            }
+        }
+        let typed: Vec<Option<&str>> =
+            typed.iter().map(|name| name.map(|name| name.get_ref().as_str())).collect();
+        Ok(object_names(&typed))
+    }
+
+    fn add_object(&mut self, name: String, spanned: &Spanned<ObjectTyped>) -> Result<(), Error> {
+        let written = spanned.get_ref();
+        let kinds = [written.mesh.is_some(), written.car.is_some(), written.shape.is_some()];
         if kinds.iter().filter(|given| **given).count() != 1 {
             let message = "an object needs exactly one of `mesh`, `car` and `shape`";
             return Err(self.source.fault(spanned.span(), message));
         }
-        let name = thing.name.clone().unwrap_or_else(|| format!("object-{}", index + 1));
-        let mut stands = vec![thing.stand()];
-        stands.extend(thing.copies.iter().cloned());
+        let mut stands = vec![written.stand()];
+        stands.extend(written.copies.iter().cloned());
         let poses = stands.iter().map(|stand| self.pose(stand)).collect::<Result<Vec<_>, _>>()?;
-        let object = self.object(name.clone(), thing.target, spanned.span())?;
-        if let Some(shape) = &thing.shape {
-            self.refuse_mesh_keys(thing)?;
-            let material = match &thing.material {
+        let object = self.object(name.clone(), written.target, spanned.span())?;
+        if let Some(shape) = &written.shape {
+            self.refuse_mesh_keys(written)?;
+            let material = match &written.material {
                 Some(typed) => self.material_typed(typed)?,
                 None => self.unnamed(&name),
             };
             for mut pose in poses {
                 let shape = self.shape(shape)?;
-                if thing.rest_on_ground {
+                if written.rest_on_ground {
                     pose.position[2] += shape.depth_below(&pose);
                 }
                 self.solids.push(Solid::new(shape, pose, material, object));
             }
             return Ok(());
         }
-        let mesh = Rc::new(self.mesh(&name, thing)?);
-        let paints = self.paints(&name, thing, &mesh)?;
-        let stand = |pose: &Pose| stand(&mesh, pose, thing.rest_on_ground);
+        let mesh = self.mesh(&name, written)?;
+        let material_indices = self.material_indices(&name, written, &mesh)?;
+        let stand = |pose: &Pose| stand(&mesh, pose, written.rest_on_ground);
         let at = poses.iter().map(stand).collect();
-        self.placed.push(Placed { mesh, paints, at, object });
+        self.placed.push(Placed { mesh, material_indices, at, object });
         Ok(())
     }
 
     /// The mesh of an object in metres, x forward, z up.
-    fn mesh(&mut self, name: &str, thing: &Thing) -> Result<Mesh, Error> {
-        let Some(path) = &thing.mesh else {
-            self.refuse_mesh_keys(thing)?;
-            return Ok(car::mesh());
+    fn mesh(&mut self, name: &str, written: &ObjectTyped) -> Result<Rc<Mesh>, Error> {
+        let Some(path) = &written.mesh else {
+            self.refuse_mesh_keys(written)?;
+            let car = match self.car.take() {
+                Some(car) => car,
+                None => Rc::new(car::mesh()?),
+            };
+            return Ok(Rc::clone(self.car.insert(car)));
         };
-        let without = match thing.material {
+        let without = match written.material {
             Some(_) => WithoutMaterials::Fine,
             None => WithoutMaterials::Refused,
         };
         let path = self.base.join(path.get_ref());
         let mut mesh = readers::read(&path, without)?;
         let gltf = readers::is_gltf(&path);
-        let metres = self.metres_per_unit(name, thing)?;
-        let (up, forward) = self.axes(name, thing, gltf)?;
+        let metres = self.metres_per_unit(name, written)?;
+        let (up, forward) = self.axes(name, written, gltf)?;
         let left = up.cross(forward);
         for vertex in &mut mesh.vertices {
             let place = DVec3::from(*vertex) * metres;
@@ -184,28 +232,33 @@ impl Assembly<'_> {
                 "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
             ));
         }
-        Ok(mesh)
+        Ok(Rc::new(mesh))
     }
 
-    fn metres_per_unit(&mut self, name: &str, thing: &Thing) -> Result<f64, Error> {
-        let scale = match &thing.scale {
+    fn metres_per_unit(&mut self, name: &str, written: &ObjectTyped) -> Result<f64, Error> {
+        let scale = match &written.scale {
             Some(scale) => self.positive(scale, "scale")?,
             None => 1.0,
         };
-        if thing.unit.is_none() && thing.scale.is_none() {
+        if written.unit.is_none() && written.scale.is_none() {
             self.notes.push(format!("{name}: no unit given, its lengths are read as metres"));
         }
-        Ok(scale * thing.unit.unwrap_or(Unit::M).metres())
+        Ok(scale * written.unit.unwrap_or(Unit::M).metres())
     }
 
     /// Up and forward of a mesh, as unit vectors in its own axes.
-    fn axes(&mut self, name: &str, thing: &Thing, gltf: bool) -> Result<(DVec3, DVec3), Error> {
+    fn axes(
+        &mut self,
+        name: &str,
+        written: &ObjectTyped,
+        gltf: bool,
+    ) -> Result<(DVec3, DVec3), Error> {
         // glTF 2.0 declares y up and z forward; the other formats declare nothing.
         let usual = if gltf { (Axis::Y, Axis::Z) } else { (Axis::Z, Axis::X) };
-        let up = thing.up.as_ref().map_or(usual.0, |axis| *axis.get_ref());
+        let up = written.up.as_ref().map_or(usual.0, |axis| *axis.get_ref());
         let across = |axis: Axis| DVec3::from(axis.vector()).dot(DVec3::from(up.vector())) == 0.0;
         let fallback = [usual.1, Axis::X, Axis::Z].into_iter().find(|axis| across(*axis));
-        let forward = match &thing.forward {
+        let forward = match &written.forward {
             Some(typed) if !across(*typed.get_ref()) => {
                 let message = "`forward` and `up` lie on the same axis; name two different ones";
                 return Err(self.source.fault(typed.span(), message));
@@ -215,7 +268,7 @@ impl Assembly<'_> {
         };
         let why = if gltf { "as glTF has it" } else { "assumed" };
         for (given, key, axis) in
-            [(thing.up.is_some(), "up", up), (thing.forward.is_some(), "forward", forward)]
+            [(written.up.is_some(), "up", up), (written.forward.is_some(), "forward", forward)]
         {
             if !given {
                 self.notes.push(format!("{name}: {key} is its {} axis, {why}", axis.word()));
@@ -224,9 +277,14 @@ impl Assembly<'_> {
         Ok((DVec3::from(up.vector()), DVec3::from(forward.vector())))
     }
 
-    /// The scene's material for each material of the mesh.
-    fn paints(&mut self, name: &str, thing: &Thing, mesh: &Mesh) -> Result<Vec<u16>, Error> {
-        for (wanted, typed) in &thing.materials {
+    /// For each material of the mesh, the index of the one it stands for in the scene.
+    fn material_indices(
+        &mut self,
+        name: &str,
+        written: &ObjectTyped,
+        mesh: &Mesh,
+    ) -> Result<Vec<u16>, Error> {
+        for (wanted, typed) in &written.materials {
             if !mesh.material_names.contains(wanted) {
                 let own: Vec<&str> = mesh
                     .material_names
@@ -247,10 +305,10 @@ impl Assembly<'_> {
                 return Err(self.source.fault(typed.span(), message));
             }
         }
-        let mut paints = Vec::with_capacity(mesh.material_names.len());
+        let mut indices = Vec::with_capacity(mesh.material_names.len());
         for (own, guess) in mesh.material_names.iter().zip(&mesh.diffuse_guesses) {
             let known = self.known(own);
-            paints.push(match (thing.materials.get(own), &thing.material, known, guess) {
+            indices.push(match (written.materials.get(own), &written.material, known, guess) {
                 (Some(typed), ..) | (None, Some(typed), ..) => self.material_typed(typed)?,
                 (None, None, Some(known), _) => self.enlist(known),
                 (None, None, None, Some(diffuse)) => {
@@ -263,7 +321,7 @@ impl Assembly<'_> {
                 (None, None, None, None) => self.unnamed(&format!("{name}, {own:?}")),
             });
         }
-        Ok(paints)
+        Ok(indices)
     }
 
     fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Shape, Error> {
@@ -285,11 +343,11 @@ impl Assembly<'_> {
     }
 
     /// Keys that mean something only for the mesh of a file.
-    fn refuse_mesh_keys(&self, thing: &Thing) -> Result<(), Error> {
+    fn refuse_mesh_keys(&self, written: &ObjectTyped) -> Result<(), Error> {
         let spans: [(Option<Range<usize>>, &str); 3] = [
-            (thing.scale.as_ref().map(Spanned::span), "scale"),
-            (thing.up.as_ref().map(Spanned::span), "up"),
-            (thing.forward.as_ref().map(Spanned::span), "forward"),
+            (written.scale.as_ref().map(Spanned::span), "scale"),
+            (written.up.as_ref().map(Spanned::span), "up"),
+            (written.forward.as_ref().map(Spanned::span), "forward"),
         ];
         for (span, key) in spans {
             if let Some(span) = span {

@@ -1,7 +1,7 @@
 //! Rays gathered into packets, and followed through glass.
 
 use super::pose::Transform;
-use super::world::Met;
+use super::world::PacketHits;
 use super::{Hits, Scene};
 use crate::kernels::{LANES, Lanes, Packet, turned};
 
@@ -24,7 +24,7 @@ pub(super) struct Batch<'a> {
     /// In the frame of the sensor, by axis.
     aims: [Lanes<f64>; 3],
     packet: Packet,
-    met: Met,
+    packet_hits: PacketHits,
     /// Rays in the packet.
     count: usize,
     shot: Lanes<u32>,
@@ -55,7 +55,7 @@ impl<'a> Batch<'a> {
             world_from_sensor: scene.sensor.world_from_sensor(),
             aims: [[0.0; LANES]; 3],
             packet: Packet::from(scene.sensor.position),
-            met: Met::default(),
+            packet_hits: PacketHits::default(),
             count: 0,
             shot: [0; LANES],
             weight: [0.0; LANES],
@@ -92,20 +92,20 @@ impl<'a> Batch<'a> {
         self.packet.range = [self.farthest; LANES];
         self.packet.range[self.count..].fill(f64::NAN);
         self.count = 0;
-        self.scene.world.cast_packet(&mut self.packet, &mut self.met);
-        let Self { packet, met, .. } = self;
+        self.scene.world.cast_packet(&mut self.packet, &mut self.packet_hits);
+        let Self { packet, packet_hits, .. } = self;
         let mut hit = [0; LANES];
         let mut count = 0;
         for lane in 0..LANES {
             hit[count] = lane;
-            count += usize::from(met.is_hit(packet, lane));
+            count += usize::from(packet_hits.is_hit(packet, lane));
         }
         let hit = &hit[..count];
         if hit.is_empty() {
             return;
         }
-        self.scene.world.describe(packet, met);
-        if hit.iter().any(|lane| self.through[usize::from(met.material[*lane])] > 0.0) {
+        self.scene.world.describe(packet, packet_hits);
+        if hit.iter().any(|lane| self.through[usize::from(packet_hits.material[*lane])] > 0.0) {
             self.follow();
         } else {
             self.write_first(hit);
@@ -114,35 +114,35 @@ impl<'a> Batch<'a> {
 
     /// Writes what the rays of the lanes in `hit` have met first.
     fn write_first(&mut self, hit: &[usize]) {
-        let Self { packet, met, hits, .. } = self;
+        let Self { packet, packet_hits, hits, .. } = self;
         keep(&mut hits.shot, hit, &self.shot);
         keep(&mut hits.weight, hit, &self.weight);
         keep(&mut hits.range, hit, &packet.range);
-        keep(&mut hits.cosine, hit, &met.cosine);
-        keep(&mut hits.material, hit, &met.material);
-        keep(&mut hits.object, hit, &met.object);
+        keep(&mut hits.cosine, hit, &packet_hits.cosine);
+        keep(&mut hits.material, hit, &packet_hits.material);
+        keep(&mut hits.object, hit, &packet_hits.object);
     }
 
     /// Sends the rays that have met glass on, until none is left, and writes what all have met.
     fn follow(&mut self) {
-        let Self { packet, met, layers, .. } = self;
+        let Self { packet, packet_hits, layers, .. } = self;
         let mut transmitted = [1.0_f32; LANES];
         layers.clear();
         for pane in 0..PANES {
             let mut goes_on = false;
             for (lane, transmitted) in transmitted.iter_mut().enumerate() {
-                if !met.is_hit(packet, lane) {
+                if !packet_hits.is_hit(packet, lane) {
                     packet.range[lane] = f64::NAN;
                     continue;
                 }
-                let (range, material) = (packet.range[lane], met.material[lane]);
+                let (range, material) = (packet.range[lane], packet_hits.material[lane]);
                 layers.push(Surface {
                     lane,
                     transmitted: *transmitted,
                     range,
-                    cosine: met.cosine[lane],
+                    cosine: packet_hits.cosine[lane],
                     material,
-                    object: met.object[lane],
+                    object: packet_hits.object[lane],
                 });
                 let through = self.through[usize::from(material)];
                 *transmitted *= through * through;
@@ -154,8 +154,8 @@ impl<'a> Batch<'a> {
             if !goes_on || pane + 1 == PANES {
                 break;
             }
-            self.scene.world.cast_packet(packet, met);
-            self.scene.world.describe(packet, met);
+            self.scene.world.cast_packet(packet, packet_hits);
+            self.scene.world.describe(packet, packet_hits);
         }
         // Stable: the surfaces of a ray stay in their order.
         layers.sort_by_key(|surface| surface.lane);

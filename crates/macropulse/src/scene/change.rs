@@ -4,6 +4,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
+use super::file::object_names;
 use super::{Error, Scene};
 use crate::names::nearest;
 
@@ -76,7 +77,7 @@ fn below<'a>(value: &'a mut Value, step: &str) -> Result<&'a mut Value, String> 
         Value::Table(inner) => inner.get_mut(step).ok_or_else(|| absent(step)),
         Value::Array(list) => {
             let names: Vec<String> = match list.first().is_some_and(Value::is_table) {
-                true => list.iter().enumerate().map(name).collect(),
+                true => object_names(&list.iter().map(name).collect::<Vec<_>>()),
                 false => COORDINATES.map(str::to_owned).to_vec(),
             };
             let place = names.iter().position(|name| name == step);
@@ -91,10 +92,9 @@ fn below<'a>(value: &'a mut Value, step: &str) -> Result<&'a mut Value, String> 
     }
 }
 
-/// As scenes call an object without a name.
-fn name((index, value): (usize, &Value)) -> String {
-    let named = value.get("name").and_then(Value::as_str).map(str::to_owned);
-    named.unwrap_or_else(|| format!("object-{}", index + 1))
+/// The name that is typed for an object.
+fn name(object: &Value) -> Option<&str> {
+    object.get("name").and_then(Value::as_str)
 }
 
 fn absent(step: &str) -> String {

@@ -16,11 +16,11 @@ impl Fnv {
 
     /// Takes in a mesh, what it is made of, and where it stands.
     pub(super) fn placed(&mut self, placed: &Placed) {
-        let Placed { mesh, paints, at, object } = placed;
+        let Placed { mesh, material_indices, at, object } = placed;
         mesh.vertices.iter().flatten().for_each(|value| self.number(*value));
         for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
             triangle.iter().for_each(|corner| self.bytes(&corner.to_le_bytes()));
-            self.bytes(&paints[usize::from(*material)].to_le_bytes());
+            self.bytes(&material_indices[usize::from(*material)].to_le_bytes());
         }
         for place in at {
             let origin = place.point([0.0; 3]);

@@ -2,7 +2,7 @@
 //!
 //! This file knows the words and their places; [`super::assemble`] knows what they mean.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
 use serde::Deserialize;
@@ -23,15 +23,15 @@ pub(super) struct SceneFile {
     #[serde(default, rename = "material")]
     pub materials: Vec<Spanned<Defined>>,
     #[serde(default, rename = "object")]
-    pub objects: Vec<Spanned<Thing>>,
+    pub objects: Vec<Spanned<ObjectTyped>>,
     #[serde(default)]
-    pub others: Vec<Spanned<OtherTyped>>,
+    pub interferers: Vec<Spanned<InterfererTyped>>,
 }
 
-/// `[[others]]`
+/// `[[interferers]]`
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct OtherTyped {
+pub(super) struct InterfererTyped {
     pub name: Option<String>,
     pub sensor: Spanned<String>,
     #[serde(default)]
@@ -44,7 +44,7 @@ pub(super) struct OtherTyped {
     pub drift_ppm: Option<Spanned<f64>>,
 }
 
-impl OtherTyped {
+impl InterfererTyped {
     /// Where the lidar stands.
     pub(super) fn stand(&self) -> Stand {
         Stand {
@@ -89,8 +89,8 @@ pub(super) struct Defined {
 /// `[[object]]`
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Thing {
-    pub name: Option<String>,
+pub(super) struct ObjectTyped {
+    pub name: Option<Spanned<String>>,
     pub mesh: Option<Spanned<String>>,
     pub car: Option<Car>,
     pub shape: Option<Spanned<ShapeTyped>>,
@@ -113,7 +113,7 @@ pub(super) struct Thing {
     pub copies: Vec<Stand>,
 }
 
-impl Thing {
+impl ObjectTyped {
     /// Where the object itself stands.
     pub(super) fn stand(&self) -> Stand {
         Stand {
@@ -209,7 +209,23 @@ impl Axis {
     }
 }
 
-/// The text of a scene file and its name: turns spans into places.
+/// What objects are called, in their order, of which these names are typed. One without a name is
+/// called by its number, from 1; where another has that name, by as many more as it takes.
+pub(super) fn object_names(typed: &[Option<&str>]) -> Vec<String> {
+    let taken: HashSet<&str> = typed.iter().copied().flatten().collect();
+    let automatic = |index: usize| {
+        let further = (2..).map(|more| format!("object-{}-{more}", index + 1));
+        let mut names = std::iter::once(format!("object-{}", index + 1)).chain(further);
+        names.find(|name| !taken.contains(name.as_str())).unwrap_or_default()
+    };
+    let name = |(index, typed): (usize, &Option<&str>)| match typed {
+        Some(name) => (*name).to_owned(),
+        None => automatic(index),
+    };
+    typed.iter().enumerate().map(name).collect()
+}
+
+/// The text of a scene file and its name: finds line and column of what is wrong.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub text: &'a str,
@@ -261,6 +277,12 @@ mod tests {
         let message = told("version = 1\n[[object]]\n  positon_m = [1, 0, 0]\n");
         assert!(message.starts_with("a.toml:3:3: unknown field `positon_m`"), "{message}");
         assert!(message.ends_with("did you mean `position_m`?"), "{message}");
+    }
+
+    #[test]
+    fn objects_without_a_name_get_one_of_their_own() {
+        let names = object_names(&[None, Some("object-1"), Some("wall"), None, Some("object-1-2")]);
+        assert_eq!(names, ["object-1-3", "object-1", "wall", "object-4", "object-1-2"]);
     }
 
     #[test]

@@ -4,17 +4,17 @@ mod assemble;
 mod batch;
 mod builtin;
 mod car;
-mod car_parts;
 mod change;
 mod closed_form;
 mod digest;
 mod error;
 mod file;
 mod hits;
-mod lit;
+mod illuminated;
+mod inside;
+mod interferer;
 pub mod material;
 mod mesh;
-mod other;
 mod placed;
 mod pose;
 mod raycast;
@@ -30,17 +30,17 @@ pub use car::SIZE as CAR_SIZE;
 pub use closed_form::{Shape, Solid};
 pub use error::Error;
 pub use hits::{CastRays, Hit, Hits, Ray};
-pub use lit::{Lit, Look};
+pub use illuminated::{Illuminated, LineOfSight};
+pub use interferer::Interferer;
 pub use material::Material;
 pub use mesh::Mesh;
-pub use other::Other;
 pub use pose::{Pose, Transform};
 pub use trace::{PARTS, Traced};
 
 use crate::digest::Fnv;
 use crate::kernels::{LANES, Packet};
 use file::Source;
-use world::{Met, World};
+use world::{PacketHits, World};
 
 /// Everything the light can meet, and where the sensor stands.
 ///
@@ -54,8 +54,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Where the sensor stands and looks.
     pub sensor: Pose,
-    /// The other lidars that shine into it.
-    pub others: Vec<Other>,
+    /// The other lidars whose light falls into the scene.
+    pub interferers: Vec<Interferer>,
     /// Every assumption made while reading: units, axes, materials. To be shown to the user.
     pub notes: Vec<String>,
     world: World,
@@ -63,7 +63,7 @@ pub struct Scene {
     surfaces: Fnv,
 }
 
-/// A thing in the scene.
+/// An object of the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     /// Name, as the scene file has it.
@@ -134,15 +134,15 @@ impl Scene {
     /// ranges.
     pub fn cast_all(&self, origin: [f64; 3], directions: &[[f64; 3]], farthest: f64) -> Vec<f64> {
         let mut ranges = Vec::with_capacity(directions.len());
-        let (mut packet, mut met) = (Packet::from(origin), Met::default());
+        let (mut packet, mut hits) = (Packet::from(origin), PacketHits::default());
         for some in directions.chunks(LANES) {
             packet.range = [f64::NAN; LANES];
             for (lane, direction) in some.iter().enumerate() {
                 packet.set(lane, *direction, farthest);
             }
-            self.world.cast_packet(&mut packet, &mut met);
+            self.world.cast_packet(&mut packet, &mut hits);
             let range =
-                |lane| if met.is_hit(&packet, lane) { packet.range[lane] } else { f64::INFINITY };
+                |lane| if hits.is_hit(&packet, lane) { packet.range[lane] } else { f64::INFINITY };
             ranges.extend((0..some.len()).map(range));
         }
         ranges
@@ -170,7 +170,7 @@ impl Scene {
             hash.bytes(&[u8::from(object.is_target)]);
         }
         hash.pose(&self.sensor);
-        self.others.iter().for_each(|other| hash.other(other));
+        self.interferers.iter().for_each(|interferer| hash.interferer(interferer));
         hash.text()
     }
 }
@@ -182,7 +182,7 @@ impl fmt::Debug for Scene {
             .field("materials", &self.materials)
             .field("objects", &self.objects)
             .field("sensor", &self.sensor)
-            .field("others", &self.others)
+            .field("interferers", &self.interferers)
             .field("notes", &self.notes)
             .field("triangles", &self.triangles())
             .finish_non_exhaustive()

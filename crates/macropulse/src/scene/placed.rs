@@ -13,7 +13,7 @@ use super::world::{Copy, World};
 pub(super) struct Placed {
     pub mesh: Rc<Mesh>,
     /// The scene's material for each of the mesh.
-    pub paints: Vec<u16>,
+    pub material_indices: Vec<u16>,
     pub at: Vec<Transform>,
     pub object: u16,
 }
@@ -37,7 +37,7 @@ impl Placed {
         let each = self.mesh.triangles.iter().zip(&self.mesh.material_of_triangle);
         each.map(move |(triangle, material)| Facet {
             corners: triangle.map(|corner| vertices[corner as usize]),
-            material: self.paints[usize::from(*material)],
+            material: self.material_indices[usize::from(*material)],
             object: self.object,
         })
     }
@@ -51,7 +51,7 @@ impl Placed {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        self.paints == other.paints
+        self.material_indices == other.material_indices
             && (Rc::ptr_eq(&self.mesh, &other.mesh) || self.mesh == other.mesh)
     }
 }

@@ -15,7 +15,7 @@ pub(super) struct Facet {
 pub(super) struct Facets {
     pub triangles: Triangles,
     /// Material and object, in the order of the leaves.
-    pub paint: Vec<[u16; 2]>,
+    pub material_and_object: Vec<[u16; 2]>,
 }
 
 impl Facets {
@@ -24,11 +24,11 @@ impl Facets {
     pub(super) fn new(facets: &[Facet], centre: [f64; 3]) -> Self {
         let (triangles, order) =
             Triangles::new(facets.len(), |index| facets[index].corners, centre);
-        let paint = |index: &u32| {
+        let pair = |index: &u32| {
             let Facet { material, object, .. } = facets[*index as usize];
             [material, object]
         };
-        Self { triangles, paint: order.iter().map(paint).collect() }
+        Self { triangles, material_and_object: order.iter().map(pair).collect() }
     }
 
     /// Number of triangles that can be hit.
@@ -40,7 +40,7 @@ impl Facets {
 impl CastRays for Facets {
     fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
         let met = self.triangles.nearest((ray.origin, ray.direction), (nearest, farthest))?;
-        let [material, object] = self.paint[met.leaf as usize];
+        let [material, object] = self.material_and_object[met.leaf as usize];
         let normal = self.triangles.normal(met.leaf);
         Some(Hit { range: met.range, normal, material, object })
     }

@@ -1,9 +1,9 @@
 //! All surfaces of a scene: triangles, copies of meshes, closed-form shapes. The nearest wins.
 //!
-//! There are three kinds. What is unbounded is asked by every ray. What stands alone, a shape or a
-//! copy of a mesh that occurs more than once, is found by a hierarchy over boxes. The triangles of
-//! all other meshes lie in one hierarchy, in the world. Of surfaces equally far away the shape
-//! wins that comes first in the scene file, then the copy, then the triangle.
+//! There are three kinds. Unbounded planes are intersected with every ray. Other shapes, and copies
+//! of a mesh that occurs more than once, are found by a hierarchy over their bounding boxes. The
+//! triangles of all other meshes lie in one hierarchy, in the world. Of surfaces equally far away
+//! the shape wins that comes first in the scene file, then the copy, then the triangle.
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -14,13 +14,13 @@ use super::pose::Transform;
 use super::raycast::{Facet, Facets};
 use crate::kernels::{LANES, Lanes, NONE, Packet, Tree, Waiting, cosines, normals, turned};
 
-/// Everything that light can meet.
+/// Every surface of a scene, ready for rays.
 pub(super) struct World {
     facets: Facets,
     /// Meshes that occur more than once, in their own frames.
     models: Vec<Facets>,
     /// Those without bounds first, then in the order of their ranks.
-    things: Vec<Thing>,
+    primitives: Vec<Primitive>,
     /// How many have no bounds.
     unbounded: usize,
     /// Over the others.
@@ -38,8 +38,8 @@ pub(super) struct Copy {
     pub object: u16,
 }
 
-/// A surface that stands alone.
-enum Thing {
+/// A surface that is tested on its own: a shape, or a copy of a mesh that occurs more than once.
+enum Primitive {
     Solid(Box<Solid>),
     Copy { copy: Copy, from_world: Transform },
 }
@@ -60,92 +60,94 @@ impl World {
         let (unbounded, bounded): (Vec<Solid>, Vec<Solid>) =
             solids.into_iter().partition(|solid| solid.half_extent().is_none());
         let first = unbounded.len();
-        let mut things: Vec<Thing> = unbounded
+        let mut primitives: Vec<Primitive> = unbounded
             .into_iter()
             .chain(bounded)
-            .map(|solid| Thing::Solid(Box::new(solid)))
+            .map(|solid| Primitive::Solid(Box::new(solid)))
             .collect();
-        things.extend(
+        primitives.extend(
             copies
                 .iter()
-                .map(|copy| Thing::Copy { copy: *copy, from_world: copy.to_world.inverse() }),
+                .map(|copy| Primitive::Copy { copy: *copy, from_world: copy.to_world.inverse() }),
         );
-        let boxes: Vec<Aabb> =
-            things[first..].iter().map(|thing| bounds(thing, &models, centre)).collect();
+        let boxes: Vec<Aabb> = primitives[first..]
+            .iter()
+            .map(|primitive| bounds(primitive, &models, centre))
+            .collect();
         let (tree, order) = Tree::over(&boxes, centre);
         let leaves = order.iter().map(|index| first as u32 + index).collect();
         let facets = Facets::new(facets, centre);
-        Self { facets, models, things, unbounded: first, tree, leaves }
+        Self { facets, models, primitives, unbounded: first, tree, leaves }
     }
 
     /// Number of triangles that can be hit, copies included.
     pub(super) fn triangles(&self) -> usize {
-        let of_thing = |thing: &Thing| match thing {
-            Thing::Copy { copy, .. } => self.models[copy.model].len(),
-            Thing::Solid(_) => 0,
+        let of_primitive = |primitive: &Primitive| match primitive {
+            Primitive::Copy { copy, .. } => self.models[copy.model].len(),
+            Primitive::Solid(_) => 0,
         };
-        self.facets.len() + self.things.iter().map(of_thing).sum::<usize>()
+        self.facets.len() + self.primitives.iter().map(of_primitive).sum::<usize>()
     }
 
     /// What each ray of `packet` meets first, as [`CastRays::cast`] has it; the range of those
     /// that meet nothing stays.
-    pub(super) fn cast_packet(&self, packet: &mut Packet, met: &mut Met) {
-        met.thing = [NONE; LANES];
-        let Met { thing, face, .. } = met;
+    pub(super) fn cast_packet(&self, packet: &mut Packet, hits: &mut PacketHits) {
+        hits.primitive = [NONE; LANES];
+        let PacketHits { primitive, face, .. } = hits;
         for index in 0..self.unbounded {
-            self.meet_packet(index as u32, packet, (u32::MAX, thing, face), &mut met.inner);
+            self.meet_packet(index as u32, packet, (u32::MAX, primitive, face), &mut hits.inner);
         }
-        packet.visit(&self.tree, &mut met.waiting, &mut |packet, leaf, set| {
+        packet.visit(&self.tree, &mut hits.waiting, &mut |packet, leaf, set| {
             let index = self.leaves[leaf as usize];
-            self.meet_packet(index, packet, (set, thing, face), &mut met.inner);
+            self.meet_packet(index, packet, (set, primitive, face), &mut hits.inner);
         });
-        packet.cast(&self.facets.triangles, &mut met.waiting);
+        packet.cast(&self.facets.triangles, &mut hits.waiting);
     }
 
-    /// Fills in what the rays of `packet` have met. Gives normals, of any length.
-    pub(super) fn describe(&self, packet: &Packet, met: &mut Met) -> [Lanes<f64>; 3] {
+    /// Fills in cosine, material and object of each hit of `packet`. Gives normals, of any length.
+    pub(super) fn describe(&self, packet: &Packet, hits: &mut PacketHits) -> [Lanes<f64>; 3] {
         let mut across = [[0.0; LANES]; 3];
         if packet.leaf != [NONE; LANES] {
             across = normals(&self.facets.triangles, packet);
         }
         for lane in 0..LANES {
-            if let Some(paint) = self.facets.paint.get(packet.leaf[lane] as usize) {
-                [met.material[lane], met.object[lane]] = *paint;
-            } else if met.thing[lane] != NONE {
+            if let Some(pair) = self.facets.material_and_object.get(packet.leaf[lane] as usize) {
+                [hits.material[lane], hits.object[lane]] = *pair;
+            } else if hits.primitive[lane] != NONE {
                 let ray = Ray { origin: packet.origin, direction: packet.along(lane) };
-                let found = (packet.range[lane], met.face[lane]);
-                let hit = self.hit(met.thing[lane], &ray, found);
-                (met.material[lane], met.object[lane]) = (hit.material, hit.object);
+                let found = (packet.range[lane], hits.face[lane]);
+                let hit = self.hit(hits.primitive[lane], &ray, found);
+                (hits.material[lane], hits.object[lane]) = (hit.material, hit.object);
                 let [x, y, z] = &mut across;
                 [x[lane], y[lane], z[lane]] = hit.normal;
             }
         }
-        met.cosine = cosines(packet, &across);
+        hits.cosine = cosines(packet, &across);
         across
     }
 
-    /// Lets the rays of `set` meet a thing, and notes which they have met where.
+    /// Intersects the rays of `set` with one primitive, and records which of them hit it and where.
     #[inline]
     fn meet_packet(
         &self,
         index: u32,
         packet: &mut Packet,
-        (set, thing, face): (u32, &mut Lanes<u32>, &mut Lanes<u32>),
+        (set, primitive, face): (u32, &mut Lanes<u32>, &mut Lanes<u32>),
         waiting: &mut Waiting,
     ) {
         let mut limit = packet.range;
         for lane in 0..LANES {
             // Of two equally far the lower rank wins, whichever comes first.
-            if thing[lane] != NONE && index < thing[lane] {
+            if primitive[lane] != NONE && index < primitive[lane] {
                 limit[lane] = limit[lane].next_up();
             }
             if set >> lane & 1 == 0 {
                 limit[lane] = f64::NAN;
             }
         }
-        let (ranges, faces) = match &self.things[index as usize] {
-            Thing::Solid(solid) => solid.meet_packet(packet, &limit),
-            Thing::Copy { copy, from_world } => {
+        let (ranges, faces) = match &self.primitives[index as usize] {
+            Primitive::Solid(solid) => solid.meet_packet(packet, &limit),
+            Primitive::Copy { copy, from_world } => {
                 let mut local = Packet::from(from_world.point(packet.origin));
                 local.direction = turned(from_world.rotation(), &packet.direction);
                 (local.nearest, local.range) = (packet.nearest, limit);
@@ -160,20 +162,20 @@ impl World {
         for lane in 0..LANES {
             if !ranges[lane].is_nan() {
                 packet.range[lane] = ranges[lane];
-                (thing[lane], face[lane]) = (index, faces[lane]);
+                (primitive[lane], face[lane]) = (index, faces[lane]);
             }
         }
     }
 
-    /// The hit of a ray on a thing, whose face, or whose leaf, it has met at `range`.
+    /// The hit of a ray on a primitive, at `range` on this face of a shape or leaf of a mesh.
     #[inline(always)]
     fn hit(&self, index: u32, ray: &Ray, (range, face): (f64, u32)) -> Hit {
-        match &self.things[index as usize] {
-            Thing::Solid(solid) => solid.hit(ray, (range, face)),
-            Thing::Copy { copy, .. } => {
+        match &self.primitives[index as usize] {
+            Primitive::Solid(solid) => solid.hit(ray, (range, face)),
+            Primitive::Copy { copy, .. } => {
                 let model = &self.models[copy.model];
                 let normal = copy.to_world.direction(model.triangles.normal(face));
-                let [material, _] = model.paint[face as usize];
+                let [material, _] = model.material_and_object[face as usize];
                 Hit { range, normal, material, object: copy.object }
             }
         }
@@ -188,9 +190,9 @@ impl CastRays for World {
         let mut meet = |index: u32| {
             let wins = best.as_ref().is_some_and(|(holder, _)| index < *holder);
             let limit = if wins { farthest.next_up() } else { farthest };
-            let hit = match &self.things[index as usize] {
-                Thing::Solid(solid) => solid.cast(ray, nearest, limit),
-                Thing::Copy { copy, from_world } => {
+            let hit = match &self.primitives[index as usize] {
+                Primitive::Solid(solid) => solid.cast(ray, nearest, limit),
+                Primitive::Copy { copy, from_world } => {
                     let local = (from_world.point(ray.origin), from_world.direction(ray.direction));
                     let met = self.models[copy.model].triangles.nearest(local, (nearest, limit));
                     met.map(|met| self.hit(index, ray, (met.range, met.leaf)))
@@ -212,36 +214,36 @@ impl CastRays for World {
     }
 }
 
-/// What the rays of a packet have met; kept between packets.
+/// The first surface that each ray of a packet hits. Kept between packets for its memory.
 #[derive(Default)]
-pub(super) struct Met {
+pub(super) struct PacketHits {
     pub cosine: Lanes<f32>,
     pub material: Lanes<u16>,
     pub object: Lanes<u16>,
-    /// Which thing, and its face or its leaf.
-    thing: Lanes<u32>,
+    /// Index of the primitive that is hit, and its face or its leaf; [`NONE`] where none is.
+    primitive: Lanes<u32>,
     face: Lanes<u32>,
     waiting: Waiting,
     inner: Waiting,
 }
 
-impl Met {
-    /// Whether the ray of a lane has met anything.
+impl PacketHits {
+    /// Whether the ray of a lane hits any surface.
     #[inline]
     pub(super) fn is_hit(&self, packet: &Packet, lane: usize) -> bool {
-        packet.leaf[lane] != NONE || self.thing[lane] != NONE
+        packet.leaf[lane] != NONE || self.primitive[lane] != NONE
     }
 }
 
-/// A box about `centre` that holds a thing with bounds.
-fn bounds(thing: &Thing, models: &[Facets], centre: [f64; 3]) -> Aabb {
-    let (low, high) = match thing {
-        Thing::Solid(solid) => {
+/// The bounding box of a primitive that has bounds, relative to `centre`.
+fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Aabb {
+    let (low, high) = match primitive {
+        Primitive::Solid(solid) => {
             let half = solid.half_extent().unwrap_or(DVec3::INFINITY);
             let middle = DVec3::from(solid.pose().position);
             (middle - half, middle + half)
         }
-        Thing::Copy { copy, .. } => {
+        Primitive::Copy { copy, .. } => {
             let (middle, half) = models[copy.model].triangles.middle_and_half();
             let middle = DVec3::from(copy.to_world.point(middle));
             let half = copy.to_world.rotation().abs() * DVec3::from(half);
@@ -331,7 +333,7 @@ mod tests {
     #[test]
     fn a_packet_meets_what_its_rays_meet_alone() {
         let mut chance = ChaCha8Rng::seed_from_u64(11);
-        let (mut met, mut hits) = (Met::default(), 0);
+        let (mut packet_hits, mut hits) = (PacketHits::default(), 0);
         for world in worlds(&poses(&mut chance, 30)) {
             for round in 0..2000 {
                 let origin = [0; 3].map(|_| f64::from(round % 2) * chance.random_range(-9.0..9.0));
@@ -339,18 +341,21 @@ mod tests {
                 let mut packet = packet(&mut chance, origin, spread);
                 packet.nearest = [f64::from(round % 5); LANES];
                 let nearest = packet.nearest[0];
-                world.cast_packet(&mut packet, &mut met);
-                world.describe(&packet, &mut met);
+                world.cast_packet(&mut packet, &mut packet_hits);
+                world.describe(&packet, &mut packet_hits);
                 for lane in 0..LANES {
                     let ray = Ray { origin, direction: packet.along(lane) };
                     let alone = world.cast(&ray, nearest, 1e3);
-                    assert_eq!(met.is_hit(&packet, lane), alone.is_some());
+                    assert_eq!(packet_hits.is_hit(&packet, lane), alone.is_some());
                     let Some(hit) = alone else { continue };
                     hits += 1;
                     assert_eq!(packet.range[lane], hit.range);
                     let cosine = DVec3::from(ray.direction).dot(DVec3::from(hit.normal)).abs();
-                    assert_eq!(met.cosine[lane], cosine.min(1.0) as f32);
-                    assert_eq!((met.material[lane], met.object[lane]), (hit.material, hit.object));
+                    assert_eq!(packet_hits.cosine[lane], cosine.min(1.0) as f32);
+                    assert_eq!(
+                        (packet_hits.material[lane], packet_hits.object[lane]),
+                        (hit.material, hit.object)
+                    );
                 }
             }
         }
@@ -386,10 +391,10 @@ mod tests {
         let place = Pose { position: [100.0, -50.0, 3.0], yaw: 1.0, pitch: 0.3, roll: -0.2 };
         let [world, _] = worlds(&[place, Pose::at([0.0, 0.0, 300.0])]);
         let mut chance = ChaCha8Rng::seed_from_u64(13);
-        let mut met = Met::default();
+        let mut packet_hits = PacketHits::default();
         for _ in 0..20_000 {
             let mut packet = packet(&mut chance, place.position, 1.0);
-            world.cast_packet(&mut packet, &mut met);
+            world.cast_packet(&mut packet, &mut packet_hits);
             assert!((0..LANES).all(|lane| packet.range[lane] < 2.1));
         }
     }

@@ -6,7 +6,7 @@ mod ply;
 mod stl;
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 use super::error::Error;
@@ -39,6 +39,11 @@ pub(super) fn read(path: &Path, without: WithoutMaterials) -> Result<Mesh, Error
         }
     };
     mesh.checked(path)
+}
+
+/// Reads the PLY file that `bytes` are; `path` is its name in messages.
+pub(super) fn read_ply(bytes: &[u8], path: &Path) -> Result<Mesh, Error> {
+    ply::read_from(&mut Cursor::new(bytes), path)?.checked(path)
 }
 
 /// Whether `path` is a glTF file, whose axes and unit are fixed by its specification.

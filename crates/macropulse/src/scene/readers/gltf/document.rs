@@ -1,180 +1,140 @@
-//! The parts of a glTF document that make a mesh, named as its specification names them
-//! \[glTF2\].
+//! The container of a glTF file and its document, checked before the crate `gltf` relies on them.
 
-use std::collections::BTreeMap;
+use std::path::Path;
 
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use ::gltf::json::validation::{Checked, Error as Fault, Validate};
+use ::gltf::json::{Path as Place, Root};
+use ::gltf::{Document, Glb, Semantic};
 
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Document {
-    #[serde(default)]
-    pub extensions_required: Vec<String>,
-    pub scene: Option<usize>,
-    #[serde(default)]
-    pub scenes: Vec<Scene>,
-    #[serde(default)]
-    pub nodes: Vec<Node>,
-    #[serde(default)]
-    pub meshes: Vec<Surfaces>,
-    #[serde(default)]
-    pub materials: Vec<Material>,
-    #[serde(default)]
-    pub accessors: Vec<Accessor>,
-    #[serde(default)]
-    pub buffer_views: Vec<BufferView>,
-    #[serde(default)]
-    pub buffers: Vec<Buffer>,
-}
+use super::super::DAMAGED;
+use super::{Bytes, TOO_LARGE};
+use crate::scene::error::Error;
 
-#[derive(Debug, Deserialize)]
-pub(super) struct Scene {
-    #[serde(default)]
-    pub nodes: Vec<usize>,
-}
+/// Most objects, lists and values that a document may have: each takes some hundred bytes of
+/// memory at most, however short its text.
+const MOST_VALUES: usize = 1 << 22;
 
-#[derive(Debug, Deserialize)]
-pub(super) struct Node {
-    #[serde(default)]
-    pub children: Vec<usize>,
-    pub mesh: Option<usize>,
-    pub matrix: Option<[f64; 16]>,
-    #[serde(default)]
-    pub translation: [f64; 3],
-    /// A unit quaternion, x y z w.
-    #[serde(default = "no_rotation")]
-    pub rotation: [f64; 4],
-    #[serde(default = "no_scale")]
-    pub scale: [f64; 3],
-}
-
-fn no_rotation() -> [f64; 4] {
-    [0.0, 0.0, 0.0, 1.0]
-}
-
-fn no_scale() -> [f64; 3] {
-    [1.0; 3]
-}
-
-/// A `mesh`.
-#[derive(Debug, Deserialize)]
-pub(super) struct Surfaces {
-    pub primitives: Vec<Primitive>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Primitive {
-    pub attributes: BTreeMap<String, usize>,
-    pub indices: Option<usize>,
-    pub material: Option<usize>,
-    #[serde(default = "triangles")]
-    pub mode: u32,
-}
-
-fn triangles() -> u32 {
-    4
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Material {
-    #[serde(default)]
-    pub name: String,
-    #[serde(default, rename = "pbrMetallicRoughness")]
-    pub colour: Colour,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Colour {
-    #[serde(default = "white", rename = "baseColorFactor")]
-    pub factor: [f64; 4],
-    #[serde(rename = "baseColorTexture")]
-    pub texture: Option<IgnoredAny>,
-}
-
-impl Default for Colour {
-    fn default() -> Self {
-        Self { factor: white(), texture: None }
-    }
-}
-
-fn white() -> [f64; 4] {
-    [1.0; 4]
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Accessor {
-    pub buffer_view: Option<usize>,
-    #[serde(default)]
-    pub byte_offset: usize,
-    pub component_type: u32,
-    pub count: usize,
-    #[serde(rename = "type")]
-    pub shape: String,
-    pub sparse: Option<IgnoredAny>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct BufferView {
-    pub buffer: usize,
-    #[serde(default)]
-    pub byte_offset: usize,
-    pub byte_length: usize,
-    pub byte_stride: Option<usize>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Buffer {
-    pub uri: Option<String>,
-    pub byte_length: usize,
-}
-
-/// JSON and binary part of a file: those of a `.glb`, or all of it and nothing. `None` if the
-/// lengths in a container do not add up.
-pub(super) fn container(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+/// JSON and binary part of a file: those of a `.glb`, or all of it and nothing.
+///
+/// # Errors
+/// What is wrong, if the lengths in a container do not add up.
+pub(super) fn container(bytes: &[u8]) -> Result<[Bytes<'_>; 2], String> {
+    const HEADER: usize = 12;
     if !bytes.starts_with(b"glTF") {
-        return Some((bytes, &[]));
+        return Ok([bytes.into(), Bytes::default()]);
     }
-    let (text, rest) = chunk(bytes.get(12..)?, b"JSON")?;
-    match rest.is_empty() {
-        true => Some((text, &[])),
-        false => Some((text, chunk(rest, b"BIN\0")?.0)),
+    let refused = |why: &str| format!("is a glTF container that does not add up ({why})");
+    // The crate takes the header from this length without asking whether it is as long.
+    let length = bytes.get(8..HEADER).and_then(|length| length.try_into().ok());
+    let length = length.map_or(0, |length| u32::from_le_bytes(length) as usize);
+    if !(HEADER..=bytes.len()).contains(&length) {
+        return Err(refused("its length is not that of the file"));
     }
+    let parts = Glb::from_slice(bytes).map_err(|fault| refused(&fault.to_string()))?;
+    Ok([parts.json, parts.bin.unwrap_or_default()])
 }
 
-/// The chunk of this kind at the start of `bytes`, and what follows it.
-fn chunk<'a>(bytes: &'a [u8], kind: &[u8; 4]) -> Option<(&'a [u8], &'a [u8])> {
-    let (length, rest) = bytes.split_first_chunk::<4>()?;
-    let (own, rest) = rest.split_first_chunk::<4>()?;
-    if own != kind {
-        return None;
+/// The document that `text` describes, of the file at `path`. Every index in it leads somewhere.
+///
+/// # Errors
+/// If it is no glTF, needs an extension, is too large, or an index or a value in it is wrong.
+pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
+    let values = text.iter().filter(|byte| matches!(byte, b'{' | b'[' | b',')).count();
+    if values > MOST_VALUES {
+        let problem = format!("describes more than {MOST_VALUES} values");
+        return Err(Error::mesh(path, problem, TOO_LARGE));
     }
-    rest.split_at_checked(u32::from_le_bytes(*length) as usize)
+    let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
+    let root: Root = ::gltf::json::deserialize::from_slice(text)
+        .map_err(|fault| damaged(format!("is no readable glTF ({fault})")))?;
+    if let Some(extension) = root.extensions_required.first() {
+        return Err(Error::mesh(
+            path,
+            format!("requires the glTF extension {extension}, which is not read here"),
+            "export it without compression and extensions",
+        ));
+    }
+    check(&root).map_err(damaged)?;
+    Ok(Document::from_json_without_validation(root))
+}
+
+/// Refuses indices that lead nowhere and values that mean nothing. What is only missing is left
+/// to those who need it: many files lack the bounds of their positions.
+fn check(root: &Root) -> Result<(), String> {
+    // The check of the crate itself looks these accessors up unchecked, and panics.
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let positions =
+        primitives.filter_map(|one| one.attributes.get(&Checked::Valid(Semantic::Positions)));
+    if positions.into_iter().any(|index| root.accessors.get(index.value()).is_none()) {
+        return Err("names an accessor that is not there".to_owned());
+    }
+    let mut problem = None;
+    root.validate(root, Place::new, &mut |place, fault| {
+        let place = place();
+        // A stride is checked against the elements it parts; some write 0 where there is none.
+        if problem.is_some() || fault == Fault::Missing || place.as_str().ends_with("byteStride") {
+            return;
+        }
+        problem = Some(match fault {
+            Fault::IndexOutOfBounds => format!("names at {place} what is not there"),
+            _ => format!("has at {place} what is no value for it"),
+        });
+    });
+    problem.map_or(Ok(()), Err)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn told(text: &str) -> String {
+        document(Path::new("a.gltf"), text.as_bytes()).unwrap_err().to_string()
+    }
+
     #[test]
     fn a_container_is_split_into_its_parts() {
-        let file = b"glTF\x02\0\0\0\0\0\0\0\x02\0\0\0JSON{}\x03\0\0\0BIN\0abc";
-        assert_eq!(container(file), Some((b"{}".as_slice(), b"abc".as_slice())));
-        assert_eq!(container(&file[..22]), Some((b"{}".as_slice(), b"".as_slice())));
+        let file = b"glTF\x02\0\0\0\x21\0\0\0\x02\0\0\0JSON{}\x03\0\0\0BIN\0abc";
+        let [text, binary] = container(file).unwrap();
+        assert_eq!((&*text, &*binary), (b"{}".as_slice(), b"abc".as_slice()));
+        let file = b"glTF\x02\0\0\0\x16\0\0\0\x02\0\0\0JSON{}";
+        let [text, binary] = container(file).unwrap();
+        assert_eq!((&*text, &*binary), (b"{}".as_slice(), b"".as_slice()));
     }
 
     #[test]
     fn plain_text_is_all_json() {
-        assert_eq!(container(b"{}"), Some((b"{}".as_slice(), b"".as_slice())));
+        assert_eq!(&*container(b"{}").unwrap()[0], b"{}");
     }
 
     #[test]
-    fn a_container_that_is_cut_short_is_refused() {
-        let file = b"glTF\x02\0\0\0\0\0\0\0\x02\0\0\0JSON{}\x03\0\0\0BIN\0ab";
-        assert_eq!(container(file), None);
-        assert_eq!(container(&file[..14]), None);
+    fn a_container_that_does_not_add_up_is_refused() {
+        let file = b"glTF\x02\0\0\0\x21\0\0\0\x02\0\0\0JSON{}\x03\0\0\0BIN\0ab";
+        assert!(container(file).is_err());
+        assert!(container(&file[..14]).is_err());
+        // Lengths that the header alone exceeds, or that nothing could hold.
+        for length in [0, 11, u32::MAX] {
+            let mut file = file.to_vec();
+            file[8..12].copy_from_slice(&length.to_le_bytes());
+            assert!(container(&file).unwrap_err().contains("does not add up"));
+        }
+    }
+
+    #[test]
+    fn indices_that_lead_nowhere_are_refused_before_they_are_followed() {
+        let asset = r#""asset":{"version":"2.0"}"#;
+        let mesh = |keys: &str| format!(r#"{{{asset},"meshes":[{{"primitives":[{{{keys}}}]}}]}}"#);
+        assert!(told(&mesh(r#""attributes":{"POSITION":7}"#)).contains("an accessor that is not"));
+        let message = told(&mesh(r#""attributes":{},"material":2"#));
+        assert!(message.contains("names at meshes[0].primitives[0].material what is"), "{message}");
+        let message = told(&mesh(r#""attributes":{},"mode":99"#));
+        assert!(message.contains("primitives[0].mode what is no value"), "{message}");
+        let bare = document(Path::new("a.gltf"), mesh(r#""attributes":{}"#).as_bytes());
+        assert!(bare.is_ok(), "what is missing is told by those who need it");
+    }
+
+    #[test]
+    fn a_document_of_too_many_values_is_refused_unread() {
+        let text = format!(r#"{{"nodes":[{}"#, "{},".repeat(MOST_VALUES / 2 + 1));
+        assert!(told(&text).contains("describes more than 4194304 values; export it in parts"));
     }
 }

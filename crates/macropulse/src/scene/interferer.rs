@@ -5,7 +5,7 @@ use std::path::Path;
 use toml::{Spanned, Table, Value};
 
 use super::error::Error;
-use super::file::{OtherTyped, Source, Stand};
+use super::file::{InterfererTyped, Source, Stand};
 use super::pose::Pose;
 use crate::design::{Design, preset_text};
 use crate::digest::Fnv;
@@ -20,9 +20,9 @@ const MOST_PHASE: f64 = 1000.0;
 /// Most by which a clock may run fast or slow, in millionths.
 const MOST_DRIFT: f64 = 1000.0;
 
-/// A lidar that shines into the scene while the sensor measures.
+/// Another lidar whose light falls into the scene while the sensor measures.
 #[derive(Debug, Clone)]
-pub struct Other {
+pub struct Interferer {
     /// Name, for reports.
     pub name: String,
     /// What it is.
@@ -35,32 +35,32 @@ pub struct Other {
 
 impl Fnv {
     /// Takes in a lidar.
-    pub(super) fn other(&mut self, other: &Other) {
-        self.bytes(other.design.text.as_bytes());
-        self.pose(&other.pose);
-        self.bytes(&other.clock.phase_fs.to_le_bytes());
-        self.bytes(&other.clock.drift.to_le_bytes());
+    pub(super) fn interferer(&mut self, interferer: &Interferer) {
+        self.bytes(interferer.design.text.as_bytes());
+        self.pose(&interferer.pose);
+        self.bytes(&interferer.clock.phase_fs.to_le_bytes());
+        self.bytes(&interferer.clock.drift.to_le_bytes());
     }
 }
 
-/// Reads `[[others]]`; `pose` reads where one stands, files of sensors are looked for in `base`.
+/// Reads `[[interferers]]`; `pose` reads where one stands, sensor files are looked for in `base`.
 /// Gives what was assumed, too.
-pub(super) fn others(
+pub(super) fn interferers(
     (source, base): (Source<'_>, &Path),
-    typed: &[Spanned<OtherTyped>],
+    typed: &[Spanned<InterfererTyped>],
     pose: impl Fn(&Stand) -> Result<Pose, Error>,
-) -> Result<(Vec<Other>, Vec<String>), Error> {
+) -> Result<(Vec<Interferer>, Vec<String>), Error> {
     if let Some(one_more) = typed.get(MOST) {
         let message = format!("a scene holds at most {MOST} other lidars");
         return Err(source.fault(one_more.span(), message));
     }
-    let (mut others, mut notes): (Vec<Other>, _) = (Vec::new(), Vec::new());
+    let (mut interferers, mut notes): (Vec<Interferer>, _) = (Vec::new(), Vec::new());
     for spanned in typed {
         let typed = spanned.get_ref();
         let design = open(source, base, typed)?;
         let name = typed.name.clone().unwrap_or_else(|| {
-            let alike = |other: &&Other| other.design.name == design.name;
-            format!("{} {}", design.name, others.iter().filter(alike).count() + 1)
+            let alike = |interferer: &&Interferer| interferer.design.name == design.name;
+            format!("{} {}", design.name, interferers.iter().filter(alike).count() + 1)
         });
         if typed.position_m.is_none() {
             notes.push(format!("{name}: no position_m given, it stands at the origin"));
@@ -84,20 +84,20 @@ pub(super) fn others(
             drift: (drift_ppm * 1e6).round() as i64,
         };
         let pose = pose(&typed.stand())?;
-        others.push(Other { name, design, pose, clock });
+        interferers.push(Interferer { name, design, pose, clock });
     }
-    if !others.is_empty() {
+    if !interferers.is_empty() {
         notes.push(
             "other lidars: their light is as strong in our receiver as their own sensitivity has \
              it in theirs, through the same aperture and optics"
                 .to_owned(),
         );
     }
-    Ok((others, notes))
+    Ok((interferers, notes))
 }
 
 /// The sensor that is named, with what is changed of it.
-fn open(source: Source<'_>, base: &Path, typed: &OtherTyped) -> Result<Design, Error> {
+fn open(source: Source<'_>, base: &Path, typed: &InterfererTyped) -> Result<Design, Error> {
     let named = typed.sensor.get_ref();
     let ready = preset_text(named).is_some() || !named.ends_with(".toml");
     let place = if ready { named.clone() } else { base.join(named).display().to_string() };
@@ -123,25 +123,25 @@ mod tests {
     use super::super::Scene;
     use super::*;
 
-    fn scene(others: &str) -> Result<Scene, Error> {
-        let text = format!("version = 1\nground = {{ material = \"asphalt\" }}\n{others}");
+    fn scene(interferers: &str) -> Result<Scene, Error> {
+        let text = format!("version = 1\nground = {{ material = \"asphalt\" }}\n{interferers}");
         Scene::from_toml(&text, "a.toml", Path::new(""))
     }
 
-    fn told(others: &str) -> String {
-        scene(others).unwrap_err().to_string()
+    fn told(interferers: &str) -> String {
+        scene(interferers).unwrap_err().to_string()
     }
 
     #[test]
     fn a_lidar_is_read_with_all_its_keys() {
         let scene = scene(
-            "[[others]]\nsensor = \"kim-park-2016\"\nposition_m = [50, 0, 2]\nyaw_deg = 180\n\
+            "[[interferers]]\nsensor = \"kim-park-2016\"\nposition_m = [50, 0, 2]\nyaw_deg = 180\n\
              phase_ns = 1234.5\ndrift_ppm = 20.0\n\
              set = { \"code.word.first\" = 3, code.word.modulus = 26 }\n\
-             [[others]]\nsensor = \"hdl-64e\"\nname = \"van\"\n",
+             [[interferers]]\nsensor = \"hdl-64e\"\nname = \"van\"\n",
         )
         .unwrap();
-        let [first, second] = scene.others.as_slice() else { unreachable!() };
+        let [first, second] = scene.interferers.as_slice() else { unreachable!() };
         assert_eq!((first.name.as_str(), second.name.as_str()), ("kim-park-2016 1", "van"));
         assert_eq!(first.pose.position, [50.0, 0.0, 2.0]);
         assert_eq!(first.clock, Clock { phase_fs: 1_234_500_000, drift: 20_000_000 });
@@ -154,29 +154,29 @@ mod tests {
 
     #[test]
     fn what_is_wrong_has_a_place_and_a_remedy() {
-        let message = told("[[others]]\nsensor = \"kim-prak-2016\"\n");
+        let message = told("[[interferers]]\nsensor = \"kim-prak-2016\"\n");
         assert!(message.starts_with("a.toml:4:10: kim-prak-2016: no such sensor"), "{message}");
-        let message = told("[[others]]\nsensor = \"hdl-64e\"\nphase_ns = nan\n");
+        let message = told("[[interferers]]\nsensor = \"hdl-64e\"\nphase_ns = nan\n");
         assert!(message.starts_with("a.toml:5:12: phase_ns is NaN; it must be from"), "{message}");
-        let message = told("[[others]]\nsensor = \"hdl-64e\"\ndrift_ppm = 1e9\n");
+        let message = told("[[interferers]]\nsensor = \"hdl-64e\"\ndrift_ppm = 1e9\n");
         assert!(message.contains("drift_ppm is 1000000000; it must be from -1000 to 1000"));
-        let message = told("[[others]]\nsensor = \"hdl-64e\"\nposition_m = [inf, 0, 0]\n");
+        let message = told("[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [inf, 0, 0]\n");
         assert!(message.contains("three finite numbers"), "{message}");
-        let message = told("[[others]]\nsensor = \"hdl-64e\"\nset = { \"scan.rate\" = 3 }\n");
+        let message = told("[[interferers]]\nsensor = \"hdl-64e\"\nset = { \"scan.rate\" = 3 }\n");
         assert!(message.contains("unknown key `rate`"), "{message}");
-        assert!(told("[[others]]\nyaw_deg = 3\n").contains("missing field `sensor`"));
-        assert!(told("[[other]]\nsensor = \"a\"\n").contains("did you mean `others`?"));
-        let many = "[[others]]\nsensor = \"peregrine\"\n".repeat(MOST + 1);
+        assert!(told("[[interferers]]\nyaw_deg = 3\n").contains("missing field `sensor`"));
+        assert!(told("[[interferer]]\nsensor = \"a\"\n").contains("did you mean `interferers`?"));
+        let many = "[[interferers]]\nsensor = \"peregrine\"\n".repeat(MOST + 1);
         assert!(told(&many).contains("at most 255 other lidars"));
     }
 
     #[test]
-    fn the_digest_knows_the_others() {
-        let digest = |others: &str| scene(others).unwrap().digest();
-        let one = digest("[[others]]\nsensor = \"hdl-64e\"\n");
+    fn the_digest_knows_the_interferers() {
+        let digest = |interferers: &str| scene(interferers).unwrap().digest();
+        let one = digest("[[interferers]]\nsensor = \"hdl-64e\"\n");
         assert_ne!(one, digest(""));
-        assert_ne!(one, digest("[[others]]\nsensor = \"hdl-64e\"\ndrift_ppm = 1\n"));
-        assert_ne!(one, digest("[[others]]\nsensor = \"peregrine\"\n"));
-        assert_eq!(one, digest("[[others]]\nsensor = \"hdl-64e\"\nphase_ns = 0\n"));
+        assert_ne!(one, digest("[[interferers]]\nsensor = \"hdl-64e\"\ndrift_ppm = 1\n"));
+        assert_ne!(one, digest("[[interferers]]\nsensor = \"peregrine\"\n"));
+        assert_eq!(one, digest("[[interferers]]\nsensor = \"hdl-64e\"\nphase_ns = 0\n"));
     }
 }

@@ -1,5 +1,4 @@
-//! What the light of another lidar shows of itself: the surfaces that it meets and the sensor
-//! sees.
+//! Surfaces that an interfering lidar illuminates and the sensor sees.
 //!
 //! 1. Each ray of each of its shots ends on the first surface it meets, of glass or not.
 //! 2. The point is kept if the sensor looks there and both stand on the same side of the surface.
@@ -8,28 +7,29 @@
 use glam::DVec3;
 
 use super::trace::Footprint;
-use super::world::Met;
-use super::{Other, Scene, Transform};
+use super::world::PacketHits;
+use super::{Interferer, Scene, Transform};
 use crate::kernels::{LANES, Lanes, Packet};
 use macropulse_codec::ShotLog;
 
 /// A ray to a point ends this much before it, m: the surface does not hide itself.
 const BEFORE: f64 = 1e-3;
 
-/// Which pixel looks at light of a shot, from a direction, after a way.
-pub type Look<'a> = dyn Fn(usize, [f64; 3], f64) -> Option<(u16, u16)> + 'a;
+/// Gives the pixel, by row and column, that receives light of a shot of the interferer from a
+/// direction after a path length, m; `None` if no pixel does.
+pub type LineOfSight<'a> = dyn Fn(usize, [f64; 3], f64) -> Option<(u16, u16)> + 'a;
 
-/// Surfaces that another lidar lights up and the sensor sees, as columns; ordered by shot, then
-/// by ray. Truth: never handed to the receiver.
+/// Surfaces that an interfering lidar illuminates and the sensor sees, as columns; ordered by shot,
+/// then by ray. Truth: never handed to the receiver.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Lit {
-    /// Index of the shot in the other's log.
+pub struct Illuminated {
+    /// Index of the shot in the interferer's log.
     pub shot: Vec<u32>,
     /// Which ray of its footprint, from 0.
     pub ray: Vec<u32>,
     /// The ray's share of the energy.
     pub weight: Vec<f32>,
-    /// Distance from the other lidar to the point, m.
+    /// Distance from the interferer to the point, m.
     pub there: Vec<f64>,
     /// Distance from the point to the sensor, m.
     pub back: Vec<f64>,
@@ -44,16 +44,23 @@ pub struct Lit {
 }
 
 impl Scene {
-    /// Where the sensor sees light of the shots in `log`, which `other` fires. Neither way is
-    /// followed farther than `farthest`, m.
+    /// The surfaces that the shots in `log`, fired by `interferer`, illuminate and the sensor
+    /// sees. Neither the way there nor the way back is followed farther than `farthest`, m.
     ///
-    /// `look` is told the shot, the unit vector of the sensor frame towards the point, and the
-    /// length of both ways, m; it gives the pixel in whose cell the point lies, if there is any
-    /// that looks there then.
-    pub fn lit(&self, other: &Other, log: &ShotLog, farthest: f64, look: &Look) -> Lit {
-        let footprint = Footprint::of(&other.design);
-        let (directions, to_world) = (other.design.directions(), other.pose.world_from_sensor());
-        let mut light = Light::new((self, other), farthest, look);
+    /// `line_of_sight` is given the number of the shot, the unit vector from the sensor to the
+    /// point in the frame of the sensor, and the length of both ways together, m; it gives the
+    /// pixel that looks there at that time, if there is one.
+    pub fn illuminated(
+        &self,
+        interferer: &Interferer,
+        log: &ShotLog,
+        farthest: f64,
+        line_of_sight: &LineOfSight,
+    ) -> Illuminated {
+        let footprint = Footprint::of(&interferer.design);
+        let (directions, to_world) =
+            (interferer.design.directions(), interferer.pose.world_from_sensor());
+        let mut light = Light::new((self, interferer), farthest, line_of_sight);
         for shot in 0..log.len() {
             let axis = directions.of(log.row[shot], log.column[shot]);
             let mut ray = 0;
@@ -73,24 +80,24 @@ impl Scene {
     }
 }
 
-/// Rays of another lidar on their way into the scene, and what of the ones before is seen.
+/// Rays of an interferer that are being cast, and the illuminated points found so far.
 struct Light<'a> {
     scene: &'a Scene,
     to_sensor: Transform,
     farthest: f64,
-    look: &'a Look<'a>,
+    line_of_sight: &'a LineOfSight<'a>,
     packet: Packet,
-    met: Met,
+    packet_hits: PacketHits,
     count: usize,
     /// Shot, ray and weight of each.
     from: Lanes<(u32, u32, f32)>,
     /// Points looked at, and in which direction of the world they lie: whether something hides
     /// them is still to be asked.
     waiting: Vec<(Point, DVec3)>,
-    seen: Lit,
+    seen: Illuminated,
 }
 
-/// A line of [`Lit`].
+/// A line of [`Illuminated`].
 struct Point {
     from: (u32, u32, f32),
     ways: (f64, f64),
@@ -100,18 +107,22 @@ struct Point {
 }
 
 impl<'a> Light<'a> {
-    fn new((scene, other): (&'a Scene, &Other), farthest: f64, look: &'a Look) -> Self {
+    fn new(
+        (scene, interferer): (&'a Scene, &Interferer),
+        farthest: f64,
+        line_of_sight: &'a LineOfSight,
+    ) -> Self {
         Self {
             scene,
             to_sensor: scene.sensor.sensor_from_world(),
             farthest,
-            look,
-            packet: Packet::from(other.pose.position),
-            met: Met::default(),
+            line_of_sight,
+            packet: Packet::from(interferer.pose.position),
+            packet_hits: PacketHits::default(),
             count: 0,
             from: [(0, 0, 0.0); LANES],
             waiting: Vec::with_capacity(2 * LANES),
-            seen: Lit::default(),
+            seen: Illuminated::default(),
         }
     }
 
@@ -125,10 +136,10 @@ impl<'a> Light<'a> {
         }
     }
 
-    fn finish(mut self) -> Lit {
+    fn finish(mut self) -> Illuminated {
         self.cast();
         while !self.waiting.is_empty() {
-            self.look();
+            self.keep_visible();
         }
         self.seen
     }
@@ -137,17 +148,17 @@ impl<'a> Light<'a> {
     fn cast(&mut self) {
         self.packet.range[self.count..].fill(f64::NAN);
         let world = &self.scene.world;
-        world.cast_packet(&mut self.packet, &mut self.met);
-        let normals = world.describe(&self.packet, &mut self.met);
+        world.cast_packet(&mut self.packet, &mut self.packet_hits);
+        let normals = world.describe(&self.packet, &mut self.packet_hits);
         let normal = |lane: usize| DVec3::from(normals.map(|axis| axis[lane]));
         for lane in 0..self.count {
-            if self.met.is_hit(&self.packet, lane) {
+            if self.packet_hits.is_hit(&self.packet, lane) {
                 self.waiting.extend(self.point(lane, normal(lane)));
             }
         }
         self.count = 0;
         while self.waiting.len() >= LANES {
-            self.look();
+            self.keep_visible();
         }
     }
 
@@ -168,24 +179,24 @@ impl<'a> Light<'a> {
         }
         let from = self.from[lane];
         let direction = self.to_sensor.direction(view.to_array());
-        let pixel = (self.look)(from.0 as usize, direction, there + back)?;
+        let pixel = (self.line_of_sight)(from.0 as usize, direction, there + back)?;
         let half = (along + view).normalize_or_zero().dot(normal).abs();
         let (ways, cosines) = ((there, back), (out.abs(), half));
-        let material = self.met.material[lane];
+        let material = self.packet_hits.material[lane];
         Some((Point { from, ways, cosines, material, pixel }, view))
     }
 
-    /// Looks at a packet of the points that wait, and writes down those that nothing hides.
-    fn look(&mut self) {
+    /// Casts a packet of rays from the sensor to waiting points, and keeps those that nothing hides.
+    fn keep_visible(&mut self) {
         let mut packet = Packet::from(self.scene.sensor.position);
         let count = self.waiting.len().min(LANES);
         for (lane, (point, view)) in self.waiting[..count].iter().enumerate() {
             packet.set(lane, view.to_array(), point.ways.1 - BEFORE);
         }
-        self.scene.world.cast_packet(&mut packet, &mut self.met);
+        self.scene.world.cast_packet(&mut packet, &mut self.packet_hits);
         let seen = &mut self.seen;
         for (lane, (point, _)) in self.waiting.drain(..count).enumerate() {
-            if self.met.is_hit(&packet, lane) {
+            if self.packet_hits.is_hit(&packet, lane) {
                 continue;
             }
             let (shot, ray, weight) = point.from;
@@ -214,16 +225,16 @@ mod tests {
             "version = 1\n\
              [[object]]\nname = \"wall\"\nshape = {{ plane = {{ normal = [-1, 0, 0] }} }}\n\
              position_m = [10, 0, 0]\nmaterial = \"white\"\n\
-             [[others]]\nsensor = \"peregrine\"\nposition_m = {position}\n{more}"
+             [[interferers]]\nsensor = \"peregrine\"\nposition_m = {position}\n{more}"
         );
         Scene::from_toml(&text, "test", Path::new("")).unwrap()
     }
 
-    fn lit(scene: &Scene) -> Lit {
+    fn illuminated(scene: &Scene) -> Illuminated {
         let ours = Design::open("peregrine", &[]).unwrap();
-        let other = &scene.others[0];
-        let log = other.clock.shots(&other.design, 0..1).next().unwrap();
-        scene.lit(other, &log, 100.0, &|_, direction, _| ours.scan.pixel_at(direction))
+        let interferer = &scene.interferers[0];
+        let log = interferer.clock.shots(&interferer.design, 0..1).next().unwrap();
+        scene.illuminated(interferer, &log, 100.0, &|_, direction, _| ours.scan.pixel_at(direction))
     }
 
     /// Known answer: a ray at direction (x, y, z) from 4 m to the left of us meets the wall 10 m
@@ -231,34 +242,34 @@ mod tests {
     #[test]
     fn points_on_a_wall_are_where_geometry_has_them() {
         let scene = scene("[0, 4, 0]", "");
-        let lit = lit(&scene);
-        let other = &scene.others[0].design;
+        let illuminated = illuminated(&scene);
+        let interferer = &scene.interferers[0].design;
         // Moved by 4 m, a quarter of its field, which is 5.4 m wide there, lies in ours.
-        assert!((800..3000).contains(&lit.shot.len()), "{}", lit.shot.len());
-        for i in 0..lit.shot.len() {
-            let (row, column) = (lit.shot[i] / 128, lit.shot[i] % 128);
-            let [x, y, z] = other.directions().of(row as u16, column as u16);
+        assert!((800..3000).contains(&illuminated.shot.len()), "{}", illuminated.shot.len());
+        for i in 0..illuminated.shot.len() {
+            let (row, column) = (illuminated.shot[i] / 128, illuminated.shot[i] % 128);
+            let [x, y, z] = interferer.directions().of(row as u16, column as u16);
             let point = DVec3::new(10.0, 4.0 + y * 10.0 / x, z * 10.0 / x);
-            assert!((lit.there[i] - 10.0 / x).abs() < 1e-9);
-            assert!((lit.back[i] - point.length()).abs() < 1e-9);
-            assert!((f64::from(lit.cosine[i]) - 10.0 / point.length()).abs() < 1e-6);
+            assert!((illuminated.there[i] - 10.0 / x).abs() < 1e-9);
+            assert!((illuminated.back[i] - point.length()).abs() < 1e-9);
+            assert!((f64::from(illuminated.cosine[i]) - 10.0 / point.length()).abs() < 1e-6);
             let half = (DVec3::new(x, y, z) + point.normalize()).normalize().x;
-            assert!((f64::from(lit.half_cosine[i]) - half).abs() < 1e-6);
+            assert!((f64::from(illuminated.half_cosine[i]) - half).abs() < 1e-6);
             assert!(point.y.abs() <= 10.0 * 15_f64.to_radians().tan() + 1e-9);
         }
     }
 
     #[test]
     fn what_is_hidden_or_lit_from_behind_is_not_seen() {
-        assert!(lit(&scene("[0, 0, 0]", "")).shot.len() == 4096);
+        assert!(illuminated(&scene("[0, 0, 0]", "")).shot.len() == 4096);
         // Something small between the wall and us alone.
         let pole = "[[object]]\nname = \"pole\"\nshape = { box = { size_m = [0.1, 20, 20] } }\n\
                     position_m = [2, 0, 0]\nmaterial = \"white\"\n";
-        assert_eq!(lit(&scene("[4, 0, 0]", pole)).shot.len(), 0);
+        assert_eq!(illuminated(&scene("[4, 0, 0]", pole)).shot.len(), 0);
         // From behind the wall, looking at us, it shines on the far side.
-        assert_eq!(lit(&scene("[20, 0, 0]\nyaw_deg = 180", "")).shot.len(), 0);
+        assert_eq!(illuminated(&scene("[20, 0, 0]\nyaw_deg = 180", "")).shot.len(), 0);
         // It looks the other way, at nothing.
-        assert_eq!(lit(&scene("[0, 0, 0]\nyaw_deg = 180", "")).shot.len(), 0);
+        assert_eq!(illuminated(&scene("[0, 0, 0]\nyaw_deg = 180", "")).shot.len(), 0);
     }
 
     #[test]

@@ -2,14 +2,14 @@
 //!
 //! Drawn, like the body, with `s` counted from the front backwards.
 
+use std::error::Error;
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use macropulse::scene::{Ray, Scene};
 
-use super::car::{AXLES, PAINT, TRIM, WHEEL_RADIUS};
-use super::hits::{CastRays, Ray};
-use super::mesh::Mesh;
-use super::raycast::{Facet, Facets};
+use crate::car::{AXLES, PAINT, TRIM, WHEEL_RADIUS};
+use crate::mesh::Mesh;
 
 const RUBBER: &str = "rubber";
 const RIM: &str = "metal";
@@ -17,17 +17,14 @@ const SEAT: &str = "fabric";
 const PLATE: &str = "number-plate";
 
 /// A grid of points: lines of equal length.
-pub(super) struct Sheet<'a> {
+pub struct Sheet<'a> {
+    /// The lines, each of as many points.
     pub points: &'a [Vec<[f64; 3]>],
 }
 
 impl Sheet<'_> {
     /// Adds the cells to which `made_of`, asked by line and place in it, gives a material.
-    pub(super) fn add<'n>(
-        &self,
-        mesh: &mut Mesh,
-        made_of: impl Fn(usize, usize) -> Option<&'n str>,
-    ) {
+    pub fn add<'n>(&self, mesh: &mut Mesh, made_of: impl Fn(usize, usize) -> Option<&'n str>) {
         let across = self.points.first().map_or(0, Vec::len) as u32;
         let start = mesh.vertices.len() as u32;
         mesh.vertices.extend(self.points.iter().flatten());
@@ -42,7 +39,7 @@ impl Sheet<'_> {
     }
 
     /// The same on both sides of the car.
-    pub(super) fn add_mirrored<'n>(
+    pub fn add_mirrored<'n>(
         &self,
         mesh: &mut Mesh,
         made_of: impl Fn(usize, usize) -> Option<&'n str>,
@@ -76,7 +73,7 @@ const WHEEL: &[(f64, f64, &str)] = &[
 ];
 
 /// Four wheels, their outer faces inside the flanks.
-pub(super) fn wheels(mesh: &mut Mesh) {
+pub fn wheels(mesh: &mut Mesh) {
     const STEPS: u32 = 60;
     for axle in AXLES {
         let lines: Vec<Vec<[f64; 3]>> = (0..=STEPS)
@@ -117,7 +114,7 @@ fn block(mesh: &mut Mesh, low: [f64; 3], high: [f64; 3], material: &str) {
 }
 
 /// Dashboard, seats, and the chassis between the wheels.
-pub(super) fn cabin(mesh: &mut Mesh) {
+pub fn cabin(mesh: &mut Mesh) {
     block(mesh, [1.56, -0.62, 0.60], [1.85, 0.62, 0.90], TRIM);
     for side in [-0.36, 0.36] {
         let (right, left) = (side - 0.24, side + 0.24);
@@ -134,7 +131,7 @@ pub(super) fn cabin(mesh: &mut Mesh) {
 }
 
 /// Two mirrors, which reach the full width.
-pub(super) fn mirrors(mesh: &mut Mesh) {
+pub fn mirrors(mesh: &mut Mesh) {
     let ring = |s: f64, grow: f64| -> Vec<[f64; 3]> {
         let (y, z, half_y, half_z) = (0.83, 0.985, 0.080 * grow, 0.060 * grow);
         (0..=16)
@@ -162,44 +159,30 @@ pub(super) fn mirrors(mesh: &mut Mesh) {
 type Outline = [(f64, f64); 4];
 
 /// Lamps, grille, intake and plates: thin patches that follow the sheet metal.
-pub(super) fn fittings(mesh: &mut Mesh) {
-    let body = solid(mesh);
+///
+/// # Errors
+/// If the body cannot be read back as a scene, or an outline misses it.
+pub fn fittings(mesh: &mut Mesh) -> Result<(), Box<dyn Error>> {
+    let body = solid(mesh)?;
     let left = |outline: Outline| outline;
     let right = |outline: Outline| outline.map(|(y, z)| (-y, z));
+    let headlamp = [(0.50, 0.575), (0.78, 0.620), (0.80, 0.695), (0.50, 0.650)];
+    let intake = [(0.56, 0.29), (0.74, 0.30), (0.72, 0.37), (0.56, 0.36)];
+    let tail_lamp = [(0.44, 0.80), (0.775, 0.80), (0.765, 0.92), (0.44, 0.90)];
     for side in [left, right] {
-        lay(
-            mesh,
-            &body,
-            Face::Front,
-            side([(0.50, 0.575), (0.78, 0.620), (0.80, 0.695), (0.50, 0.650)]),
-            "headlamp",
-        );
-        lay(
-            mesh,
-            &body,
-            Face::Front,
-            side([(0.56, 0.29), (0.74, 0.30), (0.72, 0.37), (0.56, 0.36)]),
-            TRIM,
-        );
-        lay(
-            mesh,
-            &body,
-            Face::Rear,
-            side([(0.44, 0.80), (0.775, 0.80), (0.765, 0.92), (0.44, 0.90)]),
-            "tail-lamp",
-        );
+        lay(mesh, &body, Face::Front, side(headlamp), "headlamp")?;
+        lay(mesh, &body, Face::Front, side(intake), TRIM)?;
+        lay(mesh, &body, Face::Rear, side(tail_lamp), "tail-lamp")?;
     }
-    lay(mesh, &body, Face::Front, [(-0.44, 0.50), (0.44, 0.50), (0.47, 0.63), (-0.47, 0.63)], TRIM);
-    lay(
-        mesh,
-        &body,
-        Face::Front,
-        [(-0.50, 0.285), (0.50, 0.285), (0.44, 0.38), (-0.44, 0.38)],
-        TRIM,
-    );
-    lay(mesh, &body, Face::Rear, [(-0.60, 0.36), (0.60, 0.36), (0.55, 0.46), (-0.55, 0.46)], TRIM);
+    let grille = [(-0.44, 0.50), (0.44, 0.50), (0.47, 0.63), (-0.47, 0.63)];
+    lay(mesh, &body, Face::Front, grille, TRIM)?;
+    let lower = [(-0.50, 0.285), (0.50, 0.285), (0.44, 0.38), (-0.44, 0.38)];
+    lay(mesh, &body, Face::Front, lower, TRIM)?;
+    let apron = [(-0.60, 0.36), (0.60, 0.36), (0.55, 0.46), (-0.55, 0.46)];
+    lay(mesh, &body, Face::Rear, apron, TRIM)?;
     plate(mesh, Face::Front, (-0.012, 0.43));
     plate(mesh, Face::Rear, (4.712, 0.72));
+    Ok(())
 }
 
 /// Which end of the car.
@@ -216,15 +199,22 @@ fn plate(mesh: &mut Mesh, face: Face, (s, z): (f64, f64)) {
     block(mesh, [a, -0.26, z - 0.055], [b, 0.26, z + 0.055], PLATE);
 }
 
-fn solid(mesh: &Mesh) -> Facets {
-    let corners = |triangle: &[u32; 3]| triangle.map(|corner| mesh.vertices[corner as usize]);
-    let facet = |triangle| Facet { corners: corners(triangle), material: 0, object: 0 };
-    let facets: Vec<Facet> = mesh.triangles.iter().map(facet).collect();
-    Facets::new(&facets, [0.0; 3])
+/// The body as a scene of its own, in the frame of the drawing.
+fn solid(mesh: &Mesh) -> Result<Scene, Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("body.ply"), mesh.ply())?;
+    let text = "version = 1\n[[object]]\nmesh = \"body.ply\"\nmaterial = \"white\"\n";
+    Ok(Scene::from_toml(text, "body", folder.path())?)
 }
 
 /// Lays a patch of the given outline on the body, a few millimetres proud of it.
-fn lay(mesh: &mut Mesh, body: &Facets, face: Face, outline: Outline, material: &str) {
+fn lay(
+    mesh: &mut Mesh,
+    body: &Scene,
+    face: Face,
+    outline: Outline,
+    material: &str,
+) -> Result<(), Box<dyn Error>> {
     const PROUD: f64 = 0.006;
     // Finer across than up: the corners of the car bend away across.
     const STEPS: [u32; 2] = [18, 5];
@@ -239,9 +229,8 @@ fn lay(mesh: &mut Mesh, body: &Facets, face: Face, outline: Outline, material: &
         Some((DVec3::from(ray.origin) + DVec3::X * toward * hit.range + outward * PROUD).to_array())
     };
     let line = |i: u32| (0..=STEPS[1]).map(|j| point(i, j)).collect::<Option<Vec<_>>>();
-    // An outline that misses the body is a mistake in the drawing: the car then lacks the part,
-    // which a test notices.
-    if let Some(lines) = (0..=STEPS[0]).map(line).collect::<Option<Vec<_>>>() {
-        Sheet { points: &lines }.add(mesh, |_, _| Some(material));
-    }
+    let lines = (0..=STEPS[0]).map(line).collect::<Option<Vec<_>>>();
+    let lines = lines.ok_or_else(|| format!("the outline of a {material} misses the body"))?;
+    Sheet { points: &lines }.add(mesh, |_, _| Some(material));
+    Ok(())
 }
