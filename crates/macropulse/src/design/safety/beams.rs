@@ -185,7 +185,7 @@ impl<'a> Beams<'a> {
     /// The columns within `half` of an azimuth that lies `off` before the first column.
     fn columns_between(&self, off: f64, half: f64) -> Vec<Range<u32>> {
         if half >= PI {
-            return vec![0..self.scan.columns];
+            return std::iter::once(0..self.scan.columns).collect();
         }
         let turn = |turn: f64| {
             let column = |angle: f64| (off + turn * TAU + angle) / self.step;

@@ -108,16 +108,14 @@ pub fn strictest(limits: &[Limit]) -> Option<&Limit> {
 /// and whole numbers of scans, twice as many each time, to 100 s.
 pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
     let mut all = Vec::new();
-    let alone = [
-        (Rule::Mark, exposure.mark, exposure.brightest_mark),
-        (Rule::SingleShot, exposure.shot, exposure.brightest_shot),
-    ];
-    for (rule, duration, brightness) in alone {
-        if rule == Rule::SingleShot || duration < exposure.shot {
-            let energy = class.single_exposure(duration) / brightness;
-            all.push(Limit { rule, shots: 1.0, brightness, duration, energy });
-        }
+    let mut add = |rule, shots: f64, brightness: f64, duration| {
+        let energy = class.single_exposure(duration) / (shots * brightness);
+        all.push(Limit { rule, shots, brightness, duration, energy });
+    };
+    if exposure.mark < exposure.shot {
+        add(Rule::Mark, exposure.brightest_mark, 1.0, exposure.mark);
     }
+    add(Rule::SingleShot, 1.0, exposure.brightest_shot, exposure.shot);
     for crossings in &exposure.places {
         let train = Train::of(class, exposure, crossings);
         all.extend(train.group());

@@ -101,7 +101,7 @@ fn a_small_raster_by_plain_enumeration() {
             let line = match mirror {
                 "uniform" => 0.5 - duty / 2.0 + duty * column as f64 / 40.0,
                 _ => {
-                    let across = if row % 2 == 0 { column } else { 39 - column };
+                    let across = if row.is_multiple_of(2) { column } else { 39 - column };
                     let edge = (std::f64::consts::FRAC_PI_2 * duty).sin();
                     0.5 + ((across as f64 / 20.0 - 1.0) * edge).asin() / std::f64::consts::PI
                 }
