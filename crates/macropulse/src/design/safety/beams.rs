@@ -12,6 +12,10 @@ use crate::design::{Firing, Pattern, Scan};
 const STEPS: f64 = 16.0;
 /// Places along a line at which the light that passes the aperture is estimated.
 const SAMPLES: u32 = 16;
+/// Lines by which that is done.
+const ROWS: usize = 32;
+/// Where so many shots cross, it does not matter whether the middle is on a pixel or between two.
+const MANY: f64 = 400.0;
 /// Elevations that are looked at in all columns.
 const FINALISTS: usize = 3;
 
@@ -108,7 +112,11 @@ impl<'a> Beams<'a> {
             .map(|elevation| (self.estimate(share, elevation), elevation))
             .collect();
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let most = tried.iter().take(FINALISTS).map(|&(_, elevation)| {
+        let most = tried.iter().take(FINALISTS).map(|&(shots, elevation)| {
+            if self.energies.alike && shots > MANY {
+                let azimuth = self.first - self.step * f64::from(self.scan.columns / 2);
+                return (shots, Aim { azimuth, elevation });
+            }
             let rows = self.rows_within(elevation, reach);
             self.brightest(&Lit { share, elevation, rows, widest: PI })
         });
@@ -151,8 +159,10 @@ impl<'a> Beams<'a> {
         let half = |angle: f64| libm::sin(angle / 2.0);
         let [down, across] = [half(aim - elevation), half(off)];
         let across = across * across * libm::cos(aim) * libm::cos(elevation);
-        let angle = 2.0 * libm::asin(libm::sqrt((down * down + across).min(1.0)));
-        if angle < PI / 2.0 { self.distance * libm::tan(angle) } else { f64::INFINITY }
+        let square = (down * down + across).min(1.0);
+        // The tangent of the angle whose half has this sine squared.
+        let [sine, cosine] = [2.0 * (square * (1.0 - square)).sqrt(), 1.0 - 2.0 * square];
+        if cosine > 0.0 { self.distance * sine / cosine } else { f64::INFINITY }
     }
 
     fn rows_within(&self, elevation: f64, reach: f64) -> Range<usize> {
@@ -246,7 +256,9 @@ impl<'a> Beams<'a> {
         let reach = self.reach(share);
         let field = self.step * f64::from(self.scan.columns) / 2.0;
         let mut sum = 0.0;
-        for row in &self.rows[self.rows_within(elevation, reach)] {
+        let rows = &self.rows[self.rows_within(elevation, reach)];
+        let stride = (rows.len() / ROWS).max(1);
+        for row in rows.iter().step_by(stride) {
             let Some(half) = self.half_chord(row.elevation, elevation, reach) else { continue };
             let half = half.min(field);
             let place = |n: u32| half * (f64::from(n) + 0.5) / f64::from(SAMPLES);
@@ -254,7 +266,7 @@ impl<'a> Beams<'a> {
                 (0..SAMPLES).map(|n| share.at(self.off(elevation, row.elevation, place(n))));
             sum += shares.sum::<f64>() / f64::from(SAMPLES) * 2.0 * half / self.step;
         }
-        sum
+        sum * rows.len() as f64 / rows.len().div_ceil(stride).max(1) as f64
     }
 
     /// The azimuth at which most light of these rows passes, and how much; it is on a column or
