@@ -1,7 +1,7 @@
 //! What a budget says, as text and as JSON.
 
 use macropulse::design::Design;
-use macropulse::design::safety::{Class1, Rule};
+use macropulse::design::safety::{ASSUMED, Class1, Limit, Rule};
 use macropulse::predict::verdict::{Check, Wanted, checks, mark_by_mark};
 use macropulse::predict::{Forecast, Forecaster};
 use macropulse::units::s_from_fs;
@@ -155,22 +155,21 @@ impl<'a> Figures<'a> {
         let mut columns = Columns::default();
         let Some(budget) = &self.day.budget else { return columns };
         for limit in &budget.limits {
+            let bright = match short(limit.brightness).as_str() {
+                "1" => String::new(),
+                times => format!(", {times} times as bright as the mean"),
+            };
             columns.push(
                 limit.rule.name(),
                 format!(
-                    "{} nJ a shot ({} of them in {})",
+                    "{} nJ a shot ({} of them in {}{bright})",
                     short(limit.energy * 1e9),
                     short(limit.shots),
                     time(limit.duration)
                 ),
             );
         }
-        columns.push(
-            "read as",
-            "IEC 60825-1:2014 class 1, point source, through the pupil at safety.distance_mm, lines \
-             of a scan counted as repeated exposures if safety.count_lines; a scan that stops is \
-             taken to switch the laser off. Our reading, not a certification",
-        );
+        columns.push("read as", ASSUMED);
         columns
     }
 
@@ -231,9 +230,11 @@ impl<'a> Figures<'a> {
         let budget = self.day.budget.as_ref();
         let marks = self.day.coding.codebook.mean_weight();
         let class = Class1::at(self.day.light.wavelength);
+        let alone = |limit: &&Limit| limit.rule == Rule::SingleShot;
         let single = budget
-            .and_then(|budget| budget.limits.iter().find(|limit| limit.rule == Rule::SingleShot))
-            .map(|limit| limit.energy * 1e9);
+            .and_then(|budget| budget.limits.iter().find(alone))
+            .zip(class)
+            .map(|(limit, class)| class.single_exposure(limit.duration) * 1e9);
         json!({
             "sensor": self.day.name,
             "range_m": self.wanted.range,
@@ -248,6 +249,7 @@ impl<'a> Figures<'a> {
             "limits": budget.map(|budget| budget.limits.iter().map(|limit| json!({
                 "rule": limit.rule.name(),
                 "shots": limit.shots,
+                "brightness": limit.brightness,
                 "duration_s": limit.duration,
                 "energy_per_macropulse_nj": limit.energy * 1e9,
             })).collect::<Vec<_>>()),

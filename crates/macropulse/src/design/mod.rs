@@ -18,6 +18,7 @@ mod effect;
 mod family;
 mod file;
 mod linear;
+mod moments;
 mod presets;
 pub mod safety;
 mod spectrum;
@@ -238,7 +239,7 @@ impl Design {
 
     /// Duration of one scan, s.
     pub fn scan_period(&self) -> f64 {
-        1000.0 / self.scan.rate_millihertz as f64
+        self.scan.period()
     }
 
     /// A hash of everything the sensor file says, defaults included.

@@ -3,8 +3,6 @@
 //! Shots are numbered from the first one of the first scan. Times are exact: shot `k` of a uniform
 //! raster fires at ⌊k · T_scan / shots⌋ on the chip clock, in integers, however long the run.
 
-use std::f64::consts::{FRAC_PI_2, PI};
-
 use crate::design::{Design, Firing, Mirror, Pattern};
 use crate::units::{FS_PER_S, fs_from_s};
 
@@ -51,7 +49,7 @@ pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
             let line_start = exact(order / columns * columns);
             let line = design.scan_period() / f64::from(design.scan.rows);
             let across = (order % columns) as f64 / columns as f64;
-            line_start + fs_from_s(line * moment(*mirror, *duty, across))
+            line_start + fs_from_s(line * mirror.moment(*duty, across))
         }
         Pattern::Spinning { order: rows, firing, .. } => match firing {
             Firing::BlocksInTurn => exact(order),
@@ -136,19 +134,6 @@ fn fraction_of_scan(design: &Design, scan: u64, passed: u64) -> i64 {
     (shot * NUMERATOR / parts_of_fs(design)) as i64
 }
 
-/// When, as a fraction of the line time, the mirror has crossed the fraction `across` of the line.
-///
-/// A resonant mirror stands at sin(π·s), s = −½…½ over the line time; only |s| ≤ duty/2 is used.
-fn moment(mirror: Mirror, duty: f64, across: f64) -> f64 {
-    match mirror {
-        Mirror::Uniform => (1.0 - duty) / 2.0 + duty * across,
-        Mirror::Sinusoidal => {
-            let edge = libm::sin(FRAC_PI_2 * duty);
-            0.5 + libm::asin((2.0 * across - 1.0) * edge) / PI
-        }
-    }
-}
-
 /// Two unit vectors across `direction`: to the left and up.
 pub fn beam_axes(direction: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let [x, y, z] = direction;
@@ -164,6 +149,7 @@ pub fn beam_axes(direction: [f64; 3]) -> ([f64; 3], [f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     fn sensor(name: &str) -> Design {
         sensor_with(name, &[])
@@ -235,8 +221,8 @@ mod tests {
 
     #[test]
     fn a_resonant_mirror_is_slow_at_the_edges_and_keeps_the_order() {
-        let mid = moment(Mirror::Sinusoidal, 1.0, 0.501) - moment(Mirror::Sinusoidal, 1.0, 0.5);
-        let edge = moment(Mirror::Sinusoidal, 1.0, 0.001) - moment(Mirror::Sinusoidal, 1.0, 0.0);
+        let mid = Mirror::Sinusoidal.moment(1.0, 0.501) - Mirror::Sinusoidal.moment(1.0, 0.5);
+        let edge = Mirror::Sinusoidal.moment(1.0, 0.001) - Mirror::Sinusoidal.moment(1.0, 0.0);
         // 2/π of the mean at the centre [KP16 §2.2 gives the mean only].
         approx::assert_relative_eq!(mid / 0.001, 2.0 / PI, max_relative = 1e-4);
         assert!(edge > 10.0 * mid);

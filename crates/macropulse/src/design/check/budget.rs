@@ -5,10 +5,10 @@ use crate::design::budget::{Budget, Field, Trailing, solid_angle};
 use crate::design::file::{
     EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile, SkyFile, SunFile,
 };
-use crate::design::safety::{Class1, Limit, Scanned, strictest};
+use crate::design::safety::{Class1, Limit, Sender, exposure, limits, strictest};
 use crate::design::spectrum::sunlight;
 use crate::design::{Coding, Effect, Error, Light, Pattern, Scan};
-use crate::units::{s_from_fs, tof_from_range};
+use crate::units::tof_from_range;
 
 /// What a budget is made of beside the file.
 pub(super) struct Parts<'a> {
@@ -116,23 +116,11 @@ impl Check<'_> {
     /// What class 1 allows; empty where we know no rule.
     fn limits(&self, safety: &SafetyFile, parts: &Parts) -> Result<Vec<Limit>, Error> {
         let distance = self.within("safety.distance_mm", safety.distance_mm, 1.0, 1e5)? * 1e-3;
+        let Some(class) = Class1::at(parts.light.wavelength) else { return Ok(Vec::new()) };
         let Parts { scan, light, coding, .. } = parts;
-        let Pattern::Raster { horizontal, vertical, duty, .. } = scan.pattern else {
-            return Ok(Vec::new());
-        };
-        let Some(class) = Class1::at(light.wavelength) else { return Ok(Vec::new()) };
-        let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
-        let scan_rate = scan.rate_millihertz as f64 * 1e-3;
-        let chips = i64::from(coding.codebook.chips());
-        Ok(class.limits(&Scanned {
-            pitch: [horizontal / columns, vertical / rows],
-            pixel_period: duty / (scan_rate * rows * columns),
-            line_period: 1.0 / (scan_rate * rows),
-            scan_rate,
-            shot: light.pulse.max(s_from_fs(chips * coding.chip_fs)),
-            distance,
-            count_lines: safety.count_lines,
-        }))
+        let count_groups = safety.count_lines;
+        let sender = Sender { scan, light, coding, distance, count_groups };
+        Ok(limits(&class, &exposure(&class, &sender)))
     }
 
     fn irradiance(&self, sun: &SunFile, wavelength: f64) -> Result<f64, Error> {
@@ -188,5 +176,5 @@ impl Check<'_> {
     }
 }
 
-const NO_LIMIT: &str = "no limit of class 1 is known here, only for a raster at 700 to 1050 or \
-                        1500 to 1800 nm: declare \"eye-safety\" as idealised and give shot_nj";
+const NO_LIMIT: &str = "no limit of class 1 is known here, only for 700 to 1050 and 1400 to 1800 nm: \
+                        declare \"eye-safety\" as idealised and give shot_nj";

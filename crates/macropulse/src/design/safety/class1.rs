@@ -1,0 +1,184 @@
+//! The limits of class 1 at one wavelength \[IEC60825\].
+
+/// Exposures are judged up to this time, s, beyond which the limit is a power.
+pub const LONGEST: f64 = 10.0;
+
+/// Limits of emission at one wavelength.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Class1 {
+    /// 700 to 1050 nm: the eye focuses the light on its retina.
+    Retina {
+        /// C4 = 10^(0.002·(λ/nm − 700)).
+        c4: f64,
+    },
+    /// 1400 to 1500 nm: the light is absorbed before it reaches the retina, part of it in the lens.
+    Lens,
+    /// 1500 to 1800 nm: the light is absorbed in front of the lens.
+    Cornea,
+}
+
+/// An opening through which light is judged, and for exposures of which length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Opening {
+    /// Diameter, m.
+    pub diameter: f64,
+    /// It judges exposures longer than the first and up to the second, s.
+    pub durations: [f64; 2],
+}
+
+impl Class1 {
+    /// The limits at `wavelength` metres; `None` outside 700…1050 and 1400…1800 nm.
+    pub fn at(wavelength: f64) -> Option<Self> {
+        match wavelength * 1e9 {
+            nm if (700.0..=1050.0).contains(&nm) => {
+                Some(Self::Retina { c4: libm::pow(10.0, 0.002 * (nm - 700.0)) })
+            }
+            nm if (1400.0..1500.0).contains(&nm) => Some(Self::Lens),
+            nm if (1500.0..=1800.0).contains(&nm) => Some(Self::Cornea),
+            _ => None,
+        }
+    }
+
+    /// Energy, J, that one exposure of `duration` t seconds may have.
+    ///
+    /// * 700–1050 nm: 3.8e-8 below 10 ps; 7.7e-8·C4 to 5 µs; 7e-4·t^0.75·C4 to 10 s; then
+    ///   3.9e-4·C4·t (C7 = 1).
+    /// * 1400–1500 nm: 8e5·t below 1 ns; 8e-4 to 1 ms; 4.4e-3·t^0.25 to 0.35 s; then 1e-2·t.
+    /// * 1500–1800 nm: 8e6·t below 1 ns; 8e-3 to 0.35 s; 1.8e-2·t^0.75 to 10 s; then 1e-2·t.
+    pub fn single_exposure(&self, duration: f64) -> f64 {
+        match (self, duration) {
+            (_, t) if t > LONGEST => self.continuous() * t,
+            (Self::Retina { .. }, t) if t < 1e-11 => 3.8e-8,
+            (Self::Retina { c4 }, t) if t <= self.counted_as_one() => 7.7e-8 * c4,
+            (Self::Retina { c4 }, t) => 7e-4 * libm::pow(t, 0.75) * c4,
+            (Self::Lens, t) if t < 1e-9 => 8e5 * t,
+            (Self::Lens, t) if t <= 1e-3 => 8e-4,
+            (Self::Lens, t) if t <= 0.35 => 4.4e-3 * libm::pow(t, 0.25),
+            (Self::Lens, t) => 1e-2 * t,
+            (Self::Cornea, t) if t < 1e-9 => 8e6 * t,
+            (Self::Cornea, t) if t <= 0.35 => 8e-3,
+            (Self::Cornea, t) => 1.8e-2 * libm::pow(t, 0.75),
+        }
+    }
+
+    /// Power, W, allowed without end: 3.9e-4·C4 (C7 = 1), or 1e-2.
+    pub fn continuous(&self) -> f64 {
+        match self {
+            Self::Retina { c4 } => 3.9e-4 * c4,
+            Self::Lens | Self::Cornea => 1e-2,
+        }
+    }
+
+    /// Shots within this time count as one, T_i, s.
+    pub fn counted_as_one(&self) -> f64 {
+        match self {
+            Self::Retina { .. } => 5e-6,
+            Self::Lens => 1e-3,
+            Self::Cornea => 10.0,
+        }
+    }
+
+    /// Diameter, m, of the aperture through which an exposure of `duration` t seconds is judged:
+    /// 7 mm; above 1400 nm 1 mm to 0.35 s, 1.5·t^(3/8) mm to 10 s, 3.5 mm beyond.
+    pub fn aperture(&self, duration: f64) -> f64 {
+        match (self, duration) {
+            (Self::Retina { .. }, _) => 7e-3,
+            (_, t) if t <= 0.35 => 1e-3,
+            (_, t) if t < LONGEST => 1.5e-3 * libm::pow(t, 0.375),
+            _ => 3.5e-3,
+        }
+    }
+
+    /// The apertures to judge through. One that grows with the duration is taken in three steps,
+    /// each as wide as it becomes.
+    pub(in crate::design) fn openings(&self) -> Vec<Opening> {
+        if let Self::Retina { .. } = self {
+            return vec![Opening { diameter: 7e-3, durations: [0.0, f64::INFINITY] }];
+        }
+        let ends = [0.0, 0.35, 1.0, libm::sqrt(LONGEST), LONGEST, f64::INFINITY];
+        let opening = |ends: &[f64]| Opening {
+            diameter: self.aperture(ends[1]),
+            durations: [ends[0], ends[1]],
+        };
+        ends.windows(2).map(opening).collect()
+    }
+
+    /// C5 = 1 for N ≤ 600 groups within 10 s, else max(5·N^−0.25, 0.4); for the retina alone.
+    pub(super) fn c5(&self, groups: f64) -> f64 {
+        match self {
+            Self::Retina { .. } if groups > 600.0 => (5.0 * libm::pow(groups, -0.25)).max(0.4),
+            _ => 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn the_limits_at_905_nm() {
+        let limits = Class1::at(905e-9).unwrap();
+        let Class1::Retina { c4 } = limits else { panic!("905 nm reaches the retina") };
+        assert_relative_eq!(c4, 2.570, max_relative = 1e-3);
+        assert_relative_eq!(limits.single_exposure(27e-9), 197.9e-9, max_relative = 1e-3);
+        assert_relative_eq!(limits.continuous(), 1.00e-3, max_relative = 3e-3);
+        assert_relative_eq!(limits.single_exposure(100.0), 0.1002, max_relative = 1e-3);
+        assert_eq!(limits.single_exposure(2.5e-12), 3.8e-8);
+    }
+
+    #[test]
+    fn the_limits_at_850_and_940_nm() {
+        for (nm, pulse, power) in [(850.0, 153.6e-9, 0.778e-3), (940.0, 232.5e-9, 1.178e-3)] {
+            let limits = Class1::at(nm * 1e-9).unwrap();
+            assert_relative_eq!(limits.single_exposure(1e-9), pulse, max_relative = 1e-3);
+            assert_relative_eq!(limits.continuous(), power, max_relative = 1e-3);
+        }
+    }
+
+    #[test]
+    fn limits_meet_where_the_rule_changes() {
+        let retina = Class1::at(905e-9).unwrap();
+        let edges = [
+            (retina, vec![5e-6, 10.0]),
+            (Class1::Lens, vec![1e-9, 1e-3, 0.35, 10.0]),
+            (Class1::Cornea, vec![1e-9, 0.35, 10.0]),
+        ];
+        for (class, times) in edges {
+            for time in times {
+                let (before, after) = (time * (1.0 - 1e-9), time * (1.0 + 1e-9));
+                let (before, after) = (class.single_exposure(before), class.single_exposure(after));
+                assert_relative_eq!(before, after, max_relative = 0.05);
+            }
+        }
+    }
+
+    #[test]
+    fn apertures_cover_every_duration_and_are_never_too_small() {
+        for class in [Class1::at(905e-9).unwrap(), Class1::Lens, Class1::Cornea] {
+            let openings = class.openings();
+            assert_eq!(openings[0].durations[0], 0.0);
+            assert_eq!(openings.last().unwrap().durations[1], f64::INFINITY);
+            for pair in openings.windows(2) {
+                assert_eq!(pair[0].durations[1], pair[1].durations[0]);
+            }
+            for Opening { diameter, durations: [from, to] } in openings {
+                for part in [1e-3, 0.5, 1.0] {
+                    let time = from + part * (to.min(1e3) - from);
+                    assert!(diameter >= class.aperture(time), "{class:?} at {time} s");
+                }
+            }
+        }
+        assert_eq!(Class1::Cornea.aperture(1.0), 1.5e-3);
+    }
+
+    #[test]
+    fn other_wavelengths_are_not_guessed() {
+        for nm in [532.0, 1051.0, 1310.0, 1801.0] {
+            assert!(Class1::at(nm * 1e-9).is_none(), "{nm}");
+        }
+        assert_eq!(Class1::at(1450e-9), Some(Class1::Lens));
+        assert_eq!(Class1::at(1550e-9), Some(Class1::Cornea));
+    }
+}

@@ -1,0 +1,146 @@
+//! Which shots of a scan cross an eye, and where it sees most light.
+
+use std::f64::consts::FRAC_PI_4;
+
+use super::beams::Beams;
+use super::class1::{Class1, Opening};
+use super::exposure::{Crossing, Crossings, Exposure};
+use super::share::Share;
+use crate::design::budget::solid_angle;
+use crate::design::{Coding, Light, Pattern, Scan};
+use crate::units::s_from_fs;
+
+/// Who sends, and from how far away.
+#[derive(Clone, Copy)]
+pub(in crate::design) struct Sender<'a> {
+    pub scan: &'a Scan,
+    pub light: &'a Light,
+    pub coding: &'a Coding,
+    /// Distance of the eye, m.
+    pub distance: f64,
+    /// Whether groups of shots that cross the eye count as repeated exposures.
+    pub count_groups: bool,
+}
+
+/// What `sender` sends to an eye, where that sees most of it.
+pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
+    let Sender { scan, light, coding, .. } = sender;
+    let chips = i64::from(coding.codebook.chips());
+    let energies = Energies::of(scan, coding);
+    let openings = class.openings();
+    let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
+    let places: Vec<Crossings> = match scan.pattern {
+        Pattern::Flash { horizontal, vertical } => {
+            let field = solid_angle(horizontal, vertical);
+            let flood = |opening| sender.flood(opening, [horizontal, vertical], field, &energies);
+            openings.iter().map(flood).collect()
+        }
+        Pattern::Raster { .. } | Pattern::Spinning { .. } => {
+            let beams = Beams::of(scan, &energies, sender.distance);
+            let at = |(opening, share): (&Opening, &Share)| {
+                let aims = beams.aims(share, class.counted_as_one());
+                let cross = |aim| beams.crossing(share, aim);
+                let places = aims.into_iter().map(cross);
+                let durations = opening.durations;
+                places.map(|shots| Crossings { durations, shots }).collect::<Vec<_>>()
+            };
+            openings.iter().zip(&shares).flat_map(at).collect()
+        }
+    };
+    // One shot alone is judged in the middle of the first aperture; a flash has no shot alone.
+    let (passed, brightest) = match scan.pattern {
+        Pattern::Flash { .. } => {
+            let flash = places.first().and_then(|place| place.shots.first());
+            flash.map_or((0.0, 0.0), |flash| (flash.share, flash.energy))
+        }
+        _ => {
+            let passed = shares.first().map_or(1.0, |share| share.at(0.0));
+            (passed, passed * energies.most())
+        }
+    };
+    Exposure {
+        scan_period: scan.period(),
+        shot: light.pulse.max(s_from_fs(chips * coding.chip_fs)),
+        mark: light.pulse,
+        brightest_shot: brightest,
+        brightest_mark: passed / coding.codebook.mean_weight(),
+        count_groups: sender.count_groups,
+        places,
+    }
+}
+
+impl Sender<'_> {
+    /// The radius of the beam at 1/e² at the eye, m.
+    fn spot(&self) -> f64 {
+        (self.light.beam_diameter + self.light.divergence * self.distance) / 2.0
+    }
+
+    fn share(&self, opening: &Opening) -> Share {
+        Share::new(opening.diameter / 2.0, self.spot())
+    }
+
+    /// All pixels at once, their light spread evenly over the `field`, sr, at the distance of the
+    /// eye; a wide beam widens it.
+    fn flood(
+        &self,
+        opening: &Opening,
+        sides: [f64; 2],
+        field: f64,
+        energies: &Energies,
+    ) -> Crossings {
+        let wide = 2.0 * self.spot();
+        let [across, down] = sides.map(|side| self.distance * side);
+        let lit = field * self.distance * self.distance + (across + down) * wide + wide * wide;
+        let seen = opening.diameter.min(across + wide) * opening.diameter.min(down + wide);
+        let area = (FRAC_PI_4 * opening.diameter * opening.diameter).min(seen);
+        let share = (area / lit).min(1.0);
+        let pixels = f64::from(self.scan.rows) * f64::from(self.scan.columns);
+        let energy = share * f64::from(self.scan.rows) * energies.sum();
+        let flash = Crossing { time: 0.0, share: share * pixels, energy };
+        Crossings { durations: opening.durations, shots: vec![flash] }
+    }
+}
+
+/// The energy of a shot by its column, in energies of a mean shot, every mark having the same: that
+/// of the brightest word of its label.
+pub(super) struct Energies {
+    by_column: Vec<f64>,
+    /// Whether all columns are alike.
+    pub alike: bool,
+}
+
+impl Energies {
+    fn of(scan: &Scan, coding: &Coding) -> Self {
+        let book = &coding.codebook;
+        let words = coding.first_word..coding.first_word + coding.word_modulus;
+        let marks = |label: u16| {
+            words.clone().map(|word| book.marks(label, word as u16).len()).max().unwrap_or(0)
+        };
+        let mut last = (0, marks(0));
+        let by_column = (0..scan.columns).map(|column| {
+            let label = coding.label_of(column as u16);
+            if label != last.0 {
+                last = (label, marks(label));
+            }
+            last.1 as f64 / book.mean_weight()
+        });
+        Self::new(by_column.collect())
+    }
+
+    pub(super) fn new(by_column: Vec<f64>) -> Self {
+        let alike = by_column.windows(2).all(|pair| pair[0] == pair[1]);
+        Self { by_column, alike }
+    }
+
+    pub(super) fn at(&self, column: u32) -> f64 {
+        self.by_column.get(column as usize).copied().unwrap_or(0.0)
+    }
+
+    fn most(&self) -> f64 {
+        self.by_column.iter().copied().fold(0.0, f64::max)
+    }
+
+    fn sum(&self) -> f64 {
+        self.by_column.iter().sum()
+    }
+}

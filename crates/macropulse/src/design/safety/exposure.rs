@@ -1,0 +1,344 @@
+//! What class 1 allows to the shots that cross an eye.
+
+use super::class1::{Class1, LONGEST};
+
+/// Exposures beyond [`LONGEST`] are judged up to this time, s, and then by their mean power.
+const LAST: f64 = 100.0;
+
+/// A shot that crosses the aperture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// When within the scan it is fired, s.
+    pub time: f64,
+    /// The share of its light that passes the aperture.
+    pub share: f64,
+    /// Its energy through the aperture, in energies of a mean shot.
+    pub energy: f64,
+}
+
+/// The shots of one scan that cross an aperture at one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crossings {
+    /// The exposures that this aperture judges: longer than the first and up to the second, s.
+    pub durations: [f64; 2],
+    /// The shots, in the order of their times.
+    pub shots: Vec<Crossing>,
+}
+
+/// What a sensor sends to an eye.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exposure {
+    /// Duration of a scan, s.
+    pub scan_period: f64,
+    /// Length of a shot, s.
+    pub shot: f64,
+    /// Length of one mark, s.
+    pub mark: f64,
+    /// The most light that one shot brings through an aperture, in energies of a mean shot.
+    pub brightest_shot: f64,
+    /// The same of one mark.
+    pub brightest_mark: f64,
+    /// Whether groups of shots that cross the eye count as repeated exposures, which brings in C5.
+    pub count_groups: bool,
+    /// The shots that cross the eye, by aperture and where the eye is.
+    pub places: Vec<Crossings>,
+}
+
+/// Which exposure a limit is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rule {
+    /// One mark of a shot alone.
+    Mark,
+    /// One shot alone.
+    SingleShot,
+    /// The shots that cross the eye within T_i and so count as one; repeated, with C5.
+    Group,
+    /// Shots of one scan, over any time longer than T_i.
+    Scan,
+    /// Scan after scan, up to 100 s.
+    Repeated,
+    /// Scan after scan without end.
+    Average,
+}
+
+impl Rule {
+    /// Every rule, in the order of growing duration.
+    pub const ALL: [Self; 6] =
+        [Self::Mark, Self::SingleShot, Self::Group, Self::Scan, Self::Repeated, Self::Average];
+
+    /// What it is about, in a few words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mark => "one mark",
+            Self::SingleShot => "one shot",
+            Self::Group => "the shots that count as one",
+            Self::Scan => "one scan",
+            Self::Repeated => "several scans",
+            Self::Average => "scan after scan",
+        }
+    }
+}
+
+/// What one rule allows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limit {
+    /// The rule.
+    pub rule: Rule,
+    /// Shots it adds up: their shares through the aperture.
+    pub shots: f64,
+    /// How bright those are on average, the mean shot being 1.
+    pub brightness: f64,
+    /// Duration of the exposure, s.
+    pub duration: f64,
+    /// Energy, J, that the mean shot may have.
+    pub energy: f64,
+}
+
+/// The smallest of `limits`.
+pub fn strictest(limits: &[Limit]) -> Option<&Limit> {
+    limits.iter().min_by(|a, b| a.energy.total_cmp(&b.energy))
+}
+
+/// What each rule allows to `exposure`, the rules in the order of growing duration; a rule that no
+/// exposure falls under is left out.
+///
+/// Every run of shots that follow each other through an aperture, of a duration that is tried, has
+/// at most the energy of a single exposure that lasts as long: the sum of the energies of the shots
+/// times that of a mean shot ≤ AEL(t). Durations are tried from T_i on, each twice the one before,
+/// and whole numbers of scans, twice as many each time, to 100 s.
+pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
+    let mut all = Vec::new();
+    let mut add = |rule, shots: f64, brightness: f64, duration| {
+        let energy = class.single_exposure(duration) / (shots * brightness);
+        all.push(Limit { rule, shots, brightness, duration, energy });
+    };
+    if exposure.mark < exposure.shot {
+        add(Rule::Mark, exposure.brightest_mark, 1.0, exposure.mark);
+    }
+    add(Rule::SingleShot, 1.0, exposure.brightest_shot, exposure.shot);
+    for crossings in &exposure.places {
+        let train = Train::of(class, exposure, crossings);
+        all.extend(train.group());
+        all.extend(train.within_a_scan());
+        all.extend(train.repeated());
+        all.extend(train.average());
+    }
+    let of_rule = |rule: Rule| {
+        let limits: Vec<Limit> = all.iter().filter(|limit| limit.rule == rule).copied().collect();
+        strictest(&limits).copied()
+    };
+    Rule::ALL.into_iter().filter_map(of_rule).collect()
+}
+
+/// The shots that cross an aperture in two scans, and the sums of what they bring.
+struct Train<'a> {
+    class: &'a Class1,
+    exposure: &'a Exposure,
+    durations: [f64; 2],
+    /// Shots in one scan.
+    shots: usize,
+    times: Vec<f64>,
+    /// Shares and energies of all shots before the one with that number.
+    sums: Vec<[f64; 2]>,
+}
+
+impl<'a> Train<'a> {
+    fn of(class: &'a Class1, exposure: &'a Exposure, crossings: &Crossings) -> Self {
+        let shots = crossings.shots.len();
+        let (mut times, mut sums) = (Vec::with_capacity(2 * shots), vec![[0.0; 2]]);
+        let mut sum = [0.0; 2];
+        for scan in [0.0, exposure.scan_period] {
+            for shot in &crossings.shots {
+                times.push(scan + shot.time);
+                sum = [sum[0] + shot.share, sum[1] + shot.energy];
+                sums.push(sum);
+            }
+        }
+        Self { class, exposure, durations: crossings.durations, shots, times, sums }
+    }
+
+    /// Whether this aperture judges exposures of `duration` seconds.
+    fn judges(&self, duration: f64) -> bool {
+        duration > self.durations[0] && duration <= self.durations[1]
+    }
+
+    /// What `factor` times the limit of `duration` leaves to a mean shot, where `sum` crosses.
+    fn limit(
+        &self,
+        rule: Rule,
+        [shots, energy]: [f64; 2],
+        (duration, factor): (f64, f64),
+    ) -> Limit {
+        let allowed = factor * self.class.single_exposure(duration) / energy;
+        Limit { rule, shots, brightness: energy / shots, duration, energy: allowed }
+    }
+
+    /// The runs of shots that fit into `longest` seconds and into no more, one for each first shot
+    /// of the scan, with the seconds from the first light to the last.
+    fn runs(&self, longest: f64) -> impl Iterator<Item = ([f64; 2], f64)> {
+        let mut end = 0;
+        (0..self.shots).map(move |first| {
+            let begin = self.times[first];
+            // A scan's worth at most: the same shot does not come twice.
+            let most = first + self.shots;
+            end = end.max(first + 1);
+            let fits = |end: usize| self.times[end] + self.exposure.shot - begin <= longest;
+            while end < most && fits(end) {
+                end += 1;
+            }
+            let sum = [0, 1].map(|part| self.sums[end][part] - self.sums[first][part]);
+            (sum, self.times[end - 1] + self.exposure.shot - begin)
+        })
+    }
+
+    /// The shots within T_i, together one exposure, which C5 reduces where many of them follow.
+    fn group(&self) -> Option<Limit> {
+        let longest = self.class.counted_as_one();
+        if longest > self.exposure.scan_period || !self.judges(longest) {
+            return None;
+        }
+        let groups = self.groups(longest) as f64 * LONGEST / self.exposure.scan_period;
+        let counts = self.exposure.count_groups;
+        let factor = if counts { self.class.c5(groups.ceil()) } else { 1.0 };
+        let brightest = self.runs(longest).max_by(|a, b| a.0[1].total_cmp(&b.0[1]));
+        brightest.map(|(sum, duration)| {
+            // The duration is for people to read: the limit is that of T_i.
+            let limit = self.limit(Rule::Group, sum, (longest, factor));
+            Limit { duration, ..limit }
+        })
+    }
+
+    /// How many exposures a scan has, where shots within `together` seconds of the first one are
+    /// one.
+    fn groups(&self, together: f64) -> usize {
+        let mut groups = 0;
+        let mut until = f64::NEG_INFINITY;
+        for time in &self.times[..self.shots] {
+            if *time >= until {
+                groups += 1;
+                until = time + together;
+            }
+        }
+        groups
+    }
+
+    fn within_a_scan(&self) -> Option<Limit> {
+        let period = self.exposure.scan_period.min(LAST);
+        let counted = self.class.counted_as_one();
+        // Shots within T_i have their own rule, unless the scan is over sooner.
+        let least = if counted > period { 0.0 } else { counted };
+        let mut longest = least.max(self.exposure.shot);
+        let mut limits = Vec::new();
+        while longest < period {
+            longest = (longest * 2.0).min(period);
+            for (sum, duration) in self.runs(longest) {
+                if duration > least && self.judges(duration) {
+                    limits.push(self.limit(Rule::Scan, sum, (duration, 1.0)));
+                }
+            }
+        }
+        strictest(&limits).copied()
+    }
+
+    fn repeated(&self) -> Option<Limit> {
+        let period = self.exposure.scan_period;
+        let (first, last) = (self.times.first()?, self.times.get(self.shots - 1)?);
+        let pass = last - first + self.exposure.shot;
+        let once = *self.sums.get(self.shots)?;
+        let most = |longest: f64| ((longest - pass) / period * (1.0 + 1e-12)).floor() + 1.0;
+        let mut tried: Vec<f64> = (1..40).map(|power| libm::exp2(f64::from(power))).collect();
+        // And as many as one exposure, one aperture or all that is judged can hold.
+        let ends = [LONGEST, self.durations[1].min(LAST)];
+        tried.extend(ends.map(most));
+        // From 10 s on a power is allowed, which the first exposure beyond uses up soonest.
+        tried.push(most(LONGEST) + 1.0);
+        let mut limits = Vec::new();
+        for scans in tried {
+            // Beyond the last step of the limits an exposure is as long as it is judged.
+            let duration = (scans - 1.0) * period + pass;
+            if scans >= 2.0 && duration <= LAST && self.judges(duration) {
+                let sum = once.map(|part| part * scans);
+                limits.push(self.limit(Rule::Repeated, sum, (duration, 1.0)));
+            }
+        }
+        strictest(&limits).copied()
+    }
+
+    fn average(&self) -> Option<Limit> {
+        if !self.durations[1].is_infinite() || self.shots == 0 {
+            return None;
+        }
+        let scans = LAST / self.exposure.scan_period;
+        let sum = self.sums[self.shots].map(|part| part * scans);
+        Some(self.limit(Rule::Average, sum, (LAST, 1.0)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    const CLASS: Class1 = Class1::Retina { c4: 1.0 };
+
+    fn of(times: &[f64], count_groups: bool) -> Vec<Limit> {
+        let shot = |&time: &f64| Crossing { time, share: 0.5, energy: 1.0 };
+        let shots = times.iter().map(shot).collect();
+        limits(
+            &CLASS,
+            &Exposure {
+                scan_period: 0.1,
+                shot: 1e-9,
+                mark: 1e-9,
+                brightest_shot: 1.0,
+                brightest_mark: 1.0,
+                count_groups,
+                places: vec![Crossings { durations: [0.0, f64::INFINITY], shots }],
+            },
+        )
+    }
+
+    fn found(limits: &[Limit], rule: Rule) -> Limit {
+        *limits.iter().find(|limit| limit.rule == rule).unwrap()
+    }
+
+    #[test]
+    fn one_shot_a_scan_is_held_by_its_single_exposure() {
+        let limits = of(&[0.03], true);
+        // 100 shots in 10 s are no reason for C5, and one mark is all of the shot.
+        assert_eq!(strictest(&limits).unwrap().energy, 7.7e-8);
+        let rules: Vec<Rule> = limits.iter().map(|limit| limit.rule).collect();
+        assert_eq!(rules, [Rule::SingleShot, Rule::Group, Rule::Repeated, Rule::Average]);
+        assert_eq!(found(&limits, Rule::Group).brightness, 2.0);
+        assert_relative_eq!(found(&limits, Rule::Average).energy, 3.9e-5, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn shots_within_t_i_are_one_wherever_the_scan_ends() {
+        let together = of(&[0.03, 0.03 + 4e-6], true);
+        assert_relative_eq!(found(&together, Rule::Group).energy, 3.85e-8, max_relative = 1e-12);
+        // The last shot of a scan and the first of the next are 2 µs apart.
+        let over_the_end = of(&[1e-6, 0.1 - 1e-6], true);
+        assert_relative_eq!(found(&over_the_end, Rule::Group).energy, 3.85e-8, max_relative = 1e-9);
+        let apart = of(&[0.03, 0.03 + 6e-6], true);
+        assert_eq!(found(&apart, Rule::Group).energy, 7.7e-8);
+        let scan = found(&apart, Rule::Scan);
+        assert_relative_eq!(scan.duration, 6.001e-6, max_relative = 1e-9);
+        assert_relative_eq!(scan.energy, 7e-4 * 6.001e-6_f64.powf(0.75) / 2.0, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn many_groups_in_ten_seconds_bring_in_c5() {
+        let times: Vec<f64> = (0..64).map(|n| f64::from(n) * 1e-3).collect();
+        let c5 = 5.0 * 6400_f64.powf(-0.25);
+        let counted = found(&of(&times, true), Rule::Group).energy;
+        assert_relative_eq!(counted, 7.7e-8 * c5, max_relative = 1e-12);
+        assert_eq!(found(&of(&times, false), Rule::Group).energy, 7.7e-8);
+    }
+
+    #[test]
+    fn an_eye_that_nothing_crosses_is_no_limit() {
+        let rules: Vec<Rule> = of(&[], true).iter().map(|limit| limit.rule).collect();
+        assert_eq!(rules, [Rule::SingleShot]);
+    }
+}

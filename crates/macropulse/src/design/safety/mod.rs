@@ -1,0 +1,26 @@
+//! Eye safety: our reading of IEC 60825-1:2014, class 1, point source \[IEC60825\]. Not a
+//! certification. Every assumption is a parameter, or printed by [`ASSUMED`].
+//!
+//! Three steps: the [`Class1`] limits at a wavelength; the shots of one scan that cross the eye
+//! where most light does, as times and energies ([`Exposure`]); and what that leaves to a shot,
+//! [`limits`].
+
+mod beams;
+mod class1;
+mod crossing;
+mod exposure;
+mod share;
+
+pub use class1::Class1;
+pub(super) use crossing::{Sender, exposure};
+pub use exposure::{Crossing, Crossings, Exposure, Limit, Rule, limits, strictest};
+
+/// What the limits take for granted, for people to read.
+pub const ASSUMED: &str = "IEC 60825-1:2014 class 1, point source, through the aperture at \
+    safety.distance_mm where most light crosses it; every shot as bright as the brightest word of \
+    its label; groups of shots within T_i counted as repeated exposures if safety.count_lines; above \
+    1400 nm condition 1 (2 m, seven times the aperture) is not modelled; a scan that stops is taken \
+    to switch the laser off. Our reading, not a certification";
+
+#[cfg(test)]
+mod tests;
