@@ -37,7 +37,7 @@ pub use presets::{names as preset_names, text as preset_text};
 
 use crate::code::Codebook;
 use crate::decode::Receiver;
-use crate::digest::Fnv;
+use crate::digest::Digest;
 
 /// A sensor, checked, in SI units.
 #[derive(Debug, Clone)]
@@ -240,7 +240,7 @@ impl Design {
 
     /// A hash of everything the sensor file says, defaults included.
     pub fn digest(&self) -> String {
-        let mut hash = Fnv::new();
+        let mut hash = Digest::new();
         hash.bytes(self.text.as_bytes());
         hash.text()
     }

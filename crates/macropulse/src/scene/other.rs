@@ -8,7 +8,7 @@ use super::error::Error;
 use super::file::{OtherTyped, Source, Stand};
 use super::pose::Pose;
 use crate::design::{Design, preset_text};
-use crate::digest::Fnv;
+use crate::digest::Digest;
 use crate::emit::Clock;
 
 /// Most lidars beside the sensor.
@@ -33,7 +33,7 @@ pub struct Other {
     pub clock: Clock,
 }
 
-impl Fnv {
+impl Digest {
     /// Takes in a lidar.
     pub(super) fn other(&mut self, other: &Other) {
         self.bytes(other.design.text.as_bytes());
