@@ -1,25 +1,34 @@
 //! The hash by which a manifest says which sensor and scene it was.
 
-/// The 64-bit FNV-1a hash \[FNV\] under way: the same on every machine and run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fnv(u64);
+/// What is gathered before it is hashed: numbers one by one would cost more than their hash.
+const BLOCK: usize = 1 << 16;
 
-impl Default for Fnv {
+/// The BLAKE3 hash \[BLAKE3\] under way, of which 128 bits are kept: the same on every machine and
+/// run, and no two inputs are known, or can be made, that share it.
+#[derive(Debug, Clone)]
+pub struct Digest {
+    hasher: blake3::Hasher,
+    waiting: Vec<u8>,
+}
+
+impl Default for Digest {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Fnv {
+impl Digest {
     /// The hash of nothing.
     pub fn new() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
+        Self { hasher: blake3::Hasher::new(), waiting: Vec::new() }
     }
 
     /// Takes in some bytes.
     pub fn bytes(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        self.waiting.extend_from_slice(bytes);
+        if self.waiting.len() >= BLOCK {
+            self.hasher.update(&self.waiting);
+            self.waiting.clear();
         }
     }
 
@@ -28,9 +37,12 @@ impl Fnv {
         self.bytes(&value.to_bits().to_le_bytes());
     }
 
-    /// The hash as sixteen hexadecimal digits.
-    pub fn text(self) -> String {
-        format!("{:016x}", self.0)
+    /// The first 128 bits of the hash as 32 hexadecimal digits.
+    pub fn text(mut self) -> String {
+        self.hasher.update(&self.waiting);
+        let mut kept = [0; 16];
+        self.hasher.finalize_xof().fill(&mut kept);
+        format!("{:032x}", u128::from_be_bytes(kept))
     }
 }
 
@@ -39,24 +51,33 @@ mod tests {
     use super::*;
 
     fn of(bytes: &[u8]) -> String {
-        let mut hash = Fnv::new();
+        let mut hash = Digest::new();
         hash.bytes(bytes);
         hash.text()
     }
 
     #[test]
     fn the_published_values_come_out() {
-        assert_eq!(of(b""), "cbf29ce484222325");
-        assert_eq!(of(b"a"), "af63dc4c8601ec8c");
-        assert_eq!(of(b"foobar"), "85944171f73967e8");
+        let input = |length: u32| (0..length).map(|at| (at % 251) as u8).collect::<Vec<u8>>();
+        assert_eq!(of(&input(0)), "af1349b9f5f9a1a6a0404dea36dcc949");
+        assert_eq!(of(&input(1)), "2d3adedff11b61f14c886e35afa03673");
+        assert_eq!(of(&input(102_400)), "bc3e3d41a1146b069abffad3c0d44860");
+    }
+
+    #[test]
+    fn how_the_bytes_are_divided_does_not_matter() {
+        let bytes: Vec<u8> = (0..200_003_u32).map(|at| (at.wrapping_mul(at) >> 3) as u8).collect();
+        let mut hash = Digest::new();
+        bytes.chunks(7).for_each(|part| hash.bytes(part));
+        assert_eq!(hash.text(), of(&bytes));
     }
 
     #[test]
     fn one_bit_of_one_number_counts() {
         let hash = |value: f64| {
-            let mut hash = Fnv::new();
+            let mut hash = Digest::new();
             hash.number(value);
-            hash
+            hash.text()
         };
         assert_ne!(hash(1.0), hash(1.0 + f64::EPSILON));
         assert_eq!(hash(1.0), hash(1.0));

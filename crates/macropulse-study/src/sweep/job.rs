@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::plan::folder_of_jobs;
 use super::{Error, Plan, Point};
-use macropulse::digest::Fnv;
+use macropulse::digest::Digest;
 use macropulse::formats::write_atomically;
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
@@ -56,7 +56,7 @@ impl Job<'_> {
     /// A hash of all that decides its counts: the program's version, the sensor, the scene, the
     /// part of the scan, the seed. It names the job's file.
     pub fn name(&self) -> String {
-        let mut hash = Fnv::new();
+        let mut hash = Digest::new();
         for text in [env!("CARGO_PKG_VERSION"), &self.point.text, &self.point.scene.digest] {
             hash.bytes(text.as_bytes());
             hash.bytes(&[0]);

@@ -1,14 +1,14 @@
 //! Pictures of clouds and range images, charts, and the pieces of the report.
 //!
 //! Pictures are PNG bytes, charts are SVG text, the report is one HTML file that needs nothing
-//! beside it. Nothing here knows how a number came about.
+//! beside it. A chart as PNG, and what is written on a picture, is SVG made into pixels. Nothing
+//! here knows how a number came about.
 
 mod bits;
 mod canvas;
 mod chart;
 mod colour;
 mod curves;
-mod font;
 mod matrix;
 mod page;
 mod page_style;
@@ -58,6 +58,9 @@ pub enum Error {
         /// Height in pixels.
         height: usize,
     },
+    /// A drawing has too many elements, say.
+    #[error("cannot draw the chart as pixels: {0}")]
+    Drawing(#[from] resvg::usvg::Error),
     /// The PNG encoder refused.
     #[error("cannot encode the picture: {0}")]
     Encode(#[from] png::EncodingError),

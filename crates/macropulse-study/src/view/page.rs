@@ -215,7 +215,7 @@ impl Page {
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <title>{}</title>\n<style>\n{STYLE}{}\n</style>\n</head>\n<body>\n",
             escape(&self.title),
-            svg::STYLE
+            svg::style()
         );
         html += "<header>\n";
         if !self.kicker.is_empty() {

@@ -1,16 +1,20 @@
 //! Pictures on the pixel grid of a sensor: range, amplitude, outcome.
 
 use super::Error;
-use super::canvas::{Anchor, Canvas, Pen, text_width};
+use super::canvas::Canvas;
 use super::colour::{INK, PALE, Rgb, grey, outcome_colour, place, range_colour};
+use super::svg::{self, Anchor, Ground, Svg};
 use super::ticks::{label, linear_ticks};
 use macropulse::points::Outcome;
 use std::ops::Range;
 
 const MARGIN: usize = 16;
-/// Pixels per dot of the letters; their height is seven dots.
-const LETTER: usize = 2;
-const LINE: usize = 7 * LETTER;
+/// Pixels to a unit of the letters, which are 12 units high.
+const LETTERS: f64 = 1.5;
+/// Height of a capital letter, and a bit.
+const LINE: usize = 14;
+/// Width of a scale bar's line and of a tick.
+const STROKE: usize = 2;
 /// The key below the picture needs this much, however small the picture.
 const NARROWEST: usize = 440;
 const BAR_HEIGHT: usize = 10;
@@ -194,31 +198,56 @@ pub(super) fn draw(
     if width == 0 || height == 0 {
         return Err(Error::Size { width, height });
     }
-    let inner = width.max(NARROWEST).max(text_width(&layout.title, LETTER));
+    let inner = width.max(NARROWEST).max(text_width(&layout.title));
     let top = if layout.title.is_empty() { MARGIN } else { 2 * MARGIN + LINE - 4 };
     let key_top = top.saturating_add(height).saturating_add(12);
     let total = key_top.saturating_add(key_height(layout, key, inner) + MARGIN);
-    let mut canvas = Canvas::new(inner.saturating_add(2 * MARGIN), total)?;
-    canvas.text([MARGIN, MARGIN], &layout.title, pen(INK, Anchor::Start));
+    let mut sheet = Sheet::new(inner.saturating_add(2 * MARGIN), total)?;
+    sheet.write([MARGIN, MARGIN], Anchor::Start, &layout.title);
     for (y, row) in crop.rows.clone().enumerate() {
         for (x, column) in crop.columns.clone().enumerate() {
             let corner = [MARGIN + x * zoom_x, top + y * zoom_y];
-            canvas.fill(corner, layout.zoom, colour(row * layout.columns + column));
+            sheet.canvas.fill(corner, layout.zoom, colour(row * layout.columns + column));
         }
     }
-    let bar_room = scale_bar(&mut canvas, layout, key_top, width);
+    let bar_room = scale_bar(&mut sheet, layout, key_top, width);
     match key {
-        Key::Bar { .. } => colour_bar(&mut canvas, key, key_top, inner.saturating_sub(bar_room)),
+        Key::Bar { .. } => colour_bar(&mut sheet, key, key_top, inner.saturating_sub(bar_room)),
         Key::Legend(entries) => {
             let under_bar = if bar_room > 0 { BAR_HEIGHT + LINE + 16 } else { 0 };
-            legend(&mut canvas, entries, key_top + under_bar, inner);
+            legend(&mut sheet, entries, key_top + under_bar, inner);
         }
     }
-    canvas.png()
+    sheet.png()
 }
 
-fn pen(colour: Rgb, anchor: Anchor) -> Pen {
-    Pen { size: LETTER, colour, anchor }
+/// A canvas and what is yet to be written on it.
+struct Sheet {
+    canvas: Canvas,
+    letters: Svg,
+}
+
+impl Sheet {
+    fn new(width: usize, height: usize) -> Result<Self, Error> {
+        let size = [width, height].map(|side| side as f64 / LETTERS);
+        Ok(Self { canvas: Canvas::new(width, height)?, letters: Svg::new(size, "") })
+    }
+
+    /// Writes `text` with the top of its capitals at `place[1]`.
+    fn write(&mut self, [x, top]: [usize; 2], anchor: Anchor, text: &str) {
+        let baseline = top as f64 + LINE as f64 - 0.5;
+        self.letters.text([x as f64 / LETTERS, baseline / LETTERS], anchor, "", text);
+    }
+
+    fn png(mut self) -> Result<Vec<u8>, Error> {
+        self.canvas.draw(&self.letters, Ground::Dark, LETTERS)?;
+        self.canvas.png()
+    }
+}
+
+/// Width of a text in pixels, rather too much than too little.
+fn text_width(text: &str) -> usize {
+    (svg::text_width(text) * LETTERS).ceil() as usize
 }
 
 fn key_height(layout: &Layout, key: &Key, inner: usize) -> usize {
@@ -233,13 +262,13 @@ fn key_height(layout: &Layout, key: &Key, inner: usize) -> usize {
 }
 
 /// Bar of colours with round numbers under it, from the left margin, at most `room` wide.
-fn colour_bar(canvas: &mut Canvas, key: &Key, top: usize, room: usize) {
+fn colour_bar(sheet: &mut Sheet, key: &Key, top: usize, room: usize) {
     let Key::Bar { colour, ends, unit } = key else { return };
     let width = room.min(420);
     // Room for half of the outermost labels.
     let [left, length] = [MARGIN + 2, width.saturating_sub(28).max(1)];
     for x in 0..length {
-        canvas.fill([left + x, top], [1, BAR_HEIGHT], colour(x as f64 / length as f64));
+        sheet.canvas.fill([left + x, top], [1, BAR_HEIGHT], colour(x as f64 / length as f64));
     }
     let [near, far] = ends.map(f64::from);
     let ticks = linear_ticks(near.min(far), near.max(far), (length / 72).max(2));
@@ -247,26 +276,30 @@ fn colour_bar(canvas: &mut Canvas, key: &Key, top: usize, room: usize) {
     for (at, tick) in ticks.iter().enumerate() {
         let x =
             left + (place(*tick as f32, ends[0], ends[1]) * (length - 1) as f64).round() as usize;
-        canvas.fill([x, top + BAR_HEIGHT], [LETTER, 4], PALE);
+        sheet.canvas.fill([x, top + BAR_HEIGHT], [STROKE, 4], PALE);
         let last = at + 1 == ticks.len();
-        let text = format!("{}{}", label(*tick, step), if last { unit } else { "" });
+        let digits = label(*tick, step);
         // The unit hangs over: the digits alone stay centred under their tick.
-        let digits = text_width(&label(*tick, step), LETTER);
-        let start = x.saturating_sub(digits / 2).max(MARGIN);
-        canvas.text([start, top + BAR_HEIGHT + 8], &text, pen(INK, Anchor::Start));
+        let half = text_width(&digits) / 2;
+        let middle = x.max(MARGIN + half);
+        let foot = top + BAR_HEIGHT + 8;
+        sheet.write([middle, foot], Anchor::Middle, &digits);
+        if last {
+            sheet.write([middle + half + 5, foot], Anchor::Start, unit.trim());
+        }
     }
 }
 
 /// Draws the scale bar at the right edge of the picture and gives the width it takes.
-fn scale_bar(canvas: &mut Canvas, layout: &Layout, top: usize, width: usize) -> usize {
+fn scale_bar(sheet: &mut Sheet, layout: &Layout, top: usize, width: usize) -> usize {
     let Some(bar) = &layout.scale_bar else { return 0 };
     let length = (bar.columns * layout.zoom[0] as f64).round();
     if !(1.0..=width as f64).contains(&length) {
         return 0;
     }
-    let right = canvas.width - MARGIN;
+    let right = sheet.canvas.width - MARGIN;
     let length = length as usize;
-    let text = text_width(&bar.label, LETTER);
+    let text = text_width(&bar.label);
     let taken = text.max(length) + 2 * MARGIN;
     if taken + NARROWEST / 3 > right {
         return 0;
@@ -276,11 +309,11 @@ fn scale_bar(canvas: &mut Canvas, layout: &Layout, top: usize, width: usize) -> 
         over => [right - length - over / 2, right - text / 2],
     };
     let middle = top + BAR_HEIGHT / 2 - 1;
-    canvas.fill([left, middle], [length, 2], INK);
-    for end in [left, left + length.saturating_sub(2)] {
-        canvas.fill([end, top], [2, BAR_HEIGHT], INK);
+    sheet.canvas.fill([left, middle], [length, STROKE], INK);
+    for end in [left, left + length.saturating_sub(STROKE)] {
+        sheet.canvas.fill([end, top], [STROKE, BAR_HEIGHT], INK);
     }
-    canvas.text([centre, top + BAR_HEIGHT + 8], &bar.label, pen(INK, Anchor::Middle));
+    sheet.write([centre, top + BAR_HEIGHT + 8], Anchor::Middle, &bar.label);
     taken
 }
 
@@ -289,7 +322,7 @@ fn legend_places(entries: &[(Rgb, String)], inner: usize) -> Vec<[usize; 2]> {
     let mut places = Vec::new();
     let [mut x, mut y] = [0, 0];
     for (_, text) in entries {
-        let width = LINE + 8 + text_width(text, LETTER);
+        let width = LINE + 8 + text_width(text);
         if x > 0 && x + width > inner {
             [x, y] = [0, y + LINE + 8];
         }
@@ -299,11 +332,11 @@ fn legend_places(entries: &[(Rgb, String)], inner: usize) -> Vec<[usize; 2]> {
     places
 }
 
-fn legend(canvas: &mut Canvas, entries: &[(Rgb, String)], top: usize, inner: usize) {
+fn legend(sheet: &mut Sheet, entries: &[(Rgb, String)], top: usize, inner: usize) {
     for ([x, y], (colour, text)) in legend_places(entries, inner).into_iter().zip(entries) {
         let [left, top] = [MARGIN + x, top + y];
-        canvas.fill([left, top], [LINE, LINE], *colour);
-        canvas.text([left + LINE + 8, top], text, pen(INK, Anchor::Start));
+        sheet.canvas.fill([left, top], [LINE, LINE], *colour);
+        sheet.write([left + LINE + 8, top], Anchor::Start, text);
     }
 }
 

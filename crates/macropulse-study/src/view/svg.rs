@@ -37,31 +37,77 @@ impl Hue {
     }
 }
 
-/// Style of every chart. The page carries it once; [`standalone`] puts it into a single chart.
-pub(super) const STYLE: &str = "\
-svg.mp{--ink:#1b2230;--soft:#5b6475;--grid:#e3e6ec;--paper:#fff;--blue:#2463b4;--orange:#cf6a0c;\
---green:#1d8758;--red:#c6373c;--purple:#7850bf;--teal:#0e8094;--grey:#727b8b;\
-font:12px/1.2 ui-sans-serif,system-ui,-apple-system,'Segoe UI',Roboto,Helvetica,Arial,sans-serif;\
+/// What a chart is drawn on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ground {
+    /// A light page.
+    Light,
+    /// A dark page, or a picture.
+    Dark,
+}
+
+/// Name of each colour, on a light and on a dark ground.
+const COLOURS: [(&str, &str, &str); 11] = [
+    ("ink", "#1b2230", "#e6e9f0"),
+    ("soft", "#5b6475", "#9aa3b4"),
+    ("grid", "#e3e6ec", "#2a303c"),
+    ("paper", "#fff", "#12151c"),
+    ("blue", "#2463b4", "#6aa5f8"),
+    ("orange", "#cf6a0c", "#f5a155"),
+    ("green", "#1d8758", "#55cd98"),
+    ("red", "#c6373c", "#f47c79"),
+    ("purple", "#7850bf", "#b598f7"),
+    ("teal", "#0e8094", "#4fc9da"),
+    ("grey", "#727b8b", "#98a1b2"),
+];
+
+/// What the classes look like. The hue of an element is its text colour, which its strokes and
+/// fills refer to: that, unlike a property of our own, is understood wherever SVG is drawn.
+const RULES: &str = "\
+svg.mp{font:12px/1.2 ui-sans-serif,system-ui,-apple-system,'Segoe UI',Roboto,Helvetica,Arial,sans-serif;\
 font-variant-numeric:tabular-nums}\
-@media screen and (prefers-color-scheme:dark){svg.mp{--ink:#e6e9f0;--soft:#9aa3b4;--grid:#2a303c;\
---paper:#12151c;--blue:#6aa5f8;--orange:#f5a155;--green:#55cd98;--red:#f47c79;--purple:#b598f7;\
---teal:#4fc9da;--grey:#98a1b2}}\
 .mp text{fill:var(--ink)}.mp .soft{fill:var(--soft)}.mp .bold{font-weight:600}\
 .mp .guard{paint-order:stroke;stroke:var(--paper);stroke-width:4px;stroke-linejoin:round}\
 .mp .grid{stroke:var(--grid);fill:none}.mp .axis{stroke:var(--soft);fill:none}\
-.mp .h-blue{--hue:var(--blue)}.mp .h-orange{--hue:var(--orange)}.mp .h-green{--hue:var(--green)}\
-.mp .h-red{--hue:var(--red)}.mp .h-purple{--hue:var(--purple)}.mp .h-teal{--hue:var(--teal)}\
-.mp .h-grey{--hue:var(--grey)}\
-.mp .line{fill:none;stroke:var(--hue);stroke-width:2;stroke-linejoin:round;stroke-linecap:round}\
+.mp .h-blue{color:var(--blue)}.mp .h-orange{color:var(--orange)}.mp .h-green{color:var(--green)}\
+.mp .h-red{color:var(--red)}.mp .h-purple{color:var(--purple)}.mp .h-teal{color:var(--teal)}\
+.mp .h-grey{color:var(--grey)}\
+.mp .line{fill:none;stroke:currentColor;stroke-width:2;stroke-linejoin:round;stroke-linecap:round}\
 .mp .thin{stroke-width:1}.mp .dashed{stroke-dasharray:5 5}\
-.mp .area{fill:var(--hue)}.mp .band{fill:var(--hue);opacity:.16}.mp .faint{opacity:.55}\
-.mp .outline{fill:var(--paper);stroke:var(--hue);stroke-width:1.5}\
-.mp .dot{fill:var(--hue);stroke:var(--paper);stroke-width:1}.mp text.hued{fill:var(--hue)}\
+.mp .area{fill:currentColor}.mp .band{fill:currentColor;opacity:.16}.mp .faint{opacity:.55}\
+.mp .outline{fill:var(--paper);stroke:currentColor;stroke-width:1.5}\
+.mp .dot{fill:currentColor;stroke:var(--paper);stroke-width:1}.mp text.hued{fill:currentColor}\
 .mp text.on{fill:var(--paper);font-weight:600}";
+
+/// Style of every chart, for pages that may be light or dark. The page carries it once;
+/// [`standalone`] puts it into a single chart.
+pub(super) fn style() -> String {
+    let [light, dark] = [Ground::Light, Ground::Dark].map(|ground| {
+        let each = |(name, colour)| format!("--{name}:{colour};");
+        colours(ground).map(each).collect::<String>()
+    });
+    format!(
+        "svg.mp{{{light}}}@media screen and (prefers-color-scheme:dark){{svg.mp{{{dark}}}}}{RULES}"
+    )
+}
+
+/// The same where the ground is known: plain colours, no variables.
+pub(super) fn style_on(ground: Ground) -> String {
+    colours(ground).fold(RULES.to_owned(), |rules, (name, colour)| {
+        rules.replace(&format!("var(--{name})"), colour)
+    })
+}
+
+fn colours(ground: Ground) -> impl Iterator<Item = (&'static str, &'static str)> {
+    COLOURS.into_iter().map(move |(name, light, dark)| match ground {
+        Ground::Light => (name, light),
+        Ground::Dark => (name, dark),
+    })
+}
 
 /// A chart as a file of its own, with its style inside.
 pub fn standalone(svg: &str) -> String {
-    svg.replacen('>', &format!("><style>{STYLE}</style>"), 1)
+    svg.replacen('>', &format!("><style>{}</style>", style()), 1)
 }
 
 /// Which end of a text stands at its place.
@@ -72,165 +118,96 @@ pub(super) enum Anchor {
     End,
 }
 
-/// One element of a drawing, with the classes that say what it looks like.
-#[derive(Debug, Clone)]
-pub(super) enum Stroke {
-    Line {
-        from: [f64; 2],
-        to: [f64; 2],
-        class: String,
-    },
-    /// Steps M, L, H, V and Z with absolute coordinates.
-    Path {
-        steps: String,
-        class: String,
-    },
-    Rect {
-        corner: [f64; 2],
-        size: [f64; 2],
-        class: String,
-    },
-    Dot {
-        centre: [f64; 2],
-        radius: f64,
-        class: String,
-    },
-    Text {
-        place: [f64; 2],
-        anchor: Anchor,
-        class: String,
-        text: String,
-    },
-    /// Until the window closes, what lies outside of it is cut off.
-    OpenWindow {
-        corner: [f64; 2],
-        size: [f64; 2],
-    },
-    CloseWindow,
-    /// Until the group closes, everything is moved to the right and down.
-    OpenGroup {
-        shift: [f64; 2],
-    },
-    CloseGroup,
-}
-
-/// A drawing in the making.
+/// A drawing in the making. Classes say what its elements look like.
 #[derive(Debug, Clone)]
 pub(super) struct Svg {
     pub size: [f64; 2],
     title: String,
-    pub strokes: Vec<Stroke>,
+    elements: String,
 }
 
 impl Svg {
     /// A drawing of `size`, called `title` for those who cannot see it.
     pub fn new(size: [f64; 2], title: &str) -> Self {
-        Self { size, title: title.to_owned(), strokes: Vec::new() }
+        Self { size, title: title.to_owned(), elements: String::new() }
     }
 
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], class: &str) {
-        self.strokes.push(Stroke::Line { from, to, class: class.to_owned() });
+        let [x1, y1, x2, y2] = [from[0], from[1], to[0], to[1]].map(number);
+        self.push(&format!(
+            "<line class=\"{class}\" x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"/>"
+        ));
     }
 
+    /// Steps as in the `d` of SVG; nothing if there are none.
     pub fn path(&mut self, steps: &str, class: &str) {
         if !steps.is_empty() {
-            self.strokes.push(Stroke::Path { steps: steps.to_owned(), class: class.to_owned() });
+            self.push(&format!("<path class=\"{class}\" d=\"{steps}\"/>"));
         }
     }
 
     /// A rectangle with a hint of round corners.
     pub fn rect(&mut self, corner: [f64; 2], size: [f64; 2], class: &str) {
-        self.strokes.push(Stroke::Rect { corner, size, class: class.to_owned() });
+        let [x, y, width, height] =
+            [corner[0], corner[1], size[0].max(0.0), size[1].max(0.0)].map(number);
+        let round = number((size[0].min(size[1]) / 4.0).clamp(0.0, 2.5));
+        self.push(&format!(
+            "<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"{round}\"/>"
+        ));
     }
 
     pub fn dot(&mut self, centre: [f64; 2], radius: f64, class: &str) {
-        self.strokes.push(Stroke::Dot { centre, radius, class: class.to_owned() });
+        let [x, y, r] = [centre[0], centre[1], radius].map(number);
+        self.push(&format!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{r}\"/>"));
     }
 
     /// `text` with its baseline at `place`.
     pub fn text(&mut self, place: [f64; 2], anchor: Anchor, class: &str, text: &str) {
-        let (class, text) = (class.to_owned(), text.to_owned());
-        self.strokes.push(Stroke::Text { place, anchor, class, text });
+        let [x, y] = place.map(number);
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        self.push(&format!(
+            "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
+            escape(text)
+        ));
     }
 
     /// What is drawn until [`Svg::close_window`] is cut off at this rectangle.
     pub fn open_window(&mut self, corner: [f64; 2], size: [f64; 2]) {
-        self.strokes.push(Stroke::OpenWindow { corner, size });
+        let [x, y, width, height] = [corner[0], corner[1], size[0], size[1]].map(number);
+        // A nested drawing needs no identifier, which would have to be unique in the page.
+        self.push(&format!(
+            "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\">"
+        ));
     }
 
     pub fn close_window(&mut self) {
-        self.strokes.push(Stroke::CloseWindow);
+        self.push("</svg>");
     }
 
     /// Adds another drawing, moved to the right and down by `shift`.
     pub fn add(&mut self, shift: [f64; 2], other: Self) {
-        self.strokes.push(Stroke::OpenGroup { shift });
-        self.strokes.extend(other.strokes);
-        self.strokes.push(Stroke::CloseGroup);
+        let [x, y] = shift.map(number);
+        self.push(&format!("<g transform=\"translate({x} {y})\">\n{}</g>", other.elements));
     }
 
     /// The drawing as SVG.
-    pub fn finish(self) -> String {
+    pub fn finish(&self) -> String {
         let [width, height] = self.size.map(number);
-        let mut text = format!(
+        format!(
             "<svg class=\"mp\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
-             width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"{}\">\n",
-            escape(&self.title)
-        );
-        for stroke in &self.strokes {
-            text += &stroke.markup();
-            text.push('\n');
-        }
-        text + "</svg>\n"
+             width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"{}\">\n{}</svg>\n",
+            escape(&self.title),
+            self.elements
+        )
     }
-}
 
-impl Stroke {
-    fn markup(&self) -> String {
-        match self {
-            Self::Line { from, to, class } => {
-                let [x1, y1, x2, y2] = [from[0], from[1], to[0], to[1]].map(number);
-                format!("<line class=\"{class}\" x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"/>")
-            }
-            Self::Path { steps, class } => format!("<path class=\"{class}\" d=\"{steps}\"/>"),
-            Self::Rect { corner, size, class } => {
-                let [x, y, width, height] =
-                    [corner[0], corner[1], size[0].max(0.0), size[1].max(0.0)].map(number);
-                let round = number((size[0].min(size[1]) / 4.0).clamp(0.0, 2.5));
-                format!(
-                    "<rect class=\"{class}\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"{round}\"/>"
-                )
-            }
-            Self::Dot { centre, radius, class } => {
-                let [x, y, r] = [centre[0], centre[1], *radius].map(number);
-                format!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{r}\"/>")
-            }
-            Self::Text { place, anchor, class, text } => {
-                let [x, y] = place.map(number);
-                let anchor = match anchor {
-                    Anchor::Start => "start",
-                    Anchor::Middle => "middle",
-                    Anchor::End => "end",
-                };
-                format!(
-                    "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
-                    escape(text)
-                )
-            }
-            // A nested drawing needs no identifier, which would have to be unique in the page.
-            Self::OpenWindow { corner, size } => {
-                let [x, y, width, height] = [corner[0], corner[1], size[0], size[1]].map(number);
-                format!(
-                    "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\">"
-                )
-            }
-            Self::CloseWindow => "</svg>".to_owned(),
-            Self::OpenGroup { shift } => {
-                let [x, y] = shift.map(number);
-                format!("<g transform=\"translate({x} {y})\">")
-            }
-            Self::CloseGroup => "</g>".to_owned(),
-        }
+    fn push(&mut self, element: &str) {
+        self.elements += element;
+        self.elements.push('\n');
     }
 }
 
@@ -251,6 +228,8 @@ pub(super) fn escape(text: &str) -> String {
             '<' => safe.push_str("&lt;"),
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
+            // Not even escaped may they stand in a file of this kind.
+            '\u{fffe}' | '\u{ffff}' => {}
             letter if letter.is_control() && letter != '\n' => {}
             letter => safe.push(letter),
         }
@@ -258,9 +237,29 @@ pub(super) fn escape(text: &str) -> String {
     safe
 }
 
-/// Width of a text of 12 px, about: fonts differ, so margins are generous.
+/// Width of a text of 12 px, rather too much than too little: that of Inter, in which pictures are
+/// written and which is wider than what browsers choose.
 pub(super) fn text_width(text: &str) -> f64 {
-    6.6 * text.chars().count() as f64
+    text.chars().map(letter_width).sum()
+}
+
+fn letter_width(letter: char) -> f64 {
+    match letter {
+        '\u{202f}' => 2.1,
+        'i' | 'j' | 'l' | 'I' | ' ' => 3.5,
+        '!' | '\'' | ',' | '.' | ':' | ';' | '`' | '·' | 't' => 4.0,
+        '(' | ')' | '/' | '[' | '\\' | ']' | '|' | 'f' | 'r' | '1' | '{' | '}' => 5.0,
+        '-' | '_' | '"' | '°' | '²' | '³' | '¹' | '⁰'..='⁻' | '₀'..='₉' => 6.0,
+        '*' | '?' | 'a' | 'c' | 'e' | 'k' | 's' | 'v' | 'x'..='z' | 'F' | 'J' | 'L' | '7' => 7.1,
+        '–' | '2' | '3' | '5' | '6' | '8' | '9' | '#' | 'E' | 'P' => 7.6,
+        'b' | 'd' | 'g' | 'h' | 'n'..='q' | 'u' | 'µ' => 7.6,
+        '0' | '4' | '+' | '−' | '<'..='>' | '~' | '±' | '×' | '≤' | '≥' | '$' | '&' => 8.1,
+        'B' | 'R' | 'S' | 'T' | 'Z' => 8.1,
+        'C' | 'G' | 'H' | 'N' | 'O' | 'U' | 'A' | 'D' | 'K' | 'V' | 'X' | 'Y' => 9.1,
+        'Q' | 'w' => 10.1,
+        'm' | 'M' => 11.1,
+        _ => 12.0,
+    }
 }
 
 /// Whether every tag that opens also closes, in order; what the tests of all drawings ask.

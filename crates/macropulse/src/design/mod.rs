@@ -36,7 +36,7 @@ pub use family::family_from_toml;
 pub use file::{Firing, Label, Mirror};
 pub use presets::{names as preset_names, text as preset_text};
 
-use crate::digest::Fnv;
+use crate::digest::Digest;
 use macropulse_codec::code::Codebook;
 use macropulse_codec::decode::Receiver;
 
@@ -244,7 +244,7 @@ impl Design {
 
     /// A hash of everything the sensor file says, defaults included.
     pub fn digest(&self) -> String {
-        let mut hash = Fnv::new();
+        let mut hash = Digest::new();
         hash.bytes(self.text.as_bytes());
         hash.text()
     }

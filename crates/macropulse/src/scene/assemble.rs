@@ -22,7 +22,7 @@ use super::placed::{self, Placed, stand};
 use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
 use super::{Object, Scene};
-use crate::digest::Fnv;
+use crate::digest::Digest;
 use crate::names::line_column;
 
 /// What has been put together so far.
@@ -84,7 +84,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     assembly.notes.extend(assumed);
     let Assembly { materials, objects, solids, placed, mut notes, .. } = assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
-    let mut surfaces = Fnv::new();
+    let mut surfaces = Digest::new();
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
     let shapes = inside::shapes_around(&solids, sensor.position);

@@ -3,9 +3,9 @@
 use super::closed_form::{Shape, Solid};
 use super::placed::Placed;
 use super::pose::Pose;
-use crate::digest::Fnv;
+use crate::digest::Digest;
 
-impl Fnv {
+impl Digest {
     /// Takes in a pose.
     pub(super) fn pose(&mut self, pose: &Pose) {
         let Pose { position: [x, y, z], yaw, pitch, roll } = *pose;

@@ -8,7 +8,7 @@ use super::error::Error;
 use super::file::{InterfererTyped, Source, Stand};
 use super::pose::Pose;
 use crate::design::{Design, preset_text};
-use crate::digest::Fnv;
+use crate::digest::Digest;
 use crate::emit::Clock;
 
 /// Most lidars beside the sensor: their numbers have eight bits in addresses of random numbers.
@@ -33,7 +33,7 @@ pub struct Interferer {
     pub clock: Clock,
 }
 
-impl Fnv {
+impl Digest {
     /// Takes in a lidar.
     pub(super) fn interferer(&mut self, interferer: &Interferer) {
         self.bytes(interferer.design.text.as_bytes());

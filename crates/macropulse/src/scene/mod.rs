@@ -37,7 +37,7 @@ pub use mesh::Mesh;
 pub use pose::{Pose, Transform};
 pub use trace::{PARTS, Traced};
 
-use crate::digest::Fnv;
+use crate::digest::Digest;
 use crate::kernels::{LANES, Packet};
 use file::Source;
 use world::{PacketHits, World};
@@ -60,7 +60,7 @@ pub struct Scene {
     pub notes: Vec<String>,
     world: World,
     /// Of the triangles and shapes, in the order of the file.
-    surfaces: Fnv,
+    surfaces: Digest,
 }
 
 /// An object of the scene.
@@ -157,7 +157,7 @@ impl Scene {
     /// of the sensor: surfaces, materials, sensor pose, other lidars.
     /// The same on every machine and run.
     pub fn digest(&self) -> String {
-        let mut hash = self.surfaces;
+        let mut hash = self.surfaces.clone();
         for material in &self.materials {
             hash.bytes(material.name.as_bytes());
             let Material { diffuse, specular, gloss, retro, transmission, .. } = *material;
