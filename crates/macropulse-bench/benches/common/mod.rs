@@ -5,12 +5,13 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use macropulse::channel;
+use macropulse::channel::{self, Operating};
 use macropulse::codec::ShotLog;
 use macropulse::codec::Ticks;
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
+use macropulse::environment::Environment;
 use macropulse::random::{Chance, Stage};
 use macropulse::scene::{Hits, Material, Scene};
 use macropulse::tdc;
@@ -86,10 +87,21 @@ impl Met {
         (detectors, memory): (&Detectors, &mut Memory),
     ) -> (ShotLog, Ticks) {
         let log = band.shot_log(design);
-        let echoes = channel::echoes(design, &self.materials, hits);
+        let echoes = channel::echoes(&operating(design).link, &self.materials, hits);
         let converted = tdc::ticks(design, detectors.edges(&log, &echoes, memory));
         (log, converted.ticks)
     }
+}
+
+/// A sensor where there is neither air nor sunlight.
+#[allow(clippy::unwrap_used)]
+fn operating(design: &Design) -> Operating {
+    Operating::of(design, &Environment::vacuum_dark()).unwrap()
+}
+
+/// Its detectors.
+pub fn detectors(design: &Design) -> Detectors<'_> {
+    Detectors::new(design, &operating(design), Chance::new(SEED))
 }
 
 /// `count` bands spread evenly over a scan, or all of them. It is the second scan: its first band

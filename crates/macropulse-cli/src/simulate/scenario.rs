@@ -7,7 +7,7 @@ use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
 use macropulse::names::nearest;
-use macropulse::scene::Scene;
+use macropulse::scene::{Changes, Scene};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -48,12 +48,12 @@ struct ScenarioFile {
 
 impl Scenario {
     /// One scan of the sensors in the scene, each a ready one or a file.
-    pub fn of(sensors: &[String], scene: &str, set: &[(String, String)]) -> Result<Self, Fault> {
+    pub fn of(sensors: &[String], scene: &str, changes: &Changes) -> Result<Self, Fault> {
         let designs: Result<Vec<_>, _> =
-            sensors.iter().map(|sensor| Design::open(sensor, set)).collect();
+            sensors.iter().map(|sensor| Design::open(sensor, &changes.of_sensor)).collect();
         Ok(Self {
             designs: designs?,
-            scene: Scene::open(scene)?,
+            scene: Scene::open_changed(scene, &changes.of_scene)?,
             scans: 1,
             seed: 1,
             formats: Formats::default().0,
@@ -62,7 +62,7 @@ impl Scenario {
     }
 
     /// The scenario in the file at `path`; names of files count from its folder.
-    pub fn open(path: &Path, set: &[(String, String)]) -> Result<Self, Fault> {
+    pub fn open(path: &Path, changes: &Changes) -> Result<Self, Fault> {
         let origin = path.display().to_string();
         let text =
             std::fs::read_to_string(path).map_err(|error| Fault::unreadable(&origin, &error))?;
@@ -86,13 +86,14 @@ impl Scenario {
             let name = sensor.get_ref();
             let ready = preset_text(name).is_some() || !looks_like_a_path(name);
             let place = if ready { name.clone() } else { beside(folder, name) };
-            let design = Design::open(&place, set)
+            let design = Design::open(&place, &changes.of_sensor)
                 .map_err(|error| source.fault(sensor.span(), &error.to_string()))?;
             designs.push(design);
         }
         let name = file.scene.get_ref();
         let ready = Scene::builtin(name).is_some() || !looks_like_a_path(name);
-        let scene = Scene::open(&if ready { name.clone() } else { beside(folder, name) })
+        let place = if ready { name.clone() } else { beside(folder, name) };
+        let scene = Scene::open_changed(&place, &changes.of_scene)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
         let formats = match file.formats {
             Some(names) => formats(&source, &names)?,
@@ -195,7 +196,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
-        match Scenario::open(&path, &[]) {
+        match Scenario::open(&path, &Changes::default()) {
             Err(Fault::Wrong(sentence)) => sentence.rsplit_once("s.toml").unwrap().1.to_owned(),
             _ => "accepted".to_owned(),
         }

@@ -89,7 +89,9 @@ impl Foreign {
 pub fn foreign(design: &Design, scene: &Scene, log: &ShotLog) -> Foreign {
     let mut foreign = Foreign::default();
     for (number, other) in scene.others.iter().enumerate() {
-        let Some(link) = Link::of_other(design, &other.design) else { continue };
+        let Some(link) = Link::of_other(design, &other.design, &scene.environment) else {
+            continue;
+        };
         let around_fs = around_fs(other);
         let farthest = design.scan.max_range.max(other.design.scan.max_range);
         let direct = Direct::of(scene, other, 2.0 * farthest);
@@ -286,12 +288,14 @@ impl Arrivals<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::environment::Environment;
     use std::path::Path;
 
     /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
     fn light(sensor: &str, more: &str) -> (Design, Foreign) {
         let text = format!(
-            "version = 1\n[[others]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
+            "version = 1\nenvironment = \"vacuum-dark\"\n[[others]]\nsensor = \"hdl-64e\"\n\
+             position_m = [50, 0, 0]\n\
              yaw_deg = 180\nset = {{ scan.scans_per_s = 1000, scan.raster = {{ rows = 5, \
              columns = 5, horizontal_deg = 10, vertical_deg = 10 }} }}\n{more}"
         );
@@ -313,7 +317,8 @@ mod tests {
         let flight = fs_from_s(50.0 / SPEED_OF_LIGHT);
         assert_eq!(foreign.arrives_fs[0], 480_000_000_000 + flight);
         let hdl = Design::open("hdl-64e", &[]).unwrap();
-        let white = Link::of(&hdl).photons(1.0, 1.0);
+        let dark = Environment::vacuum_dark();
+        let white = Link::of(&hdl, &dark).photons(1.0, 1.0);
         approx::assert_relative_eq!(
             foreign.photons[0],
             white / APERTURE_RADIUS.powi(2),
@@ -341,14 +346,15 @@ mod tests {
         let perfect = [("detector.photon-counting.sensitivity.pd", "1.0")];
         let (seeing, all) = (open("kim-park-2016", &[]), open("kim-park-2016", &perfect));
         let hdl = open("hdl-64e", &[]);
+        let dark = Environment::vacuum_dark();
         let photons = |ours: &Design, other: &Design| {
-            Link::of_other(ours, other).map(|link| link.photons_by((2.0, 1.0), 1.0))
+            Link::of_other(ours, other, &dark).map(|link| link.photons_by((2.0, 1.0), 1.0))
         };
-        let own = Link::of(&seeing).photons(1.0, 1.0);
+        let own = Link::of(&seeing, &dark).photons(1.0, 1.0);
         assert_eq!(photons(&seeing, &seeing), Some(own));
         assert_eq!(photons(&seeing, &all), Some(own));
         assert_eq!(photons(&all, &seeing), Some(f64::INFINITY));
-        assert_eq!(photons(&seeing, &hdl), Some(Link::of(&hdl).photons(1.0, 1.0)));
+        assert_eq!(photons(&seeing, &hdl), Some(Link::of(&hdl, &dark).photons(1.0, 1.0)));
         assert_eq!(photons(&seeing, &open("peregrine", &[])), None);
     }
 

@@ -4,14 +4,22 @@
 use std::path::{Path, PathBuf};
 
 use toml::Table;
-use toml::de::DeTable;
 
-use super::Error;
 use super::presets;
-use crate::names::line_column;
+use super::{Effect, Error};
+use crate::names::{line_column, offset_of_key, toml_value};
+
+/// Where values come from that are changed on the command line.
+const SET: &str = "--set";
 
 /// A sensor file may extend another, but not without end.
 const LONGEST_CHAIN: usize = 16;
+
+/// The key of a change that takes an effect off the list `idealised`.
+pub const WITH: &str = "with";
+
+/// The key of a change that puts an effect on the list `idealised`.
+pub const WITHOUT: &str = "without";
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
@@ -60,8 +68,11 @@ impl Chain {
         overrides: &[(String, String)],
     ) -> Result<Self, Error> {
         let mut documents = Vec::new();
+        let switches = |key: &str| [WITH, WITHOUT].contains(&key);
+        let (switched, overrides): (Vec<_>, Vec<_>) =
+            overrides.iter().cloned().partition(|(key, _)| switches(key));
         if !overrides.is_empty() {
-            documents.push(document_of_overrides(overrides)?);
+            documents.push(document_of_overrides(&overrides)?);
         }
         let mut folder = folder.to_path_buf();
         documents.push(Document::parse(text, origin)?);
@@ -87,7 +98,24 @@ impl Chain {
         fill_in(&mut merged, &fitting);
         merged.remove("extends");
         documents.push(defaults);
-        Ok(Self { documents, merged })
+        let mut chain = Self { documents, merged };
+        for (key, effect) in &switched {
+            chain.switch(key == WITHOUT, effect);
+        }
+        Ok(chain)
+    }
+
+    /// Puts an effect on the list of those left out, or takes it off.
+    fn switch(&mut self, out: bool, effect: &str) {
+        let Some(list) = self.merged.get_mut("idealised").and_then(toml::Value::as_array_mut)
+        else {
+            return;
+        };
+        list.retain(|name| name.as_str() != Some(effect));
+        // What is no effect is refused with the list.
+        if out || !Effect::ALL.iter().any(|known| known.name() == effect) {
+            list.push(effect.into());
+        }
     }
 
     /// An error about the value at the dotted `path`, pointing at the document that gave it.
@@ -144,11 +172,7 @@ pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String,
 fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Error> {
     let mut table = Table::new();
     for (path, typed) in overrides {
-        let value = format!("v = {typed}")
-            .parse::<Table>()
-            .ok()
-            .and_then(|mut parsed| parsed.remove("v"))
-            .unwrap_or_else(|| toml::Value::String(typed.clone()));
+        let value = toml_value(typed);
         let mut at = &mut table;
         let mut keys = path.split('.').peekable();
         while let Some(key) = keys.next() {
@@ -158,12 +182,12 @@ fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Err
             }
             let below = at.entry(key).or_insert_with(|| toml::Value::Table(Table::new()));
             let Some(next) = below.as_table_mut() else {
-                return Err(Error::whole("--set", format!("`{path}`: `{key}` is set twice")));
+                return Err(Error::whole(SET, format!("`{path}`: `{key}` is set twice")));
             };
             at = next;
         }
     }
-    Ok(Document { origin: "--set".to_owned(), text: String::new(), table })
+    Ok(Document { origin: SET.to_owned(), text: String::new(), table })
 }
 
 /// Adds to `strong` what only `weak` has.
@@ -202,7 +226,7 @@ fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
     let mut kept = defaults.clone();
     kept.retain(|key, _| match key {
         "code" => sensor.contains_key("code"),
-        "sun" | "safety" => sensor.contains_key("optics"),
+        "safety" => sensor.contains_key("optics"),
         _ => true,
     });
     for (group, kinds) in ALTERNATIVES {
@@ -261,7 +285,7 @@ fn place(documents: &[Document], path: &str) -> Place {
             if value_at(&document.table, wanted).is_some() {
                 return Place {
                     origin: document.origin.clone(),
-                    line_column: offset_of(&document.text, wanted)
+                    line_column: offset_of_key(&document.text, wanted)
                         .map(|at| line_column(&document.text, at)),
                     path: path.to_owned(),
                 };
@@ -272,27 +296,12 @@ fn place(documents: &[Document], path: &str) -> Place {
             None => break,
         }
     }
-    let first = documents.iter().find(|d| d.origin != "--set");
+    let first = documents.iter().find(|d| d.origin != SET);
     Place {
         origin: first.map(|d| d.origin.clone()).unwrap_or_default(),
         line_column: None,
         path: path.to_owned(),
     }
-}
-
-/// Byte offset of the key at the dotted `path`.
-fn offset_of(text: &str, path: &str) -> Option<usize> {
-    let root = DeTable::parse(text).ok()?;
-    let mut table = root.get_ref();
-    let mut keys = path.split('.').peekable();
-    while let Some(key) = keys.next() {
-        let (name, value) = table.iter().find(|(name, _)| name.get_ref().as_ref() == key)?;
-        if keys.peek().is_none() {
-            return Some(name.span().start);
-        }
-        table = value.get_ref().as_table()?;
-    }
-    None
 }
 
 #[cfg(test)]

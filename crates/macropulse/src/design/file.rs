@@ -17,9 +17,7 @@ pub(super) struct SensorFile {
     pub code: Option<CodeFile>,
     pub detector: DetectorFile,
     pub optics: Option<OpticsFile>,
-    pub sun: Option<SunFile>,
     pub safety: Option<SafetyFile>,
-    pub atmosphere: AtmosphereFile,
     pub tdc: TdcFile,
     pub receiver: ReceiverFile,
 }
@@ -132,21 +130,6 @@ pub(super) enum FieldFile {
     InFlight,
     #[serde(rename = "trailing_pixels")]
     TrailingPixels(f64),
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SunFile {
-    pub sky: SkyFile,
-    pub irradiance_w_m2_nm: Option<f64>,
-    pub albedo: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum SkyFile {
-    Day,
-    Night,
 }
 
 #[derive(Debug, Deserialize)]
@@ -294,12 +277,6 @@ pub(super) struct FirstFiringFile {
     pub noise_photons: f64,
     pub false_firing_hz: f64,
     pub jitter_ps: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct AtmosphereFile {
-    pub visibility_km: f64,
 }
 
 #[derive(Debug, Deserialize)]

@@ -104,7 +104,7 @@ mod tests {
     /// The edges of shots that all have an echo of so many photons, in the first nine bands or
     /// what the sensor has of them.
     fn run(design: &Design, photons: f64, seed: u64) -> Vec<(ShotLog, Edges)> {
-        let detectors = super::super::Detectors::new(design, Chance::new(seed));
+        let detectors = super::super::Detectors::in_the_dark(design, Chance::new(seed));
         let bands = crate::emit::bands(design, 0).take(9);
         bands
             .map(|band| {

@@ -33,8 +33,8 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    pub fn new(geiger: &Geiger, design: &Design) -> Self {
-        Self { geiger: *geiger, noise: Noise::new(geiger.false_rate, design) }
+    pub fn new(geiger: &Geiger, false_rate: f64, design: &Design) -> Self {
+        Self { geiger: *geiger, noise: Noise::new(false_rate, design) }
     }
 
     pub fn edges(&self, band: &Band, chance: &Chance, memory: &mut Memory) -> Edges {

@@ -17,7 +17,8 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::noise::Noise;
 use super::{Band, Edges, Memory};
-use crate::design::{Design, Linear};
+use crate::channel::LinearSetting;
+use crate::design::Design;
 use crate::random::{Chance, Stage};
 use crate::units::fs_from_s;
 
@@ -27,13 +28,13 @@ const PLENTY: f64 = 1e12;
 /// A linear detector and the false edges of its noise.
 #[derive(Debug)]
 pub(super) struct Thresholding {
-    linear: Linear,
+    linear: LinearSetting,
     noise: Option<Noise>,
 }
 
 impl Thresholding {
-    pub fn new(linear: &Linear, design: &Design) -> Self {
-        Self { linear: *linear, noise: Noise::new(linear.false_rate, design) }
+    pub fn new(linear: LinearSetting, design: &Design) -> Self {
+        Self { linear, noise: Noise::new(linear.false_rate, design) }
     }
 
     pub fn edges(&self, band: &Band, chance: &Chance, memory: &mut Memory) -> Edges {
@@ -97,7 +98,7 @@ impl Thresholding {
     /// How late, fs, a mark of `count` detected photons crosses the threshold; `None` if it does
     /// not.
     fn crossing(&self, count: f64, stream: &mut crate::random::Stream) -> Option<i64> {
-        let Linear { threshold, noise, excess, .. } = self.linear;
+        let LinearSetting { threshold, noise, excess, .. } = self.linear;
         let spread = (count * (excess - 1.0) + noise * noise).sqrt();
         let draw = |stream: &mut _| -> f64 { StandardNormal.sample(stream) };
         let amplitude = count + spread * draw(stream);
@@ -129,7 +130,7 @@ mod tests {
                 photons: vec![photons; 7],
                 ..Echoes::default()
             };
-            let detectors = Detectors::new(&design, Chance::new(1));
+            let detectors = Detectors::in_the_dark(&design, Chance::new(1));
             detectors.edges(&log, &echoes, &mut Memory::default()).time.len()
         };
         // The threshold is at some 300 photons.

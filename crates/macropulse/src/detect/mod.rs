@@ -21,7 +21,7 @@ use linear::Thresholding;
 use photon_counting::Counting;
 use shape::Shape;
 
-use crate::channel::{Echoes, PARTS};
+use crate::channel::{Echoes, LinearSetting, Operating, PARTS};
 use crate::design::{Design, Detector, FirstFiring};
 use crate::kernels::GROUP;
 use crate::random::{Chance, Stage, Stream};
@@ -123,12 +123,20 @@ impl Band<'_> {
 }
 
 impl<'a> Detectors<'a> {
-    /// The detectors of `design` with the accidents of `chance`.
-    pub fn new(design: &'a Design, chance: Chance) -> Self {
+    /// The detectors of `design` where it is `operating`, with the accidents of `chance`.
+    pub fn new(design: &'a Design, operating: &Operating, chance: Chance) -> Self {
+        let false_rate = operating.false_rate;
         let kind = match &design.detector {
-            Detector::PhotonCounting(counting) => Kind::Counting(Counting::new(counting, design)),
-            Detector::Geiger(geiger) => Kind::Cells(Cells::new(geiger, design)),
-            Detector::Linear(linear) => Kind::Thresholding(Thresholding::new(linear, design)),
+            Detector::PhotonCounting(counting) => {
+                Kind::Counting(Counting::new(counting, false_rate, design))
+            }
+            Detector::Geiger(geiger) => Kind::Cells(Cells::new(geiger, false_rate, design)),
+            Detector::Linear(linear) => {
+                let setting = operating.linear;
+                let setting =
+                    setting.unwrap_or_else(|| LinearSetting::of(linear, operating.background));
+                Kind::Thresholding(Thresholding::new(setting, design))
+            }
             Detector::FirstFiring(firing) => Kind::Firing(*firing),
         };
         Self { design, chance, shape: Shape::of(design), kind }
@@ -147,6 +155,14 @@ impl<'a> Detectors<'a> {
             Kind::Thresholding(linear) => linear.edges(&band, &self.chance, memory),
             Kind::Firing(firing) => first_firing::edges(firing, &band, &self.chance),
         }
+    }
+}
+
+#[cfg(test)]
+impl<'a> Detectors<'a> {
+    /// The detectors of `design` where there is neither air nor sunlight.
+    pub fn in_the_dark(design: &'a Design, chance: Chance) -> Self {
+        Self::new(design, &Operating::in_the_dark(design), chance)
     }
 }
 

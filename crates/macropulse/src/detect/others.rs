@@ -199,7 +199,7 @@ mod tests {
             let text = format!(
                 "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
                  idealised = [\"detector-bandwidth\", \"inter-chip\", \"mirror-motion\"]\n\
-                 [sun]\nsky = \"night\"\n{detector}\njitter_ps = 0.0\n"
+                 {detector}\njitter_ps = 0.0\n"
             );
             let design = Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap();
             let log = crate::emit::Band { scan: 0, first: 0, shots: 100 }.shot_log(&design);
@@ -215,7 +215,7 @@ mod tests {
                     way: vec![1],
                 };
                 let echoes = crate::channel::Echoes { foreign, ..Default::default() };
-                let detectors = crate::detect::Detectors::new(&design, Chance::new(1));
+                let detectors = crate::detect::Detectors::in_the_dark(&design, Chance::new(1));
                 let mut time = detectors.edges(&log, &echoes, &mut Memory::default()).time;
                 // Photons of one mark come together.
                 time.dedup();

@@ -44,7 +44,7 @@ pub(super) struct Counting {
 }
 
 impl Counting {
-    pub fn new(counting: &PhotonCounting, design: &Design) -> Self {
+    pub fn new(counting: &PhotonCounting, false_rate: f64, design: &Design) -> Self {
         let codebook = &design.coding.codebook;
         let chip = (design.coding.chip_fs / design.tdc.tick_fs) as u32 * PARTS_OF_TICK;
         let weights: Vec<usize> =
@@ -69,7 +69,7 @@ impl Counting {
             bit: codebook.family().length() * chip,
             kept: 1.0 - counting.missed_marks,
             jitter: Jitter::new(counting.jitter * parts),
-            noise: Noise::new(counting.false_rate, design),
+            noise: Noise::new(false_rate, design),
             pulse: design.light.pulse,
         }
     }
@@ -254,7 +254,7 @@ mod tests {
     }
 
     fn detect(design: &Design, log: &ShotLog, echoes: &Echoes, seed: u64) -> Edges {
-        Detectors::new(design, Chance::new(seed)).edges(log, echoes, &mut Memory::default())
+        Detectors::in_the_dark(design, Chance::new(seed)).edges(log, echoes, &mut Memory::default())
     }
 
     fn run(design: &Design, photons: f64, seed: u64) -> Edges {

@@ -19,6 +19,7 @@ use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
 use super::{Object, Scene};
 use crate::digest::Fnv;
+use crate::environment::Environment;
 
 /// What has been put together so far.
 struct Assembly<'a> {
@@ -51,6 +52,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         notes: vec![],
     };
     assembly.define(&file)?;
+    let environment = assembly.environment(&file)?;
     let sensor = assembly.pose(&file.sensor)?;
     if file.sensor.position_m.is_none() {
         assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
@@ -73,7 +75,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
     let world = placed::world(placed, solids, sensor.position);
-    Ok(Scene { name, materials, objects, sensor, others, notes, world, surfaces })
+    Ok(Scene { name, materials, objects, sensor, environment, others, notes, world, surfaces })
 }
 
 impl Assembly<'_> {
@@ -111,6 +113,20 @@ impl Assembly<'_> {
             self.defined.push(made);
         }
         Ok(())
+    }
+
+    /// Sun and air; those of a clear day where the file names none.
+    fn environment(&mut self, file: &SceneFile) -> Result<Environment, Error> {
+        let Some(typed) = &file.environment else {
+            let assumed = Environment::default();
+            let (name, conditions) = (&assumed.name, assumed.conditions());
+            self.notes.push(format!("environment: none given, {name} is assumed: {conditions}"));
+            return Ok(assumed);
+        };
+        Environment::read(typed.get_ref()).map_err(|error| {
+            let key = format!("environment.{}", error.key);
+            self.source.fault_at_key(&key, typed.span(), error.to_string())
+        })
     }
 
     fn ground(&mut self, ground: &Ground) -> Result<(), Error> {

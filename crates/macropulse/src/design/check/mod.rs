@@ -22,7 +22,12 @@ const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, 
 /// The format this program reads.
 const VERSION: u32 = 1;
 
+/// Where sun and air were written before they belonged to the scene: tables of the sensor file, and
+/// what to say of each.
+const MOVED: [&str; 3] = ["sun", "atmosphere", "environment"];
+
 pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
+    refuse_moved(chain)?;
     let file: SensorFile =
         serde_path_to_error::deserialize(toml::Value::Table(chain.merged.clone()))
             .map_err(|error| typed_wrongly(chain, &error))?;
@@ -50,8 +55,6 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
             idealised: &idealised,
         },
     )?;
-    let visibility =
-        check.within("atmosphere.visibility_km", file.atmosphere.visibility_km, 0.01, 1e3)? * 1e3;
     let timing = libm::hypot(detector.jitter(), light.spread.unwrap_or(0.0));
     let receiver = check.receiver(&file, &scan, &tdc, (&coding, timing))?;
     let right_within =
@@ -64,7 +67,6 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         coding,
         budget,
         detector,
-        visibility: (!off(Effect::Atmosphere)).then_some(visibility),
         tdc,
         receiver,
         right_within,
@@ -77,6 +79,24 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     check.clock(&design)?;
     check.timing(&mut design)?;
     Ok(design)
+}
+
+/// Refuses keys of sun and air, and says where they live.
+fn refuse_moved(chain: &Chain) -> Result<(), Error> {
+    for table in MOVED {
+        let Some(typed) = chain.merged.get(table) else { continue };
+        let key = typed.as_table().and_then(|keys| keys.keys().next());
+        let (path, key) = match key {
+            Some(key) => (format!("{table}.{key}"), key.as_str()),
+            None => (table.to_owned(), "sky"),
+        };
+        let message = format!(
+            "sun and air belong to the scene: write `{key}` under [environment] in the scene file, \
+             or --set environment.{key}=… where a command has a scene or an --environment"
+        );
+        return Err(chain.error(&path, message));
+    }
+    Ok(())
 }
 
 /// Turns serde's words into a sentence with a place and the nearest known key.
@@ -148,6 +168,14 @@ impl Check<'_> {
         for name in names {
             match Effect::ALL.into_iter().find(|effect| effect.name() == name) {
                 Some(effect) => found.push(effect),
+                None if crate::environment::Effect::named(name).is_some() => {
+                    let message = format!(
+                        "`{name}` is an effect of sun and air, which belong to the scene: take it \
+                         off this list; `environment = \"vacuum-dark\"` in the scene file, or \
+                         --without {name}, leaves it out"
+                    );
+                    return self.refuse("idealised", message);
+                }
                 None => {
                     let known: Vec<&str> = Effect::ALL.iter().map(|e| e.name()).collect();
                     let hint = crate::names::nearest(name, known.iter().copied())
