@@ -21,6 +21,9 @@ pub const WITH: &str = "with";
 /// The key of a change that puts an effect on the list `idealised`.
 pub const WITHOUT: &str = "without";
 
+/// What a file that extends another does not take from it: a sentence about that one.
+const PROSE: &str = "summary";
+
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
 const ALTERNATIVES: [(&str, &[&str]); 3] = [
@@ -90,8 +93,17 @@ impl Chain {
             documents.push(Document::parse(&text, &origin)?);
         }
         let mut merged = Table::new();
-        for document in &documents {
-            fill_in(&mut merged, &document.table);
+        let own = documents.iter().position(|document| document.origin != SET).unwrap_or(0);
+        for (number, document) in documents.iter().enumerate() {
+            let mut table = document.table.clone();
+            if number > own {
+                table.remove(PROSE);
+            }
+            fill_in(&mut merged, &table);
+        }
+        if let Some(parent) = documents[own].table.get("extends").and_then(toml::Value::as_str) {
+            let said = format!("extends {parent}");
+            merged.entry(PROSE).or_insert(said.into());
         }
         let defaults = Document::parse(presets::DEFAULTS, "built-in defaults")?;
         let fitting = only_for_what_is_there(&defaults.table, &merged);
@@ -128,7 +140,8 @@ impl Chain {
         let written = &self.documents[..self.documents.len() - 1];
         let mut used = Vec::new();
         leaves(&self.merged, String::new(), &mut |path, value| {
-            if !written.iter().any(|d| value_at(&d.table, path).is_some()) {
+            let is_written = written.iter().any(|d| value_at(&d.table, path).is_some());
+            if !is_written && path != PROSE {
                 used.push((path.to_owned(), value.to_string()));
             }
         });
@@ -317,6 +330,32 @@ mod tests {
         let chain = chain("extends = \"kim-park-2016\"\n[scan]\nmax_range_m = 90.0\n");
         assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_float(), Some(90.0));
         assert_eq!(value_at(&chain.merged, "scan.raster.rows").unwrap().as_integer(), Some(480));
+    }
+
+    /// A sentence about the parent is not one about the child.
+    #[test]
+    fn prose_is_not_inherited() {
+        let of = |text: &str| value_at(&chain(text).merged, "summary").cloned();
+        let said = of("extends = \"kim-park-2016\"\n").unwrap();
+        assert_eq!(said.as_str(), Some("extends kim-park-2016"));
+        let said = of("extends = \"hdl-64e\"\nsummary = \"mine\"\n").unwrap();
+        assert_eq!(said.as_str(), Some("mine"));
+        assert_eq!(of("version = 1\n"), None);
+        let used = chain("extends = \"kim-park-2016\"\n").defaults_used();
+        assert!(used.iter().all(|(key, _)| key != "summary"));
+    }
+
+    #[test]
+    fn effects_are_switched_on_top_of_what_is_written() {
+        let change = |key: &str, effect: &str| (key.to_owned(), effect.to_owned());
+        let set = [change(WITH, "footprint"), change(WITHOUT, "inter-chip")];
+        let text = "extends = \"kim-park-2016-physical\"\nidealised = [\"footprint\"]";
+        let chain = Chain::read(text, "mine.toml", Path::new(""), &set).unwrap();
+        let list = value_at(&chain.merged, "idealised").unwrap().as_array().unwrap();
+        assert_eq!(
+            list.iter().filter_map(|name| name.as_str()).collect::<Vec<_>>(),
+            ["inter-chip"]
+        );
     }
 
     #[test]
