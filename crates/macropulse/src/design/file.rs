@@ -296,7 +296,7 @@ pub(super) struct ReceiverFile {
     pub effort: Effort,
     pub false_alarm: f64,
     pub bit_threshold: u32,
-    pub right_within_m: f64,
+    pub right_within_m: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
