@@ -127,7 +127,8 @@ fn a_budget_compares_its_environment_with_the_same_at_night() {
     let far = "budget coded-practical --set light.wavelength_nm=1760";
     desk.refused(far, &["coded-practical in clear-day", "1760 nm", "irradiance_w_m2_nm"]);
     let scan = far.replace("budget coded-practical", "simulate --sensor coded-practical");
-    desk.refused(&format!("{scan} --scene wall --format none"), &["1760 nm"]);
+    desk.refused(&format!("{scan} --scene wall -o out"), &["1760 nm"]);
+    desk.refused(&format!("{scan} --sensor peregrine --scene wall -o out"), &["1760 nm"]);
     let wall = "--set scene:object.wall.material=brick";
     desk.refused(&format!("budget coded-practical {wall}"), &["this command has none"]);
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
+use macropulse::channel::Operating;
 use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
@@ -51,14 +52,9 @@ impl Scenario {
     pub fn of(sensors: &[String], scene: &str, changes: &Changes) -> Result<Self, Fault> {
         let designs: Result<Vec<_>, _> =
             sensors.iter().map(|sensor| Design::open(sensor, &changes.of_sensor)).collect();
-        Ok(Self {
-            designs: designs?,
-            scene: Scene::open_changed(scene, &changes.of_scene)?,
-            scans: 1,
-            seed: 1,
-            formats: Formats::default().0,
-            truth: false,
-        })
+        let (designs, scene) = (designs?, Scene::open_changed(scene, &changes.of_scene)?);
+        check_operating(&designs, &scene)?;
+        Ok(Self { designs, scene, scans: 1, seed: 1, formats: Formats::default().0, truth: false })
     }
 
     /// The scenario in the file at `path`; names of files count from its folder.
@@ -95,6 +91,7 @@ impl Scenario {
         let place = if ready { name.clone() } else { beside(folder, name) };
         let scene = Scene::open_changed(&place, &changes.of_scene)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
+        check_operating(&designs, &scene)?;
         let formats = match file.formats {
             Some(names) => formats(&source, &names)?,
             None => Formats::default().0,
@@ -106,6 +103,14 @@ impl Scenario {
         let (seed, truth) = (file.seed.unwrap_or(1), file.truth);
         Ok(Self { designs, scene, scans, seed, formats, truth })
     }
+}
+
+/// Whether all sensors can be simulated under the sun of the scene.
+fn check_operating(designs: &[Design], scene: &Scene) -> Result<(), Fault> {
+    for design in designs {
+        Operating::of(design, &scene.environment)?;
+    }
+    Ok(())
 }
 
 /// Whether so many scans can be had of the sensors: the sentence that says why not.
