@@ -57,8 +57,7 @@ fn at_work(design: &Design, operating: &Operating) -> Columns {
             (None, _) if operating.background > 0.0 => {
                 format!("{counts}, as declared, whatever the sky")
             }
-            (None, _) => "none: a sensor declared by its sensitivity declares what sunlight it \
-                          counts, too"
+            (None, _) => "not counted: the sensor is declared by its sensitivity, whatever the sky"
                 .to_owned(),
             (Some(_), Detector::FirstFiring(_)) => {
                 format!("{counts}, which a detector that fires once is taken not to notice")
