@@ -9,14 +9,13 @@ mod common;
 
 use std::hint::black_box;
 
-use common::{Met, SEED, clock, conditions, detector, spread};
+use common::{Met, clock, conditions, detector, spread};
 use macropulse::codec::ShotLog;
 use macropulse::codec::Ticks;
 use macropulse::codec::decode::Returns;
 use macropulse::design::Design;
-use macropulse::detect::{Detectors, Memory};
+use macropulse::detect::Memory;
 use macropulse::emit::Band;
-use macropulse::random::Chance;
 use macropulse::scene::Hits;
 use macropulse::units;
 use rustfft::FftPlanner;
@@ -50,7 +49,7 @@ struct Sample<'a> {
 
 impl<'a> Sample<'a> {
     fn new(design: &'a Design, met: &'a Met) -> Self {
-        let detectors = Detectors::new(design, Chance::new(SEED));
+        let detectors = common::detectors(design);
         let mut memory = Memory::default();
         let bands = met.bands.iter().map(|band| {
             let (log, ticks) = met.ticks(design, band, (&detectors, &mut memory));

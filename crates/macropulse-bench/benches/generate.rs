@@ -8,11 +8,10 @@ mod common;
 use std::hint::black_box;
 use std::time::Duration;
 
-use common::{Met, SEED, conditions, spread};
+use common::{Met, conditions, spread};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
-use macropulse::random::Chance;
 
 /// The ticks of all bands, counted.
 fn ticks(met: &Met, design: &Design, detectors: &Detectors, memory: &mut Memory) -> usize {
@@ -40,7 +39,7 @@ fn generate(criterion: &mut Criterion) {
         group.warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_secs(1));
         for (condition, keys) in conditions() {
             let Ok(design) = Design::open("kim-park-2016", &keys) else { continue };
-            let detectors = Detectors::new(&design, Chance::new(SEED));
+            let detectors = common::detectors(&design);
             let mut memory = Memory::default();
             group.bench_function(condition, |bencher| {
                 bencher.iter(|| ticks(met, &design, &detectors, &mut memory));

@@ -49,7 +49,7 @@ fn main() {
 /// Scans per second by the fastest of `scans`, and its seconds in each stage.
 fn best(design: &Design, scene: &Scene, scans: u64) -> (f64, [f64; Tally::STAGES.len()]) {
     let watch = Watch { done: &|_| {}, stop: &|| false };
-    let mut stream = Scans::new(design, scene, SEED);
+    let mut stream = Scans::new(design, scene, SEED).unwrap();
     let mut best = (0.0, [0.0; Tally::STAGES.len()]);
     let all = Instant::now();
     for number in 1..=scans {

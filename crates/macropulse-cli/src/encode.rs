@@ -42,7 +42,7 @@ fn pixel(typed: &str) -> Result<(u32, u32), String> {
 }
 
 pub fn run(options: &Encode) -> Result<(), Fault> {
-    let design = Design::open(&options.sensor, &options.changes.set)?;
+    let design = Design::open(&options.sensor, &options.changes.of_sensor()?)?;
     let macropulses: Vec<Macropulse> = options
         .pixels
         .iter()

@@ -4,7 +4,7 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use macropulse::{design, formats, scene};
+use macropulse::{channel, design, environment, formats, scene};
 use macropulse_study::{paper, record, sweep};
 
 /// Why a command did not do what was asked.
@@ -96,6 +96,18 @@ impl From<design::Error> for Fault {
 
 impl From<scene::Error> for Fault {
     fn from(error: scene::Error) -> Self {
+        Self::Wrong(error.to_string())
+    }
+}
+
+impl From<environment::Error> for Fault {
+    fn from(error: environment::Error) -> Self {
+        Self::Wrong(error.to_string())
+    }
+}
+
+impl From<channel::Error> for Fault {
+    fn from(error: channel::Error) -> Self {
         Self::Wrong(error.to_string())
     }
 }

@@ -22,7 +22,7 @@ const OF_SENSORS: [&str; 8] =
     ["extends", "scan", "light", "code", "detector", "tdc", "receiver", "idealised"];
 
 /// Keys only a scene file has.
-const OF_SCENES: [&str; 4] = ["object", "ground", "material", "interferers"];
+const OF_SCENES: [&str; 5] = ["object", "ground", "material", "interferers", "environment"];
 
 /// Keys only a scenario has.
 const OF_SCENARIOS: [&str; 4] = ["scene", "scans", "seed", "formats"];

@@ -5,6 +5,7 @@ mod check;
 mod codes;
 mod completions;
 mod encode;
+mod environments;
 mod fault;
 mod folder;
 mod interrupt;
@@ -49,6 +50,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Paper(paper) => paper::run(paper, common),
         Command::Sensors(sensors) => sensors::run(sensors),
         Command::Scenes(scenes) => scenes::run(scenes),
+        Command::Environments(environments) => environments::run(environments),
         Command::Check(check) => check::run(check, common),
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),

@@ -1,10 +1,15 @@
 //! What every command understands.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use macropulse::design::{self, WITH, WITHOUT};
+use macropulse::environment::{self, Environment};
+use macropulse::names::nearest;
+use macropulse::scene;
 
 use crate::fault::Fault;
 use crate::{
-    budget, check, codes, completions, encode, paper, scenes, sensors, simulate, speed, sweep,
+    budget, check, codes, completions, encode, environments, paper, scenes, sensors, simulate,
+    speed, sweep,
 };
 
 /// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
@@ -28,6 +33,7 @@ pub enum Command {
     Paper(paper::Paper),
     Sensors(sensors::Sensors),
     Scenes(scenes::Scenes),
+    Environments(environments::Environments),
     Check(check::Check),
     Budget(budget::Budget),
     Codes(codes::Codes),
@@ -79,12 +85,129 @@ impl Common {
     }
 }
 
-/// A sensor, and what is changed of it.
+/// What is changed of sensors, scenes and their environments.
 #[derive(Args)]
 pub struct Changes {
-    /// Change one value of the sensor, as scan.max_range_m=90; repeatable
+    /// Change one value of the sensor, as scan.max_range_m=90, of the environment, as
+    /// environment.visibility_km=0.05, or of the scene, as scene:object.wall.material=brick;
+    /// repeatable
     #[arg(long, value_name = "KEY=VALUE", value_parser = change)]
-    pub set: Vec<(String, String)>,
+    set: Vec<(String, String)>,
+
+    /// Simulate an effect that the sensor or the environment leaves out: take it off the list
+    /// `idealised`; repeatable
+    #[arg(long = "with", value_name = "EFFECT", value_parser = effect)]
+    with: Vec<Effect>,
+
+    /// Leave an effect out: put it on the list `idealised`; repeatable
+    #[arg(long = "without", value_name = "EFFECT", value_parser = effect)]
+    without: Vec<Effect>,
+}
+
+impl Changes {
+    /// All changes, those of the scene after the `environment` named, the switched effects before
+    /// single keys.
+    pub fn all(&self, environment: &Surroundings) -> Result<Vec<(String, String)>, Fault> {
+        if let Some(both) = self.with.iter().find(|effect| self.without.contains(effect)) {
+            let name = both.name();
+            return Err(Fault::Wrong(format!(
+                "--with {name} and --without {name} contradict each other: leave one out"
+            )));
+        }
+        let switched = |key: &'static str, list: &[Effect]| {
+            let change = |effect: &Effect| match effect {
+                Effect::OfSensor(effect) => (key.to_owned(), effect.name().to_owned()),
+                Effect::OfEnvironment(effect) => {
+                    (format!("environment.{key}"), effect.name().to_owned())
+                }
+            };
+            list.iter().map(change).collect::<Vec<_>>()
+        };
+        let switched = [switched(WITH, &self.with), switched(WITHOUT, &self.without)].concat();
+        Ok([environment.changes(), switched, self.set.clone()].concat())
+    }
+
+    /// The changes of a scene apart from those of a sensor.
+    pub fn apart(&self, environment: &Surroundings) -> Result<scene::Changes, Fault> {
+        Ok(scene::apart(&self.all(environment)?))
+    }
+
+    /// The changes of a sensor, for a command that has no scene.
+    pub fn of_sensor(&self) -> Result<Vec<(String, String)>, Fault> {
+        let apart = self.apart(&Surroundings::default())?;
+        match apart.of_scene.first() {
+            None => Ok(apart.of_sensor),
+            Some((key, _)) => Err(Fault::Wrong(format!(
+                "{key}: belongs to a scene, and this command has none; leave it out"
+            ))),
+        }
+    }
+}
+
+/// Sun and air in place of those of the scene.
+#[derive(Args, Default)]
+pub struct Surroundings {
+    /// Sun and air: a ready environment, in place of that of the scene; `macropulse environments`
+    /// lists them
+    #[arg(long = "environment", value_name = "NAME")]
+    name: Option<String>,
+}
+
+impl Surroundings {
+    /// The change of a scene to the environment named.
+    pub fn changes(&self) -> Vec<(String, String)> {
+        let named = self.name.iter();
+        named.map(|name| ("environment".to_owned(), format!("\"{name}\""))).collect()
+    }
+
+    /// The environment named, or the usual one, with the `changes` of a scene, for a command
+    /// without a scene.
+    pub fn alone(changes: &scene::Changes) -> Result<Environment, Fault> {
+        let mut typed = None;
+        for (key, value) in &changes.of_scene {
+            let Some(key) = key.strip_prefix("environment") else {
+                return Err(Fault::Wrong(format!(
+                    "{key}: belongs to a scene, and this command has none; leave it out"
+                )));
+            };
+            let key = key.strip_prefix('.').unwrap_or(key);
+            typed = Some(environment::change(typed, key, environment::value(value))?);
+        }
+        match typed {
+            None => Ok(Environment::default()),
+            Some(typed) => Ok(Environment::read(&typed)?),
+        }
+    }
+}
+
+/// An effect that can be switched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Effect {
+    OfSensor(design::Effect),
+    OfEnvironment(environment::Effect),
+}
+
+impl Effect {
+    fn all() -> impl Iterator<Item = Self> {
+        let of_environment = environment::Effect::ALL.map(Self::OfEnvironment);
+        design::Effect::ALL.map(Self::OfSensor).into_iter().chain(of_environment)
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::OfSensor(effect) => effect.name(),
+            Self::OfEnvironment(effect) => effect.name(),
+        }
+    }
+}
+
+fn effect(typed: &str) -> Result<Effect, String> {
+    Effect::all().find(|effect| effect.name() == typed).ok_or_else(|| {
+        let known: Vec<&str> = Effect::all().map(Effect::name).collect();
+        let hint = nearest(typed, known.iter().copied());
+        let hint = hint.map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+        format!("`{typed}` is no effect; {hint}known are {}", known.join(", "))
+    })
 }
 
 fn change(typed: &str) -> Result<(String, String), String> {

@@ -61,8 +61,8 @@ fn all(as_json: bool) -> Result<(), Fault> {
     print(&columns.text())
 }
 
-/// A scene file begins with a comment; its first sentence says what the scene is.
-fn summary(toml: &str) -> String {
+/// The file of a scene or an environment begins with a comment; its first sentence says what it is.
+pub fn summary(toml: &str) -> String {
     let comment: Vec<&str> =
         toml.lines().map_while(|line| line.strip_prefix('#')).map(str::trim).collect();
     first_sentence(&comment.join(" ")).to_owned()

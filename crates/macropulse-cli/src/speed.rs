@@ -11,7 +11,7 @@ use macropulse_study::paper::PERFECT;
 use serde_json::json;
 
 use crate::fault::Fault;
-use crate::options::Common;
+use crate::options::{Common, Surroundings};
 use crate::text::{Columns, print, short};
 
 /// Measure how fast this machine simulates the sensor of the paper
@@ -22,6 +22,9 @@ use crate::text::{Columns, print, short};
 #[command(after_help = "Example:
   macropulse speed --json")]
 pub struct Speed {
+    #[command(flatten)]
+    surroundings: Surroundings,
+
     /// Print as JSON
     #[arg(long)]
     json: bool,
@@ -48,14 +51,14 @@ struct Figures {
 }
 
 pub fn run(options: &Speed, common: &Common) -> Result<(), Fault> {
-    let figures = measure()?;
+    let figures = measure(&options.surroundings)?;
     if options.json {
         return print(&format!("{:#}\n", figures.json()));
     }
     if common.quiet { Ok(()) } else { print(&figures.text()) }
 }
 
-fn measure() -> Result<Figures, Fault> {
+fn measure(surroundings: &Surroundings) -> Result<Figures, Fault> {
     let sensor = |set: &[(&str, &str)]| {
         let set: Vec<(String, String)> =
             set.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
@@ -67,7 +70,9 @@ fn measure() -> Result<Figures, Fault> {
         ("detector.photon-counting.dark_counts_hz", "1e9"),
     ];
     let noisy = sensor(&[PERFECT, &noise].concat())?;
-    let (street, car) = (Scene::open("street")?, Scene::open("car-50m")?);
+    let changes = surroundings.changes();
+    let [street, car] = ["street", "car-50m"].map(|name| Scene::open_changed(name, &changes));
+    let (street, car) = (street?, car?);
     let one = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -76,17 +81,17 @@ fn measure() -> Result<Figures, Fault> {
         one.install(|| Stages::of(design, scene, every))
     };
     // The first scan finds cold memory.
-    on_one_thread(&clean, &street, SAMPLE);
-    let clear = on_one_thread(&clean, &street, 1);
-    let noisy = on_one_thread(&noisy, &street, SAMPLE);
-    let rays = on_one_thread(&clean, &car, 1);
+    on_one_thread(&clean, &street, SAMPLE)?;
+    let clear = on_one_thread(&clean, &street, 1)?;
+    let noisy = on_one_thread(&noisy, &street, SAMPLE)?;
+    let rays = on_one_thread(&clean, &car, 1)?;
     Ok(Figures {
         rays_per_s: 1.0 / (rays.per_shot(&["scene"])),
         generate: clear.times_real_time(&["emit", "channel", "detect", "tdc"]),
         decode: clear.times_real_time(&["decode"]),
         decode_noisy: noisy.times_real_time(&["decode"]),
-        clean_scans_per_s: scans_per_s(&clean, &car),
-        full_scans_per_s: scans_per_s(&full, &car),
+        clean_scans_per_s: scans_per_s(&clean, &car)?,
+        full_scans_per_s: scans_per_s(&full, &car)?,
         threads: rayon::current_num_threads(),
     })
 }
@@ -100,10 +105,10 @@ struct Stages {
 
 impl Stages {
     /// One band in `every` of a scan of `design` in `scene`.
-    fn of(design: &Design, scene: &Scene, every: usize) -> Self {
+    fn of(design: &Design, scene: &Scene, every: usize) -> Result<Self, Fault> {
         let part: Vec<Band> = bands(design, 0).step_by(every).collect();
-        let tally = sim::scan_part(design, scene, SEED, &part).tally;
-        Self { tally, period: design.scan_period() / design.shots_per_scan() as f64 }
+        let tally = sim::scan_part(design, scene, SEED, &part)?.tally;
+        Ok(Self { tally, period: design.scan_period() / design.shots_per_scan() as f64 })
     }
 
     /// Seconds that the `stages` took for one shot.
@@ -120,8 +125,8 @@ impl Stages {
 }
 
 /// Whole scans per second on all threads.
-fn scans_per_s(design: &Design, scene: &Scene) -> f64 {
-    let mut scans = Scans::new(design, scene, SEED);
+fn scans_per_s(design: &Design, scene: &Scene) -> Result<f64, Fault> {
+    let mut scans = Scans::new(design, scene, SEED)?;
     let nobody = Watch { done: &|_| {}, stop: &|| false };
     let began = Instant::now();
     let mut done = 0;
@@ -129,7 +134,7 @@ fn scans_per_s(design: &Design, scene: &Scene) -> f64 {
         scans.scan(done, &nobody);
         done += 1;
     }
-    done as f64 / began.elapsed().as_secs_f64()
+    Ok(done as f64 / began.elapsed().as_secs_f64())
 }
 
 impl Figures {

@@ -34,14 +34,14 @@ fn the_paper_with_honest_light_has_the_numbers_of_its_budget() {
 
 #[test]
 fn at_night_and_square_on_nothing_but_the_slant_fails() {
-    let budget = json("budget kim-park-2016-physical --set sun.sky=night --range 130 --json");
+    let budget = json("budget kim-park-2016-physical --environment night --range 130 --json");
     assert_eq!(budget["first_failure"]["what"], "slant");
     assert!(budget["pd"].as_f64().unwrap() > 0.9);
 }
 
 #[test]
 fn a_sensor_declared_by_its_sensitivity_has_no_energy_to_tell() {
-    let budget = json("budget kim-park-2016 --json");
+    let budget = json("budget kim-park-2016 --environment vacuum-dark --json");
     assert!(budget["energy_per_macropulse_nj"].is_null());
     assert_about(&budget, "detected_per_micropulse", 4.605, 0.001);
     assert_eq!(budget["closes"], true);

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::view::{Layout, RangePicture};
+use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::formats::{
@@ -109,7 +110,11 @@ pub fn manifest(run: &Run) -> Manifest {
         sensor: Named { name: design.name.clone(), digest: design.digest() },
         scene: Named { name: scene.name.clone(), digest: scene.digest() },
         defaults: Entries(design.defaults.clone()),
-        idealisations: design.idealised.iter().map(|effect| effect.name().to_owned()).collect(),
+        environment: format!("{}: {}", scene.environment.name, scene.environment.conditions()),
+        idealisations: idealised(design, &scene.environment)
+            .iter()
+            .map(|effect| effect.name.to_owned())
+            .collect(),
         notes: scene.notes.iter().chain(run.warnings).cloned().collect(),
         files: run.files.to_vec(),
         ..Manifest::default()

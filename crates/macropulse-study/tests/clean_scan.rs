@@ -26,7 +26,7 @@ fn clean(sensor: &str, receiver: &str, missed: &str) -> Score {
     let scene = Scene::open("car-50m").unwrap();
     let car: Vec<Band> =
         bands(&design, 0).filter(|band| (252..297).contains(&(band.first / 848))).collect();
-    let score = sim::scan_part(&design, &scene, 3, &car).score;
+    let score = sim::scan_part(&design, &scene, 3, &car).unwrap().score;
     assert!(score.with_echo() > 10_000 && score.samples_on_target > 500, "{score:?}");
     score
 }
@@ -117,8 +117,8 @@ fn ten_and_twenty_times_as_many_samples_fall_on_the_car() {
 #[test]
 fn peregrine_has_no_point_at_120_m() {
     let scene = Scene::open("car-120m").unwrap();
-    let score = sim::scan(&open("peregrine", &[]), &scene, 3, 0).score;
+    let score = sim::scan(&open("peregrine", &[]), &scene, 3, 0).unwrap().score;
     assert_eq!((score.samples_on_target, score.points_on_target), (0, 0));
-    let near = sim::scan(&open("peregrine", &[]), &Scene::open("car-30m").unwrap(), 3, 0);
+    let near = sim::scan(&open("peregrine", &[]), &Scene::open("car-30m").unwrap(), 3, 0).unwrap();
     assert!(near.score.points_on_target > 100, "{:?}", near.score);
 }

@@ -54,7 +54,7 @@ impl Seen {
                 .collect(),
             false => all,
         };
-        let scan = sim::scan_part(&design, scene, 11, &part);
+        let scan = sim::scan_part(&design, scene, 11, &part).unwrap();
         Self { design, scan }
     }
 

@@ -8,7 +8,7 @@
 //!     let fewer = [("scan.raster.rows".to_owned(), "24".to_owned())];
 //!     let design = Design::open("kim-park-2016-fixed", &fewer)?;
 //!     let scene = Scene::open("street")?;
-//!     let scan = sim::scan(&design, &scene, 1, 0);
+//!     let scan = sim::scan(&design, &scene, 1, 0)?;
 //!     let right = scan.score.count(Outcome::Right);
 //!     println!("{} points, {right} of them right", scan.cloud.returns());
 //!     assert!(scan.score.right_fraction() > 0.99);
@@ -20,6 +20,7 @@
 
 #![cfg_attr(test, allow(missing_docs))]
 
+pub mod environment;
 pub mod design;
 pub mod emit;
 pub mod scene;

@@ -1,4 +1,6 @@
-//! Help with misspelt names and with places in texts.
+//! Help with misspelt names, places in texts, and values typed on a command line.
+
+use toml::de::DeTable;
 
 /// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
 /// apart, or the beginning of it, as `yaw_deg` is of `yaw_degrees`.
@@ -21,6 +23,28 @@ pub(crate) fn line_column(text: &str, offset: usize) -> (usize, usize) {
     let line = before.matches('\n').count() + 1;
     let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
     (line, column)
+}
+
+/// Byte offset, in a TOML `text`, of the key at the dotted `path`.
+pub(crate) fn offset_of_key(text: &str, path: &str) -> Option<usize> {
+    let root = DeTable::parse(text).ok()?;
+    let mut table = root.get_ref();
+    let mut keys = path.split('.').peekable();
+    while let Some(key) = keys.next() {
+        let (name, value) = table.iter().find(|(name, _)| name.get_ref().as_ref() == key)?;
+        if keys.peek().is_none() {
+            return Some(name.span().start);
+        }
+        table = value.get_ref().as_table()?;
+    }
+    None
+}
+
+/// The value that `typed` is as TOML; what is not TOML is taken as text.
+pub fn toml_value(typed: &str) -> toml::Value {
+    let parsed = format!("v = {typed}").parse::<toml::Table>().ok();
+    let value = parsed.and_then(|mut parsed| parsed.remove("v"));
+    value.unwrap_or_else(|| toml::Value::String(typed.to_owned()))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::channel::Light;
+use crate::channel::{Error, Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands};
@@ -34,31 +34,40 @@ pub struct Scan {
 ///
 /// The bands of the scan are computed side by side on the threads of the current rayon pool; the
 /// result does not depend on how many there are.
-pub fn scan(design: &Design, scene: &Scene, seed: u64, number: u64) -> Scan {
+///
+/// # Errors
+/// If the sensor cannot be simulated in the environment of the scene, as [`Operating::of`].
+pub fn scan(design: &Design, scene: &Scene, seed: u64, number: u64) -> Result<Scan, Error> {
     let bands: Vec<Band> = bands(design, number).collect();
     scan_part(design, scene, seed, &bands)
 }
 
 /// As [`scan`], but only the `bands` given, all of one scan; the rest of the cloud stays empty.
-pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> Scan {
-    let mut scans = Scans::new(design, scene, seed);
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> Result<Scan, Error> {
+    let mut scans = Scans::new(design, scene, seed)?;
     // A watch that never says stop lets every band through.
     let nobody = Watch { done: &|_| {}, stop: &|| false };
     scans.measure(bands, &nobody);
-    scans.scan
+    Ok(scans.scan)
 }
 
 /// As [`scan`], with somebody looking on; `None` if the watch said stop before the end.
+///
+/// # Errors
+/// As [`scan`].
 pub fn scan_watched(
     design: &Design,
     scene: &Scene,
     seed: u64,
     number: u64,
     watch: &Watch,
-) -> Option<Scan> {
-    let mut scans = Scans::new(design, scene, seed);
-    scans.scan(number, watch)?;
-    Some(scans.scan)
+) -> Result<Option<Scan>, Error> {
+    let mut scans = Scans::new(design, scene, seed)?;
+    let is_whole = scans.scan(number, watch).is_some();
+    Ok(is_whole.then_some(scans.scan))
 }
 
 /// Who looks on while scans are computed. Asked and told from many threads.
@@ -73,17 +82,23 @@ pub struct Watch<'a> {
 pub struct Scans<'a> {
     design: &'a Design,
     scene: &'a Scene,
+    operating: Operating,
     detectors: Detectors<'a>,
     scan: Scan,
 }
 
 impl<'a> Scans<'a> {
     /// The scans of the sensor `design` in `scene`, with the chance of `seed`.
-    pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Self {
+    ///
+    /// # Errors
+    /// As [`scan`].
+    pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Result<Self, Error> {
+        let operating = Operating::of(design, &scene.environment)?;
+        let detectors = Detectors::new(design, &operating, Chance::new(seed));
         let mut cloud = PointCloud::empty(design, 0);
         cloud.truth = score::empty_truth(&cloud);
         let scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
-        Self { design, scene, detectors: Detectors::new(design, Chance::new(seed)), scan }
+        Ok(Self { design, scene, operating, detectors, scan })
     }
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
@@ -103,16 +118,17 @@ impl<'a> Scans<'a> {
     fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
         self.scan.cloud.clear(bands.first().map_or(0, |band| band.scan));
         (self.scan.score, self.scan.tally) = Default::default();
-        let (design, scene, detectors) = (self.design, self.scene, &self.detectors);
+        let seen = Seen { design: self.design, scene: self.scene, operating: &self.operating };
+        let setup = Setup { seen, detectors: &self.detectors };
         let scan = Mutex::new(&mut self.scan);
         let stopped = AtomicBool::new(false);
         bands.par_iter().for_each_init(Memory::default, |memory, band| {
             if stopped.load(Ordering::Relaxed) || (watch.stop)() {
                 return stopped.store(true, Ordering::Relaxed);
             }
-            let measured = measure((design, scene), detectors, memory, band);
+            let measured = measure(&setup, memory, band);
             // Bands have no pixel in common, and counts add up in any order.
-            scan.lock().unwrap_or_else(PoisonError::into_inner).add(design, scene, &measured);
+            scan.lock().unwrap_or_else(PoisonError::into_inner).add(&setup, &measured);
             (watch.done)(band.shots);
         });
         !stopped.into_inner()
@@ -120,9 +136,10 @@ impl<'a> Scans<'a> {
 }
 
 impl Scan {
-    fn add(&mut self, design: &Design, scene: &Scene, band: &Measured) {
+    fn add(&mut self, setup: &Setup, band: &Measured) {
+        let Seen { design, scene, operating } = setup.seen;
         let clock = Instant::now();
-        self.cloud.add(design, &band.log, &band.returns);
+        self.cloud.add(design, &operating.link, &band.log, &band.returns);
         let mut score = score::judge(&mut self.cloud, design, scene, &band.log, &band.hits);
         score.ghosts = score::ghosts(&self.cloud, design, &band.log, &band.light);
         self.score.add(&score);
@@ -140,12 +157,14 @@ struct Measured<'a> {
     tally: Tally,
 }
 
-fn measure<'a>(
-    (design, scene): (&'a Design, &'a Scene),
-    detectors: &Detectors,
-    memory: &mut Memory,
-    band: &Band,
-) -> Measured<'a> {
+/// What all bands of a run have in common.
+struct Setup<'a> {
+    seen: Seen<'a>,
+    detectors: &'a Detectors<'a>,
+}
+
+fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<'a> {
+    let Setup { seen: Seen { design, scene, .. }, detectors } = *setup;
     let mut tally = Tally::default();
     let mut clock = Instant::now();
     let mut stages = 0..POINTS;
@@ -158,7 +177,7 @@ fn measure<'a>(
     lap(&mut tally);
     let traced = scene.trace(design, &log);
     lap(&mut tally);
-    let light = channel::light(design, scene, &log, &traced);
+    let light = channel::light(&setup.seen, &log, &traced);
     lap(&mut tally);
     let detections = detectors.detections(&log, &light, memory);
     tally.edges = detections.time.len() as u64;

@@ -5,18 +5,16 @@ use std::path::Path;
 
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
+use macropulse::environment::Environment;
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
 use macropulse::predict::verdict::{Check, Wanted, checks};
 use macropulse::scene::Scene;
 use macropulse::sim::{self, Scan};
 
-fn sensor(name: &str, sky: &str) -> Design {
-    Design::open(name, &[("sun.sky".to_owned(), format!("\"{sky}\""))]).unwrap()
-}
-
 fn scene(text: &str) -> Scene {
-    Scene::from_toml(&format!("version = 1\n{text}"), "scene", Path::new("")).unwrap()
+    let text = format!("version = 1\nenvironment = \"clear-day\"\n{text}");
+    Scene::from_toml(&text, "scene", Path::new("")).unwrap()
 }
 
 /// A hollow sphere about the sensor: every shot meets it square on.
@@ -30,7 +28,7 @@ fn room(range: f64, reflectance: f64) -> Scene {
 /// Every so many bands of a scan.
 fn measure(design: &Design, scene: &Scene, every: usize) -> Scan {
     let part: Vec<Band> = bands(design, 0).step_by(every).collect();
-    sim::scan_part(design, scene, 1, &part)
+    sim::scan_part(design, scene, 1, &part).unwrap()
 }
 
 /// By day, 10 % and 30 % targets at 150 m are seen with probability 0.9 and more, and no more than
@@ -40,20 +38,22 @@ fn measure(design: &Design, scene: &Scene, every: usize) -> Scan {
 fn coded_practical_and_coded_360_do_what_was_asked_for() {
     let sky = scene("[[object]]\nshape.sphere.radius_m = 1\nposition_m = [-400, 0, 0]\n");
     for name in ["coded-practical", "coded-360"] {
-        let [day, night] = ["day", "night"].map(|sky| sensor(name, sky));
+        let design = Design::open(name, &[]).unwrap();
+        let [day, night] = ["clear-day", "night"]
+            .map(|sky| Forecaster::new(&design, &Environment::named(sky).unwrap()).unwrap());
         for reflectance in [0.1, 0.3, 1.0] {
             let wanted = Wanted { reflectance, range: 150.0, pd: 0.9, false_points: 1e-4 };
             let checks = checks(&day, &night, &wanted);
             assert!(checks.iter().all(Check::holds), "{name}, {reflectance}: {checks:?}");
         }
         for reflectance in [0.1, 0.3] {
-            let scan = measure(&day, &room(149.9, reflectance), 20);
-            let predicted = Forecaster::new(&day).forecast(reflectance, 149.9).pd;
+            let scan = measure(&design, &room(149.9, reflectance), 20);
+            let predicted = day.forecast(reflectance, 149.9).pd;
             let found = scan.score.right_fraction();
             assert!(found > 0.9, "{name}, {reflectance}: {found}");
             assert!((found - predicted).abs() < 0.03, "{name}: {found}, predicted {predicted}");
         }
-        let empty = measure(&day, &sky, 1);
+        let empty = measure(&design, &sky, 1);
         assert_eq!(empty.tally.surfaces, 0);
         let false_points = empty.score.count(Outcome::False) as f64;
         assert!(false_points <= 1e-4 * empty.tally.shots as f64, "{name}: {false_points}");

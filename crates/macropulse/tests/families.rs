@@ -3,8 +3,11 @@
 
 use std::path::Path;
 
+use macropulse::channel::{Operating, Seen};
 use macropulse::design::Design;
+use macropulse::detect::Detectors;
 use macropulse::points::Outcome;
+use macropulse::random::Chance;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim;
@@ -49,7 +52,7 @@ fn sensor(keys: &[(&str, &str)]) -> Design {
 
 fn scanned(design: &Design) -> Score {
     let scene = Scene::from_toml(SCENE, "steps.toml", Path::new("")).unwrap();
-    sim::scan(design, &scene, 5, 0).score
+    sim::scan(design, &scene, 5, 0).unwrap().score
 }
 
 /// That nearly all echoes come back right, and hardly anything where there is none.
@@ -143,7 +146,7 @@ fn the_example_of_dense_words_sees_the_street() {
     let lines: Vec<_> = macropulse::emit::bands(&design, 0)
         .filter(|band| (240..249).contains(&(band.first / 848)))
         .collect();
-    let score = sim::scan_part(&design, &street, 1, &lines).score;
+    let score = sim::scan_part(&design, &street, 1, &lines).unwrap().score;
     assert!(score.with_echo() > 5000 && score.right_fraction() > 0.98, "{score:?}");
 }
 
@@ -231,8 +234,10 @@ fn other_words_are_not_found() {
     design.coding.codebook = other.coding.codebook.clone();
     let scene = Scene::from_toml(SCENE, "steps.toml", Path::new("")).unwrap();
     let log = macropulse::emit::bands(&design, 0).next().unwrap().shot_log(&design);
-    let light = macropulse::channel::light(&design, &scene, &log, &scene.trace(&design, &log));
-    let detectors = macropulse::detect::Detectors::new(&design, macropulse::random::Chance::new(1));
+    let operating = Operating::of(&design, &scene.environment).unwrap();
+    let seen = Seen { design: &design, scene: &scene, operating: &operating };
+    let light = macropulse::channel::light(&seen, &log, &scene.trace(&design, &log));
+    let detectors = Detectors::new(&design, &operating, Chance::new(1));
     let detections = detectors.detections(&log, &light, &mut Default::default());
     let ticks = macropulse::tdc::ticks(&design, detections).ticks;
     let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).len();

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use macropulse::channel;
+use macropulse::channel::{self, Operating, Seen};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
@@ -45,7 +45,7 @@ fn part(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Scan {
     let design = open("kim-park-2016-fixed", keys);
     let part = chosen(&design, scan);
     assert_eq!(part.len(), LINES.len());
-    sim::scan_part(&design, &scenario(scenario_name), SEED, &part)
+    sim::scan_part(&design, &scenario(scenario_name), SEED, &part).unwrap()
 }
 
 fn score(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Score {
@@ -68,7 +68,7 @@ fn without_others_nothing_changes() {
         let scene = Scene::from_toml(&text, "none", Path::new("")).unwrap();
         assert_eq!(scene.digest() == scenario("none").digest(), is_same_scene);
         let design = open("kim-park-2016-fixed", &[]);
-        let scan = sim::scan_part(&design, &scene, SEED, &chosen(&design, 0));
+        let scan = sim::scan_part(&design, &scene, SEED, &chosen(&design, 0)).unwrap();
         assert_eq!(columns(&scan), columns(&alone));
         assert_eq!(scan.score, alone.score);
     }
@@ -173,9 +173,9 @@ fn the_ghosts_of_a_drifting_lidar_walk_past() {
 #[test]
 fn a_spinning_lidar_hardly_sees_the_others() {
     let design = open("hdl-64e", &[]);
-    let alone = sim::scan(&design, &scenario("none"), SEED, 0);
+    let alone = sim::scan(&design, &scenario("none"), SEED, 0).unwrap();
     for name in ["dense-pulses", "coded"] {
-        let scan = sim::scan(&design, &scenario(name), SEED, 0);
+        let scan = sim::scan(&design, &scenario(name), SEED, 0).unwrap();
         assert!((1..50).contains(&scan.tally.foreign), "{name} {:?}", scan.tally);
         let pixels = scan.cloud.range.iter().zip(&alone.cloud.range);
         let changed = pixels.filter(|(a, b)| a.to_bits() != b.to_bits()).count() as u64;
@@ -185,8 +185,8 @@ fn a_spinning_lidar_hardly_sees_the_others() {
 
 fn wall(keys: &str) -> Scene {
     let text = format!(
-        "version = 1\n[[object]]\nname = \"wall\"\nshape = {{ plane = {{ normal = [-1, 0, 0] }} }}\n\
-         position_m = [50, 0, 0]\nmaterial = \"dim\"\n[[material]]\nname = \"dim\"\n{keys}"
+        "version = 1\nenvironment = \"vacuum-dark\"\n[[object]]\nname = \"wall\"\n\
+         shape = {{ plane = {{ normal = [-1, 0, 0] }} }}\nposition_m = [50, 0, 0]\nmaterial = \"dim\"\n[[material]]\nname = \"dim\"\n{keys}"
     );
     Scene::from_toml(&text, "wall", Path::new("")).unwrap()
 }
@@ -195,8 +195,9 @@ fn wall(keys: &str) -> Scene {
 fn edges(design: &Design, scene: &Scene, band: &Band, is_alone: bool) -> Vec<i64> {
     let log = band.shot_log(design);
     let traced = if is_alone { Traced::default() } else { scene.trace(design, &log) };
-    let light = channel::light(design, scene, &log, &traced);
-    let detectors = Detectors::new(design, Chance::new(SEED));
+    let operating = Operating::of(design, &scene.environment).unwrap();
+    let light = channel::light(&Seen { design, scene, operating: &operating }, &log, &traced);
+    let detectors = Detectors::new(design, &operating, Chance::new(SEED));
     let edges = detectors.detections(&log, &light, &mut Memory::default());
     edges.time.iter().map(|time| edges.epoch * 64 + i64::from(*time)).collect()
 }
@@ -257,7 +258,7 @@ fn single_pulses_make_ghosts_as_often_as_theory_says() {
         ("detector.first-firing.false_firing_hz", "0"),
     ];
     let design = open("hdl-64e", &keys);
-    let scan = sim::scan(&design, &scene, SEED, 0);
+    let scan = sim::scan(&design, &scene, SEED, 0).unwrap();
     let shots = scan.tally.shots as f64;
     let expected = |rate: f64| -> f64 {
         let pixels = (0..40).flat_map(|row| (0..200).map(move |column| (row, column)));

@@ -71,8 +71,13 @@ const SIMULATOR: Layers = Layers {
             because: "constants depend on nothing; whole columns are converted in a wide loop",
         },
         Rule {
+            module: "environment",
+            may_name: &["names"],
+            because: "sun and air are there whatever looks at them",
+        },
+        Rule {
             module: "design",
-            may_name: &["digest", "names", "units"],
+            may_name: &["digest", "environment", "names", "units"],
             because: "a design is checked data: it imports no stage",
         },
         Rule {
@@ -82,12 +87,12 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "scene",
-            may_name: &["design", "digest", "emit", "kernels", "names"],
+            may_name: &["design", "digest", "emit", "environment", "kernels", "names"],
             because: "surfaces do not know what their echoes become",
         },
         Rule {
             module: "channel",
-            may_name: &["design", "emit", "scene", "units"],
+            may_name: &["design", "emit", "environment", "scene", "units"],
             because: "light arrives whether or not it is detected",
         },
         Rule {
@@ -114,7 +119,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "predict",
-            may_name: &["channel", "design", "units"],
+            may_name: &["channel", "design", "environment", "units"],
             because: "an oracle that ran the simulation would agree with it whatever it did",
         },
         Rule {

@@ -6,11 +6,12 @@
 
 use std::path::Path;
 
-use macropulse::channel::{Echo, Light, light_of_echoes};
+use macropulse::channel::{Echo, Light, Operating, light_of_echoes};
 use macropulse::codec::ShotLog;
 use macropulse::design::{Design, Detector};
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
+use macropulse::environment::Environment;
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
 use macropulse::predict::detection::{armed, bank_loss, mark_pd};
@@ -27,10 +28,15 @@ fn sensor(name: &str, set: &[(&str, &str)]) -> Design {
     Design::open(name, &set.iter().map(owned).collect::<Vec<_>>()).unwrap()
 }
 
+/// What follows from a sensor where there is neither air nor sunlight.
+fn in_the_dark(design: &Design) -> Operating {
+    Operating::of(design, &Environment::vacuum_dark()).unwrap()
+}
+
 /// A hollow sphere of a matt material about the sensor.
-fn room(range: f64, reflectance: f64) -> Scene {
+fn room(range: f64, reflectance: f64, environment: &str) -> Scene {
     let text = format!(
-        "version = 1\n[[material]]\nname = \"paint\"\ndiffuse = {reflectance}\n\
+        "version = 1\nenvironment = \"{environment}\"\n[[material]]\nname = \"paint\"\ndiffuse = {reflectance}\n\
          [[object]]\nshape.sphere.radius_m = {range}\nmaterial = \"paint\"\n"
     );
     Scene::from_toml(&text, "room", Path::new("")).unwrap()
@@ -40,7 +46,7 @@ fn room(range: f64, reflectance: f64) -> Scene {
 fn measure(design: &Design, scene: &Scene, seed: u64, count: usize) -> Scan {
     let all: Vec<Band> = bands(design, 0).collect();
     let part: Vec<Band> = all.iter().step_by(all.len().div_ceil(count)).copied().collect();
-    sim::scan_part(design, scene, seed, &part)
+    sim::scan_part(design, scene, seed, &part).unwrap()
 }
 
 /// Whether `count` of `trials` may well have come with probability `share`: neither tail of the
@@ -85,21 +91,20 @@ fn detected(scan: &Scan) -> (u64, u64) {
 /// wherever detection is neither certain nor hopeless.
 #[test]
 fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
-    let hopeless = [("sun.sky", "\"day\"")];
-    let night = [("sun.sky", "\"night\"")];
+    let design = sensor("kim-park-2016-physical", &[("receiver.effort", "\"thorough\"")]);
     let mut graded = 0;
-    for (name, set) in [("as it is", hopeless), ("at night", night)] {
-        let set = [&set[..], &[("receiver.effort", "\"thorough\"")]].concat();
-        let design = sensor("kim-park-2016-physical", &set);
+    for name in ["clear-day", "night"] {
+        let sky = Environment::named(name).unwrap();
         for range in [10.0, 20.0, 50.0, 130.0, 150.0] {
-            let forecaster = Forecaster::new(&design);
+            let forecaster = Forecaster::new(&design, &sky).unwrap();
             let predicted = forecaster.forecast(1.0, range).pd;
-            let (found, shots) = detected(&measure(&design, &room(range * 0.9999, 1.0), 1, 1));
+            let room = room(range * 0.9999, 1.0, name);
+            let (found, shots) = detected(&measure(&design, &room, 1, 1));
             assert!(
                 agrees(found, shots, predicted),
                 "{name}, {range} m: {found} of {shots}, predicted {predicted}"
             );
-            if set[0] == hopeless[0] {
+            if name == "clear-day" {
                 assert_eq!(found, 0, "{range} m: sunlight in every chip");
             }
             if (0.001..0.999).contains(&predicted) {
@@ -119,8 +124,8 @@ fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
 fn in_dense_light_the_forecast_is_a_bound() {
     let set = [("optics.field", "\"in-flight\""), ("receiver.effort", "\"thorough\"")];
     let design = sensor("kim-park-2016-physical", &set);
-    let (found, shots) = detected(&measure(&design, &room(90.49, 1.0), 1, 1));
-    let forecaster = Forecaster::new(&design);
+    let (found, shots) = detected(&measure(&design, &room(90.49, 1.0, "clear-day"), 1, 1));
+    let forecaster = Forecaster::new(&design, &Environment::default()).unwrap();
     let share = found as f64 / shots as f64;
     let predicted = forecaster.forecast(1.0, 90.5).pd;
     assert!((0.4..1.0).contains(&(share / predicted)), "{share}, predicted {predicted}");
@@ -140,7 +145,7 @@ fn with_detector(lines: &str) -> Design {
     let text = format!(
         "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
          idealised = [\"detector-bandwidth\", \"footprint\", \"inter-chip\", \
-         \"mirror-motion\"]\n[sun]\nsky = \"night\"\n{lines}"
+         \"mirror-motion\"]\n{lines}"
     );
     Design::from_toml(&text, "mine", Path::new(""), &[]).unwrap()
 }
@@ -159,7 +164,7 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
         let design = with_detector(lines);
         // A linear detector takes as many photons as its threshold.
         let unit = match &design.detector {
-            Detector::Linear(linear) => linear.threshold / 3.0,
+            Detector::Linear(_) => in_the_dark(&design).linear.unwrap().threshold / 3.0,
             _ => 1.0,
         };
         let (mut told_apart, mut some) = (0, 0);
@@ -172,16 +177,16 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
                 .zip(&log.word)
                 .map(|(&label, &word)| design.coding.codebook.marks(label, word).len() as u64)
                 .sum();
-            let detectors = Detectors::new(&design, Chance::new(2));
+            let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(2));
             let found = detectors.detections(&log, &light, &mut Memory::default());
             // Several photons of one mark are one tick.
             let edges = tdc::ticks(&design, found).ticks.tick.len() as u64;
-            let predicted = mark_pd(&design.detector, photons, 0.0);
+            let predicted = mark_pd(&design, &in_the_dark(&design), photons, 0.0);
             assert!(
                 agrees(edges, marks, predicted),
                 "{lines}: {photons} photons, {edges} of {marks}, predicted {predicted}"
             );
-            let brighter = mark_pd(&design.detector, 1.1 * photons, 0.0);
+            let brighter = mark_pd(&design, &in_the_dark(&design), 1.1 * photons, 0.0);
             some += u32::from((1e-4..0.9999).contains(&predicted));
             told_apart += u32::from(!agrees(edges, marks, brighter));
         }
@@ -202,7 +207,7 @@ fn blind_cells_lose_what_is_predicted() {
         let mut seconds = 0.0;
         for band in bands(&design, 0).take(8) {
             let log = band.shot_log(&design);
-            let detectors = Detectors::new(&design, Chance::new(3));
+            let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(3));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
             edges += found.time.len();
             let lasts = log.fired_at_fs[log.len() - 1] - log.fired_at_fs[0] + design.listening_fs();
@@ -232,7 +237,7 @@ fn a_small_bank_loses_what_erlang_says() {
         let (mut edges, mut lost) = (0, 0);
         for band in bands(&design, 0).take(4) {
             let log = band.shot_log(&design);
-            let detectors = Detectors::new(&design, Chance::new(4));
+            let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(4));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
             let ticks = tdc::ticks(&design, found);
             edges += ticks.ticks.tick.len() as u64 + ticks.lost;
@@ -269,7 +274,8 @@ fn range_is_as_precise_as_predicted() {
         let errors: Vec<f64> = right.map(error).collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         let square = errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>();
-        let forecast = Forecaster::new(&design).forecast(1.0, 50.0);
+        let forecaster = Forecaster::new(&design, &wall.environment).unwrap();
+        let forecast = forecaster.forecast(1.0, 50.0);
         assert!(forecast.bound < forecast.precision);
         ((square / errors.len() as f64).sqrt(), forecast.precision)
     };
@@ -282,14 +288,16 @@ fn range_is_as_precise_as_predicted() {
     }
     for (name, range) in [("hdl-64e", 50.0), ("peregrine", 40.0)] {
         let design = sensor(name, &[]);
-        let cloud = measure(&design, &room(range, 0.5), 6, usize::MAX).cloud;
+        let room = room(range, 0.5, "vacuum-dark");
+        let cloud = measure(&design, &room, 6, usize::MAX).cloud;
         let seen = cloud.range.iter().filter(|range| !range.is_nan());
         let errors = seen.map(|seen| f64::from(*seen) - range);
         // Firings of noise are no measurement of this target.
         let errors: Vec<f64> = errors.filter(|error| error.abs() < 0.35).collect();
         let square = errors.iter().map(|error| error * error).sum::<f64>();
         let measured = (square / errors.len() as f64).sqrt();
-        let predicted = Forecaster::new(&design).forecast(0.5, range).precision;
+        let forecaster = Forecaster::new(&design, &room.environment).unwrap();
+        let predicted = forecaster.forecast(0.5, range).precision;
         assert!((measured / predicted - 1.0).abs() < 0.05, "{name}: {measured}, {predicted}");
     }
     // Where jitter is wide, the receiver's choice of a window costs it some of what is predicted.
@@ -312,7 +320,8 @@ fn false_returns_stay_below_what_is_predicted() {
             ("scan.max_range_m", "60"),
         ];
         let design = sensor("kim-park-2016-fixed", &set);
-        let forecast = Forecaster::new(&design).forecast(1e-9, 50.0);
+        let forecaster = Forecaster::new(&design, &sky.environment).unwrap();
+        let forecast = forecaster.forecast(1e-9, 50.0);
         let scan = measure(&design, &sky, 1, 1);
         let found = scan.score.count(Outcome::False);
         (found, scan.tally.shots, forecast.false_per_shot)
@@ -331,8 +340,10 @@ fn noise_before_the_target_costs_a_single_firing() {
     for (name, range, rate) in [("hdl-64e", 60.0, "2e5"), ("peregrine", 40.0, "1e6")] {
         let set = [("detector.first-firing.false_firing_hz", rate)];
         let design = sensor(name, &set);
-        let forecast = Forecaster::new(&design).forecast(0.5, range);
-        let (found, shots) = detected(&measure(&design, &room(range, 0.5), 5, usize::MAX));
+        let room = room(range, 0.5, "vacuum-dark");
+        let forecaster = Forecaster::new(&design, &room.environment).unwrap();
+        let forecast = forecaster.forecast(0.5, range);
+        let (found, shots) = detected(&measure(&design, &room, 5, usize::MAX));
         assert!(
             agrees(found, shots, forecast.pd),
             "{name}: {found} of {shots}, predicted {}",

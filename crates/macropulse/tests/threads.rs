@@ -29,7 +29,7 @@ fn scan(sensor: &str, part: Part, (seed, threads): (u64, usize)) -> Scan {
         }
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| sim::scan_part(&design, &scene, seed, &chosen))
+    pool.install(|| sim::scan_part(&design, &scene, seed, &chosen).unwrap())
 }
 
 fn pcd(cloud: &PointCloud) -> Vec<u8> {

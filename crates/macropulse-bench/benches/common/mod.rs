@@ -5,12 +5,13 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use macropulse::channel::{self, light_of_echoes};
+use macropulse::channel::{self, Operating, light_of_echoes};
 use macropulse::codec::ShotLog;
 use macropulse::codec::Ticks;
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
+use macropulse::environment::Environment;
 use macropulse::random::{Chance, Stage};
 use macropulse::scene::{Hits, Material, Scene};
 use macropulse::tdc;
@@ -89,10 +90,21 @@ impl Met {
     ) -> (ShotLog, Ticks) {
         let log = band.shot_log(design);
         let mut light = light_of_echoes(design, &log, []);
-        channel::echoes(&mut light.trains, (design, &self.materials), &log, hits);
+        channel::echoes(&mut light.trains, (&operating(design).link, &self.materials), &log, hits);
         let converted = tdc::ticks(design, detectors.detections(&log, &light, memory));
         (log, converted.ticks)
     }
+}
+
+/// A sensor where there is neither air nor sunlight.
+#[allow(clippy::unwrap_used)]
+fn operating(design: &Design) -> Operating {
+    Operating::of(design, &Environment::vacuum_dark()).unwrap()
+}
+
+/// Its detectors.
+pub fn detectors(design: &Design) -> Detectors<'_> {
+    Detectors::new(design, &operating(design), Chance::new(SEED))
 }
 
 /// `count` bands spread evenly over a scan, or all of them. It is the second scan: its first band

@@ -1,12 +1,15 @@
 //! What a budget says, as text and as JSON.
 
+use macropulse::channel::idealised as idealised_in;
 use macropulse::design::Design;
 use macropulse::design::safety::{ASSUMED, Class1, Limit, Rule};
+use macropulse::environment::Environment;
 use macropulse::predict::verdict::{Check, Wanted, checks, mark_by_mark};
 use macropulse::predict::{Forecast, Forecaster};
 use macropulse::units::s_from_fs;
 use serde_json::{Value, json};
 
+use crate::fault::Fault;
 use crate::text::{Columns, section, short};
 
 /// Reflectances that tables and curves show.
@@ -14,43 +17,49 @@ pub const REFLECTANCES: [f64; 5] = [0.05, 0.1, 0.3, 0.8, 1.0];
 
 /// Everything there is to say.
 pub struct Figures<'a> {
-    pub day: &'a Design,
-    pub night: &'a Design,
+    pub design: &'a Design,
+    pub environment: Environment,
+    /// The sensor in that environment, and in the same at night.
+    pub chosen: Forecaster<'a>,
+    pub night: Forecaster<'a>,
     pub wanted: Wanted,
     checks: Vec<Check>,
     by_mark: Option<f64>,
-    /// What is to be expected of the target, by day.
+    /// What is to be expected of the target in the environment chosen.
     there: Forecast,
     /// How far each reflectance is seen.
     reaches: Vec<Reach>,
 }
 
-/// By day or by night, and where each reflectance is seen.
+/// Where a reflectance is seen.
 struct Reach {
     reflectance: f64,
-    /// By day and by night, m.
+    /// In the environment chosen and at night, m.
     ranges: [Option<f64>; 2],
-    /// At the range wanted, by day.
+    /// At the range wanted, in the environment chosen.
     there: Forecast,
 }
 
 impl<'a> Figures<'a> {
-    pub fn of(day: &'a Design, night: &'a Design, wanted: Wanted) -> Self {
-        let skies = [day, night].map(Forecaster::new);
+    pub fn of(design: &'a Design, environment: Environment, wanted: Wanted) -> Result<Self, Fault> {
+        let chosen = Forecaster::new(design, &environment)?;
+        let night = Forecaster::new(design, &environment.at_night())?;
         let reach = |reflectance: f64| Reach {
             reflectance,
-            ranges: skies.each_ref().map(|sky| sky.reach(wanted.pd, reflectance)),
-            there: skies[0].forecast(reflectance, wanted.range),
+            ranges: [&chosen, &night].map(|sky| sky.reach(wanted.pd, reflectance)),
+            there: chosen.forecast(reflectance, wanted.range),
         };
-        Self {
-            day,
+        Ok(Self {
+            checks: checks(&chosen, &night, &wanted),
+            by_mark: mark_by_mark(&chosen, &wanted),
+            there: chosen.forecast(wanted.reflectance, wanted.range),
+            reaches: REFLECTANCES.map(reach).into(),
+            design,
+            environment,
+            chosen,
             night,
             wanted,
-            checks: checks(day, night, &wanted),
-            by_mark: mark_by_mark(day, &wanted),
-            there: skies[0].forecast(wanted.reflectance, wanted.range),
-            reaches: REFLECTANCES.map(reach).into(),
-        }
+        })
     }
 
     /// Whether all that must hold holds.
@@ -64,7 +73,7 @@ impl<'a> Figures<'a> {
     }
 
     pub fn text(&self) -> String {
-        let mut text = format!("{}: a link budget\n{}\n", self.day.name, self.day.summary);
+        let mut text = format!("{}: a link budget\n{}\n", self.design.name, self.design.summary);
         text += &section("Wanted", &self.request());
         text += &section("Light", &self.light());
         text += &section("Eye safety", &self.eyes());
@@ -79,8 +88,8 @@ impl<'a> Figures<'a> {
         text += &section("Checks", &list);
         text += &section("Verdict", &self.verdict());
         let mut idealised = Columns::default();
-        for effect in &self.day.idealised {
-            idealised.push(effect.name(), effect.assumption());
+        for effect in idealised_in(self.design, &self.environment) {
+            idealised.push(effect.name, effect.assumption);
         }
         text += &section("Idealised", &idealised);
         text
@@ -90,7 +99,9 @@ impl<'a> Figures<'a> {
         let mut columns = Columns::default();
         let wanted = &self.wanted;
         let share = short(wanted.reflectance * 100.0);
+        let Environment { name, .. } = &self.environment;
         columns.push("target", format!("{share} % at {} m, square on", short(wanted.range)));
+        columns.push("in", format!("{name}: {}", self.environment.conditions()));
         columns.push("Pd", format!("at least {}", wanted.pd));
         columns.push("false", format!("at most {:e} points per shot", wanted.false_points));
         columns
@@ -99,13 +110,13 @@ impl<'a> Figures<'a> {
     fn light(&self) -> Columns {
         let mut columns = Columns::default();
         let there = &self.there;
-        match &self.day.budget {
+        match &self.design.budget {
             None => {
                 columns.push("energy", "unknown: the sensor is declared by what it can see");
             }
             Some(budget) => {
-                let marks = self.day.coding.codebook.mean_weight();
-                let power = budget.energy / self.day.derived().pixel_period;
+                let marks = self.design.coding.codebook.mean_weight();
+                let power = budget.energy / self.design.derived().pixel_period;
                 columns.push(
                     "energy",
                     format!(
@@ -153,7 +164,7 @@ impl<'a> Figures<'a> {
 
     fn eyes(&self) -> Columns {
         let mut columns = Columns::default();
-        let Some(budget) = &self.day.budget else { return columns };
+        let Some(budget) = &self.design.budget else { return columns };
         for limit in &budget.limits {
             let bright = match short(limit.brightness).as_str() {
                 "1" => String::new(),
@@ -176,18 +187,10 @@ impl<'a> Figures<'a> {
     fn table(&self) -> String {
         let mut text = format!(
             "  {:>6} {:>9} {:>9} {:>8} {:>8} {:>9} {:>10} {:>9} {:>9}\n",
-            "target",
-            "photons",
-            "detected",
-            "SNR",
-            "Pd",
-            "false",
-            "precision",
-            "by day",
-            "by night"
+            "target", "photons", "detected", "SNR", "Pd", "false", "precision", "range", "at night"
         );
         let metres = |range: Option<f64>| range.map_or("-".to_owned(), |r| format!("{r:.1} m"));
-        for Reach { reflectance, ranges: [day, night], there } in &self.reaches {
+        for Reach { reflectance, ranges: [range, night], there } in &self.reaches {
             text += &format!(
                 "  {:>4.0} % {:>9} {:>9} {:>8} {:>8.4} {:>9.1e} {:>7.3} mm {:>9} {:>9}\n",
                 reflectance * 100.0,
@@ -197,12 +200,15 @@ impl<'a> Figures<'a> {
                 there.pd,
                 there.false_per_shot,
                 there.precision * 1e3,
-                metres(*day),
+                metres(*range),
                 metres(*night)
             );
         }
         let pd = self.wanted.pd;
-        text + &format!("  photons a shot, detected a mark; by day, by night: range of Pd {pd}\n")
+        text + &format!(
+            "  photons a shot, detected a mark; range of Pd {pd} in {}, and at night\n",
+            self.environment.name
+        )
     }
 
     fn verdict(&self) -> Columns {
@@ -221,22 +227,25 @@ impl<'a> Figures<'a> {
     }
 
     fn background_per_chip(&self) -> f64 {
-        let chip = s_from_fs(self.day.coding.chip_fs);
-        self.day.budget.as_ref().map_or(0.0, |budget| budget.background() * chip)
+        let chip = s_from_fs(self.design.coding.chip_fs);
+        let detected = self.chosen.operating().background * chip;
+        self.design.budget.as_ref().map_or(0.0, |budget| detected / budget.efficiency)
     }
 
     pub fn json(&self) -> Value {
         let there = &self.there;
-        let budget = self.day.budget.as_ref();
-        let marks = self.day.coding.codebook.mean_weight();
-        let class = Class1::at(self.day.light.wavelength);
+        let budget = self.design.budget.as_ref();
+        let marks = self.design.coding.codebook.mean_weight();
+        let class = Class1::at(self.design.light.wavelength);
         let alone = |limit: &&Limit| limit.rule == Rule::SingleShot;
         let single = budget
             .and_then(|budget| budget.limits.iter().find(alone))
             .zip(class)
             .map(|(limit, class)| class.single_exposure(limit.duration) * 1e9);
         json!({
-            "sensor": self.day.name,
+            "sensor": self.design.name,
+            "environment": self.environment.name,
+            "conditions": self.environment.conditions(),
             "range_m": self.wanted.range,
             "reflectance": self.wanted.reflectance,
             "energy_per_macropulse_nj": budget.map(|budget| budget.energy * 1e9),
@@ -266,7 +275,10 @@ impl<'a> Figures<'a> {
             "checks": self.checks.iter().map(check_json).collect::<Vec<_>>(),
             "first_failure": self.first_failure().map(check_json),
             "closes": self.closes(),
-            "idealised": self.day.idealised.iter().map(|effect| effect.name()).collect::<Vec<_>>(),
+            "idealised": idealised_in(self.design, &self.environment)
+                .iter()
+                .map(|effect| effect.name)
+                .collect::<Vec<_>>(),
         })
     }
 }
@@ -279,8 +291,8 @@ fn reach_json(reach: &Reach) -> Value {
         "pd": reach.there.pd,
         "false_points_per_shot": reach.there.false_per_shot,
         "precision_mm": reach.there.precision * 1e3,
-        "range_by_day_m": reach.ranges[0],
-        "range_by_night_m": reach.ranges[1],
+        "range_of_pd_m": reach.ranges[0],
+        "range_of_pd_at_night_m": reach.ranges[1],
     })
 }
 

@@ -12,21 +12,26 @@ use macropulse::predict::verdict::Wanted;
 
 use crate::fault::Fault;
 use crate::folder::Folder;
-use crate::options::{Changes, Common};
+use crate::options::{Changes, Common, Surroundings};
 use crate::text::{print, print_json};
 use figures::Figures;
 
 /// Work out the link budget of a sensor: photons, Pd, false points, precision, eye safety
 ///
 /// Everything is closed form; the tests hold that simulation agrees. Says what fails first, by
-/// what factor, and what would be needed.
+/// what factor, and what would be needed; in the environment named, by default a clear day, and in
+/// the same at night.
 #[derive(Args)]
-#[command(after_help = "Example:
-  macropulse budget kim-park-2016-physical -o out")]
+#[command(after_help = "Examples:
+  macropulse budget kim-park-2016-physical -o out
+  macropulse budget coded-practical --environment overcast --set environment.visibility_km=2")]
 pub struct Budget {
     /// A ready sensor, or a TOML file
     #[arg(value_name = "NAME-or-FILE")]
     sensor: String,
+
+    #[command(flatten)]
+    surroundings: Surroundings,
 
     #[command(flatten)]
     changes: Changes,
@@ -71,15 +76,16 @@ fn share(typed: &str) -> Result<f64, String> {
 }
 
 pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
-    let day = Design::open(&options.sensor, &options.changes.set)?;
+    let changes = options.changes.apart(&options.surroundings)?;
+    let design = Design::open(&options.sensor, &changes.of_sensor)?;
+    let environment = Surroundings::alone(&changes)?;
     let wanted = Wanted {
         reflectance: options.reflectance,
-        range: options.range.unwrap_or(day.scan.reach),
+        range: options.range.unwrap_or(design.scan.reach),
         pd: options.pd,
         false_points: options.false_points,
     };
-    let night = night(options, &day)?;
-    let figures = Figures::of(&day, &night, wanted);
+    let figures = Figures::of(&design, environment, wanted)?;
     if let Some(output) = &options.output {
         let mut folder = Folder::claim(output)?;
         folder.make()?;
@@ -100,15 +106,4 @@ pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
         }
         None => Ok(()),
     }
-}
-
-/// The sensor without the sun; the same where the sun is no part of it.
-fn night(options: &Budget, day: &Design) -> Result<Design, Fault> {
-    if day.budget.is_none() {
-        return Ok(day.clone());
-    }
-    let mut set = options.changes.set.clone();
-    set.retain(|(key, _)| key != "sun.sky");
-    set.push(("sun.sky".to_owned(), "\"night\"".to_owned()));
-    Ok(Design::open(&options.sensor, &set)?)
 }

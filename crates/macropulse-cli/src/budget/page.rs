@@ -1,6 +1,5 @@
 //! The curves of a budget, as a page.
 
-use macropulse::design::Design;
 use macropulse::predict::{Forecast, Forecaster};
 use macropulse_study::view::{Axis, Block, Chart, Figure, Hue, Line, Page, Section, Series, Style};
 
@@ -10,7 +9,7 @@ use super::figures::{Figures, REFLECTANCES};
 const STEPS: u32 = 96;
 
 pub fn page(figures: &Figures) -> Page {
-    let design = figures.day;
+    let design = figures.design;
     let verdict = match figures.first_failure() {
         None => "It closes: everything that was asked for holds.".to_owned(),
         Some(check) => {
@@ -20,9 +19,10 @@ pub fn page(figures: &Figures) -> Page {
     let along = curves(figures);
     let drawn = (figures, along.as_slice());
     let curves = Section::new("Curves")
-        .paragraph(
-            "By reflectance of a target square on, from 5 to 100 %; solid by day, dashed by night.",
-        )
+        .paragraph(&format!(
+            "By reflectance of a target square on, from 5 to 100 %; solid in {}, dashed at night.",
+            figures.environment.name
+        ))
         .figure(chart(drawn, "Photons of a shot that reach the detector", Kind::Photons))
         .figure(chart(drawn, "Probability of a return", Kind::Pd))
         .figure(chart(drawn, "Signal to noise of a whole shot", Kind::Snr))
@@ -55,31 +55,31 @@ impl Kind {
     }
 }
 
-/// What is to be expected of a reflectance along the range.
+/// What is to be expected of a reflectance along the range, in the environment chosen and at
+/// night.
 struct Curve {
     reflectance: f64,
-    day: Vec<Forecast>,
+    chosen: Vec<Forecast>,
     night: Vec<Forecast>,
 }
 
 /// The ranges that curves show, m.
 fn span(figures: &Figures) -> [f64; 2] {
-    let nearest = figures.day.scan.min_range.max(1.0);
+    let nearest = figures.design.scan.min_range.max(1.0);
     [nearest, 2.0 * figures.wanted.range.max(nearest)]
 }
 
 fn curves(figures: &Figures) -> Vec<Curve> {
     let [nearest, farthest] = span(figures);
-    let along = |design: &Design, reflectance: f64| {
-        let forecaster = Forecaster::new(design);
+    let along = |forecaster: &Forecaster, reflectance: f64| {
         let range =
             |step: u32| nearest * (farthest / nearest).powf(f64::from(step) / f64::from(STEPS));
         (0..=STEPS).map(|step| forecaster.forecast(reflectance, range(step))).collect()
     };
     let curve = |reflectance| Curve {
         reflectance,
-        day: along(figures.day, reflectance),
-        night: along(figures.night, reflectance),
+        chosen: along(&figures.chosen, reflectance),
+        night: along(&figures.night, reflectance),
     };
     REFLECTANCES.map(curve).into()
 }
@@ -103,7 +103,7 @@ fn chart((figures, curves): (&Figures, &[Curve]), title: &str, kind: Kind) -> Fi
             Series { label, points: forecasts.iter().map(point).collect(), style, hue }
         };
         let percent = format!("{} %", curve.reflectance * 100.0);
-        chart.series.push(series(percent, Style::Line, &curve.day));
+        chart.series.push(series(percent, Style::Line, &curve.chosen));
         chart.series.push(series(String::new(), Style::Dashed, &curve.night));
     }
     Figure::svg(&chart.svg(), "")

@@ -7,12 +7,12 @@ use std::path::Path;
 
 use clap::Args;
 use macropulse::design::Design;
-use macropulse::scene::Scene;
+use macropulse::scene::{self as scenes, Scene};
 use serde_json::{Value, json};
 
 use crate::fault::Fault;
 use crate::kind::Kind;
-use crate::options::{Changes, Common};
+use crate::options::{Changes, Common, Surroundings};
 use crate::simulate::scenario::Scenario;
 use crate::text::{Columns, counted, print, print_json};
 
@@ -29,6 +29,9 @@ pub struct Check {
     files: Vec<String>,
 
     #[command(flatten)]
+    surroundings: Surroundings,
+
+    #[command(flatten)]
     changes: Changes,
 
     /// Print as JSON: an object, or an array of them for several files
@@ -37,10 +40,11 @@ pub struct Check {
 }
 
 pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
+    let changes = options.changes.apart(&options.surroundings)?;
     let mut reports = Vec::new();
     let mut wrong = false;
     for file in &options.files {
-        match Report::of(file, &options.changes.set) {
+        match Report::of(file, &changes) {
             Ok(report) => reports.push(report),
             Err(fault) => {
                 fault.report();
@@ -70,11 +74,14 @@ struct Report {
 }
 
 impl Report {
-    fn of(name: &str, set: &[(String, String)]) -> Result<Self, Fault> {
+    fn of(name: &str, changes: &scenes::Changes) -> Result<Self, Fault> {
         match Kind::of(name)? {
-            Kind::Sensor => Ok(sensor::report(&Design::open(name, set)?)),
-            Kind::Scene => Ok(scene::report(&Scene::open(name)?)),
-            Kind::Scenario => Ok(scenario(name, &Scenario::open(Path::new(name), set)?)),
+            Kind::Sensor => {
+                let environment = Surroundings::alone(changes)?;
+                sensor::report(&Design::open(name, &changes.of_sensor)?, &environment)
+            }
+            Kind::Scene => Ok(scene::report(&Scene::open_changed(name, &changes.of_scene)?)),
+            Kind::Scenario => Ok(scenario(name, &Scenario::open(Path::new(name), changes)?)),
         }
     }
 }
@@ -86,6 +93,9 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
     let mut columns = Columns::default();
     columns.push("sensors", sensors.join(", "));
     columns.push("scene", scenario.scene.name.clone());
+    let environment = &scenario.scene.environment;
+    let conditions = environment.conditions();
+    columns.push("environment", format!("{}: {conditions}", environment.name));
     columns.push("length", counted(scenario.scans, "scan"));
     columns.push("seed", scenario.seed.to_string());
     columns
@@ -105,6 +115,8 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
             "name": name,
             "sensors": sensors,
             "scene": scenario.scene.name,
+            "environment": environment.name,
+            "conditions": conditions,
             "scans": scenario.scans,
             "seed": scenario.seed,
             "formats": formats,

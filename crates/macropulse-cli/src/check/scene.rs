@@ -1,7 +1,7 @@
 //! The report on a scene.
 
 use macropulse::scene::{Interferer, Pose, Scene};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::Report;
 use crate::text::{Columns, grouped, short};
@@ -19,7 +19,12 @@ pub fn report(scene: &Scene) -> Report {
         .push("targets", if targets.is_empty() { "none".to_owned() } else { targets.join(", ") });
     columns.push("materials", materials.join(", "));
     columns.push("sensor", stands(&scene.sensor));
-    columns.push_list("others", scene.interferers.iter().map(told));
+    let environment = &scene.environment;
+    let conditions = environment.conditions();
+    columns.push("environment", format!("{}: {conditions}", environment.name));
+    let left_out = environment.idealised.iter();
+    columns.push_list("idealised", left_out.map(|e| format!("{}: {}", e.name(), e.assumption())));
+    columns.push_list("interferers", scene.interferers.iter().map(told));
     columns.push("digest", scene.digest());
     let notes = scene.notes.iter().cloned();
     columns.push_list(
@@ -39,7 +44,14 @@ pub fn report(scene: &Scene) -> Report {
             "sensor_yaw_deg": scene.sensor.yaw.to_degrees(),
             "sensor_pitch_deg": scene.sensor.pitch.to_degrees(),
             "sensor_roll_deg": scene.sensor.roll.to_degrees(),
-            "others": scene.interferers.iter().map(json).collect::<Vec<_>>(),
+            "environment": environment.name,
+            "conditions": conditions,
+            "idealised": environment
+                .idealised
+                .iter()
+                .map(|e| (e.name().to_owned(), e.assumption().into()))
+                .collect::<Map<_, _>>(),
+            "interferers": scene.interferers.iter().map(json).collect::<Vec<_>>(),
             "digest": scene.digest(),
             "assumed": scene.notes,
         }),

@@ -2,19 +2,26 @@
 
 use std::collections::BTreeMap;
 
-use macropulse::design::{Derived, Design};
+use macropulse::channel::Operating;
+use macropulse::design::{Derived, Design, Detector};
+use macropulse::environment::Environment;
 use serde_json::{Map, Value, json};
 
 use super::Report;
+use crate::fault::Fault;
 use crate::text::{Columns, counted, grouped, section, short};
 
-/// What follows from a sensor, and what it takes for granted.
-pub fn report(design: &Design) -> Report {
+/// What follows from a sensor and, for its light, from an environment; and what it takes for
+/// granted.
+pub fn report(design: &Design, environment: &Environment) -> Result<Report, Fault> {
     let derived = design.derived();
+    let operating = Operating::of(design, environment)?;
     let mut text = format!("{}: a sensor\n{}\n", design.name, design.summary);
     text += &section("Time", &times(design, &derived));
     text += &section("Range", &ranges(design, &derived));
     text += &section("Light", &light(design, &derived));
+    let conditions = format!("In {} ({})", environment.name, environment.conditions());
+    text += &section(&conditions, &at_work(design, &operating));
     let mut idealised = Columns::default();
     for effect in &design.idealised {
         idealised.push(effect.name(), effect.assumption());
@@ -28,7 +35,43 @@ pub fn report(design: &Design) -> Report {
     let mut warnings = Columns::default();
     warnings.push_list("!", design.warnings.iter().cloned());
     text += &section("Warnings", &warnings);
-    Report { text, json: json(design, &derived) }
+    let mut json = json(design, &derived);
+    json["environment"] = environment.name.clone().into();
+    json["conditions"] = environment.conditions().into();
+    json["sunlight_hz"] = operating.background.into();
+    json["false_rate_hz"] = operating.false_rate.into();
+    json["transmission"] = operating.link.transmission(design.scan.reach).into();
+    Ok(Report { text, json })
+}
+
+/// What sun and air do to it.
+fn at_work(design: &Design, operating: &Operating) -> Columns {
+    let mut columns = Columns::default();
+    let reach = design.scan.reach;
+    let transmission = short(operating.link.transmission(reach) * 100.0);
+    columns.push("air", format!("{transmission} % of the light gets {} m far", short(reach)));
+    let counts = format!("{:.3e} counts a second in each detector", operating.background);
+    columns.push(
+        "sunlight",
+        match (&design.budget, &design.detector) {
+            (None, _) if operating.background > 0.0 => {
+                format!("{counts}, as declared, whatever the sky")
+            }
+            (None, _) => "not counted: the sensor is declared by its sensitivity, whatever the sky"
+                .to_owned(),
+            (Some(_), Detector::FirstFiring(_)) => {
+                format!("{counts}, which a detector that fires once is taken not to notice")
+            }
+            (Some(_), _) => counts,
+        },
+    );
+    if let Some(linear) = &operating.linear {
+        let (noise, threshold) = (short(linear.noise), short(linear.threshold));
+        columns.push("noise", format!("{noise} photons rms, the threshold at {threshold}"));
+    }
+    let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
+    columns.push("false edges", events);
+    columns
 }
 
 fn times(design: &Design, derived: &Derived) -> Columns {

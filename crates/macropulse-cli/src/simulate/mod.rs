@@ -8,12 +8,13 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use macropulse::scene::Changes;
 
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::kind::Kind;
-use crate::options::{Changes, Common};
+use crate::options::{self, Common, Surroundings};
 use crate::text::{print, print_json};
 use formats::Formats;
 use run::Run;
@@ -27,6 +28,7 @@ use scenario::Scenario;
 #[command(after_help = "Examples:
   macropulse simulate --sensor kim-park-2016-fixed --scene car-30m -o out
   macropulse simulate --sensor hdl-64e --scene street --scans 5 --format ply,csv --truth -o out
+  macropulse simulate --sensor hdl-64e --scene street --environment fog-50m -o out
   macropulse simulate crossing.toml -o out
 
 A scenario file:
@@ -52,7 +54,10 @@ pub struct Simulate {
     scene: Option<String>,
 
     #[command(flatten)]
-    changes: Changes,
+    surroundings: Surroundings,
+
+    #[command(flatten)]
+    changes: options::Changes,
 
     /// Receiver that decodes the macropulses: short for --set receiver.kind=…
     #[arg(long, value_name = "KIND")]
@@ -99,13 +104,13 @@ enum ReceiverName {
 impl Simulate {
     /// What is to be done, all of it checked.
     fn scenario(&self) -> Result<Scenario, Fault> {
-        let mut set = self.changes.set.clone();
+        let mut changes = self.changes.apart(&self.surroundings)?;
         if let Some(kind) = self.receiver.and_then(|receiver| receiver.to_possible_value()) {
-            set.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
+            changes.of_sensor.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
         }
         let mut scenario = match (&self.scenario, &self.scene) {
-            (Some(path), _) => open(path, &set)?,
-            (None, scene) => Scenario::of(&self.sensors, scene.as_deref().unwrap_or(""), &set)?,
+            (Some(path), _) => open(path, &changes)?,
+            (None, scene) => Scenario::of(&self.sensors, scene.as_deref().unwrap_or(""), &changes)?,
         };
         if let Some(formats) = &self.format {
             scenario.formats.clone_from(&formats.0);
@@ -156,11 +161,11 @@ pub fn run(options: &Simulate, common: &Common) -> Result<(), Fault> {
 }
 
 /// The scenario in the file at `path`; a sensor or a scene in its place is a slip worth a hint.
-fn open(path: &Path, set: &[(String, String)]) -> Result<Scenario, Fault> {
+fn open(path: &Path, changes: &Changes) -> Result<Scenario, Fault> {
     let (what, option, other) = match Kind::of(&path.display().to_string()) {
         Ok(Kind::Sensor) => ("sensor", "--sensor", "--scene"),
         Ok(Kind::Scene) => ("scene", "--scene", "--sensor"),
-        _ => return Scenario::open(path, set),
+        _ => return Scenario::open(path, changes),
     };
     let path = path.display();
     Err(Fault::Wrong(format!(

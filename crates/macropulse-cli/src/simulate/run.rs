@@ -49,7 +49,7 @@ impl<'a> Run<'a> {
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
-        let mut scans = Scans::new(design, &scenario.scene, scenario.seed);
+        let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };

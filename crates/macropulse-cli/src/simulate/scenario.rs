@@ -3,11 +3,12 @@
 use std::ops::Range;
 use std::path::Path;
 
+use macropulse::channel::Operating;
 use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
 use macropulse::names::nearest;
-use macropulse::scene::Scene;
+use macropulse::scene::{Changes, Scene};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -48,21 +49,16 @@ struct ScenarioFile {
 
 impl Scenario {
     /// One scan of the sensors in the scene, each a ready one or a file.
-    pub fn of(sensors: &[String], scene: &str, set: &[(String, String)]) -> Result<Self, Fault> {
+    pub fn of(sensors: &[String], scene: &str, changes: &Changes) -> Result<Self, Fault> {
         let designs: Result<Vec<_>, _> =
-            sensors.iter().map(|sensor| Design::open(sensor, set)).collect();
-        Ok(Self {
-            designs: designs?,
-            scene: Scene::open(scene)?,
-            scans: 1,
-            seed: 1,
-            formats: Formats::default().0,
-            truth: false,
-        })
+            sensors.iter().map(|sensor| Design::open(sensor, &changes.of_sensor)).collect();
+        let (designs, scene) = (designs?, Scene::open_changed(scene, &changes.of_scene)?);
+        check_operating(&designs, &scene)?;
+        Ok(Self { designs, scene, scans: 1, seed: 1, formats: Formats::default().0, truth: false })
     }
 
     /// The scenario in the file at `path`; names of files count from its folder.
-    pub fn open(path: &Path, set: &[(String, String)]) -> Result<Self, Fault> {
+    pub fn open(path: &Path, changes: &Changes) -> Result<Self, Fault> {
         let origin = path.display().to_string();
         let text =
             std::fs::read_to_string(path).map_err(|error| Fault::unreadable(&origin, &error))?;
@@ -86,14 +82,16 @@ impl Scenario {
             let name = sensor.get_ref();
             let ready = preset_text(name).is_some() || !looks_like_a_path(name);
             let place = if ready { name.clone() } else { beside(folder, name) };
-            let design = Design::open(&place, set)
+            let design = Design::open(&place, &changes.of_sensor)
                 .map_err(|error| source.fault(sensor.span(), &error.to_string()))?;
             designs.push(design);
         }
         let name = file.scene.get_ref();
         let ready = Scene::builtin(name).is_some() || !looks_like_a_path(name);
-        let scene = Scene::open(&if ready { name.clone() } else { beside(folder, name) })
+        let place = if ready { name.clone() } else { beside(folder, name) };
+        let scene = Scene::open_changed(&place, &changes.of_scene)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
+        check_operating(&designs, &scene)?;
         let formats = match file.formats {
             Some(names) => formats(&source, &names)?,
             None => Formats::default().0,
@@ -105,6 +103,14 @@ impl Scenario {
         let (seed, truth) = (file.seed.unwrap_or(1), file.truth);
         Ok(Self { designs, scene, scans, seed, formats, truth })
     }
+}
+
+/// Whether all sensors can be simulated under the sun of the scene.
+fn check_operating(designs: &[Design], scene: &Scene) -> Result<(), Fault> {
+    for design in designs {
+        Operating::of(design, &scene.environment)?;
+    }
+    Ok(())
 }
 
 /// Whether so many scans can be had of the sensors: the sentence that says why not.
@@ -195,7 +201,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
-        match Scenario::open(&path, &[]) {
+        match Scenario::open(&path, &Changes::default()) {
             Err(Fault::Wrong(sentence)) => sentence.rsplit_once("s.toml").unwrap().1.to_owned(),
             _ => "accepted".to_owned(),
         }

@@ -1,5 +1,6 @@
 //! What is printed of a run.
 
+use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
 use serde_json::{Map, Value, json};
@@ -38,7 +39,11 @@ impl Run<'_> {
         columns.push("converters", self.converters());
         let stages = self.stages().map(|(stage, s)| format!("{stage}{NO_BREAK}{}", lasted(s)));
         columns.push("time", format!("{}; summed over threads", listed(stages)));
-        columns.push("idealised", listed(design.idealised.iter().map(|e| e.name().to_owned())));
+        let environment = &self.scene.environment;
+        let conditions = environment.conditions();
+        columns.push("environment", format!("{}: {conditions}", environment.name));
+        let idealised = idealised(design, environment).into_iter();
+        columns.push("idealised", listed(idealised.map(|effect| effect.name.to_owned())));
         if verbose {
             columns.push_list("assumed", self.scene.notes.iter().cloned());
             let defaults = design.defaults.iter().map(|(key, value)| format!("{key} = {value}"));
@@ -127,7 +132,9 @@ impl Run<'_> {
             .collect();
         let stages: Map<String, Value> =
             self.stages().map(|(stage, seconds)| (stage.to_owned(), seconds.into())).collect();
-        let idealised: Vec<&str> = self.design.idealised.iter().map(|e| e.name()).collect();
+        let environment = &self.scene.environment;
+        let idealised: Vec<&str> =
+            idealised(self.design, environment).iter().map(|effect| effect.name).collect();
         let defaults: Map<String, Value> = self
             .design
             .defaults
@@ -137,6 +144,8 @@ impl Run<'_> {
         let mut json = json!({
             "sensor": self.design.name,
             "scene": self.scene.name,
+            "environment": environment.name,
+            "conditions": environment.conditions(),
             "seed": self.seed,
             "scans": self.scans,
             "shots": tally.shots,

@@ -11,7 +11,7 @@ use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
 use crate::fault::{Fault, complain};
 use crate::interrupt::Interrupt;
-use crate::options::{Changes, Common};
+use crate::options::{Changes, Common, Surroundings};
 use crate::progress::Progress;
 use crate::text::{NO_BREAK, counted, print};
 
@@ -39,6 +39,9 @@ pub struct Sweep {
     /// equal ratios; given twice, the second key makes a curve for each of its values
     #[arg(long, value_name = "KEY=VALUES")]
     vary: Vec<Axis>,
+
+    #[command(flatten)]
+    surroundings: Surroundings,
 
     #[command(flatten)]
     changes: Changes,
@@ -91,12 +94,14 @@ fn after_help() -> String {
         Metric::ALL.map(|metric| format!("  {:<10} {}\n", metric.name(), metric.meaning()));
     format!(
         "Scores:\n{}
-A key of the scene stands behind scene:, an object by its name, as scene:object.wall.position_m.x.
+A key of the scene stands behind scene:, an object by its name, as scene:object.wall.position_m.x;
+sun and air are environment.visibility_km and the like.
 
 Examples:
   macropulse sweep kim-park-2016-fixed --scene wall --shots 20000 -o out \\
     --vary detector.photon-counting.missed_marks=0,0.1,0.2,0.4 --score pd,wrong,precision
   macropulse sweep peregrine --scene wall --vary scene:object.wall.position_m.x=10..70:13 -o far
+  macropulse sweep hdl-64e --scene street --vary environment.visibility_km=0.05..5:log7 -o fog
   macropulse sweep --sensors kim-park-2016,kim-park-2016-fixed,hdl-64e --scene car-50m -o cars
   macropulse sweep mine.toml --scene street --vary tdc.converters=8..512:log7 --shard 1/2 -o tdc",
         scores.concat()
@@ -104,20 +109,20 @@ Examples:
 }
 
 impl Sweep {
-    fn request(&self) -> Request {
-        Request {
+    fn request(&self) -> Result<Request, Fault> {
+        Ok(Request {
             sensors: self.sensor.iter().chain(&self.sensors).cloned().collect(),
             scene: self.scene.clone(),
-            set: self.changes.set.clone(),
+            set: self.changes.all(&self.surroundings)?,
             vary: self.vary.clone(),
             seeds: self.seed..self.seed + self.seeds,
             shots: self.shots,
-        }
+        })
     }
 }
 
 pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
-    let plan = Plan::of(&options.request())?;
+    let plan = Plan::of(&options.request()?)?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;
     let interrupt = Interrupt::listen()?;

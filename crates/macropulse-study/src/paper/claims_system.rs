@@ -6,6 +6,7 @@ use super::claim::{Claim, Verdict, holds};
 use macropulse::channel::Link;
 use macropulse::design::safety::Class1;
 use macropulse::design::{Design, Pattern};
+use macropulse::environment::Environment;
 use macropulse::predict::link::{diffraction, spot_depth};
 use macropulse::units::{range_from_tof, s_from_fs};
 
@@ -164,8 +165,13 @@ fn mirror(design: &Design) -> Claim {
 }
 
 /// Claims on light, eyes and parts: what the `strict` reading of class 1 leaves, and the `lax` one
-/// without the factor for repeated exposures.
-pub(super) fn light(design: &Design, lax: &Design, strict: &Design) -> Vec<Claim> {
+/// without the factor for repeated exposures, in the air and under the sun of a `day`.
+pub(super) fn light(
+    design: &Design,
+    lax: &Design,
+    strict: &Design,
+    day: &Environment,
+) -> Vec<Claim> {
     let (Some(lax), Some(budget)) = (&lax.budget, &strict.budget) else { return Vec::new() };
     let derived = design.derived();
     let Pattern::Raster { horizontal, vertical, .. } = design.scan.pattern else {
@@ -180,10 +186,11 @@ pub(super) fn light(design: &Design, lax: &Design, strict: &Design) -> Vec<Claim
     let tilt = libm::atan(chip_range / spot).to_degrees();
     let smear = spot_depth(spot, PI / 4.0) / chip_range;
     let (lax, energy) = (lax.energy, budget.energy);
-    let through_air = Link::of(strict).transmission(design.scan.max_range).powi(2);
+    let through_air = Link::of(strict, day).transmission(design.scan.max_range).powi(2);
     let photons = budget.photons(energy, 1.0, design.scan.max_range) * through_air;
     let per_mark = photons / derived.marks.1;
-    let background = budget.background() * s_from_fs(design.coding.chip_fs);
+    let irradiance = day.irradiance(wavelength).unwrap_or(f64::NAN);
+    let background = budget.background(irradiance, day.albedo) * s_from_fs(design.coding.chip_fs);
     let limits = Class1::at(wavelength);
     vec![
         Claim {

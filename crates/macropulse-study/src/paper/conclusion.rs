@@ -3,6 +3,7 @@
 use super::{Comparison, Error, Findings};
 use crate::view::{Align, Cell, Table, Verdict as Mark};
 use macropulse::design::Design;
+use macropulse::environment::Environment;
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
 use macropulse::predict::verdict::{Check, Wanted, checks};
@@ -49,13 +50,12 @@ fn sentences(findings: &Findings) -> Result<Vec<Sentence>, Error> {
         let of = |c: &&Comparison| c.sensor == "kim-park-2016" && c.receiver == receiver;
         findings.comparisons.iter().find(of).map_or(f64::NAN, |c| 100.0 * c.share(Outcome::Right))
     };
-    let honest = |sky: &str| {
-        let set = [("sun.sky".to_owned(), format!("\"{sky}\""))];
-        Design::open("kim-park-2016-physical", &set)
-    };
+    let honest = Design::open("kim-park-2016-physical", &[])?;
+    let day = Environment::default();
+    let [by_day, by_night] = [&day, &day.at_night()].map(|sky| Forecaster::new(&honest, sky));
     let range = paper.scan.reach;
     let white = Wanted { reflectance: 1.0, range, pd: 0.9, false_points: 1e-4 };
-    let failing = checks(&honest("day")?, &honest("night")?, &white);
+    let failing = checks(&by_day?, &by_night?, &white);
     let failing: Vec<String> = failing
         .iter()
         .filter(|check| !check.holds())
@@ -65,7 +65,7 @@ fn sentences(findings: &Findings) -> Result<Vec<Sentence>, Error> {
         })
         .collect();
     let practical = Design::open("coded-practical", &[])?;
-    let dark = Forecaster::new(&practical).forecast(0.1, range);
+    let dark = Forecaster::new(&practical, &day)?.forecast(0.1, range);
     let slow = Design::open("bipolar-gold", &[])?;
     Ok(vec![
         Sentence {

@@ -42,6 +42,11 @@ pub struct Trial {
     pub lowest_sample: f64,
 }
 
+/// The scene with the car so far away, m.
+pub(super) fn scene(distance: u32) -> Result<Scene, Error> {
+    Ok(Scene::open(&format!("car-{distance}m"))?)
+}
+
 /// Runs one trial and writes its cloud, pictures and manifest into `folder`.
 pub(super) fn trial(
     design: &Design,
@@ -50,9 +55,9 @@ pub(super) fn trial(
     folder: &Path,
     watch: &Watch,
 ) -> Result<Trial, Error> {
-    let scene = Scene::open(&format!("car-{distance}m"))?;
+    let scene = scene(distance)?;
     let began = Instant::now();
-    let scan = sim::scan_watched(design, &scene, seed, 0, watch).ok_or(Error::Stopped)?;
+    let scan = sim::scan_watched(design, &scene, seed, 0, watch)?.ok_or(Error::Stopped)?;
     let elapsed = began.elapsed().as_secs_f64();
     let folder = folder.join(format!("{sensor}-{distance}m"));
     std::fs::create_dir_all(&folder)

@@ -23,6 +23,7 @@ pub use geometry::{Prediction, predict};
 pub use receivers::{Comparison, PERFECT};
 
 use macropulse::design::Design;
+use macropulse::environment::Environment;
 use macropulse::formats::write_atomically;
 use macropulse::sim::Watch;
 
@@ -46,6 +47,12 @@ pub enum Error {
     /// A ready scene was refused.
     #[error(transparent)]
     Scene(#[from] macropulse::scene::Error),
+    /// A ready sensor cannot be simulated in a ready scene.
+    #[error(transparent)]
+    Operating(#[from] macropulse::channel::Error),
+    /// A ready environment was refused.
+    #[error(transparent)]
+    Environment(#[from] macropulse::environment::Error),
     /// A code was refused.
     #[error(transparent)]
     Code(macropulse::codec::code::Error),
@@ -65,6 +72,8 @@ pub enum Error {
 pub struct Findings {
     /// The sensors, in the order of [`SENSORS`].
     pub designs: Vec<Design>,
+    /// Sun and air of all scenes.
+    pub environment: Environment,
     /// Every sensor at every distance.
     pub trials: Vec<Trial>,
     /// The receivers compared.
@@ -102,7 +111,8 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let trials = trials.collect::<Result<Vec<_>, Error>>()?;
     let comparisons = receivers::compare(seed, watch)?;
     let claims = claims(&designs[0], &trials, &comparisons)?;
-    let findings = Findings { designs, trials, comparisons, claims };
+    let environment = experiment::scene(DISTANCES[0])?.environment;
+    let findings = Findings { designs, environment, trials, comparisons, claims };
     write_atomically(&folder.join("points.csv"), |out| {
         out.write_all(tables::points_csv(&findings.trials).as_bytes())
     })?;
@@ -129,7 +139,8 @@ pub fn claims_on_paper(design: &Design) -> Result<Vec<Claim>, Error> {
         Design::open("kim-park-2016-physical", &set)
     });
     let [lax, strict] = honest;
-    claims.extend(claims_system::light(design, &lax?, &strict?));
+    let day = Environment::default();
+    claims.extend(claims_system::light(design, &lax?, &strict?, &day));
     claims.extend(claims_system::elevations(&Design::open("hdl-64e", &[])?));
     Ok(claims)
 }

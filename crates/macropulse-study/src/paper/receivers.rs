@@ -98,7 +98,7 @@ pub(super) fn compare(seed: u64, watch: &Watch) -> Result<Vec<Comparison>, Error
                     .collect();
                 let design = Design::open(sensor, &set)?;
                 let part = part(&design);
-                let score = sim::scan_part(&design, &scene, seed, &part).score;
+                let score = sim::scan_part(&design, &scene, seed, &part)?.score;
                 (watch.done)(part.iter().map(|band| band.shots).sum());
                 rows.push(Comparison { sensor, detector, receiver, score });
             }

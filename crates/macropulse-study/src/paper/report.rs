@@ -194,8 +194,9 @@ fn conclusion(findings: &Findings) -> Result<Section, Error> {
 
 fn idealisations(findings: &Findings) -> Section {
     let mut section = Section::new("Idealisations").paragraph(
-        "Effects that are switched off in the sensor files, by their names there. Values that no \
-         file states come from the defaults and are listed in each manifest.",
+        "Effects that are switched off in the sensor files, and in the environment of the scenes, \
+         by their names there. Values that no file states come from the defaults and are listed in \
+         each manifest.",
     );
     for design in &findings.designs {
         let items = design
@@ -205,5 +206,9 @@ fn idealisations(findings: &Findings) -> Section {
             .collect();
         section = section.block(Block::Heading(design.name.clone())).block(Block::List(items));
     }
-    section
+    let environment = &findings.environment;
+    let items = environment.idealised.iter();
+    let items = items.map(|e| format!("`{}`: {}", e.name(), e.assumption())).collect();
+    let heading = format!("The environment {}", environment.name);
+    section.block(Block::Heading(heading)).block(Block::List(items))
 }

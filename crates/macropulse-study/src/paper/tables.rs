@@ -102,28 +102,27 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
             c.sensitivity.photons,
             c.sensitivity.reflectance,
             c.sensitivity.range,
-            c.false_rate,
+            c.dark,
             c.jitter * 1e12
         ),
         Detector::Geiger(g) => format!(
             "{} cells in Geiger mode; {:.2} photons a mark from reflectance {} at {} m; dead for \
-             {} ns; {:.0e} false counts/s",
+             {} ns; {:.0e} dark counts/s",
             g.cells,
             g.sensitivity.photons,
             g.sensitivity.reflectance,
             g.sensitivity.range,
             s_from_fs(g.dead_fs) * 1e9,
-            g.false_rate
+            g.dark
         ),
         Detector::Linear(l) => format!(
-            "linear; threshold {:.1} photons, noise {:.1}; {:.2} photons a mark from reflectance \
-             {} at {} m; {:.0e} false alarms/s",
-            l.threshold,
-            l.noise,
+            "linear; threshold {:.2} times the noise; {:.2} photons a mark from reflectance {} at \
+             {} m; {:.0e} false alarms/s",
+            l.threshold_over_noise,
             l.sensitivity.photons,
             l.sensitivity.reflectance,
             l.sensitivity.range,
-            l.false_rate
+            l.false_alarm
         ),
         Detector::FirstFiring(f) => format!(
             "fires at {} photons, {:.0} from reflectance {} at {} m; noise {} photons; jitter {} ps",

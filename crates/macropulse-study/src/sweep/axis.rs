@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use super::Error;
+use macropulse::scene::apart;
 
 /// More values than this of one key are taken for a slip.
 const MOST_VALUES: usize = 1000;
@@ -17,7 +18,8 @@ const REMEDY: &str = "write a list as 0,0.1,0.2, equal steps as 50..200:7 (7 val
 /// A key with the values it takes, in the order in which they are shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// Dotted key of the sensor file, or of the scene behind `scene:`; `sensor` for sensors.
+    /// Dotted key of the sensor file, of the environment, or of the scene behind `scene:`; `sensor`
+    /// for sensors.
     pub key: String,
     /// The values as TOML.
     pub values: Vec<String>,
@@ -54,6 +56,11 @@ impl Axis {
             return Error::asked(format!("{key}: the value {} is given twice", values[at]));
         }
         Ok(Self { key: key.to_owned(), values, spread })
+    }
+
+    /// Whether it is of the scene or its environment, not of the sensor.
+    pub(super) fn is_of_scene(&self) -> bool {
+        !apart(&[(self.key.clone(), String::new())]).of_scene.is_empty()
     }
 
     /// Where the value of number `index` lies; names lie at their numbers.

@@ -75,7 +75,7 @@ impl Job<'_> {
     /// None for the jobs of a [`Plan`], whose points have been checked.
     pub fn measure(&self, watch: &Watch) -> Result<Option<Counted>, Error> {
         let design = self.point.design()?;
-        let mut scans = Scans::new(&design, self.scene, self.seed);
+        let mut scans = Scans::new(&design, self.scene, self.seed)?;
         let Some(scan) = scans.part(&self.point.bands, watch) else { return Ok(None) };
         Ok(Some(Counted {
             job: self.name(),
@@ -223,7 +223,7 @@ mod tests {
             plan.jobs().map(|job| job.measure(&nobody).unwrap().unwrap()).collect();
         let set = [("scan.flash.rows", "8"), ("scan.max_range_m", "60")];
         let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
-        let scan = sim::scan(&Design::open("peregrine", &set).unwrap(), &scene, 2, 0);
+        let scan = sim::scan(&Design::open("peregrine", &set).unwrap(), &scene, 2, 0).unwrap();
         let wanted = &counted[3];
         assert_eq!((wanted.seed, wanted.score, wanted.edges), (2, scan.score, scan.tally.edges));
         assert_eq!(wanted.right, RangeError::of(&scan.cloud));

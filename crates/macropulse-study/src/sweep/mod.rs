@@ -34,6 +34,9 @@ pub enum Error {
     /// The scene is wrong.
     #[error(transparent)]
     Scene(#[from] macropulse::scene::Error),
+    /// The sensor cannot be simulated in the environment of the scene.
+    #[error(transparent)]
+    Operating(#[from] macropulse::channel::Error),
     /// A file could not be written or read.
     #[error(transparent)]
     Formats(#[from] macropulse::formats::Error),

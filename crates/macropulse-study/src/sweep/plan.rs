@@ -7,16 +7,14 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Axis, Error, Job};
+use macropulse::channel::{Operating, idealised};
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
 use macropulse::formats::Named;
-use macropulse::scene::Scene;
+use macropulse::scene::{Changes, Scene, apart};
 
 /// More jobs than this are taken for a slip.
 const MOST_JOBS: u64 = 100_000;
-
-/// Keys of the scene stand behind this.
-const OF_SCENE: &str = "scene:";
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -25,7 +23,8 @@ pub struct Request {
     pub sensors: Vec<String>,
     /// Ready scene or file.
     pub scene: String,
-    /// What is changed of all sensors, and behind `scene:` of the scene: dotted keys and values.
+    /// What is changed of all sensors, and, behind `scene:` or of its environment, of the scene:
+    /// dotted keys and values.
     pub set: Vec<(String, String)>,
     /// What is varied.
     pub vary: Vec<Axis>,
@@ -47,7 +46,7 @@ pub struct Plan {
     /// Ready scene or file, as typed.
     pub scene: String,
     set: Vec<(String, String)>,
-    scenes: Vec<(Changes, Scene)>,
+    scenes: Vec<(Vec<(String, String)>, Scene)>,
 }
 
 /// A sensor in a scene: one combination of values.
@@ -63,6 +62,8 @@ pub struct Point {
     pub shots: u64,
     /// Pixels of a whole scan.
     pub shots_per_scan: u64,
+    /// Sun and air: the name of the environment, and what it is like.
+    pub environment: String,
     /// Effects that are left out.
     pub idealisations: Vec<String>,
     /// Values nobody wrote: dotted key and value.
@@ -76,9 +77,6 @@ pub struct Point {
     /// Number of its scene.
     scene_index: usize,
 }
-
-/// Keys and values.
-type Changes = Vec<(String, String)>;
 
 impl Plan {
     /// The sweep that is asked for.
@@ -98,13 +96,13 @@ impl Plan {
                 "{count} values with {seeds} seeds each are too many; {MOST_JOBS} scans at most"
             ));
         }
-        let mut scenes: Vec<(Changes, Scene)> = Vec::new();
+        let mut scenes: Vec<(Vec<(String, String)>, Scene)> = Vec::new();
         let combinations = combinations(&axes);
         for values in &combinations {
-            let (changes, _) = changes(request, &axes, values);
+            let changes = changes(request, &axes, values).of_scene;
             if scenes.iter().all(|(known, _)| *known != changes) {
                 let scene = Scene::open_changed(&request.scene, &changes).map_err(|error| {
-                    match axes.iter().any(|axis| axis.key.starts_with(OF_SCENE)) {
+                    match axes.iter().any(Axis::is_of_scene) {
                         true => at(&axes, values, &error.to_string()),
                         false => error.into(),
                     }
@@ -176,9 +174,9 @@ impl Point {
         request: &Request,
         axes: &[Axis],
         values: &[String],
-        scenes: &[(Changes, Scene)],
+        scenes: &[(Vec<(String, String)>, Scene)],
     ) -> Result<Self, Error> {
-        let (of_scene, of_sensor) = changes(request, axes, values);
+        let Changes { of_scene, of_sensor } = changes(request, axes, values);
         let scene_index = scenes.iter().position(|(known, _)| *known == of_scene).unwrap_or(0);
         let scene = &scenes[scene_index].1;
         let varied = axes.iter().zip(values).find(|(axis, _)| is_sensor(request, axis));
@@ -186,11 +184,13 @@ impl Point {
         let sensor = sensor.map_or("", String::as_str);
         let design = Design::open(sensor, &of_sensor).map_err(|error| {
             // What is wrong as well without what is varied is said as such.
-            match Design::open(sensor, &split(&request.set).1) {
+            match Design::open(sensor, &apart(&request.set).of_sensor) {
                 Err(plain) if plain == error => plain.into(),
                 _ => at(axes, values, &error.to_string()),
             }
         })?;
+        Operating::of(&design, &scene.environment)
+            .map_err(|error| at(axes, values, &error.to_string()))?;
         let bands = spread(&design, request.shots);
         Ok(Self {
             values: values.to_vec(),
@@ -198,7 +198,11 @@ impl Point {
             scene: Named { name: scene.name.clone(), digest: scene.digest() },
             shots: bands.iter().map(|band| band.shots).sum(),
             shots_per_scan: design.shots_per_scan(),
-            idealisations: design.idealised.iter().map(|e| e.name().to_owned()).collect(),
+            environment: format!("{}: {}", scene.environment.name, scene.environment.conditions()),
+            idealisations: idealised(&design, &scene.environment)
+                .iter()
+                .map(|effect| effect.name.to_owned())
+                .collect(),
             notes: scene.notes.iter().chain(&design.warnings).cloned().collect(),
             defaults: design.defaults,
             text: design.text,
@@ -256,22 +260,10 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
 }
 
 /// The changes of the scene and of the sensor where the axes have these `values`.
-fn changes(request: &Request, axes: &[Axis], values: &[String]) -> (Changes, Changes) {
+fn changes(request: &Request, axes: &[Axis], values: &[String]) -> Changes {
     let keys = axes.iter().zip(values).filter(|(axis, _)| !is_sensor(request, axis));
     let varied = keys.map(|(axis, value)| (axis.key.clone(), value.clone()));
-    split(&request.set.iter().cloned().chain(varied).collect::<Vec<_>>())
-}
-
-/// Changes of the scene apart from those of the sensor.
-fn split(all: &[(String, String)]) -> (Changes, Changes) {
-    let (mut of_scene, mut of_sensor) = (Vec::new(), Vec::new());
-    for (key, value) in all {
-        match key.strip_prefix(OF_SCENE) {
-            Some(key) => of_scene.push((key.to_owned(), value.clone())),
-            None => of_sensor.push((key.clone(), value.clone())),
-        }
-    }
-    (of_scene, of_sensor)
+    apart(&request.set.iter().cloned().chain(varied).collect::<Vec<_>>())
 }
 
 /// What is wrong with one combination of values.

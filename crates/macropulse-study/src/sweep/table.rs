@@ -100,6 +100,8 @@ impl Plan {
         let mut notes: Vec<String> =
             all(|point| &point.notes).into_iter().map(str::to_owned).collect();
         notes.extend(table.empty());
+        let environments = self.points.iter().map(|point| point.environment.as_str());
+        manifest["environments"] = each_once(environments).into();
         manifest["defaults"] = defaults.into();
         manifest["idealisations"] = all(|point| &point.idealisations).into();
         manifest["notes"] = notes.into();

@@ -47,7 +47,9 @@ const DIRECT: u32 = 31;
 pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, log: &ShotLog) {
     for (number, other) in scene.interferers.iter().enumerate() {
         light.transmitters.push(Transmitter::of(&other.design, other.clock.stretch()));
-        let Some(link) = Link::of_interferer(design, &other.design) else { continue };
+        let Some(link) = Link::of_interferer(design, &other.design, &scene.environment) else {
+            continue;
+        };
         let around_fs = around_fs(other);
         let farthest = design.scan.light_range.max(other.design.scan.light_range);
         let direct = Direct::of(scene, other, 2.0 * farthest);
@@ -248,12 +250,14 @@ impl Arrivals<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::environment::Environment;
     use std::path::Path;
 
     /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
     fn light(sensor: &str, more: &str) -> Trains {
         let text = format!(
-            "version = 1\n[[interferers]]\nsensor = \"hdl-64e\"\nposition_m = [50, 0, 0]\n\
+            "version = 1\nenvironment = \"vacuum-dark\"\n[[interferers]]\nsensor = \"hdl-64e\"\n\
+             position_m = [50, 0, 0]\n\
              yaw_deg = 180\nset = {{ scan.scans_per_s = 1000, scan.raster = {{ rows = 5, \
              columns = 5, horizontal_deg = 10, vertical_deg = 10 }} }}\n{more}"
         );
@@ -277,7 +281,8 @@ mod tests {
         let flight = fs_from_s(50.0 / SPEED_OF_LIGHT);
         assert_eq!(foreign.arrives_fs[0], 480_000_000_000 + flight);
         let hdl = Design::open("hdl-64e", &[]).unwrap();
-        let white = Link::of(&hdl).photons(1.0, 1.0);
+        let dark = Environment::vacuum_dark();
+        let white = Link::of(&hdl, &dark).photons(1.0, 1.0);
         approx::assert_relative_eq!(
             foreign.photons[0],
             white / APERTURE_RADIUS.powi(2),
@@ -305,14 +310,15 @@ mod tests {
         let perfect = [("detector.photon-counting.sensitivity.pd", "1.0")];
         let (seeing, all) = (open("kim-park-2016", &[]), open("kim-park-2016", &perfect));
         let hdl = open("hdl-64e", &[]);
+        let dark = Environment::vacuum_dark();
         let photons = |ours: &Design, other: &Design| {
-            Link::of_interferer(ours, other).map(|link| link.photons_by((2.0, 1.0), 1.0))
+            Link::of_interferer(ours, other, &dark).map(|link| link.photons_by((2.0, 1.0), 1.0))
         };
-        let own = Link::of(&seeing).photons(1.0, 1.0);
+        let own = Link::of(&seeing, &dark).photons(1.0, 1.0);
         assert_eq!(photons(&seeing, &seeing), Some(own));
         assert_eq!(photons(&seeing, &all), Some(own));
         assert_eq!(photons(&all, &seeing), Some(f64::INFINITY));
-        assert_eq!(photons(&seeing, &hdl), Some(Link::of(&hdl).photons(1.0, 1.0)));
+        assert_eq!(photons(&seeing, &hdl), Some(Link::of(&hdl, &dark).photons(1.0, 1.0)));
         assert_eq!(photons(&seeing, &open("peregrine", &[])), None);
     }
 

@@ -1,6 +1,7 @@
 //! The link equation: photons from energy, reflectance, range and air.
 
 use crate::design::{Design, Field};
+use crate::environment::Environment;
 use crate::scene::{Hits, Material};
 use crate::units::tof_from_range;
 
@@ -16,14 +17,11 @@ pub struct Link {
 }
 
 impl Link {
-    /// The link of a sensor through its air.
-    pub fn of(design: &Design) -> Self {
-        let sensitivity = design.detector.sensitivity();
-        let extinction = design.visibility.map_or(0.0, |v| extinction(v, design.light.wavelength));
+    /// The link of a sensor through the air of `environment`.
+    pub fn of(design: &Design, environment: &Environment) -> Self {
         Self {
-            photons_at_one_metre: sensitivity.photons * sensitivity.range.powi(2)
-                / sensitivity.reflectance,
-            extinction,
+            photons_at_one_metre: at_one_metre(design),
+            extinction: environment.extinction(design.light.wavelength),
             field: design.budget.as_ref().map(|b| b.field).filter(|f| f.trailing.is_some()),
         }
     }
@@ -44,19 +42,19 @@ impl Link {
     /// own, which ours are taken to be unless both have a link budget. A detector of ours that never
     /// misses sees every mark; of another that never misses, by which its energy is left open, ours
     /// is assumed.
-    pub fn of_interferer(ours: &Design, other: &Design) -> Option<Self> {
+    pub fn of_interferer(ours: &Design, other: &Design, environment: &Environment) -> Option<Self> {
         let filter = ours.budget.as_ref().map_or(FILTER, |budget| budget.filter / 2.0);
         if (ours.light.wavelength - other.light.wavelength).abs() > filter {
             return None;
         }
-        let [own, its] = [ours, other].map(|design| Self::of(design).photons_at_one_metre);
+        let [own, its] = [ours, other].map(at_one_metre);
         let receivers = match (&ours.budget, &other.budget) {
             (Some(ours), Some(other)) => ours.receiver() / other.receiver(),
             _ => 1.0,
         };
         let its = its * receivers;
         let photons_at_one_metre = if own.is_infinite() || its.is_infinite() { own } else { its };
-        let extinction = ours.visibility.map_or(0.0, |v| extinction(v, other.light.wavelength));
+        let extinction = environment.extinction(other.light.wavelength);
         Some(Self { photons_at_one_metre, extinction, field: None })
     }
 
@@ -89,38 +87,24 @@ impl Link {
     }
 }
 
-/// Extinction of air in 1/m for a meteorological `visibility` V in m at a `wavelength` λ in m.
-///
-/// σ = 3.912/V · (λ/550 nm)^−q, natural units, with q after Kim: 1.6 (V > 50 km), 1.3 (6–50 km),
-/// 0.16·V + 0.34 (1–6 km), V − 0.5 (0.5–1 km), 0 below \[Kim01\].
-pub fn extinction(visibility: f64, wavelength: f64) -> f64 {
-    let km = visibility * 1e-3;
-    let q = match km {
-        _ if km > 50.0 => 1.6,
-        _ if km > 6.0 => 1.3,
-        _ if km > 1.0 => 0.16 * km + 0.34,
-        _ if km > 0.5 => km - 0.5,
-        _ => 0.0,
-    };
-    3.912 / visibility * libm::pow(wavelength / 550e-9, -q)
+/// Mean photons that a sensor detects per mark from white at one metre, in clear air.
+fn at_one_metre(design: &Design) -> f64 {
+    let sensitivity = design.detector.sensitivity();
+    sensitivity.photons * sensitivity.range.powi(2) / sensitivity.reflectance
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn extinction_has_the_published_values() {
-        approx::assert_relative_eq!(extinction(23e3, 550e-9), 0.170e-3, max_relative = 1e-3);
-        approx::assert_relative_eq!(extinction(23e3, 905e-9), 0.0890e-3, max_relative = 2e-3);
-        // In dense fog the wavelength does not matter.
-        assert_eq!(extinction(400.0, 905e-9), extinction(400.0, 1550e-9));
+    fn dark() -> Environment {
+        Environment::vacuum_dark()
     }
 
     #[test]
     fn the_reference_target_gives_the_reference_photons() {
         let design = Design::open("kim-park-2016", &[]).unwrap();
-        let link = Link::of(&design);
+        let link = Link::of(&design, &dark());
         // Pd = 0.99 per mark means −ln 0.01 photons.
         approx::assert_relative_eq!(link.photons(1.0, 150.0), 4.605_170, max_relative = 1e-6);
         approx::assert_relative_eq!(link.photons(0.5, 75.0), 2.0 * 4.605_170, max_relative = 1e-6);
@@ -130,7 +114,7 @@ mod tests {
     fn black_gives_nothing_even_to_a_perfect_detector() {
         let perfect = [("detector.photon-counting.sensitivity.pd".into(), "1.0".into())];
         let design = Design::open("kim-park-2016", &perfect).unwrap();
-        assert_eq!(Link::of(&design).photons(0.0, 10.0), 0.0);
-        assert_eq!(Link::of(&design).photons(1e-3, 10.0), f64::INFINITY);
+        assert_eq!(Link::of(&design, &dark()).photons(0.0, 10.0), 0.0);
+        assert_eq!(Link::of(&design, &dark()).photons(1e-3, 10.0), f64::INFINITY);
     }
 }

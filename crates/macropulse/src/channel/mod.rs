@@ -16,10 +16,12 @@
 mod interferers;
 mod light;
 mod link;
+mod operating;
 
 pub use interferers::APERTURE_RADIUS;
 pub use light::{ALL_MARKS, Background, Light, PulseTrain, Trains, Transmitter};
-pub use link::{FILTER, Link, extinction};
+pub use link::{FILTER, Link};
+pub use operating::{Error, Idealised, LinearSetting, Operating, idealised};
 
 use macropulse_codec::ShotLog;
 
@@ -27,18 +29,28 @@ use crate::design::Design;
 use crate::scene::{Hits, Material, PARTS, Scene, Traced};
 use crate::units::tof_fs_from_ranges;
 
-/// The light that reaches the sensor `design` while it listens to the shots of `log`, which have
-/// met `traced` in `scene`.
-pub fn light<'a>(
-    design: &'a Design,
-    scene: &'a Scene,
-    log: &ShotLog,
-    traced: &Traced,
-) -> Light<'a> {
-    let mut light = Light { transmitters: vec![Transmitter::of(design, 1.0)], ..Light::default() };
+/// A sensor in a scene, at work in the environment of the scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// The sensor.
+    pub design: &'a Design,
+    /// The scene that it looks at.
+    pub scene: &'a Scene,
+    /// What follows from the sensor and the environment of the scene.
+    pub operating: &'a Operating,
+}
+
+/// The light that reaches a sensor while it listens to the shots of `log`, which have met `traced`.
+pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
+    let Seen { design, scene, operating } = *seen;
+    let mut light = Light {
+        transmitters: vec![Transmitter::of(design, 1.0)],
+        background: Background { steady: operating.background, ..Background::default() },
+        ..Light::default()
+    };
     match traced.parts.as_slice() {
-        [] => echoes(&mut light.trains, (design, &scene.materials), log, &traced.middle),
-        parts => echoes_of_parts(&mut light.trains, (design, &scene.materials), log, parts),
+        [] => echoes(&mut light.trains, (&operating.link, &scene.materials), log, &traced.middle),
+        parts => echoes_of_parts(&mut light.trains, seen, log, parts),
     }
     interferers::add(&mut light, design, scene, log);
     light
@@ -47,11 +59,10 @@ pub fn light<'a>(
 /// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out.
 pub fn echoes(
     trains: &mut Trains,
-    (design, materials): (&Design, &[Material]),
+    (link, materials): (&Link, &[Material]),
     log: &ShotLog,
     hits: &Hits,
 ) {
-    let link = Link::of(design);
     let delay_fs = tof_fs_from_ranges(&hits.range);
     let from = trains.photons.len();
     trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(materials, hits, i)));
@@ -87,14 +98,9 @@ pub fn echoes(
 
 /// Adds the echoes of macropulses whose parts have met `hits` each, the part sent first first;
 /// ordered by shot.
-fn echoes_of_parts(
-    trains: &mut Trains,
-    (design, materials): (&Design, &[Material]),
-    log: &ShotLog,
-    parts: &[Hits],
-) {
-    let link = Link::of(design);
-    let codebook = &design.coding.codebook;
+fn echoes_of_parts(trains: &mut Trains, seen: &Seen, log: &ShotLog, parts: &[Hits]) {
+    let (link, materials) = (&seen.operating.link, &seen.scene.materials);
+    let codebook = &seen.design.coding.codebook;
     let mut order: Vec<(u32, u8, usize)> = Vec::new();
     for (part, hits) in parts.iter().enumerate() {
         order.extend(hits.shot.iter().enumerate().map(|(i, shot)| (*shot, part as u8, i)));
@@ -193,10 +199,11 @@ mod tests {
         };
         let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
         let mut trains = Trains::default();
-        echoes(&mut trains, (&design, &materials), &log, &hits);
+        let link = Link::of(&design, &crate::environment::Environment::vacuum_dark());
+        echoes(&mut trains, (&link, &materials), &log, &hits);
         assert_eq!((&trains.shot[..], &trains.way[..]), (&[3, 5][..], &[0, 0][..]));
         let delay_fs = crate::units::fs_from_s(crate::units::tof_from_range(30.0));
         assert_eq!(trains.arrives_fs[1], log.fired_at_fs[5] + delay_fs);
-        assert_eq!(trains.photons[1], Link::of(&design).photons(0.5, 30.0));
+        assert_eq!(trains.photons[1], link.photons(0.5, 30.0));
     }
 }

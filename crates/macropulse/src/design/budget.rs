@@ -1,4 +1,4 @@
-//! Where the photons come from: energy, aperture, optics and sun.
+//! Where the photons come from: energy, aperture and optics.
 
 use std::f64::consts::PI;
 
@@ -22,10 +22,6 @@ pub struct Budget {
     pub filter: f64,
     /// What the detector looks at.
     pub field: Field,
-    /// Spectral irradiance of the scene, W/m² per metre of wavelength; 0 at night.
-    pub irradiance: f64,
-    /// Mean diffuse reflectance of what lies in the field, for the sunlight it sends back.
-    pub albedo: f64,
     /// Detections per photon.
     pub efficiency: f64,
 }
@@ -73,10 +69,11 @@ impl Budget {
         received / self.photon_energy()
     }
 
-    /// Photons of sunlight per second that reach the detector: E_λ·Δλ·ρ_b/π·A·Ω·η over h·c/λ
-    /// (docs/physics.md#background).
-    pub fn background(&self) -> f64 {
-        let power = self.irradiance * self.filter * self.albedo / PI
+    /// Photons of sunlight per second that reach the detector where the scene has the spectral
+    /// `irradiance` E_λ in W/m² per metre and the mean reflectance `albedo` ρ_b:
+    /// E_λ·Δλ·ρ_b/π·A·Ω·η over h·c/λ (docs/physics.md#background).
+    pub fn background(&self, irradiance: f64, albedo: f64) -> f64 {
+        let power = irradiance * self.filter * albedo / PI
             * self.area()
             * self.field.solid_angle
             * self.transmission;
@@ -133,8 +130,9 @@ mod tests {
     fn a_staring_receiver_drowns_in_sunlight() {
         let budget = physical(&[]);
         assert_relative_eq!(budget.field.solid_angle, 0.310, max_relative = 1e-3);
-        assert_relative_eq!(budget.background() * 2.5e-12, 947.0, max_relative = 2e-3);
-        assert_eq!(physical(&[("sun.sky", "night")]).background(), 0.0);
+        let photons = budget.background(0.817e9, 0.3);
+        assert_relative_eq!(photons * 2.5e-12, 947.0, max_relative = 2e-3);
+        assert_eq!(budget.background(0.0, 0.3), 0.0);
     }
 
     #[test]

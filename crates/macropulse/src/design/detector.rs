@@ -2,6 +2,8 @@
 
 use macropulse_codec::statistics::normal_quantile;
 
+use super::linear::Amplifier;
+
 /// Light to edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Detector {
@@ -32,18 +34,18 @@ impl Detector {
         match self {
             Self::PhotonCounting(counting) => counting.jitter,
             Self::Geiger(geiger) => geiger.jitter,
-            Self::Linear(linear) => linear.timing(linear.threshold),
+            Self::Linear(linear) => linear.jitter_at_threshold(),
             Self::FirstFiring(firing) => firing.jitter,
         }
     }
 
-    /// Edges per second without any light of the sensor's own.
-    pub fn false_rate(&self) -> f64 {
+    /// Counts of sunlight per second that the file declares; 0 where they follow from optics and
+    /// environment.
+    pub fn declared_background(&self) -> f64 {
         match self {
-            Self::PhotonCounting(counting) => counting.false_rate,
-            Self::Geiger(geiger) => geiger.false_rate,
-            Self::Linear(linear) => linear.false_rate,
-            Self::FirstFiring(firing) => firing.false_rate,
+            Self::PhotonCounting(counting) => counting.background,
+            Self::Geiger(geiger) => geiger.background,
+            Self::Linear(_) | Self::FirstFiring(_) => 0.0,
         }
     }
 }
@@ -55,8 +57,10 @@ pub struct PhotonCounting {
     pub sensitivity: Sensitivity,
     /// Marks lost for another reason than lack of light, as a fraction.
     pub missed_marks: f64,
-    /// Dark and background counts together, 1/s.
-    pub false_rate: f64,
+    /// Dark counts, 1/s.
+    pub dark: f64,
+    /// Background counts where the file declares them, 1/s; else 0.
+    pub background: f64,
     /// Standard deviation of the timing, s.
     pub jitter: f64,
 }
@@ -70,37 +74,36 @@ pub struct Geiger {
     pub cells: u32,
     /// Time for which a cell that has fired is blind, fs.
     pub dead_fs: i64,
-    /// Dark and background counts of all cells together, were they always armed, 1/s.
-    pub false_rate: f64,
+    /// Dark counts of all cells together, were they always armed, 1/s.
+    pub dark: f64,
+    /// Background counts of all cells where the file declares them, 1/s; else 0.
+    pub background: f64,
     /// Standard deviation of the timing, s.
     pub jitter: f64,
 }
 
-/// A photodiode with an amplifier and a threshold. Amplitudes are in detected photons: in
-/// electrons before multiplication.
+/// A photodiode with an amplifier and a threshold. Its noise, and with it the threshold, depends on
+/// the sunlight it sees, too: [`LinearSetting`](crate::channel::LinearSetting).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Linear {
     /// Mean photons detected per mark at the reference target.
     pub sensitivity: Sensitivity,
-    /// Amplitude that makes an edge.
-    pub threshold: f64,
-    /// Noise without a mark, rms.
-    pub noise: f64,
-    /// Excess noise factor of the multiplication.
-    pub excess: f64,
-    /// Full width at half maximum of a mark behind the amplifier, s.
-    pub response: f64,
-    /// Crossings of the threshold by noise alone, 1/s.
-    pub false_rate: f64,
+    /// The photodiode and its amplifier.
+    pub amplifier: Amplifier,
+    /// Crossings of the threshold by noise alone that are accepted, 1/s.
+    pub false_alarm: f64,
+    /// The threshold over the rms noise that this takes.
+    pub threshold_over_noise: f64,
     /// Standard deviation of the timing of the converter's input alone, s.
     pub jitter: f64,
 }
 
 impl Linear {
-    /// Standard deviation, s, of the time at which a mark of `amplitude` detected photons crosses
-    /// the threshold: noise over the slope, τ·noise/amplitude, with the jitter of the input.
-    pub fn timing(&self, amplitude: f64) -> f64 {
-        libm::hypot(self.jitter, self.response * self.noise / amplitude.max(self.threshold))
+    /// Standard deviation, s, of the time at which a mark crosses the threshold that only just
+    /// does: noise over the slope, τ·noise/threshold, with the jitter of the input. It does not
+    /// depend on how large the noise is.
+    pub fn jitter_at_threshold(&self) -> f64 {
+        libm::hypot(self.jitter, self.amplifier.response() / self.threshold_over_noise)
     }
 }
 

@@ -4,14 +4,25 @@
 use std::path::{Path, PathBuf};
 
 use toml::Table;
-use toml::de::DeTable;
 
-use super::Error;
 use super::presets;
-use crate::names::line_column;
+use super::{Effect, Error};
+use crate::names::{line_column, offset_of_key, toml_value};
+
+/// Where values come from that are changed on the command line.
+const SET: &str = "--set";
 
 /// A sensor file may extend another, but not without end.
 const LONGEST_CHAIN: usize = 16;
+
+/// The key of a change that takes an effect off the list `idealised`.
+pub const WITH: &str = "with";
+
+/// The key of a change that puts an effect on the list `idealised`.
+pub const WITHOUT: &str = "without";
+
+/// What a file that extends another does not take from it: a sentence about that one.
+const PROSE: &str = "summary";
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
@@ -60,8 +71,11 @@ impl Chain {
         overrides: &[(String, String)],
     ) -> Result<Self, Error> {
         let mut documents = Vec::new();
+        let switches = |key: &str| [WITH, WITHOUT].contains(&key);
+        let (switched, overrides): (Vec<_>, Vec<_>) =
+            overrides.iter().cloned().partition(|(key, _)| switches(key));
         if !overrides.is_empty() {
-            documents.push(document_of_overrides(overrides)?);
+            documents.push(document_of_overrides(&overrides)?);
         }
         let mut folder = folder.to_path_buf();
         documents.push(Document::parse(text, origin)?);
@@ -79,15 +93,41 @@ impl Chain {
             documents.push(Document::parse(&text, &origin)?);
         }
         let mut merged = Table::new();
-        for document in &documents {
-            fill_in(&mut merged, &document.table);
+        let own = documents.iter().position(|document| document.origin != SET).unwrap_or(0);
+        for (number, document) in documents.iter().enumerate() {
+            let mut table = document.table.clone();
+            if number > own {
+                table.remove(PROSE);
+            }
+            fill_in(&mut merged, &table);
+        }
+        if let Some(parent) = documents[own].table.get("extends").and_then(toml::Value::as_str) {
+            let said = format!("extends {parent}");
+            merged.entry(PROSE).or_insert(said.into());
         }
         let defaults = Document::parse(presets::DEFAULTS, "built-in defaults")?;
         let fitting = only_for_what_is_there(&defaults.table, &merged);
         fill_in(&mut merged, &fitting);
         merged.remove("extends");
         documents.push(defaults);
-        Ok(Self { documents, merged })
+        let mut chain = Self { documents, merged };
+        for (key, effect) in &switched {
+            chain.switch(key == WITHOUT, effect);
+        }
+        Ok(chain)
+    }
+
+    /// Puts an effect on the list of those left out, or takes it off.
+    fn switch(&mut self, out: bool, effect: &str) {
+        let Some(list) = self.merged.get_mut("idealised").and_then(toml::Value::as_array_mut)
+        else {
+            return;
+        };
+        list.retain(|name| name.as_str() != Some(effect));
+        // What is no effect is refused with the list.
+        if out || !Effect::ALL.iter().any(|known| known.name() == effect) {
+            list.push(effect.into());
+        }
     }
 
     /// An error about the value at the dotted `path`, pointing at the document that gave it.
@@ -100,7 +140,8 @@ impl Chain {
         let written = &self.documents[..self.documents.len() - 1];
         let mut used = Vec::new();
         leaves(&self.merged, String::new(), &mut |path, value| {
-            if !written.iter().any(|d| value_at(&d.table, path).is_some()) {
+            let is_written = written.iter().any(|d| value_at(&d.table, path).is_some());
+            if !is_written && path != PROSE {
                 used.push((path.to_owned(), value.to_string()));
             }
         });
@@ -144,11 +185,7 @@ pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String,
 fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Error> {
     let mut table = Table::new();
     for (path, typed) in overrides {
-        let value = format!("v = {typed}")
-            .parse::<Table>()
-            .ok()
-            .and_then(|mut parsed| parsed.remove("v"))
-            .unwrap_or_else(|| toml::Value::String(typed.clone()));
+        let value = toml_value(typed);
         let mut at = &mut table;
         let mut keys = path.split('.').peekable();
         while let Some(key) = keys.next() {
@@ -158,12 +195,12 @@ fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Err
             }
             let below = at.entry(key).or_insert_with(|| toml::Value::Table(Table::new()));
             let Some(next) = below.as_table_mut() else {
-                return Err(Error::whole("--set", format!("`{path}`: `{key}` is set twice")));
+                return Err(Error::whole(SET, format!("`{path}`: `{key}` is set twice")));
             };
             at = next;
         }
     }
-    Ok(Document { origin: "--set".to_owned(), text: String::new(), table })
+    Ok(Document { origin: SET.to_owned(), text: String::new(), table })
 }
 
 /// Adds to `strong` what only `weak` has.
@@ -202,7 +239,7 @@ fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
     let mut kept = defaults.clone();
     kept.retain(|key, _| match key {
         "code" => sensor.contains_key("code"),
-        "sun" | "safety" => sensor.contains_key("optics"),
+        "safety" => sensor.contains_key("optics"),
         _ => true,
     });
     for (group, kinds) in ALTERNATIVES {
@@ -261,7 +298,7 @@ fn place(documents: &[Document], path: &str) -> Place {
             if value_at(&document.table, wanted).is_some() {
                 return Place {
                     origin: document.origin.clone(),
-                    line_column: offset_of(&document.text, wanted)
+                    line_column: offset_of_key(&document.text, wanted)
                         .map(|at| line_column(&document.text, at)),
                     path: path.to_owned(),
                 };
@@ -272,27 +309,12 @@ fn place(documents: &[Document], path: &str) -> Place {
             None => break,
         }
     }
-    let first = documents.iter().find(|d| d.origin != "--set");
+    let first = documents.iter().find(|d| d.origin != SET);
     Place {
         origin: first.map(|d| d.origin.clone()).unwrap_or_default(),
         line_column: None,
         path: path.to_owned(),
     }
-}
-
-/// Byte offset of the key at the dotted `path`.
-fn offset_of(text: &str, path: &str) -> Option<usize> {
-    let root = DeTable::parse(text).ok()?;
-    let mut table = root.get_ref();
-    let mut keys = path.split('.').peekable();
-    while let Some(key) = keys.next() {
-        let (name, value) = table.iter().find(|(name, _)| name.get_ref().as_ref() == key)?;
-        if keys.peek().is_none() {
-            return Some(name.span().start);
-        }
-        table = value.get_ref().as_table()?;
-    }
-    None
 }
 
 #[cfg(test)]
@@ -308,6 +330,32 @@ mod tests {
         let chain = chain("extends = \"kim-park-2016\"\n[scan]\nmax_range_m = 90.0\n");
         assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_float(), Some(90.0));
         assert_eq!(value_at(&chain.merged, "scan.raster.rows").unwrap().as_integer(), Some(480));
+    }
+
+    /// A sentence about the parent is not one about the child.
+    #[test]
+    fn prose_is_not_inherited() {
+        let of = |text: &str| value_at(&chain(text).merged, "summary").cloned();
+        let said = of("extends = \"kim-park-2016\"\n").unwrap();
+        assert_eq!(said.as_str(), Some("extends kim-park-2016"));
+        let said = of("extends = \"hdl-64e\"\nsummary = \"mine\"\n").unwrap();
+        assert_eq!(said.as_str(), Some("mine"));
+        assert_eq!(of("version = 1\n"), None);
+        let used = chain("extends = \"kim-park-2016\"\n").defaults_used();
+        assert!(used.iter().all(|(key, _)| key != "summary"));
+    }
+
+    #[test]
+    fn effects_are_switched_on_top_of_what_is_written() {
+        let change = |key: &str, effect: &str| (key.to_owned(), effect.to_owned());
+        let set = [change(WITH, "footprint"), change(WITHOUT, "inter-chip")];
+        let text = "extends = \"kim-park-2016-physical\"\nidealised = [\"footprint\"]";
+        let chain = Chain::read(text, "mine.toml", Path::new(""), &set).unwrap();
+        let list = value_at(&chain.merged, "idealised").unwrap().as_array().unwrap();
+        assert_eq!(
+            list.iter().filter_map(|name| name.as_str()).collect::<Vec<_>>(),
+            ["inter-chip"]
+        );
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Effects that a sensor file may leave out.
+//! Effects that a sensor file may leave out; those of sun and air belong to the
+//! [environment](crate::environment::Effect).
 
 /// A physical effect that can be idealised away. Its name stands under `idealised` in the sensor
 /// file, and every report prints it.
@@ -6,10 +7,6 @@
 pub enum Effect {
     /// The beam has a width: several rays, several delays.
     Footprint,
-    /// The air absorbs and scatters.
-    Atmosphere,
-    /// Sunlight makes edges.
-    Background,
     /// Photons follow from energy, aperture and optics.
     LinkBudget,
     /// The energy is held to a laser class.
@@ -24,10 +21,8 @@ pub enum Effect {
 
 impl Effect {
     /// All effects.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 6] = [
         Self::Footprint,
-        Self::Atmosphere,
-        Self::Background,
         Self::LinkBudget,
         Self::EyeSafety,
         Self::DetectorBandwidth,
@@ -39,8 +34,6 @@ impl Effect {
     pub fn name(self) -> &'static str {
         match self {
             Self::Footprint => "footprint",
-            Self::Atmosphere => "atmosphere",
-            Self::Background => "background",
             Self::LinkBudget => "link-budget",
             Self::EyeSafety => "eye-safety",
             Self::DetectorBandwidth => "detector-bandwidth",
@@ -53,8 +46,6 @@ impl Effect {
     pub fn assumption(self) -> &'static str {
         match self {
             Self::Footprint => "the beam is a line without width",
-            Self::Atmosphere => "the air is perfectly clear",
-            Self::Background => "no sunlight reaches the detector",
             Self::LinkBudget => {
                 "the receiver is declared by what it can see, not by energy, aperture and optics"
             }

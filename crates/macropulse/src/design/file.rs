@@ -17,9 +17,7 @@ pub(super) struct SensorFile {
     pub code: Option<CodeFile>,
     pub detector: DetectorFile,
     pub optics: Option<OpticsFile>,
-    pub sun: Option<SunFile>,
     pub safety: Option<SafetyFile>,
-    pub atmosphere: AtmosphereFile,
     pub tdc: TdcFile,
     pub receiver: ReceiverFile,
 }
@@ -133,21 +131,6 @@ pub(super) enum FieldFile {
     InFlight,
     #[serde(rename = "trailing_pixels")]
     TrailingPixels(f64),
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SunFile {
-    pub sky: SkyFile,
-    pub irradiance_w_m2_nm: Option<f64>,
-    pub albedo: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum SkyFile {
-    Day,
-    Night,
 }
 
 #[derive(Debug, Deserialize)]
@@ -299,12 +282,6 @@ pub(super) struct FirstFiringFile {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct AtmosphereFile {
-    pub visibility_km: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(super) struct TdcFile {
     pub converters: u32,
     pub resolution_ps: f64,
@@ -320,7 +297,7 @@ pub(super) struct ReceiverFile {
     pub effort: Effort,
     pub false_alarm: f64,
     pub bit_threshold: u32,
-    pub right_within_m: f64,
+    pub right_within_m: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

@@ -12,7 +12,7 @@ const PEAK: f64 = 0.939_437_278_699_651_3;
 
 /// A photodiode and its amplifier, SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Amplifier {
+pub struct Amplifier {
     /// Mean multiplication M; 1 for a PIN diode.
     pub gain: f64,
     /// Ratio k of the ionisation coefficients.

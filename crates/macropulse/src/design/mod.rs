@@ -21,7 +21,6 @@ mod linear;
 mod moments;
 mod presets;
 pub mod safety;
-mod spectrum;
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -31,9 +30,11 @@ pub use budget::{Budget, Field, Trailing, solid_angle};
 pub use derived::Derived;
 pub use detector::{Detector, FirstFiring, Geiger, Linear, PhotonCounting, Sensitivity};
 pub use directions::Directions;
+pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
 pub use family::family_from_toml;
 pub use file::{Firing, Label, Mirror};
+pub use linear::Amplifier;
 pub use presets::{names as preset_names, text as preset_text};
 
 use crate::digest::Digest;
@@ -57,8 +58,6 @@ pub struct Design {
     pub budget: Option<Budget>,
     /// From light to edges.
     pub detector: Detector,
-    /// Meteorological visibility, m; `None` where the air is idealised away.
-    pub visibility: Option<f64>,
     /// From edges to ticks.
     pub tdc: Tdc,
     /// From ticks to returns.

@@ -180,7 +180,7 @@ mod tests {
     /// The edges of shots that all have an echo of so many photons, in the first nine bands or
     /// what the sensor has of them.
     fn run(design: &Design, photons: f64, seed: u64) -> Vec<(ShotLog, Detections)> {
-        let detectors = super::super::Detectors::new(design, Chance::new(seed));
+        let detectors = super::super::Detectors::in_the_dark(design, Chance::new(seed));
         let bands = crate::emit::bands(design, 0).take(9);
         bands
             .map(|band| {
@@ -317,7 +317,7 @@ mod tests {
             // 165 m away: 1.1 µs. Shots follow each other after 1 µs, or after 2 µs.
             let echo = |shot| Echo { shot, delay_fs: 1_100_000_000, photons: 1e6 };
             let light = light_of_echoes(&design, &log, (0..10).map(echo));
-            let detectors = super::super::Detectors::new(&design, Chance::new(1));
+            let detectors = super::super::Detectors::in_the_dark(&design, Chance::new(1));
             let found = detectors.detections(&log, &light, &mut super::super::Memory::default());
             assert_eq!(found.time.len(), expected, "{rate} scans per second");
         }

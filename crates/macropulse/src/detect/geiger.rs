@@ -9,7 +9,7 @@
 //! 4. When the detector begins to look, a cell is blind with the probability ρ = r·τ/(1 + r·τ) that
 //!    the steady rate r of counts per cell leaves, τ the dead time, and for a time that is even
 //!    between 0 and τ: the stationary state of a cell in steady light. It begins several dead
-//!    times before the first owned shot ([`Design::history_fs`]), so that by then the state is
+//!    times before the first owned shot ([`history_fs`](crate::design::Design::history_fs)), so that by then the state is
 //!    what the light has made of it.
 //!
 //! A single cell with a dead time as long as the range gate is the detector that fires once per
@@ -19,9 +19,9 @@ use rand::RngExt;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::channel::Channel;
-use super::noise::{Noise, PART_BITS, counts};
+use super::noise::{PART_BITS, counts};
 use super::{Detections, Memory};
-use crate::design::{Design, Geiger};
+use crate::design::Geiger;
 use crate::random::{Address, Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s, s_from_fs};
 
@@ -31,16 +31,20 @@ const FLOOD: f64 = 64.0;
 /// Stands for all cells.
 const ALL: u32 = u32::MAX;
 
-/// Cells in Geiger mode, and the background that falls on them.
+/// Cells in Geiger mode.
 #[derive(Debug)]
 pub(super) struct Cells {
     geiger: Geiger,
-    noise: Option<Noise>,
 }
 
 impl Cells {
-    pub fn new(geiger: &Geiger, design: &Design) -> Self {
-        Self { geiger: *geiger, noise: Noise::new(geiger.false_rate, design) }
+    pub fn new(geiger: &Geiger) -> Self {
+        Self { geiger: *geiger }
+    }
+
+    /// Counts per second of steady light and of the dark, on all cells of a channel.
+    fn steady(&self, channel: &Channel) -> f64 {
+        self.geiger.dark + channel.light.background.steady
     }
 
     /// Adds the events of a channel to those found.
@@ -51,7 +55,7 @@ impl Cells {
         (found, memory): (&mut Detections, &mut Memory),
     ) {
         let mut photons = self.photons(channel, chance);
-        counts(self.noise.as_ref(), channel, chance, &mut memory.noise);
+        counts(self.steady(channel), channel, chance, &mut memory.noise);
         for &time in &memory.noise {
             let mut stream = chance.stream(self.address(Stage::Cell, channel, time.into()));
             let cell = stream.random_range(0..self.geiger.cells);
@@ -117,8 +121,8 @@ impl Cells {
 
     /// When each cell is armed, in parts of a tick, where the detector begins to look at `start`.
     fn armed_at(&self, start: i64, channel: &Channel, chance: &Chance) -> Vec<i64> {
-        let Geiger { cells, dead_fs, false_rate, .. } = self.geiger;
-        let each = false_rate / f64::from(cells) * s_from_fs(dead_fs);
+        let Geiger { cells, dead_fs, .. } = self.geiger;
+        let each = self.steady(channel) / f64::from(cells) * s_from_fs(dead_fs);
         let blind = each / (1.0 + each);
         let mut stream = chance.stream(self.address(Stage::Blind, channel, start));
         let dead = channel.clock.parts(dead_fs) as f64;
@@ -175,6 +179,7 @@ impl Cells {
 mod tests {
     use super::*;
     use crate::channel::Light;
+    use crate::design::Design;
     use crate::detect::Detectors;
 
     fn cells(cells: &str, dead_ns: &str, rate: &str) -> Design {
@@ -189,7 +194,7 @@ mod tests {
     /// The events of steady light, in seconds from the first owned shot on, of several bands that
     /// each begin anew.
     fn events(design: &Design, bands: u64) -> Vec<Vec<f64>> {
-        let detectors = Detectors::new(design, Chance::new(7));
+        let detectors = Detectors::in_the_dark(design, Chance::new(7));
         let of_band = |n: u64| {
             let band = crate::emit::Band { scan: 1, first: 848 * n, shots: 20 };
             let log = band.shot_log(design);

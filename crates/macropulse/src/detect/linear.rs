@@ -14,9 +14,10 @@
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::channel::Channel;
-use super::noise::{Noise, counts};
+use super::noise::counts;
 use super::{Detections, Memory};
-use crate::design::{Design, Linear};
+use crate::channel::LinearSetting;
+use crate::design::Design;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::fs_from_s;
 
@@ -26,8 +27,7 @@ const PLENTY: f64 = 1e12;
 /// A linear detector and the crossings that its noise makes.
 #[derive(Debug)]
 pub(super) struct Thresholding {
-    linear: Linear,
-    noise: Option<Noise>,
+    linear: LinearSetting,
     /// Whether the height of a pulse is measured: by the receiver of single pulses, which tells
     /// reflectance from it.
     measures: bool,
@@ -44,9 +44,8 @@ struct Together {
 }
 
 impl Thresholding {
-    pub fn new(linear: &Linear, design: &Design) -> Self {
-        let noise = Noise::new(linear.false_rate, design);
-        Self { linear: *linear, noise, measures: !design.is_coded() }
+    pub fn new(linear: LinearSetting, design: &Design) -> Self {
+        Self { linear, measures: !design.is_coded() }
     }
 
     /// Adds the events of a channel to those found.
@@ -71,7 +70,7 @@ impl Thresholding {
                 }
             }
         }
-        counts(self.noise.as_ref(), channel, chance, &mut memory.noise);
+        counts(self.linear.false_rate, channel, chance, &mut memory.noise);
         let noise = memory.noise.iter();
         events.extend(noise.map(|time| (*time, self.linear.threshold as f32)));
         events.sort_unstable_by_key(|event| event.0);
@@ -116,7 +115,7 @@ impl Thresholding {
     /// How late, fs, a mark of `count` detected photons crosses the threshold, and its amplitude;
     /// `None` if it does not.
     fn crossing(&self, count: f64, stream: &mut Stream) -> Option<(i64, f64)> {
-        let Linear { threshold, noise, excess, .. } = self.linear;
+        let LinearSetting { threshold, noise, excess, .. } = self.linear;
         let spread = (count * (excess - 1.0) + noise * noise).sqrt();
         let draw = |stream: &mut _| -> f64 { StandardNormal.sample(stream) };
         let amplitude = count + spread * draw(stream);
@@ -144,7 +143,7 @@ mod tests {
         let edges = |apart_fs: i64, photons: f64| {
             let echo = |ray| Echo { shot, delay_fs: 500_000_000 + ray * apart_fs, photons };
             let light = light_of_echoes(&design, &log, (0..7).map(echo));
-            let detectors = Detectors::new(&design, Chance::new(1));
+            let detectors = Detectors::in_the_dark(&design, Chance::new(1));
             detectors.detections(&log, &light, &mut Memory::default()).time.len()
         };
         // The threshold is at some 300 photons.

@@ -25,7 +25,7 @@ use linear::Thresholding;
 use photon_counting::Counting;
 use shape::Shape;
 
-use crate::channel::Light;
+use crate::channel::{Light, LinearSetting, Operating};
 use crate::design::{Design, Detector, FirstFiring};
 use crate::kernels::GROUP;
 use crate::random::Chance;
@@ -62,12 +62,17 @@ enum Kind {
 }
 
 impl<'a> Detectors<'a> {
-    /// The detectors of `design` with the random numbers of `chance`.
-    pub fn new(design: &'a Design, chance: Chance) -> Self {
+    /// The detectors of `design` where it is `operating`, with the random numbers of `chance`.
+    pub fn new(design: &'a Design, operating: &Operating, chance: Chance) -> Self {
         let kind = match &design.detector {
             Detector::PhotonCounting(counting) => Kind::Counting(Counting::new(counting, design)),
-            Detector::Geiger(geiger) => Kind::Cells(Cells::new(geiger, design)),
-            Detector::Linear(linear) => Kind::Thresholding(Thresholding::new(linear, design)),
+            Detector::Geiger(geiger) => Kind::Cells(Cells::new(geiger)),
+            Detector::Linear(linear) => {
+                let setting = operating.linear;
+                let setting =
+                    setting.unwrap_or_else(|| LinearSetting::of(linear, operating.background));
+                Kind::Thresholding(Thresholding::new(setting, design))
+            }
             Detector::FirstFiring(firing) => Kind::Firing(*firing),
         };
         Self { design, chance, shape: Shape::of(design), kind }
@@ -113,6 +118,14 @@ impl<'a> Detectors<'a> {
     }
 }
 
+#[cfg(test)]
+impl<'a> Detectors<'a> {
+    /// The detectors of `design` where there is neither air nor sunlight.
+    pub fn in_the_dark(design: &'a Design, chance: Chance) -> Self {
+        Self::new(design, &Operating::in_the_dark(design), chance)
+    }
+}
+
 /// Memory that serves band after band: to have it anew costs more than to fill it.
 #[derive(Debug, Default)]
 pub struct Memory {
@@ -143,7 +156,7 @@ mod tests {
         let text = format!(
             "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
              idealised = [\"detector-bandwidth\", \"inter-chip\", \"mirror-motion\"]\n\
-             [sun]\nsky = \"night\"\n{detector}\njitter_ps = 0.0\n"
+             {detector}\njitter_ps = 0.0\n"
         );
         Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap()
     }
@@ -176,7 +189,7 @@ mod tests {
                 light
             };
             let events = |photons: f64| {
-                let detectors = Detectors::new(&design, Chance::new(1));
+                let detectors = Detectors::in_the_dark(&design, Chance::new(1));
                 let light = light(photons);
                 let mut time = detectors.detections(&log, &light, &mut Memory::default()).time;
                 // Photons of one mark come together.
@@ -205,7 +218,7 @@ mod tests {
                 ..Background::default()
             };
             let light = Light { background, ..Light::default() };
-            let detectors = Detectors::new(&design, Chance::new(9));
+            let detectors = Detectors::in_the_dark(&design, Chance::new(9));
             let found = detectors.detections(&log, &light, &mut Memory::default());
             let part = design.tdc.tick_fs as f64 / f64::from(crate::design::PARTS_OF_TICK);
             let epoch_fs = found.epoch * design.tdc.tick_fs;

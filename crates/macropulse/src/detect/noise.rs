@@ -31,7 +31,7 @@ const TICKS: i64 = 1 << 14;
 
 /// Counts at a steady rate.
 #[derive(Debug)]
-pub(super) enum Noise {
+enum Noise {
     /// Drawn one after the other.
     Apart(Waits),
     /// Drawn tick by tick.
@@ -43,7 +43,7 @@ pub(super) enum Noise {
 
 /// Waits from one count to the next.
 #[derive(Debug)]
-pub(super) struct Waits {
+struct Waits {
     /// Mean wait, in fractions of a part of a tick.
     mean: f32,
     /// Those fractions are 2 to the power of −`shift`, and a window lasts [`END`] of them.
@@ -52,7 +52,7 @@ pub(super) struct Waits {
 
 impl Noise {
     /// Counts at `rate` per second; `None` where there are none.
-    pub fn new(rate: f64, design: &Design) -> Option<Self> {
+    fn new(rate: f64, design: &Design) -> Option<Self> {
         if rate <= 0.0 {
             return None;
         }
@@ -86,16 +86,11 @@ impl Noise {
     }
 }
 
-/// The counts of the background while `channel` listens, ascending: the `steady` ones and those of
-/// stretches with a rate of their own; in `times`, in place of what was there.
-pub(super) fn counts(
-    steady: Option<&Noise>,
-    channel: &Channel,
-    chance: &Chance,
-    times: &mut Vec<u32>,
-) {
+/// The counts while `channel` listens, ascending: `steady` ones, per second, and those of the
+/// stretches of background with a rate of their own; in `times`, in place of what was there.
+pub(super) fn counts(steady: f64, channel: &Channel, chance: &Chance, times: &mut Vec<u32>) {
     times.clear();
-    if let Some(steady) = steady {
+    if let Some(steady) = Noise::new(steady, channel.design) {
         steady.times(channel, chance, times);
     }
     let from = times.len();

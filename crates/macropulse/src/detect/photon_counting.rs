@@ -14,7 +14,7 @@
 use super::channel::Channel;
 use super::first_photon::FirstPhoton;
 use super::jitter::Jitter;
-use super::noise::{Noise, counts};
+use super::noise::counts;
 use super::{Detections, Memory};
 use crate::channel::ALL_MARKS;
 use crate::design::{Design, PARTS_OF_TICK, PhotonCounting};
@@ -40,7 +40,8 @@ pub(super) struct Counting {
     /// Fraction of the marks that are not missed for another reason than lack of light.
     kept: f64,
     jitter: Option<Jitter>,
-    noise: Option<Noise>,
+    /// Dark counts per second.
+    dark: f64,
     /// Length of a micropulse, s.
     pulse: f64,
 }
@@ -71,7 +72,7 @@ impl Counting {
             bit: codebook.family().length() * chip,
             kept: 1.0 - counting.missed_marks,
             jitter: Jitter::new(counting.jitter * parts),
-            noise: Noise::new(counting.false_rate, design),
+            dark: counting.dark,
             pulse: design.light.pulse,
         }
     }
@@ -90,7 +91,8 @@ impl Counting {
         for arrival in channel.order.iter() {
             self.add_train(channel, *arrival, chance, (&mut time, memory));
         }
-        counts(self.noise.as_ref(), channel, chance, &mut memory.noise);
+        let steady = self.dark + channel.light.background.steady;
+        counts(steady, channel, chance, &mut memory.noise);
         if memory.noise.len() < time.len() / FEW {
             insert(&mut time, &memory.noise);
         } else if !memory.noise.is_empty() {
@@ -253,7 +255,11 @@ mod tests {
     }
 
     fn detect(design: &Design, log: &ShotLog, light: &Light, seed: u64) -> Detections {
-        Detectors::new(design, Chance::new(seed)).detections(log, light, &mut Memory::default())
+        Detectors::in_the_dark(design, Chance::new(seed)).detections(
+            log,
+            light,
+            &mut Memory::default(),
+        )
     }
 
     /// An echo of each shot of `log`.

@@ -47,6 +47,8 @@ pub struct Manifest {
     pub sensor: Named,
     /// The scene.
     pub scene: Named,
+    /// Sun and air: the name of the environment, and what it is like.
+    pub environment: String,
     /// Values the files left open, by key, as text with unit.
     pub defaults: Entries<String>,
     /// What was idealised.

@@ -147,15 +147,14 @@ impl PointCloud {
 
     /// Writes the returns of one band, and the firing times of its owned shots, into the cloud.
     ///
-    /// Intensity is the photons a mark brought over the photons a white surface seen square on
+    /// Intensity, by the `link` of the sensor through its air, is the photons a mark brought over the photons a white surface seen square on
     /// would have brought from the same range; 1 for a detector without a photon scale.
-    pub fn add(&mut self, design: &Design, log: &ShotLog, returns: &Returns) {
+    pub fn add(&mut self, design: &Design, link: &Link, log: &ShotLog, returns: &Returns) {
         let scan_start = self.scan as f64 * design.scan_period() * 1e9;
         for shot in log.owned.clone() {
             let pixel = self.pixel(log, shot);
             self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
         }
-        let link = Link::of(design);
         let directions = design.directions();
         for (i, &shot) in returns.shot.iter().enumerate() {
             let shot = shot as usize;

@@ -2,7 +2,8 @@
 
 use macropulse_codec::statistics::{erlang_b, normal_tail, poisson};
 
-use crate::design::{Detector, FirstFiring, Geiger, Linear, Tdc};
+use crate::channel::{LinearSetting, Operating};
+use crate::design::{Design, Detector, FirstFiring, Geiger, Tdc};
 
 /// Terms of a Poisson sum that are less than this share of all are left out.
 const NEGLIGIBLE: f64 = 1e-15;
@@ -10,20 +11,25 @@ const NEGLIGIBLE: f64 = 1e-15;
 /// From so many photons on, their number passes for a normal variable.
 const MANY: f64 = 1e4;
 
-/// Probability that a mark of which `photons` are detected on average makes an edge, where
-/// nothing else keeps the detector busy but `edges_per_s` false counts that fall on it.
+/// Probability that a mark of which `photons` are detected on average makes an edge of the sensor
+/// `design` where it is `operating`, and where nothing else keeps the detector busy but `edges_per_s` false counts that fall on it.
 ///
 /// * counting: (1 − m)·(1 − exp(−n)), m the marks lost for other reasons;
 /// * Geiger: 1 − exp(−n·a), a the share of cells that are armed, [`armed`];
 /// * linear: Σ_k Poisson(k; n)·Q((threshold − k)/√(k·(F − 1) + noise²)), see [`crossing`];
 /// * first firing: [`firing`].
-pub fn mark_pd(detector: &Detector, photons: f64, edges_per_s: f64) -> f64 {
-    match detector {
+pub fn mark_pd(design: &Design, operating: &Operating, photons: f64, edges_per_s: f64) -> f64 {
+    match &design.detector {
         Detector::PhotonCounting(counting) => {
             -(1.0 - counting.missed_marks) * libm::expm1(-photons)
         }
         Detector::Geiger(geiger) => -libm::expm1(-photons * armed(geiger, edges_per_s)),
-        Detector::Linear(linear) => crossing(linear, photons),
+        Detector::Linear(linear) => {
+            let setting = operating.linear;
+            let setting =
+                setting.unwrap_or_else(|| LinearSetting::of(linear, operating.background));
+            crossing(&setting, photons)
+        }
         Detector::FirstFiring(firing_) => firing(firing_, photons),
     }
 }
@@ -41,8 +47,8 @@ pub fn armed(geiger: &Geiger, edges_per_s: f64) -> f64 {
 ///
 /// With so much noise of the amplifier that the photons' own does not matter it is the
 /// ½·erfc((TNR − SNR)/√2) of textbooks.
-pub fn crossing(linear: &Linear, photons: f64) -> f64 {
-    let Linear { threshold, noise, excess, .. } = *linear;
+pub fn crossing(linear: &LinearSetting, photons: f64) -> f64 {
+    let LinearSetting { threshold, noise, excess, .. } = *linear;
     let above = |count: f64, variance: f64| normal_tail((threshold - count) / variance.sqrt());
     if photons > MANY {
         return above(photons, photons * excess + noise * noise);
@@ -80,25 +86,10 @@ pub fn bank_loss(tdc: &Tdc, edges_per_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::Design;
     use approx::assert_relative_eq;
 
-    fn linear(threshold: f64, noise: f64, excess: f64) -> Linear {
-        let set = [("name".to_owned(), "\"any\"".to_owned())];
-        let Detector::PhotonCounting(counting) =
-            Design::open("kim-park-2016", &set).unwrap().detector
-        else {
-            panic!("it counts photons")
-        };
-        Linear {
-            sensitivity: counting.sensitivity,
-            threshold,
-            noise,
-            excess,
-            response: 1e-9,
-            false_rate: 0.0,
-            jitter: 0.0,
-        }
+    fn linear(threshold: f64, noise: f64, excess: f64) -> LinearSetting {
+        LinearSetting { threshold, noise, excess, response: 1e-9, false_rate: 0.0, jitter: 0.0 }
     }
 
     /// TNR 9.78 dB: SNR of 9.8, 12, 13, 14 and 16 dB give 0.50, 0.816, 0.917, 0.973 and 0.9994.

@@ -7,14 +7,16 @@ use std::collections::BTreeMap;
 
 use super::detection::bank_loss;
 use super::matched;
-use crate::channel::Link;
+use crate::channel::{Error, Operating};
 use crate::design::{Design, Detector};
+use crate::environment::Environment;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 
-/// A sensor, perhaps with more or less light than it has.
+/// A sensor in an environment, perhaps with more or less light than it has.
 #[derive(Debug, Clone)]
 pub struct Forecaster<'a> {
     design: &'a Design,
+    operating: Operating,
     pixel_period: f64,
     /// How many macropulses have so many marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
@@ -58,8 +60,12 @@ pub struct Forecast {
 }
 
 impl<'a> Forecaster<'a> {
-    /// The sensor as it is.
-    pub fn new(design: &'a Design) -> Self {
+    /// The sensor as it is, in `environment`.
+    ///
+    /// # Errors
+    /// As [`Operating::of`].
+    pub fn new(design: &'a Design, environment: &Environment) -> Result<Self, Error> {
+        let operating = Operating::of(design, environment)?;
         let codebook = &design.coding.codebook;
         let mut weights = BTreeMap::new();
         let sent = (0..codebook.labels() as u16)
@@ -70,7 +76,18 @@ impl<'a> Forecaster<'a> {
         }
         let pixel_period = design.derived().pixel_period;
         let mean_weight = codebook.mean_weight();
-        Self { design, pixel_period, weights, mean_weight, light: 1.0, background: 1.0 }
+        let (light, background) = (1.0, 1.0);
+        Ok(Self { design, operating, pixel_period, weights, mean_weight, light, background })
+    }
+
+    /// The sensor.
+    pub fn design(&self) -> &'a Design {
+        self.design
+    }
+
+    /// What follows from it and its environment.
+    pub fn operating(&self) -> &Operating {
+        &self.operating
     }
 
     /// The same with so many times the light.
@@ -85,17 +102,17 @@ impl<'a> Forecaster<'a> {
 
     /// What it will measure of a target of `reflectance` at `range` metres.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
-        let design = self.design;
+        let (design, operating) = (self.design, &self.operating);
         let detector = &design.detector;
         let (pixel_period, mean_weight) = (self.pixel_period, self.mean_weight);
-        let detected = self.light * Link::of(design).photons(reflectance, range);
-        let false_rate = self.background * detector.false_rate();
+        let detected = self.light * operating.link.photons(reflectance, range);
+        let false_rate = self.background * operating.false_rate;
         let photon_rate = detected * mean_weight / pixel_period;
         let falling = match detector {
             Detector::Geiger(_) => false_rate + photon_rate,
             _ => 0.0,
         };
-        let edge = matched::edges(design, detected, falling);
+        let edge = matched::edges(design, operating, detected, falling);
         let false_edges = match detector {
             Detector::Geiger(geiger) => false_rate * super::detection::armed(geiger, falling),
             _ => false_rate,
@@ -105,23 +122,23 @@ impl<'a> Forecaster<'a> {
         let own = edge * mean_weight / pixel_period;
         let edges = -libm::expm1(-(false_edges + own) * tick) / tick;
         let loss = bank_loss(&design.tdc, edges);
-        let place = matched::Place::of(design, detected);
+        let place = matched::Place::of(design, operating, detected);
         // Where the bank is overrun, all is lit until the last converter is taken: what is lost
         // then makes the rest no clearer.
         let density = -libm::expm1(-(false_edges + own) * place.width);
-        let seen = place.seen(design, detected, falling) * (1.0 - loss);
+        let seen = place.seen(design, operating, detected, falling) * (1.0 - loss);
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - density);
 
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
         let (pd, false_per_shot) = match design.is_coded() {
             true => {
                 let without = -libm::expm1(-false_edges * place.width);
-                matched::chances(design, &self.weights, (mark_pd, density, without))
+                matched::chances(design, operating, &self.weights, (mark_pd, density, without))
             }
             false => first(design, mark_pd, false_edges, range),
         };
         let spread = (density * (1.0 - density)).max(f64::MIN_POSITIVE).sqrt();
-        let timing = matched::Timing::of(design, detected);
+        let timing = matched::Timing::of(design, operating, detected);
         let marks_seen = (mean_weight * seen).max(1.0);
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
         Forecast {
@@ -133,7 +150,7 @@ impl<'a> Forecaster<'a> {
             bank_loss: loss,
             density,
             snr: match detector {
-                _ if !design.is_coded() => detected / noise_of_one(detector, detected),
+                _ if !design.is_coded() => detected / noise_of_one(design, operating, detected),
                 _ => (mark_pd - density) * mean_weight.sqrt() / spread,
             },
             pd,
@@ -190,11 +207,11 @@ fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
 }
 
 /// The noise of an amplitude of `photons`, rms.
-fn noise_of_one(detector: &Detector, photons: f64) -> f64 {
-    match detector {
-        Detector::Linear(linear) => (photons * linear.excess + linear.noise.powi(2)).sqrt(),
-        Detector::FirstFiring(firing) => (photons + firing.noise_photons.powi(2)).sqrt(),
-        Detector::PhotonCounting(_) | Detector::Geiger(_) => photons.sqrt(),
+fn noise_of_one(design: &Design, operating: &Operating, photons: f64) -> f64 {
+    match (&design.detector, &operating.linear) {
+        (_, Some(linear)) => (photons * linear.excess + linear.noise.powi(2)).sqrt(),
+        (Detector::FirstFiring(firing), _) => (photons + firing.noise_photons.powi(2)).sqrt(),
+        _ => photons.sqrt(),
     }
 }
 

@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 use macropulse_codec::statistics::{binomial_tail, normal_quantile, normal_tail};
 
 use super::detection::mark_pd;
+use crate::channel::Operating;
 use crate::design::{Design, Detector, FirstFiring};
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
 
@@ -35,14 +36,14 @@ pub(super) struct Place {
 impl Place {
     /// A tick where edges are exact, else one more than four deviations, rounded up; for marks of
     /// which `detected` photons are detected, whose own deviation may be less than that.
-    pub fn of(design: &Design, detected: f64) -> Self {
+    pub fn of(design: &Design, operating: &Operating, detected: f64) -> Self {
         let tick = s_from_fs(design.tdc.tick_fs);
         let looked_for = design.receiver.jitter_ticks;
         if !design.is_coded() || looked_for <= 0.05 {
             return Self { width: tick, share: 1.0 };
         }
         let ticks = 1.0 + (4.0 * looked_for).ceil();
-        let sigma = Timing::of(design, detected).sigma;
+        let sigma = Timing::of(design, operating, detected).sigma;
         let half = ticks / 2.0 / (sigma * std::f64::consts::SQRT_2);
         Self { width: ticks * tick, share: libm::erf(half) }
     }
@@ -52,18 +53,19 @@ impl Place {
     /// Probability that a mark of which `detected` photons are detected is found where it is
     /// looked for. Photons of a micropulse that reaches beyond its chip fall there or not each by
     /// itself; else its one edge does.
-    pub fn seen(&self, design: &Design, detected: f64, falling: f64) -> f64 {
+    pub fn seen(&self, design: &Design, operating: &Operating, detected: f64, falling: f64) -> f64 {
+        let lit = |photons: f64| mark_pd(design, operating, photons, falling);
         match design.light.spread {
-            Some(_) => mark_pd(&design.detector, detected * self.share, falling),
-            None => mark_pd(&design.detector, detected, falling) * self.share,
+            Some(_) => lit(detected * self.share),
+            None => lit(detected) * self.share,
         }
     }
 }
 
 /// Ticks that a mark of which `detected` photons are detected lights on average, each with the
 /// share of the light that falls into it.
-pub(super) fn edges(design: &Design, detected: f64, falling: f64) -> f64 {
-    let lit = |photons: f64| mark_pd(&design.detector, photons, falling);
+pub(super) fn edges(design: &Design, operating: &Operating, detected: f64, falling: f64) -> f64 {
+    let lit = |photons: f64| mark_pd(design, operating, photons, falling);
     let Some(spread) = design.light.spread else { return lit(detected) };
     let width = spread / s_from_fs(design.tdc.tick_fs);
     let below = |place: f64| normal_tail(-place / width);
@@ -78,10 +80,11 @@ pub(super) fn edges(design: &Design, detected: f64, falling: f64) -> f64 {
 /// many have so many marks.
 pub(super) fn chances(
     design: &Design,
+    operating: &Operating,
     weights: &BTreeMap<usize, usize>,
     (seen, density, false_density): (f64, f64, f64),
 ) -> (f64, f64) {
-    let gate = Gate::of(design);
+    let gate = Gate::of(design, operating);
     let labels: usize = weights.values().sum();
     let mut sums = (0.0, 0.0);
     for (&marks, &count) in weights {
@@ -104,14 +107,14 @@ struct Gate {
 }
 
 impl Gate {
-    fn of(design: &Design) -> Self {
+    fn of(design: &Design, operating: &Operating) -> Self {
         let (nearest, farthest) = design.receiver.gate_ticks;
         let chips = i64::from(design.coding.codebook.chips());
         let around =
             s_from_fs(chips * design.coding.chip_fs) + AROUND * s_from_fs(design.tdc.tick_fs);
         Self {
             lags: f64::from(farthest - nearest) + 1.0,
-            own: Place::of(design, 1.0).width / around,
+            own: Place::of(design, operating, 1.0).width / around,
             false_alarm: design.receiver.false_alarm,
         }
     }
@@ -145,11 +148,11 @@ pub(super) struct Timing {
 
 impl Timing {
     /// Timing of marks of which `detected` photons are detected.
-    pub fn of(design: &Design, detected: f64) -> Self {
+    pub fn of(design: &Design, operating: &Operating, detected: f64) -> Self {
         let tick = s_from_fs(design.tdc.tick_fs);
-        let jitter = match &design.detector {
-            Detector::Linear(linear) => linear.timing(detected),
-            other => other.jitter(),
+        let jitter = match &operating.linear {
+            Some(linear) => linear.timing(detected),
+            None => operating.jitter,
         };
         let rms = design.light.pulse * RMS_OF_FWHM;
         let spread = libm::hypot(rms, jitter);

@@ -45,18 +45,18 @@ impl Check {
 }
 
 /// What must hold, in the order of the light: eyes, the light alone, sunlight, converters, false
-/// returns, chips on a slanted surface. `night` is `day` without the sun. What is idealised is
-/// left out.
-pub fn checks(day: &Design, night: &Design, wanted: &Wanted) -> Vec<Check> {
-    let (by_day, by_night) = (Forecaster::new(day), Forecaster::new(night));
+/// returns, chips on a slanted surface. `by_night` is the same without the sun. What is idealised
+/// is left out.
+pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Vec<Check> {
+    let day = by_day.design();
     let forecast = by_day.forecast(wanted.reflectance, wanted.range);
     let mut checks = Vec::new();
     checks.extend(eyes(day));
-    let light = light(&by_night, wanted);
+    let light = light(by_night, wanted);
     let bright_enough = light.holds();
     checks.push(light);
-    if bright_enough && day.budget.as_ref().is_some_and(|budget| budget.irradiance > 0.0) {
-        checks.push(sunlight(&by_day, wanted, &forecast));
+    if bright_enough && day.budget.is_some() && by_day.operating().background > 0.0 {
+        checks.push(sunlight(by_day, wanted, &forecast));
     }
     checks.push(converters(day, &forecast));
     checks.push(Check {
@@ -75,10 +75,11 @@ pub fn checks(day: &Design, night: &Design, wanted: &Wanted) -> Vec<Check> {
 /// The light that a receiver needs which decides mark by mark and must see all, with probability
 /// 0.99, over the light there is from `wanted`, the mean number of marks taken; of a counter
 /// without noise, n = −ln(1 − 0.99^(1/N)) each. `None` where shots are not coded.
-pub fn mark_by_mark(design: &Design, wanted: &Wanted) -> Option<f64> {
+pub fn mark_by_mark(forecaster: &Forecaster, wanted: &Wanted) -> Option<f64> {
+    let design = forecaster.design();
     let marks = design.coding.codebook.mean_weight();
     let needed = -libm::log1p(-libm::pow(0.99, 1.0 / marks));
-    let forecast = Forecaster::new(design).forecast(wanted.reflectance, wanted.range);
+    let forecast = forecaster.forecast(wanted.reflectance, wanted.range);
     design.is_coded().then(|| needed / forecast.detected_per_mark)
 }
 
@@ -128,7 +129,7 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
         name: "sunlight",
         shortfall,
         finding: format!(
-            "by day Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
+            "under the sun Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
             forecast.pd, forecast.density
         ),
         remedy: "a narrower field or filter by that factor, or more light in fewer marks".into(),
@@ -162,7 +163,7 @@ fn slant(design: &Design, range: f64) -> Option<Check> {
         false => design.light.pulse,
     };
     let chip = match &design.detector {
-        Detector::Linear(linear) => chip.max(linear.response),
+        Detector::Linear(linear) => chip.max(linear.amplifier.response()),
         _ => chip,
     } * SPEED_OF_LIGHT
         / 2.0;
@@ -196,14 +197,18 @@ fn swept(design: &Design) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::environment::Environment;
 
-    fn physical(set: &[(&str, &str)]) -> [Design; 2] {
-        ["day", "night"].map(|sky| {
-            let sky = [("sun.sky", sky)];
-            let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
-            let set: Vec<_> = set.iter().chain(&sky).map(owned).collect();
-            Design::open("kim-park-2016-physical", &set).unwrap()
-        })
+    fn physical(set: &[(&str, &str)]) -> Design {
+        let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+        let set: Vec<_> = set.iter().map(owned).collect();
+        Design::open("kim-park-2016-physical", &set).unwrap()
+    }
+
+    /// By day and by night.
+    fn skies(design: &Design) -> [Forecaster<'_>; 2] {
+        let day = Environment::default();
+        [&day, &day.at_night()].map(|sky| Forecaster::new(design, sky).unwrap())
     }
 
     const WHITE: Wanted = Wanted { reflectance: 1.0, range: 150.0, pd: 0.9, false_points: 1e-4 };
@@ -214,7 +219,8 @@ mod tests {
 
     #[test]
     fn the_paper_has_too_little_light_at_150_metres_and_too_much_sun_nearer() {
-        let [day, night] = physical(&[]);
+        let design = physical(&[]);
+        let [day, night] = skies(&design);
         assert_eq!(failing(&checks(&day, &night, &WHITE)), ["light", "converters", "slant"]);
         assert_eq!(failing(&checks(&night, &night, &WHITE)), ["light", "slant"]);
         let nearer = Wanted { range: 130.0, ..WHITE };
@@ -225,16 +231,19 @@ mod tests {
     /// 99 times too little light for a receiver that must see every micropulse.
     #[test]
     fn chip_by_chip_it_is_short_by_a_factor_of_100() {
-        let [day, _] = physical(&[]);
+        let design = physical(&[]);
+        let [day, _] = skies(&design);
         let factor = mark_by_mark(&day, &WHITE).unwrap();
         assert!((97.0..101.0).contains(&factor), "{factor}");
-        assert_eq!(mark_by_mark(&Design::open("hdl-64e", &[]).unwrap(), &WHITE), None);
+        let uncoded = Design::open("hdl-64e", &[]).unwrap();
+        assert_eq!(mark_by_mark(&skies(&uncoded)[0], &WHITE), None);
     }
 
     #[test]
     fn more_energy_than_class_1_allows_is_said_with_its_factor() {
         let own = "['eye-safety', 'detector-bandwidth', 'inter-chip', 'mirror-motion']";
-        let [day, night] = physical(&[("light.energy", "{ shot_nj = 10.1 }"), ("idealised", own)]);
+        let design = physical(&[("light.energy", "{ shot_nj = 10.1 }"), ("idealised", own)]);
+        let [day, night] = skies(&design);
         let checks = checks(&day, &night, &WHITE);
         assert_eq!(checks[0].name, "eye safety");
         assert!((12.1..12.4).contains(&checks[0].shortfall), "{}", checks[0].shortfall);
@@ -242,7 +251,8 @@ mod tests {
 
     #[test]
     fn a_black_target_needs_more_light() {
-        let [day, night] = physical(&[]);
+        let design = physical(&[]);
+        let [day, night] = skies(&design);
         let checks = checks(&day, &night, &Wanted { reflectance: 0.05, ..WHITE });
         let light = checks.iter().find(|check| check.name == "light").unwrap();
         assert!(light.shortfall > 5.0 && light.shortfall < 40.0, "{}", light.shortfall);

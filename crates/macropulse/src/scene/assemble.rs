@@ -23,6 +23,7 @@ use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
 use super::{Object, Scene};
 use crate::digest::Digest;
+use crate::environment::Environment;
 use crate::names::line_column;
 
 /// What has been put together so far.
@@ -59,6 +60,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         car: None,
     };
     assembly.define(&file)?;
+    let environment = assembly.environment(&file)?;
     let sensor = assembly.pose(&file.sensor)?;
     if file.sensor.position_m.is_none() {
         assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
@@ -95,7 +97,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         let name = &objects[usize::from(*object)].name;
         format!("sensor: it stands inside {name}; move one of them, unless that is meant")
     }));
-    Ok(Scene { name, materials, objects, sensor, interferers, notes, world, surfaces })
+    Ok(Scene { name, materials, objects, sensor, environment, interferers, notes, world, surfaces })
 }
 
 impl Assembly<'_> {
@@ -133,6 +135,20 @@ impl Assembly<'_> {
             self.defined.push(made);
         }
         Ok(())
+    }
+
+    /// Sun and air; those of a clear day where the file names none.
+    fn environment(&mut self, file: &SceneFile) -> Result<Environment, Error> {
+        let Some(typed) = &file.environment else {
+            let assumed = Environment::default();
+            let (name, conditions) = (&assumed.name, assumed.conditions());
+            self.notes.push(format!("environment: none given, {name} is assumed: {conditions}"));
+            return Ok(assumed);
+        };
+        Environment::read(typed.get_ref()).map_err(|error| {
+            let key = format!("environment.{}", error.key);
+            self.source.fault_at_key(&key, typed.span(), error.to_string())
+        })
     }
 
     /// Adds the ground; gives its height, m.

@@ -6,7 +6,8 @@ use toml::{Table, Value};
 
 use super::file::object_names;
 use super::{Error, Scene};
-use crate::names::nearest;
+use crate::environment;
+use crate::names::{nearest, toml_value};
 
 /// Names of the three numbers of a position or size.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
@@ -34,12 +35,21 @@ impl Scene {
             }
         };
         let keys = || changes.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>().join(", ");
-        let refused = |message: String| Error::Changed { key: keys(), message };
+        let refused = |message: String| {
+            let told = |key: &str| message.strip_prefix(key)?.strip_prefix(": ");
+            let named = changes.iter().find_map(|(key, _)| Some((key, told(key)?)));
+            match named {
+                Some((key, rest)) => Error::Changed { key: key.clone(), message: rest.to_owned() },
+                None => Error::Changed { key: keys(), message },
+            }
+        };
         let mut table: Table =
             text.parse().map_err(|error: toml::de::Error| refused(error.message().to_owned()))?;
         for (key, value) in changes {
-            change(&mut table, key, value)
-                .map_err(|message| Error::Changed { key: key.clone(), message })?;
+            change(&mut table, key, value).map_err(|message| {
+                let rest = message.strip_prefix(&format!("{key}: ")).map(str::to_owned);
+                Error::Changed { key: key.clone(), message: rest.unwrap_or(message) }
+            })?;
         }
         let text = toml::to_string(&table).map_err(|error| refused(error.to_string()))?;
         Self::from_toml(&text, name_or_file, base).map_err(|error| match error {
@@ -50,11 +60,49 @@ impl Scene {
     }
 }
 
+/// Keys of the scene stand behind this among those of a sensor.
+const OF_SCENE: &str = "scene:";
+
+/// The table of sun and air.
+const ENVIRONMENT: &str = "environment";
+
+/// Of `changes`, those of a scene, which are the keys behind `scene:` and those of its environment,
+/// and apart from them those of a sensor.
+pub fn apart(changes: &[(String, String)]) -> Changes {
+    let mut apart = Changes::default();
+    for (key, value) in changes {
+        let of_scene = key.strip_prefix(OF_SCENE).or_else(|| key_of(key).map(|_| key.as_str()));
+        match of_scene {
+            Some(key) => apart.of_scene.push((key.to_owned(), value.clone())),
+            None => apart.of_sensor.push((key.clone(), value.clone())),
+        }
+    }
+    apart
+}
+
+/// Changes of a scene apart from those of a sensor: dotted keys and values.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Changes {
+    /// For [`Scene::open_changed`].
+    pub of_scene: Vec<(String, String)>,
+    /// For [`Design::open`](crate::design::Design::open).
+    pub of_sensor: Vec<(String, String)>,
+}
+
+/// The key within the environment, empty for the whole of it; `None` for other keys.
+fn key_of(key: &str) -> Option<&str> {
+    let rest = key.strip_prefix(ENVIRONMENT)?;
+    if rest.is_empty() { Some(rest) } else { rest.strip_prefix('.') }
+}
+
 fn change(table: &mut Table, key: &str, typed: &str) -> Result<(), String> {
-    let value = format!("v = {typed}").parse::<Table>().ok();
-    let value = value
-        .and_then(|mut parsed| parsed.remove("v"))
-        .unwrap_or_else(|| Value::String(typed.to_owned()));
+    let value = toml_value(typed);
+    if let Some(key) = key_of(key) {
+        let now = environment::change(table.remove(ENVIRONMENT), key, value);
+        let now = now.map_err(|error| error.to_string())?;
+        table.insert(ENVIRONMENT.to_owned(), now);
+        return Ok(());
+    }
     let (above, last) = key.rsplit_once('.').unwrap_or(("", key));
     let mut at = None;
     for step in above.split('.').filter(|step| !step.is_empty()) {

@@ -4,8 +4,26 @@ use super::closed_form::{Shape, Solid};
 use super::placed::Placed;
 use super::pose::Pose;
 use crate::digest::Digest;
+use crate::environment::{Effect, Environment, Sunlight};
 
 impl Digest {
+    /// Takes in sun and air.
+    pub(super) fn environment(&mut self, environment: &Environment) {
+        let Environment { name: _, sunlight, albedo, visibility, rain_mm_h, idealised } =
+            environment;
+        let (sky, value) = match *sunlight {
+            Sunlight::Day { elevation: None } => (0, 0.0),
+            Sunlight::Day { elevation: Some(elevation) } => (1, elevation),
+            Sunlight::Overcast => (2, 0.0),
+            Sunlight::Night => (3, 0.0),
+            Sunlight::Declared(irradiance) => (4, irradiance),
+        };
+        self.bytes(&[sky]);
+        [value, *albedo, *visibility, *rain_mm_h].into_iter().for_each(|value| self.number(value));
+        let effects = Effect::ALL.map(|effect| u8::from(idealised.contains(&effect)));
+        self.bytes(&effects);
+    }
+
     /// Takes in a pose.
     pub(super) fn pose(&mut self, pose: &Pose) {
         let Pose { position: [x, y, z], yaw, pitch, roll } = *pose;

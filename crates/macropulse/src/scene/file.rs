@@ -9,7 +9,7 @@ use serde::Deserialize;
 use toml::{Spanned, Table};
 
 use super::error::Error;
-use crate::names::{line_column, nearest};
+use crate::names::{line_column, nearest, offset_of_key};
 
 /// A whole scene file.
 #[derive(Debug, Deserialize)]
@@ -19,6 +19,7 @@ pub(super) struct SceneFile {
     pub name: Option<String>,
     #[serde(default)]
     pub sensor: Stand,
+    pub environment: Option<Spanned<toml::Value>>,
     pub ground: Option<Ground>,
     #[serde(default, rename = "material")]
     pub materials: Vec<Spanned<Defined>>,
@@ -237,6 +238,17 @@ impl Source<'_> {
     pub(super) fn parse(&self) -> Result<SceneFile, Error> {
         toml::from_str(self.text)
             .map_err(|fault| self.fault(fault.span().unwrap_or(0..0), with_advice(fault.message())))
+    }
+
+    /// An error at the dotted `key`, or else at `span`.
+    pub(super) fn fault_at_key(
+        &self,
+        key: &str,
+        span: Range<usize>,
+        message: impl Into<String>,
+    ) -> Error {
+        let span = offset_of_key(self.text, key).map_or(span, |at| at..at);
+        self.fault(span, message)
     }
 
     /// An error at a place in the text.

@@ -27,6 +27,7 @@ use std::path::Path;
 
 pub use builtin::builtin_names;
 pub use car::SIZE as CAR_SIZE;
+pub use change::{Changes, apart};
 pub use closed_form::{Shape, Solid};
 pub use error::Error;
 pub use hits::{CastRays, Hit, Hits, Ray};
@@ -38,6 +39,7 @@ pub use pose::{Pose, Transform};
 pub use trace::{PARTS, Traced};
 
 use crate::digest::Digest;
+use crate::environment::Environment;
 use crate::kernels::{LANES, Packet};
 use file::Source;
 use world::{PacketHits, World};
@@ -54,6 +56,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Where the sensor stands and looks.
     pub sensor: Pose,
+    /// Sun and air.
+    pub environment: Environment,
     /// The other lidars whose light falls into the scene.
     pub interferers: Vec<Interferer>,
     /// Every assumption made while reading: units, axes, materials. To be shown to the user.
@@ -170,6 +174,7 @@ impl Scene {
             hash.bytes(&[u8::from(object.is_target)]);
         }
         hash.pose(&self.sensor);
+        hash.environment(&self.environment);
         self.interferers.iter().for_each(|interferer| hash.interferer(interferer));
         hash.text()
     }
@@ -182,6 +187,7 @@ impl fmt::Debug for Scene {
             .field("materials", &self.materials)
             .field("objects", &self.objects)
             .field("sensor", &self.sensor)
+            .field("environment", &self.environment)
             .field("interferers", &self.interferers)
             .field("notes", &self.notes)
             .field("triangles", &self.triangles())

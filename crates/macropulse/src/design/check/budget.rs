@@ -1,12 +1,9 @@
-//! Energy, optics, sun and eyes.
+//! Energy, optics and eyes.
 
 use super::Check;
 use crate::design::budget::{Budget, Field, Trailing, solid_angle};
-use crate::design::file::{
-    EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile, SkyFile, SunFile,
-};
+use crate::design::file::{EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile};
 use crate::design::safety::{Class1, Limit, Sender, exposure, limits, strictest};
-use crate::design::spectrum::sunlight;
 use crate::design::{Coding, Effect, Error, Light, Pattern, Scan};
 use crate::units::tof_from_range;
 
@@ -37,8 +34,7 @@ impl Check<'_> {
             }
             return Ok(None);
         }
-        let (Some(optics), Some(sun), Some(safety)) = (&file.optics, &file.sun, &file.safety)
-        else {
+        let (Some(optics), Some(safety)) = (&file.optics, &file.safety) else {
             return self.refuse(
                 "optics",
                 "the link budget is not idealised: it needs [optics], or \"link-budget\" in the \
@@ -52,10 +48,6 @@ impl Check<'_> {
         let wavelength = parts.light.wavelength;
         let limits = self.limits(safety, parts)?;
         let energy = self.energy(file, &limits, off(Effect::EyeSafety))?;
-        let irradiance = match off(Effect::Background) {
-            true => 0.0,
-            false => self.irradiance(sun, wavelength)?,
-        };
         Ok(Some(Budget {
             wavelength,
             energy,
@@ -64,8 +56,6 @@ impl Check<'_> {
             transmission: self.within("optics.transmission", optics.transmission, 1e-6, 1.0)?,
             filter: self.within("optics.filter_nm", optics.filter_nm, 1e-3, 1e3)? * 1e-9,
             field: self.field(optics, parts.scan)?,
-            irradiance,
-            albedo: self.within("sun.albedo", sun.albedo, 0.0, 1.0)?,
             efficiency: self.within(path, efficiency, 1e-6, 1.0)?,
         }))
     }
@@ -121,20 +111,6 @@ impl Check<'_> {
         let count_groups = safety.count_lines;
         let sender = Sender { scan, light, coding, distance, count_groups };
         Ok(limits(&class, &exposure(&class, &sender)))
-    }
-
-    fn irradiance(&self, sun: &SunFile, wavelength: f64) -> Result<f64, Error> {
-        let path = "sun.irradiance_w_m2_nm";
-        match (sun.sky, sun.irradiance_w_m2_nm) {
-            (SkyFile::Night, _) => Ok(0.0),
-            (SkyFile::Day, Some(per_nm)) => Ok(self.within(path, per_nm, 0.0, 1e3)? * 1e9),
-            (SkyFile::Day, None) => match sunlight(wavelength) {
-                Some(irradiance) => Ok(irradiance),
-                None => {
-                    self.refuse(path, "is needed: the table of sunlight ends at 350 and 1750 nm")
-                }
-            },
-        }
     }
 
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {

@@ -13,7 +13,7 @@ use crate::design::{
 };
 use crate::units::fs_from_s;
 
-/// The most false edges per second of a detector whose every count is followed on its own.
+/// The most dark counts, or declared background counts, per second.
 const MOST_COUNTS: f64 = 1e12;
 
 /// What a detector gets to see.
@@ -121,8 +121,8 @@ impl Check<'_> {
         Ok(PhotonCounting {
             sensitivity,
             missed_marks: self.within(&at("missed_marks"), file.missed_marks, 0.0, 1.0)?,
-            false_rate: dark
-                + self.background((at("background_hz"), file.background_hz), before)?,
+            dark,
+            background: self.background((at("background_hz"), file.background_hz), before)?,
             jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
         })
     }
@@ -132,21 +132,14 @@ impl Check<'_> {
         let declared = (at("sensitivity"), &file.sensitivity);
         let sensitivity = self.sensitivity(declared, before, |pd| -(-pd).ln_1p())?;
         let dark = self.within(&at("dark_counts_hz"), file.dark_counts_hz, 0.0, MOST_COUNTS)?;
-        let light = self.background((at("background_hz"), file.background_hz), before)?;
-        if dark + light > MOST_COUNTS {
-            let message = format!(
-                "{:.1e} counts per second would fire it again and again, more than are followed \
-                 one by one ({MOST_COUNTS:.0e}): narrow the field or the filter",
-                dark + light
-            );
-            return self.refuse("detector.geiger", message);
-        }
+        let background = self.background((at("background_hz"), file.background_hz), before)?;
         let dead = self.within(&at("dead_time_ns"), file.dead_time_ns, 0.0, 1e6)?;
         Ok(Geiger {
             sensitivity,
             cells: self.count(&at("cells"), file.cells, 1, 1 << 20)?,
             dead_fs: fs_from_s(dead * 1e-9),
-            false_rate: dark + light,
+            dark,
+            background,
             jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
         })
     }
@@ -184,14 +177,11 @@ impl Check<'_> {
             );
             return self.refuse(&path, message);
         };
-        let noise = amplifier.noise_electrons(budget.background() * budget.efficiency);
         Ok(Linear {
             sensitivity: before.honest(budget),
-            threshold: tnr * noise,
-            noise,
-            excess: amplifier.excess(),
-            response: amplifier.response(),
-            false_rate: rate,
+            amplifier,
+            false_alarm: rate,
+            threshold_over_noise: tnr,
             jitter: self.within(&at("jitter_ps"), file.jitter_ps, 0.0, 1e6)? * 1e-12,
         })
     }
@@ -237,18 +227,16 @@ impl Check<'_> {
         })
     }
 
-    /// Counts per second that sunlight makes: by the budget, or as declared.
+    /// Counts per second that sunlight makes, as declared; 0 where they follow from a budget.
     fn background(&self, (path, declared): (String, f64), before: &Before) -> Result<f64, Error> {
         let declared = self.within(&path, declared, 0.0, MOST_COUNTS)?;
         match before.budget {
-            _ if before.is_off(Effect::Background) => Ok(0.0),
-            None => Ok(declared),
             Some(_) if declared > 0.0 => self.refuse(
                 &path,
-                "follows from [sun] and [optics] where the link budget is not idealised: leave it \
-                 out",
+                "follows from [optics] and the environment of the scene where the link budget is \
+                 not idealised: leave it out",
             ),
-            Some(budget) => Ok(budget.background() * budget.efficiency),
+            _ => Ok(declared),
         }
     }
 }

@@ -8,7 +8,7 @@ const STEP: f64 = 5.0;
 /// 37° towards the sun, air mass 1.5 \[G173\]; `None` outside 350…1750 nm. Between the entries of
 /// the table, 5 nm apart, it is interpolated: a filter as narrow as a line of the spectrum may see
 /// more or less.
-pub(super) fn sunlight(wavelength: f64) -> Option<f64> {
+pub fn sunlight(wavelength: f64) -> Option<f64> {
     let place = (wavelength * 1e9 - FIRST) / STEP;
     if !(place >= 0.0 && place <= (GLOBAL_TILT.len() - 1) as f64) {
         return None;

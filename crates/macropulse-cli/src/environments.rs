@@ -1,0 +1,67 @@
+//! `macropulse environments`: sun and air that come with the program.
+
+use clap::Args;
+use macropulse::environment::{self, Environment};
+use serde_json::json;
+
+use crate::fault::Fault;
+use crate::scenes::summary;
+use crate::text::{Columns, print};
+
+/// List the ready environments, sun and air of a scene, or print one as TOML to start from
+#[derive(Args)]
+#[command(after_help = "A scene names one, or writes a table of its own over one:
+  environment = \"night\"
+
+  [environment]
+  base = \"clear-day\"
+  visibility_km = 2.0
+
+Example:
+  macropulse environments fog-50m")]
+pub struct Environments {
+    /// Environment to print
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+
+    /// Print as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(options: &Environments) -> Result<(), Fault> {
+    match &options.name {
+        Some(name) => one(name, options.json),
+        None => all(options.json),
+    }
+}
+
+fn one(name: &str, as_json: bool) -> Result<(), Fault> {
+    let environment = Environment::named(name)?;
+    let toml = environment::text(name).unwrap_or_default();
+    if as_json {
+        let environment = json!({
+            "name": name,
+            "summary": summary(toml),
+            "conditions": environment.conditions(),
+            "toml": toml,
+        });
+        return print(&format!("{environment:#}\n"));
+    }
+    print(toml)
+}
+
+fn all(as_json: bool) -> Result<(), Fault> {
+    let mut columns = Columns::default();
+    let mut list = Vec::new();
+    for name in environment::names() {
+        let summary = summary(environment::text(name).unwrap_or_default());
+        let conditions = Environment::named(name)?.conditions();
+        list.push(json!({ "name": name, "summary": summary, "conditions": conditions }));
+        columns.push(name, format!("{summary}: {conditions}"));
+    }
+    if as_json {
+        return print(&format!("{:#}\n", serde_json::Value::from(list)));
+    }
+    print(&columns.text())
+}
