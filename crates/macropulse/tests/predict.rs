@@ -91,7 +91,9 @@ fn detected(scan: &Scan) -> (u64, u64) {
 /// wherever detection is neither certain nor hopeless.
 #[test]
 fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
-    let design = sensor("kim-park-2016-physical", &[("receiver.effort", "\"thorough\"")]);
+    // Where the light is faint a sidelobe may win, up to 0.3 m farther: not beyond the gate.
+    let keys = [("receiver.effort", "\"thorough\""), ("scan.gate_beyond_m", "1.0")];
+    let design = sensor("kim-park-2016-physical", &keys);
     let mut graded = 0;
     for name in ["clear-day", "night"] {
         let sky = Environment::named(name).unwrap();

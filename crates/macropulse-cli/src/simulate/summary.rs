@@ -16,7 +16,7 @@ impl Run<'_> {
         columns.push("shots", grouped(tally.shots));
         columns.push("light", self.light());
         if !self.scene.interferers.is_empty() {
-            columns.push("others", self.others());
+            columns.push("interferers", self.others());
         }
         columns.push("returns", grouped(tally.returns));
         columns.push("pixels", self.outcomes());

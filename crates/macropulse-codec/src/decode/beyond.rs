@@ -4,8 +4,9 @@
 //! word, arrives while a later one is listened to; where both payloads have bits in common, it
 //! looks like a faint echo of the later shot. The receiver knows what it has sent, and holds the
 //! two against each other at the same place, or whole bits beside it. Some marks both have; of
-//! these a share c is lit. If the earlier shot alone had sent, its other marks are lit as often,
-//! and the other marks of the later shot are dark: half of c divides the two.
+//! these a share c is lit. Of the marks that only one of them has, a share c is lit if the light is
+//! of that one, and the share d of all places that are lit anyway if it is of the other. The return
+//! is given up where the light is of the earlier shot with odds of [`ODDS`] to one.
 
 use std::ops::Range;
 
@@ -13,6 +14,9 @@ use super::timeline::Timeline;
 use super::{Receiver, Reject, Return, Returns};
 use crate::code::Codebook;
 use crate::{ShotLog, Ticks};
+
+/// One return in so many that is held against an earlier shot may be given up wrongly.
+const ODDS: f64 = 1000.0;
 
 /// Takes the returns out of `returns` that light from beyond the gate accounts for better.
 pub(super) fn exclude(
@@ -30,7 +34,12 @@ pub(super) fn exclude(
     // Half of the window in which a mark is looked for, and rounding.
     let slack = 1 + (2.0 * receiver.jitter_ticks).ceil().min(super::FARTHEST_JITTER / 2.0) as u32;
     let timeline = receiver.timeline(codebook, &fired, ticks).dilated(slack, slack);
-    let bench = Bench { receiver, codebook, log, fired, timeline };
+    // At most so many are lit: neighbours overlap.
+    let lit = ticks.tick.len() as f64 * f64::from(2 * slack + 1);
+    let lasts =
+        ticks.tick.last().zip(ticks.tick.first()).map_or(1, |(last, first)| last - first + 1);
+    let density = (lit / f64::from(lasts)).clamp(1e-6, 0.999);
+    let bench = Bench { receiver, codebook, log, fired, timeline, density };
     let mut kept = Returns::with_capacity(returns.len());
     kept.add_rejects(returns);
     for one in returns.each() {
@@ -50,6 +59,8 @@ struct Bench<'a> {
     fired: Vec<i64>,
     /// A tick is lit if light came about then.
     timeline: Timeline,
+    /// Share of the ticks that are.
+    density: f64,
 }
 
 impl Bench<'_> {
@@ -113,10 +124,15 @@ impl Bench<'_> {
                 (Some(_), None) => break,
             }
         }
-        // found/all < c/2, without a division by nothing.
-        let is_dark = |counts: [usize; 2]| 2 * counts[0] * both[1] < counts[1] * both[0];
-        let differ = of_earlier[1] + of_later[1] > 0;
-        both[0] > 0 && differ && !is_dark(of_earlier) && (of_later[1] == 0 || is_dark(of_later))
+        let lit = (both[0] as f64 + 0.5) / (both[1] as f64 + 1.0);
+        if lit <= self.density {
+            return false;
+        }
+        // What each mark says in favour of a macropulse that has it: ln(c/d), or ln((1 − c)/(1 − d)).
+        let (found, missing) =
+            (libm::log(lit / self.density), libm::log((1.0 - lit) / (1.0 - self.density)));
+        let speaks = |[lit, all]: [usize; 2]| lit as f64 * found + (all - lit) as f64 * missing;
+        speaks(of_earlier) - speaks(of_later) > libm::log(ODDS)
     }
 
     /// The shots before `shot`, in the same word, of which light from beyond the gate can arrive
