@@ -1,7 +1,6 @@
 //! The whole flow, as function calls.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -10,14 +9,14 @@ use crate::channel::Foreign;
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands};
-use crate::points::PointCloud;
+use crate::points::{Piece, PointCloud};
 use crate::random::Chance;
 use crate::scene::{Hits, Scene};
 use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
 use macropulse_codec::ShotLog;
-use macropulse_codec::decode::{Reject, Returns};
+use macropulse_codec::decode::{MOST_RETURNS, Reject, Returns};
 
 /// One scan, measured.
 #[derive(Debug, Clone)]
@@ -69,21 +68,23 @@ pub struct Watch<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Scan after scan of one sensor in one scene, as many as there may be in the memory of one.
+/// Scan after scan of one sensor in one scene, as many as there may be in the memory of one: its
+/// points once as pieces of bands, and once joined.
 pub struct Scans<'a> {
     design: &'a Design,
     scene: &'a Scene,
     detectors: Detectors<'a>,
+    pieces: Vec<Piece>,
     scan: Scan,
 }
 
 impl<'a> Scans<'a> {
     /// The scans of the sensor `design` in `scene`, with the chance of `seed`.
     pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Self {
-        let mut cloud = PointCloud::empty(design, 0);
-        cloud.truth = score::empty_truth(&cloud);
+        let cloud = PointCloud::empty(design, 0);
         let scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
-        Self { design, scene, detectors: Detectors::new(design, Chance::new(seed)), scan }
+        let detectors = Detectors::new(design, Chance::new(seed));
+        Self { design, scene, detectors, pieces: Vec::new(), scan }
     }
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
@@ -101,35 +102,33 @@ impl<'a> Scans<'a> {
 
     /// Measures `bands` of one scan; whether to the end.
     fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
-        self.scan.cloud.clear(bands.first().map_or(0, |band| band.scan));
-        (self.scan.score, self.scan.tally) = Default::default();
         let (design, scene, detectors) = (self.design, self.scene, &self.detectors);
-        let scan = Mutex::new(&mut self.scan);
         let stopped = AtomicBool::new(false);
-        bands.par_iter().for_each_init(Memory::default, |memory, band| {
+        self.pieces.resize_with(bands.len(), Piece::default);
+        let counts = bands.par_iter().zip(&mut self.pieces);
+        let counts = counts.map_init(Memory::default, |memory, (band, piece)| {
             if stopped.load(Ordering::Relaxed) || (watch.stop)() {
-                return stopped.store(true, Ordering::Relaxed);
+                stopped.store(true, Ordering::Relaxed);
+                return Default::default();
             }
             let measured = measure((design, scene), detectors, memory, band);
-            // Bands have no pixel in common, and counts add up in any order.
-            scan.lock().unwrap_or_else(PoisonError::into_inner).add(design, scene, &measured);
+            let counted = measured.judged((design, scene), band.scan, piece);
             (watch.done)(band.shots);
+            counted
         });
-        !stopped.into_inner()
-    }
-}
-
-impl Scan {
-    fn add(&mut self, design: &Design, scene: &Scene, band: &Measured) {
-        let clock = Instant::now();
-        self.cloud.add(design, &band.log, &band.returns);
-        let mut score = score::judge(&mut self.cloud, design, scene, &band.log, &band.hits);
-        if !band.foreign.is_empty() {
-            score.ghosts = score::ghosts(&self.cloud, design, &band.log, &band.foreign);
+        let counts: Vec<(Score, Tally)> = counts.collect();
+        if stopped.into_inner() {
+            return false;
         }
-        self.score.add(&score);
-        self.tally.add(&band.tally);
-        self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        (self.scan.score, self.scan.tally) = Default::default();
+        for (score, tally) in &counts {
+            self.scan.score.add(score);
+            self.scan.tally.add(tally);
+        }
+        self.scan.cloud.join(bands.first().map_or(0, |band| band.scan), &self.pieces);
+        self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        true
     }
 }
 
@@ -140,6 +139,25 @@ struct Measured {
     foreign: Foreign,
     returns: Returns,
     tally: Tally,
+}
+
+impl Measured {
+    /// Makes the returns of a band of scan number `scan` the points of `piece`, and counts.
+    fn judged(
+        mut self,
+        (design, scene): (&Design, &Scene),
+        scan: u64,
+        piece: &mut Piece,
+    ) -> (Score, Tally) {
+        let clock = Instant::now();
+        piece.fill(design, &self.log, &self.returns, scan);
+        let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
+        if !self.foreign.is_empty() {
+            score.ghosts = score::ghosts(piece, design, &self.log, &self.foreign);
+        }
+        self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        (score, self.tally)
+    }
 }
 
 fn measure(
@@ -186,6 +204,9 @@ fn measure(
     tally.lost = lost;
     tally.peak_busy = peak_busy;
     tally.returns = returns.shot.len() as u64;
+    for number in &returns.number {
+        tally.by_number[usize::from(number - 1)] += 1;
+    }
     tally.rejects = returns.rejects;
     memory.take_back(ticks.tick);
     Measured { log, hits, foreign: echoes.foreign, returns, tally }
@@ -218,6 +239,8 @@ pub struct Tally {
     pub peak_busy: u32,
     /// Returns decoded.
     pub returns: u64,
+    /// Of these the first, the second ones of their shots, and so on.
+    pub by_number: [u64; MOST_RETURNS as usize],
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
     /// Seconds spent in each of [`Tally::STAGES`], summed over threads.
@@ -244,6 +267,7 @@ impl Tally {
         ];
         sums.into_iter().for_each(|(sum, more)| *sum += more);
         self.peak_busy = self.peak_busy.max(other.peak_busy);
+        self.by_number.iter_mut().zip(other.by_number).for_each(|(sum, more)| *sum += more);
         self.rejects.iter_mut().zip(other.rejects).for_each(|(sum, more)| *sum += more);
         self.seconds.iter_mut().zip(other.seconds).for_each(|(sum, more)| *sum += more);
     }

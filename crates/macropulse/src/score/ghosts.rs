@@ -9,28 +9,28 @@ use std::ops::Range;
 
 use crate::channel::Foreign;
 use crate::design::Design;
-use crate::points::{Outcome, PointCloud};
+use crate::points::{Outcome, Piece};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 use macropulse_codec::ShotLog;
 
-/// Counts the ghosts among the owned shots of `log`, whose returns in `cloud` are judged already,
-/// in the light of others that is `foreign`.
-pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, foreign: &Foreign) -> u64 {
-    let light = Light::of(design, foreign);
-    let is_ghost = |shot: &usize| {
-        let pixel = cloud.pixel(log, *shot);
-        let outcome = cloud.truth.outcome[pixel];
+/// Counts the ghosts among the returns of a band, which are judged already, in the light of others
+/// that is `foreign`.
+pub fn ghosts(piece: &Piece, design: &Design, log: &ShotLog, foreign: &Foreign) -> u64 {
+    let (light, points) = (Light::of(design, foreign), &piece.points);
+    let is_ghost = |at: &usize| {
+        let (at, shot) = (*at, piece.shot[*at] as usize);
+        let outcome = points.truth.returns.outcome[at];
         if !matches!(outcome, Outcome::Wrong | Outcome::False) {
             return false;
         }
-        let tof_fs = fs_from_s(tof_from_range(f64::from(cloud.range[pixel])));
-        let begins_fs = log.fired_at_fs[*shot] + tof_fs;
-        let own = design.coding.codebook.marks(log.label[*shot], log.word[*shot]);
+        let tof_fs = fs_from_s(tof_from_range(f64::from(points.range[at])));
+        let begins_fs = log.fired_at_fs[shot] + tof_fs;
+        let own = design.coding.codebook.marks(log.label[shot], log.word[shot]);
         let own = own.iter().map(|mark| begins_fs + i64::from(*mark) * design.coding.chip_fs);
-        let met = light.met(own, (log.row[*shot], log.column[*shot]));
-        2 * met >= u64::from(cloud.peak[pixel]).max(1)
+        let met = light.met(own, (log.row[shot], log.column[shot]));
+        2 * met >= u64::from(points.peak[at]).max(1)
     };
-    log.owned.clone().filter(is_ghost).count() as u64
+    (0..piece.shot.len()).filter(is_ghost).count() as u64
 }
 
 /// Foreign light, in the order in which it arrives.
@@ -91,16 +91,26 @@ impl<'a> Light<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::points::Surface;
+    use macropulse_codec::decode::Returns;
 
     /// One shot of the coded sensor that was answered from 30 m, with `outcome`; foreign light has
     /// the same marks, `late_fs` behind them.
     fn count(outcome: Outcome, late_fs: i64, kept: usize) -> u64 {
         let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
-        let mut cloud = PointCloud::empty(&design, 0);
-        cloud.truth = crate::score::empty_truth(&cloud);
-        cloud.truth.outcome[0] = outcome;
-        (cloud.range[0], cloud.peak[0]) = (30.0, 40);
+        let answered = Returns {
+            shot: vec![0],
+            number: vec![1],
+            tof: vec![tof_from_range(30.0)],
+            peak: vec![40],
+            marks: vec![40],
+            margin: vec![40],
+            photons: vec![1.0],
+            ..Returns::default()
+        };
+        let mut piece = Piece::of(&design, &log, &answered, 0);
+        piece.points.truth.returns.push(Surface { outcome, ..Surface::NONE });
         let chip_fs = design.coding.chip_fs;
         let marks = design.coding.codebook.marks(log.label[0], log.word[0]);
         let mark_fs: Vec<i64> =
@@ -116,7 +126,7 @@ mod tests {
             shot: vec![0],
             way: vec![0],
         };
-        ghosts(&cloud, &design, &log, &foreign)
+        ghosts(&piece, &design, &log, &foreign)
     }
 
     #[test]
@@ -130,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_right_return_is_none_nor_is_one_beside_the_light() {
-        for outcome in [Outcome::Right, Outcome::Near, Outcome::Missed, Outcome::Empty] {
+        for outcome in [Outcome::Right, Outcome::Near] {
             assert_eq!(count(outcome, 0, 58), 0, "{outcome:?}");
         }
         assert_eq!(count(Outcome::Wrong, 10 * 2500, 58), 0);
