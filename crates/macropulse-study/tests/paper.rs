@@ -405,12 +405,13 @@ mod others {
         let design = Design::open("peregrine", &[]).unwrap();
         let scene = Scene::open(&format!("car-{distance}m")).unwrap();
         let cloud = sim::scan(&design, &scene, 1, 0).cloud;
-        let first = &cloud.truth.pixels;
-        let heights = (0..first.object.len()).filter_map(|pixel| {
-            let object = first.object[pixel];
+        let image = cloud.image(cloud.pick);
+        let heights = (0..image.len()).filter_map(|pixel| {
+            let seen = image.surface(&cloud, pixel);
+            let object = seen.object;
             let (row, column) = (pixel / cloud.columns, pixel % cloud.columns);
             let [_, _, up] = design.directions().of(row as u16, column as u16);
-            let height = scene.sensor.position[2] + up * f64::from(first.range[pixel]);
+            let height = scene.sensor.position[2] + up * f64::from(seen.range);
             (object != NO_OBJECT && scene.objects[usize::from(object)].is_target).then_some(height)
         });
         heights.fold(f64::INFINITY, f64::min)

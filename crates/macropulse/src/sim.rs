@@ -68,8 +68,7 @@ pub struct Watch<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Scan after scan of one sensor in one scene, as many as there may be in the memory of one: its
-/// points once as pieces of bands, and once joined.
+/// Scan after scan of one sensor in one scene, as many as there may be in the memory of one.
 pub struct Scans<'a> {
     design: &'a Design,
     scene: &'a Scene,
@@ -104,33 +103,44 @@ impl<'a> Scans<'a> {
     fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
         let (design, scene, detectors) = (self.design, self.scene, &self.detectors);
         let stopped = AtomicBool::new(false);
-        self.pieces.resize_with(bands.len(), Piece::default);
-        let counts = bands.par_iter().zip(&mut self.pieces);
-        let counts = counts.map_init(Memory::default, |memory, (band, piece)| {
-            if stopped.load(Ordering::Relaxed) || (watch.stop)() {
-                stopped.store(true, Ordering::Relaxed);
-                return Default::default();
-            }
-            let measured = measure((design, scene), detectors, memory, band);
-            let counted = measured.judged((design, scene), band.scan, piece);
-            (watch.done)(band.shots);
-            counted
-        });
-        let counts: Vec<(Score, Tally)> = counts.collect();
-        if stopped.into_inner() {
-            return false;
-        }
         let clock = Instant::now();
         (self.scan.score, self.scan.tally) = Default::default();
-        for (score, tally) in &counts {
-            self.scan.score.add(score);
-            self.scan.tally.add(tally);
-        }
-        self.scan.cloud.join(bands.first().map_or(0, |band| band.scan), &self.pieces);
+        self.scan.cloud.start(bands.first().map_or(0, |band| band.scan));
         self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        let at_once = BANDS_PER_THREAD * rayon::current_num_threads();
+        self.pieces.resize_with(at_once.min(bands.len()), Piece::default);
+        for bands in bands.chunks(at_once) {
+            let pieces = &mut self.pieces[..bands.len()];
+            let counts = bands.par_iter().zip(pieces);
+            let counts = counts.map_init(Memory::default, |memory, (band, piece)| {
+                if stopped.load(Ordering::Relaxed) || (watch.stop)() {
+                    stopped.store(true, Ordering::Relaxed);
+                    return Default::default();
+                }
+                let measured = measure((design, scene), detectors, memory, band);
+                let counted = measured.judged((design, scene), band.scan, piece);
+                (watch.done)(band.shots);
+                counted
+            });
+            let counts: Vec<(Score, Tally)> = counts.collect();
+            if stopped.load(Ordering::Relaxed) {
+                return false;
+            }
+            let clock = Instant::now();
+            for (score, tally) in &counts {
+                self.scan.score.add(score);
+                self.scan.tally.add(tally);
+            }
+            self.scan.cloud.append(&self.pieces[..bands.len()]);
+            self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        }
         true
     }
 }
+
+/// Bands are computed side by side, and then joined while they are still in the cache: so many for
+/// each thread, that hardly any thread waits for the last one.
+const BANDS_PER_THREAD: usize = 16;
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
 struct Measured {

@@ -45,7 +45,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
                     cosine: 0.5,
                     outcome: Outcome::Missed,
                 },
-                |at| truth.returns.at(at),
+                |at| Surface { outcome: truth.returns.outcome[at], ..Surface::NONE },
             ));
         }
     }

@@ -116,7 +116,7 @@ fn parse(bytes: &[u8]) -> Result<PointCloud, String> {
         record.pixel = [(at / columns) as u16, (at % columns) as u16];
         record.number = [1, 1];
         cloud.fired_ns.push(record.time_ns);
-        cloud.truth.pixels.push(record.surface);
+        cloud.truth.pixels.push(record.of_pixel());
         if record.is_return() {
             cloud.add(&record);
         }
@@ -147,7 +147,8 @@ fn with_pixels(cloud: &PointCloud) -> Truth {
     let returns = cloud.truth.returns.clone();
     let mut of_pixels = Surfaces::default();
     for at in cloud.image(cloud.pick).iter() {
-        of_pixels.push(at.map_or(Surface::NONE, |at| returns.at(at)));
+        let outcome = at.map_or(Outcome::Empty, |at| returns.outcome[at]);
+        of_pixels.push(Surface { outcome, ..Surface::NONE });
     }
     Truth { returns, pixels: of_pixels }
 }
@@ -281,6 +282,14 @@ impl Record {
             record.range = x.hypot(y).hypot(z);
         }
         Ok(record)
+    }
+
+    /// What stands beside its pixel.
+    fn of_pixel(&self) -> Surface {
+        match self.is_return() {
+            true => Surface { outcome: self.surface.outcome, ..Surface::NONE },
+            false => self.surface,
+        }
     }
 
     fn is_return(&self) -> bool {

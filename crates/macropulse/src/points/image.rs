@@ -59,7 +59,8 @@ impl Image {
     }
 
     /// What stands beside `pixel` of `cloud`: the surface of the return it shows or, without one, the
-    /// first surface along its beam. The outcome is that of the pixel.
+    /// first surface along its beam. The outcome is that of the pixel
+    /// if this is the image of the cloud's own pick.
     pub fn surface(&self, cloud: &PointCloud, pixel: usize) -> Surface {
         let truth = &cloud.truth;
         self.get(pixel).map_or_else(|| truth.pixels.at(pixel), |at| truth.returns.at(at))

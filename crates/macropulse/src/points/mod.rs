@@ -112,8 +112,8 @@ pub struct Truth {
     /// Of every return, the surface it came from, or else the first one along the beam within the
     /// range gate; and how the return came out.
     pub returns: Surfaces,
-    /// Of every pixel, the first surface along the beam within the range gate; and how the pixel came
-    /// out, by the return that its image shows.
+    /// How every pixel came out, by the return that its image shows; and of those without a return the
+    /// first surface along the beam within the range gate.
     pub pixels: Surfaces,
 }
 
@@ -177,6 +177,27 @@ impl Surfaces {
             cosine: self.cosine[at],
             outcome: self.outcome[at],
         }
+    }
+
+    /// Replaces line `at`.
+    #[inline]
+    pub(crate) fn set(&mut self, at: usize, surface: Surface) {
+        self.range[at] = surface.range;
+        self.object[at] = surface.object;
+        self.material[at] = surface.material;
+        self.cosine[at] = surface.cosine;
+        self.outcome[at] = surface.outcome;
+    }
+
+    /// Makes it so many lines of [`Surface::NONE`], in the memory of what was there.
+    pub(crate) fn blank(&mut self, lines: usize) {
+        self.clear();
+        let Surface { range, object, material, cosine, outcome } = Surface::NONE;
+        self.range.resize(lines, range);
+        self.object.resize(lines, object);
+        self.material.resize(lines, material);
+        self.cosine.resize(lines, cosine);
+        self.outcome.resize(lines, outcome);
     }
 
     /// Forgets all lines, and keeps their memory.

@@ -5,7 +5,7 @@
 
 use std::iter::repeat_n;
 
-use super::{NO_OBJECT, Outcome, PointCloud};
+use super::PointCloud;
 use crate::channel::Link;
 use crate::design::Design;
 use crate::units::range_from_tof;
@@ -21,6 +21,8 @@ pub struct Piece {
     pub shot: Vec<u32>,
     /// For each owned shot, the index of its pixel.
     pixel: Vec<u32>,
+    /// Whether these are one after the other.
+    in_a_row: bool,
 }
 
 impl Piece {
@@ -47,6 +49,7 @@ impl Piece {
             usize::from(log.row[shot]) * points.columns + usize::from(log.column[shot])
         };
         self.pixel.extend(log.owned.clone().map(|shot| pixel(shot) as u32));
+        self.in_a_row = self.pixel.windows(2).all(|pair| pair[1] == pair[0] + 1);
         points.fired_ns.extend(log.owned.clone().map(time_ns));
         self.shot.extend(&returns.shot);
         points.return_number.extend(&returns.number);
@@ -60,56 +63,68 @@ impl Piece {
             points.number_of_returns.extend(repeat_n(further as u8 + 1, further + 1));
             first += further + 1;
         }
+        let fired = returns.shot.iter().map(|&shot| shot as usize);
+        points.row.extend(fired.clone().map(|shot| log.row[shot]));
+        points.column.extend(fired.clone().map(|shot| log.column[shot]));
+        points.time_ns.extend(fired.map(time_ns));
+        points.range.extend(returns.tof.iter().map(|&tof| range_from_tof(tof) as f32));
         let link = Link::of(design);
+        points.intensity.extend(returns.tof.iter().zip(&returns.photons).map(
+            |(&tof, &photons)| {
+                let white = link.photons(1.0, range_from_tof(tof));
+                if white.is_finite() { (f64::from(photons) / white) as f32 } else { 1.0 }
+            },
+        ));
         let directions = design.directions();
-        for (&shot, (&tof, &photons)) in
-            returns.shot.iter().zip(returns.tof.iter().zip(&returns.photons))
-        {
-            let shot = shot as usize;
-            let (row, column) = (log.row[shot], log.column[shot]);
+        // Written in place: three columns that grow one by one take longer than what they hold.
+        for column in [&mut points.x, &mut points.y, &mut points.z] {
+            column.resize(returns.len(), 0.0);
+        }
+        let pixels = points.row.iter().zip(&points.column);
+        let places = points.x.iter_mut().zip(points.y.iter_mut().zip(&mut points.z));
+        for (((&row, &column), &tof), (x, (y, z))) in pixels.zip(&returns.tof).zip(places) {
             let range = range_from_tof(tof);
-            let [x, y, z] = directions.of(row, column);
-            let white = link.photons(1.0, range);
-            let intensity =
-                if white.is_finite() { (f64::from(photons) / white) as f32 } else { 1.0 };
-            points.row.push(row);
-            points.column.push(column);
-            points.x.push((x * range) as f32);
-            points.y.push((y * range) as f32);
-            points.z.push((z * range) as f32);
-            points.range.push(range as f32);
-            points.intensity.push(intensity);
-            points.time_ns.push(time_ns(shot));
+            let point = directions.of(row, column).map(|part| (part * range) as f32);
+            [*x, *y, *z] = point;
         }
     }
 
     /// Forgets everything, and keeps the memory.
     fn clear(&mut self) {
-        let points = &mut self.points;
         [&mut self.shot, &mut self.pixel].into_iter().for_each(Vec::clear);
-        [&mut points.row, &mut points.column, &mut points.peak].into_iter().for_each(Vec::clear);
-        [&mut points.marks, &mut points.margin].into_iter().for_each(Vec::clear);
-        [&mut points.return_number, &mut points.number_of_returns].into_iter().for_each(Vec::clear);
-        [&mut points.x, &mut points.y, &mut points.z].into_iter().for_each(Vec::clear);
-        [&mut points.intensity, &mut points.range, &mut points.photons]
-            .into_iter()
-            .for_each(Vec::clear);
-        [&mut points.time_ns, &mut points.fired_ns].into_iter().for_each(Vec::clear);
-        points.truth.returns.clear();
-        points.truth.pixels.clear();
+        self.points.clear();
     }
 }
 
 impl PointCloud {
-    /// Makes it the cloud of scan number `scan` that has the `pieces`, in their order, in the memory
-    /// of what was in it before. Pixels of no piece are empty.
-    pub fn join(&mut self, scan: u64, pieces: &[Piece]) {
+    /// Makes it the cloud of scan number `scan`, with no return yet and all pixels empty, in the memory
+    /// of what was in it before.
+    pub fn start(&mut self, scan: u64) {
         self.scan = scan;
-        let target = Target {
-            pieces,
-            pixels: self.rows * self.columns,
-            covered: pieces.iter().map(|piece| piece.pixel.len()).sum(),
-        };
+        self.clear();
+        let pixels = self.rows * self.columns;
+        self.fired_ns.resize(pixels, f64::NAN);
+        self.truth.pixels.blank(pixels);
+    }
+
+    /// Empties all columns, and keeps their memory.
+    fn clear(&mut self) {
+        let bytes = [&mut self.return_number, &mut self.number_of_returns];
+        let counts = [&mut self.row, &mut self.column, &mut self.peak];
+        let counts = counts.into_iter().chain([&mut self.marks, &mut self.margin]);
+        let reals = [&mut self.x, &mut self.y, &mut self.z, &mut self.intensity];
+        let reals = reals.into_iter().chain([&mut self.range, &mut self.photons]);
+        bytes.into_iter().for_each(Vec::clear);
+        counts.for_each(Vec::clear);
+        reals.for_each(Vec::clear);
+        [&mut self.time_ns, &mut self.fired_ns].into_iter().for_each(Vec::clear);
+        self.truth.returns.clear();
+        self.truth.pixels.clear();
+    }
+
+    /// Adds the next `pieces`, in their order.
+    pub fn append(&mut self, pieces: &[Piece]) {
+        let target = Target { pieces };
         let truth = &mut self.truth;
         let (seen, first) = (&mut truth.returns, &mut truth.pixels);
         let bytes: [(_, Column<u8>); 2] = [
@@ -156,20 +171,17 @@ impl PointCloud {
                 scope.spawn(move |_| target.append(column, of));
             }
             for (column, of) in real_pixels {
-                scope.spawn(move |_| target.scatter(column, of, f32::NAN));
+                scope.spawn(move |_| target.scatter(column, of));
             }
             for (column, of) in named_pixels {
-                scope.spawn(move |_| target.scatter(column, of, NO_OBJECT));
+                scope.spawn(move |_| target.scatter(column, of));
             }
             let (time_ns, fired_ns) = (&mut self.time_ns, &mut self.fired_ns);
             let (of_returns, of_pixels) = (&mut seen.outcome, &mut first.outcome);
             scope.spawn(|_| target.append(time_ns, |points| &points.time_ns));
-            scope.spawn(|_| target.scatter(fired_ns, |points| &points.fired_ns, f64::NAN));
+            scope.spawn(|_| target.scatter(fired_ns, |points| &points.fired_ns));
             scope.spawn(|_| target.append(of_returns, |points| &points.truth.returns.outcome));
-            let empty = Outcome::Empty;
-            scope.spawn(move |_| {
-                target.scatter(of_pixels, |points| &points.truth.pixels.outcome, empty);
-            });
+            scope.spawn(|_| target.scatter(of_pixels, |points| &points.truth.pixels.outcome));
         });
     }
 }
@@ -180,35 +192,26 @@ type Column<T> = fn(&PointCloud) -> &Vec<T>;
 /// What is joined, and where it goes.
 struct Target<'a> {
     pieces: &'a [Piece],
-    pixels: usize,
-    /// Pixels that the pieces have.
-    covered: usize,
 }
 
 impl Target<'_> {
-    /// Makes `column` that of all pieces, one after the other.
+    /// Adds the column of all pieces to `column`, one after the other.
     fn append<T: Copy>(&self, column: &mut Vec<T>, of: Column<T>) {
-        column.clear();
-        column.reserve(self.pieces.iter().map(|piece| of(&piece.points).len()).sum());
         self.pieces.iter().for_each(|piece| column.extend_from_slice(of(&piece.points)));
     }
 
-    /// Puts the entries of all pieces at their pixels, `none` elsewhere; and nothing if the pieces
-    /// have no such column.
-    fn scatter<T: Copy>(&self, column: &mut Vec<T>, of: Column<T>, none: T) {
-        let is_known = |piece: &Piece| of(&piece.points).len() == piece.pixel.len();
-        if column.len() != self.pixels || self.covered < self.pixels {
-            column.clear();
-            column.resize(self.pixels, none);
-        }
-        if !self.pieces.iter().all(is_known) {
-            return column.clear();
-        }
+    /// Puts the entries of all pieces at their pixels.
+    fn scatter<T: Copy>(&self, column: &mut [T], of: Column<T>) {
         for piece in self.pieces {
-            for (&pixel, &value) in piece.pixel.iter().zip(of(&piece.points)) {
-                if let Some(place) = column.get_mut(pixel as usize) {
-                    *place = value;
-                }
+            let (values, Some(&first)) = (of(&piece.points), piece.pixel.first()) else { continue };
+            let row = first as usize..first as usize + values.len();
+            match column.get_mut(row).filter(|_| piece.in_a_row) {
+                Some(places) => places.copy_from_slice(values),
+                None => piece.pixel.iter().zip(values).for_each(|(&pixel, &value)| {
+                    if let Some(place) = column.get_mut(pixel as usize) {
+                        *place = value;
+                    }
+                }),
             }
         }
     }
@@ -259,7 +262,9 @@ mod tests {
         cloud.range = vec![1.0; 9];
         let logs = [log(2, 0), log(2, 4), log(5, 100)];
         let pieces = logs.each_ref().map(|log| Piece::of(&design, log, &returns(log), 0));
-        cloud.join(0, &pieces);
+        cloud.start(0);
+        cloud.append(&pieces[..2]);
+        cloud.append(&pieces[2..]);
         let expected = logs.iter().map(|log| returns(log).len()).sum::<usize>();
         assert_eq!((cloud.scan, cloud.returns()), (0, expected));
         assert!(cloud.time_ns.is_sorted());
@@ -271,8 +276,7 @@ mod tests {
             let is_last = cloud.return_number[at] == cloud.number_of_returns[at];
             assert_eq!(is_last, !next_is_further, "{at}");
         }
-        assert!(cloud.truth.pixels.outcome.is_empty());
-        cloud.join(8, &[]);
+        cloud.start(8);
         assert_eq!((cloud.scan, cloud.returns()), (8, 0));
         assert!(cloud.fired_ns.iter().all(|time| time.is_nan()));
     }

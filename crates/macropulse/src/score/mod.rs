@@ -86,6 +86,8 @@ pub fn judge(
     let gate = design.scan.min_range..=design.scan.max_range;
     let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
     let mut at = 0;
+    piece.points.truth.pixels.blank(log.owned.len());
+    piece.points.truth.returns.blank(piece.shot.len());
     for shot in log.owned.clone() {
         let first = next;
         while next < hits.shot.len() && hits.shot[next] as usize == shot {
@@ -118,7 +120,7 @@ pub fn judge(
             };
             let answered = matches!(outcome, Outcome::Right | Outcome::Near);
             let source = if answered { nearest } else { met.clone().next() };
-            piece.points.truth.returns.push(surface(source, outcome));
+            piece.points.truth.returns.set(at, surface(source, outcome));
             let points = &piece.points;
             let is_further = points.return_number[at] > 1;
             score.further[outcome as usize] += u64::from(is_further);
@@ -135,7 +137,13 @@ pub fn judge(
             (None, None) => Outcome::Empty,
             (None, Some(_)) => Outcome::Missed,
         };
-        piece.points.truth.pixels.push(surface(first, outcome));
+        let (pixels, pixel) = (&mut piece.points.truth.pixels, shot - log.owned.start);
+        match outcome {
+            Outcome::Empty => {}
+            Outcome::Missed => pixels.set(pixel, surface(first, outcome)),
+            // The surface of a return stands beside the return.
+            _ => pixels.outcome[pixel] = outcome,
+        }
         score.points_on_target += u64::from(shown.is_some_and(|(.., on_target)| on_target));
         let is_dark = || design.coding.codebook.marks(log.label[shot], log.word[shot]).is_empty();
         score.dark += u64::from(outcome == Outcome::Missed && is_dark());
