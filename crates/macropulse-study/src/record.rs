@@ -69,7 +69,7 @@ fn colour_picture(cloud: &PointCloud, design: &Design) -> Result<Vec<u8>, crate:
     layout.zoom = [even, even.max(zoom(cloud.rows, 256))];
     let picture = RangePicture {
         layout,
-        range: &cloud.range,
+        range: &cloud.image(cloud.pick).spread(&cloud.range, f32::NAN),
         near: design.scan.min_range as f32,
         far: design.scan.max_range as f32,
     };
@@ -129,6 +129,10 @@ pub fn manifest(run: &Run) -> Manifest {
         ("returns", tally.returns),
     ] {
         manifest.counts.push(name, count);
+    }
+    for number in 2..=design.receiver.returns {
+        let count = tally.by_number[usize::from(number) - 1];
+        manifest.counts.push(format!("returns_{number}"), count);
     }
     if !scene.interferers.is_empty() {
         manifest.counts.push("foreign", tally.foreign);

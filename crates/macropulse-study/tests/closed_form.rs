@@ -59,7 +59,7 @@ fn pixels(
     farthest: f64,
     formula: impl Fn([f64; 3]) -> Option<f64>,
 ) -> Vec<Pixel> {
-    let measured = (0..cloud.range.len()).filter(|&at| !cloud.time_ns[at].is_nan());
+    let measured = (0..cloud.fired_ns.len()).filter(|&at| !cloud.fired_ns[at].is_nan());
     let with_light = measured.filter(|at| {
         let label = if design.is_coded() { at % cloud.columns } else { 0 };
         !design.coding.codebook.marks(label as u16, 0).is_empty()
@@ -81,10 +81,16 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (square / values.len() as f64).sqrt())
 }
 
+/// The range that each pixel shows, NaN without any.
+fn ranges(cloud: &PointCloud) -> Vec<f32> {
+    cloud.image(cloud.pick).spread(&cloud.range, f32::NAN)
+}
+
 /// Range errors of `pixels` that have a return within the sensor's tolerance, and the fraction
 /// that do.
 fn errors(design: &Design, cloud: &PointCloud, pixels: &[Pixel]) -> (Vec<f64>, f64) {
-    let all = pixels.iter().map(|pixel| f64::from(cloud.range[pixel.at]) - pixel.expected);
+    let ranges = ranges(cloud);
+    let all = pixels.iter().map(|pixel| f64::from(ranges[pixel.at]) - pixel.expected);
     let right: Vec<f64> = all.filter(|error| error.abs() <= design.right_within).collect();
     let fraction = right.len() as f64 / pixels.len() as f64;
     (right, fraction)
@@ -140,11 +146,10 @@ fn points_lie_on_the_wall_in_the_direction_of_their_pixel() {
         let design = clear(name);
         let cloud = measure(&design, &scene);
         let mut before = 0;
+        let image = cloud.image(cloud.pick);
         for Pixel { at, aim, .. } in pixels(&design, &cloud, 60.0, wall) {
+            let Some(at) = image.get(at) else { continue };
             let range = f64::from(cloud.range[at]);
-            if range.is_nan() {
-                continue;
-            }
             let point = [cloud.x[at], cloud.y[at], cloud.z[at]].map(f64::from);
             for (value, part) in point.iter().zip(aim) {
                 assert!((value - part * range).abs() < 1e-5, "{name}: {point:?}, {aim:?}");
@@ -225,8 +230,12 @@ fn the_place_in_the_world_does_not_matter() {
             })
         };
         assert!(a.returns() > 300, "{name}");
-        assert!(farthest(&a.truth.range, &b.truth.range) < 1e-5, "{name}: truth");
-        assert!(farthest(&a.range, &b.range) < 1e-4, "{name}: range");
+        let truth = |cloud: &PointCloud| -> Vec<f32> {
+            let image = cloud.image(cloud.pick);
+            (0..image.len()).map(|pixel| image.surface(cloud, pixel).range).collect()
+        };
+        assert!(farthest(&truth(&a), &truth(&b)) < 1e-5, "{name}: truth");
+        assert!(farthest(&ranges(&a), &ranges(&b)) < 1e-4, "{name}: range");
         // The world alone must not move, or the comparison is blind.
         let apart = written("[[object]]\nshape.sphere.radius_m = 1.5\nposition_m = [30, 2.1, 2]");
         assert_ne!(measure(&design, &apart).returns(), a.returns(), "{name}");
@@ -252,7 +261,9 @@ fn a_matt_wall_is_as_bright_as_the_cosine_law_says() {
         let farthest = distance / 0.9;
         let ahead = |aim: [f64; 3]| (aim[0] > 0.0).then(|| distance / aim[0]);
         let mut by_cosine = [(0.0, 0.0, 0); 5];
+        let image = cloud.image(cloud.pick);
         for Pixel { at, aim, expected } in pixels(&design, &cloud, farthest, ahead) {
+            let Some(at) = image.get(at) else { continue };
             if (f64::from(cloud.range[at]) - expected).abs() <= design.right_within {
                 let bin = &mut by_cosine[((aim[0] - 0.9) * 50.0) as usize];
                 *bin = (bin.0 + aim[0], bin.1 + f64::from(cloud.intensity[at]), bin.2 + 1);

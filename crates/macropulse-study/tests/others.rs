@@ -65,8 +65,8 @@ impl Seen {
         let to_world = scene.sensor.world_from_sensor();
         (0..cloud.range.len())
             .filter(|&at| {
-                cloud.truth.outcome[at] == Outcome::Right
-                    && usize::from(cloud.truth.object[at]) == object
+                let seen = cloud.truth.returns.at(at);
+                seen.outcome == Outcome::Right && usize::from(seen.object) == object
             })
             .map(|at| to_world.point([cloud.x[at], cloud.y[at], cloud.z[at]].map(f64::from)))
             .collect()

@@ -411,11 +411,13 @@ mod others {
         let design = Design::open("peregrine", &[]).unwrap();
         let scene = Scene::open(&format!("car-{distance}m")).unwrap();
         let cloud = sim::scan(&design, &scene, 1, 0).unwrap().cloud;
-        let heights = (0..cloud.range.len()).filter_map(|pixel| {
-            let object = cloud.truth.object[pixel];
+        let image = cloud.image(cloud.pick);
+        let heights = (0..image.len()).filter_map(|pixel| {
+            let seen = image.surface(&cloud, pixel);
+            let object = seen.object;
             let (row, column) = (pixel / cloud.columns, pixel % cloud.columns);
             let [_, _, up] = design.directions().of(row as u16, column as u16);
-            let height = scene.sensor.position[2] + up * f64::from(cloud.truth.range[pixel]);
+            let height = scene.sensor.position[2] + up * f64::from(seen.range);
             (object != NO_OBJECT && scene.objects[usize::from(object)].is_target).then_some(height)
         });
         heights.fold(f64::INFINITY, f64::min)

@@ -1,7 +1,6 @@
 //! The whole flow, as function calls.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -10,14 +9,14 @@ use crate::channel::{Error, Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands};
-use crate::points::PointCloud;
+use crate::points::{Piece, PointCloud};
 use crate::random::Chance;
 use crate::scene::{Hits, Scene};
 use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
 use macropulse_codec::ShotLog;
-use macropulse_codec::decode::{Reject, Returns};
+use macropulse_codec::decode::{MOST_RETURNS, Reject, Returns};
 
 /// One scan, measured.
 #[derive(Debug, Clone)]
@@ -84,6 +83,7 @@ pub struct Scans<'a> {
     scene: &'a Scene,
     operating: Operating,
     detectors: Detectors<'a>,
+    pieces: Vec<Piece>,
     scan: Scan,
 }
 
@@ -95,10 +95,9 @@ impl<'a> Scans<'a> {
     pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Result<Self, Error> {
         let operating = Operating::of(design, &scene.environment)?;
         let detectors = Detectors::new(design, &operating, Chance::new(seed));
-        let mut cloud = PointCloud::empty(design, 0);
-        cloud.truth = score::empty_truth(&cloud);
+        let cloud = PointCloud::empty(design, 0);
         let scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
-        Ok(Self { design, scene, operating, detectors, scan })
+        Ok(Self { design, scene, operating, detectors, pieces: Vec::new(), scan })
     }
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
@@ -116,37 +115,47 @@ impl<'a> Scans<'a> {
 
     /// Measures `bands` of one scan; whether to the end.
     fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
-        self.scan.cloud.clear(bands.first().map_or(0, |band| band.scan));
-        (self.scan.score, self.scan.tally) = Default::default();
         let seen = Seen { design: self.design, scene: self.scene, operating: &self.operating };
         let setup = Setup { seen, detectors: &self.detectors };
-        let scan = Mutex::new(&mut self.scan);
         let stopped = AtomicBool::new(false);
-        bands.par_iter().for_each_init(Memory::default, |memory, band| {
-            if stopped.load(Ordering::Relaxed) || (watch.stop)() {
-                return stopped.store(true, Ordering::Relaxed);
+        let clock = Instant::now();
+        (self.scan.score, self.scan.tally) = Default::default();
+        self.scan.cloud.start(bands.first().map_or(0, |band| band.scan));
+        self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        let at_once = BANDS_PER_THREAD * rayon::current_num_threads();
+        self.pieces.resize_with(at_once.min(bands.len()), Piece::default);
+        for bands in bands.chunks(at_once) {
+            let pieces = &mut self.pieces[..bands.len()];
+            let counts = bands.par_iter().zip(pieces);
+            let counts = counts.map_init(Memory::default, |memory, (band, piece)| {
+                if stopped.load(Ordering::Relaxed) || (watch.stop)() {
+                    stopped.store(true, Ordering::Relaxed);
+                    return Default::default();
+                }
+                let measured = measure(&setup, memory, band);
+                let counted = measured.judged(&setup.seen, piece);
+                (watch.done)(band.shots);
+                counted
+            });
+            let counts: Vec<(Score, Tally)> = counts.collect();
+            if stopped.load(Ordering::Relaxed) {
+                return false;
             }
-            let measured = measure(&setup, memory, band);
-            // Bands have no pixel in common, and counts add up in any order.
-            scan.lock().unwrap_or_else(PoisonError::into_inner).add(&setup, &measured);
-            (watch.done)(band.shots);
-        });
-        !stopped.into_inner()
+            let clock = Instant::now();
+            for (score, tally) in &counts {
+                self.scan.score.add(score);
+                self.scan.tally.add(tally);
+            }
+            self.scan.cloud.append(&self.pieces[..bands.len()]);
+            self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        }
+        true
     }
 }
 
-impl Scan {
-    fn add(&mut self, setup: &Setup, band: &Measured) {
-        let Seen { design, scene, operating } = setup.seen;
-        let clock = Instant::now();
-        self.cloud.add(design, &operating.link, &band.log, &band.returns);
-        let mut score = score::judge(&mut self.cloud, design, scene, &band.log, &band.hits);
-        score.ghosts = score::ghosts(&self.cloud, design, &band.log, &band.light);
-        self.score.add(&score);
-        self.tally.add(&band.tally);
-        self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
-    }
-}
+/// Bands are computed side by side, and then joined while they are still in the cache: so many for
+/// each thread, that hardly any thread waits for the last one.
+const BANDS_PER_THREAD: usize = 16;
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
 struct Measured<'a> {
@@ -155,6 +164,19 @@ struct Measured<'a> {
     light: Light<'a>,
     returns: Returns,
     tally: Tally,
+}
+
+impl Measured<'_> {
+    /// Makes the returns of a band the points of `piece`, and counts.
+    fn judged(mut self, seen: &Seen, piece: &mut Piece) -> (Score, Tally) {
+        let Seen { design, scene, operating } = *seen;
+        let clock = Instant::now();
+        piece.fill(design, &operating.link, &self.log, &self.returns);
+        let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
+        score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
+        self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        (score, self.tally)
+    }
 }
 
 /// What all bands of a run have in common.
@@ -205,6 +227,9 @@ fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<
     tally.lost = lost;
     tally.peak_busy = peak_busy;
     tally.returns = returns.shot.len() as u64;
+    for number in &returns.number {
+        tally.by_number[usize::from(number - 1)] += 1;
+    }
     tally.rejects = returns.rejects;
     memory.take_back(ticks.tick);
     Measured { log, hits, light, returns, tally }
@@ -237,6 +262,8 @@ pub struct Tally {
     pub peak_busy: u32,
     /// Returns decoded.
     pub returns: u64,
+    /// Of these the first, the second ones of their shots, and so on.
+    pub by_number: [u64; MOST_RETURNS as usize],
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
     /// Seconds spent in each of [`Tally::STAGES`], summed over threads.
@@ -263,6 +290,7 @@ impl Tally {
         ];
         sums.into_iter().for_each(|(sum, more)| *sum += more);
         self.peak_busy = self.peak_busy.max(other.peak_busy);
+        self.by_number.iter_mut().zip(other.by_number).for_each(|(sum, more)| *sum += more);
         self.rejects.iter_mut().zip(other.rejects).for_each(|(sum, more)| *sum += more);
         self.seconds.iter_mut().zip(other.seconds).for_each(|(sum, more)| *sum += more);
     }

@@ -79,6 +79,11 @@ fn columns(scan: &Scan) -> (Vec<u32>, Vec<u16>) {
     (scan.cloud.range.iter().map(|range| range.to_bits()).collect(), scan.cloud.peak.clone())
 }
 
+/// The range that each pixel shows, NaN without any.
+fn ranges(scan: &Scan) -> Vec<f32> {
+    scan.cloud.image(scan.cloud.pick).spread(&scan.cloud.range, f32::NAN)
+}
+
 /// One mark in a place is far from the 58 or more of a macropulse.
 #[test]
 fn single_pulses_do_nothing_to_a_coded_receiver() {
@@ -132,7 +137,7 @@ fn an_identical_lidar_out_of_step_looks_like_faint_echoes() {
     assert!((5..100).contains(&scan.score.ghosts), "{:?}", scan.score);
     let found = |outcome: Outcome| {
         let cloud = &scan.cloud;
-        let of = (0..cloud.range.len()).filter(|&at| cloud.truth.outcome[at] == outcome);
+        let of = (0..cloud.range.len()).filter(|&at| cloud.truth.returns.outcome[at] == outcome);
         let (peak, marks) = of.fold((0.0, 0.0), |(peak, marks), at| {
             (peak + f64::from(cloud.peak[at]), marks + f64::from(cloud.marks[at]))
         });
@@ -141,7 +146,7 @@ fn an_identical_lidar_out_of_step_looks_like_faint_echoes() {
     let (ghosts, right) = (found(Outcome::False), found(Outcome::Right));
     let cloud = &scan.cloud;
     let flags = (0..cloud.range.len())
-        .filter(|&at| cloud.truth.outcome[at] == Outcome::False)
+        .filter(|&at| cloud.truth.returns.outcome[at] == Outcome::False)
         .map(|at| cloud.flags(at) & FAINT);
     let faint = flags.clone().filter(|flag| *flag == FAINT).count();
     assert!(100 * faint > 98 * flags.count(), "{faint} faint");
@@ -154,10 +159,11 @@ fn the_ghosts_of_a_drifting_lidar_walk_past() {
     let scans: Vec<Scan> = (0..5).map(|scan| part("drifting", &[], scan)).collect();
     let ghosts: Vec<u64> = scans.iter().map(|scan| scan.score.ghosts).collect();
     assert!(ghosts[0] > 3500 && ghosts[4] < 100, "{ghosts:?}");
-    let is_false = |scan: &Scan, at: usize| scan.cloud.truth.outcome[at] == Outcome::False;
-    let mut walked: Vec<f64> = (0..scans[0].cloud.range.len())
+    let is_false = |scan: &Scan, at: usize| scan.cloud.truth.pixels.outcome[at] == Outcome::False;
+    let [before, after] = [ranges(&scans[0]), ranges(&scans[1])];
+    let mut walked: Vec<f64> = (0..before.len())
         .filter(|&at| is_false(&scans[0], at) && is_false(&scans[1], at))
-        .map(|at| f64::from(scans[0].cloud.range[at] - scans[1].cloud.range[at]))
+        .map(|at| f64::from(before[at] - after[at]))
         .collect();
     walked.sort_by(f64::total_cmp);
     assert!(walked.len() > 1000, "{}", walked.len());
@@ -177,7 +183,7 @@ fn a_spinning_lidar_hardly_sees_the_others() {
     for name in ["dense-pulses", "coded"] {
         let scan = sim::scan(&design, &scenario(name), SEED, 0).unwrap();
         assert!((1..50).contains(&scan.tally.foreign), "{name} {:?}", scan.tally);
-        let pixels = scan.cloud.range.iter().zip(&alone.cloud.range);
+        let pixels = ranges(&scan).into_iter().zip(ranges(&alone));
         let changed = pixels.filter(|(a, b)| a.to_bits() != b.to_bits()).count() as u64;
         assert!(changed <= scan.tally.foreign && scan.score.ghosts <= changed, "{name} {changed}");
     }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse::formats::{Format, Names, read_pcd, read_range_png, write_cloud};
-use macropulse::points::{NO_OBJECT, Outcome, PointCloud, Truth};
+use macropulse::points::{NO_OBJECT, Outcome, Pick, PointCloud, Surface, Surfaces, Truth};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 use std::fs;
@@ -12,39 +12,70 @@ use tempfile::TempDir;
 const ROWS: usize = 5;
 const COLUMNS: usize = 7;
 
-/// Every third pixel is empty; no two pixels have the same value in any column.
-fn cloud(with_truth: bool) -> PointCloud {
+/// Every third pixel is empty, the others have so many returns; no two returns have the same value in
+/// any column.
+fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
     let pixels = ROWS * COLUMNS;
-    let empty = |at: usize| at % 3 == 2;
+    let answered = (0..pixels).filter(|pixel| pixel % 3 != 2);
+    let all: Vec<(usize, u8)> =
+        answered.flat_map(|pixel| (1..=returns_per_shot).map(move |n| (pixel, n))).collect();
+    let place = |&(pixel, number): &(usize, u8)| pixel * 4 + usize::from(number) - 1;
     let each = |value: &dyn Fn(f32) -> f32| -> Vec<f32> {
-        (0..pixels).map(|at| if empty(at) { f32::NAN } else { value(at as f32) }).collect()
+        all.iter().map(|point| value(place(point) as f32 / 4.0)).collect()
     };
-    let count = |scale: usize| (0..pixels).map(|at| (at * scale) as u16).collect::<Vec<_>>();
-    let named = |shift: u16| {
-        (0..pixels).map(|at| if empty(at) { NO_OBJECT } else { at as u16 % 2 + shift }).collect()
-    };
-    let truth = Truth {
-        range: each(&|at| 20.0 + at),
-        object: named(0),
-        material: named(1),
-        cosine: each(&|at| 1.0 - at / 64.0),
-        outcome: (0..pixels).map(|at| Outcome::ALL[at % 6]).collect(),
-    };
+    let count = |scale: usize| all.iter().map(|point| (place(point) * scale) as u16).collect();
+    let fired_ns: Vec<f64> = (0..pixels).map(|at| at as f64 * 40.946_502_1).collect();
+    let mut truth = Truth::default();
+    if with_truth {
+        truth.returns = Surfaces {
+            range: each(&|at| 20.0 + at),
+            object: all.iter().map(|point| place(point) as u16 % 2).collect(),
+            material: all.iter().map(|point| place(point) as u16 % 2 + 1).collect(),
+            cosine: each(&|at| 1.0 - at / 64.0),
+            outcome: all.iter().map(|point| Outcome::ALL[1 + place(point) % 3]).collect(),
+        };
+        for pixel in 0..pixels {
+            let shown = all.iter().position(|&(other, _)| other == pixel);
+            // Of a pixel without a return, the first surface.
+            truth.pixels.push(shown.map_or(
+                Surface {
+                    range: pixel as f32,
+                    object: NO_OBJECT,
+                    material: 3,
+                    cosine: 0.5,
+                    outcome: Outcome::Missed,
+                },
+                |at| Surface { outcome: truth.returns.outcome[at], ..Surface::NONE },
+            ));
+        }
+    }
     PointCloud {
         scan: 12,
         rows: ROWS,
         columns: COLUMNS,
+        returns_per_shot,
+        pick: Pick::First,
+        row: all.iter().map(|(pixel, _)| (pixel / COLUMNS) as u16).collect(),
+        column: all.iter().map(|(pixel, _)| (pixel % COLUMNS) as u16).collect(),
+        return_number: all.iter().map(|(_, number)| *number).collect(),
+        number_of_returns: vec![returns_per_shot; all.len()],
         x: each(&|at| 0.1 + at),
         y: each(&|at| -0.2 * at),
         z: each(&|at| 0.3 * at - 2.0),
         intensity: each(&|at| at / 40.0),
         range: each(&|at| 20.001 + at),
-        time_ns: (0..pixels).map(|at| at as f64 * 40.946_502_1).collect(),
+        time_ns: all.iter().map(|(pixel, _)| fired_ns[*pixel]).collect(),
         peak: count(3),
         marks: count(5),
         margin: count(2),
-        truth: if with_truth { truth } else { Truth::default() },
+        photons: vec![f32::NAN; all.len()],
+        fired_ns,
+        truth,
     }
+}
+
+fn cloud(with_truth: bool) -> PointCloud {
+    cloud_of(1, with_truth)
 }
 
 fn names() -> [Vec<String>; 2] {
@@ -70,6 +101,31 @@ fn assert_same(read: &[f32], written: &[f32], tolerance: f32, what: &str) {
     }
 }
 
+fn assert_same_returns(read: &PointCloud, written: &PointCloud) {
+    assert_same(&read.x, &written.x, 0.0, "x");
+    assert_same(&read.y, &written.y, 0.0, "y");
+    assert_same(&read.z, &written.z, 0.0, "z");
+    assert_same(&read.intensity, &written.intensity, 0.0, "intensity");
+    assert_same(&read.range, &written.range, 0.0, "range");
+    assert_eq!(read.time_ns, written.time_ns);
+    assert_eq!((&read.row, &read.column), (&written.row, &written.column));
+    assert_eq!(read.return_number, written.return_number);
+    assert_eq!(read.number_of_returns, written.number_of_returns);
+    assert_eq!(read.peak, written.peak);
+    assert_eq!(read.marks, written.marks);
+    assert_eq!(read.margin, written.margin);
+    assert_same_truth(&read.truth.returns, &written.truth.returns);
+}
+
+fn assert_same_truth(read: &Surfaces, written: &Surfaces) {
+    assert_same(&read.range, &written.range, 0.0, "true range");
+    assert_eq!(read.object, written.object);
+    assert_eq!(read.material, written.material);
+    assert_eq!(read.outcome, written.outcome);
+    // Stored as an angle in f32: half an ulp of π/2 is 6e-8 rad.
+    assert_same(&read.cosine, &written.cosine, 2e-7, "cosine");
+}
+
 #[test]
 fn pcd_keeps_every_column_of_every_pixel() {
     for with_truth in [false, true] {
@@ -77,48 +133,54 @@ fn pcd_keeps_every_column_of_every_pixel() {
         let (_folder, path) = write(Format::Pcd, &written);
         let read = read_pcd(&path).unwrap();
         assert_eq!((read.scan, read.rows, read.columns), (12, ROWS, COLUMNS));
-        assert_same(&read.x, &written.x, 0.0, "x");
-        assert_same(&read.y, &written.y, 0.0, "y");
-        assert_same(&read.z, &written.z, 0.0, "z");
-        assert_same(&read.intensity, &written.intensity, 0.0, "intensity");
-        assert_same(&read.range, &written.range, 0.0, "range");
-        assert_eq!(read.time_ns, written.time_ns);
-        assert_eq!(read.peak, written.peak);
-        assert_eq!(read.marks, written.marks);
-        assert_eq!(read.margin, written.margin);
-        assert_same(&read.truth.range, &written.truth.range, 0.0, "true range");
-        assert_eq!(read.truth.object, written.truth.object);
-        assert_eq!(read.truth.material, written.truth.material);
-        assert_eq!(read.truth.outcome, written.truth.outcome);
-        // Stored as an angle in f32: half an ulp of π/2 is 6e-8 rad.
-        assert_same(&read.truth.cosine, &written.truth.cosine, 2e-7, "cosine");
+        assert_same_returns(&read, &written);
+        assert_eq!(read.fired_ns, written.fired_ns);
+        assert_same_truth(&read.truth.pixels, &written.truth.pixels);
+    }
+}
+
+#[test]
+fn pcd_keeps_every_return_of_a_list_and_its_image() {
+    for with_truth in [false, true] {
+        for pick in [Pick::First, Pick::Strongest, Pick::Last] {
+            let written = PointCloud { pick, ..cloud_of(3, with_truth) };
+            let (_folder, path) = write(Format::Pcd, &written);
+            let read = read_pcd(&path).unwrap();
+            assert_eq!((read.scan, read.rows, read.columns), (12, ROWS, COLUMNS));
+            assert_eq!((read.returns_per_shot, read.pick), (3, pick));
+            assert_same_returns(&read, &written);
+            assert_eq!(read.image(pick), written.image(pick));
+            // What is written again is the same.
+            let (_other, again) = write(Format::Pcd, &read);
+            assert_eq!(fs::read(&path).unwrap(), fs::read(again).unwrap());
+        }
     }
 }
 
 #[test]
 fn ply_holds_the_returns_as_another_reader_sees_them() {
-    let written = cloud(true);
+    let written = cloud_of(2, true);
     let (_folder, path) = write(Format::Ply, &written);
     let mut file = fs::File::open(path).unwrap();
     let ply = Parser::<DefaultElement>::new().read_ply(&mut file).unwrap();
     let vertices = &ply.payload["vertex"];
-    let valid: Vec<usize> =
-        (0..ROWS * COLUMNS).filter(|&at| written.range[at].is_finite()).collect();
-    assert_eq!(vertices.len(), valid.len());
-    for (vertex, at) in vertices.iter().zip(valid) {
-        let truth = &written.truth;
+    assert_eq!(vertices.len(), written.returns());
+    for (at, vertex) in vertices.iter().enumerate() {
+        let truth = &written.truth.returns;
         assert_eq!(vertex["x"], Property::Float(written.x[at]));
         assert_eq!(vertex["y"], Property::Float(written.y[at]));
         assert_eq!(vertex["z"], Property::Float(written.z[at]));
         assert_eq!(vertex["intensity"], Property::Float(written.intensity[at]));
         assert_eq!(vertex["range"], Property::Float(written.range[at]));
         assert_eq!(vertex["time_ns"], Property::Double(written.time_ns[at]));
-        assert_eq!(vertex["row"], Property::UShort((at / COLUMNS) as u16));
-        assert_eq!(vertex["column"], Property::UShort((at % COLUMNS) as u16));
+        assert_eq!(vertex["row"], Property::UShort(written.row[at]));
+        assert_eq!(vertex["column"], Property::UShort(written.column[at]));
         assert_eq!(vertex["ring"], vertex["row"]);
         assert_eq!(vertex["peak"], Property::UShort(written.peak[at]));
         assert_eq!(vertex["marks"], Property::UShort(written.marks[at]));
         assert_eq!(vertex["margin"], Property::UShort(written.margin[at]));
+        assert_eq!(vertex["return_number"], Property::UChar(1 + at as u8 % 2));
+        assert_eq!(vertex["number_of_returns"], Property::UChar(2));
         assert_eq!(vertex["true_range"], Property::Float(truth.range[at]));
         assert_eq!(vertex["object"], Property::UShort(truth.object[at]));
         assert_eq!(vertex["material"], Property::UShort(truth.material[at]));
@@ -128,7 +190,7 @@ fn ply_holds_the_returns_as_another_reader_sees_them() {
 
 #[test]
 fn csv_holds_the_returns_to_the_last_digit() {
-    let written = cloud(false);
+    let written = cloud_of(2, false);
     let (_folder, path) = write(Format::Csv, &written);
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
@@ -137,16 +199,17 @@ fn csv_holds_the_returns_to_the_last_digit() {
         "x_m,y_m,z_m,intensity,range_m,time_ns,row,column,ring,peak,marks,margin,\
          return_number,number_of_returns,flags"
     );
-    for line in lines {
+    for (at, line) in lines.enumerate() {
         let cells: Vec<&str> = line.split(',').collect();
         let place = |at: usize| cells[at].parse::<usize>().unwrap();
-        let at = place(6) * COLUMNS + place(7);
+        assert_eq!([place(6), place(7)], [written.row[at], written.column[at]].map(usize::from));
         assert_eq!(cells[0].parse::<f32>().unwrap(), written.x[at]);
         assert_eq!(cells[4].parse::<f32>().unwrap(), written.range[at]);
         assert_eq!(cells[5].parse::<f64>().unwrap(), written.time_ns[at]);
         assert_eq!(place(11), usize::from(written.margin[at]));
+        assert_eq!([place(12), place(13)], [1 + at % 2, 2]);
     }
-    assert_eq!(text.lines().count(), 1 + written.range.iter().filter(|r| r.is_finite()).count());
+    assert_eq!(text.lines().count(), 1 + written.returns());
 }
 
 #[test]
@@ -155,7 +218,8 @@ fn png_is_16_bit_grey_with_its_scale_inside() {
     let (_folder, path) = write(Format::Png, &written);
     let image = read_range_png(&path).unwrap();
     assert_eq!((image.rows, image.columns), (ROWS, COLUMNS));
-    assert_same(&image.range, &written.range, 1.0 / 512.0, "range");
+    let shown = written.image(written.pick).spread(&written.range, f32::NAN);
+    assert_same(&image.range, &shown, 1.0 / 512.0, "range");
     let file = std::io::BufReader::new(fs::File::open(path).unwrap());
     let reader = png::Decoder::new(file).read_info().unwrap();
     let text = &reader.info().uncompressed_latin1_text[0];

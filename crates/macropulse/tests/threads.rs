@@ -19,7 +19,9 @@ enum Part {
 
 /// One scan of the car at 50 m on a pool of `threads` threads.
 fn scan(sensor: &str, part: Part, (seed, threads): (u64, usize)) -> Scan {
-    let design = Design::open(sensor, &[]).unwrap();
+    let (sensor, keys) = sensor.split_once(' ').unwrap_or((sensor, ""));
+    let keys = keys.split_once('=').map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let design = Design::open(sensor, keys.as_slice()).unwrap();
     let scene = Scene::open("car-50m").unwrap();
     let chosen: Vec<Band> = match part {
         Part::Whole => bands(&design, 0).collect(),
@@ -45,6 +47,12 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         scan,
         rows,
         columns,
+        returns_per_shot,
+        pick,
+        row,
+        column,
+        return_number,
+        number_of_returns,
         x,
         y,
         z,
@@ -54,19 +62,26 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         peak,
         marks,
         margin,
-        truth,
+        photons,
+        fired_ns,
+        truth: Truth { returns, pixels },
     } = cloud;
-    let Truth { range: true_range, object, material, cosine, outcome } = truth;
-    let reals = [x, y, z, intensity, range, true_range, cosine]
-        .map(|column| column.iter().map(|value| u64::from(value.to_bits())).collect());
-    let counts = [peak, marks, margin, object, material]
-        .map(|column| column.iter().map(|&value| u64::from(value)).collect());
-    let rest = [
-        vec![*scan, *rows as u64, *columns as u64],
-        time_ns.iter().map(|value| value.to_bits()).collect(),
-        outcome.iter().map(|&outcome| outcome as u64).collect(),
-    ];
-    reals.into_iter().chain(counts).chain(rest).collect()
+    let reals = [x, y, z, intensity, range, photons];
+    let reals = reals.into_iter().chain([&returns.range, &returns.cosine]);
+    let reals = reals.chain([&pixels.range, &pixels.cosine]);
+    let counts = [row, column, peak, marks, margin, &returns.object, &returns.material];
+    let counts = counts.into_iter().chain([&pixels.object, &pixels.material]);
+    let numbers = [return_number, number_of_returns];
+    let times = [time_ns, fired_ns];
+    let outcomes = [&returns.outcome, &pixels.outcome];
+    let shape = vec![*scan, *rows as u64, *columns as u64, *returns_per_shot as u64, *pick as u64];
+    std::iter::once(shape)
+        .chain(reals.map(|column| column.iter().map(|value| u64::from(value.to_bits())).collect()))
+        .chain(counts.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
+        .chain(numbers.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
+        .chain(times.map(|column| column.iter().map(|value| value.to_bits()).collect()))
+        .chain(outcomes.map(|column| column.iter().map(|&outcome| outcome as u64).collect()))
+        .collect()
 }
 
 /// Everything counted; only the seconds may differ.
@@ -95,6 +110,11 @@ fn bands_of_the_coded_sensor() {
 }
 
 #[test]
+fn bands_of_the_coded_sensor_with_several_returns() {
+    assert_same_on_any_pool("kim-park-2016 receiver.returns=3", Part::Road(2));
+}
+
+#[test]
 fn the_spinning_sensor() {
     assert_same_on_any_pool("hdl-64e", Part::Whole);
 }
@@ -109,10 +129,12 @@ fn the_flash() {
 fn a_band_alone_and_among_its_neighbours() {
     let both = scan("kim-park-2016", Part::Road(2), (SEED, 2)).cloud;
     let one = scan("kim-park-2016", Part::Road(1), (SEED, 1)).cloud;
-    let returns = (0..one.range.len()).filter(|&pixel| !one.range[pixel].is_nan());
+    let [one, both] =
+        [one, both].map(|cloud| cloud.image(cloud.pick).spread(&cloud.range, f32::NAN));
+    let returns = (0..one.len()).filter(|&pixel| !one[pixel].is_nan());
     let mut compared = 0;
     for pixel in returns {
-        assert_eq!(one.range[pixel].to_bits(), both.range[pixel].to_bits(), "pixel {pixel}");
+        assert_eq!(one[pixel].to_bits(), both[pixel].to_bits(), "pixel {pixel}");
         compared += 1;
     }
     assert!(compared > 5000, "{compared}");

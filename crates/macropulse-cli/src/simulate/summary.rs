@@ -18,7 +18,7 @@ impl Run<'_> {
         if !self.scene.interferers.is_empty() {
             columns.push("interferers", self.others());
         }
-        columns.push("returns", grouped(tally.returns));
+        columns.push("returns", self.returns());
         columns.push("pixels", self.outcomes());
         if score.with_echo() > 0 {
             // Rounded down: 100 % is said only of all.
@@ -83,6 +83,20 @@ impl Run<'_> {
         let shots = counted(self.tally.foreign, "shot");
         let ghosts = counted(self.score.ghosts, "ghost");
         format!("{lidars}, {shots} of theirs seen, {ghosts}")
+    }
+
+    fn returns(&self) -> String {
+        let tally = &self.tally;
+        let all = grouped(tally.returns);
+        if self.design.receiver.returns == 1 {
+            return all;
+        }
+        let numbers = (1..).zip(tally.by_number).filter(|(_, count)| *count > 0);
+        let numbers = numbers.map(|(number, count)| format!("{} no. {number}", grouped(count)));
+        let further = &self.score;
+        let met = Outcome::ALL.into_iter().filter(|outcome| further.count_further(*outcome) > 0);
+        let met = met.map(|o| format!("{} {}", grouped(further.count_further(o)), o.name()));
+        format!("{all}: {}; of the further ones {}", listed(numbers), listed(met))
     }
 
     fn outcomes(&self) -> String {
@@ -173,6 +187,15 @@ impl Run<'_> {
             "folder": (!self.folder.is_empty()).then_some(&self.folder),
             "files": self.files,
         });
+        if self.design.receiver.returns > 1 {
+            let most = usize::from(self.design.receiver.returns);
+            json["returns_by_number"] = tally.by_number[..most].into();
+            json["further_outcomes"] = Outcome::ALL
+                .into_iter()
+                .map(|o| (o.name().to_owned(), self.score.count_further(o).into()))
+                .collect::<Map<String, Value>>()
+                .into();
+        }
         if !self.scene.interferers.is_empty() {
             json["foreign"] = tally.foreign.into();
             json["ghosts"] = self.score.ghosts.into();

@@ -228,6 +228,8 @@ mod tests {
             jitter_ticks,
             false_alarm: 1e-2,
             bit_threshold: 1,
+            returns: 1,
+            pick: crate::decode::Pick::Strongest,
         }
     }
 

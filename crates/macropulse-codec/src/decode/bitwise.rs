@@ -360,6 +360,8 @@ mod tests {
             jitter_ticks: 0.0,
             false_alarm: 1e-3,
             bit_threshold: 6,
+            returns: 1,
+            pick: crate::decode::Pick::Strongest,
         };
         receiver.decode(&codebook(), log, ticks)
     }

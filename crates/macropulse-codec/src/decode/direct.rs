@@ -1,12 +1,19 @@
-//! The receiver of a sensor that is not coded: each detector waits for the first tick.
+//! The receiver of a sensor that is not coded: each detector listens for the ticks of its shot.
 
-use super::{Receiver, Reject, Return, Returns};
+use super::{Receiver, Reject, Return, Returns, Strength};
 use crate::ShotLog;
 use crate::Ticks;
 
-/// For each owned shot the first tick of its channel in its range gate.
+/// For each owned shot the ticks of its channel in its range gate; of more than
+/// [`Receiver::returns`] those that are picked, by amplitude where it is measured.
 pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Returns {
     let mut returns = Returns::default();
+    // Places in the list of ticks.
+    let mut found: Vec<usize> = Vec::new();
+    let photons = |place: usize| match ticks.amplitude.get(place) {
+        Some(&amplitude) => amplitude,
+        None => super::photons_per_mark(1, 1, 0.0),
+    };
     for shot in log.owned.clone() {
         let fired = receiver.fired(log, shot);
         let listening = match ticks.channel.is_empty() {
@@ -18,36 +25,43 @@ pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Retur
             }
         };
         let (nearest, farthest) = receiver.gate_ticks;
-        let lag = |index: usize| ticks.epoch + i64::from(ticks.tick[index]) - fired;
+        let lag = |place: usize| ticks.epoch + i64::from(ticks.tick[place]) - fired;
         let channel = &ticks.tick[listening.clone()];
         let opened = fired + i64::from(nearest) - ticks.epoch;
         let first = listening.start + channel.partition_point(|&tick| i64::from(tick) < opened);
-        if first == listening.end || lag(first) > i64::from(farthest) {
+        found.clear();
+        found.extend((first..listening.end).take_while(|&place| lag(place) <= i64::from(farthest)));
+        if found.is_empty() {
             returns.reject(Reject::NoPeak);
-            continue;
         }
-        returns.push(Return {
-            shot,
-            tof: receiver.tof(log.fired_at_fs[shot], fired + lag(first)),
-            peak: 1,
-            marks: 1,
-            margin: 1,
-            photons: match ticks.amplitude.get(first) {
-                Some(&amplitude) => amplitude,
-                None => super::photons_per_mark(1, 1, 0.0),
-            },
-        });
+        let strength = |&place: &usize| Strength { peak: 1, light: photons(place) };
+        receiver.pick.keep(receiver.returns.into(), &mut found, strength);
+        for &place in &found {
+            returns.push(Return {
+                shot,
+                tof: receiver.tof(log.fired_at_fs[shot], fired + lag(place)),
+                peak: 1,
+                marks: 1,
+                margin: 1,
+                photons: photons(place),
+            });
+        }
     }
     returns
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::ReceiverKind;
+    use super::super::{Pick, ReceiverKind};
     use super::*;
     use crate::code::Codebook;
 
     fn decode(log: &ShotLog, ticks: &Ticks) -> Returns {
+        keep((1, Pick::First), log, ticks)
+    }
+
+    /// Decodes with so many returns at most, and which of them.
+    fn keep((returns, pick): (u8, Pick), log: &ShotLog, ticks: &Ticks) -> Returns {
         let receiver = Receiver {
             kind: ReceiverKind::Direct,
             effort: crate::decode::Effort::Quick,
@@ -58,6 +72,8 @@ mod tests {
             jitter_ticks: 0.0,
             false_alarm: 1e-3,
             bit_threshold: 1,
+            returns,
+            pick,
         };
         receiver.decode(&Codebook::single(), log, ticks)
     }
@@ -112,5 +128,27 @@ mod tests {
             let ticks = Ticks { tick: vec![tick], ..Ticks::default() };
             assert_eq!(decode(&log, &ticks).len(), found, "tick {tick}");
         }
+    }
+
+    #[test]
+    fn several_ticks_are_several_returns() {
+        let mut log = log();
+        log.owned = 0..1;
+        let ticks = Ticks {
+            tick: vec![5, 20, 30, 40, 50, 501],
+            amplitude: vec![9.0, 3.0, 1.0, 4.0, 2.0, 9.0],
+            ..Ticks::default()
+        };
+        let kept = |returns, pick| keep((returns, pick), &log, &ticks).photons;
+        assert_eq!(kept(8, Pick::First), [3.0, 1.0, 4.0, 2.0]);
+        assert_eq!(kept(2, Pick::First), [3.0, 1.0]);
+        assert_eq!(kept(2, Pick::Last), [4.0, 2.0]);
+        assert_eq!(kept(2, Pick::Strongest), [3.0, 4.0]);
+        assert_eq!(kept(1, Pick::Strongest), [4.0]);
+        assert_eq!(keep((3, Pick::Last), &log, &ticks).number, [1, 2, 3]);
+        // Where no amplitude is measured all are as strong: the nearest.
+        let unmeasured = Ticks { amplitude: vec![], ..ticks.clone() };
+        let nearest = keep((2, Pick::Strongest), &log, &unmeasured);
+        assert_eq!(nearest.tof, keep((2, Pick::First), &log, &ticks).tof);
     }
 }

@@ -14,12 +14,16 @@
 //!    too.
 //! 5. *Check.* A bit that should be dark must not be lit, nor a lit one dark.
 //!
+//! 6. *Further surfaces.* Where several returns of a shot are wanted, the light that is left is
+//!    searched for more of it.
+//!
 //! A return is believed if chance would not reach its count of marks at any lag of the gate, see
 //! [`super::threshold`].
 
 mod contest;
 #[cfg(test)]
 mod exhaustive;
+mod further;
 mod leftover;
 mod peel;
 mod track;
@@ -32,7 +36,7 @@ use super::correlator::Counts;
 use super::field::{self, Field};
 use super::search::Search;
 use super::threshold::Thresholds;
-use super::{Effort, FARTHEST_JITTER, Receiver, Returns};
+use super::{Effort, FARTHEST_JITTER, Pick, Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::{CodeWord, Codebook};
@@ -56,6 +60,7 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
         band.search(Evidence::MoreThanChance, every);
         band.track_back(Evidence::MoreThanChance);
         band.contest();
+        band.search_further();
     }
     let returns = band.returns();
     MEMORY.set(band.into_memory());
@@ -75,6 +80,9 @@ const FEW: f64 = 50.0;
 
 /// Surfaces that light of a shot may come from beside the one that is taken for its range.
 const SURFACES: usize = 3;
+
+/// Returns of a shot that this receiver can give at most.
+pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
 /// How often chance may light an end of a macropulse where there is none.
 const BY_CHANCE: f64 = 1e-3;
@@ -229,6 +237,11 @@ impl<'a> Sent<'a> {
         self.receiver.effort == Effort::Thorough
     }
 
+    /// Whether surfaces of a shot beside the strongest one are asked for.
+    fn wants_further(&self) -> bool {
+        self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
+    }
+
     /// Number of lags in the gate.
     fn lags(&self) -> f64 {
         let (nearest, farthest) = self.gate();
@@ -259,8 +272,8 @@ struct Band<'a> {
     /// The shot at the same column one line earlier.
     above: Vec<Option<u32>>,
     locks: Vec<Option<Lock>>,
-    /// The lags of further surfaces that each shot was found at.
-    behind: Vec<[Option<i64>; SURFACES]>,
+    /// Further surfaces that each shot was found at.
+    behind: Vec<[Option<Lock>; SURFACES]>,
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
     bit_thresholds: Thresholds,
@@ -275,6 +288,8 @@ struct Band<'a> {
     counts: Counts,
     /// Memory for the lit bits of a shot.
     bits: Vec<usize>,
+    /// Memory for light nobody has explained.
+    residual: Vec<u64>,
     search: Search,
     /// Photons per mark where all marks are found, by their number.
     all_found: Vec<f32>,
@@ -282,9 +297,12 @@ struct Band<'a> {
 
 impl<'a> Band<'a> {
     fn new(sent: &'a Sent<'a>, ticks: (&'a [u32], peel::Peeled), memory: Memory) -> Self {
-        let (ticks, peel::Peeled { locks, left }) = ticks;
+        let (ticks, peel::Peeled { locks, mut again, left }) = ticks;
+        if !sent.wants_further() {
+            again.clear();
+        }
         // Nobody looks at a field that is explained altogether.
-        let dark = left.as_ref().is_some_and(Vec::is_empty);
+        let dark = left.as_ref().is_some_and(Vec::is_empty) && again.is_empty();
         let span = if dark { 0..0 } else { sent.span() };
         let (receiver, codebook) = (sent.receiver, sent.codebook);
         let chips = sent.width.div_ceil(receiver.ticks_per_chip.max(1));
@@ -309,7 +327,10 @@ impl<'a> Band<'a> {
                 None => vec![u32::MAX; sent.fired.len()],
             },
             above: if dark { vec![] } else { above(sent.log) },
-            behind: vec![[None; SURFACES]; if dark { 0 } else { locks.len() }],
+            behind: match dark {
+                true => vec![],
+                false => further::found_again(locks.len(), again),
+            },
             locks,
             thresholds,
             bit_thresholds,
@@ -317,6 +338,7 @@ impl<'a> Band<'a> {
             end_thresholds,
             counts: Counts::default(),
             bits: Vec::new(),
+            residual: Vec::new(),
             barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
             marks_per_tick: (0..words)
                 .map(|word| crowding(codebook.word(word as u16), chips))
@@ -445,7 +467,7 @@ mod tests {
                 tick.dedup();
                 let receiver = Receiver { false_alarm: 1e4, ..receiver(jitter) };
                 let sent = Sent::new(&receiver, (&codebook, &log), 0);
-                let nothing = peel::Peeled { locks: vec![None], left: None };
+                let nothing = peel::Peeled { locks: vec![None], again: vec![], left: None };
                 let mut band = Band::new(&sent, (&tick, nothing), Memory::default());
                 let (lag, count) = exhaustive(&sent, &tick, 0);
                 if let Some(lock) = band.searched(0, 1) {

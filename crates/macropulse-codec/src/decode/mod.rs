@@ -7,12 +7,14 @@ mod correlator;
 mod direct;
 mod field;
 mod matched;
+mod pick;
 mod returns;
 mod search;
 mod threshold;
 mod timeline;
 mod unexplained;
 
+pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 
 use serde::Deserialize;
@@ -36,7 +38,7 @@ pub enum ReceiverKind {
     /// As `Matched`, but what falls on dark chips counts against it; for words of which about half
     /// the chips are lit.
     Balanced,
-    /// One mark per shot, a detector of its own: the first tick in the range gate.
+    /// One mark per shot, a detector of its own: the ticks in the range gate.
     Direct,
 }
 
@@ -76,6 +78,11 @@ pub struct Receiver {
     pub false_alarm: f64,
     /// Marks of a code word that make a 1 bit, for the literal and the blind receiver.
     pub bit_threshold: u16,
+    /// Returns of a shot at most, 1 to [`MOST_RETURNS`]. The literal, the blind and the balanced
+    /// receiver give one whatever this says.
+    pub returns: u8,
+    /// Which surfaces are kept if a shot has met more of them.
+    pub pick: Pick,
 }
 
 /// Dark ticks at both ends of a timeline, so that a mark may jitter off its end.
@@ -83,6 +90,17 @@ const MARGIN: i64 = 2048;
 
 /// How far from its place a mark is looked for at most, in ticks.
 const FARTHEST_JITTER: f64 = 1023.0;
+
+impl ReceiverKind {
+    /// Returns of a shot that this receiver can give at most.
+    pub fn most_returns(self) -> u8 {
+        match self {
+            Self::Literal | Self::Blind | Self::Balanced => 1,
+            Self::Matched => matched::MOST_RETURNS,
+            Self::Direct => MOST_RETURNS,
+        }
+    }
+}
 
 impl Receiver {
     /// A matched receiver of ticks of `tick_fs` femtoseconds, a chip to a tick, with edges exact to
@@ -98,14 +116,17 @@ impl Receiver {
             jitter_ticks: 0.0,
             false_alarm: 1e-6,
             bit_threshold: 1,
+            returns: 1,
+            pick: Pick::Strongest,
         }
     }
 
-    /// The returns of the owned shots of `log`, out of all the `ticks` of its band.
+    /// The returns of the owned shots of `log`, out of all the `ticks` of its band, ordered by shot,
+    /// those of one shot by range.
     ///
-    /// `ticks` must cover the whole time in which light of a owned shot can arrive. The shots of
-    /// the guard shots are decoded too, as their light overlaps, and dropped. The ticks of a coded
-    /// sensor must be those of one detector; labels and words must be in the `codebook`.
+    /// `ticks` must cover the whole time in which light of an owned shot can arrive. Guard shots
+    /// are decoded too, as their light overlaps, and dropped. Each channel is decoded by itself;
+    /// labels and words must be in the `codebook`.
     ///
     /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
     /// does not bring everything nearer.
@@ -143,6 +164,7 @@ impl Receiver {
             found.extend(of_channel.each().map(|one| Return { shot: shots[one.shot], ..one }));
             returns.add_rejects(&of_channel);
         }
+        // Stable: the returns of a shot stay in their order.
         found.sort_by_key(|one| one.shot);
         found.into_iter().for_each(|one| returns.push(one));
         returns
@@ -237,6 +259,8 @@ mod tests {
             jitter_ticks: 0.0,
             false_alarm: 0.1,
             bit_threshold: 1,
+            returns: 1,
+            pick: Pick::Strongest,
         };
         for first in [0, 7, -2498, 10_i64.pow(17) + 1] {
             let times = [0, 1, 2489, 2490, 2496, 2497, -1, -2497, 2497 * 2497, 1 << 51, 1 << 53];

@@ -32,12 +32,15 @@ impl Reject {
     }
 }
 
-/// Decoded measurements of the owned shots of a band, as columns, at most one per shot, ordered by
-/// shot; and the count of what was rejected.
+/// Decoded measurements of the owned shots of a band, as columns, ordered by shot, then by time of
+/// flight; and the count of what was rejected. A shot has as many as [`super::Receiver::returns`] at
+/// most.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Returns {
     /// Index of the shot in the band's log.
     pub shot: Vec<u32>,
+    /// Number of the return among those of its shot, from 1, the nearest first.
+    pub number: Vec<u8>,
     /// Two-way time of flight, s.
     pub tof: Vec<f64>,
     /// Marks found at their place (correlation peak).
@@ -83,6 +86,7 @@ impl Returns {
     pub(super) fn with_capacity(returns: usize) -> Self {
         Self {
             shot: Vec::with_capacity(returns),
+            number: Vec::with_capacity(returns),
             tof: Vec::with_capacity(returns),
             peak: Vec::with_capacity(returns),
             marks: Vec::with_capacity(returns),
@@ -109,8 +113,15 @@ impl Returns {
         self.rejects.iter_mut().zip(other.rejects).for_each(|(sum, more)| *sum += more);
     }
 
+    /// Adds the next return: of a shot behind the last one, or of the same shot and not nearer.
     pub(super) fn push(&mut self, found: Return) {
-        self.shot.push(found.shot as u32);
+        let shot = found.shot as u32;
+        let before = match self.shot.last() {
+            Some(&last) if last == shot => self.number.last().copied().unwrap_or(0),
+            _ => 0,
+        };
+        self.number.push(before.saturating_add(1));
+        self.shot.push(shot);
         self.tof.push(found.tof);
         self.peak.push(found.peak);
         self.marks.push(found.marks);
@@ -141,6 +152,16 @@ impl Returns {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn returns_of_a_shot_are_numbered_from_one() {
+        let mut returns = Returns::default();
+        for (shot, tof) in [(3, 1e-7), (3, 2e-7), (4, 1e-7), (9, 5e-8), (9, 6e-8), (9, 7e-8)] {
+            returns.push(Return { shot, tof, peak: 1, marks: 1, margin: 1, photons: 1.0 });
+        }
+        assert_eq!(returns.number, [1, 2, 1, 1, 2, 3]);
+        assert_eq!(returns.shot, [3, 3, 4, 9, 9, 9]);
+    }
 
     #[test]
     fn rejects_are_counted_in_the_order_of_their_list() {

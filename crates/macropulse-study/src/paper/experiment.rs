@@ -82,10 +82,10 @@ pub(super) fn trial(
     };
     record::manifest(&run).write(&folder)?;
     let samples = samples_on_car(design, &scene);
+    let image = scan.cloud.image(scan.cloud.pick);
     let found = |sample: &Sample| {
-        let truth = &scan.cloud.truth;
-        matches!(truth.outcome[sample.pixel], Outcome::Right | Outcome::Near)
-            && is_target(&scene, truth.object[sample.pixel])
+        let seen = image.surface(&scan.cloud, sample.pixel);
+        matches!(seen.outcome, Outcome::Right | Outcome::Near) && is_target(&scene, seen.object)
     };
     let mut rows: Vec<usize> =
         samples.iter().filter(|s| found(s)).map(|s| s.pixel / scan.cloud.columns).collect();

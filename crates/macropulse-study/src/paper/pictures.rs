@@ -72,6 +72,7 @@ pub(super) fn payload(design: &Design, (row, column): (u16, u16)) -> Option<Figu
 pub(super) fn timeline(design: &Design, trial: &Trial, row: usize) -> Figure {
     const SHOWN_NS: f64 = 520.0;
     let columns = trial.cloud.columns;
+    let image = trial.cloud.image(trial.cloud.pick);
     let first = columns / 2 - 6;
     let line = bands(design, 0)
         .map(|band| band.shot_log(design))
@@ -99,7 +100,8 @@ pub(super) fn timeline(design: &Design, trial: &Trial, row: usize) -> Figure {
                 hollow: false,
             };
             sent.push(span(start));
-            let range = f64::from(trial.cloud.range[row * columns + usize::from(log.column[shot])]);
+            let returned = image.get(row * columns + usize::from(log.column[shot]));
+            let range = returned.map_or(f64::NAN, |at| f64::from(trial.cloud.range[at]));
             let arrival = start + tof_from_range(range) * 1e9;
             if arrival < SHOWN_NS {
                 received.push(span(arrival));
@@ -147,7 +149,7 @@ pub(super) fn range_images(
         let layout = layout.fit(pitch, WIDTH);
         let png = RangePicture {
             layout,
-            range: &trial.cloud.range,
+            range: &trial.cloud.image(trial.cloud.pick).spread(&trial.cloud.range, f32::NAN),
             near: (away - 1.0) as f32,
             far: (away + 7.0) as f32,
         }

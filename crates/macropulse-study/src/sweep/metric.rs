@@ -175,6 +175,7 @@ mod tests {
             samples_on_target: 8,
             points_on_target: 6,
             ghosts: 2,
+            further: [0; 6],
         };
         let right = RangeError { count: 60, mean: Some(1e-4), deviation: Some(2e-4) };
         Counted { score, edges: 1000, lost: 5, peak_busy: 7, right, ..Counted::default() }

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use macropulse_codec::decode::Effort;
+use macropulse_codec::decode::{Effort, Pick};
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -298,6 +298,8 @@ pub(super) struct ReceiverFile {
     pub false_alarm: f64,
     pub bit_threshold: u32,
     pub right_within_m: Option<f64>,
+    pub returns: u32,
+    pub pick: Option<Pick>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

@@ -1,10 +1,19 @@
-//! What is written of each pixel: one table for all point formats.
+//! What is written of each point: one table for all point formats.
 
 use super::Error;
-use crate::points::{Outcome, PointCloud};
+use crate::points::{Outcome, PointCloud, Surface};
 
 /// Rows or columns that 16 bits can number.
 const MOST_ROWS: usize = 1 << 16;
+
+/// What is written as a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Point {
+    /// The return at this place of the list.
+    Return(usize),
+    /// This pixel, which has no return.
+    Unanswered(usize),
+}
 
 /// One attribute of a point, in the order of the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,7 +121,7 @@ impl Attribute {
         format!("{}{unit}", self.name())
     }
 
-    /// A value of the attribute's type, to ask its width of.
+    /// A value of the attribute's type, to ask its width of, and what stands for no return.
     pub fn blank(self) -> Value {
         match self {
             Self::TimeNs => Value::F8(0.0),
@@ -124,12 +133,18 @@ impl Attribute {
         }
     }
 
-    /// The attribute at pixel `at` of a cloud that passed [`check_even`].
+    /// The attribute of `point` in a cloud that passed [`check_even`].
     ///
-    /// Object and material of a pixel without a surface are `NO_OBJECT`; the incidence angle is
-    /// acos of the cosine, in radians.
-    pub fn value(self, cloud: &PointCloud, at: usize) -> Value {
-        let truth = &cloud.truth;
+    /// Object and material of a point without a surface are `NO_OBJECT`; the incidence angle is
+    /// acos of the cosine, in radians. A pixel without a return has the first surface along its beam.
+    pub fn value(self, cloud: &PointCloud, point: Point) -> Value {
+        match point {
+            Point::Return(at) => self.of_return(cloud, at),
+            Point::Unanswered(pixel) => self.of_unanswered(cloud, pixel),
+        }
+    }
+
+    fn of_return(self, cloud: &PointCloud, at: usize) -> Value {
         match self {
             Self::X => Value::F4(cloud.x[at]),
             Self::Y => Value::F4(cloud.y[at]),
@@ -137,24 +152,42 @@ impl Attribute {
             Self::Intensity => Value::F4(cloud.intensity[at]),
             Self::Range => Value::F4(cloud.range[at]),
             Self::TimeNs => Value::F8(cloud.time_ns[at]),
-            Self::Row | Self::Ring => Value::U2((at / cloud.columns) as u16),
-            Self::Column => Value::U2((at % cloud.columns) as u16),
+            Self::Row | Self::Ring => Value::U2(cloud.row[at]),
+            Self::Column => Value::U2(cloud.column[at]),
             Self::Peak => Value::U2(cloud.peak[at]),
             Self::Marks => Value::U2(cloud.marks[at]),
             Self::Margin => Value::U2(cloud.margin[at]),
-            // A shot has one return or none.
-            Self::ReturnNumber | Self::NumberOfReturns => {
-                Value::U1(u8::from(!cloud.range[at].is_nan()))
-            }
+            Self::ReturnNumber => Value::U1(cloud.return_number[at]),
+            Self::NumberOfReturns => Value::U1(cloud.number_of_returns[at]),
             Self::Flags => Value::U1(cloud.flags(at)),
-            Self::TrueRange => Value::F4(truth.range[at]),
-            Self::Object => Value::U2(truth.object[at]),
-            Self::Material => Value::U2(truth.material[at]),
+            _ => self.of_surface(&cloud.truth.returns.at(at)),
+        }
+    }
+
+    fn of_unanswered(self, cloud: &PointCloud, pixel: usize) -> Value {
+        match self {
+            Self::TimeNs => Value::F8(cloud.fired_ns[pixel]),
+            Self::Row | Self::Ring => Value::U2((pixel / cloud.columns) as u16),
+            Self::Column => Value::U2((pixel % cloud.columns) as u16),
+            Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
+                self.of_surface(&cloud.truth.pixels.at(pixel))
+            }
+            _ => self.blank(),
+        }
+    }
+
+    /// An attribute of the truth.
+    fn of_surface(self, surface: &Surface) -> Value {
+        match self {
+            Self::TrueRange => Value::F4(surface.range),
+            Self::Object => Value::U2(surface.object),
+            Self::Material => Value::U2(surface.material),
             Self::Incidence => {
-                let cosine = f64::from(truth.cosine[at]).clamp(0.0, 1.0);
+                let cosine = f64::from(surface.cosine).clamp(0.0, 1.0);
                 Value::F4(libm::acos(cosine) as f32)
             }
-            Self::Outcome => Value::U1(truth.outcome[at] as u8),
+            Self::Outcome => Value::U1(surface.outcome as u8),
+            _ => self.blank(),
         }
     }
 }
@@ -183,12 +216,20 @@ impl Value {
 
 /// Whether the truth stands beside the measurement.
 pub(super) fn has_truth(cloud: &PointCloud) -> bool {
-    !cloud.truth.outcome.is_empty()
+    !(cloud.truth.pixels.outcome.is_empty() && cloud.truth.returns.outcome.is_empty())
 }
 
-/// Pixels that hold a return.
-pub(super) fn valid_pixels(cloud: &PointCloud) -> impl Iterator<Item = usize> + '_ {
-    (0..cloud.range.len()).filter(|&at| cloud.range[at].is_finite())
+/// All returns, in the order of the list.
+pub(super) fn returns(cloud: &PointCloud) -> impl Iterator<Item = Point> + '_ {
+    (0..cloud.returns()).map(Point::Return)
+}
+
+/// Every pixel, with the return that the image of the cloud shows.
+pub(super) fn pixels(cloud: &PointCloud) -> Vec<Point> {
+    let image = cloud.image(cloud.pick);
+    let point =
+        |(pixel, at): (usize, Option<usize>)| at.map_or(Point::Unanswered(pixel), Point::Return);
+    image.iter().enumerate().map(point).collect()
 }
 
 /// The outcome with the number `code` in binary files.
@@ -202,38 +243,54 @@ pub(super) fn comment_lines(what: &str, names: &[String]) -> Vec<String> {
     names.iter().enumerate().map(|(at, name)| format!("{what} {at} {}", clean(name))).collect()
 }
 
-/// Refuses a cloud whose columns have not one entry per pixel each, or too many pixels to number:
-/// after this, indexing is safe.
+/// Refuses a cloud whose columns have not one entry per return or pixel each, or too many pixels to
+/// number: after this, indexing is safe.
 pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
-    let measured = [
+    let of_returns = [
         ("x", cloud.x.len()),
         ("y", cloud.y.len()),
         ("z", cloud.z.len()),
         ("intensity", cloud.intensity.len()),
-        ("range", cloud.range.len()),
         ("time_ns", cloud.time_ns.len()),
+        ("row", cloud.row.len()),
+        ("column", cloud.column.len()),
+        ("return_number", cloud.return_number.len()),
+        ("number_of_returns", cloud.number_of_returns.len()),
         ("peak", cloud.peak.len()),
         ("marks", cloud.marks.len()),
         ("margin", cloud.margin.len()),
+        ("photons", cloud.photons.len()),
     ];
-    let truth = [
-        ("truth.range", cloud.truth.range.len()),
-        ("truth.object", cloud.truth.object.len()),
-        ("truth.material", cloud.truth.material.len()),
-        ("truth.cosine", cloud.truth.cosine.len()),
-        ("truth.outcome", cloud.truth.outcome.len()),
+    let (seen, first) = (&cloud.truth.returns, &cloud.truth.pixels);
+    let true_returns = [
+        ("truth.returns.range", seen.range.len()),
+        ("truth.returns.object", seen.object.len()),
+        ("truth.returns.material", seen.material.len()),
+        ("truth.returns.cosine", seen.cosine.len()),
+        ("truth.returns.outcome", seen.outcome.len()),
     ];
-    let with_truth = truth.iter().any(|(_, entries)| *entries > 0);
+    let true_pixels = [
+        ("truth.pixels.range", first.range.len()),
+        ("truth.pixels.object", first.object.len()),
+        ("truth.pixels.material", first.material.len()),
+        ("truth.pixels.cosine", first.cosine.len()),
+        ("truth.pixels.outcome", first.outcome.len()),
+    ];
     let (rows, columns) = (cloud.rows, cloud.columns);
     if rows.max(columns) > MOST_ROWS {
         return Err(Error::TooLarge { rows, columns });
     }
-    let pixels = rows.saturating_mul(columns);
-    measured
-        .into_iter()
-        .chain(truth.into_iter().filter(|_| with_truth))
-        .find(|(_, entries)| *entries != pixels)
-        .map_or(Ok(()), |(column, found)| Err(Error::Uneven { column, found, rows, columns }))
+    let with_truth = true_returns.iter().chain(&true_pixels).any(|(_, entries)| *entries > 0);
+    let (returns, pixels) = (cloud.range.len(), rows.saturating_mul(columns));
+    let per_return = of_returns.into_iter().chain(true_returns.into_iter().filter(|_| with_truth));
+    let per_pixel = true_pixels.into_iter().filter(|_| with_truth);
+    let per_pixel = per_pixel.chain([("fired_ns", cloud.fired_ns.len())]);
+    let wanted = per_return.map(|column| (column, returns, "returns"));
+    let mut wanted = wanted.chain(per_pixel.map(|column| (column, pixels, "pixels")));
+    match wanted.find(|((_, found), needed, _)| found != needed) {
+        Some(((column, found), needed, of)) => Err(Error::Uneven { column, found, needed, of }),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -246,24 +303,31 @@ mod tests {
     fn blank_has_the_type_of_every_value() {
         let cloud = sample_cloud();
         for attribute in Attribute::of(&cloud) {
-            let [blank, value] = [attribute.blank(), attribute.value(&cloud, 0)];
-            assert_eq!(std::mem::discriminant(&blank), std::mem::discriminant(&value));
+            for point in [Point::Return(0), Point::Unanswered(2)] {
+                let [blank, value] = [attribute.blank(), attribute.value(&cloud, point)];
+                assert_eq!(std::mem::discriminant(&blank), std::mem::discriminant(&value));
+            }
         }
     }
 
     #[test]
     fn flags_tell_faint_and_ambiguous_returns() {
         let mut cloud = sample_cloud();
-        let flags = |cloud: &PointCloud, at| Attribute::Flags.value(cloud, at);
-        assert_eq!(flags(&cloud, 0), Value::U1(0));
+        let flags = |cloud: &PointCloud, point| Attribute::Flags.value(cloud, point);
+        assert_eq!(flags(&cloud, Point::Return(0)), Value::U1(0));
         // 60 of 174 marks.
-        assert_eq!(flags(&cloud, 3), Value::U1(1));
-        cloud.margin[3] = 0;
-        assert_eq!(flags(&cloud, 3), Value::U1(3));
-        // No return: no flag, no number.
+        assert_eq!(flags(&cloud, Point::Return(2)), Value::U1(1));
         cloud.margin[2] = 0;
-        assert_eq!(flags(&cloud, 2), Value::U1(0));
-        assert_eq!(Attribute::ReturnNumber.value(&cloud, 2), Value::U1(0));
+        assert_eq!(flags(&cloud, Point::Return(2)), Value::U1(3));
+        // No return: no flag, no number.
+        assert_eq!(flags(&cloud, Point::Unanswered(2)), Value::U1(0));
+        assert_eq!(Attribute::ReturnNumber.value(&cloud, Point::Unanswered(2)), Value::U1(0));
+    }
+
+    #[test]
+    fn every_pixel_has_its_return_or_stands_for_itself() {
+        let points = pixels(&sample_cloud());
+        assert_eq!(points[1..4], [Point::Return(1), Point::Unanswered(2), Point::Return(2)]);
     }
 
     #[test]
@@ -278,9 +342,13 @@ mod tests {
     #[test]
     fn half_a_truth_is_refused() {
         let mut cloud = sample_cloud();
-        cloud.truth.outcome.clear();
+        cloud.truth.pixels.outcome.clear();
         let error = check_even(&cloud).unwrap_err();
-        assert!(matches!(error, Error::Uneven { column: "truth.outcome", found: 0, .. }));
+        assert!(matches!(error, Error::Uneven { column: "truth.pixels.outcome", found: 0, .. }));
+        let mut cloud = sample_cloud();
+        cloud.truth.returns = Default::default();
+        let error = check_even(&cloud).unwrap_err();
+        assert!(matches!(error, Error::Uneven { column: "truth.returns.range", needed: 5, .. }));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Comma-separated text: the returns, one per line, for spreadsheets and for eyes.
 
 use super::Names;
-use super::attributes::{Attribute, Value, outcome_from_code, valid_pixels};
+use super::attributes::{Attribute, Value, outcome_from_code, returns};
 use crate::points::{NO_OBJECT, PointCloud};
 use std::io::{self, Write};
 
@@ -12,13 +12,13 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
     let header: Vec<_> = attributes.iter().map(|attribute| attribute.name_with_unit()).collect();
     writeln!(out, "{}", header.join(","))?;
     let mut line = String::new();
-    for pixel in valid_pixels(cloud) {
+    for point in returns(cloud) {
         line.clear();
         for attribute in &attributes {
             if !line.is_empty() {
                 line.push(',');
             }
-            line.push_str(&cell(*attribute, attribute.value(cloud, pixel), names));
+            line.push_str(&cell(*attribute, attribute.value(cloud, point), names));
         }
         writeln!(out, "{line}")?;
     }

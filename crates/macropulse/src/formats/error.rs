@@ -36,18 +36,17 @@ pub enum Error {
     },
     /// The caller's cloud is not rectangular.
     #[error(
-        "the point cloud cannot be written: column `{column}` has {found} entries, its {rows} × {columns} pixels need {}",
-        rows * columns
+        "the point cloud cannot be written: column `{column}` has {found} entries, its {of} need {needed}"
     )]
     Uneven {
         /// Name of the column.
         column: &'static str,
         /// Its entries.
         found: usize,
-        /// Rows of the cloud.
-        rows: usize,
-        /// Columns of the cloud.
-        columns: usize,
+        /// Entries it should have.
+        needed: usize,
+        /// Of what it should have one each: returns or pixels.
+        of: &'static str,
     },
     /// The caller's cloud has more rows or columns than files can number.
     #[error(

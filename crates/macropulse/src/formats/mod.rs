@@ -26,13 +26,14 @@ use std::path::Path;
 /// The formats a point cloud can be written in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Format {
-    /// Point Cloud Data 0.7, binary, organised; every pixel, NaN where nothing returned.
+    /// Point Cloud Data 0.7, binary. Organised, every pixel, NaN where nothing returned; where a shot
+    /// may have several returns, a list of them.
     Pcd,
     /// Polygon file format, binary little endian; returns only.
     Ply,
     /// Comma-separated text with units in the header; returns only.
     Csv,
-    /// Range image, 16-bit grey, metres = value / 256, 0 = no return.
+    /// Range image, 16-bit grey, metres = value / 256, 0 = no return; of each pixel the return picked.
     Png,
 }
 
@@ -76,7 +77,7 @@ pub struct Names<'a> {
 /// Writes `cloud` to `path`. Truth is written when the cloud has it.
 ///
 /// # Errors
-/// [`Error::Uneven`] if a column of the cloud has not one entry per pixel, [`Error::TooLarge`] if it
+/// [`Error::Uneven`] if a column of the cloud has not one entry per return or pixel, [`Error::TooLarge`] if it
 /// has too many pixels to number, [`Error::Write`] if the file cannot be written; then an older file of that name is untouched.
 pub fn write_cloud(
     format: Format,
@@ -96,34 +97,58 @@ pub fn write_cloud(
 /// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.
 #[cfg(test)]
 fn sample_cloud() -> PointCloud {
-    use crate::points::{NO_OBJECT, Outcome, Truth};
+    use crate::points::{NO_OBJECT, Outcome, Pick, Surfaces, Truth};
     let nan = f32::NAN;
+    let fired_ns = vec![0.0, 40.946_5, 81.893, 122.84, 163.786, 204.732_5];
     PointCloud {
         scan: 3,
         rows: 2,
         columns: 3,
-        x: vec![30.0, 30.5, nan, 29.0, 31.25, 28.0],
-        y: vec![1.0, 0.0, nan, 1.5, 0.25, -1.0],
-        z: vec![0.5, 0.5, nan, -0.5, -0.25, -0.75],
-        intensity: vec![0.8, 0.1, nan, 0.3, 1.0, 0.0],
-        range: vec![30.02, 30.5, nan, 29.04, 31.26, 28.03],
-        time_ns: vec![0.0, 40.946_5, 81.893, 122.84, 163.786, 204.732_5],
-        peak: vec![174, 170, 0, 60, 174, 58],
-        marks: vec![174, 174, 58, 174, 174, 58],
-        margin: vec![80, 70, 0, 3, 81, 20],
+        returns_per_shot: 1,
+        pick: Pick::Strongest,
+        row: vec![0, 0, 1, 1, 1],
+        column: vec![0, 1, 0, 1, 2],
+        return_number: vec![1; 5],
+        number_of_returns: vec![1; 5],
+        x: vec![30.0, 30.5, 29.0, 31.25, 28.0],
+        y: vec![1.0, 0.0, 1.5, 0.25, -1.0],
+        z: vec![0.5, 0.5, -0.5, -0.25, -0.75],
+        intensity: vec![0.8, 0.1, 0.3, 1.0, 0.0],
+        range: vec![30.02, 30.5, 29.04, 31.26, 28.03],
+        time_ns: [0, 1, 3, 4, 5].map(|pixel| fired_ns[pixel]).to_vec(),
+        peak: vec![174, 170, 60, 174, 58],
+        marks: vec![174, 174, 174, 174, 58],
+        margin: vec![80, 70, 3, 81, 20],
+        photons: vec![nan; 5],
+        fired_ns,
         truth: Truth {
-            range: vec![30.02, 30.5, nan, 40.0, 31.26, nan],
-            object: vec![0, 0, NO_OBJECT, 1, 0, NO_OBJECT],
-            material: vec![1, 0, NO_OBJECT, 2, 0, NO_OBJECT],
-            cosine: vec![1.0, 0.5, nan, 0.0, 0.999_999_9, nan],
-            outcome: vec![
-                Outcome::Right,
-                Outcome::Near,
-                Outcome::Empty,
-                Outcome::Wrong,
-                Outcome::Right,
-                Outcome::False,
-            ],
+            returns: Surfaces {
+                range: vec![30.02, 30.5, 40.0, 31.26, nan],
+                object: vec![0, 0, 1, 0, NO_OBJECT],
+                material: vec![1, 0, 2, 0, NO_OBJECT],
+                cosine: vec![1.0, 0.5, 0.0, 0.999_999_9, nan],
+                outcome: vec![
+                    Outcome::Right,
+                    Outcome::Near,
+                    Outcome::Wrong,
+                    Outcome::Right,
+                    Outcome::False,
+                ],
+            },
+            pixels: Surfaces {
+                range: vec![30.02, 30.5, nan, 40.0, 31.26, nan],
+                object: vec![0, 0, NO_OBJECT, 1, 0, NO_OBJECT],
+                material: vec![1, 0, NO_OBJECT, 2, 0, NO_OBJECT],
+                cosine: vec![1.0, 0.5, nan, 0.0, 0.999_999_9, nan],
+                outcome: vec![
+                    Outcome::Right,
+                    Outcome::Near,
+                    Outcome::Empty,
+                    Outcome::Wrong,
+                    Outcome::Right,
+                    Outcome::False,
+                ],
+            },
         },
     }
 }
@@ -160,7 +185,7 @@ mod tests {
         let error = write_cloud(Format::Pcd, &cloud, &Names::default(), &path).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "the point cloud cannot be written: column `margin` has 5 entries, its 2 × 3 pixels need 6"
+            "the point cloud cannot be written: column `margin` has 4 entries, its returns need 5"
         );
         assert!(!path.exists());
     }

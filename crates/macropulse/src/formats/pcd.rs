@@ -1,27 +1,36 @@
-//! PCD 0.7, binary, organised: every pixel, also those without a return.
+//! PCD 0.7, binary: organised, every pixel, where a shot has one return at most; else a list.
 
 use super::Names;
-use super::attributes::{Attribute, Value, comment_lines};
+use super::attributes::{Attribute, Value, comment_lines, pixels, returns};
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
 /// Comment that carries the number of the scan through the file.
 pub(super) const SCAN_COMMENT: &str = "# macropulse scan ";
 
-/// Writes every pixel of a cloud whose columns are even. `WIDTH` are the columns, `HEIGHT` the
-/// rows; a pixel without a return is NaN, never 0.
+/// Comment that carries rows, columns, most returns of a shot and the return picked through a list.
+pub(super) const LIST_COMMENT: &str = "# macropulse list ";
+
+/// Writes a cloud whose columns are even. Where a shot has one return at most, every pixel: `WIDTH`
+/// are the columns, `HEIGHT` the rows; a pixel without a return is NaN, never 0. Where it may have
+/// several, and where there are no pixels, the returns as a list: `HEIGHT` is 1.
 pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
     write_header(cloud, &attributes, names, out)?;
     let mut bytes = Vec::new();
-    for pixel in 0..cloud.range.len() {
+    let points = if is_list(cloud) { returns(cloud).collect() } else { pixels(cloud) };
+    for point in points {
         bytes.clear();
         for attribute in &attributes {
-            attribute.value(cloud, pixel).append_to(&mut bytes);
+            attribute.value(cloud, point).append_to(&mut bytes);
         }
         out.write_all(&bytes)?;
     }
     Ok(())
+}
+
+fn is_list(cloud: &PointCloud) -> bool {
+    cloud.returns_per_shot > 1 || cloud.rows * cloud.columns == 0
 }
 
 fn write_header(
@@ -35,6 +44,12 @@ fn write_header(
     };
     writeln!(out, "# .PCD v0.7 - Point Cloud Data file format")?;
     writeln!(out, "{SCAN_COMMENT}{}", cloud.scan)?;
+    let (mut columns, mut rows) = (cloud.columns, cloud.rows);
+    if is_list(cloud) {
+        let (most, pick) = (cloud.returns_per_shot, cloud.pick.name());
+        writeln!(out, "{LIST_COMMENT}{rows} {columns} {most} {pick}")?;
+        (columns, rows) = (cloud.returns(), 1);
+    }
     for (what, list) in [("object", names.objects), ("material", names.materials)] {
         for line in comment_lines(what, list) {
             writeln!(out, "# {line}")?;
@@ -45,9 +60,9 @@ fn write_header(
     writeln!(out, "SIZE {}", row(&|attribute| attribute.blank().size().to_string()))?;
     writeln!(out, "TYPE {}", row(&|attribute| type_letter(attribute.blank()).to_owned()))?;
     writeln!(out, "COUNT {}", row(&|_| "1".to_owned()))?;
-    writeln!(out, "WIDTH {}\nHEIGHT {}", cloud.columns, cloud.rows)?;
+    writeln!(out, "WIDTH {columns}\nHEIGHT {rows}")?;
     writeln!(out, "VIEWPOINT 0 0 0 1 0 0 0")?;
-    writeln!(out, "POINTS {}", cloud.range.len())?;
+    writeln!(out, "POINTS {}", columns * rows)?;
     writeln!(out, "DATA binary")
 }
 
@@ -94,6 +109,17 @@ mod tests {
         assert!(header.contains(" flags true_range object material incidence outcome\n"));
         assert!(header.contains(" 4 2 2 4 1\n"));
         assert!(header.contains("# object 0 car\n"));
+    }
+
+    #[test]
+    fn several_returns_of_a_shot_are_a_list() {
+        let cloud = PointCloud { returns_per_shot: 2, ..sample_cloud() };
+        let text = header(&cloud, &Names::default());
+        assert!(text.contains("# macropulse list 2 3 2 strongest\n"), "{text}");
+        assert!(text.contains("WIDTH 5\nHEIGHT 1\n"), "{text}");
+        let mut bytes = Vec::new();
+        write(&cloud, &Names::default(), &mut bytes).unwrap();
+        assert_eq!((bytes.len() - text.len()) % 5, 0);
     }
 
     #[test]

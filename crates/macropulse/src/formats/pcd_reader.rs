@@ -1,16 +1,21 @@
 //! Reads PCD files back, ours and those of others that are binary and have x, y and z.
 
 use super::attributes::{Attribute, Value, outcome_from_code};
-use super::pcd::{SCAN_COMMENT, type_letter};
+use super::pcd::{LIST_COMMENT, SCAN_COMMENT, type_letter};
 use super::{Error, Format};
-use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth};
+use crate::points::{Outcome, Pick, PointCloud, Surface, Surfaces, Truth};
 use std::path::Path;
 
-/// Reads a binary PCD file into an organised cloud.
+/// Reads a binary PCD file into a cloud. Points without x, y and z are pixels that had no return.
 ///
 /// Fields we do not know are skipped. Of ours, x, y and z must be there; the others are NaN or 0
-/// where the file lacks them, except that the range is then the length of (x, y, z). Truth is read
-/// if the file has the outcome.
+/// where the file lacks them, except that the range is then the length of (x, y, z), and a point the
+/// first return of one. Truth is read if the file has the outcome.
+///
+/// An organised file has an image, with a pixel for each of its points. A list has the image of which
+/// its header tells; of the pixels that have no return it says nothing, of the others what it says of
+/// the return they show. A list of
+/// another program has no image: no rows, no columns.
 ///
 /// # Errors
 /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is no such PCD file.
@@ -36,6 +41,32 @@ struct Header {
     columns: Option<usize>,
     rows: Option<usize>,
     points: Option<usize>,
+    /// What the header of a list says of its image, if it does.
+    list: Option<List>,
+}
+
+/// The image of a list: rows, columns, returns of a shot at most, and which of them is shown.
+#[derive(Debug, Clone, Copy, Default)]
+struct List {
+    rows: usize,
+    columns: usize,
+    most: u8,
+    pick: Pick,
+}
+
+/// One point of a file: a return, or a pixel without one.
+#[derive(Debug, Clone, Copy)]
+struct Record {
+    position: [f32; 3],
+    intensity: f32,
+    range: f32,
+    time_ns: f64,
+    pixel: [u16; 2],
+    number: [u8; 2],
+    peak: u16,
+    marks: u16,
+    margin: u16,
+    surface: Surface,
 }
 
 fn parse(bytes: &[u8]) -> Result<PointCloud, String> {
@@ -52,14 +83,74 @@ fn parse(bytes: &[u8]) -> Result<PointCloud, String> {
         let whole = body.len() / stride;
         return Err(format!("it ends after {whole} of {points} points; the file was cut short"));
     }
-    let mut cloud = PointCloud { scan: header.scan, rows, columns, ..PointCloud::default() };
-    for record in body.chunks_exact(stride).take(points) {
-        append(&mut cloud, &fields, record)?;
+    let has = |attribute| fields.iter().any(|field: &Field| field.attribute == attribute);
+    let has_truth = has(Attribute::Outcome);
+    let records = body.chunks_exact(stride).take(points);
+    let is_others = rows == 1 && !has(Attribute::Column);
+    if header.list.is_some() || is_others {
+        let list = header.list.unwrap_or_default();
+        let pixels = list.rows.checked_mul(list.columns).filter(|&pixels| pixels <= MOST_PIXELS);
+        let pixels = pixels.ok_or("its list has more pixels than rows and columns can number")?;
+        let mut cloud = empty(&header, list);
+        cloud.fired_ns.resize(pixels, f64::NAN);
+        for (at, record) in records.enumerate() {
+            let record = Record::read(&fields, record, at)?;
+            if record.is_return() {
+                cloud.add(&record);
+            }
+        }
+        cloud.truth = if has_truth { with_pixels(&cloud) } else { Truth::default() };
+        let image = cloud.image(cloud.pick);
+        for (fired, at) in cloud.fired_ns.iter_mut().zip(image.iter()) {
+            *fired = at.map_or(f64::NAN, |at| cloud.time_ns[at]);
+        }
+        return Ok(cloud);
     }
-    if !fields.iter().any(|field| field.attribute == Attribute::Outcome) {
+    if rows.max(columns) > 1 << 16 {
+        return Err(format!("it has {rows} × {columns} pixels; 65536 rows and columns are read"));
+    }
+    let mut cloud = empty(&header, List { rows, columns, most: 1, pick: Pick::default() });
+    for (at, record) in records.enumerate() {
+        let mut record = Record::read(&fields, record, at)?;
+        // An organised file tells the pixel by the place.
+        record.pixel = [(at / columns) as u16, (at % columns) as u16];
+        record.number = [1, 1];
+        cloud.fired_ns.push(record.time_ns);
+        cloud.truth.pixels.push(record.of_pixel());
+        if record.is_return() {
+            cloud.add(&record);
+        }
+    }
+    if !has_truth {
         cloud.truth = Truth::default();
     }
     Ok(cloud)
+}
+
+/// Rows times columns that 16 bits can number.
+const MOST_PIXELS: usize = 1 << 32;
+
+/// A cloud without a return, of the image that `list` tells.
+fn empty(header: &Header, list: List) -> PointCloud {
+    PointCloud {
+        scan: header.scan,
+        rows: list.rows,
+        columns: list.columns,
+        returns_per_shot: list.most.max(1),
+        pick: list.pick,
+        ..PointCloud::default()
+    }
+}
+
+/// The truth of a list, with that of its pixels as far as their returns tell.
+fn with_pixels(cloud: &PointCloud) -> Truth {
+    let returns = cloud.truth.returns.clone();
+    let mut of_pixels = Surfaces::default();
+    for at in cloud.image(cloud.pick).iter() {
+        let outcome = at.map_or(Outcome::Empty, |at| returns.outcome[at]);
+        of_pixels.push(Surface { outcome, ..Surface::NONE });
+    }
+    Truth { returns, pixels: of_pixels }
 }
 
 /// The header, and the bytes after it.
@@ -73,6 +164,9 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
         rest = &rest[end + 1..];
         if let Some(scan) = line.strip_prefix(SCAN_COMMENT) {
             header.scan = scan.parse().unwrap_or(0);
+        }
+        if let Some(list) = line.strip_prefix(LIST_COMMENT) {
+            header.list = Some(list_of(list)?);
         }
         let (key, values) = line.split_once(' ').unwrap_or((line, ""));
         let words = || values.split_whitespace().map(str::to_owned).collect();
@@ -101,6 +195,22 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
     Err("its header has no DATA line".into())
 }
 
+/// Rows, columns, most returns of a shot and the return picked, as the header of a list has them.
+fn list_of(text: &str) -> Result<List, String> {
+    let list = |words: Vec<&str>| -> Option<List> {
+        let [rows, columns, most, pick] = words.try_into().ok()?;
+        let picks = [Pick::First, Pick::Strongest, Pick::Last];
+        Some(List {
+            rows: rows.parse().ok()?,
+            columns: columns.parse().ok()?,
+            most: most.parse().ok()?,
+            pick: picks.into_iter().find(|known| known.name() == pick)?,
+        })
+    };
+    let fault = || format!("its list is `{text}`, not rows, columns, returns and the one shown");
+    list(text.split_whitespace().collect()).ok_or_else(fault)
+}
+
 fn whole_number(key: &str, text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("{key} is `{text}`, not a whole number"))
 }
@@ -116,7 +226,10 @@ fn layout(header: &Header) -> Result<(Vec<Field>, usize), String> {
     let mut fields = Vec::new();
     let mut stride = 0_usize;
     let blank = PointCloud {
-        truth: Truth { outcome: vec![Outcome::Empty], ..Truth::default() },
+        truth: Truth {
+            pixels: Surfaces { outcome: vec![Outcome::Empty], ..Surfaces::default() },
+            ..Truth::default()
+        },
         ..PointCloud::default()
     };
     let known = Attribute::of(&blank);
@@ -145,30 +258,98 @@ fn layout(header: &Header) -> Result<(Vec<Field>, usize), String> {
     Ok((fields, stride))
 }
 
-/// Appends one record to all columns: first as a pixel without a return, then what the file has.
-fn append(cloud: &mut PointCloud, fields: &[Field], record: &[u8]) -> Result<(), String> {
-    let at = cloud.x.len();
-    for column in [&mut cloud.x, &mut cloud.y, &mut cloud.z, &mut cloud.intensity, &mut cloud.range]
-    {
-        column.push(f32::NAN);
+impl Record {
+    /// What the file has of point `at`; what it lacks, as of a pixel without a return.
+    fn read(fields: &[Field], bytes: &[u8], at: usize) -> Result<Self, String> {
+        let mut record = Self {
+            position: [f32::NAN; 3],
+            intensity: f32::NAN,
+            range: f32::NAN,
+            time_ns: 0.0,
+            pixel: [0; 2],
+            number: [1; 2],
+            peak: 0,
+            marks: 0,
+            margin: 0,
+            surface: Surface::NONE,
+        };
+        for field in fields {
+            let value = read(field.attribute.blank(), &bytes[field.offset..]);
+            record.set(at, field.attribute, value)?;
+        }
+        if !fields.iter().any(|field| field.attribute == Attribute::Range) {
+            let [x, y, z] = record.position;
+            record.range = x.hypot(y).hypot(z);
+        }
+        Ok(record)
     }
-    cloud.time_ns.push(0.0);
-    for column in [&mut cloud.peak, &mut cloud.marks, &mut cloud.margin] {
-        column.push(0);
+
+    /// What stands beside its pixel.
+    fn of_pixel(&self) -> Surface {
+        match self.is_return() {
+            true => Surface { outcome: self.surface.outcome, ..Surface::NONE },
+            false => self.surface,
+        }
     }
-    cloud.truth.range.push(f32::NAN);
-    cloud.truth.cosine.push(f32::NAN);
-    cloud.truth.object.push(NO_OBJECT);
-    cloud.truth.material.push(NO_OBJECT);
-    cloud.truth.outcome.push(Outcome::Empty);
-    for field in fields {
-        let value = read(field.attribute.blank(), &record[field.offset..]);
-        set(cloud, at, field.attribute, value)?;
+
+    fn is_return(&self) -> bool {
+        self.range.is_finite()
     }
-    if !fields.iter().any(|field| field.attribute == Attribute::Range) {
-        cloud.range[at] = cloud.x[at].hypot(cloud.y[at]).hypot(cloud.z[at]);
+
+    fn set(&mut self, at: usize, attribute: Attribute, value: Value) -> Result<(), String> {
+        match (attribute, value) {
+            (Attribute::X, Value::F4(x)) => self.position[0] = x,
+            (Attribute::Y, Value::F4(y)) => self.position[1] = y,
+            (Attribute::Z, Value::F4(z)) => self.position[2] = z,
+            (Attribute::Intensity, Value::F4(intensity)) => self.intensity = intensity,
+            (Attribute::Range, Value::F4(range)) => self.range = range,
+            (Attribute::TimeNs, Value::F8(time)) => self.time_ns = time,
+            (Attribute::Row, Value::U2(row)) => self.pixel[0] = row,
+            (Attribute::Column, Value::U2(column)) => self.pixel[1] = column,
+            (Attribute::ReturnNumber, Value::U1(number)) => self.number[0] = number,
+            (Attribute::NumberOfReturns, Value::U1(number)) => self.number[1] = number,
+            (Attribute::Peak, Value::U2(peak)) => self.peak = peak,
+            (Attribute::Marks, Value::U2(marks)) => self.marks = marks,
+            (Attribute::Margin, Value::U2(margin)) => self.margin = margin,
+            (Attribute::TrueRange, Value::F4(range)) => self.surface.range = range,
+            (Attribute::Object, Value::U2(object)) => self.surface.object = object,
+            (Attribute::Material, Value::U2(material)) => self.surface.material = material,
+            (Attribute::Incidence, Value::F4(angle)) => {
+                self.surface.cosine = libm::cos(f64::from(angle)) as f32;
+            }
+            (Attribute::Outcome, Value::U1(code)) => {
+                self.surface.outcome = outcome_from_code(code).ok_or_else(|| {
+                    format!("point {at} has the outcome {code}; known are 0 to 5")
+                })?;
+            }
+            // The ring is the row; flags follow from the other columns.
+            _ => {}
+        }
+        Ok(())
     }
-    Ok(())
+}
+
+impl PointCloud {
+    /// Adds a return that was read.
+    fn add(&mut self, record: &Record) {
+        let [x, y, z] = record.position;
+        self.x.push(x);
+        self.y.push(y);
+        self.z.push(z);
+        self.intensity.push(record.intensity);
+        self.range.push(record.range);
+        self.time_ns.push(record.time_ns);
+        let ([row, column], [number, of]) = (record.pixel, record.number);
+        self.row.push(row);
+        self.column.push(column);
+        self.return_number.push(number);
+        self.number_of_returns.push(of);
+        self.peak.push(record.peak);
+        self.marks.push(record.marks);
+        self.margin.push(record.margin);
+        self.photons.push(f32::NAN);
+        self.truth.returns.push(record.surface);
+    }
 }
 
 /// The value at the start of `bytes`, of the same type as `like`; `layout` made sure of the length.
@@ -182,40 +363,6 @@ fn read(like: Value, bytes: &[u8]) -> Value {
         Value::F4(_) => Value::F4(f32::from_le_bytes([a, b, c, d])),
         Value::F8(_) => Value::F8(f64::from_le_bytes(wide)),
     }
-}
-
-fn set(
-    cloud: &mut PointCloud,
-    at: usize,
-    attribute: Attribute,
-    value: Value,
-) -> Result<(), String> {
-    let truth = &mut cloud.truth;
-    match (attribute, value) {
-        (Attribute::X, Value::F4(x)) => cloud.x[at] = x,
-        (Attribute::Y, Value::F4(y)) => cloud.y[at] = y,
-        (Attribute::Z, Value::F4(z)) => cloud.z[at] = z,
-        (Attribute::Intensity, Value::F4(intensity)) => cloud.intensity[at] = intensity,
-        (Attribute::Range, Value::F4(range)) => cloud.range[at] = range,
-        (Attribute::TimeNs, Value::F8(time)) => cloud.time_ns[at] = time,
-        (Attribute::Peak, Value::U2(peak)) => cloud.peak[at] = peak,
-        (Attribute::Marks, Value::U2(marks)) => cloud.marks[at] = marks,
-        (Attribute::Margin, Value::U2(margin)) => cloud.margin[at] = margin,
-        (Attribute::TrueRange, Value::F4(range)) => truth.range[at] = range,
-        (Attribute::Object, Value::U2(object)) => truth.object[at] = object,
-        (Attribute::Material, Value::U2(material)) => truth.material[at] = material,
-        (Attribute::Incidence, Value::F4(angle)) => {
-            truth.cosine[at] = libm::cos(f64::from(angle)) as f32;
-        }
-        (Attribute::Outcome, Value::U1(code)) => {
-            truth.outcome[at] = outcome_from_code(code)
-                .ok_or_else(|| format!("point {at} has the outcome {code}; known are 0 to 5"))?;
-        }
-        // Row, column and ring follow from the place in an organised file, return numbers and
-        // flags from the other columns.
-        _ => {}
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -240,10 +387,10 @@ mod tests {
     #[test]
     fn a_stranger_s_file_is_read_without_the_fields_it_lacks() {
         let cloud = parse(&foreign(XYZ_RGB, 2)).unwrap();
-        assert_eq!((cloud.rows, cloud.columns), (1, 2));
+        assert_eq!((cloud.rows, cloud.columns, cloud.returns()), (0, 0, 2));
         assert_eq!(cloud.range, [13.0, 13.0]);
         assert!(cloud.intensity[0].is_nan());
-        assert!(cloud.truth.outcome.is_empty());
+        assert!(cloud.truth.returns.outcome.is_empty());
     }
 
     #[test]

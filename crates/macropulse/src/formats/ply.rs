@@ -1,7 +1,7 @@
 //! PLY, binary little endian: the returns as vertices.
 
 use super::Names;
-use super::attributes::{Attribute, Value, comment_lines, valid_pixels};
+use super::attributes::{Attribute, Value, comment_lines, returns};
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
@@ -16,7 +16,7 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
             writeln!(out, "comment {line}")?;
         }
     }
-    writeln!(out, "element vertex {}", valid_pixels(cloud).count())?;
+    writeln!(out, "element vertex {}", cloud.returns())?;
     for attribute in &attributes {
         let kind = match attribute.blank() {
             Value::U1(_) => "uchar",
@@ -28,10 +28,10 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
     }
     writeln!(out, "end_header")?;
     let mut bytes = Vec::new();
-    for pixel in valid_pixels(cloud) {
+    for point in returns(cloud) {
         bytes.clear();
         for attribute in &attributes {
-            attribute.value(cloud, pixel).append_to(&mut bytes);
+            attribute.value(cloud, point).append_to(&mut bytes);
         }
         out.write_all(&bytes)?;
     }

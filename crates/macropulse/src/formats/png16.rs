@@ -23,7 +23,7 @@ pub struct RangeImage {
     pub range: Vec<f32>,
 }
 
-/// Writes the range image of a cloud whose columns are even.
+/// Writes the range image of a cloud whose columns are even: of each pixel the return picked.
 pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     let [width, height] = [cloud.columns, cloud.rows]
         .map(|length| u32::try_from(length).ok().filter(|&length| length > 0));
@@ -34,8 +34,9 @@ pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
     encoder.add_text_chunk(KEYWORD.into(), DECLARATION.into())?;
+    let image = cloud.image(cloud.pick).spread(&cloud.range, f32::NAN);
     let grey: Vec<u8> =
-        cloud.range.iter().flat_map(|&range| grey_from_range(range).to_be_bytes()).collect();
+        image.into_iter().flat_map(|range| grey_from_range(range).to_be_bytes()).collect();
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&grey)?;
     Ok(writer.finish()?)
@@ -103,7 +104,8 @@ mod tests {
         write(&cloud, &mut bytes).unwrap();
         let image = decode(Cursor::new(bytes)).unwrap();
         assert_eq!((image.rows, image.columns), (2, 3));
-        for (read, written) in image.range.iter().zip(&cloud.range) {
+        let written = cloud.image(cloud.pick).spread(&cloud.range, f32::NAN);
+        for (read, written) in image.range.iter().zip(&written) {
             assert!(
                 (read - written).abs() <= 0.5 / VALUES_PER_METRE
                     || read.is_nan() && written.is_nan()

@@ -1,16 +1,24 @@
-//! Returns to points: the organised cloud of one scan.
+//! Returns to points: the cloud of one scan.
+//!
+//! A cloud is a list of returns. Each is named by its pixel and its number among the returns of that
+//! pixel's shot. What an organised image shows of it is a view, [`Image`]: one return of each pixel,
+//! the first, the strongest or the last one ([`Pick`]).
 
-use crate::channel::Link;
+mod image;
+mod piece;
+
+pub use image::Image;
+pub use macropulse_codec::decode::Pick;
+pub use piece::Piece;
+
 use crate::design::Design;
-use crate::units::range_from_tof;
-use macropulse_codec::ShotLog;
-use macropulse_codec::decode::Returns;
+use macropulse_codec::decode::Strength;
 
-/// How a pixel came out, measured against truth.
+/// How a return or a pixel came out, measured against truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Outcome {
-    /// Nothing there, nothing answered.
+    /// Nothing there, nothing answered; of pixels only.
     Empty = 0,
     /// Range right within the timing resolution.
     Right = 1,
@@ -18,7 +26,7 @@ pub enum Outcome {
     Near = 2,
     /// Off by more than that.
     Wrong = 3,
-    /// A surface within the range gate gave no return.
+    /// A surface within the range gate gave no return; of pixels only.
     Missed = 4,
     /// An answer where no surface is.
     False = 5,
@@ -42,18 +50,33 @@ impl Outcome {
     }
 }
 
-/// One scan as an organised cloud: `rows` × `columns` entries, row-major, row 0 at the top and
-/// column 0 at the left. A pixel without a return is NaN in x, y, z, range and intensity.
+/// One scan as a list of returns, in the order in which their shots were fired, those of one shot
+/// nearest first: the order in which they are decoded, so nothing is sorted on the way.
+///
+/// All columns have one entry per return, except those of pixels, which have `rows` × `columns`
+/// entries, row-major, row 0 at the top and column 0 at the left.
 ///
 /// Sensor frame (REP-103): x forward, y left, z up, metres.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
     /// Number of the scan, from 0.
     pub scan: u64,
-    /// Rows of the organised cloud.
+    /// Rows of pixels; 0 where the list has no image.
     pub rows: usize,
-    /// Columns of the organised cloud.
+    /// Columns of pixels; 0 where the list has no image.
     pub columns: usize,
+    /// Returns that a shot may have at most.
+    pub returns_per_shot: u8,
+    /// Which return of a pixel its image shows.
+    pub pick: Pick,
+    /// Row of the pixel.
+    pub row: Vec<u16>,
+    /// Column of the pixel.
+    pub column: Vec<u16>,
+    /// Number among the returns of the shot, from 1, the nearest first.
+    pub return_number: Vec<u8>,
+    /// Returns of the shot.
+    pub number_of_returns: Vec<u8>,
     /// Forward, m.
     pub x: Vec<f32>,
     /// Left, m.
@@ -61,11 +84,11 @@ pub struct PointCloud {
     /// Up, m.
     pub z: Vec<f32>,
     /// Apparent reflectance, 1 = white Lambertian facing the sensor, range and its own energy
-    /// estimate taken into account; NaN where there is no return.
+    /// estimate taken into account.
     pub intensity: Vec<f32>,
     /// One-way range, m.
     pub range: Vec<f32>,
-    /// Time at which the shot was fired, ns from the start of the scan; set for every pixel.
+    /// Time at which the shot was fired, ns from the start of the scan.
     pub time_ns: Vec<f64>,
     /// Marks found at their place.
     pub peak: Vec<u16>,
@@ -73,15 +96,31 @@ pub struct PointCloud {
     pub marks: Vec<u16>,
     /// Peak minus the best other lag.
     pub margin: Vec<u16>,
+    /// Energy as the receiver can tell it, in detected photons per mark. Not written to files: NaN in
+    /// a cloud read from one.
+    pub photons: Vec<f32>,
+    /// For every pixel, whether it answered or not, the time at which its shot was fired, ns from
+    /// the start of the scan; NaN where none was.
+    pub fired_ns: Vec<f64>,
     /// What is known from the scene; filled by the score stage, empty without it.
     pub truth: Truth,
 }
 
-/// The truth beside a point cloud, one entry per pixel.
+/// The truth beside a point cloud.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Truth {
-    /// Range of the surface the return came from, or else of the first one within the range gate,
-    /// m; NaN where there is none.
+    /// Of every return, the surface it came from, or else the first one along the beam within the
+    /// range gate; and how the return came out.
+    pub returns: Surfaces,
+    /// How every pixel came out, by the return that its image shows; and of those without a return the
+    /// first surface along the beam within the range gate.
+    pub pixels: Surfaces,
+}
+
+/// Surfaces that were seen or could have been, as columns.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Surfaces {
+    /// Range, m; NaN where there is none.
     pub range: Vec<f32>,
     /// Index into the scene's objects; `NO_OBJECT` where there is none.
     pub object: Vec<u16>,
@@ -89,8 +128,86 @@ pub struct Truth {
     pub material: Vec<u16>,
     /// Cosine of the incidence angle; NaN where there is none.
     pub cosine: Vec<f32>,
-    /// How the pixel came out.
+    /// How the return or the pixel came out.
     pub outcome: Vec<Outcome>,
+}
+
+/// A surface that was seen or could have been: a line of [`Surfaces`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Range, m; NaN where there is none.
+    pub range: f32,
+    /// Index into the scene's objects; `NO_OBJECT` where there is none.
+    pub object: u16,
+    /// Index into the scene's materials; `NO_OBJECT` where there is none.
+    pub material: u16,
+    /// Cosine of the incidence angle; NaN where there is none.
+    pub cosine: f32,
+    /// How the return or the pixel came out.
+    pub outcome: Outcome,
+}
+
+impl Surface {
+    /// Where there is no surface, and no answer.
+    pub const NONE: Self = Self {
+        range: f32::NAN,
+        object: NO_OBJECT,
+        material: NO_OBJECT,
+        cosine: f32::NAN,
+        outcome: Outcome::Empty,
+    };
+}
+
+impl Surfaces {
+    /// Adds a line.
+    pub fn push(&mut self, surface: Surface) {
+        self.range.push(surface.range);
+        self.object.push(surface.object);
+        self.material.push(surface.material);
+        self.cosine.push(surface.cosine);
+        self.outcome.push(surface.outcome);
+    }
+
+    /// Line `at`.
+    pub fn at(&self, at: usize) -> Surface {
+        Surface {
+            range: self.range[at],
+            object: self.object[at],
+            material: self.material[at],
+            cosine: self.cosine[at],
+            outcome: self.outcome[at],
+        }
+    }
+
+    /// Replaces line `at`.
+    #[inline]
+    pub(crate) fn set(&mut self, at: usize, surface: Surface) {
+        self.range[at] = surface.range;
+        self.object[at] = surface.object;
+        self.material[at] = surface.material;
+        self.cosine[at] = surface.cosine;
+        self.outcome[at] = surface.outcome;
+    }
+
+    /// Makes it so many lines of [`Surface::NONE`], in the memory of what was there.
+    pub(crate) fn blank(&mut self, lines: usize) {
+        self.clear();
+        let Surface { range, object, material, cosine, outcome } = Surface::NONE;
+        self.range.resize(lines, range);
+        self.object.resize(lines, object);
+        self.material.resize(lines, material);
+        self.cosine.resize(lines, cosine);
+        self.outcome.resize(lines, outcome);
+    }
+
+    /// Forgets all lines, and keeps their memory.
+    fn clear(&mut self) {
+        self.range.clear();
+        self.object.clear();
+        self.material.clear();
+        self.cosine.clear();
+        self.outcome.clear();
+    }
 }
 
 /// Flag of a return with fewer than half of its marks.
@@ -103,93 +220,42 @@ pub const AMBIGUOUS: u8 = 2;
 pub const NO_OBJECT: u16 = u16::MAX;
 
 impl PointCloud {
-    /// A cloud of scan number `scan` without any return yet.
+    /// A cloud of scan number `scan` without any return yet, nor the truth.
     pub fn empty(design: &Design, scan: u64) -> Self {
         let (rows, columns) = (design.scan.rows as usize, design.scan.columns as usize);
-        let none = vec![f32::NAN; rows * columns];
-        let zero = vec![0; rows * columns];
         Self {
             scan,
             rows,
             columns,
-            x: none.clone(),
-            y: none.clone(),
-            z: none.clone(),
-            intensity: none.clone(),
-            range: none,
-            time_ns: vec![f64::NAN; rows * columns],
-            peak: zero.clone(),
-            marks: zero.clone(),
-            margin: zero,
-            truth: Truth::default(),
+            returns_per_shot: design.receiver.returns,
+            pick: design.receiver.pick,
+            fired_ns: vec![f64::NAN; rows * columns],
+            ..Self::default()
         }
     }
 
-    /// Makes it the cloud of scan number `scan`, without any return, in the same memory.
-    pub fn clear(&mut self, scan: u64) {
-        self.scan = scan;
-        let columns = [&mut self.x, &mut self.y, &mut self.z, &mut self.intensity, &mut self.range];
-        columns.into_iter().for_each(|column| column.fill(f32::NAN));
-        self.time_ns.fill(f64::NAN);
-        let columns = [&mut self.peak, &mut self.marks, &mut self.margin];
-        columns.into_iter().for_each(|column| column.fill(0));
-        let truth = &mut self.truth;
-        [&mut truth.range, &mut truth.cosine].into_iter().for_each(|column| column.fill(f32::NAN));
-        let columns = [&mut truth.object, &mut truth.material];
-        columns.into_iter().for_each(|column| column.fill(NO_OBJECT));
-        truth.outcome.fill(Outcome::Empty);
+    /// Number of returns.
+    pub fn returns(&self) -> usize {
+        self.range.len()
     }
 
-    /// Index of the pixel of shot `shot`.
-    pub fn pixel(&self, log: &ShotLog, shot: usize) -> usize {
-        usize::from(log.row[shot]) * self.columns + usize::from(log.column[shot])
-    }
-
-    /// Writes the returns of one band, and the firing times of its owned shots, into the cloud.
-    ///
-    /// Intensity, by the `link` of the sensor through its air, is the photons a mark brought over the photons a white surface seen square on
-    /// would have brought from the same range; 1 for a detector without a photon scale.
-    pub fn add(&mut self, design: &Design, link: &Link, log: &ShotLog, returns: &Returns) {
-        let scan_start = self.scan as f64 * design.scan_period() * 1e9;
-        for shot in log.owned.clone() {
-            let pixel = self.pixel(log, shot);
-            self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
-        }
-        let directions = design.directions();
-        for (i, &shot) in returns.shot.iter().enumerate() {
-            let shot = shot as usize;
-            let pixel = self.pixel(log, shot);
-            let range = range_from_tof(returns.tof[i]);
-            let [x, y, z] = directions.of(log.row[shot], log.column[shot]);
-            self.x[pixel] = (x * range) as f32;
-            self.y[pixel] = (y * range) as f32;
-            self.z[pixel] = (z * range) as f32;
-            self.range[pixel] = range as f32;
-            let white = link.photons(1.0, range);
-            self.intensity[pixel] = if white.is_finite() {
-                (f64::from(returns.photons[i]) / white) as f32
-            } else {
-                1.0
-            };
-            self.peak[pixel] = returns.peak[i];
-            self.marks[pixel] = returns.marks[i];
-            self.margin[pixel] = returns.margin[i];
-        }
-    }
-
-    /// What is to be known of the return of a pixel, as bits: [`FAINT`], [`AMBIGUOUS`]; 0 for a
-    /// sound return, and for a pixel without one.
-    pub fn flags(&self, pixel: usize) -> u8 {
-        if self.range[pixel].is_nan() {
-            return 0;
-        }
-        let faint = 2 * self.peak[pixel] < self.marks[pixel];
-        let ambiguous = self.margin[pixel] == 0;
+    /// What is to be known of return `at`, as bits: [`FAINT`], [`AMBIGUOUS`]; 0 for a sound one.
+    pub fn flags(&self, at: usize) -> u8 {
+        let faint = 2 * self.peak[at] < self.marks[at];
+        let ambiguous = self.margin[at] == 0;
         (u8::from(faint) * FAINT) | (u8::from(ambiguous) * AMBIGUOUS)
     }
 
-    /// Number of pixels that have a return.
-    pub fn returns(&self) -> usize {
-        self.range.iter().filter(|range| !range.is_nan()).count()
+    /// One return of each pixel, by `pick`.
+    pub fn image(&self, pick: Pick) -> Image {
+        Image::of(self, pick)
+    }
+
+    /// What decides whether return `at` is the strongest of its shot.
+    pub(crate) fn strength(&self, at: usize) -> Strength {
+        let photons = self.photons[at];
+        // A file keeps no photons, but what follows from them.
+        let light = if photons.is_nan() { self.intensity[at] } else { photons };
+        Strength { peak: self.peak[at], light }
     }
 }

@@ -11,29 +11,29 @@ use macropulse_codec::ShotLog;
 
 use crate::channel::Light;
 use crate::design::Design;
-use crate::points::{Outcome, PointCloud};
+use crate::points::{Outcome, Piece};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
-/// Counts the ghosts among the owned shots of `log`, whose returns in `cloud` are judged already,
-/// in `light`.
-pub fn ghosts(cloud: &PointCloud, design: &Design, log: &ShotLog, light: &Light) -> u64 {
+/// Counts the ghosts among the returns of a band, which are judged already, in `light`.
+pub fn ghosts(piece: &Piece, design: &Design, log: &ShotLog, light: &Light) -> u64 {
     let interference = Interference::of(design, light);
     if interference.order.is_empty() {
         return 0;
     }
-    let is_ghost = |shot: &usize| {
-        let pixel = cloud.pixel(log, *shot);
-        let outcome = cloud.truth.outcome[pixel];
+    let points = &piece.points;
+    let is_ghost = |at: &usize| {
+        let (at, shot) = (*at, piece.shot[*at] as usize);
+        let outcome = points.truth.returns.outcome[at];
         if !matches!(outcome, Outcome::Wrong | Outcome::False) {
             return false;
         }
-        let tof_fs = fs_from_s(tof_from_range(f64::from(cloud.range[pixel])));
-        let begins_fs = log.fired_at_fs[*shot] + tof_fs;
-        let own = design.coding.codebook.marks(log.label[*shot], log.word[*shot]);
+        let tof_fs = fs_from_s(tof_from_range(f64::from(points.range[at])));
+        let begins_fs = log.fired_at_fs[shot] + tof_fs;
+        let own = design.coding.codebook.marks(log.label[shot], log.word[shot]);
         let own = own.iter().map(|mark| begins_fs + i64::from(*mark) * design.coding.chip_fs);
-        2 * interference.met(own, log.channel[*shot]) >= u64::from(cloud.peak[pixel]).max(1)
+        2 * interference.met(own, log.channel[shot]) >= u64::from(points.peak[at]).max(1)
     };
-    log.owned.clone().filter(is_ghost).count() as u64
+    (0..piece.shot.len()).filter(is_ghost).count() as u64
 }
 
 /// Pulse trains of interferers, in the order in which they arrive.
@@ -92,17 +92,27 @@ impl<'a> Interference<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::channel::{PulseTrain, Transmitter};
+    use crate::channel::{Operating, PulseTrain, Transmitter};
+    use crate::points::Surface;
+    use macropulse_codec::decode::Returns;
 
     /// One shot of the coded sensor that was answered from 30 m, with `outcome`; foreign light has
     /// the same marks, `late_fs` behind them.
     fn count(outcome: Outcome, late_fs: i64, kept: usize) -> u64 {
         let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
-        let mut cloud = PointCloud::empty(&design, 0);
-        cloud.truth = crate::score::empty_truth(&cloud);
-        cloud.truth.outcome[0] = outcome;
-        (cloud.range[0], cloud.peak[0]) = (30.0, 40);
+        let answered = Returns {
+            shot: vec![0],
+            number: vec![1],
+            tof: vec![tof_from_range(30.0)],
+            peak: vec![40],
+            marks: vec![40],
+            margin: vec![40],
+            photons: vec![1.0],
+            ..Returns::default()
+        };
+        let mut piece = Piece::of(&design, &Operating::in_the_dark(&design).link, &log, &answered);
+        piece.points.truth.returns.push(Surface { outcome, ..Surface::NONE });
         let tof_fs = fs_from_s(tof_from_range(30.0));
         // What the interferer sends is what we send, without its last marks.
         let transmitters = vec![Transmitter::of(&design, 1.0); 2];
@@ -118,7 +128,7 @@ mod tests {
             shot: 0,
             way: 0,
         });
-        ghosts(&cloud, &design, &log, &light)
+        ghosts(&piece, &design, &log, &light)
     }
 
     #[test]
@@ -132,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_right_return_is_none_nor_is_one_beside_the_light() {
-        for outcome in [Outcome::Right, Outcome::Near, Outcome::Missed, Outcome::Empty] {
+        for outcome in [Outcome::Right, Outcome::Near] {
             assert_eq!(count(outcome, 0, 58), 0, "{outcome:?}");
         }
         assert_eq!(count(Outcome::Wrong, 10 * 2500, 58), 0);

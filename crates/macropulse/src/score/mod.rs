@@ -9,7 +9,7 @@ pub use interval::Estimate;
 pub use range_error::RangeError;
 
 use crate::design::Design;
-use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth};
+use crate::points::{Outcome, Piece, Surface};
 use crate::scene::{Hits, Scene};
 use macropulse_codec::ShotLog;
 
@@ -17,7 +17,7 @@ use macropulse_codec::ShotLog;
 /// within one bit.
 pub const NEAR: f64 = 0.35;
 
-/// How many pixels came out how.
+/// How many pixels came out how, each by the return that its image shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Score {
     /// Pixels by outcome, in the order of [`Outcome::ALL`].
@@ -27,8 +27,12 @@ pub struct Score {
     pub dark: u64,
     /// Pixels whose ray meets the target object within the range gate.
     pub samples_on_target: u64,
-    /// Returns that come from a surface of the target object.
+    /// Pixels whose return comes from a surface of the target object.
     pub points_on_target: u64,
+    /// Second and later returns of all shots by outcome, in the order of [`Outcome::ALL`]; each is
+    /// judged against all surfaces along its beam.
+    #[serde(default)]
+    pub further: [u64; 6],
     /// Wrong and false returns that light of other lidars has made, as [`ghosts`] has it.
     pub ghosts: u64,
 }
@@ -37,6 +41,11 @@ impl Score {
     /// Pixels that came out as `outcome`.
     pub fn count(&self, outcome: Outcome) -> u64 {
         self.pixels[outcome as usize]
+    }
+
+    /// Second and later returns that came out as `outcome`.
+    pub fn count_further(&self, outcome: Outcome) -> u64 {
+        self.further[outcome as usize]
     }
 
     /// Pixels that have an echo: a surface within the range gate, and a shot with light.
@@ -57,29 +66,17 @@ impl Score {
         self.samples_on_target += other.samples_on_target;
         self.points_on_target += other.points_on_target;
         self.ghosts += other.ghosts;
+        self.further.iter_mut().zip(other.further).for_each(|(sum, more)| *sum += more);
     }
 }
 
-/// Room for the truth of every pixel of `cloud`.
-pub fn empty_truth(cloud: &PointCloud) -> Truth {
-    let pixels = cloud.rows * cloud.columns;
-    Truth {
-        range: vec![f32::NAN; pixels],
-        object: vec![NO_OBJECT; pixels],
-        material: vec![NO_OBJECT; pixels],
-        cosine: vec![f32::NAN; pixels],
-        outcome: vec![Outcome::Empty; pixels],
-    }
-}
-
-/// Compares the returns already in `cloud` with what the owned shots of a band met, and writes the
-/// truth beside them.
+/// Compares the returns of a band with what its owned shots met, and writes the truth beside them.
 ///
 /// A return is right if any surface along its beam lies within the sensor's tolerance: behind
 /// glass there are several. The truth written is that of the surface the return came from; of the
-/// first one met where there is no return, or none that fits.
+/// first one met where none fits. A pixel comes out as the return does that its image shows.
 pub fn judge(
-    cloud: &mut PointCloud,
+    piece: &mut Piece,
     design: &Design,
     scene: &Scene,
     log: &ShotLog,
@@ -88,40 +85,68 @@ pub fn judge(
     let mut score = Score::default();
     let gate = design.scan.min_range..=design.scan.max_range;
     let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
+    let mut at = 0;
+    piece.points.truth.pixels.blank(log.owned.len());
+    piece.points.truth.returns.blank(piece.shot.len());
     for shot in log.owned.clone() {
         let first = next;
         while next < hits.shot.len() && hits.shot[next] as usize == shot {
             next += 1;
         }
-        let pixel = cloud.pixel(log, shot);
         let met = (first..next).filter(|&i| gate.contains(&hits.range[i]));
-        let measured = f64::from(cloud.range[pixel]);
-        let error = |i: usize| (hits.range[i] - measured).abs();
-        let nearest = met.clone().min_by(|&a, &b| error(a).total_cmp(&error(b)));
-        let on_target = |i: usize| scene.objects[usize::from(hits.object[i])].is_target;
-        if met.clone().any(on_target) {
-            score.samples_on_target += 1;
-        }
-        let outcome = match nearest {
-            None if measured.is_nan() => Outcome::Empty,
-            None => Outcome::False,
-            Some(_) if measured.is_nan() => Outcome::Missed,
-            Some(i) if error(i) <= design.right_within => Outcome::Right,
-            Some(i) if error(i) <= NEAR => Outcome::Near,
-            Some(_) => Outcome::Wrong,
+        let surface = |i: Option<usize>, outcome: Outcome| match i {
+            None => Surface { outcome, ..Surface::NONE },
+            Some(i) => Surface {
+                range: hits.range[i] as f32,
+                object: hits.object[i],
+                material: hits.material[i],
+                cosine: hits.cosine[i],
+                outcome,
+            },
         };
-        let answered = matches!(outcome, Outcome::Right | Outcome::Near);
-        let source = if answered { nearest } else { met.clone().next() };
-        if let Some(i) = source {
-            score.points_on_target += u64::from(answered && on_target(i));
-            cloud.truth.range[pixel] = hits.range[i] as f32;
-            cloud.truth.object[pixel] = hits.object[i];
-            cloud.truth.material[pixel] = hits.material[i];
-            cloud.truth.cosine[pixel] = hits.cosine[i];
+        let on_target = |i: usize| scene.objects[usize::from(hits.object[i])].is_target;
+        score.samples_on_target += u64::from(met.clone().any(on_target));
+        // The return shown, its outcome, and whether it comes from the target.
+        let mut shown: Option<(usize, Outcome, bool)> = None;
+        while at < piece.shot.len() && piece.shot[at] as usize == shot {
+            let measured = f64::from(piece.points.range[at]);
+            let error = |i: usize| (hits.range[i] - measured).abs();
+            let nearest = met.clone().min_by(|&a, &b| error(a).total_cmp(&error(b)));
+            let outcome = match nearest {
+                None => Outcome::False,
+                Some(i) if error(i) <= design.right_within => Outcome::Right,
+                Some(i) if error(i) <= NEAR => Outcome::Near,
+                Some(_) => Outcome::Wrong,
+            };
+            let answered = matches!(outcome, Outcome::Right | Outcome::Near);
+            let source = if answered { nearest } else { met.clone().next() };
+            piece.points.truth.returns.set(at, surface(source, outcome));
+            let points = &piece.points;
+            let is_further = points.return_number[at] > 1;
+            score.further[outcome as usize] += u64::from(is_further);
+            let is_better =
+                |shown: usize| points.pick.prefers(points.strength(at), points.strength(shown));
+            if shown.is_none_or(|(shown, ..)| is_better(shown)) {
+                shown = Some((at, outcome, answered && source.is_some_and(on_target)));
+            }
+            at += 1;
         }
+        let first = met.clone().next();
+        let outcome = match (shown, first) {
+            (Some((_, outcome, _)), _) => outcome,
+            (None, None) => Outcome::Empty,
+            (None, Some(_)) => Outcome::Missed,
+        };
+        let (pixels, pixel) = (&mut piece.points.truth.pixels, shot - log.owned.start);
+        match outcome {
+            Outcome::Empty => {}
+            Outcome::Missed => pixels.set(pixel, surface(first, outcome)),
+            // The surface of a return stands beside the return.
+            _ => pixels.outcome[pixel] = outcome,
+        }
+        score.points_on_target += u64::from(shown.is_some_and(|(.., on_target)| on_target));
         let is_dark = || design.coding.codebook.marks(log.label[shot], log.word[shot]).is_empty();
         score.dark += u64::from(outcome == Outcome::Missed && is_dark());
-        cloud.truth.outcome[pixel] = outcome;
         score.pixels[outcome as usize] += 1;
     }
     score

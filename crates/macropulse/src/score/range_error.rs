@@ -2,7 +2,7 @@
 
 use crate::points::{Outcome, PointCloud};
 
-/// The range errors of the right points of a cloud: measured less true range.
+/// The range errors of the right points of a cloud, one of each pixel: measured less true range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RangeError {
     /// Right points.
@@ -16,14 +16,14 @@ pub struct RangeError {
 }
 
 impl RangeError {
-    /// Of the right points of `cloud`, pixel by pixel, so that rounding is the same whatever order
+    /// Of the right points that the image of `cloud` shows, pixel by pixel, so that rounding is the same whatever order
     /// they came in. Ranges are `f32`: at 150 m they are kept to 8 µm.
     pub fn of(cloud: &PointCloud) -> Self {
-        let pixels = cloud.truth.outcome.iter().enumerate();
-        let right = pixels.filter(|(_, outcome)| **outcome == Outcome::Right);
-        let errors: Vec<f64> = right
-            .map(|(pixel, _)| f64::from(cloud.range[pixel]) - f64::from(cloud.truth.range[pixel]))
-            .collect();
+        let truth = &cloud.truth.returns;
+        let image = cloud.image(cloud.pick);
+        let right = image.iter().flatten().filter(|&at| truth.outcome[at] == Outcome::Right);
+        let errors: Vec<f64> =
+            right.map(|at| f64::from(cloud.range[at]) - f64::from(truth.range[at])).collect();
         let count = errors.len() as f64;
         let mean = errors.iter().sum::<f64>() / count;
         let squares = errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>();
@@ -38,14 +38,24 @@ impl RangeError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::points::Truth;
+    use crate::points::{Surfaces, Truth};
 
+    /// A row of pixels, those that have a range with a return.
     fn cloud(pixels: &[(f32, f32, Outcome)]) -> PointCloud {
+        let answered = pixels.iter().enumerate().filter(|(_, pixel)| !pixel.0.is_nan());
+        let returns = answered.clone().count();
         PointCloud {
-            range: pixels.iter().map(|pixel| pixel.0).collect(),
+            rows: 1,
+            columns: pixels.len(),
+            row: vec![0; returns],
+            column: answered.clone().map(|(column, _)| column as u16).collect(),
+            range: answered.clone().map(|(_, pixel)| pixel.0).collect(),
             truth: Truth {
-                range: pixels.iter().map(|pixel| pixel.1).collect(),
-                outcome: pixels.iter().map(|pixel| pixel.2).collect(),
+                returns: Surfaces {
+                    range: answered.clone().map(|(_, pixel)| pixel.1).collect(),
+                    outcome: answered.map(|(_, pixel)| pixel.2).collect(),
+                    ..Surfaces::default()
+                },
                 ..Truth::default()
             },
             ..PointCloud::default()

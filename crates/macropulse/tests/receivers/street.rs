@@ -5,7 +5,7 @@ use std::ops::Range;
 use macropulse::codec::ShotLog;
 use macropulse::codec::Ticks;
 use macropulse::codec::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse::codec::decode::{Effort, Receiver, ReceiverKind, Returns};
+use macropulse::codec::decode::{Effort, Pick, Receiver, ReceiverKind, Returns};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -99,6 +99,8 @@ impl Sensor {
                 jitter_ticks: 0.0,
                 false_alarm: 1e-6,
                 bit_threshold: 15,
+                returns: 1,
+                pick: Pick::Strongest,
             },
             first_label: 0,
             labels,

@@ -59,9 +59,9 @@ impl Band<'_> {
     }
 
     /// Whether a surface of `shot` was found at `lag`.
-    fn is_known(&self, shot: usize, lag: i64) -> bool {
+    pub(super) fn is_known(&self, shot: usize, lag: i64) -> bool {
         self.locks[shot].is_some_and(|lock| lock.lag == lag)
-            || self.behind[shot].contains(&Some(lag))
+            || self.behind[shot].iter().flatten().any(|lock| lock.lag == lag)
     }
 
     /// Looks for further surfaces where the neighbours have one.
@@ -73,11 +73,11 @@ impl Band<'_> {
             if surfaces.iter().all(Option::is_none) {
                 continue;
             }
-            let seen_there = surfaces.map(|lag| lag.or(self.locks[neighbour].map(|lock| lock.lag)));
-            for lag in seen_there.into_iter().flatten() {
+            let seen_there = surfaces.map(|found| found.or(self.locks[neighbour]));
+            for lag in seen_there.into_iter().flatten().map(|lock| lock.lag) {
                 let Some(lock) = self.locks[shot] else { return };
-                let own = self.behind[shot].iter().flatten().chain([&lock.lag]);
-                if own.into_iter().any(|own| own.abs_diff(lag) < BLOCK as u64 / 4) {
+                let own = self.behind[shot].iter().flatten().chain([&lock]);
+                if own.into_iter().any(|own| own.lag.abs_diff(lag) < BLOCK as u64 / 4) {
                     continue;
                 }
                 if !self.may_be_elsewhere(shot, lock) {
@@ -111,7 +111,7 @@ impl Band<'_> {
         let is_better =
             rival.count > lock.count || (rival.count == lock.count && rival.lag < lock.lag);
         if let Some(free) = self.behind[shot].iter_mut().find(|lag| lag.is_none()) {
-            *free = Some(if is_better { lock.lag } else { rival.lag });
+            *free = Some(if is_better { lock } else { rival });
         }
         self.locks[shot] = Some(if is_better { rival } else { lock });
     }

@@ -56,6 +56,8 @@ pub(super) fn receiver(jitter_ticks: f64) -> Receiver {
         jitter_ticks,
         false_alarm: 1e-2,
         bit_threshold: 6,
+        returns: 1,
+        pick: crate::decode::Pick::Strongest,
     }
 }
 

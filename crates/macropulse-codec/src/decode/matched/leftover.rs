@@ -151,7 +151,7 @@ impl Band<'_> {
     }
 
     /// The lag at which most marks of `shot` are unexplained, if `least` are.
-    fn most_unexplained(&mut self, shot: usize, least: u16) -> Option<i64> {
+    pub(super) fn most_unexplained(&mut self, shot: usize, least: u16) -> Option<i64> {
         let sent = self.sent;
         let (nearest, farthest) = sent.gate();
         let word = sent.codebook.word(sent.log.word[shot]);

@@ -30,6 +30,8 @@ const MOST_HIDDEN: usize = 2;
 pub(super) struct Peeled {
     /// The lag of each shot that was found.
     pub locks: Vec<Option<Lock>>,
+    /// Shots that were found once more, behind their first lag, and where.
+    pub again: Vec<(usize, Lock)>,
     /// Ticks that nobody has explained, in order, unless these are all.
     pub left: Option<Vec<u32>>,
 }
@@ -45,6 +47,7 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
         least: fewest_without_a_gap(sent, ticks),
         explained: Explained::new(ticks.len()),
         locks: vec![None; sent.fired.len()],
+        again: Vec::new(),
         oldest: 0,
         oldest_beyond: 0,
         next: 0,
@@ -61,7 +64,7 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
     }
     let found_any = ticks.is_empty() || peeler.explained.any();
     let left = found_any.then(|| peeler.explained.left(ticks));
-    Peeled { locks: peeler.locks, left }
+    Peeled { locks: peeler.locks, again: peeler.again, left }
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
@@ -84,6 +87,7 @@ struct Peeler<'a> {
     least: usize,
     explained: Explained,
     locks: Vec<Option<Lock>>,
+    again: Vec<(usize, Lock)>,
     /// Light of no shot before this one can come from within the gate any more.
     oldest: usize,
     /// Light of no shot before this one can come any more.
@@ -189,7 +193,7 @@ impl Peeler<'_> {
         true
     }
 
-    /// Keeps `lag` unless the shot was found before: of several surfaces the first one counts.
+    /// Keeps `lag`: of several surfaces the first one counts, the others are found again.
     fn lock(&mut self, shot: usize, lag: i64, count: usize) {
         let count = count as u16;
         self.next = shot + 1;
@@ -198,7 +202,10 @@ impl Peeler<'_> {
         }
         let margin = count
             - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
-        self.locks[shot].get_or_insert(Lock { lag, count, margin });
+        let lock = Lock { lag, count, margin };
+        if self.locks[shot].get_or_insert(lock).lag != lag {
+            self.again.push((shot, lock));
+        }
     }
 }
 

@@ -31,21 +31,27 @@ impl Band<'_> {
                     continue;
                 }
             }
-            let marks = self.sent.weight(shot);
-            let photons = match lock.count == marks {
-                true => self.all_found[usize::from(marks)],
-                false => photons_per_mark(lock.count, marks, self.density_around(shot, lock)),
-            };
-            returns.push(Return {
-                shot,
-                tof: self.tof(shot, lock),
-                peak: lock.count,
-                marks,
-                margin: lock.margin,
-                photons,
-            });
+            let is_behind = self.behind.get(shot).is_some_and(|behind| behind[0].is_some());
+            if is_behind && self.sent.wants_further() {
+                for lock in self.kept(shot, lock) {
+                    returns.push(self.measured(shot, lock));
+                }
+            } else {
+                returns.push(self.measured(shot, lock));
+            }
         }
         returns
+    }
+
+    /// What is measured of `shot` at `lock`.
+    pub(super) fn measured(&mut self, shot: usize, lock: Lock) -> Return {
+        let marks = self.sent.weight(shot);
+        let photons = match lock.count == marks {
+            true => self.all_found[usize::from(marks)],
+            false => photons_per_mark(lock.count, marks, self.density_around(shot, lock)),
+        };
+        let (peak, margin) = (lock.count, lock.margin);
+        Return { shot, tof: self.tof(shot, lock), peak, marks, margin, photons }
     }
 
     /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
@@ -53,7 +59,7 @@ impl Band<'_> {
     /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it;
     /// unexplained light only, as other shots may well shine there. A lit bit is dark if it has
     /// less than half the marks of the others and chance would not take away so many.
-    fn carries_its_label(&mut self, shot: usize, lock: Lock) -> bool {
+    pub(super) fn carries_its_label(&mut self, shot: usize, lock: Lock) -> bool {
         let all_found = lock.count == self.sent.weight(shot);
         if all_found && self.is_dark() {
             return true;

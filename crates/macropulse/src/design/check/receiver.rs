@@ -4,7 +4,7 @@ use super::{Check, TOO_FINE};
 use crate::design::file::{ReceiverKindFile, SensorFile};
 use crate::design::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
-use macropulse_codec::decode::{Receiver, ReceiverKind};
+use macropulse_codec::decode::{MOST_RETURNS, Pick, Receiver, ReceiverKind};
 
 impl Check<'_> {
     pub(super) fn tdc(&self, file: &SensorFile) -> Result<Tdc, Error> {
@@ -52,6 +52,7 @@ impl Check<'_> {
             );
         }
         self.can_read(kind, coding)?;
+        let (returns, pick) = self.returns(file, kind)?;
         let (threshold, lightest) =
             (file.receiver.bit_threshold, coding.codebook.lightest_word() as u32);
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
@@ -81,7 +82,45 @@ impl Check<'_> {
                 // The others ask for none: a light word may have fewer marks than the default.
                 _ => threshold.clamp(1, lightest.max(1)) as u16,
             },
+            returns,
+            pick,
         })
+    }
+
+    /// How many returns a shot may have at most, and which are kept of more.
+    fn returns(&self, file: &SensorFile, kind: ReceiverKind) -> Result<(u8, Pick), Error> {
+        let wanted =
+            self.count("receiver.returns", file.receiver.returns, 1, MOST_RETURNS.into())?;
+        let one_only = match kind {
+            ReceiverKind::Direct if file.detector.first_firing.is_some() => {
+                Some("detector.first-firing fires once per shot")
+            }
+            ReceiverKind::Direct | ReceiverKind::Matched => None,
+            ReceiverKind::Literal => Some("receiver.kind = \"literal\" gives one return per shot"),
+            ReceiverKind::Blind => Some("receiver.kind = \"blind\" gives one return per shot"),
+            ReceiverKind::Balanced => {
+                Some("receiver.kind = \"balanced\" gives one return per shot")
+            }
+        };
+        if let Some(why) = one_only {
+            if wanted > 1 {
+                let message = format!("is {wanted}, but {why}: leave it at 1");
+                return self.refuse("receiver.returns", message);
+            }
+            if file.receiver.pick.is_some() {
+                return self
+                    .refuse("receiver.pick", format!("has no effect, as {why}: leave it out"));
+            }
+        }
+        let most = kind.most_returns();
+        if wanted > most.into() {
+            let message = format!(
+                "is {wanted}, but receiver.kind = \"matched\" finds {most} returns of a shot at most"
+            );
+            return self.refuse("receiver.returns", message);
+        }
+        let otherwise = if kind == ReceiverKind::Direct { Pick::First } else { Pick::Strongest };
+        Ok((wanted as u8, file.receiver.pick.unwrap_or(otherwise)))
     }
 
     /// Whether a receiver of this kind understands what is sent.
