@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     fn dark(design: &Design) -> Link {
-        Link::of(design, &crate::environment::Environment::vacuum_dark())
+        crate::channel::Operating::in_the_dark(design).link
     }
 
     /// One return of every owned shot, two of every second one.
