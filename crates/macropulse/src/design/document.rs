@@ -62,6 +62,18 @@ pub(super) struct Chain {
     pub merged: Table,
 }
 
+/// Where a key was typed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Typed {
+    /// On the command line.
+    Set,
+    /// In the file that was asked for, not in one that it extends.
+    File,
+}
+
+/// The origin of what is typed on the command line.
+const OVERRIDES: &str = "--set";
+
 impl Chain {
     /// Reads `text` and everything it extends. `folder` is where relative names start.
     pub fn read(
@@ -133,6 +145,31 @@ impl Chain {
     /// An error about the value at the dotted `path`, pointing at the document that gave it.
     pub fn error(&self, path: &str, message: impl Into<String>) -> Error {
         place(&self.documents, path).error(message)
+    }
+
+    /// Where the key at the dotted `path` was typed, if it was: with `--set`, or in the file itself.
+    pub fn typed(&self, path: &str) -> Option<Typed> {
+        let mut documents = self.documents.iter();
+        let first = documents.next()?;
+        let set = (first.origin == OVERRIDES).then_some(first);
+        if set.is_some_and(|set| value_at(&set.table, path).is_some()) {
+            return Some(Typed::Set);
+        }
+        let file = if set.is_some() { documents.next()? } else { first };
+        value_at(&file.table, path).map(|_| Typed::File)
+    }
+
+    /// The same chain without the keys at the dotted `paths`, as far as it is read as one.
+    pub fn without(mut self, paths: &[&str]) -> Self {
+        for path in paths {
+            let (mut table, mut key) = (Some(&mut self.merged), *path);
+            while let Some((outer, inner)) = key.split_once('.') {
+                table = table.and_then(|table| table.get_mut(outer)?.as_table_mut());
+                key = inner;
+            }
+            table.and_then(|table| table.remove(key));
+        }
+        self
     }
 
     /// Dotted paths of the values nobody wrote, with the value taken.
@@ -239,7 +276,7 @@ fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
     let mut kept = defaults.clone();
     kept.retain(|key, _| match key {
         "code" => sensor.contains_key("code"),
-        "safety" => sensor.contains_key("optics"),
+        "safety" => ["optics", "safety"].iter().any(|key| sensor.contains_key(*key)),
         _ => true,
     });
     for (group, kinds) in ALTERNATIVES {

@@ -3,6 +3,7 @@
 mod budget;
 mod code;
 mod detector;
+mod effectless;
 mod light;
 mod receiver;
 mod scan;
@@ -44,6 +45,9 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     let scan = check.scan(&file.scan, !idealised.contains(&Effect::MirrorMotion))?;
     let tdc = check.tdc(&file)?;
     let coding = check.coding(file.code.as_ref(), &scan, &tdc)?;
+    if let Some(idle) = check.without_effect(&file, &idealised).into_iter().next() {
+        return Err(idle);
+    }
     let off = |effect| idealised.contains(&effect);
     let light = check.light(&file, off)?;
     let parts =
@@ -65,6 +69,8 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         Some(typed) => check.within("receiver.right_within_m", typed, 0.0, WIDEST)?,
         None => resolved(&detector, &light, &tdc),
     };
+    // What has no effect belongs neither to the sensor nor to its digest.
+    let said = chain.clone().without(&effectless::idle_keys(&file, &idealised));
     let mut design = Design {
         name: file.name,
         summary: file.summary,
@@ -77,9 +83,9 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         receiver,
         right_within,
         idealised,
-        defaults: chain.defaults_used(),
+        defaults: said.defaults_used(),
         warnings: Vec::new(),
-        text: chain.text(),
+        text: said.text(),
         directions: OnceLock::new(),
     };
     check.clock(&design)?;

@@ -1,0 +1,151 @@
+//! Keys that another setting makes meaningless: typing one is an error that names both.
+//!
+//! Only what a user has just typed counts: keys given with `--set`, and keys of the file itself
+//! where `--set` does not change what makes them meaningless. What a file inherits by `extends` may
+//! lie idle.
+
+use super::Check;
+use crate::design::document::Typed;
+use crate::design::file::{Label, ReceiverKindFile, SensorFile};
+use crate::design::{Effect, Error};
+
+/// A key without effect, the key of the setting that makes it so, and how.
+struct Idle {
+    key: &'static str,
+    by: &'static str,
+    why: &'static str,
+}
+
+const FOOTPRINT: &str = "the beam has no width while \"footprint\" is in this list: \
+                         --with footprint simulates it";
+const BUDGET: &str = "the receiver is declared by its sensitivity while \"link-budget\" is in this \
+                      list: --with link-budget counts photons";
+
+impl Check<'_> {
+    /// The keys that were typed for nothing, each as an error.
+    pub(super) fn without_effect(&self, file: &SensorFile, idealised: &[Effect]) -> Vec<Error> {
+        idle(file, idealised).into_iter().filter_map(|idle| self.told(&idle)).collect()
+    }
+
+    fn told(&self, idle: &Idle) -> Option<Error> {
+        let because = match self.chain.typed(idle.key)? {
+            Typed::Set => true,
+            // What `--set` has just changed, the file could not know.
+            Typed::File => self.chain.typed(idle.by) != Some(Typed::Set),
+        };
+        let message = format!("has no effect because of `{}`: {}", idle.by, idle.why);
+        because.then(|| self.chain.error(idle.key, message))
+    }
+}
+
+/// The keys that mean nothing for such a sensor, typed or not.
+pub(super) fn idle_keys(file: &SensorFile, idealised: &[Effect]) -> Vec<&'static str> {
+    idle(file, idealised).into_iter().map(|idle| idle.key).collect()
+}
+
+fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
+    let off = |effect| idealised.contains(&effect);
+    let mut found = Vec::new();
+    let mut add = |holds: bool, keys: &[&'static str], by, why| {
+        if holds {
+            found.extend(keys.iter().map(|key| Idle { key, by, why }));
+        }
+    };
+    let beam = ["light.divergence_mrad", "light.footprint_rays"];
+    add(off(Effect::Footprint), &beam, "idealised", FOOTPRINT);
+    let declared = off(Effect::LinkBudget);
+    let counted = [
+        "light.energy",
+        "optics",
+        "safety",
+        "detector.photon-counting.efficiency",
+        "detector.geiger.efficiency",
+        "detector.first-firing.efficiency",
+    ];
+    add(declared, &counted, "idealised", BUDGET);
+    let sensitivity = [
+        "detector.photon-counting.sensitivity",
+        "detector.geiger.sensitivity",
+        "detector.first-firing.sensitivity",
+    ];
+    add(
+        !declared,
+        &sensitivity,
+        "idealised",
+        "photons follow from energy and optics: --without link-budget declares the receiver instead",
+    );
+    let kind = file.receiver.kind;
+    let bitwise = matches!(kind, ReceiverKindFile::Literal | ReceiverKindFile::Blind);
+    let correlating = matches!(kind, ReceiverKindFile::Matched | ReceiverKindFile::Balanced);
+    add(
+        !bitwise,
+        &["receiver.bit_threshold"],
+        "receiver.kind",
+        "only `literal` and `blind` decide bit by bit",
+    );
+    add(
+        !correlating,
+        &["receiver.false_alarm"],
+        "receiver.kind",
+        "only `matched` and `balanced` derive their threshold from it",
+    );
+    add(
+        kind != ReceiverKindFile::Matched,
+        &["receiver.effort"],
+        "receiver.kind",
+        "only `matched` searches",
+    );
+    let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
+    let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
+    add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::design::Design;
+    use std::path::Path;
+
+    fn told(text: &str, set: &[(&str, &str)]) -> String {
+        let text = format!("version = 1\nextends = \"kim-park-2016\"\nname = \"mine\"\n{text}");
+        let set: Vec<(String, String)> =
+            set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        match Design::from_toml(&text, "mine.toml", Path::new(""), &set) {
+            Ok(_) => String::new(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn a_key_that_changes_nothing_is_refused_and_both_are_named() {
+        for (text, key, by) in [
+            ("[light]\nfootprint_rays = 7\n", "light.footprint_rays", "idealised"),
+            ("[light]\ndivergence_mrad = 0.3\n", "light.divergence_mrad", "idealised"),
+            ("[light]\nenergy = \"class-1\"\n", "light.energy", "idealised"),
+            ("[safety]\ndistance_mm = 200.0\n", "safety", "idealised"),
+            ("[receiver]\nbit_threshold = 12\n", "receiver.bit_threshold", "receiver.kind"),
+            (
+                "[receiver]\nkind = \"literal\"\nfalse_alarm = 1e-4\n",
+                "receiver.false_alarm",
+                "receiver.kind",
+            ),
+            ("[receiver]\nkind = \"blind\"\neffort = \"quick\"\n", "receiver.effort", "kind"),
+            ("[code]\nlabel = \"none\"\nsync_bit = true\n", "code.sync_bit", "code.label"),
+        ] {
+            let message = told(text, &[]);
+            assert!(message.contains(key) && message.contains(by), "{key}: {message}");
+            assert!(message.contains("has no effect"), "{message}");
+        }
+        let message = told("", &[("light.footprint_rays", "7")]);
+        assert!(message.starts_with("--set: light.footprint_rays: has no effect"), "{message}");
+    }
+
+    /// Control: with what makes them matter, and where `--set` has changed that.
+    #[test]
+    fn a_key_that_matters_is_not() {
+        assert_eq!(told("[receiver]\nkind = \"literal\"\nbit_threshold = 12\n", &[]), "");
+        let set = [("receiver.kind", "matched")];
+        assert_eq!(told("[receiver]\nkind = \"literal\"\nbit_threshold = 12\n", &set), "");
+        assert_eq!(told("", &[]), "");
+    }
+}
