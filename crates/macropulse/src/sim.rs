@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use crate::channel::{Error, Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
-use crate::emit::{Band, bands};
-use crate::points::PointCloud;
+use crate::emit::{Band, bands, scan_begins_fs};
+use crate::points::{PointCloud, Viewpoint};
 use crate::random::Chance;
-use crate::scene::{Hits, Scene};
+use crate::scene::{Hits, Pose, Scene};
 use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
@@ -116,7 +116,10 @@ impl<'a> Scans<'a> {
 
     /// Measures `bands` of one scan; whether to the end.
     fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
-        self.scan.cloud.clear(bands.first().map_or(0, |band| band.scan));
+        let number = bands.first().map_or(0, |band| band.scan);
+        self.scan.cloud.clear(number);
+        let pose = self.scene.sensor.at(scan_begins_fs(self.design, number));
+        self.scan.cloud.viewpoint = viewpoint(&pose);
         (self.scan.score, self.scan.tally) = Default::default();
         let seen = Seen { design: self.design, scene: self.scene, operating: &self.operating };
         let setup = Setup { seen, detectors: &self.detectors };
@@ -133,6 +136,11 @@ impl<'a> Scans<'a> {
         });
         !stopped.into_inner()
     }
+}
+
+/// The pose of a sensor as clouds have it.
+fn viewpoint(pose: &Pose) -> Viewpoint {
+    Viewpoint { position: pose.position, turn: pose.quaternion() }
 }
 
 impl Scan {

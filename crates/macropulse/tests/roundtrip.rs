@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse::formats::{Format, Names, read_pcd, read_range_png, write_cloud};
-use macropulse::points::{NO_OBJECT, Outcome, PointCloud, Truth};
+use macropulse::points::{NO_OBJECT, Outcome, PointCloud, Truth, Viewpoint};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 use std::fs;
@@ -34,6 +34,7 @@ fn cloud(with_truth: bool) -> PointCloud {
         scan: 12,
         rows: ROWS,
         columns: COLUMNS,
+        viewpoint: Viewpoint { position: [12.1, -0.3, 1.7], turn: [0.8, 0.0, -0.6, 0.0] },
         x: each(&|at| 0.1 + at),
         y: each(&|at| -0.2 * at),
         z: each(&|at| 0.3 * at - 2.0),
@@ -83,6 +84,7 @@ fn pcd_keeps_every_column_of_every_pixel() {
         assert_same(&read.intensity, &written.intensity, 0.0, "intensity");
         assert_same(&read.range, &written.range, 0.0, "range");
         assert_eq!(read.time_ns, written.time_ns);
+        assert_eq!(read.viewpoint, written.viewpoint);
         assert_eq!(read.peak, written.peak);
         assert_eq!(read.marks, written.marks);
         assert_eq!(read.margin, written.margin);

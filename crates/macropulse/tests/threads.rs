@@ -45,6 +45,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         scan,
         rows,
         columns,
+        viewpoint,
         x,
         y,
         z,
@@ -64,6 +65,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
     let rest = [
         vec![*scan, *rows as u64, *columns as u64],
         time_ns.iter().map(|value| value.to_bits()).collect(),
+        viewpoint.position.iter().chain(&viewpoint.turn).map(|value| value.to_bits()).collect(),
         outcome.iter().map(|&outcome| outcome as u64).collect(),
     ];
     reals.into_iter().chain(counts).chain(rest).collect()

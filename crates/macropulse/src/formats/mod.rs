@@ -16,7 +16,7 @@ mod png16;
 pub use atomic::write_atomically;
 pub use csv::quoted;
 pub use error::Error;
-pub use manifest::{Entries, Manifest, Named};
+pub use manifest::{Begun, Entries, Manifest, Named};
 pub use pcd_reader::read_pcd;
 pub use png16::{RangeImage, read_range_png};
 
@@ -96,12 +96,13 @@ pub fn write_cloud(
 /// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.
 #[cfg(test)]
 fn sample_cloud() -> PointCloud {
-    use crate::points::{NO_OBJECT, Outcome, Truth};
+    use crate::points::{NO_OBJECT, Outcome, Truth, Viewpoint};
     let nan = f32::NAN;
     PointCloud {
         scan: 3,
         rows: 2,
         columns: 3,
+        viewpoint: Viewpoint { position: [1.5, -2.0, 0.25], turn: [0.6, 0.0, 0.0, -0.8] },
         x: vec![30.0, 30.5, nan, 29.0, 31.25, 28.0],
         y: vec![1.0, 0.0, nan, 1.5, 0.25, -1.0],
         z: vec![0.5, 0.5, nan, -0.5, -0.25, -0.75],

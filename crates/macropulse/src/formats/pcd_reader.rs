@@ -3,7 +3,7 @@
 use super::attributes::{Attribute, Value, outcome_from_code};
 use super::pcd::{SCAN_COMMENT, type_letter};
 use super::{Error, Format};
-use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth};
+use crate::points::{NO_OBJECT, Outcome, PointCloud, Truth, Viewpoint};
 use std::path::Path;
 
 /// Reads a binary PCD file into an organised cloud.
@@ -29,6 +29,7 @@ struct Field {
 #[derive(Debug, Default)]
 struct Header {
     scan: u64,
+    viewpoint: Viewpoint,
     fields: Vec<String>,
     sizes: Vec<String>,
     types: Vec<String>,
@@ -52,7 +53,8 @@ fn parse(bytes: &[u8]) -> Result<PointCloud, String> {
         let whole = body.len() / stride;
         return Err(format!("it ends after {whole} of {points} points; the file was cut short"));
     }
-    let mut cloud = PointCloud { scan: header.scan, rows, columns, ..PointCloud::default() };
+    let Header { scan, viewpoint, .. } = header;
+    let mut cloud = PointCloud { scan, rows, columns, viewpoint, ..PointCloud::default() };
     for record in body.chunks_exact(stride).take(points) {
         append(&mut cloud, &fields, record)?;
     }
@@ -93,12 +95,25 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
                     "its points are stored as `{values}`; only `DATA binary` is read"
                 ));
             }
-            "VERSION" | "VIEWPOINT" | "" => {}
+            "VIEWPOINT" => header.viewpoint = viewpoint(values)?,
+            "VERSION" | "" => {}
             _ if key.starts_with('#') => {}
             _ => return Err(format!("its header has a line that begins with `{key}`")),
         }
     }
     Err("its header has no DATA line".into())
+}
+
+/// Position and quaternion, as PCD has them: x y z, then w i j k.
+fn viewpoint(text: &str) -> Result<Viewpoint, String> {
+    let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
+    let numbers = numbers.unwrap_or_default();
+    match *numbers.as_slice() {
+        [x, y, z, w, i, j, k] if numbers.iter().all(|number| number.is_finite()) => {
+            Ok(Viewpoint { position: [x, y, z], turn: [w, i, j, k] })
+        }
+        _ => Err(format!("VIEWPOINT is `{text}`, not seven finite numbers")),
+    }
 }
 
 fn whole_number(key: &str, text: &str) -> Result<usize, String> {
@@ -272,6 +287,19 @@ mod tests {
             fault(&foreign("FIELDS x y z\nSIZE 4 4\nTYPE F F F\nCOUNT 1 1 1", 1)),
             "FIELDS, SIZE, TYPE and COUNT have different lengths"
         );
+    }
+
+    #[test]
+    fn a_viewpoint_is_seven_numbers() {
+        let read = |viewpoint: &str| parse(&foreign(&format!("{viewpoint}\n{XYZ_RGB}"), 1));
+        let cloud = read("VIEWPOINT 1 2 -3.5 0.8 0 0 0.6").unwrap();
+        assert_eq!(cloud.viewpoint.position, [1.0, 2.0, -3.5]);
+        assert_eq!(cloud.viewpoint.turn, [0.8, 0.0, 0.0, 0.6]);
+        assert_eq!(parse(&foreign(XYZ_RGB, 1)).unwrap().viewpoint, Viewpoint::default());
+        for wrong in ["0 0 0 1 0 0", "0 0 0 1 0 0 0 0", "0 0 0 1 0 0 x 0", "0 0 nan 1 0 0 0"] {
+            let told = read(&format!("VIEWPOINT {wrong}")).unwrap_err();
+            assert_eq!(told, format!("VIEWPOINT is `{wrong}`, not seven finite numbers"));
+        }
     }
 
     #[test]

@@ -45,7 +45,8 @@ impl Outcome {
 /// One scan as an organised cloud: `rows` × `columns` entries, row-major, row 0 at the top and
 /// column 0 at the left. A pixel without a return is NaN in x, y, z, range and intensity.
 ///
-/// Sensor frame (REP-103): x forward, y left, z up, metres.
+/// Sensor frame (REP-103): x forward, y left, z up, metres. Each point of a sensor that moves is in
+/// its frame at the time of that point: raw, not deskewed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
     /// Number of the scan, from 0.
@@ -54,6 +55,8 @@ pub struct PointCloud {
     pub rows: usize,
     /// Columns of the organised cloud.
     pub columns: usize,
+    /// Where the sensor was when the scan began.
+    pub viewpoint: Viewpoint,
     /// Forward, m.
     pub x: Vec<f32>,
     /// Left, m.
@@ -65,7 +68,7 @@ pub struct PointCloud {
     pub intensity: Vec<f32>,
     /// One-way range, m.
     pub range: Vec<f32>,
-    /// Time at which the shot was fired, ns from the start of the scan; set for every pixel.
+    /// Time at which the shot was fired, ns from the beginning of the first scan; set for every pixel.
     pub time_ns: Vec<f64>,
     /// Marks found at their place.
     pub peak: Vec<u16>,
@@ -75,6 +78,23 @@ pub struct PointCloud {
     pub margin: Vec<u16>,
     /// What is known from the scene; filled by the score stage, empty without it.
     pub truth: Truth,
+}
+
+/// Where the sensor was in the world when a scan began.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Viewpoint {
+    /// Position, m.
+    pub position: [f64; 3],
+    /// The turn that carries directions of the sensor frame into the world, as a unit quaternion
+    /// w, x, y, z.
+    pub turn: [f64; 4],
+}
+
+impl Default for Viewpoint {
+    /// At the origin, not turned.
+    fn default() -> Self {
+        Self { position: [0.0; 3], turn: [1.0, 0.0, 0.0, 0.0] }
+    }
 }
 
 /// The truth beside a point cloud, one entry per pixel.
@@ -112,6 +132,7 @@ impl PointCloud {
             scan,
             rows,
             columns,
+            viewpoint: Viewpoint::default(),
             x: none.clone(),
             y: none.clone(),
             z: none.clone(),
@@ -150,10 +171,9 @@ impl PointCloud {
     /// Intensity, by the `link` of the sensor through its air, is the photons a mark brought over the photons a white surface seen square on
     /// would have brought from the same range; 1 for a detector without a photon scale.
     pub fn add(&mut self, design: &Design, link: &Link, log: &ShotLog, returns: &Returns) {
-        let scan_start = self.scan as f64 * design.scan_period() * 1e9;
         for shot in log.owned.clone() {
             let pixel = self.pixel(log, shot);
-            self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
+            self.time_ns[pixel] = log.fired_at_fs[shot] as f64 * 1e-6;
         }
         let directions = design.directions();
         for (i, &shot) in returns.shot.iter().enumerate() {
