@@ -34,6 +34,40 @@ fn a_run_leaves_its_scans_and_a_manifest() {
     assert_eq!(manifest["files"].as_array().unwrap().len(), 6);
 }
 
+/// Where a moving sensor was stands beside its scans, and with the points.
+#[test]
+fn a_run_of_a_moving_sensor_tells_where_each_scan_began() {
+    let desk = Desk::new();
+    let scene = "version = 1\nground = { material = \"asphalt\" }\n[sensor]\n\
+                 position_m = [0, 0, 2]\npitch_deg = 20\nvelocity_m_s = [20, 0, 0]\n\
+                 turn_rate_deg_s = 10\n";
+    fs::write(desk.path().join("drive.toml"), scene).unwrap();
+    let ran = desk.run("simulate --sensor peregrine --scene drive.toml --scans 2 -o a");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&fs::read(desk.path().join("a/manifest.json")).unwrap()).unwrap();
+    let [first, second] = manifest["scans"].as_array().unwrap().as_slice() else { unreachable!() };
+    assert_eq!((&first["scan"], &second["scan"]), (&0.into(), &1.into()));
+    assert_eq!(first["start_ns"], 0.0);
+    let start = second["start_ns"].as_f64().unwrap() * 1e-9;
+    assert!(start > 0.01, "{start}");
+    let close = |value: &serde_json::Value, wanted: f64| {
+        assert!((value.as_f64().unwrap() - wanted).abs() < 1e-9, "{value} {wanted}");
+    };
+    close(&second["position_m"][0], 20.0 * start);
+    close(&second["position_m"][2], 2.0);
+    close(&second["yaw_deg"], 10.0 * start);
+    close(&second["pitch_deg"], 20.0);
+    let pcd = fs::read(desk.path().join("a/scan-000001.pcd")).unwrap();
+    let header = String::from_utf8_lossy(&pcd[..2000]).into_owned();
+    let viewpoint = header.lines().find_map(|line| line.strip_prefix("VIEWPOINT ")).unwrap();
+    let numbers: Vec<f64> = viewpoint.split(' ').map(|number| number.parse().unwrap()).collect();
+    assert!((numbers[0] - 20.0 * start).abs() < 1e-9 && numbers[2] == 2.0, "{viewpoint}");
+    assert!((numbers[3..].iter().map(|part| part * part).sum::<f64>() - 1.0).abs() < 1e-12);
+    let told = desk.run("check drive.toml").out;
+    assert!(told.contains("sensor: moves by (20, 0, 0) m and turns by 10 deg in each"), "{told}");
+}
+
 #[test]
 fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let desk = Desk::new();

@@ -6,8 +6,9 @@ use crate::view::{Layout, RangePicture};
 use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
+use macropulse::emit::scan_begins_fs;
 use macropulse::formats::{
-    self, Entries, Format, Manifest, Named, Names, write_atomically, write_cloud,
+    self, Begun, Entries, Format, Manifest, Named, Names, write_atomically, write_cloud,
 };
 use macropulse::points::{Outcome, PointCloud};
 use macropulse::scene::Scene;
@@ -116,6 +117,7 @@ pub fn manifest(run: &Run) -> Manifest {
             .map(|effect| effect.name.to_owned())
             .collect(),
         notes: scene.notes.iter().chain(run.warnings).cloned().collect(),
+        scans: (0..run.scans).map(|scan| begun(design, scene, scan)).collect(),
         files: run.files.to_vec(),
         ..Manifest::default()
     };
@@ -153,4 +155,17 @@ pub fn manifest(run: &Run) -> Manifest {
     manifest.stage_times_s.push("write", run.writing);
     manifest.stage_times_s.push("elapsed", run.elapsed);
     manifest
+}
+
+fn begun(design: &Design, scene: &Scene, scan: u64) -> Begun {
+    let start_fs = scan_begins_fs(design, scan);
+    let pose = scene.sensor.at(start_fs);
+    Begun {
+        scan,
+        start_ns: start_fs as f64 * 1e-6,
+        position_m: pose.position,
+        yaw_deg: pose.yaw.to_degrees(),
+        pitch_deg: pose.pitch.to_degrees(),
+        roll_deg: pose.roll.to_degrees(),
+    }
 }

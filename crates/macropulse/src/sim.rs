@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use crate::channel::{Error, Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
-use crate::emit::{Band, bands};
-use crate::points::{Piece, PointCloud};
+use crate::emit::{Band, bands, scan_begins_fs};
+use crate::points::{Piece, PointCloud, Viewpoint};
 use crate::random::Chance;
-use crate::scene::{Hits, Scene};
+use crate::scene::{Hits, Pose, Scene};
 use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
@@ -120,7 +120,10 @@ impl<'a> Scans<'a> {
         let stopped = AtomicBool::new(false);
         let clock = Instant::now();
         (self.scan.score, self.scan.tally) = Default::default();
-        self.scan.cloud.start(bands.first().map_or(0, |band| band.scan));
+        let number = bands.first().map_or(0, |band| band.scan);
+        self.scan.cloud.start(number);
+        let pose = self.scene.sensor.at(scan_begins_fs(self.design, number));
+        self.scan.cloud.viewpoint = viewpoint(&pose);
         self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
         let at_once = BANDS_PER_THREAD * rayon::current_num_threads();
         self.pieces.resize_with(at_once.min(bands.len()), Piece::default);
@@ -156,6 +159,11 @@ impl<'a> Scans<'a> {
 /// Bands are computed side by side, and then joined while they are still in the cache: so many for
 /// each thread, that hardly any thread waits for the last one.
 const BANDS_PER_THREAD: usize = 16;
+
+/// The pose of a sensor as clouds have it.
+fn viewpoint(pose: &Pose) -> Viewpoint {
+    Viewpoint { position: pose.position, turn: pose.quaternion() }
+}
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
 struct Measured<'a> {

@@ -87,7 +87,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "scene",
-            may_name: &["design", "digest", "emit", "environment", "kernels", "names"],
+            may_name: &["design", "digest", "emit", "environment", "kernels", "names", "units"],
             because: "surfaces do not know what their echoes become",
         },
         Rule {

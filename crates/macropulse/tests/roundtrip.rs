@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse::formats::{Format, Names, read_pcd, read_range_png, write_cloud};
-use macropulse::points::{NO_OBJECT, Outcome, Pick, PointCloud, Surface, Surfaces, Truth};
+use macropulse::points::{
+    NO_OBJECT, Outcome, Pick, PointCloud, Surface, Surfaces, Truth, Viewpoint,
+};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 use std::fs;
@@ -53,6 +55,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
         scan: 12,
         rows: ROWS,
         columns: COLUMNS,
+        viewpoint: Viewpoint { position: [12.1, -0.3, 1.7], turn: [0.8, 0.0, -0.6, 0.0] },
         returns_per_shot,
         pick: Pick::First,
         row: all.iter().map(|(pixel, _)| (pixel / COLUMNS) as u16).collect(),
@@ -135,6 +138,7 @@ fn pcd_keeps_every_column_of_every_pixel() {
         assert_eq!((read.scan, read.rows, read.columns), (12, ROWS, COLUMNS));
         assert_same_returns(&read, &written);
         assert_eq!(read.fired_ns, written.fired_ns);
+        assert_eq!(read.viewpoint, written.viewpoint);
         assert_same_truth(&read.truth.pixels, &written.truth.pixels);
     }
 }

@@ -47,6 +47,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         scan,
         rows,
         columns,
+        viewpoint,
         returns_per_shot,
         pick,
         row,
@@ -75,7 +76,9 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
     let times = [time_ns, fired_ns];
     let outcomes = [&returns.outcome, &pixels.outcome];
     let shape = vec![*scan, *rows as u64, *columns as u64, *returns_per_shot as u64, *pick as u64];
-    std::iter::once(shape)
+    let seen_from = viewpoint.position.iter().chain(&viewpoint.turn).map(|value| value.to_bits());
+    [shape, seen_from.collect()]
+        .into_iter()
         .chain(reals.map(|column| column.iter().map(|value| u64::from(value.to_bits())).collect()))
         .chain(counts.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
         .chain(numbers.map(|column| column.iter().map(|&value| u64::from(value)).collect()))

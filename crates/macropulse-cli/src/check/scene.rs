@@ -1,6 +1,6 @@
 //! The report on a scene.
 
-use macropulse::scene::{Interferer, Pose, Scene};
+use macropulse::scene::{Interferer, Moving, Pose, Scene};
 use serde_json::{Map, Value, json};
 
 use super::Report;
@@ -18,7 +18,9 @@ pub fn report(scene: &Scene) -> Report {
     columns
         .push("targets", if targets.is_empty() { "none".to_owned() } else { targets.join(", ") });
     columns.push("materials", materials.join(", "));
-    columns.push("sensor", stands(&scene.sensor));
+    columns.push("sensor", stands(&scene.sensor.pose));
+    let moving = scene.moving.iter();
+    columns.push_list("moving", moving.map(|one| format!("{}: {}", one.name, one.motion.told())));
     let environment = &scene.environment;
     let conditions = environment.conditions();
     columns.push("environment", format!("{}: {conditions}", environment.name));
@@ -40,10 +42,11 @@ pub fn report(scene: &Scene) -> Report {
             "objects": objects,
             "targets": targets,
             "materials": materials,
-            "sensor_position_m": scene.sensor.position,
-            "sensor_yaw_deg": scene.sensor.yaw.to_degrees(),
-            "sensor_pitch_deg": scene.sensor.pitch.to_degrees(),
-            "sensor_roll_deg": scene.sensor.roll.to_degrees(),
+            "sensor_position_m": scene.sensor.pose.position,
+            "sensor_yaw_deg": scene.sensor.pose.yaw.to_degrees(),
+            "sensor_pitch_deg": scene.sensor.pose.pitch.to_degrees(),
+            "sensor_roll_deg": scene.sensor.pose.roll.to_degrees(),
+            "moving": scene.moving.iter().map(moves).collect::<Vec<_>>(),
             "environment": environment.name,
             "conditions": conditions,
             "idealised": environment
@@ -63,6 +66,15 @@ fn stands(pose: &Pose) -> String {
     let [yaw, pitch, roll] =
         [pose.yaw, pose.pitch, pose.roll].map(|angle| short(angle.to_degrees()));
     format!("at x {x}, y {y}, z {z} m; yaw {yaw}, pitch {pitch}, roll {roll} deg")
+}
+
+/// Something that moves: what, and how.
+fn moves(moving: &Moving) -> Value {
+    json!({
+        "name": moving.name,
+        "velocity_m_s": moving.motion.velocity,
+        "turn_rate_deg_s": moving.motion.turn_rate.to_degrees(),
+    })
 }
 
 /// One of the other lidars: what, where, when.

@@ -118,12 +118,12 @@ fn is_target(scene: &Scene, object: u16) -> bool {
 
 /// The rays of the sensor that meet the car first, in the order of the cloud.
 fn samples_on_car(design: &Design, scene: &Scene) -> Vec<Sample> {
-    let world_from_sensor = scene.sensor.world_from_sensor();
+    let world_from_sensor = scene.sensor.pose.world_from_sensor();
     let columns = design.scan.columns as usize;
     let sample = |pixel: usize| {
         let aim = design.directions().of((pixel / columns) as u16, (pixel % columns) as u16);
         let ray =
-            Ray { origin: scene.sensor.position, direction: world_from_sensor.direction(aim) };
+            Ray { origin: scene.sensor.pose.position, direction: world_from_sensor.direction(aim) };
         let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range)?;
         let height = ray.origin[2] + ray.direction[2] * hit.range;
         is_target(scene, hit.object).then_some(Sample { pixel, material: hit.material, height })

@@ -80,12 +80,12 @@ pub fn predict(design: &Design, scene: &Scene) -> Prediction {
 fn silhouette(design: &Design, scene: &Scene, window: Window) -> Option<(Window, usize)> {
     let at = |(from, to): (f64, f64), i: usize| from + (to - from) * (i as f64 + 0.5) / GRID as f64;
     let half = |(from, to): (f64, f64)| (to - from) / GRID as f64 / 2.0;
-    let world_from_sensor = scene.sensor.world_from_sensor();
+    let world_from_sensor = scene.sensor.pose.world_from_sensor();
     let meets_target = |elevation: f64, azimuth: f64| {
         let (sin_a, cos_a) = libm::sincos(azimuth);
         let (sin_e, cos_e) = libm::sincos(elevation);
         let direction = world_from_sensor.direction([cos_e * cos_a, cos_e * sin_a, sin_e]);
-        let ray = Ray { origin: scene.sensor.position, direction };
+        let ray = Ray { origin: scene.sensor.pose.position, direction };
         let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range);
         hit.is_some_and(|hit| scene.objects[usize::from(hit.object)].is_target)
     };

@@ -7,5 +7,5 @@ mod shot;
 
 pub use band::{Band, bands};
 pub use clock::Clock;
-pub use pattern::beam_axes;
+pub use pattern::{beam_axes, scan_begins_fs};
 pub use shot::{Shot, most_scans, shot_at, shot_of_pixel};

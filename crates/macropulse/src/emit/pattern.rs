@@ -134,6 +134,11 @@ fn fraction_of_scan(design: &Design, scan: u64, passed: u64) -> i64 {
     (shot * NUMERATOR / parts_of_fs(design)) as i64
 }
 
+/// When scan number `scan` begins, fs from the beginning of the first one.
+pub fn scan_begins_fs(design: &Design, scan: u64) -> i64 {
+    fraction_of_scan(design, scan, 0)
+}
+
 /// Two unit vectors across `direction`: to the left and up.
 pub fn beam_axes(direction: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let [x, y, z] = direction;

@@ -36,6 +36,23 @@ pub struct Named {
     pub digest: String,
 }
 
+/// When a scan began, and where the sensor was then.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+pub struct Begun {
+    /// Number of the scan, from 0.
+    pub scan: u64,
+    /// Since the first scan began, ns.
+    pub start_ns: f64,
+    /// In the world, m.
+    pub position_m: [f64; 3],
+    /// About the vertical axis, deg; positive to the left.
+    pub yaw_deg: f64,
+    /// About the left axis, deg; positive looks down.
+    pub pitch_deg: f64,
+    /// About the forward axis, deg; positive lifts the left side.
+    pub roll_deg: f64,
+}
+
 /// What is needed to repeat a run and to judge it. The fields are written in this order.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Manifest {
@@ -63,6 +80,8 @@ pub struct Manifest {
     pub tdc: Entries<u64>,
     /// Pixels by outcome; empty without truth.
     pub outcomes: Entries<u64>,
+    /// Scan by scan, when it began and where the sensor was.
+    pub scans: Vec<Begun>,
     /// Files written beside the manifest, relative to it.
     pub files: Vec<String>,
     /// Wall-clock time per stage, s. Last, because it is the only part that differs between two

@@ -16,7 +16,7 @@ mod png16;
 pub use atomic::write_atomically;
 pub use csv::quoted;
 pub use error::Error;
-pub use manifest::{Entries, Manifest, Named};
+pub use manifest::{Begun, Entries, Manifest, Named};
 pub use pcd_reader::read_pcd;
 pub use png16::{RangeImage, read_range_png};
 
@@ -97,13 +97,14 @@ pub fn write_cloud(
 /// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.
 #[cfg(test)]
 fn sample_cloud() -> PointCloud {
-    use crate::points::{NO_OBJECT, Outcome, Pick, Surfaces, Truth};
+    use crate::points::{NO_OBJECT, Outcome, Pick, Surfaces, Truth, Viewpoint};
     let nan = f32::NAN;
     let fired_ns = vec![0.0, 40.946_5, 81.893, 122.84, 163.786, 204.732_5];
     PointCloud {
         scan: 3,
         rows: 2,
         columns: 3,
+        viewpoint: Viewpoint { position: [1.5, -2.0, 0.25], turn: [0.6, 0.0, 0.0, -0.8] },
         returns_per_shot: 1,
         pick: Pick::Strongest,
         row: vec![0, 0, 1, 1, 1],

@@ -2,7 +2,7 @@
 
 use super::Names;
 use super::attributes::{Attribute, Value, comment_lines, pixels, returns};
-use crate::points::PointCloud;
+use crate::points::{PointCloud, Viewpoint};
 use std::io::{self, Write};
 
 /// Comment that carries the number of the scan through the file.
@@ -61,7 +61,8 @@ fn write_header(
     writeln!(out, "TYPE {}", row(&|attribute| type_letter(attribute.blank()).to_owned()))?;
     writeln!(out, "COUNT {}", row(&|_| "1".to_owned()))?;
     writeln!(out, "WIDTH {columns}\nHEIGHT {rows}")?;
-    writeln!(out, "VIEWPOINT 0 0 0 1 0 0 0")?;
+    let Viewpoint { position: [x, y, z], turn: [w, i, j, k] } = cloud.viewpoint;
+    writeln!(out, "VIEWPOINT {x} {y} {z} {w} {i} {j} {k}")?;
     writeln!(out, "POINTS {}", columns * rows)?;
     writeln!(out, "DATA binary")
 }
@@ -98,7 +99,7 @@ mod tests {
              SIZE 4 4 4 4 4 8 2 2 2 2 2 2 1 1 1\n\
              TYPE F F F F F F U U U U U U U U U\n\
              COUNT 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1\n\
-             WIDTH 3\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 6\nDATA binary\n"
+             WIDTH 3\nHEIGHT 2\nVIEWPOINT 1.5 -2 0.25 0.6 0 0 -0.8\nPOINTS 6\nDATA binary\n"
         );
     }
 

@@ -3,7 +3,7 @@
 use super::attributes::{Attribute, Value, outcome_from_code};
 use super::pcd::{LIST_COMMENT, SCAN_COMMENT, type_letter};
 use super::{Error, Format};
-use crate::points::{Outcome, Pick, PointCloud, Surface, Surfaces, Truth};
+use crate::points::{Outcome, Pick, PointCloud, Surface, Surfaces, Truth, Viewpoint};
 use std::path::Path;
 
 /// Reads a binary PCD file into a cloud. Points without x, y and z are pixels that had no return.
@@ -34,6 +34,7 @@ struct Field {
 #[derive(Debug, Default)]
 struct Header {
     scan: u64,
+    viewpoint: Viewpoint,
     fields: Vec<String>,
     sizes: Vec<String>,
     types: Vec<String>,
@@ -134,6 +135,7 @@ const MOST_PIXELS: usize = 1 << 32;
 fn empty(header: &Header, list: List) -> PointCloud {
     PointCloud {
         scan: header.scan,
+        viewpoint: header.viewpoint,
         rows: list.rows,
         columns: list.columns,
         returns_per_shot: list.most.max(1),
@@ -187,7 +189,8 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
                     "its points are stored as `{values}`; only `DATA binary` is read"
                 ));
             }
-            "VERSION" | "VIEWPOINT" | "" => {}
+            "VIEWPOINT" => header.viewpoint = viewpoint(values)?,
+            "VERSION" | "" => {}
             _ if key.starts_with('#') => {}
             _ => return Err(format!("its header has a line that begins with `{key}`")),
         }
@@ -209,6 +212,18 @@ fn list_of(text: &str) -> Result<List, String> {
     };
     let fault = || format!("its list is `{text}`, not rows, columns, returns and the one shown");
     list(text.split_whitespace().collect()).ok_or_else(fault)
+}
+
+/// Position and quaternion, as PCD has them: x y z, then w i j k.
+fn viewpoint(text: &str) -> Result<Viewpoint, String> {
+    let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
+    let numbers = numbers.unwrap_or_default();
+    match *numbers.as_slice() {
+        [x, y, z, w, i, j, k] if numbers.iter().all(|number| number.is_finite()) => {
+            Ok(Viewpoint { position: [x, y, z], turn: [w, i, j, k] })
+        }
+        _ => Err(format!("VIEWPOINT is `{text}`, not seven finite numbers")),
+    }
 }
 
 fn whole_number(key: &str, text: &str) -> Result<usize, String> {
@@ -419,6 +434,19 @@ mod tests {
             fault(&foreign("FIELDS x y z\nSIZE 4 4\nTYPE F F F\nCOUNT 1 1 1", 1)),
             "FIELDS, SIZE, TYPE and COUNT have different lengths"
         );
+    }
+
+    #[test]
+    fn a_viewpoint_is_seven_numbers() {
+        let read = |viewpoint: &str| parse(&foreign(&format!("{viewpoint}\n{XYZ_RGB}"), 1));
+        let cloud = read("VIEWPOINT 1 2 -3.5 0.8 0 0 0.6").unwrap();
+        assert_eq!(cloud.viewpoint.position, [1.0, 2.0, -3.5]);
+        assert_eq!(cloud.viewpoint.turn, [0.8, 0.0, 0.0, 0.6]);
+        assert_eq!(parse(&foreign(XYZ_RGB, 1)).unwrap().viewpoint, Viewpoint::default());
+        for wrong in ["0 0 0 1 0 0", "0 0 0 1 0 0 0 0", "0 0 0 1 0 0 x 0", "0 0 nan 1 0 0 0"] {
+            let told = read(&format!("VIEWPOINT {wrong}")).unwrap_err();
+            assert_eq!(told, format!("VIEWPOINT is `{wrong}`, not seven finite numbers"));
+        }
     }
 
     #[test]

@@ -56,11 +56,14 @@ impl Outcome {
 /// All columns have one entry per return, except those of pixels, which have `rows` × `columns`
 /// entries, row-major, row 0 at the top and column 0 at the left.
 ///
-/// Sensor frame (REP-103): x forward, y left, z up, metres.
+/// Sensor frame (REP-103): x forward, y left, z up, metres. Each point of a sensor that moves is in
+/// its frame at the time of that point: raw, not deskewed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
     /// Number of the scan, from 0.
     pub scan: u64,
+    /// Where the sensor was when the scan began.
+    pub viewpoint: Viewpoint,
     /// Rows of pixels; 0 where the list has no image.
     pub rows: usize,
     /// Columns of pixels; 0 where the list has no image.
@@ -88,7 +91,7 @@ pub struct PointCloud {
     pub intensity: Vec<f32>,
     /// One-way range, m.
     pub range: Vec<f32>,
-    /// Time at which the shot was fired, ns from the start of the scan.
+    /// Time at which the shot was fired, ns from the beginning of the first scan.
     pub time_ns: Vec<f64>,
     /// Marks found at their place.
     pub peak: Vec<u16>,
@@ -104,6 +107,23 @@ pub struct PointCloud {
     pub fired_ns: Vec<f64>,
     /// What is known from the scene; filled by the score stage, empty without it.
     pub truth: Truth,
+}
+
+/// Where the sensor was in the world when a scan began.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Viewpoint {
+    /// Position, m.
+    pub position: [f64; 3],
+    /// The turn that carries directions of the sensor frame into the world, as a unit quaternion
+    /// w, x, y, z.
+    pub turn: [f64; 4],
+}
+
+impl Default for Viewpoint {
+    /// At the origin, not turned.
+    fn default() -> Self {
+        Self { position: [0.0; 3], turn: [1.0, 0.0, 0.0, 0.0] }
+    }
 }
 
 /// The truth beside a point cloud.

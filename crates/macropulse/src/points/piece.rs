@@ -45,8 +45,7 @@ impl Piece {
         points.scan = scan;
         (points.rows, points.columns) = (design.scan.rows as usize, design.scan.columns as usize);
         (points.returns_per_shot, points.pick) = (design.receiver.returns, design.receiver.pick);
-        let scan_start = scan as f64 * design.scan_period() * 1e9;
-        let time_ns = |shot: usize| log.fired_at_fs[shot] as f64 * 1e-6 - scan_start;
+        let time_ns = |shot: usize| log.fired_at_fs[shot] as f64 * 1e-6;
         let pixel = |shot: usize| {
             usize::from(log.row[shot]) * points.columns + usize::from(log.column[shot])
         };

@@ -11,13 +11,13 @@ use toml::Spanned;
 use super::car;
 use super::closed_form::{Shape, Solid};
 use super::error::Error;
-use super::file::{
-    Axis, Ground, ObjectTyped, SceneFile, ShapeTyped, Source, Stand, Unit, object_names,
-};
+use super::file::{Axis, Ground, ObjectTyped, SceneFile, Source, Stand, Unit, object_names};
 use super::inside;
 use super::interferer;
 use super::material::{self, Material, plain};
 use super::mesh::Mesh;
+use super::motion::{Motion, Moving};
+use super::moving::{Mover, MovingShape};
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
@@ -36,6 +36,8 @@ struct Assembly<'a> {
     objects: Vec<Object>,
     solids: Vec<Solid>,
     placed: Vec<Placed>,
+    moving_shapes: Vec<MovingShape>,
+    moving: Vec<Moving>,
     notes: Vec<String>,
     /// The mesh of the car, once there is one.
     car: Option<Rc<Mesh>>,
@@ -56,18 +58,25 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         objects: vec![],
         solids: vec![],
         placed: vec![],
+        moving_shapes: vec![],
+        moving: vec![],
         notes: vec![],
         car: None,
     };
     assembly.define(&file)?;
     let environment = assembly.environment(&file)?;
-    let sensor = assembly.pose(&file.sensor)?;
+    let sensor = assembly.motion("sensor", &file.sensor)?;
     if file.sensor.position_m.is_none() {
         assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
     }
+    if sensor.moves() {
+        let note = "sensor: each point is in its frame at the time of the point, not deskewed";
+        assembly.notes.push(note.to_owned());
+    }
+    let stands = sensor.pose.position;
     if let Some(ground) = &file.ground {
         let height = assembly.ground(ground)?;
-        let below = height - sensor.position[2];
+        let below = height - stands[2];
         if below > 0.0 {
             let note = format!(
                 "sensor: it stands {below:.2} m below the ground; lift it, unless that is meant"
@@ -78,26 +87,52 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     for (name, written) in assembly.names(&file)?.into_iter().zip(&file.objects) {
         assembly.add_object(name, written)?;
     }
-    if assembly.solids.is_empty() && assembly.placed.is_empty() {
+    let shapes = assembly.solids.len() + assembly.moving_shapes.len();
+    if shapes == 0 && assembly.placed.is_empty() {
         assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
     }
-    let pose = |stand: &Stand| assembly.pose(stand);
+    if let (Some(other), false) = (file.interferers.first(), assembly.moving.is_empty()) {
+        let message = "other lidars are not simulated where something moves; remove [[interferers]] \
+                       or every velocity_m_s and turn_rate_deg_s";
+        return Err(source.fault(other.span(), message));
+    }
+    let pose = |stand: &Stand| source.pose(stand);
     let (interferers, assumed) = interferer::interferers((source, base), &file.interferers, pose)?;
     assembly.notes.extend(assumed);
-    let Assembly { materials, objects, solids, placed, mut notes, .. } = assembly;
+    let Assembly { materials, objects, solids, placed, moving_shapes, moving, mut notes, .. } =
+        assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Digest::new();
     placed.iter().for_each(|placed| surfaces.placed(placed));
     solids.iter().for_each(|solid| surfaces.solid(solid));
-    let shapes = inside::shapes_around(&solids, sensor.position);
+    for MovingShape { solid, motion } in &moving_shapes {
+        surfaces.solid(solid);
+        surfaces.motion(motion);
+    }
+    let first: Vec<Solid> = moving_shapes.iter().map(MovingShape::at_first).collect();
+    let mut shapes = inside::shapes_around(&solids, stands);
+    shapes.extend(inside::shapes_around(&first, stands));
     let meshes: Vec<u16> = placed.iter().map(|placed| placed.object).collect();
-    let world = placed::world(placed, solids, sensor.position);
-    let meshes = inside::meshes_around(&world, &meshes, sensor.position);
+    let mut movers: Vec<Mover> = moving_shapes.into_iter().map(Mover::from).collect();
+    movers.extend(placed::movers(&placed));
+    let world = placed::world(placed, solids, stands).with(movers);
+    let meshes = inside::meshes_around(&world, &meshes, stands);
     notes.extend(shapes.iter().chain(&meshes).map(|object| {
         let name = &objects[usize::from(*object)].name;
         format!("sensor: it stands inside {name}; move one of them, unless that is meant")
     }));
-    Ok(Scene { name, materials, objects, sensor, environment, interferers, notes, world, surfaces })
+    Ok(Scene {
+        name,
+        materials,
+        objects,
+        sensor,
+        moving,
+        environment,
+        interferers,
+        notes,
+        world,
+        surfaces,
+    })
 }
 
 impl Assembly<'_> {
@@ -154,7 +189,15 @@ impl Assembly<'_> {
     /// Adds the ground; gives its height, m.
     fn ground(&mut self, ground: &Ground) -> Result<f64, Error> {
         let material = self.material_typed(&ground.material)?;
-        let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.finite(z, "z_m"))?;
+        let spans = [
+            ground.velocity_m_s.as_ref().map(Spanned::span),
+            ground.turn_rate_deg_s.as_ref().map(Spanned::span),
+        ];
+        if let Some(span) = spans.into_iter().flatten().next() {
+            let message = "the ground cannot move; let the sensor and the objects move over it";
+            return Err(self.source.fault(span, message));
+        }
+        let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.source.finite(z, "z_m"))?;
         let object = self.object("ground".to_owned(), false, 0..0)?;
         let shape = Shape::Plane { normal: [0.0, 0.0, 1.0] };
         self.solids.push(Solid::new(shape, Pose::at([0.0, 0.0, height]), material, object));
@@ -192,35 +235,55 @@ impl Assembly<'_> {
         }
         let mut stands = vec![written.stand()];
         stands.extend(written.copies.iter().cloned());
-        let poses = stands.iter().map(|stand| self.pose(stand)).collect::<Result<Vec<_>, _>>()?;
+        let mut motions = Vec::with_capacity(stands.len());
+        for (copy, stand) in stands.iter().enumerate() {
+            let called = match copy {
+                0 => name.clone(),
+                _ => format!("{name}, copy {copy}"),
+            };
+            motions.push(self.motion(&called, stand)?);
+        }
         let object = self.object(name.clone(), written.target, spanned.span())?;
         if let Some(shape) = &written.shape {
-            self.refuse_mesh_keys(written)?;
+            self.source.refuse_mesh_keys(written)?;
             let material = match &written.material {
                 Some(typed) => self.material_typed(typed)?,
                 None => self.unnamed(&name),
             };
-            for mut pose in poses {
-                let shape = self.shape(shape)?;
+            for mut motion in motions {
+                let shape = self.source.shape(shape)?;
                 if written.rest_on_ground {
-                    pose.position[2] += shape.depth_below(&pose);
+                    motion.pose.position[2] += shape.depth_below(&motion.pose);
                 }
-                self.solids.push(Solid::new(shape, pose, material, object));
+                if motion.moves() {
+                    let solid = Solid::new(shape, Pose::default(), material, object);
+                    self.moving_shapes.push(MovingShape { solid, motion });
+                } else {
+                    self.solids.push(Solid::new(shape, motion.pose, material, object));
+                }
             }
             return Ok(());
         }
         let mesh = self.mesh(&name, written)?;
         let material_indices = self.material_indices(&name, written, &mesh)?;
-        let stand = |pose: &Pose| stand(&mesh, pose, written.rest_on_ground);
-        let at = poses.iter().map(stand).collect();
-        self.placed.push(Placed { mesh, material_indices, at, object });
+        let (mut at, mut moving) = (Vec::new(), Vec::new());
+        for mut motion in motions {
+            let place = stand(&mesh, &motion.pose, written.rest_on_ground);
+            if motion.moves() {
+                motion.pose.position = place.point([0.0; 3]);
+                moving.push(motion);
+            } else {
+                at.push(place);
+            }
+        }
+        self.placed.push(Placed { mesh, material_indices, at, moving, object });
         Ok(())
     }
 
     /// The mesh of an object in metres, x forward, z up.
     fn mesh(&mut self, name: &str, written: &ObjectTyped) -> Result<Rc<Mesh>, Error> {
         let Some(path) = &written.mesh else {
-            self.refuse_mesh_keys(written)?;
+            self.source.refuse_mesh_keys(written)?;
             let car = match self.car.take() {
                 Some(car) => car,
                 None => Rc::new(car::mesh()?),
@@ -253,7 +316,7 @@ impl Assembly<'_> {
 
     fn metres_per_unit(&mut self, name: &str, written: &ObjectTyped) -> Result<f64, Error> {
         let scale = match &written.scale {
-            Some(scale) => self.positive(scale, "scale")?,
+            Some(scale) => self.source.positive(scale, "scale")?,
             None => 1.0,
         };
         if written.unit.is_none() && written.scale.is_none() {
@@ -340,76 +403,14 @@ impl Assembly<'_> {
         Ok(indices)
     }
 
-    fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Shape, Error> {
-        let fault = |message: &str| Err(self.source.fault(typed.span(), message));
-        match *typed.get_ref() {
-            ShapeTyped::Plane { normal } => match DVec3::from(normal).try_normalize() {
-                Some(normal) => Ok(Shape::Plane { normal: normal.to_array() }),
-                None => fault("`normal` must be a finite direction, not zero"),
-            },
-            ShapeTyped::Sphere { radius_m: radius } => match radius > 0.0 && radius.is_finite() {
-                true => Ok(Shape::Sphere { radius }),
-                false => fault("`radius_m` must be finite and above zero"),
-            },
-            ShapeTyped::Box { size_m } => match size_m.iter().all(|s| *s > 0.0 && s.is_finite()) {
-                true => Ok(Shape::Box { half: size_m.map(|side| side / 2.0) }),
-                false => fault("each of `size_m` must be finite and above zero"),
-            },
+    /// Where the thing called `name` stands and how it moves; enters it among what moves.
+    fn motion(&mut self, name: &str, stand: &Stand) -> Result<Motion, Error> {
+        let motion = self.source.motion(stand)?;
+        if motion.moves() {
+            self.notes.push(format!("{name}: {}", motion.told()));
+            self.moving.push(Moving { name: name.to_owned(), motion });
         }
-    }
-
-    /// Keys that mean something only for the mesh of a file.
-    fn refuse_mesh_keys(&self, written: &ObjectTyped) -> Result<(), Error> {
-        let spans: [(Option<Range<usize>>, &str); 3] = [
-            (written.scale.as_ref().map(Spanned::span), "scale"),
-            (written.up.as_ref().map(Spanned::span), "up"),
-            (written.forward.as_ref().map(Spanned::span), "forward"),
-        ];
-        for (span, key) in spans {
-            if let Some(span) = span {
-                let message = format!("`{key}` belongs to objects with a `mesh`; remove it here");
-                return Err(self.source.fault(span, message));
-            }
-        }
-        Ok(())
-    }
-
-    fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
-        let mut pose = Pose::default();
-        if let Some(position) = &stand.position_m {
-            if position.get_ref().iter().any(|value| !value.is_finite()) {
-                let message = "position_m must be three finite numbers";
-                return Err(self.source.fault(position.span(), message));
-            }
-            pose.position = *position.get_ref();
-        }
-        let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
-            Some(typed) => Ok(self.finite(typed, key)?.to_radians()),
-            None => Ok(0.0),
-        };
-        pose.yaw = angle(&stand.yaw_deg, "yaw_deg")?;
-        pose.pitch = angle(&stand.pitch_deg, "pitch_deg")?;
-        pose.roll = angle(&stand.roll_deg, "roll_deg")?;
-        Ok(pose)
-    }
-
-    fn finite(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
-        let value = *typed.get_ref();
-        match value.is_finite() {
-            true => Ok(value),
-            false => Err(self.source.fault(typed.span(), format!("{key} must be a finite number"))),
-        }
-    }
-
-    fn positive(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
-        let value = self.finite(typed, key)?;
-        match value > 0.0 {
-            true => Ok(value),
-            false => {
-                let message = format!("{key} is {value}; it must be above zero");
-                Err(self.source.fault(typed.span(), message))
-            }
-        }
+        Ok(motion)
     }
 
     fn object(&mut self, name: String, is_target: bool, at: Range<usize>) -> Result<u16, Error> {

@@ -20,6 +20,9 @@ pub(super) struct Batch<'a> {
     /// Transmission of each material, one way.
     through: Vec<f32>,
     farthest: f64,
+    sensor_moves: bool,
+    /// When rays leave that are added now, fs.
+    now_fs: i64,
     world_from_sensor: Transform,
     /// In the frame of the sensor, by axis.
     aims: [Lanes<f64>; 3],
@@ -29,6 +32,7 @@ pub(super) struct Batch<'a> {
     count: usize,
     shot: Lanes<u32>,
     weight: Lanes<f32>,
+    time_fs: Lanes<i64>,
     /// Surfaces met by the packet, where some are of glass.
     layers: Vec<Surface>,
     hits: Hits,
@@ -52,16 +56,34 @@ impl<'a> Batch<'a> {
             scene,
             through: scene.materials.iter().map(|known| known.transmission as f32).collect(),
             farthest,
-            world_from_sensor: scene.sensor.world_from_sensor(),
+            sensor_moves: scene.sensor.moves(),
+            now_fs: 0,
+            world_from_sensor: scene.sensor.pose.world_from_sensor(),
             aims: [[0.0; LANES]; 3],
-            packet: Packet::from(scene.sensor.position),
+            packet: Packet::from(scene.sensor.pose.position),
             packet_hits: PacketHits::default(),
             count: 0,
             shot: [0; LANES],
             weight: [0.0; LANES],
+            time_fs: [0; LANES],
             layers: Vec::new(),
             hits: Hits::default(),
         }
+    }
+
+    /// The rays that are added from now on leave at `time_fs`. Those of a sensor that moves have a
+    /// place of their own then, and travel in packets of their own.
+    #[inline(always)]
+    pub(super) fn leave_at(&mut self, time_fs: i64) {
+        if self.sensor_moves && time_fs != self.now_fs {
+            if self.count > 0 {
+                self.flush();
+            }
+            let pose = self.scene.sensor.at(time_fs);
+            self.world_from_sensor = pose.world_from_sensor();
+            self.packet.origin = pose.position;
+        }
+        self.now_fs = time_fs;
     }
 
     /// Adds a ray, given in the frame of the sensor.
@@ -73,6 +95,7 @@ impl<'a> Batch<'a> {
         self.aims[2][lane] = z;
         self.shot[lane] = shot;
         self.weight[lane] = weight;
+        self.time_fs[lane] = self.now_fs;
         self.count += 1;
         if self.count == LANES {
             self.flush();
@@ -92,7 +115,7 @@ impl<'a> Batch<'a> {
         self.packet.range = [self.farthest; LANES];
         self.packet.range[self.count..].fill(f64::NAN);
         self.count = 0;
-        self.scene.world.cast_packet(&mut self.packet, &mut self.packet_hits);
+        self.scene.world.cast_packet_at(&mut self.packet, &self.time_fs, &mut self.packet_hits);
         let Self { packet, packet_hits, .. } = self;
         let mut hit = [0; LANES];
         let mut count = 0;
@@ -154,7 +177,7 @@ impl<'a> Batch<'a> {
             if !goes_on || pane + 1 == PANES {
                 break;
             }
-            self.scene.world.cast_packet(packet, packet_hits);
+            self.scene.world.cast_packet_at(packet, &self.time_fs, packet_hits);
             self.scene.world.describe(packet, packet_hits);
         }
         // Stable: the surfaces of a ray stay in their order.

@@ -28,6 +28,15 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// The distance of its farthest point from the origin, m; infinite for a plane.
+    pub(super) fn reach(&self) -> f64 {
+        match *self {
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Sphere { radius } => radius,
+            Self::Box { half } => DVec3::from(half).length(),
+        }
+    }
+
     /// How far the shape reaches below the position of `pose`, m; 0 for a plane.
     pub(super) fn depth_below(&self, pose: &Pose) -> f64 {
         match *self {

@@ -1,6 +1,7 @@
 //! What of a scene goes into its digest: all that decides what light meets.
 
 use super::closed_form::{Shape, Solid};
+use super::motion::Motion;
 use super::placed::Placed;
 use super::pose::Pose;
 use crate::digest::Digest;
@@ -32,9 +33,19 @@ impl Digest {
         }
     }
 
+    /// Takes in a motion: nothing but the pose of what stands still.
+    pub(super) fn motion(&mut self, motion: &Motion) {
+        self.pose(&motion.pose);
+        if motion.moves() {
+            self.bytes(b"moves");
+            motion.velocity.iter().for_each(|value| self.number(*value));
+            self.number(motion.turn_rate);
+        }
+    }
+
     /// Takes in a mesh, what it is made of, and where it stands.
     pub(super) fn placed(&mut self, placed: &Placed) {
-        let Placed { mesh, material_indices, at, object } = placed;
+        let Placed { mesh, material_indices, at, moving, object } = placed;
         mesh.vertices.iter().flatten().for_each(|value| self.number(*value));
         for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
             triangle.iter().for_each(|corner| self.bytes(&corner.to_le_bytes()));
@@ -46,6 +57,7 @@ impl Digest {
             let turned = axes.map(|axis| place.direction(axis));
             origin.iter().chain(turned.iter().flatten()).for_each(|value| self.number(*value));
         }
+        moving.iter().for_each(|motion| self.motion(motion));
         self.bytes(&object.to_le_bytes());
     }
 

@@ -53,6 +53,7 @@ impl InterfererTyped {
             yaw_deg: self.yaw_deg.clone(),
             pitch_deg: self.pitch_deg.clone(),
             roll_deg: self.roll_deg.clone(),
+            ..Stand::default()
         }
     }
 }
@@ -65,6 +66,8 @@ pub(super) struct Stand {
     pub yaw_deg: Option<Spanned<f64>>,
     pub pitch_deg: Option<Spanned<f64>>,
     pub roll_deg: Option<Spanned<f64>>,
+    pub velocity_m_s: Option<Spanned<[f64; 3]>>,
+    pub turn_rate_deg_s: Option<Spanned<f64>>,
 }
 
 /// `ground = { … }`
@@ -73,6 +76,9 @@ pub(super) struct Stand {
 pub(super) struct Ground {
     pub material: Spanned<String>,
     pub z_m: Option<Spanned<f64>>,
+    /// Known only to be refused.
+    pub velocity_m_s: Option<Spanned<toml::Value>>,
+    pub turn_rate_deg_s: Option<Spanned<toml::Value>>,
 }
 
 /// `[[material]]`
@@ -103,6 +109,8 @@ pub(super) struct ObjectTyped {
     pub yaw_deg: Option<Spanned<f64>>,
     pub pitch_deg: Option<Spanned<f64>>,
     pub roll_deg: Option<Spanned<f64>>,
+    pub velocity_m_s: Option<Spanned<[f64; 3]>>,
+    pub turn_rate_deg_s: Option<Spanned<f64>>,
     #[serde(default)]
     pub rest_on_ground: bool,
     pub material: Option<Spanned<String>>,
@@ -115,13 +123,15 @@ pub(super) struct ObjectTyped {
 }
 
 impl ObjectTyped {
-    /// Where the object itself stands.
+    /// Where the object itself stands, and how it moves.
     pub(super) fn stand(&self) -> Stand {
         Stand {
             position_m: self.position_m.clone(),
             yaw_deg: self.yaw_deg.clone(),
             pitch_deg: self.pitch_deg.clone(),
             roll_deg: self.roll_deg.clone(),
+            velocity_m_s: self.velocity_m_s.clone(),
+            turn_rate_deg_s: self.turn_rate_deg_s.clone(),
         }
     }
 }

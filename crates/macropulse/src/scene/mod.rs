@@ -15,11 +15,14 @@ mod inside;
 mod interferer;
 pub mod material;
 mod mesh;
+mod motion;
+mod moving;
 mod placed;
 mod pose;
 mod raycast;
 mod readers;
 mod trace;
+mod typed;
 mod world;
 
 use std::fmt;
@@ -35,6 +38,7 @@ pub use illuminated::{Illuminated, LineOfSight};
 pub use interferer::Interferer;
 pub use material::Material;
 pub use mesh::Mesh;
+pub use motion::{Motion, Moving};
 pub use pose::{Pose, Transform};
 pub use trace::{PARTS, Traced};
 
@@ -54,8 +58,10 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// What surfaces belong to; [`Hit::object`] counts in this list.
     pub objects: Vec<Object>,
-    /// Where the sensor stands and looks.
-    pub sensor: Pose,
+    /// Where the sensor stands and looks, at any time.
+    pub sensor: Motion,
+    /// All that moves, the sensor included; empty for a scene that stands still.
+    pub moving: Vec<Moving>,
     /// Sun and air.
     pub environment: Environment,
     /// The other lidars whose light falls into the scene.
@@ -127,9 +133,16 @@ impl Scene {
         builtin_names()
     }
 
-    /// The nearest surface on `ray`, given in the world, with a range in (`nearest`, `farthest`).
+    /// The nearest surface on `ray`, given in the world, with a range in (`nearest`, `farthest`),
+    /// when the first scan begins.
     pub fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
         self.world.cast(ray, nearest, farthest)
+    }
+
+    /// As [`Scene::cast`], at `time_fs` from the beginning of the first scan, with a range within
+    /// the limits `between`.
+    pub fn cast_at(&self, ray: &Ray, time_fs: i64, between: (f64, f64)) -> Option<Hit> {
+        self.world.cast_at(ray, time_fs, between)
     }
 
     /// How far the nearest surface lies on each of many rays from one place in the world, given
@@ -144,7 +157,7 @@ impl Scene {
             for (lane, direction) in some.iter().enumerate() {
                 packet.set(lane, *direction, farthest);
             }
-            self.world.cast_packet(&mut packet, &mut hits);
+            self.world.cast_packet_at(&mut packet, &[0; LANES], &mut hits);
             let range =
                 |lane| if hits.is_hit(&packet, lane) { packet.range[lane] } else { f64::INFINITY };
             ranges.extend((0..some.len()).map(range));
@@ -158,7 +171,7 @@ impl Scene {
     }
 
     /// A hash of everything that decides what light meets, and which light there is beside that
-    /// of the sensor: surfaces, materials, sensor pose, other lidars.
+    /// of the sensor: surfaces, materials, sensor pose, motion, other lidars.
     /// The same on every machine and run.
     pub fn digest(&self) -> String {
         let mut hash = self.surfaces.clone();
@@ -173,7 +186,7 @@ impl Scene {
             hash.bytes(object.name.as_bytes());
             hash.bytes(&[u8::from(object.is_target)]);
         }
-        hash.pose(&self.sensor);
+        hash.motion(&self.sensor);
         hash.environment(&self.environment);
         self.interferers.iter().for_each(|interferer| hash.interferer(interferer));
         hash.text()
@@ -187,6 +200,7 @@ impl fmt::Debug for Scene {
             .field("materials", &self.materials)
             .field("objects", &self.objects)
             .field("sensor", &self.sensor)
+            .field("moving", &self.moving)
             .field("environment", &self.environment)
             .field("interferers", &self.interferers)
             .field("notes", &self.notes)

@@ -2,9 +2,14 @@
 //! once kept once.
 
 use std::rc::Rc;
+use std::sync::Arc;
+
+use glam::DVec3;
 
 use super::closed_form::Solid;
 use super::mesh::Mesh;
+use super::motion::Motion;
+use super::moving::Mover;
 use super::pose::{Pose, Transform};
 use super::raycast::{Facet, Facets};
 use super::world::{Copy, World};
@@ -14,7 +19,10 @@ pub(super) struct Placed {
     pub mesh: Rc<Mesh>,
     /// The scene's material for each of the mesh.
     pub material_indices: Vec<u16>,
+    /// Where it stands still.
     pub at: Vec<Transform>,
+    /// How it moves where it does not.
+    pub moving: Vec<Motion>,
     pub object: u16,
 }
 
@@ -50,6 +58,12 @@ impl Placed {
         Facets::new(&facets, middle)
     }
 
+    /// The distance of its farthest corner from the origin of its frame, m.
+    fn reach(&self) -> f64 {
+        let lengths = self.mesh.vertices.iter().map(|vertex| DVec3::from(*vertex).length());
+        lengths.filter(|length| length.is_finite()).fold(0.0, f64::max)
+    }
+
     fn is_like(&self, other: &Self) -> bool {
         self.material_indices == other.material_indices
             && (Rc::ptr_eq(&self.mesh, &other.mesh) || self.mesh == other.mesh)
@@ -62,7 +76,7 @@ pub(super) fn world(placed: Vec<Placed>, solids: Vec<Solid>, centre: [f64; 3]) -
     let (mut models, mut copies) = (Vec::new(), Vec::new());
     let mut seen: Vec<bool> = vec![false; placed.len()];
     for (index, one) in placed.iter().enumerate() {
-        if seen[index] {
+        if seen[index] || one.at.is_empty() {
             continue;
         }
         let like = |other: &usize| placed[*other].is_like(one);
@@ -85,4 +99,22 @@ pub(super) fn world(placed: Vec<Placed>, solids: Vec<Solid>, centre: [f64; 3]) -
     }
     drop(placed);
     World::new(&facets, (models, &copies), solids, centre)
+}
+
+/// The meshes among `placed` that move, in their order; each mesh is kept once.
+pub(super) fn movers(placed: &[Placed]) -> Vec<Mover> {
+    let mut models: Vec<(&Placed, Arc<Facets>)> = Vec::new();
+    let mut movers = Vec::new();
+    for one in placed.iter().filter(|one| !one.moving.is_empty()) {
+        let known = models.iter().find(|(other, _)| other.is_like(one));
+        let model = match known {
+            Some((_, model)) => Arc::clone(model),
+            None => Arc::new(one.model()),
+        };
+        let reach = one.reach();
+        let mover = |motion: &Motion| Mover::mesh((Arc::clone(&model), reach), one.object, *motion);
+        movers.extend(one.moving.iter().map(mover));
+        models.push((one, model));
+    }
+    movers
 }

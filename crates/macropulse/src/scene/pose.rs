@@ -38,6 +38,19 @@ impl Pose {
         Transform { rotation, translation: DVec3::from(self.position) }
     }
 
+    /// The turn of [`Pose::world_from_sensor`] as a unit quaternion w, x, y, z.
+    pub fn quaternion(&self) -> [f64; 4] {
+        let (sy, cy) = libm::sincos(self.yaw / 2.0);
+        let (sp, cp) = libm::sincos(self.pitch / 2.0);
+        let (sr, cr) = libm::sincos(self.roll / 2.0);
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ]
+    }
+
     /// The map that carries the world into the local frame of this pose; inverse of
     /// [`Pose::world_from_sensor`].
     pub fn sensor_from_world(&self) -> Transform {
@@ -106,6 +119,18 @@ mod tests {
         let point = [7.0, 1.0, -4.0];
         let back = pose.sensor_from_world().point(pose.world_from_sensor().point(point));
         assert!(DVec3::from(back).distance(DVec3::from(point)) < 1e-9);
+    }
+
+    #[test]
+    fn the_quaternion_turns_as_the_map_does() {
+        let pose = Pose { yaw: 0.7, pitch: -0.4, roll: 2.1, ..Pose::default() };
+        let [w, x, y, z] = pose.quaternion();
+        let turn = glam::DQuat::from_xyzw(x, y, z, w);
+        for axis in DVec3::AXES {
+            let turned = pose.world_from_sensor().direction(axis.to_array());
+            assert!(close((turn * axis).to_array(), turned));
+        }
+        assert_eq!(Pose::at([1.0; 3]).quaternion(), [1.0, 0.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //!    has rays of its own (docs/physics.md#mirror-motion).
 //! 3. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
+//! 4. Where something moves, all rays of a shot are cast at the time at which it is fired.
 
 use super::batch::Batch;
 use super::{Hits, Scene};
@@ -14,7 +15,8 @@ use crate::emit::beam_axes;
 use macropulse_codec::ShotLog;
 
 impl Scene {
-    /// What the shots of `log` meet, as far as light is followed, in the order of the log.
+    /// What the shots of `log` meet when they are fired, as far as light is followed, in the order
+    /// of the log. Ranges are those from where the sensor is at that time.
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Traced {
         let directions = design.directions();
         let along = |shot: usize| directions.of(log.row[shot], log.column[shot]);
@@ -22,8 +24,8 @@ impl Scene {
         if !design.scan.moves {
             return Traced { middle, parts: Vec::new() };
         }
-        let motion = Motion { design, log };
-        let part = |part| self.trace_along(design, log, |shot| motion.axis(shot, part));
+        let mirror = Mirror { design, log };
+        let part = |part| self.trace_along(design, log, |shot| mirror.axis(shot, part));
         Traced { middle, parts: (0..PARTS).map(part).collect() }
     }
 
@@ -37,6 +39,7 @@ impl Scene {
         let mut batch = Batch::new(self, design.scan.light_range);
         for shot in 0..log.len() {
             let axis = axis(shot);
+            batch.leave_at(log.fired_at_fs[shot]);
             footprint.rays(axis, |aim, weight| {
                 batch.add(shot as u32, weight, aim);
             });
@@ -60,12 +63,12 @@ pub struct Traced {
 pub const PARTS: u8 = 8;
 
 /// Where the beam points while the mirror moves on.
-struct Motion<'a> {
+struct Mirror<'a> {
     design: &'a Design,
     log: &'a ShotLog,
 }
 
-impl Motion<'_> {
+impl Mirror<'_> {
     /// The direction in which the middle of a `part` of `shot` leaves. The middle of the macropulse
     /// leaves towards the pixel; from there to the next pixel of the line the mirror takes the time
     /// from shot to shot.
@@ -153,10 +156,10 @@ mod tests {
     fn the_parts_of_a_macropulse_sweep_two_thirds_of_a_pixel() {
         let design = Design::open("kim-park-2016-physical", &[]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 848 }.shot_log(&design);
-        let motion = Motion { design: &design, log: &log };
+        let mirror = Mirror { design: &design, log: &log };
         let pitch = (43.2_f64 / 848.0).to_radians();
         let shot = log.owned.start + 400;
-        let [first, last] = [0, PARTS - 1].map(|part| motion.axis(shot, part));
+        let [first, last] = [0, PARTS - 1].map(|part| mirror.axis(shot, part));
         let angle =
             |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
         let swept = angle(first, last) * f64::from(PARTS) / f64::from(PARTS - 1);
@@ -167,6 +170,6 @@ mod tests {
         assert!(angle(last, next) < angle(first, next), "it moves towards the next pixel");
         // The last pixel of a line has none after it.
         let end = log.owned.end - 1;
-        assert!(angle(motion.axis(end, 0), motion.axis(end, PARTS - 1)) > 0.5 * pitch);
+        assert!(angle(mirror.axis(end, 0), mirror.axis(end, PARTS - 1)) > 0.5 * pitch);
     }
 }

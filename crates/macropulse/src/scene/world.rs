@@ -4,12 +4,16 @@
 //! of a mesh that occurs more than once, are found by a hierarchy over their bounding boxes. The
 //! triangles of all other meshes lie in one hierarchy, in the world. Of surfaces equally far away
 //! the shape wins that comes first in the scene file, then the copy, then the triangle.
+//!
+//! What moves is kept apart and asked after all that, ray by ray; of equally far surfaces it comes
+//! last, in the order of the scene file.
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 
 use super::closed_form::Solid;
 use super::hits::{CastRays, Hit, Ray};
+use super::moving::Mover;
 use super::pose::Transform;
 use super::raycast::{Facet, Facets};
 use crate::kernels::{LANES, Lanes, NONE, Packet, Tree, Waiting, cosines, normals, turned};
@@ -27,7 +31,12 @@ pub(super) struct World {
     tree: Tree,
     /// Which one each leaf is.
     leaves: Vec<u32>,
+    /// What moves: shapes, then meshes.
+    movers: Vec<Mover>,
 }
+
+/// In place of the index of a primitive, where a ray has met something that moves.
+const MOVER: u32 = NONE - 1;
 
 /// A copy of a mesh.
 #[derive(Debug, Clone, Copy)]
@@ -77,7 +86,13 @@ impl World {
         let (tree, order) = Tree::over(&boxes, centre);
         let leaves = order.iter().map(|index| first as u32 + index).collect();
         let facets = Facets::new(facets, centre);
-        Self { facets, models, primitives, unbounded: first, tree, leaves }
+        let movers = Vec::new();
+        Self { facets, models, primitives, unbounded: first, tree, leaves, movers }
+    }
+
+    /// The same world with `movers` in it.
+    pub(super) fn with(self, movers: Vec<Mover>) -> Self {
+        Self { movers, ..self }
     }
 
     /// Number of triangles that can be hit, copies included.
@@ -86,11 +101,46 @@ impl World {
             Primitive::Copy { copy, .. } => self.models[copy.model].len(),
             Primitive::Solid(_) => 0,
         };
-        self.facets.len() + self.primitives.iter().map(of_primitive).sum::<usize>()
+        let moving = self.movers.iter().map(Mover::triangles).sum::<usize>();
+        self.facets.len() + self.primitives.iter().map(of_primitive).sum::<usize>() + moving
     }
 
-    /// What each ray of `packet` meets first, as [`CastRays::cast`] has it; the range of those
-    /// that meet nothing stays.
+    /// What each ray of `packet` meets first at its own time, as [`World::cast_at`] has it; the
+    /// range of those that meet nothing stays.
+    #[inline]
+    pub(super) fn cast_packet_at(
+        &self,
+        packet: &mut Packet,
+        time_fs: &Lanes<i64>,
+        hits: &mut PacketHits,
+    ) {
+        self.cast_packet(packet, hits);
+        if !self.movers.is_empty() {
+            self.meet_movers(packet, time_fs, hits);
+        }
+    }
+
+    /// Lets the rays of `packet`, which know what stands still, meet what moves.
+    fn meet_movers(&self, packet: &mut Packet, time_fs: &Lanes<i64>, hits: &mut PacketHits) {
+        for (lane, &time_fs) in time_fs.iter().enumerate() {
+            if packet.range[lane].is_nan() {
+                continue;
+            }
+            let ray = Ray { origin: packet.origin, direction: packet.along(lane) };
+            for mover in &self.movers {
+                let between = (packet.nearest[lane], packet.range[lane]);
+                if let Some(hit) = mover.cast(&ray, time_fs, between) {
+                    packet.range[lane] = hit.range;
+                    packet.leaf[lane] = NONE;
+                    hits.primitive[lane] = MOVER;
+                    hits.moving[lane] = Some(hit);
+                }
+            }
+        }
+    }
+
+    /// What each ray of `packet` meets first of what stands still; the range of those that meet
+    /// nothing stays.
     pub(super) fn cast_packet(&self, packet: &mut Packet, hits: &mut PacketHits) {
         hits.primitive = [NONE; LANES];
         let PacketHits { primitive, face, .. } = hits;
@@ -116,7 +166,10 @@ impl World {
             } else if hits.primitive[lane] != NONE {
                 let ray = Ray { origin: packet.origin, direction: packet.along(lane) };
                 let found = (packet.range[lane], hits.face[lane]);
-                let hit = self.hit(hits.primitive[lane], &ray, found);
+                let hit = match (hits.primitive[lane], hits.moving[lane]) {
+                    (MOVER, Some(hit)) => hit,
+                    (index, _) => self.hit(index, &ray, found),
+                };
                 (hits.material[lane], hits.object[lane]) = (hit.material, hit.object);
                 let [x, y, z] = &mut across;
                 [x[lane], y[lane], z[lane]] = hit.normal;
@@ -182,8 +235,23 @@ impl World {
     }
 }
 
-impl CastRays for World {
-    fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
+impl World {
+    /// The nearest hit of a ray that leaves at `time_fs`, with a range in (`nearest`, `farthest`).
+    pub(super) fn cast_at(
+        &self,
+        ray: &Ray,
+        time_fs: i64,
+        (nearest, farthest): (f64, f64),
+    ) -> Option<Hit> {
+        let still = self.cast_still(ray, nearest, farthest);
+        self.movers.iter().fold(still, |best, mover| {
+            let limit = best.map_or(farthest, |hit| hit.range);
+            mover.cast(ray, time_fs, (nearest, limit)).or(best)
+        })
+    }
+
+    /// As [`World::cast_at`], of what stands still.
+    fn cast_still(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
         let mut best: Option<(u32, Hit)> = None;
         let mut limit = farthest;
         let mut farthest = farthest;
@@ -214,6 +282,13 @@ impl CastRays for World {
     }
 }
 
+impl CastRays for World {
+    /// At the beginning of the first scan.
+    fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit> {
+        self.cast_at(ray, 0, (nearest, farthest))
+    }
+}
+
 /// The first surface that each ray of a packet hits. Kept between packets for its memory.
 #[derive(Default)]
 pub(super) struct PacketHits {
@@ -223,6 +298,8 @@ pub(super) struct PacketHits {
     /// Index of the primitive that is hit, and its face or its leaf; [`NONE`] where none is.
     primitive: Lanes<u32>,
     face: Lanes<u32>,
+    /// What a ray hits that has [`MOVER`] for a primitive.
+    moving: Lanes<Option<Hit>>,
     waiting: Waiting,
     inner: Waiting,
 }
@@ -257,145 +334,4 @@ fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Aabb {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::closed_form::Shape;
-    use super::super::pose::Pose;
-    use super::*;
-    use crate::kernels::Corners;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    /// A closed mesh of 4·`rows`² triangles about the origin, 4 m long.
-    fn egg(rows: u32) -> Vec<Corners> {
-        let point = |row: u32, column: u32| {
-            let polar = std::f64::consts::PI * f64::from(row) / f64::from(rows);
-            let around = std::f64::consts::PI * f64::from(column % (2 * rows)) / f64::from(rows);
-            let ring = if row == 0 || row == rows { 0.0 } else { polar.sin() };
-            [2.0 * ring * around.cos(), ring * around.sin(), polar.cos()]
-        };
-        let cell = |row: u32, column: u32| {
-            let (a, b) = (point(row, column), point(row, column + 1));
-            let (c, d) = (point(row + 1, column + 1), point(row + 1, column));
-            [[a, b, c], [a, c, d]]
-        };
-        (0..rows).flat_map(|row| (0..2 * rows).flat_map(move |column| cell(row, column))).collect()
-    }
-
-    fn poses(chance: &mut ChaCha8Rng, count: usize) -> Vec<Pose> {
-        let pose = |_| Pose {
-            position: [0; 3].map(|_| chance.random_range(-40.0..40.0)),
-            yaw: chance.random_range(-3.0..3.0),
-            pitch: chance.random_range(-1.0..1.0),
-            roll: chance.random_range(-1.0..1.0),
-        };
-        (0..count).map(pose).collect()
-    }
-
-    /// The same eggs, kept once or laid out; with a plane, a box and a ball.
-    fn worlds(poses: &[Pose]) -> [World; 2] {
-        let mesh = egg(20);
-        let facet = |corners: Corners, object| Facet { corners, material: 1, object };
-        let solids = || {
-            let solid = |shape, at, object| Solid::new(shape, Pose::at(at), 0, object);
-            vec![
-                solid(Shape::Plane { normal: [0.0, 0.0, 1.0] }, [0.0, 0.0, -50.0], 0),
-                solid(Shape::Box { half: [3.0, 2.0, 1.0] }, [20.0, 0.0, 0.0], 1),
-                solid(Shape::Sphere { radius: 2.0 }, [-15.0, 10.0, 0.0], 2),
-            ]
-        };
-        let model: Vec<Facet> = mesh.iter().map(|corners| facet(*corners, 0)).collect();
-        let mut copies = vec![];
-        let mut flat = vec![];
-        for (index, pose) in poses.iter().enumerate() {
-            let (to_world, object) = (pose.world_from_sensor(), 3 + index as u16);
-            copies.push(Copy { model: 0, to_world, object });
-            let laid =
-                |corners: &Corners| facet(corners.map(|corner| to_world.point(corner)), object);
-            flat.extend(mesh.iter().map(laid));
-        }
-        let models = vec![Facets::new(&model, [0.0; 3])];
-        [
-            World::new(&[], (models, &copies), solids(), [0.0; 3]),
-            World::new(&flat, (vec![], &[]), solids(), [0.0; 3]),
-        ]
-    }
-
-    fn packet(chance: &mut ChaCha8Rng, origin: [f64; 3], spread: f64) -> Packet {
-        let mut packet = Packet::from(origin);
-        let middle = [0; 3].map(|_| chance.random_range(-1.0..1.0_f64));
-        for lane in 0..LANES {
-            let aim = DVec3::from(middle.map(|slope| slope + chance.random_range(-spread..spread)));
-            packet.set(lane, aim.normalize().to_array(), 1e3);
-        }
-        packet
-    }
-
-    #[test]
-    fn a_packet_meets_what_its_rays_meet_alone() {
-        let mut chance = ChaCha8Rng::seed_from_u64(11);
-        let (mut packet_hits, mut hits) = (PacketHits::default(), 0);
-        for world in worlds(&poses(&mut chance, 30)) {
-            for round in 0..2000 {
-                let origin = [0; 3].map(|_| f64::from(round % 2) * chance.random_range(-9.0..9.0));
-                let spread = if round % 3 == 0 { 1.0 } else { 0.02 };
-                let mut packet = packet(&mut chance, origin, spread);
-                packet.nearest = [f64::from(round % 5); LANES];
-                let nearest = packet.nearest[0];
-                world.cast_packet(&mut packet, &mut packet_hits);
-                world.describe(&packet, &mut packet_hits);
-                for lane in 0..LANES {
-                    let ray = Ray { origin, direction: packet.along(lane) };
-                    let alone = world.cast(&ray, nearest, 1e3);
-                    assert_eq!(packet_hits.is_hit(&packet, lane), alone.is_some());
-                    let Some(hit) = alone else { continue };
-                    hits += 1;
-                    assert_eq!(packet.range[lane], hit.range);
-                    let cosine = DVec3::from(ray.direction).dot(DVec3::from(hit.normal)).abs();
-                    assert_eq!(packet_hits.cosine[lane], cosine.min(1.0) as f32);
-                    assert_eq!(
-                        (packet_hits.material[lane], packet_hits.object[lane]),
-                        (hit.material, hit.object)
-                    );
-                }
-            }
-        }
-        assert!(hits > 30_000, "{hits}");
-    }
-
-    #[test]
-    fn a_mesh_kept_once_is_met_where_its_copies_stand() {
-        let mut chance = ChaCha8Rng::seed_from_u64(12);
-        let poses = poses(&mut chance, 30);
-        let [kept_once, laid_out] = worlds(&poses);
-        assert_eq!(kept_once.triangles(), laid_out.triangles());
-        let mut on_copies = 0;
-        for round in 0..100_000 {
-            let beside = DVec3::from([0; 3].map(|_| chance.random_range(-2.0..2.0)));
-            let aim = DVec3::from(poses[round % 30].position) + beside;
-            let direction = aim.normalize().to_array();
-            let ray = Ray { origin: [0.0; 3], direction };
-            let [once, flat] = [&kept_once, &laid_out].map(|world| world.cast(&ray, 0.0, 1e3));
-            let (Some(once), Some(flat)) = (once, flat) else {
-                assert_eq!(once, flat);
-                continue;
-            };
-            on_copies += usize::from(once.object > 2);
-            assert!((once.range - flat.range).abs() < 1e-6, "{once:?} {flat:?}");
-            assert_eq!((once.material, once.object), (flat.material, flat.object));
-        }
-        assert!(on_copies > 10_000, "{on_copies}");
-    }
-
-    #[test]
-    fn no_ray_leaks_out_of_a_mesh_that_is_kept_once() {
-        let place = Pose { position: [100.0, -50.0, 3.0], yaw: 1.0, pitch: 0.3, roll: -0.2 };
-        let [world, _] = worlds(&[place, Pose::at([0.0, 0.0, 300.0])]);
-        let mut chance = ChaCha8Rng::seed_from_u64(13);
-        let mut packet_hits = PacketHits::default();
-        for _ in 0..20_000 {
-            let mut packet = packet(&mut chance, place.position, 1.0);
-            world.cast_packet(&mut packet, &mut packet_hits);
-            assert!((0..LANES).all(|lane| packet.range[lane] < 2.1));
-        }
-    }
-}
+mod tests;

@@ -1,0 +1,147 @@
+//! What single keys of a scene file mean, and what they may be: poses, motions, shapes, numbers.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use toml::Spanned;
+
+use super::closed_form::Shape;
+use super::error::Error;
+use super::file::{ObjectTyped, ShapeTyped, Source, Stand};
+use super::motion::{FASTEST, FASTEST_TURN_DEG, Motion};
+use super::pose::Pose;
+
+impl Source<'_> {
+    /// Where something stands and how it moves.
+    pub(super) fn motion(&self, stand: &Stand) -> Result<Motion, Error> {
+        let mut motion = Motion::still(self.pose(stand)?);
+        if let Some(typed) = &stand.velocity_m_s {
+            let speed = DVec3::from(*typed.get_ref()).length();
+            if !(0.0..=FASTEST).contains(&speed) {
+                let message = format!(
+                    "velocity_m_s must be three finite numbers, {FASTEST} m/s together at most"
+                );
+                return Err(self.fault(typed.span(), message));
+            }
+            motion.velocity = *typed.get_ref();
+        }
+        if let Some(typed) = &stand.turn_rate_deg_s {
+            let rate = *typed.get_ref();
+            if !(-FASTEST_TURN_DEG..=FASTEST_TURN_DEG).contains(&rate) {
+                let most = FASTEST_TURN_DEG;
+                let message =
+                    format!("turn_rate_deg_s is {rate}; it must be from -{most} to {most}");
+                return Err(self.fault(typed.span(), message));
+            }
+            motion.turn_rate = rate.to_radians();
+        }
+        Ok(motion)
+    }
+
+    /// Where something stands.
+    pub(super) fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
+        let mut pose = Pose::default();
+        if let Some(position) = &stand.position_m {
+            if position.get_ref().iter().any(|value| !value.is_finite()) {
+                let message = "position_m must be three finite numbers";
+                return Err(self.fault(position.span(), message));
+            }
+            pose.position = *position.get_ref();
+        }
+        let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
+            Some(typed) => Ok(self.finite(typed, key)?.to_radians()),
+            None => Ok(0.0),
+        };
+        pose.yaw = angle(&stand.yaw_deg, "yaw_deg")?;
+        pose.pitch = angle(&stand.pitch_deg, "pitch_deg")?;
+        pose.roll = angle(&stand.roll_deg, "roll_deg")?;
+        Ok(pose)
+    }
+
+    /// A shape about the position of its object.
+    pub(super) fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Shape, Error> {
+        let fault = |message: &str| Err(self.fault(typed.span(), message));
+        match *typed.get_ref() {
+            ShapeTyped::Plane { normal } => match DVec3::from(normal).try_normalize() {
+                Some(normal) => Ok(Shape::Plane { normal: normal.to_array() }),
+                None => fault("`normal` must be a finite direction, not zero"),
+            },
+            ShapeTyped::Sphere { radius_m: radius } => match radius > 0.0 && radius.is_finite() {
+                true => Ok(Shape::Sphere { radius }),
+                false => fault("`radius_m` must be finite and above zero"),
+            },
+            ShapeTyped::Box { size_m } => match size_m.iter().all(|s| *s > 0.0 && s.is_finite()) {
+                true => Ok(Shape::Box { half: size_m.map(|side| side / 2.0) }),
+                false => fault("each of `size_m` must be finite and above zero"),
+            },
+        }
+    }
+
+    /// Keys that mean something only for the mesh of a file.
+    pub(super) fn refuse_mesh_keys(&self, written: &ObjectTyped) -> Result<(), Error> {
+        let spans: [(Option<Range<usize>>, &str); 3] = [
+            (written.scale.as_ref().map(Spanned::span), "scale"),
+            (written.up.as_ref().map(Spanned::span), "up"),
+            (written.forward.as_ref().map(Spanned::span), "forward"),
+        ];
+        for (span, key) in spans {
+            if let Some(span) = span {
+                let message = format!("`{key}` belongs to objects with a `mesh`; remove it here");
+                return Err(self.fault(span, message));
+            }
+        }
+        Ok(())
+    }
+
+    /// A number that is one.
+    pub(super) fn finite(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
+        let value = *typed.get_ref();
+        match value.is_finite() {
+            true => Ok(value),
+            false => Err(self.fault(typed.span(), format!("{key} must be a finite number"))),
+        }
+    }
+
+    /// A number above zero.
+    pub(super) fn positive(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
+        let value = self.finite(typed, key)?;
+        match value > 0.0 {
+            true => Ok(value),
+            false => {
+                let message = format!("{key} is {value}; it must be above zero");
+                Err(self.fault(typed.span(), message))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion(keys: &str) -> Result<Motion, String> {
+        let text = format!("version = 1\n[sensor]\n{keys}");
+        let source = Source { text: &text, origin: "a.toml" };
+        let file = source.parse().unwrap();
+        source.motion(&file.sensor).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_motion_is_read_in_si_units() {
+        let read =
+            motion("position_m = [1, 2, 3]\nvelocity_m_s = [4, 5, 6]\nturn_rate_deg_s = -90");
+        let turn_rate = -std::f64::consts::FRAC_PI_2;
+        let pose = Pose::at([1.0, 2.0, 3.0]);
+        assert_eq!(read, Ok(Motion { pose, velocity: [4.0, 5.0, 6.0], turn_rate }));
+        assert_eq!(motion(""), Ok(Motion::default()));
+    }
+
+    #[test]
+    fn the_fastest_motion_is_read_and_nothing_faster() {
+        let told = |keys| motion(keys).unwrap_err();
+        assert!(motion("velocity_m_s = [-1e4, 0, 0]\nturn_rate_deg_s = -1e5").is_ok());
+        assert!(told("velocity_m_s = [0, 1.0001e4, 0]").contains("10000 m/s together at most"));
+        assert!(told("turn_rate_deg_s = -1.0001e5").contains("from -100000 to 100000"));
+        assert!(told("turn_rate_deg_s = nan").contains("turn_rate_deg_s is NaN"));
+    }
+}
