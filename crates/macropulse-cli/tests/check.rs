@@ -91,7 +91,7 @@ fn the_other_lidars_of_a_scene_are_listed_and_their_ghosts_counted() {
     ] {
         assert!(plain.contains(words), "no {words:?} in {text}");
     }
-    assert_eq!(desk.json("check a.toml --json")["others"][0]["phase_ns"], 1234.5);
+    assert_eq!(desk.json("check a.toml --json")["interferers"][0]["phase_ns"], 1234.5);
     let run = "simulate --sensor peregrine --scene a.toml --format none";
     assert!(desk.run(run).out.contains("2 other lidars, "));
     let counted = desk.json(&format!("{run} --json"));

@@ -161,6 +161,7 @@ impl Document {
             line_column: error.span().map(|span| line_column(text, span.start)),
             path: String::new(),
             message: error.message().to_owned(),
+            others: Vec::new(),
         })?;
         Ok(Self { origin: origin.to_owned(), text: text.to_owned(), table })
     }
@@ -285,6 +286,7 @@ impl Place {
             line_column: self.line_column,
             path: self.path,
             message: message.into(),
+            others: Vec::new(),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Energy, optics and eyes.
 
+use std::f64::consts::{FRAC_PI_4, TAU};
+
 use super::Check;
 use crate::design::budget::{Budget, Field, Trailing, solid_angle};
 use crate::design::file::{EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile};
@@ -113,43 +115,73 @@ impl Check<'_> {
         Ok(limits(&class, &exposure(&class, &sender)))
     }
 
+    /// What each detector looks at: of a raster as the file says, of several detectors the cell of
+    /// its pixel or a cone about it.
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {
         let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
-        let (horizontal, vertical) = match &scan.pattern {
-            Pattern::Raster { horizontal, vertical, .. }
-            | Pattern::Flash { horizontal, vertical } => (*horizontal, *vertical),
-            Pattern::Spinning { .. } => {
-                return self.refuse(
-                    "idealised",
-                    "the link budget of a spinning sensor is not modelled: \"link-budget\" must \
-                     be in this list",
-                );
-            }
+        let [across, down] = cell(scan);
+        let pixel = solid_angle(across, down);
+        let pixel_period = scan.channel_period();
+        let follows = !matches!(scan.pattern, Pattern::Flash { .. });
+        let trailing = |pixels: f64, solid_angle: f64| Field {
+            solid_angle,
+            trailing: follows.then_some(Trailing { pixels, pixel_period }),
         };
-        let pixel = solid_angle(horizontal / columns, vertical / rows);
-        let pixel_period = 1e3 / (scan.rate_millihertz as f64 * rows * columns);
-        let trailing = |pixels: f64| Field {
-            solid_angle: pixels * pixel,
-            trailing: Some(Trailing { pixels, pixel_period }),
-        };
-        if matches!(scan.pattern, Pattern::Flash { .. }) {
-            // Every pixel has a detector of its own.
-            return Ok(Field { solid_angle: pixel, trailing: None });
+        if let FieldFile::ConeMrad(angle) = optics.field {
+            let angle = self.within("optics.field.cone_mrad", angle, 1e-3, 1e3)? * 1e-3;
+            return Ok(trailing(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
         }
-        Ok(match optics.field {
-            FieldFile::Staring => {
-                Field { solid_angle: solid_angle(horizontal, vertical), trailing: None }
-            }
-            FieldFile::Descanned => trailing(1.0),
-            FieldFile::InFlight => trailing(1.0 + tof_from_range(scan.max_range) / pixel_period),
-            FieldFile::TrailingPixels(pixels) => trailing(self.within(
-                "optics.field.trailing_pixels",
-                pixels,
-                1.0,
-                rows * columns,
-            )?),
-        })
+        if let Pattern::Raster { horizontal, vertical, .. } = scan.pattern {
+            let strip = |pixels: f64| trailing(pixels, pixels * pixel);
+            return Ok(match optics.field {
+                FieldFile::Staring => {
+                    Field { solid_angle: solid_angle(horizontal, vertical), trailing: None }
+                }
+                FieldFile::InFlight => strip(1.0 + tof_from_range(scan.max_range) / pixel_period),
+                FieldFile::TrailingPixels(pixels) => strip(self.within(
+                    "optics.field.trailing_pixels",
+                    pixels,
+                    1.0,
+                    rows * columns,
+                )?),
+                FieldFile::Descanned | FieldFile::ConeMrad(_) => strip(1.0),
+            });
+        }
+        match optics.field {
+            FieldFile::Descanned => Ok(trailing(1.0, pixel)),
+            _ => self.refuse(
+                "optics.field",
+                "each detector of a spinning or flash sensor looks at its own cell: use \
+                 \"descanned\", or { cone_mrad = … }",
+            ),
+        }
     }
+}
+
+/// Width and height, rad, of the cell that belongs to a pixel. The lasers of a turning head are
+/// rarely evenly spaced: theirs is as high as the median step between them, that of one alone as
+/// high as wide.
+fn cell(scan: &Scan) -> [f64; 2] {
+    let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
+    match &scan.pattern {
+        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
+            [horizontal / columns, vertical / rows]
+        }
+        Pattern::Spinning { elevations, .. } => {
+            let mut steps: Vec<f64> = elevations.windows(2).map(|two| two[0] - two[1]).collect();
+            steps.sort_by(f64::total_cmp);
+            let across = TAU / columns;
+            let middle = [steps.len().saturating_sub(1) / 2, steps.len() / 2];
+            let median = middle.map(|place| steps.get(place).copied().unwrap_or(across));
+            [across, (median[0] + median[1]) / 2.0]
+        }
+    }
+}
+
+/// How many pixels a round field about the beam reaches back, `width` pixels being its diameter:
+/// half of it and half the pixel that the beam is on, that pixel at least.
+fn cone_pixels(width: f64) -> f64 {
+    ((width + 1.0) / 2.0).max(1.0)
 }
 
 const NO_LIMIT: &str = "no limit of class 1 is known here, only for 700 to 1050 and 1400 to 1800 nm: \
