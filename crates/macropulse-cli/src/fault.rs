@@ -12,6 +12,8 @@ use macropulse_study::{paper, record, sweep};
 pub enum Fault {
     /// Somebody wrote a wrong file, name or option.
     Wrong(String),
+    /// As `Wrong`, for several reasons at once: a sentence each.
+    AllWrong(Vec<String>),
     /// As `Wrong`, and said already.
     Told,
     /// The program, or the machine under it.
@@ -33,14 +35,15 @@ impl Fault {
         Self::Wrong(format!("{name}: cannot be read: {reason}"))
     }
 
-    /// Says on stderr, in one sentence, what is to be said, and gives the exit code.
+    /// Says on stderr, in one sentence for each reason, what is to be said, and gives the exit code.
     pub fn report(&self) -> ExitCode {
         match self {
             Self::Wrong(sentence) | Self::Ours(sentence) => complain(sentence),
+            Self::AllWrong(sentences) => sentences.iter().for_each(|one| complain(one)),
             Self::Told | Self::Interrupted => {}
         }
         match self {
-            Self::Wrong(_) | Self::Told => ExitCode::from(2),
+            Self::Wrong(_) | Self::AllWrong(_) | Self::Told => ExitCode::from(2),
             Self::Ours(_) => ExitCode::from(1),
             Self::Interrupted => ExitCode::from(crate::interrupt::EXIT_CODE),
         }
@@ -90,7 +93,7 @@ fn sentence_of(rendered: &str) -> String {
 
 impl From<design::Error> for Fault {
     fn from(error: design::Error) -> Self {
-        Self::Wrong(error.to_string())
+        Self::AllWrong(error.sentences().collect())
     }
 }
 

@@ -86,3 +86,35 @@ fn what_cannot_be_is_refused_with_a_reason() {
         assert!(ran.err.contains(reason), "{line}: {}", ran.err);
     }
 }
+
+/// Sensors written from the reference alone: energy, photons and Pd against range.
+#[test]
+fn every_pattern_and_detector_has_a_budget() {
+    for name in ["spinning-32", "flash-cells", "flash-linear", "flash-coded"] {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/examples/sensors");
+        let at = |range: f64| json(&format!("budget {folder}/{name}.toml --range {range} --json"));
+        let [near, far] = [at(15.0), at(150.0)];
+        for budget in [&near, &far] {
+            assert!(budget["energy_per_macropulse_nj"].as_f64().unwrap() > 1.0, "{name}");
+        }
+        let of = |budget: &serde_json::Value, key: &str| budget[key].as_f64().unwrap();
+        let ratio = of(&near, "photons_per_macropulse") / of(&far, "photons_per_macropulse");
+        // As the square of the range, with the air, and a head that has turned on.
+        assert!((100.0..105.0).contains(&ratio), "{name}: {ratio}");
+        assert!(of(&near, "pd") > 0.9 && of(&far, "pd") <= of(&near, "pd"), "{name}");
+    }
+}
+
+#[test]
+fn all_that_is_wrong_with_a_sensor_is_told_line_by_line() {
+    let desk = Desk::new();
+    let text = "version = 1\nname = \"mine\"\nextends = \"peregrine\"\n[light]\npulse_ps = 0.0\n\
+                [tdc]\nconverters = 7\n";
+    desk.put("mine.toml", text);
+    let ran = desk.run("check mine.toml");
+    assert_eq!(ran.code, Some(2));
+    let lines: Vec<&str> = ran.err.lines().collect();
+    assert_eq!(lines.len(), 2, "{}", ran.err);
+    assert!(lines[0].starts_with("macropulse: mine.toml:7:1: tdc.converters: is 7, but the bank"));
+    assert!(lines[1].starts_with("macropulse: mine.toml:5:1: light.pulse_ps: is 0"));
+}

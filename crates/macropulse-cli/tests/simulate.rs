@@ -136,7 +136,7 @@ fn an_empty_cloud_says_where_the_points_went() {
 #[test]
 fn a_range_image_too_large_for_a_picture_is_written_all_the_same() {
     let desk = Desk::new();
-    let long = "--set scan.flash.rows=1 --set scan.flash.columns=30000";
+    let long = "--set scan.flash.rows=1 --set scan.flash.columns=30000 --set tdc.converters=30000";
     let ran = desk.run(&format!("{START} {long} --format png -o out"));
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     assert!(ran.err.contains("too many pixels for a picture in colour"), "{}", ran.err);

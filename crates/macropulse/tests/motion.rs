@@ -51,8 +51,8 @@ fn some_bands(design: &Design, scan: u64, step: usize) -> Vec<Band> {
 /// For each measured row, the time of its leftmost return, s, and how far to the left it lies, m.
 fn left_edge(cloud: &PointCloud) -> Vec<(f64, f64)> {
     let row = |row: usize| {
-        let pixels = row * cloud.columns..(row + 1) * cloud.columns;
-        let leftmost = pixels.into_iter().find(|pixel| !cloud.range[*pixel].is_nan())?;
+        let of_row = (0..cloud.returns()).filter(|at| usize::from(cloud.row[*at]) == row);
+        let leftmost = of_row.min_by_key(|at| cloud.column[*at])?;
         Some((cloud.time_ns[leftmost] * 1e-9, f64::from(cloud.y[leftmost])))
     };
     (0..cloud.rows).filter_map(row).collect()

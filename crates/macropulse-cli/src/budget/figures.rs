@@ -145,9 +145,10 @@ impl<'a> Figures<'a> {
                         short(there.photons_per_shot / marks)
                     ),
                 );
+                let chip = if self.design.is_coded() { "chip" } else { "tick" };
                 columns.push(
                     "sunlight",
-                    format!("{} photons in every chip", short(self.background_per_chip())),
+                    format!("{} photons in every {chip}", short(self.background_per_chip())),
                 );
             }
         }

@@ -59,15 +59,20 @@ fn at_work(design: &Design, operating: &Operating) -> Columns {
             }
             (None, _) => "not counted: the sensor is declared by its sensitivity, whatever the sky"
                 .to_owned(),
-            (Some(_), Detector::FirstFiring(_)) => {
-                format!("{counts}, which a detector that fires once is taken not to notice")
-            }
+            (Some(_), Detector::FirstFiring(firing)) => match firing.firing_photons {
+                1 => format!("{counts}, each of which fires it"),
+                _ => format!("{counts}, which are noise to it"),
+            },
             (Some(_), _) => counts,
         },
     );
     if let Some(linear) = &operating.linear {
         let (noise, threshold) = (short(linear.noise), short(linear.threshold));
         columns.push("noise", format!("{noise} photons rms, the threshold at {threshold}"));
+    }
+    if let Some(firing) = operating.first_firing.filter(|firing| firing.noise > 0.0) {
+        let (noise, needed) = (short(firing.noise), firing.needed);
+        columns.push("noise", format!("{noise} photons rms; it fires at {needed}"));
     }
     let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
     columns.push("false edges", events);
@@ -89,6 +94,14 @@ fn times(design: &Design, derived: &Derived) -> Columns {
         ),
     );
     columns.push("pixel period", format!("{} ns", short(derived.pixel_period * 1e9)));
+    if design.channels() > 1 {
+        let (period, detectors) =
+            (short(derived.channel_period * 1e9), grouped(design.channels().into()));
+        columns.push(
+            "",
+            format!("{period} ns between shots of the same one of {detectors} detectors"),
+        );
+    }
     columns.push("shortest dwell", format!("{} ns", short(derived.shortest_dwell * 1e9)));
     columns.push("range gate", format!("{} ns", short(derived.gate * 1e9)));
     columns.push("shots in flight", short(derived.shots_in_flight));

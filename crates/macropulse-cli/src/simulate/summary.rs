@@ -113,7 +113,7 @@ impl Run<'_> {
     }
 
     fn converters(&self) -> String {
-        let per_channel = (self.design.tdc.converters / self.design.channels()).max(1);
+        let per_channel = self.design.converters_per_channel();
         let of = if self.design.channels() == 1 { "" } else { " per detector" };
         format!(
             "at most {} of {}{of} busy; {} lost, {} merged",

@@ -120,18 +120,17 @@ struct Sent<'a> {
     fired: Vec<i64>,
     /// Length of the stretch in which a mark may be found, in ticks.
     width: u32,
-    /// The code words, in ticks.
-    words: Vec<WordTicks>,
-    /// The same as bits, once somebody asks: where everything is clear nobody does.
-    bits: OnceCell<Bits>,
+    /// The code words, in ticks, each once somebody asks: one pixel of a flash has a single word.
+    words: Vec<OnceCell<WordTicks>>,
+    /// The same as bits: where everything is clear nobody asks.
+    bits: Vec<OnceCell<Bits>>,
 }
 
-/// The code words, as bits.
+/// A code word, as bits.
 struct Bits {
-    /// How many ticks before a mark others are explained by it.
-    farther: i64,
-    patterns: Vec<Pattern>,
-    explained: Vec<Pattern>,
+    pattern: Pattern,
+    /// The ticks that it explains, half a window before each mark and as many behind it.
+    explained: Pattern,
 }
 
 impl<'a> Sent<'a> {
@@ -139,38 +138,36 @@ impl<'a> Sent<'a> {
         let (codebook, log) = sent;
         let fired = receiver.all_fired(log).iter().map(|fired| fired - epoch).collect();
         let width = window(receiver.jitter_ticks);
-        let ticks = |word: usize| {
-            WordTicks::new(&codebook.word(word as u16).marks, receiver.ticks_per_chip)
-        };
-        let words = (0..codebook.words()).map(ticks).collect();
-        Self { receiver, codebook, log, epoch, fired, width, words, bits: OnceCell::new() }
+        let words = vec![OnceCell::new(); codebook.words()];
+        let bits = (0..codebook.words()).map(|_| OnceCell::new()).collect();
+        Self { receiver, codebook, log, epoch, fired, width, words, bits }
     }
 
     /// The code word of `shot` as bits, one for each mark.
     fn pattern(&self, shot: usize) -> &Pattern {
-        &self.as_bits().patterns[usize::from(self.log.word[shot])]
+        &self.as_bits(shot).pattern
     }
 
     /// The ticks that the code word of `shot` explains, from so many before its start on.
     fn explains(&self, shot: usize) -> (i64, &Pattern) {
-        let bits = self.as_bits();
-        (bits.farther, &bits.explained[usize::from(self.log.word[shot])])
+        (self.farther().into(), &self.as_bits(shot).explained)
     }
 
-    fn as_bits(&self) -> &Bits {
-        self.bits.get_or_init(|| {
-            // One edge in twenty jitters farther than marks are looked for.
-            let farther = self.width / 2;
+    /// How many ticks before a mark others are explained by it: one edge in twenty jitters farther
+    /// than marks are looked for.
+    fn farther(&self) -> u32 {
+        self.width / 2
+    }
+
+    fn as_bits(&self, shot: usize) -> &Bits {
+        let word = self.log.word[shot];
+        self.bits[usize::from(word)].get_or_init(|| {
             let scale = self.receiver.ticks_per_chip as usize;
-            let all = |width: u32| {
-                let word = |word: usize| {
-                    let marks = self.codebook.word(word as u16).marks.iter();
-                    Pattern::new(marks.map(|&mark| scale * usize::from(mark)), width as usize)
-                };
-                (0..self.codebook.words()).map(word).collect()
+            let pattern = |width: u32| {
+                let marks = self.codebook.word(word).marks.iter();
+                Pattern::new(marks.map(|&mark| scale * usize::from(mark)), width as usize)
             };
-            let (patterns, explained) = (all(1), all(self.width + 2 * farther));
-            Bits { farther: farther.into(), patterns, explained }
+            Bits { pattern: pattern(1), explained: pattern(self.width + 2 * self.farther()) }
         })
     }
 
@@ -191,7 +188,10 @@ impl<'a> Sent<'a> {
 
     /// The code word of `shot`.
     fn word(&self, shot: usize) -> &WordTicks {
-        &self.words[usize::from(self.log.word[shot])]
+        let word = self.log.word[shot];
+        self.words[usize::from(word)].get_or_init(|| {
+            WordTicks::new(&self.codebook.word(word).marks, self.receiver.ticks_per_chip)
+        })
     }
 
     /// Ticks per chip.
@@ -281,8 +281,8 @@ struct Band<'a> {
     word_thresholds: Thresholds,
     /// For the first marks of a macropulse, or the last ones.
     end_thresholds: Thresholds,
-    /// For each word, the marks that one tick may count for.
-    marks_per_tick: Vec<u32>,
+    /// For each word, the marks that one tick may count for, once somebody asks.
+    marks_per_tick: Vec<OnceCell<u32>>,
     /// For each shot, the number of marks that nowhere in its gate are unexplained.
     barren: Vec<u16>,
     counts: Counts,
@@ -304,9 +304,8 @@ impl<'a> Band<'a> {
         // Nobody looks at a field that is explained altogether.
         let dark = left.as_ref().is_some_and(Vec::is_empty) && again.is_empty();
         let span = if dark { 0..0 } else { sent.span() };
-        let (receiver, codebook) = (sent.receiver, sent.codebook);
-        let chips = sent.width.div_ceil(receiver.ticks_per_chip.max(1));
-        let words = if dark { 0 } else { codebook.words() };
+        let receiver = sent.receiver;
+        let words = if dark { 0 } else { sent.codebook.words() };
         let (lags, false_alarm) = (sent.lags(), receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
         let wanted = [(lags, false_alarm), (bits, false_alarm), (lags, FEW), (1.0, BY_CHANCE)]
@@ -340,9 +339,7 @@ impl<'a> Band<'a> {
             bits: Vec::new(),
             residual: Vec::new(),
             barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
-            marks_per_tick: (0..words)
-                .map(|word| crowding(codebook.word(word as u16), chips))
-                .collect(),
+            marks_per_tick: vec![OnceCell::new(); words],
             search: memory.search,
             all_found: memory.all_found,
         }
@@ -353,6 +350,14 @@ impl<'a> Band<'a> {
             vec![self.thresholds, self.bit_thresholds, self.word_thresholds, self.end_thresholds];
         let (field, all_found) = (self.field.into_memory(), self.all_found);
         Memory { field, search: self.search, thresholds, all_found }
+    }
+
+    /// Most marks of `shot` that one tick may count for; `None` where nobody looks at a field.
+    fn marks_per_tick(&self, shot: usize) -> Option<u32> {
+        let word = self.sent.log.word[shot];
+        let cell = self.marks_per_tick.get(usize::from(word))?;
+        let chips = self.sent.width.div_ceil(self.sent.receiver.ticks_per_chip.max(1));
+        Some(*cell.get_or_init(|| crowding(self.sent.codebook.word(word), chips)))
     }
 
     /// Whether nothing is left to be explained.

@@ -1,7 +1,7 @@
 //! A sensor at work in an environment: what follows from both.
 
 use super::Link;
-use crate::design::{Design, Detector, Linear};
+use crate::design::{Design, Detector, FirstFiring, Linear};
 use crate::environment::Environment;
 
 /// More counts per second than this are not followed one by one through the cells of a Geiger
@@ -30,6 +30,8 @@ pub struct Operating {
     pub false_rate: f64,
     /// Noise and threshold of a linear detector.
     pub linear: Option<LinearSetting>,
+    /// Noise and false firings of a detector that fires once per shot.
+    pub first_firing: Option<FirstFiringSetting>,
     /// Standard deviation of the timing, s; of a linear detector at its threshold, where it is
     /// largest.
     pub jitter: f64,
@@ -50,6 +52,19 @@ pub struct LinearSetting {
     /// Crossings of the threshold by noise alone, 1/s.
     pub false_rate: f64,
     /// Standard deviation of the timing of the converter's input alone, s.
+    pub jitter: f64,
+}
+
+/// What a detector that fires once per shot does under the light it sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstFiringSetting {
+    /// Photons needed to fire; 1 is a Geiger detector.
+    pub needed: u32,
+    /// White noise integrated over one pulse, photons rms.
+    pub noise: f64,
+    /// Firings without a target, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing, s.
     pub jitter: f64,
 }
 
@@ -101,11 +116,19 @@ impl Operating {
             Detector::Linear(linear) => Some(LinearSetting::of(linear, background)),
             _ => None,
         };
+        let first_firing = match &design.detector {
+            Detector::FirstFiring(firing) => {
+                Some(FirstFiringSetting::of(firing, background, design.light.pulse))
+            }
+            _ => None,
+        };
         let false_rate = match &design.detector {
             Detector::PhotonCounting(counting) => counting.dark + background,
             Detector::Geiger(geiger) => geiger.dark + background,
             Detector::Linear(linear) => linear.false_alarm,
-            Detector::FirstFiring(firing) => firing.false_rate,
+            Detector::FirstFiring(firing) => {
+                first_firing.map_or(firing.false_rate, |setting| setting.false_rate)
+            }
         };
         if matches!(design.detector, Detector::Geiger(_)) && false_rate > MOST_COUNTS {
             return Err(refuse(format!(
@@ -119,6 +142,7 @@ impl Operating {
             background,
             false_rate,
             linear,
+            first_firing,
             jitter: design.detector.jitter(),
         })
     }
@@ -129,6 +153,23 @@ impl Operating {
     /// The sensor where there is neither air nor sunlight.
     pub fn in_the_dark(design: &Design) -> Self {
         Self::of(design, &Environment::vacuum_dark()).unwrap()
+    }
+}
+
+impl FirstFiringSetting {
+    /// The setting of a detector that sees `background` detections of steady light per second,
+    /// adding light up over a `pulse` of so many seconds.
+    ///
+    /// Where one photon is enough every one of them fires it. Where more are needed, their mean is
+    /// taken off (the amplifier passes no steady current) and their fluctuation is shot noise:
+    /// √(a² + b·τ), a the noise rms without light, b the background, τ the pulse.
+    pub fn of(firing: &FirstFiring, background: f64, pulse: f64) -> Self {
+        let FirstFiring { firing_photons, noise_photons, false_rate, jitter, .. } = *firing;
+        let (noise, false_rate) = match firing_photons {
+            1 => (noise_photons, false_rate + background),
+            _ => ((noise_photons.powi(2) + background * pulse).sqrt(), false_rate),
+        };
+        Self { needed: firing_photons, noise, false_rate, jitter }
     }
 }
 
@@ -202,6 +243,34 @@ mod tests {
         let ratio = by_night.threshold / by_night.noise;
         assert_relative_eq!(by_day.threshold / by_day.noise, ratio, max_relative = 1e-12);
         assert_relative_eq!(by_day.timing(0.0), day.jitter, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn sunlight_fires_a_detector_of_one_photon_and_is_noise_to_one_of_more() {
+        let sensor = |photons: &str| {
+            let text = format!(
+                "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
+                 idealised = [\"detector-bandwidth\", \"inter-chip\", \"mirror-motion\"]\n\
+                 [detector.first-firing]\nefficiency = 1.0\nfiring_photons = {photons}\n\
+                 noise_photons = 3.0\nfalse_firing_hz = 100.0\n[code]\nlabel = \"none\"\n\
+                 family = {{ sparse = {{ length = 9, weight = 1, words = 2, seed = 1 }} }}\n\
+                 word = {{ first = 0, modulus = 2 }}\n"
+            );
+            Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap()
+        };
+        let setting = |photons: &str, name: &str| {
+            let operating = Operating::of(&sensor(photons), &environment(name)).unwrap();
+            let setting = operating.first_firing.unwrap();
+            assert_eq!(operating.false_rate, setting.false_rate);
+            (operating.background, setting)
+        };
+        let (sun, one) = setting("1", "clear-day");
+        assert_eq!((one.false_rate, one.noise), (100.0 + sun, 3.0));
+        let (_, many) = setting("5", "clear-day");
+        let pulse = sensor("5").light.pulse;
+        assert_relative_eq!(many.noise.powi(2), 9.0 + sun * pulse, max_relative = 1e-12);
+        assert_eq!(many.false_rate, 100.0);
+        assert_eq!(setting("5", "night").1.noise, 3.0);
     }
 
     #[test]

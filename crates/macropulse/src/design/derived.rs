@@ -8,6 +8,8 @@ use crate::units::{range_from_tof, s_from_fs, tof_from_range};
 pub struct Derived {
     /// Mean time between shots, s.
     pub pixel_period: f64,
+    /// Mean time between shots of the same detector, s: a macropulse must fit into it.
+    pub channel_period: f64,
     /// Shortest time the beam spends on a pixel, s (\[KP16\] §2.2 gives the mean only).
     pub shortest_dwell: f64,
     /// Range gate, s.
@@ -22,9 +24,10 @@ pub struct Derived {
     pub marks: (usize, f64, usize),
     /// Marks sent in one scan.
     pub marks_per_scan: u64,
-    /// Macropulses in the air on average at a point of the receiver's time line, if all return.
+    /// Macropulses in the air on average at a point of a detector's time line, if all return.
     pub mean_overlap: f64,
-    /// Range at which another shot has the same code word, m; `None` for uncoded shots.
+    /// Range at which another shot of the same detector has the same code word, m; `None` for
+    /// uncoded shots.
     pub unambiguous_range: Option<f64>,
     /// Range covered by one tick, m.
     pub tick_range: f64,
@@ -44,8 +47,10 @@ impl Derived {
         let mean = codebook.mean_weight();
         let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
         let at_once = f64::from(design.channels());
+        let channel_period = design.scan.channel_period();
         Self {
             pixel_period,
+            channel_period,
             shortest_dwell: shortest_dwell(design, pixel_period),
             gate,
             shots_in_flight: gate / pixel_period,
@@ -57,14 +62,23 @@ impl Derived {
                 codebook.max_weight(),
             ),
             marks_per_scan: (mean * shots as f64).round() as u64,
-            mean_overlap: macropulse / pixel_period,
+            mean_overlap: macropulse / channel_period,
             unambiguous_range: design
                 .is_coded()
-                .then(|| range_from_tof(f64::from(design.coding.word_modulus) * pixel_period)),
+                .then(|| range_from_tof(word_period(design, channel_period))),
             tick_range: range_from_tof(s_from_fs(design.tdc.tick_fs)),
             idle_listening_rate: at_once / (gate * shots as f64),
             reference_photons: design.detector.sensitivity().photons,
         }
+    }
+}
+
+/// Time, s, until a detector is sent the same code word again. A laser of a turning head goes from
+/// column to column and so from word to word; a pixel of a flash has one word.
+fn word_period(design: &Design, channel_period: f64) -> f64 {
+    match design.scan.pattern {
+        Pattern::Flash { .. } => channel_period,
+        _ => f64::from(design.coding.word_modulus) * channel_period,
     }
 }
 

@@ -198,6 +198,7 @@ impl Document {
             line_column: error.span().map(|span| line_column(text, span.start)),
             path: String::new(),
             message: error.message().to_owned(),
+            others: Vec::new(),
         })?;
         Ok(Self { origin: origin.to_owned(), text: text.to_owned(), table })
     }
@@ -322,6 +323,7 @@ impl Place {
             line_column: self.line_column,
             path: self.path,
             message: message.into(),
+            others: Vec::new(),
         }
     }
 }

@@ -131,6 +131,8 @@ pub(super) enum FieldFile {
     InFlight,
     #[serde(rename = "trailing_pixels")]
     TrailingPixels(f64),
+    #[serde(rename = "cone_mrad")]
+    ConeMrad(f64),
 }
 
 #[derive(Debug, Deserialize)]

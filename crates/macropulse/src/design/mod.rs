@@ -219,11 +219,12 @@ impl Design {
 
     /// Number of separate detectors.
     pub fn channels(&self) -> u32 {
-        match &self.scan.pattern {
-            Pattern::Raster { .. } => 1,
-            Pattern::Spinning { elevations, .. } => elevations.len() as u32,
-            Pattern::Flash { .. } => self.scan.rows * self.scan.columns,
-        }
+        self.scan.channels()
+    }
+
+    /// Converters of the bank that each detector has.
+    pub fn converters_per_channel(&self) -> u32 {
+        self.tdc.converters / self.channels()
     }
 
     /// Shots in one scan.
@@ -254,14 +255,17 @@ impl Design {
     }
 }
 
-/// Somebody wrote a wrong sensor file: where, and what to do.
+/// Somebody wrote a wrong sensor file: where, and what to do. Where several things are wrong that
+/// do not follow from each other it says all of them, one to a line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{}{}{message}", self.place(), self.key())]
+#[error("{}", self.sentences().collect::<Vec<_>>().join("\n"))]
 pub struct Error {
     origin: String,
     line_column: Option<(usize, usize)>,
     path: String,
     message: String,
+    /// Further faults, each on its own.
+    others: Vec<Error>,
 }
 
 impl Error {
@@ -272,7 +276,25 @@ impl Error {
             line_column: None,
             path: String::new(),
             message: message.into(),
+            others: Vec::new(),
         }
+    }
+
+    /// All of `faults` as one error; `None` where there is none.
+    fn all(faults: Vec<Self>) -> Option<Self> {
+        let mut faults = faults.into_iter();
+        let first = faults.next()?;
+        Some(Self { others: faults.collect(), ..first })
+    }
+
+    /// What is wrong: a sentence with its place for each fault, in the order of the file's
+    /// sections.
+    pub fn sentences(&self) -> impl Iterator<Item = String> {
+        std::iter::once(self).chain(&self.others).map(Self::sentence)
+    }
+
+    fn sentence(&self) -> String {
+        format!("{}{}{}", self.place(), self.key(), self.message)
     }
 
     fn place(&self) -> String {

@@ -21,6 +21,22 @@ impl Mirror {
 }
 
 impl Scan {
+    /// Number of separate detectors: one behind a single beam, one for each laser of a turning
+    /// head, one for each pixel of a flash.
+    pub fn channels(&self) -> u32 {
+        match &self.pattern {
+            Pattern::Raster { .. } => 1,
+            Pattern::Spinning { elevations, .. } => elevations.len() as u32,
+            Pattern::Flash { .. } => self.rows * self.columns,
+        }
+    }
+
+    /// Mean time between shots of the same detector, s.
+    pub fn channel_period(&self) -> f64 {
+        let shots = f64::from(self.rows) * f64::from(self.columns);
+        self.period() / shots * f64::from(self.channels())
+    }
+
     /// Duration of one scan, s.
     pub fn period(&self) -> f64 {
         1000.0 / self.rate_millihertz as f64

@@ -9,7 +9,8 @@
 //! 4. False firings are Poisson in time. The earliest firing in the range gate wins, whatever its
 //!    light is: an echo of this shot, one of an earlier shot from beyond the gate, an interferer.
 //!    An interferer's marks that come within one micropulse of the detector's own are one flash, in
-//!    the middle of them.
+//!    the middle of them. Sunlight fires a detector of one photon as false firings do; to one of
+//!    more it is noise ([`FirstFiringSetting`]).
 //! 5. A Gaussian sample of the temporal response is added. The converter quantises.
 //!
 //! \[KP16\] mixes two kinds of detector here: additive Gaussian noise belongs to a linear-mode
@@ -26,7 +27,7 @@ use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 use super::Detections;
 use super::channel::Channel;
 use super::noise::stretches;
-use crate::design::FirstFiring;
+use crate::channel::FirstFiringSetting;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
 
@@ -48,7 +49,7 @@ struct Flash {
 /// Adds the events of a channel to those found: for each shot, while its gate is open, the first
 /// firing.
 pub(super) fn add(
-    firing: &FirstFiring,
+    firing: &FirstFiringSetting,
     channel: &Channel,
     chance: &Chance,
     found: &mut Detections,
@@ -91,7 +92,7 @@ pub(super) fn add(
 
 /// How the detector fires.
 struct Firing<'a> {
-    firing: &'a FirstFiring,
+    firing: &'a FirstFiringSetting,
     /// Photons needed, and their sum of unit exponentials.
     needed: f64,
     gamma: Gamma<f64>,
@@ -100,8 +101,8 @@ struct Firing<'a> {
 }
 
 impl<'a> Firing<'a> {
-    fn of(firing: &'a FirstFiring, channel: &Channel) -> Option<Self> {
-        let needed = f64::from(firing.firing_photons);
+    fn of(firing: &'a FirstFiringSetting, channel: &Channel) -> Option<Self> {
+        let needed = f64::from(firing.needed);
         let gamma = Gamma::new(needed, 1.0).ok()?;
         let rms_fs = channel.design.light.pulse * RMS_OF_FWHM * FS_PER_S as f64;
         Some(Self { firing, needed, gamma, rms_fs })
@@ -111,7 +112,7 @@ impl<'a> Firing<'a> {
     /// does not.
     fn fires(&self, flash: &Flash, stream: &mut Stream) -> Option<(i64, f64)> {
         let noise: f64 = StandardNormal.sample(stream);
-        let photons = (flash.photons.min(PLENTY) + self.firing.noise_photons * noise).max(0.0);
+        let photons = (flash.photons.min(PLENTY) + self.firing.noise * noise).max(0.0);
         let draw: f64 = self.gamma.sample(stream);
         (draw < photons).then(|| {
             let early = normal_quantile(draw / photons)
@@ -133,7 +134,9 @@ impl<'a> Firing<'a> {
         };
         let steady = (self.firing.false_rate > 0.0)
             .then(|| gate.start().saturating_add(wait_fs(self.firing.false_rate)));
-        let others = stretches(channel).filter_map(|stretch| {
+        // What needs more photons than one adds them up, and steady light is noise to it.
+        let by_one = self.firing.needed == 1;
+        let others = stretches(channel).filter(|_| by_one).filter_map(|stretch| {
             let from_fs = stretch.from_fs.max(*gate.start());
             let until_fs = stretch.until_fs.min(*gate.end());
             let first_fs = (from_fs < until_fs).then(|| from_fs + wait_fs(stretch.per_s))?;

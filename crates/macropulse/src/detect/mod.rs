@@ -25,8 +25,8 @@ use linear::Thresholding;
 use photon_counting::Counting;
 use shape::Shape;
 
-use crate::channel::{Light, LinearSetting, Operating};
-use crate::design::{Design, Detector, FirstFiring};
+use crate::channel::{FirstFiringSetting, Light, LinearSetting, Operating};
+use crate::design::{Design, Detector};
 use crate::kernels::GROUP;
 use crate::random::Chance;
 
@@ -58,7 +58,7 @@ enum Kind {
     Counting(Counting),
     Cells(Cells),
     Thresholding(Thresholding),
-    Firing(FirstFiring),
+    Firing(FirstFiringSetting),
 }
 
 impl<'a> Detectors<'a> {
@@ -73,7 +73,11 @@ impl<'a> Detectors<'a> {
                     setting.unwrap_or_else(|| LinearSetting::of(linear, operating.background));
                 Kind::Thresholding(Thresholding::new(setting, design))
             }
-            Detector::FirstFiring(firing) => Kind::Firing(*firing),
+            Detector::FirstFiring(firing) => {
+                let of =
+                    || FirstFiringSetting::of(firing, operating.background, design.light.pulse);
+                Kind::Firing(operating.first_firing.unwrap_or_else(of))
+            }
         };
         Self { design, chance, shape: Shape::of(design), kind }
     }

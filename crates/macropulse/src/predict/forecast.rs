@@ -5,10 +5,10 @@
 
 use std::collections::BTreeMap;
 
-use super::detection::bank_loss;
+use super::detection::{FirstOfCells, bank_loss};
 use super::matched;
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Detector};
+use crate::design::{Design, Detector, Tdc};
 use crate::environment::Environment;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 
@@ -17,7 +17,8 @@ use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 pub struct Forecaster<'a> {
     design: &'a Design,
     operating: Operating,
-    pixel_period: f64,
+    /// Mean time between shots of the same detector, s.
+    channel_period: f64,
     /// How many macropulses have so many marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
     mean_weight: f64,
@@ -74,10 +75,10 @@ impl<'a> Forecaster<'a> {
         for weight in sent.filter(|&weight| weight > 0) {
             *weights.entry(weight).or_insert(0) += 1;
         }
-        let pixel_period = design.derived().pixel_period;
+        let channel_period = design.scan.channel_period();
         let mean_weight = codebook.mean_weight();
         let (light, background) = (1.0, 1.0);
-        Ok(Self { design, operating, pixel_period, weights, mean_weight, light, background })
+        Ok(Self { design, operating, channel_period, weights, mean_weight, light, background })
     }
 
     /// The sensor.
@@ -104,10 +105,10 @@ impl<'a> Forecaster<'a> {
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
         let (design, operating) = (self.design, &self.operating);
         let detector = &design.detector;
-        let (pixel_period, mean_weight) = (self.pixel_period, self.mean_weight);
+        let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
         let detected = self.light * operating.link.photons(reflectance, range);
         let false_rate = self.background * operating.false_rate;
-        let photon_rate = detected * mean_weight / pixel_period;
+        let photon_rate = detected * mean_weight / channel_period;
         let falling = match detector {
             Detector::Geiger(_) => false_rate + photon_rate,
             _ => 0.0,
@@ -119,9 +120,10 @@ impl<'a> Forecaster<'a> {
         };
         // Edges that share a tick keep a single converter busy.
         let tick = s_from_fs(design.tdc.tick_fs);
-        let own = edge * mean_weight / pixel_period;
+        let own = edge * mean_weight / channel_period;
         let edges = -libm::expm1(-(false_edges + own) * tick) / tick;
-        let loss = bank_loss(&design.tdc, edges);
+        let share = Tdc { converters: design.converters_per_channel(), ..design.tdc.clone() };
+        let loss = bank_loss(&share, edges);
         let place = matched::Place::of(design, operating, detected);
         // Where the bank is overrun, all is lit until the last converter is taken: what is lost
         // then makes the rest no clearer.
@@ -135,7 +137,18 @@ impl<'a> Forecaster<'a> {
                 let without = -libm::expm1(-false_edges * place.width);
                 matched::chances(design, operating, &self.weights, (mark_pd, density, without))
             }
-            false => first(design, mark_pd, false_edges, range),
+            false => match detector {
+                Detector::Geiger(geiger) => {
+                    let armed = super::detection::armed(geiger, falling);
+                    let of = |range: f64, photons| {
+                        let since = since_opening(design, range);
+                        FirstOfCells::of(geiger, armed, false_rate, (since, photons))
+                    };
+                    let pd = of(range, detected).seen * (1.0 - loss);
+                    (pd, 1.0 - of(design.scan.max_range, 0.0).silent)
+                }
+                _ => first(design, mark_pd, false_edges, range),
+            },
         };
         let spread = (density * (1.0 - density)).max(f64::MIN_POSITIVE).sqrt();
         let timing = matched::Timing::of(design, operating, detected);
@@ -150,7 +163,7 @@ impl<'a> Forecaster<'a> {
             bank_loss: loss,
             density,
             snr: match detector {
-                _ if !design.is_coded() => detected / noise_of_one(design, operating, detected),
+                _ if !design.is_coded() => detected / noise_of_one(operating, detected),
                 _ => (mark_pd - density) * mean_weight.sqrt() / spread,
             },
             pd,
@@ -207,10 +220,10 @@ fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
 }
 
 /// The noise of an amplitude of `photons`, rms.
-fn noise_of_one(design: &Design, operating: &Operating, photons: f64) -> f64 {
-    match (&design.detector, &operating.linear) {
-        (_, Some(linear)) => (photons * linear.excess + linear.noise.powi(2)).sqrt(),
-        (Detector::FirstFiring(firing), _) => (photons + firing.noise_photons.powi(2)).sqrt(),
+fn noise_of_one(operating: &Operating, photons: f64) -> f64 {
+    match (&operating.linear, &operating.first_firing) {
+        (Some(linear), _) => (photons * linear.excess + linear.noise.powi(2)).sqrt(),
+        (_, Some(firing)) => (photons + firing.noise.powi(2)).sqrt(),
         _ => photons.sqrt(),
     }
 }
@@ -218,7 +231,12 @@ fn noise_of_one(design: &Design, operating: &Operating, photons: f64) -> f64 {
 /// The chances of a sensor that takes the first edge in its gate: a target is seen if nothing
 /// came before it, exp(−K), K the false edges until then.
 fn first(design: &Design, seen: f64, false_edges: f64, range: f64) -> (f64, f64) {
-    let since = |range: f64| tof_from_range(range) - tof_from_range(design.scan.min_range);
-    let nothing_before = libm::exp(-false_edges * since(range).max(0.0));
+    let since = |range: f64| since_opening(design, range);
+    let nothing_before = libm::exp(-false_edges * since(range));
     (seen * nothing_before, -libm::expm1(-false_edges * since(design.scan.max_range)))
+}
+
+/// Time, s, from the opening of the range gate to an echo from `range` metres.
+fn since_opening(design: &Design, range: f64) -> f64 {
+    (tof_from_range(range) - tof_from_range(design.scan.min_range)).max(0.0)
 }

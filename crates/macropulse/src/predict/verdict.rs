@@ -144,7 +144,7 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
         finding: format!(
             "{:.2} % of edges find all {} of a detector's bank busy",
             loss * 100.0,
-            design.tdc.converters
+            design.converters_per_channel()
         ),
         remedy: "more converters, a shorter dead time, or fewer false edges".into(),
     }

@@ -61,7 +61,7 @@ pub fn ticks(design: &Design, detections: Detections) -> Converted {
     let Detections { epoch, mut time, mut channel, mut amplitude } = detections;
     let found = time.len();
     let mut bank = Bank {
-        converters: (tdc.converters / design.channels()).max(1) as usize,
+        converters: design.converters_per_channel() as usize,
         dead: u32::try_from((tdc.dead_fs + tdc.tick_fs - 1) / tdc.tick_fs).unwrap_or(u32::MAX),
         ..Bank::default()
     };

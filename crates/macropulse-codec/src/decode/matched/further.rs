@@ -91,7 +91,7 @@ impl Band<'_> {
     fn most_left(&mut self, shot: usize) -> Option<i64> {
         let least = self.least_left(shot);
         let left = self.field.left().at_most(self.sent.gate_and_macropulse(shot));
-        let could_be = left * self.marks_per_tick[usize::from(self.sent.log.word[shot])];
+        let could_be = left * self.marks_per_tick(shot).unwrap_or(1);
         if could_be < u32::from(least) {
             return None;
         }

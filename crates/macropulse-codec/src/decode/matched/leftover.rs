@@ -92,7 +92,7 @@ impl Band<'_> {
     /// everywhere, and for one of its lit bits within one code word.
     pub(super) fn is_crowded(&self, shot: usize, marks: u16) -> bool {
         let sent = self.sent;
-        let per_tick = self.marks_per_tick[usize::from(sent.log.word[shot])];
+        let per_tick = self.marks_per_tick(shot).unwrap_or(1);
         let bits = sent.lit_bits(shot).len() as u32;
         let gate = sent.gate_and_macropulse(shot);
         let needed = |bits: u32| u32::from(marks).div_ceil(bits).div_ceil(per_tick).max(1);

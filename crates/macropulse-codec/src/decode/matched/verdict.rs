@@ -93,8 +93,7 @@ impl Band<'_> {
         let (length, width) = (i64::from(word.length) * scale, i64::from(self.sent.width));
         // Half of a lit bit must come from somewhere.
         let needed = (mean / 2.0).ceil() as u32;
-        let per_tick = self.marks_per_tick.get(usize::from(self.sent.log.word[shot]));
-        let per_tick = per_tick.copied().unwrap_or(1);
+        let per_tick = self.marks_per_tick(shot).unwrap_or(1);
         let whole = start..start + self.sent.length() + width;
         if self.field.left().at_most(whole) * per_tick < needed {
             return true;

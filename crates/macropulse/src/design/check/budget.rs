@@ -1,5 +1,7 @@
 //! Energy, optics and eyes.
 
+use std::f64::consts::{FRAC_PI_4, TAU};
+
 use super::Check;
 use crate::design::budget::{Budget, Field, Trailing, solid_angle};
 use crate::design::file::{EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile};
@@ -113,44 +115,175 @@ impl Check<'_> {
         Ok(limits(&class, &exposure(&class, &sender)))
     }
 
+    /// What each detector looks at: of a raster as the file says, of several detectors the cell of
+    /// its pixel or a cone about it.
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {
         let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
-        let (horizontal, vertical) = match &scan.pattern {
-            Pattern::Raster { horizontal, vertical, .. }
-            | Pattern::Flash { horizontal, vertical } => (*horizontal, *vertical),
-            Pattern::Spinning { .. } => {
-                return self.refuse(
-                    "idealised",
-                    "the link budget of a spinning sensor is not modelled: \"link-budget\" must \
-                     be in this list",
-                );
-            }
+        let [across, down] = cell(scan);
+        let pixel = solid_angle(across, down);
+        let pixel_period = scan.channel_period();
+        let follows = !matches!(scan.pattern, Pattern::Flash { .. });
+        let trailing = |pixels: f64, solid_angle: f64| Field {
+            solid_angle,
+            trailing: follows.then_some(Trailing { pixels, pixel_period }),
         };
-        let pixel = solid_angle(horizontal / columns, vertical / rows);
-        let pixel_period = 1e3 / (scan.rate_millihertz as f64 * rows * columns);
-        let trailing = |pixels: f64| Field {
-            solid_angle: pixels * pixel,
-            trailing: Some(Trailing { pixels, pixel_period }),
-        };
-        if matches!(scan.pattern, Pattern::Flash { .. }) {
-            // Every pixel has a detector of its own.
-            return Ok(Field { solid_angle: pixel, trailing: None });
+        if let FieldFile::ConeMrad(angle) = optics.field {
+            let angle = self.within("optics.field.cone_mrad", angle, 1e-3, 1e3)? * 1e-3;
+            return Ok(trailing(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
         }
-        Ok(match optics.field {
-            FieldFile::Staring => {
-                Field { solid_angle: solid_angle(horizontal, vertical), trailing: None }
-            }
-            FieldFile::Descanned => trailing(1.0),
-            FieldFile::InFlight => trailing(1.0 + tof_from_range(scan.max_range) / pixel_period),
-            FieldFile::TrailingPixels(pixels) => trailing(self.within(
-                "optics.field.trailing_pixels",
-                pixels,
-                1.0,
-                rows * columns,
-            )?),
-        })
+        if let Pattern::Raster { horizontal, vertical, .. } = scan.pattern {
+            let strip = |pixels: f64| trailing(pixels, pixels * pixel);
+            return Ok(match optics.field {
+                FieldFile::Staring => {
+                    Field { solid_angle: solid_angle(horizontal, vertical), trailing: None }
+                }
+                FieldFile::InFlight => strip(1.0 + tof_from_range(scan.max_range) / pixel_period),
+                FieldFile::TrailingPixels(pixels) => strip(self.within(
+                    "optics.field.trailing_pixels",
+                    pixels,
+                    1.0,
+                    rows * columns,
+                )?),
+                FieldFile::Descanned | FieldFile::ConeMrad(_) => strip(1.0),
+            });
+        }
+        match optics.field {
+            FieldFile::Descanned => Ok(trailing(1.0, pixel)),
+            _ => self.refuse(
+                "optics.field",
+                "each detector of a spinning or flash sensor looks at its own cell: use \
+                 \"descanned\", or { cone_mrad = … }",
+            ),
+        }
     }
+}
+
+/// Width and height, rad, of the cell that belongs to a pixel. The lasers of a turning head are
+/// rarely evenly spaced: theirs is as high as the median step between them, that of one alone as
+/// high as wide.
+fn cell(scan: &Scan) -> [f64; 2] {
+    let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
+    match &scan.pattern {
+        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
+            [horizontal / columns, vertical / rows]
+        }
+        Pattern::Spinning { elevations, .. } => {
+            let mut steps: Vec<f64> = elevations.windows(2).map(|two| two[0] - two[1]).collect();
+            steps.sort_by(f64::total_cmp);
+            let across = TAU / columns;
+            let middle = [steps.len().saturating_sub(1) / 2, steps.len() / 2];
+            let median = middle.map(|place| steps.get(place).copied().unwrap_or(across));
+            [across, (median[0] + median[1]) / 2.0]
+        }
+    }
+}
+
+/// How many pixels a round field about the beam reaches back, `width` pixels being its diameter:
+/// half of it and half the pixel that the beam is on, that pixel at least.
+fn cone_pixels(width: f64) -> f64 {
+    ((width + 1.0) / 2.0).max(1.0)
 }
 
 const NO_LIMIT: &str = "no limit of class 1 is known here, only for 700 to 1050 and 1400 to 1800 nm: \
                         declare \"eye-safety\" as idealised and give shot_nj";
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_4;
+    use std::path::Path;
+
+    use approx::assert_relative_eq;
+
+    use crate::design::{Design, Error, solid_angle};
+
+    fn sensor(scan: &str, field: &str) -> Result<Design, Error> {
+        let text = format!(
+            "version = 1\nname = \"mine\"\nidealised = [\"footprint\", \"eye-safety\", \
+             \"mirror-motion\"]\nscan.scans_per_s = 10.0\nscan.max_range_m = 30.0\n{scan}\n\
+             light = {{ wavelength_nm = 1550.0, pulse_ps = 100.0, energy = {{ shot_nj = 1.0 }} }}\n\
+             [optics]\naperture_mm = 3.0\ntransmission = 0.7\nfilter_nm = 1.0\nfield = {field}\n\
+             [detector.geiger]\nefficiency = 0.1\n[tdc]\nconverters = 64\nresolution_ps = 100.0\n\
+             [receiver]\nkind = \"direct\"\n"
+        );
+        Design::from_toml(&text, "mine.toml", Path::new(""), &[])
+    }
+
+    fn head(blocks: &str) -> String {
+        format!("scan.spinning = {{ azimuth_step_deg = 0.5, blocks = [{blocks}] }}")
+    }
+
+    const UNEVEN: &str = "{ lasers = 3, first_deg = 9.0, step_deg = -1.0 }, \
+                          { lasers = 2, first_deg = 3.0, step_deg = -2.0 }";
+    const FLASH: &str =
+        "scan.flash = { rows = 4, columns = 8, horizontal_deg = 16.0, vertical_deg = 4.0 }";
+
+    #[test]
+    fn every_laser_sees_its_own_cell_and_follows_the_head() {
+        let field =
+            |blocks: &str, field: &str| sensor(&head(blocks), field).unwrap().budget.unwrap().field;
+        let [across, down] = [0.5_f64, 1.5].map(f64::to_radians);
+        let cell = field(UNEVEN, "\"descanned\"");
+        // Steps of 1, 1, 4 and 2 degrees.
+        assert_relative_eq!(cell.solid_angle, solid_angle(across, down), max_relative = 1e-12);
+        let trailing = cell.trailing.unwrap();
+        // 720 columns ten times a second.
+        assert_eq!(trailing.pixels, 1.0);
+        assert_relative_eq!(trailing.pixel_period, 1.0 / 7200.0, max_relative = 1e-12);
+        let alone = field("{ lasers = 1, first_deg = 0.0, step_deg = -1.0 }", "\"descanned\"");
+        assert_relative_eq!(alone.solid_angle, solid_angle(across, across), max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_cone_is_round_and_belongs_to_any_pattern() {
+        let cone = |scan: &str| sensor(scan, "{ cone_mrad = 20.0 }").unwrap().budget.unwrap().field;
+        let raster =
+            "scan.raster = { rows = 4, columns = 8, horizontal_deg = 8.0, vertical_deg = 4.0 }";
+        for scan in [&head(UNEVEN), FLASH, raster] {
+            let solid_angle = cone(scan).solid_angle;
+            assert_relative_eq!(solid_angle, FRAC_PI_4 * 4e-4, max_relative = 1e-12);
+        }
+        assert!(cone(FLASH).trailing.is_none());
+        // 20 mrad are 1.15 pixels of a degree.
+        let pixels = cone(raster).trailing.unwrap().pixels;
+        assert_relative_eq!(pixels, (1.1459 + 1.0) / 2.0, max_relative = 1e-4);
+    }
+
+    #[test]
+    fn fields_behind_a_single_beam_are_for_rasters_alone() {
+        for scan in [&head(UNEVEN), FLASH] {
+            for field in ["\"staring\"", "\"in-flight\"", "{ trailing_pixels = 2.0 }"] {
+                let told = sensor(scan, field).unwrap_err().to_string();
+                assert!(
+                    told.contains("optics.field: each detector of a spinning or flash"),
+                    "{told}"
+                );
+                assert_eq!(told.lines().count(), 1);
+            }
+        }
+    }
+
+    /// 13 chips of 10 µs fit between two shots of one laser, 139 µs apart, of 11 µs they do not.
+    #[test]
+    fn a_macropulse_fits_between_two_shots_of_the_same_detector() {
+        let coded = |chip_us: &str| {
+            let text = sensor(&head(UNEVEN), "\"descanned\"").unwrap().text;
+            let text = text.replace("\"direct\"", "\"matched\"");
+            let code = format!(
+                "[code]\nchip_ps = {chip_us}e6\nlabel = \"none\"\n\
+                 family = {{ sparse = {{ length = 13, weight = 3, words = 4, seed = 1 }} }}\n\
+                 word = {{ first = 0, modulus = 4 }}\n"
+            );
+            Design::from_toml(&format!("{text}\n{code}"), "mine.toml", Path::new(""), &[])
+        };
+        let design = coded("10.0").unwrap();
+        let derived = design.derived();
+        assert!(derived.macropulse > derived.pixel_period);
+        assert_relative_eq!(
+            derived.channel_period,
+            5.0 * derived.pixel_period,
+            max_relative = 1e-9
+        );
+        let told = coded("11.0").unwrap_err().to_string();
+        assert!(told.contains("between two shots of a detector"), "{told}");
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::Check;
 use crate::design::file::{CodeFile, FamilyFile, KeyingFile, OrthogonalFile, SparseFile};
-use crate::design::{Coding, Error, Label, Pattern, Scan, Tdc};
+use crate::design::{Coding, Error, Label, Scan, Tdc};
 use macropulse_codec::code::{self, Codebook, Crc, Family, Keying, Payload};
 
 impl Check<'_> {
@@ -21,9 +21,6 @@ impl Check<'_> {
                 word_modulus: 1,
             });
         };
-        if !matches!(scan.pattern, Pattern::Raster { .. }) {
-            return self.refuse("code", "only a raster can be coded; leave [code] out");
-        }
         let family =
             family(file.family).or_else(|error| self.refuse("code.family", error.to_string()))?;
         let chip_fs = self.whole_fs("code.chip_ps", file.chip_ps)?;

@@ -8,8 +8,8 @@ use crate::design::file::{
 };
 use crate::design::linear::Amplifier;
 use crate::design::{
-    Coding, Detector, Effect, Error, FirstFiring, Geiger, Light, Linear, Pattern, PhotonCounting,
-    Scan, Sensitivity,
+    Coding, Detector, Effect, Error, FirstFiring, Geiger, Light, Linear, PhotonCounting, Scan,
+    Sensitivity,
 };
 use crate::units::fs_from_s;
 
@@ -22,7 +22,6 @@ pub(super) struct Before<'a> {
     pub light: &'a Light,
     pub coding: &'a Coding,
     pub budget: Option<&'a Budget>,
-    pub idealised: &'a [Effect],
 }
 
 impl Before<'_> {
@@ -32,10 +31,6 @@ impl Before<'_> {
         let range = self.scan.reach;
         let photons = budget.photons(energy, 1.0, range) * budget.efficiency;
         Sensitivity { photons, range, reflectance: 1.0 }
-    }
-
-    fn is_off(&self, effect: Effect) -> bool {
-        self.idealised.contains(&effect)
     }
 }
 
@@ -61,33 +56,27 @@ pub(super) fn efficiency(file: &DetectorFile) -> (&'static str, Option<f64>) {
 impl Check<'_> {
     pub(super) fn detector(&self, file: &DetectorFile, before: &Before) -> Result<Detector, Error> {
         let kinds = (&file.photon_counting, &file.geiger, &file.linear, &file.first_firing);
-        let detector = match kinds {
+        match kinds {
             (Some(counting), None, None, None) => {
-                Detector::PhotonCounting(self.photon_counting(counting, before)?)
+                Ok(Detector::PhotonCounting(self.photon_counting(counting, before)?))
             }
-            (None, Some(geiger), None, None) => Detector::Geiger(self.geiger(geiger, before)?),
-            (None, None, Some(linear), None) => Detector::Linear(self.linear(linear, before)?),
+            (None, Some(geiger), None, None) => Ok(Detector::Geiger(self.geiger(geiger, before)?)),
+            (None, None, Some(linear), None) => Ok(Detector::Linear(self.linear(linear, before)?)),
             (None, None, None, Some(firing)) => {
-                Detector::FirstFiring(self.first_firing(firing, before)?)
+                Ok(Detector::FirstFiring(self.first_firing(firing, before)?))
             }
-            _ => {
-                return self.refuse(
-                    "detector",
-                    "needs exactly one of [detector.photon-counting], [detector.geiger], \
-                     [detector.linear], [detector.first-firing]",
-                );
-            }
-        };
-        let several = !matches!(before.scan.pattern, Pattern::Raster { .. });
-        if several && !matches!(detector, Detector::FirstFiring(_)) {
-            return self.refuse(
+            _ => self.refuse(
                 "detector",
-                "a spinning or flash sensor has a detector for each direction, and only \
-                 [detector.first-firing] models those",
-            );
+                "needs exactly one of [detector.photon-counting], [detector.geiger], \
+                 [detector.linear], [detector.first-firing]",
+            ),
         }
-        let has_bandwidth = matches!(detector, Detector::Linear(_) | Detector::Geiger(_));
-        if !has_bandwidth && !before.is_off(Effect::DetectorBandwidth) {
+    }
+
+    /// Whether a detector without a bandwidth of its own is declared to need none.
+    pub(super) fn bandwidth(&self, file: &DetectorFile, idealised: &[Effect]) -> Result<(), Error> {
+        let without = file.photon_counting.is_some() || file.first_firing.is_some();
+        if without && !idealised.contains(&Effect::DetectorBandwidth) {
             let message = format!(
                 "this detector has no bandwidth of its own: add `{}` to this list, which declares \
                  that {}",
@@ -96,8 +85,14 @@ impl Check<'_> {
             );
             return self.refuse("idealised", message);
         }
-        let by_photons = matches!(detector, Detector::PhotonCounting(_) | Detector::Geiger(_));
-        if !by_photons && !before.is_off(Effect::InterChip) {
+        Ok(())
+    }
+
+    /// Whether a detector that does not follow light into neighbouring chips is declared to need
+    /// not.
+    pub(super) fn chips(&self, file: &DetectorFile, idealised: &[Effect]) -> Result<(), Error> {
+        let alone = file.linear.is_some() || file.first_firing.is_some();
+        if alone && !idealised.contains(&Effect::InterChip) {
             let message = format!(
                 "this detector judges every mark alone: add `{}` to this list, which declares \
                  that {}",
@@ -106,7 +101,7 @@ impl Check<'_> {
             );
             return self.refuse("idealised", message);
         }
-        Ok(detector)
+        Ok(())
     }
 
     fn photon_counting(
@@ -188,6 +183,14 @@ impl Check<'_> {
 
     fn first_firing(&self, file: &FirstFiringFile, before: &Before) -> Result<FirstFiring, Error> {
         let at = |key: &str| format!("detector.first-firing.{key}");
+        if before.coding.codebook.max_weight() > 1 {
+            return self.refuse(
+                "detector.first-firing",
+                "fires once per shot, but a coded shot has several marks: use \
+                 [detector.geiger], [detector.linear] or [detector.photon-counting], or leave \
+                 [code] out",
+            );
+        }
         let needed = self.count(&at("firing_photons"), file.firing_photons, 1, 1 << 20)?;
         let noise = self.within(&at("noise_photons"), file.noise_photons, 0.0, 1e6)?;
         let photons = |pd| photons_for(pd, needed, noise);

@@ -14,8 +14,9 @@ pub(super) use code::family;
 
 use super::document::Chain;
 use super::file::SensorFile;
-use super::{Design, Detector, Effect, Error, Light, Tdc};
+use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
 use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs};
+use macropulse_codec::decode::Receiver;
 
 /// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
 const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, if shots are not coded) with the \
@@ -40,37 +41,15 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         let message = format!("is {}, but this program reads version {VERSION}", file.version);
         return Err(chain.error("version", message));
     }
-    let check = Check { chain };
-    let idealised = check.effects(&file.idealised)?;
-    let scan = check.scan(&file.scan, !idealised.contains(&Effect::MirrorMotion))?;
-    let tdc = check.tdc(&file)?;
-    let coding = check.coding(file.code.as_ref(), &scan, &tdc)?;
-    if let Some(idle) = check.without_effect(&file, &idealised).into_iter().next() {
-        return Err(idle);
-    }
-    let off = |effect| idealised.contains(&effect);
-    let light = check.light(&file, off)?;
-    let parts =
-        budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
-    let budget = check.budget(&file, &parts, detector::efficiency(&file.detector))?;
-    let detector = check.detector(
-        &file.detector,
-        &detector::Before {
-            scan: &scan,
-            light: &light,
-            coding: &coding,
-            budget: budget.as_ref(),
-            idealised: &idealised,
-        },
-    )?;
-    let timing = libm::hypot(detector.jitter(), light.spread.unwrap_or(0.0));
-    let receiver = check.receiver(&file, &scan, &tdc, (&coding, timing))?;
-    let right_within = match file.receiver.right_within_m {
-        Some(typed) => check.within("receiver.right_within_m", typed, 0.0, WIDEST)?,
-        None => resolved(&detector, &light, &tdc),
+    let mut faults = Faults::default();
+    let Some(parts) = parts(&Check { chain }, &file, &mut faults) else {
+        return Err(faults.into_error(chain));
     };
+    let idle = effectless::idle_keys(&file, &parts.idealised);
+    let Parts { idealised, scan, tdc, coding, light, budget, detector, receiver, right_within } =
+        parts;
     // What has no effect belongs neither to the sensor nor to its digest.
-    let said = chain.clone().without(&effectless::idle_keys(&file, &idealised));
+    let said = chain.clone().without(&idle);
     let mut design = Design {
         name: file.name,
         summary: file.summary,
@@ -88,9 +67,96 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         text: said.text(),
         directions: OnceLock::new(),
     };
-    check.clock(&design)?;
-    check.timing(&mut design)?;
-    Ok(design)
+    let check = Check { chain };
+    faults.keep(check.clock(&design));
+    faults.keep(check.timing(&mut design));
+    if faults.is_empty() { Ok(design) } else { Err(faults.into_error(chain)) }
+}
+
+/// What the sections of a sensor file say, each checked.
+struct Parts {
+    idealised: Vec<Effect>,
+    scan: Scan,
+    tdc: Tdc,
+    coding: Coding,
+    light: Light,
+    budget: Option<Budget>,
+    detector: Detector,
+    receiver: Receiver,
+    right_within: f64,
+}
+
+/// Checks section by section; `None` if something is wrong, and then all that is, as far as it does
+/// not follow from what was wrong before, is in `faults`.
+fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts> {
+    let effects = faults.keep(check.effects(&file.idealised));
+    let off = |effect| effects.as_ref().is_some_and(|effects| effects.contains(&effect));
+    // Of a list that cannot be read nothing follows for the motion of the beam.
+    let moves = effects.is_some() && !off(Effect::MirrorMotion);
+    let scan = faults.keep(check.scan(&file.scan, moves));
+    let tdc = faults.keep(check.tdc(file));
+    let coding = match (&scan, &tdc) {
+        (Some(scan), Some(tdc)) => {
+            faults.keep(check.share(tdc, scan));
+            faults.keep(check.coding(file.code.as_ref(), scan, tdc))
+        }
+        _ => None,
+    };
+    let light = effects.as_ref().and_then(|effects| {
+        faults.0.extend(check.without_effect(file, effects));
+        faults.keep(check.bandwidth(&file.detector, effects));
+        faults.keep(check.chips(&file.detector, effects));
+        faults.keep(check.light(file, off))
+    });
+    let right_within = match file.receiver.right_within_m {
+        Some(typed) => {
+            faults.keep(check.within("receiver.right_within_m", typed, 0.0, WIDEST)).map(Some)
+        }
+        None => Some(None),
+    };
+    let (idealised, scan, tdc, coding, light) = (effects?, scan?, tdc?, coding?, light?);
+    let before =
+        budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
+    let efficiency = detector::efficiency(&file.detector);
+    let budget = faults.keep(check.budget(file, &before, efficiency));
+    let before = detector::Before {
+        scan: &scan,
+        light: &light,
+        coding: &coding,
+        budget: budget.as_ref().and_then(Option::as_ref),
+    };
+    let detector =
+        budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
+    // Without a detector the receiver has no timing, of which none of its limits depends.
+    let jitter = detector.as_ref().map_or(0.0, Detector::jitter);
+    let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
+    let receiver = faults.keep(check.receiver(file, &scan, &tdc, (&coding, timing)));
+    if !faults.is_empty() {
+        return None;
+    }
+    let (budget, detector, receiver) = (budget?, detector?, receiver?);
+    let right_within = right_within?.unwrap_or_else(|| resolved(&detector, &light, &tdc));
+    Some(Parts { idealised, scan, tdc, coding, light, budget, detector, receiver, right_within })
+}
+
+/// What was found wrong so far.
+#[derive(Default)]
+struct Faults(Vec<Error>);
+
+impl Faults {
+    /// What was checked, if nothing was wrong with it.
+    fn keep<T>(&mut self, checked: Result<T, Error>) -> Option<T> {
+        checked.map_err(|error| self.0.push(error)).ok()
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// All of it as one error.
+    fn into_error(self, chain: &Chain) -> Error {
+        Error::all(self.0).unwrap_or_else(|| chain.error("", "is no sensor"))
+    }
 }
 
 /// Range error, m, up to which a return of this sensor is called right if its file does not say:
@@ -229,15 +295,19 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// A macropulse must end before the next one begins.
+    /// A macropulse must end before the next one that the same detector sees begins.
     fn timing(&self, design: &mut Design) -> Result<(), Error> {
         let derived = design.derived();
-        if design.is_coded() && derived.macropulse > derived.pixel_period {
+        if design.is_coded() && derived.macropulse > derived.channel_period {
+            let of = match design.channels() {
+                1 => "of a pixel",
+                _ => "between two shots of a detector",
+            };
             let message = format!(
-                "a macropulse lasts {:.3} ns, longer than the {:.3} ns of a pixel: \
+                "a macropulse lasts {:.3} ns, longer than the {:.3} ns {of}: \
                  fewer bits, shorter words or chips, or a slower scan",
                 derived.macropulse * 1e9,
-                derived.pixel_period * 1e9
+                derived.channel_period * 1e9
             );
             return self.refuse("code", message);
         }

@@ -31,6 +31,19 @@ impl Check<'_> {
         })
     }
 
+    /// Whether each detector of `scan` has a converter.
+    pub(super) fn share(&self, tdc: &Tdc, scan: &Scan) -> Result<(), Error> {
+        let (converters, channels) = (tdc.converters, scan.channels());
+        if converters >= channels {
+            return Ok(());
+        }
+        let message = format!(
+            "is {converters}, but the bank is divided evenly among {channels} detectors: write \
+             {channels}, or more"
+        );
+        self.refuse("tdc.converters", message)
+    }
+
     pub(super) fn receiver(
         &self,
         file: &SensorFile,
