@@ -65,13 +65,16 @@ fn file(scanned: &str, seen: &str, shots: &str, light: &str) -> String {
         }
         _ => "",
     };
-    let kind = if shots == "coded" { "matched" } else { "direct" };
+    let receiver = match shots {
+        "coded" => "kind = \"matched\"\nfalse_alarm = 1e-3\n",
+        _ => "kind = \"direct\"\n",
+    };
     let energy = if light == "budget" { "energy = { shot_nj = 100.0 }\n" } else { "" };
     format!(
         "version = 1\nname = \"mine\"\nidealised = {idealised:?}\nscan.scans_per_s = 10.0\n\
          scan.max_range_m = 30.0\n{}\n[light]\nwavelength_nm = 1550.0\npulse_ps = 200.0\n{energy}\
          {optics}{code}{}[tdc]\nconverters = 64\nresolution_ps = 100.0\n[receiver]\n\
-         kind = \"{kind}\"\nfalse_alarm = 1e-3\n",
+         {receiver}",
         pattern(scanned),
         detector(seen, light),
     )
