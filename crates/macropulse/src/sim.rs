@@ -121,7 +121,8 @@ impl<'a> Scans<'a> {
         let clock = Instant::now();
         (self.scan.score, self.scan.tally) = Default::default();
         let number = bands.first().map_or(0, |band| band.scan);
-        self.scan.cloud.start(number);
+        let shots: u64 = bands.iter().map(|band| band.shots).sum();
+        self.scan.cloud.start(number, shots == self.design.shots_per_scan());
         let pose = self.scene.sensor.at(scan_begins_fs(self.design, number));
         self.scan.cloud.viewpoint = viewpoint(&pose);
         self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
@@ -158,7 +159,7 @@ impl<'a> Scans<'a> {
 
 /// Bands are computed side by side, and then joined while they are still in the cache: so many for
 /// each thread, that hardly any thread waits for the last one.
-const BANDS_PER_THREAD: usize = 16;
+const BANDS_PER_THREAD: usize = 4;
 
 /// The pose of a sensor as clouds have it.
 fn viewpoint(pose: &Pose) -> Viewpoint {

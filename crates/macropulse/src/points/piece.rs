@@ -98,17 +98,27 @@ impl Piece {
 
 impl PointCloud {
     /// Makes it the cloud of scan number `scan`, with no return yet and all pixels empty, in the memory
-    /// of what was in it before.
-    pub fn start(&mut self, scan: u64) {
+    /// of what was in it before. Of a `whole` scan every pixel is written in any case.
+    pub fn start(&mut self, scan: u64, whole: bool) {
         self.scan = scan;
-        self.clear();
+        self.clear_returns();
         let pixels = self.rows * self.columns;
-        self.fired_ns.resize(pixels, f64::NAN);
-        self.truth.pixels.blank(pixels);
+        if !whole || self.fired_ns.len() != pixels || self.truth.pixels.outcome.len() != pixels {
+            self.fired_ns.clear();
+            self.fired_ns.resize(pixels, f64::NAN);
+            self.truth.pixels.blank(pixels);
+        }
     }
 
     /// Empties all columns, and keeps their memory.
     fn clear(&mut self) {
+        self.clear_returns();
+        self.fired_ns.clear();
+        self.truth.pixels.clear();
+    }
+
+    /// Empties the columns of returns.
+    fn clear_returns(&mut self) {
         let bytes = [&mut self.return_number, &mut self.number_of_returns];
         let counts = [&mut self.row, &mut self.column, &mut self.peak];
         let counts = counts.into_iter().chain([&mut self.marks, &mut self.margin]);
@@ -117,9 +127,8 @@ impl PointCloud {
         bytes.into_iter().for_each(Vec::clear);
         counts.for_each(Vec::clear);
         reals.for_each(Vec::clear);
-        [&mut self.time_ns, &mut self.fired_ns].into_iter().for_each(Vec::clear);
+        self.time_ns.clear();
         self.truth.returns.clear();
-        self.truth.pixels.clear();
     }
 
     /// Adds the next `pieces`, in their order.
@@ -267,7 +276,7 @@ mod tests {
         let logs = [log(2, 0), log(2, 4), log(5, 100)];
         let pieces =
             logs.each_ref().map(|log| Piece::of(&design, &dark(&design), log, &returns(log)));
-        cloud.start(0);
+        cloud.start(0, false);
         cloud.append(&pieces[..2]);
         cloud.append(&pieces[2..]);
         let expected = logs.iter().map(|log| returns(log).len()).sum::<usize>();
@@ -281,7 +290,7 @@ mod tests {
             let is_last = cloud.return_number[at] == cloud.number_of_returns[at];
             assert_eq!(is_last, !next_is_further, "{at}");
         }
-        cloud.start(8);
+        cloud.start(8, false);
         assert_eq!((cloud.scan, cloud.returns()), (8, 0));
         assert!(cloud.fired_ns.iter().all(|time| time.is_nan()));
     }
