@@ -113,8 +113,13 @@ impl<'a> Scans<'a> {
         self.measure(bands, watch).then_some(&mut self.scan)
     }
 
-    /// Measures `bands` of one scan; whether to the end.
+    /// Measures `bands` of one scan; whether to the end. All of it on threads of the pool: to change
+    /// between them and another one with every step takes as long as the step.
     fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
+        rayon::scope(|_| self.measure_in_pool(bands, watch))
+    }
+
+    fn measure_in_pool(&mut self, bands: &[Band], watch: &Watch) -> bool {
         let seen = Seen { design: self.design, scene: self.scene, operating: &self.operating };
         let setup = Setup { seen, detectors: &self.detectors };
         let stopped = AtomicBool::new(false);

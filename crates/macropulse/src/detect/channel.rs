@@ -110,9 +110,10 @@ fn spans(
     shots: impl Iterator<Item = u32>,
 ) -> Vec<RangeInclusive<i64>> {
     let mut spans: Vec<(i64, i64)> = Vec::new();
+    let listening_fs = design.listening_fs();
     for shot in shots {
         let fired_fs = log.fired_at_fs[shot as usize];
-        let closes_fs = fired_fs + design.listening_fs();
+        let closes_fs = fired_fs + listening_fs;
         match spans.last_mut() {
             Some(last) if fired_fs <= last.1 => last.1 = closes_fs,
             _ => spans.push((fired_fs, closes_fs)),
