@@ -26,7 +26,7 @@ use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 
 use super::Detections;
 use super::channel::Channel;
-use super::noise::stretches;
+use super::noise::{Stretch, stretches};
 use crate::channel::FirstFiringSetting;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
@@ -65,7 +65,7 @@ pub(super) fn add(
         let fired_fs = log.fired_at_fs[shot as usize];
         let gate = fired_fs + opens..=fired_fs + closes;
         let mut stream = chance.at(Stage::Firing, log.first + u64::from(shot));
-        let mut earliest = flash.by_itself(&gate, channel, &mut stream);
+        let mut earliest = flash.by_itself(&gate, &mut stream);
         // Light that arrives just before the gate opens may fire the detector just after.
         let early_fs = fs_from_s(design.light.pulse);
         let first = flashes.partition_point(|flash| flash.arrives_fs < *gate.start() - early_fs);
@@ -98,6 +98,9 @@ struct Firing<'a> {
     gamma: Gamma<f64>,
     /// rms length of a micropulse, fs.
     rms_fs: f64,
+    /// Background that fires it as false firings do. What needs more photons than one adds them up,
+    /// and to that it is noise.
+    stretches: Vec<Stretch>,
 }
 
 impl<'a> Firing<'a> {
@@ -105,7 +108,8 @@ impl<'a> Firing<'a> {
         let needed = f64::from(firing.needed);
         let gamma = Gamma::new(needed, 1.0).ok()?;
         let rms_fs = channel.design.light.pulse * RMS_OF_FWHM * FS_PER_S as f64;
-        Some(Self { firing, needed, gamma, rms_fs })
+        let stretches = if firing.needed == 1 { stretches(channel).collect() } else { Vec::new() };
+        Some(Self { firing, needed, gamma, rms_fs, stretches })
     }
 
     /// When it fires in the light of a flash, fs, and the photons that it measures; `None` if it
@@ -122,27 +126,20 @@ impl<'a> Firing<'a> {
     }
 
     /// When it first fires without a pulse while `gate` is open, fs, and what it takes that for.
-    fn by_itself(
-        &self,
-        gate: &RangeInclusive<i64>,
-        channel: &Channel,
-        stream: &mut Stream,
-    ) -> Option<(i64, f64)> {
+    fn by_itself(&self, gate: &RangeInclusive<i64>, stream: &mut Stream) -> Option<(i64, f64)> {
         let mut wait_fs = |per_s: f64| -> i64 {
             let wait: f64 = Exp1.sample(stream);
             (wait / per_s * FS_PER_S as f64) as i64
         };
         let steady = (self.firing.false_rate > 0.0)
             .then(|| gate.start().saturating_add(wait_fs(self.firing.false_rate)));
-        // What needs more photons than one adds them up, and steady light is noise to it.
-        let by_one = self.firing.needed == 1;
-        let others = stretches(channel).filter(|_| by_one).filter_map(|stretch| {
+        let others = self.stretches.iter().filter_map(|stretch| {
             let from_fs = stretch.from_fs.max(*gate.start());
             let until_fs = stretch.until_fs.min(*gate.end());
             let first_fs = (from_fs < until_fs).then(|| from_fs + wait_fs(stretch.per_s))?;
             (first_fs < until_fs).then_some(first_fs)
         });
-        let earliest = others.collect::<Vec<i64>>().into_iter().chain(steady).min()?;
+        let earliest = others.chain(steady).min()?;
         Some((earliest, self.needed))
     }
 }
