@@ -133,7 +133,6 @@ impl PointCloud {
 
     /// Adds the next `pieces`, in their order.
     pub fn append(&mut self, pieces: &[Piece]) {
-        let target = Target { pieces };
         let truth = &mut self.truth;
         let (seen, first) = (&mut truth.returns, &mut truth.pixels);
         let bytes: [(_, Column<u8>); 2] = [
@@ -167,30 +166,29 @@ impl PointCloud {
             (&mut first.object, |points| &points.truth.pixels.object),
             (&mut first.material, |points| &points.truth.pixels.material),
         ];
-        let target = &target;
         // Each column by itself: which thread takes which makes no difference.
         rayon::scope(|scope| {
             for (column, of) in bytes {
-                scope.spawn(move |_| target.append(column, of));
+                scope.spawn(move |_| append(pieces, column, of));
             }
             for (column, of) in counts {
-                scope.spawn(move |_| target.append(column, of));
+                scope.spawn(move |_| append(pieces, column, of));
             }
             for (column, of) in reals {
-                scope.spawn(move |_| target.append(column, of));
+                scope.spawn(move |_| append(pieces, column, of));
             }
             for (column, of) in real_pixels {
-                scope.spawn(move |_| target.scatter(column, of));
+                scope.spawn(move |_| scatter(pieces, column, of));
             }
             for (column, of) in named_pixels {
-                scope.spawn(move |_| target.scatter(column, of));
+                scope.spawn(move |_| scatter(pieces, column, of));
             }
             let (time_ns, fired_ns) = (&mut self.time_ns, &mut self.fired_ns);
             let (of_returns, of_pixels) = (&mut seen.outcome, &mut first.outcome);
-            scope.spawn(|_| target.append(time_ns, |points| &points.time_ns));
-            scope.spawn(|_| target.scatter(fired_ns, |points| &points.fired_ns));
-            scope.spawn(|_| target.append(of_returns, |points| &points.truth.returns.outcome));
-            scope.spawn(|_| target.scatter(of_pixels, |points| &points.truth.pixels.outcome));
+            scope.spawn(|_| append(pieces, time_ns, |points| &points.time_ns));
+            scope.spawn(|_| scatter(pieces, fired_ns, |points| &points.fired_ns));
+            scope.spawn(|_| append(pieces, of_returns, |points| &points.truth.returns.outcome));
+            scope.spawn(|_| scatter(pieces, of_pixels, |points| &points.truth.pixels.outcome));
         });
     }
 }
@@ -198,30 +196,23 @@ impl PointCloud {
 /// A column of a cloud.
 type Column<T> = fn(&PointCloud) -> &Vec<T>;
 
-/// What is joined, and where it goes.
-struct Target<'a> {
-    pieces: &'a [Piece],
+/// Adds the column of all `pieces` to `column`, one after the other.
+fn append<T: Copy>(pieces: &[Piece], column: &mut Vec<T>, of: Column<T>) {
+    pieces.iter().for_each(|piece| column.extend_from_slice(of(&piece.points)));
 }
 
-impl Target<'_> {
-    /// Adds the column of all pieces to `column`, one after the other.
-    fn append<T: Copy>(&self, column: &mut Vec<T>, of: Column<T>) {
-        self.pieces.iter().for_each(|piece| column.extend_from_slice(of(&piece.points)));
-    }
-
-    /// Puts the entries of all pieces at their pixels.
-    fn scatter<T: Copy>(&self, column: &mut [T], of: Column<T>) {
-        for piece in self.pieces {
-            let (values, Some(&first)) = (of(&piece.points), piece.pixel.first()) else { continue };
-            let row = first as usize..first as usize + values.len();
-            match column.get_mut(row).filter(|_| piece.in_a_row) {
-                Some(places) => places.copy_from_slice(values),
-                None => piece.pixel.iter().zip(values).for_each(|(&pixel, &value)| {
-                    if let Some(place) = column.get_mut(pixel as usize) {
-                        *place = value;
-                    }
-                }),
-            }
+/// Puts the entries of all `pieces` at their pixels.
+fn scatter<T: Copy>(pieces: &[Piece], column: &mut [T], of: Column<T>) {
+    for piece in pieces {
+        let (values, Some(&first)) = (of(&piece.points), piece.pixel.first()) else { continue };
+        let row = first as usize..first as usize + values.len();
+        match column.get_mut(row).filter(|_| piece.in_a_row) {
+            Some(places) => places.copy_from_slice(values),
+            None => piece.pixel.iter().zip(values).for_each(|(&pixel, &value)| {
+                if let Some(place) = column.get_mut(pixel as usize) {
+                    *place = value;
+                }
+            }),
         }
     }
 }
