@@ -14,6 +14,20 @@ impl Default for Formats {
     }
 }
 
+impl Formats {
+    /// What `--help` says of them.
+    pub fn help() -> String {
+        let names =
+            |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();
+        let (known, default) = (names(&Format::ALL), names(&Self::default().0));
+        format!(
+            "Formats to write: {}, with commas between them, or none [default: {}]",
+            known.join(", "),
+            default.join(",")
+        )
+    }
+}
+
 impl FromStr for Formats {
     type Err = formats::Error;
 

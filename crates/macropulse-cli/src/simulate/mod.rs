@@ -75,8 +75,7 @@ pub struct Simulate {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// Formats to write: pcd, ply, csv, png, with commas between them, or none [default: pcd,png]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", help = Formats::help())]
     format: Option<Formats>,
 
     /// Write the truth beside each point: range, object, material, incidence, outcome
