@@ -342,12 +342,10 @@ mod others {
 
     fn steps(sensor: &str) -> Vec<f64> {
         let design = Design::open(sensor, &[]).unwrap();
-        let Pattern::Spinning { elevations, .. } = design.scan.pattern else {
-            panic!("{sensor} spins")
-        };
-        assert_eq!(elevations.len(), 64);
-        assert_relative_eq!(elevations[0].to_degrees(), 2.0, epsilon = 1e-9);
-        elevations.windows(2).map(|pair| (pair[0] - pair[1]).to_degrees()).collect()
+        let Pattern::Spinning(head) = design.scan.pattern else { panic!("{sensor} spins") };
+        assert_eq!(head.elevations.len(), 64);
+        assert_relative_eq!(head.elevations[0].to_degrees(), 2.0, epsilon = 1e-9);
+        head.elevations.windows(2).map(|pair| (pair[0] - pair[1]).to_degrees()).collect()
     }
 
     #[test]

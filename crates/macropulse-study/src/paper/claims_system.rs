@@ -122,8 +122,9 @@ pub(super) fn timing(design: &Design) -> Vec<Claim> {
 
 /// The claim on the elevations of the HDL-64E, whose `design` this is.
 pub(super) fn elevations(design: &Design) -> Option<Claim> {
-    let Pattern::Spinning { elevations, .. } = &design.scan.pattern else { return None };
-    let degrees: Vec<f64> = elevations.iter().map(|elevation| elevation.to_degrees()).collect();
+    let Pattern::Spinning(head) = &design.scan.pattern else { return None };
+    let degrees: Vec<f64> =
+        head.elevations.iter().map(|elevation| elevation.to_degrees()).collect();
     let (top, bottom) = (degrees.first()?, degrees.last()?);
     let step = |at: &[f64]| at.windows(2).next().map(|pair| pair[0] - pair[1]);
     let (upper, lower) = degrees.split_at(degrees.len() / 2);
@@ -174,11 +175,9 @@ pub(super) fn light(
 ) -> Vec<Claim> {
     let (Some(lax), Some(budget)) = (&lax.budget, &strict.budget) else { return Vec::new() };
     let derived = design.derived();
-    let Pattern::Raster { horizontal, vertical, .. } = design.scan.pattern else {
-        return Vec::new();
-    };
-    let pitch = horizontal / f64::from(design.scan.columns);
-    let pitch_down = vertical / f64::from(design.scan.rows);
+    let Pattern::Raster(raster) = &design.scan.pattern else { return Vec::new() };
+    let pitch = raster.horizontal / f64::from(raster.columns);
+    let pitch_down = raster.vertical / f64::from(raster.rows);
     let wavelength = design.light.wavelength;
     let spread = diffraction(wavelength, design.light.beam_diameter);
     let spot = spread * design.scan.max_range;

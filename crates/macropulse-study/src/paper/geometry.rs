@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use macropulse::design::{Design, Pattern};
+use macropulse::design::{Design, Extent};
 use macropulse::scene::{Ray, Scene};
 
 /// Steps of the silhouette's grid, each way.
@@ -31,35 +31,27 @@ pub struct Prediction {
     pub cut_off: f64,
 }
 
-/// A rectangle of directions, rad: azimuth to the left, elevation up.
-#[derive(Debug, Clone, Copy)]
-struct Window {
-    azimuth: (f64, f64),
-    elevation: (f64, f64),
-}
-
 /// Where a target is looked for.
-const AHEAD: Window = Window { azimuth: (-0.3, 0.3), elevation: (-0.3, 0.3) };
+const AHEAD: Extent = Extent { azimuth: [-0.3, 0.3], elevation: [-0.3, 0.3] };
 
 /// The prediction for the target objects of `scene`.
 pub fn predict(design: &Design, scene: &Scene) -> Prediction {
-    let field = field(design);
+    let field = design.scan.extent();
     let Some((whole, _)) = silhouette(design, scene, AHEAD) else { return Prediction::default() };
-    let within =
-        |(from, to): (f64, f64), (least, most): (f64, f64)| (from.max(least), to.min(most));
-    let coarse = Window {
+    let within = |[from, to]: [f64; 2], [least, most]: [f64; 2]| [from.max(least), to.min(most)];
+    let coarse = Extent {
         azimuth: within(AHEAD.azimuth, field.azimuth),
         elevation: within(AHEAD.elevation, field.elevation),
     };
-    let rough = Window {
+    let rough = Extent {
         azimuth: within(whole.azimuth, field.azimuth),
         elevation: within(whole.elevation, field.elevation),
     };
-    let step = |(from, to): (f64, f64)| (to - from) / GRID as f64;
-    let wider = |(from, to): (f64, f64), by: f64, (least, most): (f64, f64)| {
-        ((from - by).max(least), (to + by).min(most))
+    let step = |[from, to]: [f64; 2]| (to - from) / GRID as f64;
+    let wider = |[from, to]: [f64; 2], by: f64, [least, most]: [f64; 2]| {
+        [(from - by).max(least), (to + by).min(most)]
     };
-    let fine = Window {
+    let fine = Extent {
         azimuth: wider(rough.azimuth, step(coarse.azimuth), coarse.azimuth),
         elevation: wider(rough.elevation, step(coarse.elevation), coarse.elevation),
     };
@@ -67,19 +59,19 @@ pub fn predict(design: &Design, scene: &Scene) -> Prediction {
         return Prediction::default();
     };
     let cell = step(fine.azimuth) * step(fine.elevation);
-    let (across, down) = pitch(design, (around.elevation.0 + around.elevation.1) / 2.0);
-    let columns = (around.azimuth.1 - around.azimuth.0) / across;
-    let rows = (around.elevation.1 - around.elevation.0) / down;
+    let [across, down] = pitch(design, (around.elevation[0] + around.elevation[1]) / 2.0);
+    let columns = (around.azimuth[1] - around.azimuth[0]) / across;
+    let rows = (around.elevation[1] - around.elevation[0]) / down;
     let samples = filled as f64 * cell / (across * down);
     let off_by = |by: f64| samples * (1.0 + by / rows).max(0.0) * (1.0 + by / columns).max(0.0);
-    let cut_off = (field.elevation.0 - whole.elevation.0).max(0.0);
+    let cut_off = (field.elevation[0] - whole.elevation[0]).max(0.0);
     Prediction { samples, low: off_by(-1.0), high: off_by(1.0), rows, columns, cut_off }
 }
 
 /// The smallest window around the target, and the number of grid directions that meet it first.
-fn silhouette(design: &Design, scene: &Scene, window: Window) -> Option<(Window, usize)> {
-    let at = |(from, to): (f64, f64), i: usize| from + (to - from) * (i as f64 + 0.5) / GRID as f64;
-    let half = |(from, to): (f64, f64)| (to - from) / GRID as f64 / 2.0;
+fn silhouette(design: &Design, scene: &Scene, window: Extent) -> Option<(Extent, usize)> {
+    let at = |[from, to]: [f64; 2], i: usize| from + (to - from) * (i as f64 + 0.5) / GRID as f64;
+    let half = |[from, to]: [f64; 2]| (to - from) / GRID as f64 / 2.0;
     let world_from_sensor = scene.sensor.pose.world_from_sensor();
     let meets_target = |elevation: f64, azimuth: f64| {
         let (sin_a, cos_a) = libm::sincos(azimuth);
@@ -94,15 +86,15 @@ fn silhouette(design: &Design, scene: &Scene, window: Window) -> Option<(Window,
         let elevation = at(window.elevation, row);
         let azimuths = (0..GRID).map(|column| at(window.azimuth, column));
         let met: Vec<f64> = azimuths.filter(|&azimuth| meets_target(elevation, azimuth)).collect();
-        let around = Window {
-            azimuth: (met.first()? - wide, met.last()? + wide),
-            elevation: (elevation - tall, elevation + tall),
+        let around = Extent {
+            azimuth: [met.first()? - wide, met.last()? + wide],
+            elevation: [elevation - tall, elevation + tall],
         };
         Some((around, met.len()))
     };
     (0..GRID).into_par_iter().filter_map(row).reduce_with(|(a, filled), (b, more)| {
-        let both = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-        let around = Window {
+        let both = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let around = Extent {
             azimuth: both(a.azimuth, b.azimuth),
             elevation: both(a.elevation, b.elevation),
         };
@@ -110,36 +102,19 @@ fn silhouette(design: &Design, scene: &Scene, window: Window) -> Option<(Window,
     })
 }
 
-/// Everything the sensor looks at.
-fn field(design: &Design) -> Window {
-    let centred = |angle: f64| (-angle / 2.0, angle / 2.0);
-    match &design.scan.pattern {
-        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
-            Window { azimuth: centred(*horizontal), elevation: centred(*vertical) }
-        }
-        Pattern::Spinning { elevations, .. } => Window {
-            azimuth: centred(std::f64::consts::TAU),
-            elevation: (
-                elevations.iter().copied().fold(f64::INFINITY, f64::min),
-                elevations.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            ),
-        },
-    }
+/// Elevations of the rows of the image, rad, from the top, in the middle column.
+pub(super) fn elevations(design: &Design) -> Vec<f64> {
+    let column = (design.scan.columns / 2) as u16;
+    let elevation = |row| libm::asin(design.directions().of(row, column)[2]);
+    (0..design.scan.rows as u16).map(elevation).collect()
 }
 
 /// Angles between neighbouring samples, rad, at `elevation`: across and down.
-fn pitch(design: &Design, elevation: f64) -> (f64, f64) {
-    let (rows, columns) = (f64::from(design.scan.rows), f64::from(design.scan.columns));
-    match &design.scan.pattern {
-        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
-            (horizontal / columns, vertical / rows)
-        }
-        Pattern::Spinning { elevations, .. } => {
-            let below =
-                elevations.partition_point(|e| *e > elevation).clamp(1, elevations.len() - 1);
-            (std::f64::consts::TAU / columns, elevations[below - 1] - elevations[below])
-        }
-    }
+pub(super) fn pitch(design: &Design, elevation: f64) -> [f64; 2] {
+    let [right, left] = design.scan.extent().azimuth;
+    let elevations = elevations(design);
+    let below = elevations.partition_point(|e| *e > elevation).clamp(1, elevations.len() - 1);
+    [(left - right) / f64::from(design.scan.columns), elevations[below - 1] - elevations[below]]
 }
 
 #[cfg(test)]

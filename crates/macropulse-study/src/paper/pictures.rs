@@ -2,13 +2,14 @@
 
 use super::Error;
 use super::experiment::{DISTANCES, SENSORS, Trial};
+use super::geometry::{elevations, pitch};
 use super::receivers::Comparison;
 use crate::view::{
     AmplitudePicture, Axis, BitPicture, Chart, CloudPicture, Crop, Figure, Flight, Hue, Lane,
     Layout, Line, Note, RangePicture, ScaleBar, Span, Style, Timeline, Viewpoint,
 };
 use macropulse::codec::code::CodeWord;
-use macropulse::design::{Design, Pattern};
+use macropulse::design::Design;
 use macropulse::emit::{bands, shot_of_pixel};
 use macropulse::points::Outcome;
 use macropulse::units::{s_from_fs, tof_from_range};
@@ -166,27 +167,15 @@ pub(super) fn range_images(
 
 /// Rows and columns around the car, and the angles between them.
 fn window(design: &Design, away: f64) -> (Crop, [f64; 2]) {
-    let (rows, columns) = (f64::from(design.scan.rows), f64::from(design.scan.columns));
+    let columns = f64::from(design.scan.columns);
     let (side, above, below) = (AROUND.0 / away, AROUND.1 / away, AROUND.2 / away);
     let to = |value: f64, end: f64| value.round().clamp(0.0, end) as usize;
-    match &design.scan.pattern {
-        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
-            let pitch = [horizontal / columns, vertical / rows];
-            let column = |azimuth: f64| to(columns / 2.0 - azimuth / pitch[0], columns);
-            let row = |elevation: f64| to(rows / 2.0 - elevation / pitch[1], rows);
-            (Crop { rows: row(above)..row(-below), columns: column(side)..column(-side) }, pitch)
-        }
-        Pattern::Spinning { elevations, .. } => {
-            let across = std::f64::consts::TAU / columns;
-            let column = |azimuth: f64| to(columns / 2.0 - azimuth / across, columns);
-            let row = |elevation: f64| elevations.partition_point(|&e| e > elevation);
-            let rows = row(above)..row(-below).max(row(above) + 1);
-            (
-                Crop { rows, columns: column(side)..column(-side) },
-                [across, elevations[0] - elevations[1]],
-            )
-        }
-    }
+    let elevations = elevations(design);
+    let pitch = pitch(design, above);
+    let column = |azimuth: f64| to(columns / 2.0 - azimuth / pitch[0], columns);
+    let row = |elevation: f64| elevations.partition_point(|&e| e > elevation);
+    let rows = row(above)..row(-below).max(row(above) + 1);
+    (Crop { rows, columns: column(side)..column(-side) }, pitch)
 }
 
 /// The points on and around the car, seen from above and aside.

@@ -5,7 +5,7 @@ use super::experiment::{DISTANCES, Trial};
 use super::receivers::Comparison;
 use crate::view::{self, Align, Cell, Table};
 use macropulse::codec::code::prime_sequence;
-use macropulse::design::{Design, Detector, Pattern};
+use macropulse::design::{Design, Detector, Extent};
 use macropulse::points::Outcome;
 use macropulse::units::s_from_fs;
 
@@ -40,6 +40,22 @@ pub(super) fn prime_sequences(p: u32) -> Table {
     })
 }
 
+/// Width and height of a field, and where it lies if not about the forward direction.
+fn field(extent: &Extent) -> String {
+    let [[right, left], [bottom, top]] =
+        [extent.azimuth, extent.elevation].map(|ends| ends.map(f64::to_degrees));
+    let (wide, high) = (degrees(left - right), format!("{:.1}\u{b0}", top - bottom));
+    if top + bottom == 0.0 {
+        return format!("{wide} \u{d7} {high}");
+    }
+    format!("{wide} \u{d7} {high} ({top:+.1}\u{b0} to {bottom:+.1}\u{b0})")
+}
+
+/// An angle with one digit; a whole turn without.
+fn degrees(angle: f64) -> String {
+    if angle == 360.0 { "360\u{b0}".to_owned() } else { format!("{angle:.1}\u{b0}") }
+}
+
 /// Table 3: the parameters of the three sensors.
 pub(super) fn parameters(designs: &[Design]) -> Table {
     let mut header = vec![("", Align::Left)];
@@ -50,29 +66,9 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
         cells.extend(designs.iter().map(|design| Cell::from(value(design))));
         table = std::mem::take(&mut table).row(cells);
     };
-    row("pattern", &|d| match d.scan.pattern {
-        Pattern::Raster { .. } => "one beam, mirror raster".into(),
-        Pattern::Spinning { .. } => format!("{} beams, turning head", d.channels()),
-        Pattern::Flash { .. } => format!("one flash, {} detectors", d.channels()),
-    });
+    row("pattern", &|d| d.scan.describe());
     row("directions", &|d| format!("{} \u{d7} {}", d.scan.columns, d.scan.rows));
-    row("field", &|d| match &d.scan.pattern {
-        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
-            format!(
-                "{:.1}\u{b0} \u{d7} {:.1}\u{b0}",
-                horizontal.to_degrees(),
-                vertical.to_degrees()
-            )
-        }
-        Pattern::Spinning { elevations, .. } => {
-            let [top, bottom] = [elevations.first(), elevations.last()]
-                .map(|e| e.copied().unwrap_or(0.0).to_degrees());
-            format!(
-                "360\u{b0} \u{d7} {:.1}\u{b0} ({top:+.1}\u{b0} to {bottom:+.1}\u{b0})",
-                top - bottom
-            )
-        }
-    });
+    row("field", &|d| field(&d.scan.extent()));
     row("refresh rate", &|d| format!("{} Hz", d.scan.rate_millihertz as f64 / 1e3));
     row("range", &|d| format!("{} m", d.scan.reach));
     row("wavelength", &|d| format!("{:.0} nm", d.light.wavelength * 1e9));
@@ -91,9 +87,9 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
         }
     });
     row("pixel period", &|d| format!("{:.3} ns", d.derived().pixel_period * 1e9));
-    row("shots in flight", &|d| match d.scan.pattern {
-        Pattern::Flash { .. } => "1 flash".into(),
-        _ => format!("{:.1}", d.derived().shots_in_flight),
+    row("shots in flight", &|d| match d.scan.is_one_flash() {
+        true => "1 flash".into(),
+        false => format!("{:.1}", d.derived().shots_in_flight),
     });
     row("detector", &|d| match d.detector {
         Detector::PhotonCounting(c) => format!(

@@ -1,6 +1,6 @@
 //! Quantities that follow from a sensor file, for people to read.
 
-use super::{Design, Mirror, Pattern};
+use super::Design;
 use crate::units::{range_from_tof, s_from_fs, tof_from_range};
 
 /// What follows from a design. SI units.
@@ -51,7 +51,7 @@ impl Derived {
         Self {
             pixel_period,
             channel_period,
-            shortest_dwell: shortest_dwell(design, pixel_period),
+            shortest_dwell: design.scan.answers().shortest_dwell(pixel_period),
             gate,
             shots_in_flight: gate / pixel_period,
             chips: codebook.chips(),
@@ -76,22 +76,8 @@ impl Derived {
 /// Time, s, until a detector is sent the same code word again. A laser of a turning head goes from
 /// column to column and so from word to word; a pixel of a flash has one word.
 fn word_period(design: &Design, channel_period: f64) -> f64 {
-    match design.scan.pattern {
-        Pattern::Flash { .. } => channel_period,
-        _ => f64::from(design.coding.word_modulus) * channel_period,
+    if u64::from(design.channels()) == design.shots_per_scan() {
+        return channel_period;
     }
-}
-
-fn shortest_dwell(design: &Design, pixel_period: f64) -> f64 {
-    let columns = f64::from(design.scan.columns);
-    match design.scan.pattern {
-        Pattern::Raster { mirror: Mirror::Sinusoidal, duty, .. } => {
-            // Position sin(π·s) for s in ±duty/2 of the line time, scaled to ±1 at the edges.
-            let line = pixel_period * columns;
-            let edge = (std::f64::consts::FRAC_PI_2 * duty).sin();
-            line * 2.0 / std::f64::consts::PI * (edge / columns).asin()
-        }
-        Pattern::Raster { duty, .. } => pixel_period * duty,
-        _ => pixel_period * f64::from(design.channels()),
-    }
+    f64::from(design.coding.word_modulus) * channel_period
 }

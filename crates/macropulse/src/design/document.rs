@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::Table;
 
 use super::presets;
+use super::scan::PATTERNS;
 use super::{Effect, Error};
 use crate::names::{line_column, offset_of_key, toml_value};
 
@@ -27,7 +28,7 @@ const PROSE: &str = "summary";
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
 const ALTERNATIVES: [(&str, &[&str]); 3] = [
-    ("scan", &["raster", "spinning", "flash"]),
+    ("scan", &PATTERNS),
     ("detector", &["photon-counting", "geiger", "linear", "first-firing"]),
     ("family", FAMILIES),
 ];

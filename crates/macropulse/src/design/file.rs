@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use super::light::LightFile;
+use super::scan::ScanFile;
 use macropulse_codec::decode::{Effort, Pick};
 
 #[derive(Debug, Deserialize)]
@@ -20,95 +22,6 @@ pub(super) struct SensorFile {
     pub safety: Option<SafetyFile>,
     pub tdc: TdcFile,
     pub receiver: ReceiverFile,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ScanFile {
-    pub scans_per_s: f64,
-    pub min_range_m: f64,
-    pub max_range_m: f64,
-    pub gate_beyond_m: f64,
-    pub light_range_m: Option<f64>,
-    pub raster: Option<RasterFile>,
-    pub spinning: Option<SpinningFile>,
-    pub flash: Option<FlashFile>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RasterFile {
-    pub rows: u32,
-    pub columns: u32,
-    pub horizontal_deg: f64,
-    pub vertical_deg: f64,
-    pub mirror: Mirror,
-    pub duty: f64,
-}
-
-/// How the fast axis of a raster moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mirror {
-    /// Constant angular speed, every line in the same direction.
-    Uniform,
-    /// Resonant: sinusoidal, lines to and fro.
-    Sinusoidal,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SpinningFile {
-    pub azimuth_step_deg: f64,
-    pub blocks: Vec<LaserBlockFile>,
-    pub firing: Firing,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LaserBlockFile {
-    pub lasers: u32,
-    pub first_deg: f64,
-    pub step_deg: f64,
-}
-
-/// In which order the lasers of a spinning sensor fire while it turns by one azimuth step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Firing {
-    /// Evenly spaced in time, one laser of each block in turn.
-    BlocksInTurn,
-    /// All at once.
-    Together,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FlashFile {
-    pub rows: u32,
-    pub columns: u32,
-    pub horizontal_deg: f64,
-    pub vertical_deg: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LightFile {
-    pub wavelength_nm: f64,
-    pub beam_diameter_mm: f64,
-    pub divergence_mrad: f64,
-    pub footprint_rays: u32,
-    pub pulse_ps: f64,
-    pub energy: Option<EnergyFile>,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) enum EnergyFile {
-    #[serde(rename = "class-1")]
-    Class1,
-    #[serde(rename = "shot_nj")]
-    ShotNj(f64),
 }
 
 #[derive(Debug, Deserialize)]

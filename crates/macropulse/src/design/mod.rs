@@ -12,15 +12,15 @@ mod budget;
 mod check;
 mod derived;
 mod detector;
-mod directions;
 mod document;
 mod effect;
 mod family;
 mod file;
+mod light;
 mod linear;
-mod moments;
 mod presets;
 pub mod safety;
+mod scan;
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -29,13 +29,14 @@ pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use budget::{Budget, Field, Trailing, solid_angle};
 pub use derived::Derived;
 pub use detector::{Detector, FirstFiring, Geiger, Linear, PhotonCounting, Sensitivity};
-pub use directions::Directions;
 pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
 pub use family::family_from_toml;
-pub use file::{Firing, Label, Mirror};
+pub use file::Label;
+pub use light::Light;
 pub use linear::Amplifier;
 pub use presets::{names as preset_names, text as preset_text};
+pub use scan::{Directions, Extent, Firing, Flash, Mirror, Pattern, Raster, Scan, Spinning};
 
 use crate::digest::Digest;
 use macropulse_codec::code::Codebook;
@@ -74,80 +75,6 @@ pub struct Design {
     pub text: String,
     /// Made when first asked for.
     directions: OnceLock<Directions>,
-}
-
-/// Where and when the sensor looks.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scan {
-    /// Rows of the range image.
-    pub rows: u32,
-    /// Columns of the range image.
-    pub columns: u32,
-    /// Scans in 1000 s: an integer, so that shot times are exact fractions.
-    pub rate_millihertz: u64,
-    /// Nearest range accepted, m.
-    pub min_range: f64,
-    /// Range the sensor is declared to reach, m.
-    pub reach: f64,
-    /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
-    pub max_range: f64,
-    /// Range to which the light of a shot is followed, m: beyond the gate, because what returns
-    /// from there arrives in the gates of later shots.
-    pub light_range: f64,
-    /// Whether the mirror moves on during a macropulse.
-    pub moves: bool,
-    /// How directions follow each other.
-    pub pattern: Pattern,
-}
-
-/// How directions follow each other.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Pattern {
-    /// One beam, line by line.
-    Raster {
-        /// Full horizontal field, rad.
-        horizontal: f64,
-        /// Full vertical field, rad.
-        vertical: f64,
-        /// Motion of the fast axis.
-        mirror: Mirror,
-        /// Fraction of the line time in which shots are fired.
-        duty: f64,
-    },
-    /// Fixed elevations on a turning head.
-    Spinning {
-        /// Elevation of each row, rad, from the top.
-        elevations: Vec<f64>,
-        /// Rows in the order in which they fire.
-        order: Vec<u16>,
-        /// When they fire.
-        firing: Firing,
-    },
-    /// Every direction at once.
-    Flash {
-        /// Full horizontal field, rad.
-        horizontal: f64,
-        /// Full vertical field, rad.
-        vertical: f64,
-    },
-}
-
-/// The light a sensor sends.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Light {
-    /// Wavelength, m.
-    pub wavelength: f64,
-    /// Beam diameter at the sensor (1/e²), m.
-    pub beam_diameter: f64,
-    /// Full divergence (1/e²), rad; zero where the footprint is idealised away.
-    pub divergence: f64,
-    /// Rays that sample the footprint: 1, 7 or 19.
-    pub footprint_rays: u32,
-    /// Length of one micropulse (full width at half maximum), s.
-    pub pulse: f64,
-    /// Its rms length, s, where its light is followed into neighbouring chips; `None` where it is
-    /// taken to stay in its own.
-    pub spread: Option<f64>,
 }
 
 /// How shots are told apart.
@@ -229,12 +156,12 @@ impl Design {
 
     /// Shots in one scan.
     pub fn shots_per_scan(&self) -> u64 {
-        u64::from(self.scan.rows) * u64::from(self.scan.columns)
+        self.scan.shots()
     }
 
     /// Where its pixels lie.
     pub fn directions(&self) -> &Directions {
-        self.directions.get_or_init(|| Directions::of_scan(&self.scan))
+        self.directions.get_or_init(|| self.scan.answers().directions())
     }
 
     /// Duration of one scan, s.

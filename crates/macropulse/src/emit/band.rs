@@ -6,8 +6,8 @@
 use std::iter::repeat_n;
 use std::ops::Range;
 
-use super::pattern::{EqualSteps, fired_at_fs, pixel};
-use crate::design::{Design, Mirror, Pattern};
+use super::times::{EqualSteps, fired_at_fs};
+use crate::design::Design;
 use macropulse_codec::ShotLog;
 
 /// A band holds about this many shots, in whole lines: few enough for the edges of a coded sensor
@@ -39,11 +39,10 @@ pub fn bands(design: &Design, scan: u64) -> impl Iterator<Item = Band> {
 /// Shots of every band but the last: whole lines, or equal parts of a line where a line takes
 /// longer than the clock of a band counts.
 fn shots_of_band(design: &Design) -> u64 {
-    let line = match &design.scan.pattern {
-        Pattern::Raster { .. } => u64::from(design.scan.columns),
-        Pattern::Spinning { order, .. } => order.len() as u64,
-        Pattern::Flash { .. } => return design.shots_per_scan(),
-    };
+    if design.scan.is_one_flash() {
+        return design.shots_per_scan();
+    }
+    let line = design.scan.answers().line();
     let room_fs = design.longest_band_fs();
     let line_fs = design.scan_period() * 1e15 * line as f64 / design.shots_per_scan() as f64;
     let lines = (SHOTS / line).min((room_fs as f64 / line_fs) as u64);
@@ -112,19 +111,19 @@ pub(super) fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
     for column in [&mut log.row, &mut log.column, &mut log.label, &mut log.word, &mut log.channel] {
         column.reserve_exact(count);
     }
-    match design.scan.pattern {
-        Pattern::Raster { mirror: Mirror::Uniform, .. } => add_lines(design, shots, &mut log),
-        _ => add_pixels(design, shots, &mut log),
+    match design.scan.answers().draws_from_the_left() {
+        true => add_lines(design, shots, &mut log),
+        false => add_pixels(design, shots, &mut log),
     }
     log
 }
 
-/// Pixels, labels and words of a raster that goes from the left to the right, line by line.
+/// Pixels, labels and words of one beam that goes from the left to the right, line by line.
 fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
     let columns = u64::from(design.scan.columns);
     let mut next = shots.start;
     while next < shots.end {
-        let (row, column) = pixel(design, next % design.shots_per_scan());
+        let (row, column) = design.scan.answers().pixel(next % design.shots_per_scan());
         let run = (columns - u64::from(column)).min(shots.end - next) as usize;
         let pixels = column..column + run as u16;
         log.row.extend(repeat_n(row, run));
@@ -145,18 +144,15 @@ fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
 
 /// Pixels, labels, words and detectors in whatever order.
 fn add_pixels(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
+    let pattern = design.scan.answers();
     for shot in shots {
         let order = shot % design.shots_per_scan();
-        let (row, column) = pixel(design, order);
+        let (row, column) = pattern.pixel(order);
         log.row.push(row);
         log.column.push(column);
         log.label.push(design.coding.label_of(column));
         log.word.push(word(design, row, column));
-        log.channel.push(match design.scan.pattern {
-            Pattern::Raster { .. } => 0,
-            Pattern::Spinning { .. } => row,
-            Pattern::Flash { .. } => order as u16,
-        });
+        log.channel.push(pattern.channel_of(order, row));
     }
 }
 

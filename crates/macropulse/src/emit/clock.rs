@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::band::log_of;
-use super::pattern::fired_at_fs;
+use super::times::fired_at_fs;
 use crate::design::Design;
 use crate::units::FS_PER_S;
 use macropulse_codec::ShotLog;

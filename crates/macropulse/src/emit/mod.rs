@@ -2,10 +2,10 @@
 
 mod band;
 mod clock;
-mod pattern;
+mod times;
 mod shot;
 
 pub use band::{Band, bands};
 pub use clock::Clock;
-pub use pattern::{beam_axes, scan_begins_fs};
 pub use shot::{Shot, most_scans, shot_at, shot_of_pixel};
+pub use times::{beam_axes, scan_begins_fs};

@@ -3,7 +3,7 @@
 use macropulse_codec::ShotLog;
 
 use super::band::word;
-use super::pattern::{fired_at_fs, order_of_pixel};
+use super::times::fired_at_fs;
 use crate::design::Design;
 
 /// Longest run in s: absolute time is an `i64` of femtoseconds, which ends after 9223 s.
@@ -28,7 +28,7 @@ pub fn shot_of_pixel(design: &Design, scan: u64, row: u32, column: u32) -> Optio
     }
     let (row, column) = (row as u16, column as u16);
     Some(Shot {
-        fired_at_fs: fired_at_fs(design, scan, order_of_pixel(design, row, column)),
+        fired_at_fs: fired_at_fs(design, scan, design.scan.answers().order_of(row, column)),
         label: design.coding.label_of(column),
         word: word(design, row, column),
     })
@@ -43,7 +43,7 @@ pub fn most_scans(design: &Design) -> u64 {
 /// there are several.
 pub fn shot_at(design: &Design, log: &ShotLog, (row, column): (u16, u16)) -> Option<usize> {
     let per_scan = design.shots_per_scan();
-    let order = order_of_pixel(design, row, column);
+    let order = design.scan.answers().order_of(row, column);
     let after = (order + per_scan - log.first % per_scan) % per_scan;
     usize::try_from(after).ok().filter(|shot| *shot < log.len())
 }

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_4;
 use super::forecast::{Forecast, Forecaster};
 use super::link::spot_depth;
 use crate::design::safety::strictest;
-use crate::design::{Design, Detector, Pattern};
+use crate::design::{Design, Detector};
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
 
 /// Share of converters' work that may be lost.
@@ -184,14 +184,11 @@ fn slant(design: &Design, range: f64) -> Option<Check> {
 
 /// Angle, rad, by which the mirror moves on during a macropulse.
 fn swept(design: &Design) -> f64 {
-    match design.scan.pattern {
-        Pattern::Raster { horizontal, .. } if design.scan.moves => {
-            let derived = design.derived();
-            let pixels = derived.macropulse / derived.pixel_period;
-            pixels * horizontal / f64::from(design.scan.columns)
-        }
-        _ => 0.0,
-    }
+    let Some(pixel) = design.scan.answers().moves_by().filter(|_| design.scan.moves) else {
+        return 0.0;
+    };
+    let derived = design.derived();
+    derived.macropulse / derived.pixel_period * pixel
 }
 
 #[cfg(test)]

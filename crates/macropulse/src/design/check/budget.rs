@@ -1,12 +1,13 @@
 //! Energy, optics and eyes.
 
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::f64::consts::FRAC_PI_4;
 
 use super::Check;
 use crate::design::budget::{Budget, Field, Trailing, solid_angle};
-use crate::design::file::{EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile};
+use crate::design::file::{FieldFile, OpticsFile, SafetyFile, SensorFile};
+use crate::design::light::EnergyFile;
 use crate::design::safety::{Class1, Limit, Sender, exposure, limits, strictest};
-use crate::design::{Coding, Effect, Error, Light, Pattern, Scan};
+use crate::design::{Coding, Effect, Error, Light, Scan};
 use crate::units::tof_from_range;
 
 /// What a budget is made of beside the file.
@@ -119,10 +120,10 @@ impl Check<'_> {
     /// its pixel or a cone about it.
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {
         let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
-        let [across, down] = cell(scan);
+        let [across, down] = scan.answers().cell();
         let pixel = solid_angle(across, down);
         let pixel_period = scan.channel_period();
-        let follows = !matches!(scan.pattern, Pattern::Flash { .. });
+        let follows = scan.answers().follows();
         let trailing = |pixels: f64, solid_angle: f64| Field {
             solid_angle,
             trailing: follows.then_some(Trailing { pixels, pixel_period }),
@@ -131,7 +132,7 @@ impl Check<'_> {
             let angle = self.within("optics.field.cone_mrad", angle, 1e-3, 1e3)? * 1e-3;
             return Ok(trailing(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
         }
-        if let Pattern::Raster { horizontal, vertical, .. } = scan.pattern {
+        if let Some([horizontal, vertical]) = scan.answers().shared_field() {
             let strip = |pixels: f64| trailing(pixels, pixels * pixel);
             return Ok(match optics.field {
                 FieldFile::Staring => {
@@ -154,26 +155,6 @@ impl Check<'_> {
                 "each detector of a spinning or flash sensor looks at its own cell: use \
                  \"descanned\", or { cone_mrad = … }",
             ),
-        }
-    }
-}
-
-/// Width and height, rad, of the cell that belongs to a pixel. The lasers of a turning head are
-/// rarely evenly spaced: theirs is as high as the median step between them, that of one alone as
-/// high as wide.
-fn cell(scan: &Scan) -> [f64; 2] {
-    let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
-    match &scan.pattern {
-        Pattern::Raster { horizontal, vertical, .. } | Pattern::Flash { horizontal, vertical } => {
-            [horizontal / columns, vertical / rows]
-        }
-        Pattern::Spinning { elevations, .. } => {
-            let mut steps: Vec<f64> = elevations.windows(2).map(|two| two[0] - two[1]).collect();
-            steps.sort_by(f64::total_cmp);
-            let across = TAU / columns;
-            let middle = [steps.len().saturating_sub(1) / 2, steps.len() / 2];
-            let median = middle.map(|place| steps.get(place).copied().unwrap_or(across));
-            [across, (median[0] + median[1]) / 2.0]
         }
     }
 }

@@ -4,9 +4,7 @@ mod budget;
 mod code;
 mod detector;
 mod effectless;
-mod light;
 mod receiver;
-mod scan;
 
 use std::sync::OnceLock;
 
@@ -106,7 +104,7 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
         faults.0.extend(check.without_effect(file, effects));
         faults.keep(check.bandwidth(&file.detector, effects));
         faults.keep(check.chips(&file.detector, effects));
-        faults.keep(check.light(file, off))
+        faults.keep(check.light(&file.light, off))
     });
     let right_within = match file.receiver.right_within_m {
         Some(typed) => {
@@ -224,24 +222,40 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
     chain.error(&path, said)
 }
 
-struct Check<'a> {
+pub(in crate::design) struct Check<'a> {
     chain: &'a Chain,
 }
 
 impl Check<'_> {
-    fn refuse<T>(&self, path: &str, message: impl Into<String>) -> Result<T, Error> {
+    pub(in crate::design) fn refuse<T>(
+        &self,
+        path: &str,
+        message: impl Into<String>,
+    ) -> Result<T, Error> {
         Err(self.chain.error(path, message))
     }
 
     /// A number in [least, most]; NaN and infinities are refused by the same comparison.
-    fn within(&self, path: &str, value: f64, least: f64, most: f64) -> Result<f64, Error> {
+    pub(in crate::design) fn within(
+        &self,
+        path: &str,
+        value: f64,
+        least: f64,
+        most: f64,
+    ) -> Result<f64, Error> {
         if value >= least && value <= most {
             return Ok(value);
         }
         self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
     }
 
-    fn count(&self, path: &str, value: u32, least: u32, most: u32) -> Result<u32, Error> {
+    pub(in crate::design) fn count(
+        &self,
+        path: &str,
+        value: u32,
+        least: u32,
+        most: u32,
+    ) -> Result<u32, Error> {
         if (least..=most).contains(&value) {
             return Ok(value);
         }
@@ -249,7 +263,7 @@ impl Check<'_> {
     }
 
     /// A duration that must be a whole, positive number of femtoseconds.
-    fn whole_fs(&self, path: &str, picoseconds: f64) -> Result<i64, Error> {
+    pub(in crate::design) fn whole_fs(&self, path: &str, picoseconds: f64) -> Result<i64, Error> {
         let ps = self.within(path, picoseconds, 1e-3, 1e9)?;
         let fs = (ps * 1e3).round();
         if (ps * 1e3 - fs).abs() > 1e-6 * fs {

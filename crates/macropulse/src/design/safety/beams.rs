@@ -1,4 +1,4 @@
-//! The beams of a raster or a turning head, and those of them that cross an aperture.
+//! The beams of a scan, and those of them that cross an aperture.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::crossing::Energies;
 use super::exposure::Crossing;
 use super::share::Share;
-use crate::design::{Firing, Pattern, Scan};
+use crate::design::Scan;
 
 /// Places along an aperture at which its middle is tried, where many pixels lie in it.
 const STEPS: f64 = 16.0;
@@ -19,6 +19,27 @@ const MANY: f64 = 400.0;
 /// Elevations that are looked at in all columns.
 const FINALISTS: usize = 3;
 
+/// Beams in lines, each as far in azimuth from the one before it.
+pub(crate) struct Lines {
+    /// From the top down.
+    pub rows: Vec<Line>,
+    /// Angle between columns, rad, to the right.
+    pub step: f64,
+    /// Azimuth of the first column, rad, of a line that fires first.
+    pub first: f64,
+    /// Whether lines are drawn one after another, evenly spaced and alike above and below the
+    /// horizon, rather than all at once.
+    pub one_by_one: bool,
+}
+
+/// A line of beams.
+pub(crate) struct Line {
+    /// Its elevation, rad.
+    pub elevation: f64,
+    /// Azimuth of its first column, rad.
+    pub first: f64,
+}
+
 /// Where the middle of an aperture is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Aim {
@@ -26,55 +47,18 @@ pub(super) struct Aim {
     pub elevation: f64,
 }
 
-/// The beams of a scan, line by line.
-pub(super) struct Beams<'a> {
+/// The beams of a scan, line by line, and what they carry.
+pub(super) struct LineBeams<'a> {
     scan: &'a Scan,
     energies: &'a Energies,
     distance: f64,
-    rows: Vec<Row>,
-    /// Angle between columns, rad.
-    step: f64,
-    /// Azimuth of the first column, rad, if its row fires first.
-    first: f64,
+    lines: Lines,
 }
 
-struct Row {
-    elevation: f64,
-    /// Azimuth of the first column, rad.
-    first: f64,
-    /// The place of the row in the order in which rows fire.
-    turn: usize,
-}
-
-impl<'a> Beams<'a> {
-    /// Of a raster or a turning head; of any other `scan` none.
-    pub fn of(scan: &'a Scan, energies: &'a Energies, distance: f64) -> Self {
-        let columns = f64::from(scan.columns);
-        let mut rows = Vec::new();
-        let (mut step, mut first) = (TAU / columns, PI);
-        match &scan.pattern {
-            Pattern::Raster { horizontal, vertical, .. } => {
-                step = horizontal / columns;
-                first = (horizontal - step) / 2.0;
-                for row in 0..scan.rows {
-                    let down = (f64::from(row) + 0.5) / f64::from(scan.rows);
-                    rows.push(Row { elevation: vertical * (0.5 - down), first, turn: 0 });
-                }
-            }
-            Pattern::Spinning { elevations, order, firing } => {
-                for (row, &elevation) in elevations.iter().enumerate() {
-                    let turn = order.iter().position(|&fired| usize::from(fired) == row);
-                    let turn = turn.unwrap_or(0);
-                    let turned = match firing {
-                        Firing::BlocksInTurn => turn as f64 / order.len() as f64,
-                        Firing::Together => 0.0,
-                    };
-                    rows.push(Row { elevation, first: PI - step * turned, turn });
-                }
-            }
-            Pattern::Flash { .. } => {}
-        }
-        Self { scan, energies, distance, rows, step, first }
+impl<'a> LineBeams<'a> {
+    /// The beams of `scan` in its `lines`, at the `distance` of an eye, m.
+    pub fn new(scan: &'a Scan, lines: Lines, energies: &'a Energies, distance: f64) -> Self {
+        Self { scan, energies, distance, lines }
     }
 
     /// The shots that cross an aperture with its middle at `aim`, in the order of their times.
@@ -82,12 +66,13 @@ impl<'a> Beams<'a> {
         let reach = self.reach(share);
         let mut shots = Vec::new();
         for number in self.rows_within(aim.elevation, reach) {
-            let row = &self.rows[number];
+            let row = &self.lines.rows[number];
             for columns in self.columns_within(row, aim, reach) {
                 for column in columns {
-                    let off = row.first - self.step * f64::from(column) - aim.azimuth;
+                    let off = row.first - self.lines.step * f64::from(column) - aim.azimuth;
                     let share = share.at(self.off(aim.elevation, row.elevation, off));
-                    let time = self.scan.moment([number as u32, column], row.turn);
+                    let order = self.scan.answers().order_of(number as u16, column as u16);
+                    let time = self.scan.moment(order);
                     let energy = share * self.energies.at(column);
                     if share > 0.0 {
                         shots.push(Crossing { time, share, energy });
@@ -114,7 +99,7 @@ impl<'a> Beams<'a> {
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
         let most = tried.iter().take(FINALISTS).map(|&(shots, elevation)| {
             if self.energies.alike && shots > MANY {
-                let azimuth = self.first - self.step * f64::from(self.scan.columns / 2);
+                let azimuth = self.lines.first - self.lines.step * f64::from(self.scan.columns / 2);
                 return (shots, Aim { azimuth, elevation });
             }
             let rows = self.rows_within(elevation, reach);
@@ -126,14 +111,14 @@ impl<'a> Beams<'a> {
             return aims;
         }
         // So many columns pass within the time, if that is shorter than a line takes to cross.
-        let line = self.scan.period() / self.lines();
-        let widest = counted / line * f64::from(self.scan.columns) * self.step / 2.0;
+        let line = self.scan.period() / self.lines_in_turn();
+        let widest = counted / line * f64::from(self.scan.columns) * self.lines.step / 2.0;
         for elevation in self.edges(reach) {
             let number = self.nearest(elevation);
-            let elevation = self.rows[number].elevation;
-            let rows = match self.scan.pattern {
-                Pattern::Raster { .. } => number..number + 1,
-                _ => self.rows_within(elevation, reach),
+            let elevation = self.lines.rows[number].elevation;
+            let rows = match self.lines.one_by_one {
+                true => number..number + 1,
+                false => self.rows_within(elevation, reach),
             };
             aims.push(self.brightest(&Lit { share, elevation, rows, widest }).1);
         }
@@ -145,12 +130,9 @@ impl<'a> Beams<'a> {
         libm::atan(share.reach() / self.distance)
     }
 
-    /// Lines drawn one after another in a scan: a turning head draws all at once.
-    fn lines(&self) -> f64 {
-        match self.scan.pattern {
-            Pattern::Raster { .. } => f64::from(self.scan.rows),
-            _ => 1.0,
-        }
+    /// Lines drawn one after another in a scan.
+    fn lines_in_turn(&self) -> f64 {
+        if self.lines.one_by_one { f64::from(self.scan.rows) } else { 1.0 }
     }
 
     /// Distance in the plane of the aperture, m, between its middle and a beam `off` in azimuth.
@@ -166,7 +148,7 @@ impl<'a> Beams<'a> {
     }
 
     fn rows_within(&self, elevation: f64, reach: f64) -> Range<usize> {
-        let above = |limit: f64| self.rows.partition_point(|row| row.elevation > limit);
+        let above = |limit: f64| self.lines.rows.partition_point(|row| row.elevation > limit);
         let within = reach * (1.0 + 1e-9);
         above(elevation + within)..above(elevation - within).max(above(elevation + within))
     }
@@ -185,7 +167,7 @@ impl<'a> Beams<'a> {
     }
 
     /// The columns of `row` within `reach` of `aim`: one run of them, or two at a seam.
-    fn columns_within(&self, row: &Row, aim: Aim, reach: f64) -> Vec<Range<u32>> {
+    fn columns_within(&self, row: &Line, aim: Aim, reach: f64) -> Vec<Range<u32>> {
         let Some(half) = self.half_chord(row.elevation, aim.elevation, reach) else {
             return Vec::new();
         };
@@ -198,7 +180,7 @@ impl<'a> Beams<'a> {
             return std::iter::once(0..self.scan.columns).collect();
         }
         let turn = |turn: f64| {
-            let column = |angle: f64| (off + turn * TAU + angle) / self.step;
+            let column = |angle: f64| (off + turn * TAU + angle) / self.lines.step;
             let [from, to] = [column(-half).ceil(), column(half).floor() + 1.0];
             // Casts stop at the ends of the numbers.
             (from as u32)..(to.max(0.0) as u32).min(self.scan.columns)
@@ -208,30 +190,30 @@ impl<'a> Beams<'a> {
 
     /// The row nearest to `elevation`.
     fn nearest(&self, elevation: f64) -> usize {
-        let below = self.rows.partition_point(|row| row.elevation > elevation);
-        let off = |number: &usize| (self.rows[*number].elevation - elevation).abs();
-        let near = below.saturating_sub(1)..(below + 1).min(self.rows.len());
+        let below = self.lines.rows.partition_point(|row| row.elevation > elevation);
+        let off = |number: &usize| (self.lines.rows[*number].elevation - elevation).abs();
+        let near = below.saturating_sub(1)..(below + 1).min(self.lines.rows.len());
         near.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
     }
 
     /// Elevations of interest to what crosses at once: of a raster the outermost row, the one an
     /// aperture's radius further in, and the middle; of a turning head every one.
     fn edges(&self, reach: f64) -> Vec<f64> {
-        match (&self.scan.pattern, self.rows.first()) {
-            (Pattern::Raster { .. }, Some(row)) => {
+        match self.lines.rows.first().filter(|_| self.lines.one_by_one) {
+            Some(row) => {
                 let inside = (row.elevation - reach).max(0.0);
                 vec![row.elevation, inside, 0.0]
             }
-            _ => self.elevations(reach),
+            None => self.elevations(reach),
         }
     }
 
     /// Elevations at which the middle of an aperture is tried: every row and between rows, thinned
     /// out where they are many. A raster is alike above and below the horizon.
     fn elevations(&self, reach: f64) -> Vec<f64> {
-        let raster = matches!(self.scan.pattern, Pattern::Raster { .. });
-        let of_row = |row: &Row| row.elevation;
-        let mut all: Vec<f64> = self.rows.iter().map(of_row).collect();
+        let raster = self.lines.one_by_one;
+        let of_row = |row: &Line| row.elevation;
+        let mut all: Vec<f64> = self.lines.rows.iter().map(of_row).collect();
         let between: Vec<f64> = all.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0).collect();
         all.extend(between);
         all.sort_by(|a, b| b.total_cmp(a));
@@ -254,9 +236,9 @@ impl<'a> Beams<'a> {
     /// of the columns.
     fn estimate(&self, share: &Share, elevation: f64) -> f64 {
         let reach = self.reach(share);
-        let field = self.step * f64::from(self.scan.columns) / 2.0;
+        let field = self.lines.step * f64::from(self.scan.columns) / 2.0;
         let mut sum = 0.0;
-        let rows = &self.rows[self.rows_within(elevation, reach)];
+        let rows = &self.lines.rows[self.rows_within(elevation, reach)];
         let stride = (rows.len() / ROWS).max(1);
         for row in rows.iter().step_by(stride) {
             let Some(half) = self.half_chord(row.elevation, elevation, reach) else { continue };
@@ -264,7 +246,7 @@ impl<'a> Beams<'a> {
             let place = |n: u32| half * (f64::from(n) + 0.5) / f64::from(SAMPLES);
             let shares =
                 (0..SAMPLES).map(|n| share.at(self.off(elevation, row.elevation, place(n))));
-            sum += shares.sum::<f64>() / f64::from(SAMPLES) * 2.0 * half / self.step;
+            sum += shares.sum::<f64>() / f64::from(SAMPLES) * 2.0 * half / self.lines.step;
         }
         sum * rows.len() as f64 / rows.len().div_ceil(stride).max(1) as f64
     }
@@ -287,7 +269,7 @@ impl<'a> Beams<'a> {
                 best = (light, place);
             }
         }
-        let azimuth = self.first - self.step * f64::from(best.1) / 2.0;
+        let azimuth = self.lines.first - self.lines.step * f64::from(best.1) / 2.0;
         (best.0, Aim { azimuth, elevation: lit.elevation })
     }
 
@@ -296,15 +278,15 @@ impl<'a> Beams<'a> {
     fn kernel(&self, lit: &Lit) -> Vec<f64> {
         let reach = self.reach(lit.share);
         let mut kernel = Vec::new();
-        for row in &self.rows[lit.rows.clone()] {
+        for row in &self.lines.rows[lit.rows.clone()] {
             let Some(half) = self.half_chord(row.elevation, lit.elevation, reach) else { continue };
-            let half = half.min(lit.widest).min(self.step * f64::from(self.scan.columns));
-            let places = (2.0 * half / self.step * (1.0 + 1e-9)) as usize + 1;
+            let half = half.min(lit.widest).min(self.lines.step * f64::from(self.scan.columns));
+            let places = (2.0 * half / self.lines.step * (1.0 + 1e-9)) as usize + 1;
             if kernel.len() < places {
                 kernel.resize(places, 0.0);
             }
             for (place, sum) in kernel.iter_mut().enumerate().take(places) {
-                let off = place as f64 * self.step / 2.0;
+                let off = place as f64 * self.lines.step / 2.0;
                 *sum += lit.share.at(self.off(lit.elevation, row.elevation, off));
             }
         }
@@ -314,9 +296,9 @@ impl<'a> Beams<'a> {
     /// The light that passes an aperture `place` half columns from the first one.
     fn light(&self, kernel: &[f64], place: u32) -> f64 {
         let Some(last) = kernel.len().checked_sub(1) else { return 0.0 };
-        let half = last as f64 * self.step / 2.0;
-        let off = self.step * f64::from(place) / 2.0;
-        let around = (TAU / self.step * 2.0).round() as i64;
+        let half = last as f64 * self.lines.step / 2.0;
+        let off = self.lines.step * f64::from(place) / 2.0;
+        let around = (TAU / self.lines.step * 2.0).round() as i64;
         let mut light = 0.0;
         for columns in self.columns_between(off, half * (1.0 + 1e-9)) {
             for column in columns {

@@ -2,13 +2,21 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use super::beams::Beams;
+use super::beams::{LineBeams, Lines};
 use super::class1::{Class1, Opening};
 use super::exposure::{Crossing, Crossings, Exposure};
 use super::share::Share;
 use crate::design::budget::solid_angle;
-use crate::design::{Coding, Light, Pattern, Scan};
+use crate::design::{Coding, Light, Scan};
 use crate::units::s_from_fs;
+
+/// What is sent in a scan, as eye safety counts it.
+pub(crate) enum Beams {
+    /// A beam for each pixel, line by line.
+    Lines(Lines),
+    /// All pixels at once: light spread evenly over a field of this width and height, rad.
+    Flood([f64; 2]),
+}
 
 /// Who sends, and from how far away.
 #[derive(Clone, Copy)]
@@ -28,15 +36,18 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
     let chips = i64::from(coding.codebook.chips());
     let energies = Energies::of(scan, coding);
     let openings = class.openings();
-    let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
-    let places: Vec<Crossings> = match scan.pattern {
-        Pattern::Flash { horizontal, vertical } => {
-            let field = solid_angle(horizontal, vertical);
-            let flood = |opening| sender.flood(opening, [horizontal, vertical], field, &energies);
-            openings.iter().map(flood).collect()
+    let (places, passed, brightest) = match scan.answers().beams() {
+        Beams::Flood(sides) => {
+            let flood = |opening| sender.flood(opening, sides, &energies);
+            let places: Vec<Crossings> = openings.iter().map(flood).collect();
+            // A flash has no shot alone.
+            let flash = places.first().and_then(|place| place.shots.first());
+            let (passed, brightest) = flash.map_or((0.0, 0.0), |flash| (flash.share, flash.energy));
+            (places, passed, brightest)
         }
-        Pattern::Raster { .. } | Pattern::Spinning { .. } => {
-            let beams = Beams::of(scan, &energies, sender.distance);
+        Beams::Lines(lines) => {
+            let beams = LineBeams::new(scan, lines, &energies, sender.distance);
+            let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
             let at = |(opening, share): (&Opening, &Share)| {
                 let aims = beams.aims(share, class.counted_as_one());
                 let cross = |aim| beams.crossing(share, aim);
@@ -44,18 +55,10 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
                 let durations = opening.durations;
                 places.map(|shots| Crossings { durations, shots }).collect::<Vec<_>>()
             };
-            openings.iter().zip(&shares).flat_map(at).collect()
-        }
-    };
-    // One shot alone is judged in the middle of the first aperture; a flash has no shot alone.
-    let (passed, brightest) = match scan.pattern {
-        Pattern::Flash { .. } => {
-            let flash = places.first().and_then(|place| place.shots.first());
-            flash.map_or((0.0, 0.0), |flash| (flash.share, flash.energy))
-        }
-        _ => {
+            let places = openings.iter().zip(&shares).flat_map(at).collect();
+            // One shot alone is judged in the middle of the first aperture.
             let passed = shares.first().map_or(1.0, |share| share.at(0.0));
-            (passed, passed * energies.most())
+            (places, passed, passed * energies.most())
         }
     };
     Exposure {
@@ -79,15 +82,10 @@ impl Sender<'_> {
         Share::new(opening.diameter / 2.0, self.spot())
     }
 
-    /// All pixels at once, their light spread evenly over the `field`, sr, at the distance of the
-    /// eye; a wide beam widens it.
-    fn flood(
-        &self,
-        opening: &Opening,
-        sides: [f64; 2],
-        field: f64,
-        energies: &Energies,
-    ) -> Crossings {
+    /// All pixels at once, their light spread evenly over a field of these `sides`, rad, at the
+    /// distance of the eye; a wide beam widens it.
+    fn flood(&self, opening: &Opening, sides: [f64; 2], energies: &Energies) -> Crossings {
+        let field = solid_angle(sides[0], sides[1]);
         let wide = 2.0 * self.spot();
         let [across, down] = sides.map(|side| self.distance * side);
         let lit = field * self.distance * self.distance + (across + down) * wide + wide * wide;

@@ -11,7 +11,9 @@ mod crossing;
 mod exposure;
 mod share;
 
+pub(crate) use beams::{Line, Lines};
 pub use class1::Class1;
+pub(crate) use crossing::Beams;
 pub(super) use crossing::{Sender, exposure};
 pub use exposure::{Crossing, Crossings, Exposure, Limit, Rule, limits, strictest};
 

@@ -1,17 +1,57 @@
-//! The light a sensor sends.
+//! The light a sensor sends: `[light]`.
 
-use super::Check;
-use crate::design::file::SensorFile;
-use crate::design::{Effect, Error, Light};
+use serde::Deserialize;
+
+use super::check::Check;
+use super::{Effect, Error};
 use crate::units::RMS_OF_FWHM;
 
+/// `[light]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LightFile {
+    wavelength_nm: f64,
+    beam_diameter_mm: f64,
+    divergence_mrad: f64,
+    footprint_rays: u32,
+    pulse_ps: f64,
+    pub energy: Option<EnergyFile>,
+}
+
+/// The energy of a shot as typed.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) enum EnergyFile {
+    #[serde(rename = "class-1")]
+    Class1,
+    #[serde(rename = "shot_nj")]
+    ShotNj(f64),
+}
+
+/// The light a sensor sends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Light {
+    /// Wavelength, m.
+    pub wavelength: f64,
+    /// Beam diameter at the sensor (1/e²), m.
+    pub beam_diameter: f64,
+    /// Full divergence (1/e²), rad; zero where the footprint is idealised away.
+    pub divergence: f64,
+    /// Rays that sample the footprint: 1, 7 or 19.
+    pub footprint_rays: u32,
+    /// Length of one micropulse (full width at half maximum), s.
+    pub pulse: f64,
+    /// Its rms length, s, where its light is followed into neighbouring chips; `None` where it is
+    /// taken to stay in its own.
+    pub spread: Option<f64>,
+}
+
 impl Check<'_> {
-    pub(super) fn light(
+    pub(in crate::design) fn light(
         &self,
-        file: &SensorFile,
+        light: &LightFile,
         off: impl Fn(Effect) -> bool,
     ) -> Result<Light, Error> {
-        let light = &file.light;
         let footprint_off = off(Effect::Footprint);
         let rays = light.footprint_rays;
         if ![1, 7, 19].contains(&rays) {

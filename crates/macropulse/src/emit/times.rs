@@ -1,62 +1,15 @@
-//! Scan patterns: the pixel and the time of every shot.
+//! The time of every shot.
 //!
 //! Shots are numbered from the first one of the first scan. Times are exact: shot `k` of a uniform
 //! raster fires at ⌊k · T_scan / shots⌋ on the chip clock, in integers, however long the run.
 
-use crate::design::{Design, Firing, Mirror, Pattern};
+use crate::design::Design;
 use crate::units::{FS_PER_S, fs_from_s};
-
-/// Row and column of the `order`-th shot of a scan.
-pub(super) fn pixel(design: &Design, order: u64) -> (u16, u16) {
-    let columns = u64::from(design.scan.columns);
-    match &design.scan.pattern {
-        Pattern::Raster { mirror: Mirror::Sinusoidal, .. } if order / columns % 2 == 1 => {
-            ((order / columns) as u16, (columns - 1 - order % columns) as u16)
-        }
-        Pattern::Raster { .. } | Pattern::Flash { .. } => {
-            ((order / columns) as u16, (order % columns) as u16)
-        }
-        Pattern::Spinning { order: rows, .. } => {
-            let lasers = rows.len() as u64;
-            (rows[(order % lasers) as usize], (order / lasers) as u16)
-        }
-    }
-}
-
-/// The place of a pixel of the image in the order of its scan: the inverse of [`pixel`].
-pub(super) fn order_of_pixel(design: &Design, row: u16, column: u16) -> u64 {
-    let columns = u64::from(design.scan.columns);
-    let (line, across) = (u64::from(row), u64::from(column));
-    match &design.scan.pattern {
-        Pattern::Raster { mirror: Mirror::Sinusoidal, .. } if line % 2 == 1 => {
-            line * columns + columns - 1 - across
-        }
-        Pattern::Raster { .. } | Pattern::Flash { .. } => line * columns + across,
-        Pattern::Spinning { order: rows, .. } => {
-            let turn = rows.iter().position(|&fired| fired == row).unwrap_or(0);
-            across * rows.len() as u64 + turn as u64
-        }
-    }
-}
 
 /// Absolute time at which shot number `order` of scan `scan` is fired, fs.
 pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
-    let columns = u64::from(design.scan.columns);
-    let exact = |passed: u64| fraction_of_scan(design, scan, passed);
-    let fs = match &design.scan.pattern {
-        Pattern::Raster { mirror: Mirror::Uniform, duty: 1.0, .. } => exact(order),
-        Pattern::Raster { mirror, duty, .. } => {
-            let line_start = exact(order / columns * columns);
-            let line = design.scan_period() / f64::from(design.scan.rows);
-            let across = (order % columns) as f64 / columns as f64;
-            line_start + fs_from_s(line * mirror.moment(*duty, across))
-        }
-        Pattern::Spinning { order: rows, firing, .. } => match firing {
-            Firing::BlocksInTurn => exact(order),
-            Firing::Together => exact(order - order % rows.len() as u64),
-        },
-        Pattern::Flash { .. } => exact(0),
-    };
+    let moment = design.scan.answers().moment(order, design.scan_period());
+    let fs = fraction_of_scan(design, scan, moment.shots) + fs_from_s(moment.then);
     fs - fs.rem_euclid(design.coding.chip_fs)
 }
 
@@ -79,10 +32,8 @@ impl EqualSteps {
     /// From shot number `first` on, counted from the first one of the first scan; `None` where
     /// shots are not equally far apart.
     pub(super) fn new(design: &Design, first: u64) -> Option<Self> {
-        match design.scan.pattern {
-            Pattern::Raster { mirror: Mirror::Uniform, duty: 1.0, .. }
-            | Pattern::Spinning { firing: Firing::BlocksInTurn, .. } => {}
-            _ => return None,
+        if !design.scan.answers().equal_steps() {
+            return None;
         }
         let (parts, chip_fs) = (parts_of_fs(design), design.coding.chip_fs);
         let numerator = u128::from(first) * NUMERATOR;
@@ -154,6 +105,7 @@ pub fn beam_axes(direction: [f64; 3]) -> ([f64; 3], [f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::Mirror;
     use std::f64::consts::PI;
 
     fn sensor(name: &str) -> Design {
@@ -236,9 +188,10 @@ mod tests {
     #[test]
     fn every_laser_of_a_spinning_sensor_fires_once_a_column() {
         let design = sensor("hdl-64e");
-        let mut rows: Vec<u16> = (0..64).map(|order| pixel(&design, 64 + order).0).collect();
+        let mut rows: Vec<u16> =
+            (0..64).map(|order| design.scan.answers().pixel(64 + order).0).collect();
         rows.sort_unstable();
         assert_eq!(rows, (0..64).collect::<Vec<u16>>());
-        assert_eq!(pixel(&design, 64).1, 1);
+        assert_eq!(design.scan.answers().pixel(64).1, 1);
     }
 }

@@ -1,0 +1,243 @@
+//! Where and when the sensor looks: `[scan]`, and a scan pattern in it.
+//!
+//! Each pattern is one file: its keys, their limits, and its answers to what the workbench asks of
+//! every pattern, [`ScanPattern`]. The lists of those there are stand here and nowhere else.
+
+mod directions;
+mod flash;
+mod pattern;
+mod raster;
+mod spinning;
+
+use serde::Deserialize;
+
+pub use directions::Directions;
+pub use flash::Flash;
+pub use pattern::Extent;
+pub(crate) use pattern::ScanPattern;
+pub use raster::{Mirror, Raster};
+pub use spinning::{Firing, Spinning};
+
+use self::flash::FlashFile;
+use self::raster::RasterFile;
+use self::spinning::SpinningFile;
+use super::Error;
+use super::check::Check;
+
+/// The tables of patterns, of which `[scan]` has exactly one.
+pub(super) const PATTERNS: [&str; 3] = ["raster", "spinning", "flash"];
+
+/// `[scan]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ScanFile {
+    scans_per_s: f64,
+    min_range_m: f64,
+    max_range_m: f64,
+    gate_beyond_m: f64,
+    light_range_m: Option<f64>,
+    raster: Option<RasterFile>,
+    spinning: Option<SpinningFile>,
+    flash: Option<FlashFile>,
+}
+
+impl ScanFile {
+    /// The tables of patterns that are there, in the order of [`PATTERNS`].
+    fn patterns(&self) -> [Option<&dyn PatternFile>; PATTERNS.len()] {
+        fn any(table: &impl PatternFile) -> &dyn PatternFile {
+            table
+        }
+        [
+            self.raster.as_ref().map(any),
+            self.spinning.as_ref().map(any),
+            self.flash.as_ref().map(any),
+        ]
+    }
+}
+
+/// How directions follow each other.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Pattern {
+    /// One beam, line by line.
+    Raster(Raster),
+    /// Fixed elevations on a turning head.
+    Spinning(Spinning),
+    /// Every direction at once.
+    Flash(Flash),
+}
+
+impl Pattern {
+    fn answers(&self) -> &dyn ScanPattern {
+        match self {
+            Self::Raster(raster) => raster,
+            Self::Spinning(spinning) => spinning,
+            Self::Flash(flash) => flash,
+        }
+    }
+}
+
+/// The table of a pattern as typed.
+trait PatternFile {
+    /// The pattern, if all limits are kept.
+    fn check(&self, check: &Check) -> Result<Pattern, Error>;
+}
+
+/// Where and when the sensor looks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// Rows of the range image.
+    pub rows: u32,
+    /// Columns of the range image.
+    pub columns: u32,
+    /// Scans in 1000 s: an integer, so that shot times are exact fractions.
+    pub rate_millihertz: u64,
+    /// Nearest range accepted, m.
+    pub min_range: f64,
+    /// Range the sensor is declared to reach, m.
+    pub reach: f64,
+    /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
+    pub max_range: f64,
+    /// Range to which the light of a shot is followed, m: beyond the gate, because what returns
+    /// from there arrives in the gates of later shots.
+    pub light_range: f64,
+    /// Whether the mirror moves on during a macropulse.
+    pub moves: bool,
+    /// How directions follow each other.
+    pub pattern: Pattern,
+}
+
+impl Scan {
+    /// What its pattern is, in a few words for people.
+    pub fn describe(&self) -> String {
+        self.pattern.answers().describe()
+    }
+
+    /// What its pattern answers.
+    pub(crate) fn answers(&self) -> &dyn ScanPattern {
+        self.pattern.answers()
+    }
+
+    /// Shots in a scan.
+    pub fn shots(&self) -> u64 {
+        u64::from(self.rows) * u64::from(self.columns)
+    }
+
+    /// Number of separate detectors: one behind a single beam, one for each laser of a turning
+    /// head, one for each pixel of a flash.
+    pub fn channels(&self) -> u32 {
+        self.answers().channels()
+    }
+
+    /// Duration of one scan, s.
+    pub fn period(&self) -> f64 {
+        1000.0 / self.rate_millihertz as f64
+    }
+
+    /// Mean time between shots of the same detector, s.
+    pub fn channel_period(&self) -> f64 {
+        self.period() / self.shots() as f64 * f64::from(self.channels())
+    }
+
+    /// Whether all shots of a scan are fired at one moment.
+    pub fn is_one_flash(&self) -> bool {
+        let moment = |order| self.answers().moment(order, self.period());
+        moment(0) == moment(self.shots() - 1)
+    }
+
+    /// The pixel, row and column, in whose cell the unit vector `direction` of the sensor frame
+    /// lies; `None` outside the field of view. A cell reaches half of the way to its neighbours.
+    pub fn pixel_at(&self, direction: [f64; 3]) -> Option<(u16, u16)> {
+        let [x, y, z] = direction;
+        self.answers().pixel_at(libm::atan2(y, x), libm::asin(z.clamp(-1.0, 1.0)))
+    }
+
+    /// Everything it looks at.
+    pub fn extent(&self) -> Extent {
+        self.answers().extent()
+    }
+
+    /// Seconds from the beginning of a scan until the shot `order` is fired. The chip clock, for
+    /// which a shot waits, is left out.
+    pub(super) fn moment(&self, order: u64) -> f64 {
+        let moment = self.answers().moment(order, self.period());
+        moment.shots as f64 / self.shots() as f64 * self.period() + moment.then
+    }
+}
+
+/// Pixels of the largest range image: a scan of it takes some 4 GB.
+const MOST_PIXELS: u64 = 1 << 25;
+
+/// Light is followed to so many times the end of the range gate, unless the file says how far: to
+/// all second-time-around returns that fall into the gate of the shot fired one gate later. From
+/// twice the range a surface brings a quarter of the light at most.
+const LIGHT_BEYOND_GATE: f64 = 2.0;
+
+/// Full angles of a field as typed.
+struct Sides {
+    horizontal_deg: f64,
+    vertical_deg: f64,
+}
+
+impl Check<'_> {
+    pub(super) fn scan(&self, file: &ScanFile, moves: bool) -> Result<Scan, Error> {
+        let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
+        let reach = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
+        let beyond = self.within("scan.gate_beyond_m", file.gate_beyond_m, 0.0, 1e5)?;
+        let max_range = reach + beyond;
+        let light_range = match file.light_range_m {
+            Some(typed) => self.within("scan.light_range_m", typed, max_range, 1e5)?,
+            None => LIGHT_BEYOND_GATE * max_range,
+        };
+        let min_range = self.within("scan.min_range_m", file.min_range_m, 0.0, max_range)?;
+        let mut typed = file.patterns().into_iter().flatten();
+        let (Some(pattern), None) = (typed.next(), typed.next()) else {
+            let tables = PATTERNS.map(|name| format!("[scan.{name}]")).join(", ");
+            return self.refuse("scan", format!("needs exactly one of {tables}"));
+        };
+        let pattern = pattern.check(self)?;
+        if moves && pattern.answers().moves_by().is_none() {
+            return self.refuse(
+                "idealised",
+                "the motion of the beam is modelled for a raster alone: add \"mirror-motion\" to \
+                 this list",
+            );
+        }
+        let [rows, columns] = pattern.answers().size();
+        if u64::from(rows) * u64::from(columns) > MOST_PIXELS {
+            let message = format!("{rows} x {columns} pixels are more than {MOST_PIXELS}");
+            return self.refuse("scan", message);
+        }
+        let rate_millihertz = (rate * 1e3).round() as u64;
+        Ok(Scan {
+            rows,
+            columns,
+            rate_millihertz,
+            min_range,
+            reach,
+            max_range,
+            light_range,
+            moves,
+            pattern,
+        })
+    }
+
+    /// Rows and columns of the pattern of this `name`.
+    fn pixels(&self, name: &str, [rows, columns]: [u32; 2]) -> Result<[u32; 2], Error> {
+        Ok([
+            self.count(&format!("scan.{name}.rows"), rows, 1, 1 << 14)?,
+            self.count(&format!("scan.{name}.columns"), columns, 1, 1 << 15)?,
+        ])
+    }
+
+    /// Width and height, rad, of the field of the pattern of this `name`.
+    fn sides(&self, name: &str, typed: &Sides) -> Result<[f64; 2], Error> {
+        let side = |key: &str, typed, most| {
+            let checked = self.within(&format!("scan.{name}.{key}"), typed, 1e-3, most);
+            checked.map(f64::to_radians)
+        };
+        Ok([
+            side("horizontal_deg", typed.horizontal_deg, 360.0)?,
+            side("vertical_deg", typed.vertical_deg, 180.0)?,
+        ])
+    }
+}

@@ -1,0 +1,116 @@
+//! What every scan pattern answers.
+//!
+//! A pixel is a row and a column of the image. The order of a shot is its place among the shots of
+//! a scan, from 0.
+
+use super::Directions;
+use crate::design::safety::Beams;
+
+/// How the directions of a scan follow each other.
+pub(crate) trait ScanPattern {
+    /// What it is, in a few words for people.
+    fn describe(&self) -> String;
+
+    /// Rows and columns of the image: as many pixels as a scan has shots.
+    fn size(&self) -> [u32; 2];
+
+    /// Number of separate detectors.
+    fn channels(&self) -> u32;
+
+    /// The detector that sees the shot `order` of a scan, sent to `row`.
+    fn channel_of(&self, order: u64, row: u16) -> u16;
+
+    /// Row and column of the shot `order` of a scan.
+    fn pixel(&self, order: u64) -> (u16, u16);
+
+    /// The place of a pixel in the order of its scan: the inverse of [`ScanPattern::pixel`].
+    fn order_of(&self, row: u16, column: u16) -> u64;
+
+    /// When the shot `order` of a scan that lasts `period` seconds is fired. The chip clock, for
+    /// which a shot waits, is left out.
+    fn moment(&self, order: u64, period: f64) -> Moment;
+
+    /// Whether a scan is fired shot by shot, all of them equally far apart.
+    fn equal_steps(&self) -> bool {
+        false
+    }
+
+    /// Shots of a line: of what is computed together where time allows.
+    fn line(&self) -> u64;
+
+    /// Whether one beam draws every line from column 0 on, row by row.
+    fn draws_from_the_left(&self) -> bool {
+        false
+    }
+
+    /// Shortest time the beam spends on a pixel, s, `pixel_period` being the mean time between
+    /// shots.
+    fn shortest_dwell(&self, pixel_period: f64) -> f64;
+
+    /// Angle, rad, by which the beam moves on from a pixel to the next, where its motion during a
+    /// macropulse is modelled.
+    fn moves_by(&self) -> Option<f64> {
+        None
+    }
+
+    /// Where the pixels lie.
+    fn directions(&self) -> Directions;
+
+    /// The pixel in whose cell a direction lies, rad; `None` outside the field of view. A cell
+    /// reaches half of the way to its neighbours.
+    fn pixel_at(&self, azimuth: f64, elevation: f64) -> Option<(u16, u16)>;
+
+    /// Width and height, rad, of the cell that belongs to a pixel.
+    fn cell(&self) -> [f64; 2];
+
+    /// All that it looks at.
+    fn extent(&self) -> Extent;
+
+    /// Width and height, rad, of the field that a detector behind a moving beam would see if it
+    /// stared; `None` where each detector has pixels of its own.
+    fn shared_field(&self) -> Option<[f64; 2]>;
+
+    /// Whether what a detector sees moves on from shot to shot.
+    fn follows(&self) -> bool;
+
+    /// What it sends, as eye safety counts it.
+    fn beams(&self) -> Beams;
+}
+
+/// When a shot is fired, from the beginning of its scan: exact, and a rest that is not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Moment {
+    /// So many mean times between shots have passed.
+    pub shots: u64,
+    /// And this time more, s.
+    pub then: f64,
+}
+
+/// A rectangle of directions, rad: azimuth to the left, elevation up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Least and largest azimuth.
+    pub azimuth: [f64; 2],
+    /// Least and largest elevation.
+    pub elevation: [f64; 2],
+}
+
+impl Extent {
+    /// Of a field of `sides` rad, width and height, about the forward direction.
+    pub(super) fn centred(sides: [f64; 2]) -> Self {
+        let [azimuth, elevation] = sides.map(|side| [-side / 2.0, side / 2.0]);
+        Self { azimuth, elevation }
+    }
+}
+
+/// Middles, rad, of `cells` equal cells of a `field` about the forward direction, from the left to
+/// the right or from the top down.
+pub(super) fn middles(field: f64, cells: u32) -> impl Iterator<Item = f64> {
+    (0..cells).map(move |cell| field * (0.5 - (f64::from(cell) + 0.5) / f64::from(cells)))
+}
+
+/// The cell, of `cells` equal ones of a `field`, in which the direction `angle` lies, rad.
+pub(super) fn cell_at(angle: f64, field: f64, cells: u32) -> Option<u16> {
+    let cell = ((0.5 - angle / field) * f64::from(cells)).floor();
+    (0.0..f64::from(cells)).contains(&cell).then_some(cell as u16)
+}

@@ -1,0 +1,189 @@
+//! One beam that a mirror leads over the field, line by line.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use serde::Deserialize;
+
+use super::directions::{Angles, Directions};
+use super::pattern::{Extent, Moment, ScanPattern, cell_at, middles};
+use super::{Pattern, PatternFile, Sides};
+use crate::design::Error;
+use crate::design::check::Check;
+use crate::design::safety::{Beams, Line, Lines};
+
+/// One beam, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raster {
+    /// Rows of the image, from the top.
+    pub rows: u32,
+    /// Columns of the image, from the left.
+    pub columns: u32,
+    /// Full horizontal field, rad.
+    pub horizontal: f64,
+    /// Full vertical field, rad.
+    pub vertical: f64,
+    /// Motion of the fast axis.
+    pub mirror: Mirror,
+    /// Fraction of the line time in which shots are fired.
+    pub duty: f64,
+}
+
+/// How the fast axis of a raster moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mirror {
+    /// Constant angular speed, every line in the same direction.
+    Uniform,
+    /// Resonant: sinusoidal, lines to and fro.
+    Sinusoidal,
+}
+
+impl Mirror {
+    /// When, as a fraction of the line time, the mirror has crossed the fraction `across` of the
+    /// line, shots being fired in the fraction `duty` of that time.
+    ///
+    /// A resonant mirror stands at sin(π·s), s = −½…½ over the line time; only |s| ≤ duty/2 is used.
+    pub fn moment(self, duty: f64, across: f64) -> f64 {
+        match self {
+            Self::Uniform => (1.0 - duty) / 2.0 + duty * across,
+            Self::Sinusoidal => {
+                let end = libm::sin(FRAC_PI_2 * duty);
+                0.5 + libm::asin((2.0 * across - 1.0) * end) / PI
+            }
+        }
+    }
+}
+
+/// `[scan.raster]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RasterFile {
+    rows: u32,
+    columns: u32,
+    horizontal_deg: f64,
+    vertical_deg: f64,
+    mirror: Mirror,
+    duty: f64,
+}
+
+impl PatternFile for RasterFile {
+    fn check(&self, check: &Check) -> Result<Pattern, Error> {
+        let [rows, columns] = check.pixels("raster", [self.rows, self.columns])?;
+        let sides = Sides { horizontal_deg: self.horizontal_deg, vertical_deg: self.vertical_deg };
+        let [horizontal, vertical] = check.sides("raster", &sides)?;
+        let duty = check.within("scan.raster.duty", self.duty, 0.01, 1.0)?;
+        let mirror = self.mirror;
+        Ok(Pattern::Raster(Raster { rows, columns, horizontal, vertical, mirror, duty }))
+    }
+}
+
+impl Raster {
+    /// Whether the line of this number is drawn from the right to the left.
+    fn comes_back(&self, line: u64) -> bool {
+        self.mirror == Mirror::Sinusoidal && line % 2 == 1
+    }
+}
+
+impl ScanPattern for Raster {
+    fn describe(&self) -> String {
+        "one beam, mirror raster".to_owned()
+    }
+
+    fn size(&self) -> [u32; 2] {
+        [self.rows, self.columns]
+    }
+
+    fn channels(&self) -> u32 {
+        1
+    }
+
+    fn channel_of(&self, _order: u64, _row: u16) -> u16 {
+        0
+    }
+
+    fn pixel(&self, order: u64) -> (u16, u16) {
+        let columns = u64::from(self.columns);
+        let (line, across) = (order / columns, order % columns);
+        let column = if self.comes_back(line) { columns - 1 - across } else { across };
+        (line as u16, column as u16)
+    }
+
+    fn order_of(&self, row: u16, column: u16) -> u64 {
+        let (line, columns) = (u64::from(row), u64::from(self.columns));
+        let column = u64::from(column);
+        line * columns + if self.comes_back(line) { columns - 1 - column } else { column }
+    }
+
+    fn moment(&self, order: u64, period: f64) -> Moment {
+        if self.equal_steps() {
+            return Moment { shots: order, then: 0.0 };
+        }
+        let columns = u64::from(self.columns);
+        let across = (order % columns) as f64 / columns as f64;
+        let line = period / f64::from(self.rows);
+        let then = line * self.mirror.moment(self.duty, across);
+        Moment { shots: order / columns * columns, then }
+    }
+
+    fn equal_steps(&self) -> bool {
+        self.mirror == Mirror::Uniform && self.duty == 1.0
+    }
+
+    fn line(&self) -> u64 {
+        self.columns.into()
+    }
+
+    fn draws_from_the_left(&self) -> bool {
+        self.mirror == Mirror::Uniform
+    }
+
+    fn shortest_dwell(&self, pixel_period: f64) -> f64 {
+        match self.mirror {
+            Mirror::Uniform => pixel_period * self.duty,
+            Mirror::Sinusoidal => {
+                // Position sin(π·s) for s in ±duty/2 of the line time, scaled to ±1 at the ends.
+                let columns = f64::from(self.columns);
+                let end = (FRAC_PI_2 * self.duty).sin();
+                pixel_period * columns * 2.0 / PI * (end / columns).asin()
+            }
+        }
+    }
+
+    fn moves_by(&self) -> Option<f64> {
+        Some(self.horizontal / f64::from(self.columns))
+    }
+
+    fn directions(&self) -> Directions {
+        let elevations = Angles::by_row(middles(self.vertical, self.rows));
+        Directions::new(&elevations, &Angles::by_column(middles(self.horizontal, self.columns)))
+    }
+
+    fn pixel_at(&self, azimuth: f64, elevation: f64) -> Option<(u16, u16)> {
+        let row = cell_at(elevation, self.vertical, self.rows)?;
+        Some((row, cell_at(azimuth, self.horizontal, self.columns)?))
+    }
+
+    fn cell(&self) -> [f64; 2] {
+        [self.horizontal / f64::from(self.columns), self.vertical / f64::from(self.rows)]
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::centred([self.horizontal, self.vertical])
+    }
+
+    fn shared_field(&self) -> Option<[f64; 2]> {
+        Some([self.horizontal, self.vertical])
+    }
+
+    fn follows(&self) -> bool {
+        true
+    }
+
+    fn beams(&self) -> Beams {
+        let step = self.horizontal / f64::from(self.columns);
+        let first = (self.horizontal - step) / 2.0;
+        let rows = middles(self.vertical, self.rows);
+        let rows = rows.map(|elevation| Line { elevation, first }).collect();
+        Beams::Lines(Lines { rows, step, first, one_by_one: true })
+    }
+}
