@@ -84,7 +84,7 @@ pub struct Run<'a> {
     pub design: &'a Design,
     /// The scene.
     pub scene: &'a Scene,
-    /// Seed of all chance.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// Scans that are complete.
     pub scans: u64,

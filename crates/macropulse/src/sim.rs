@@ -29,7 +29,7 @@ pub struct Scan {
     pub tally: Tally,
 }
 
-/// Scan number `number` of the sensor `design` in `scene`, with the chance of `seed`.
+/// Scan number `number` of the sensor `design` in `scene`, with the random numbers of `seed`.
 ///
 /// The bands of the scan are computed side by side on the threads of the current rayon pool; the
 /// result does not depend on how many there are.
@@ -88,7 +88,7 @@ pub struct Scans<'a> {
 }
 
 impl<'a> Scans<'a> {
-    /// The scans of the sensor `design` in `scene`, with the chance of `seed`.
+    /// The scans of the sensor `design` in `scene`, with the random numbers of `seed`.
     ///
     /// # Errors
     /// As [`scan`].

@@ -25,7 +25,7 @@ const DESCRIPTION: &str = "sweep.json";
 pub struct Job<'a> {
     /// What is measured.
     pub point: &'a Point,
-    /// With which chance.
+    /// The seed of its random numbers.
     pub seed: u64,
     pub(super) scene: &'a Scene,
 }

@@ -58,7 +58,7 @@ pub struct Begun {
 pub struct Manifest {
     /// Version of macropulse.
     pub version: String,
-    /// Seed of all chance.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// The sensor.
     pub sensor: Named,
