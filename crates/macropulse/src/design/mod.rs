@@ -87,9 +87,9 @@ pub struct Scan {
     pub rate_millihertz: u64,
     /// Nearest range accepted, m.
     pub min_range: f64,
-    /// Range the sensor is declared to reach, m.
-    pub reach: f64,
-    /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
+    /// Rated range: the range that the sensor is declared for, m.
+    pub rated_range: f64,
+    /// Farthest range accepted, m: the end of the range gate, at or beyond the rated range.
     pub max_range: f64,
     /// Range to which the light of a shot is followed, m: beyond the gate, because what returns
     /// from there arrives in the gates of later shots.

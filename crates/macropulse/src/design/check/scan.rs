@@ -15,9 +15,9 @@ const LIGHT_BEYOND_GATE: f64 = 2.0;
 impl Check<'_> {
     pub(super) fn scan(&self, file: &ScanFile, moves: bool) -> Result<Scan, Error> {
         let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
-        let reach = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
+        let rated_range = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
         let beyond = self.within("scan.gate_beyond_m", file.gate_beyond_m, 0.0, 1e5)?;
-        let max_range = reach + beyond;
+        let max_range = rated_range + beyond;
         let light_range = match file.light_range_m {
             Some(typed) => self.within("scan.light_range_m", typed, max_range, 1e5)?,
             None => LIGHT_BEYOND_GATE * max_range,
@@ -80,7 +80,7 @@ impl Check<'_> {
             columns,
             rate_millihertz,
             min_range,
-            reach,
+            rated_range,
             max_range,
             light_range,
             moves,
