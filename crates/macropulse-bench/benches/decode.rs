@@ -274,7 +274,7 @@ impl<'a> Sought<'a> {
 }
 
 /// The receiver beside the plain ways, on the same ticks.
-fn rivals() {
+fn plain_ways() {
     let design = open(&detector(0.0, 0.0));
     let bands = spread(&design, BANDS);
     let met = met(&design, &bands, "street");
@@ -357,7 +357,7 @@ fn main() {
     if !std::env::args().any(|word| word == "--bench") {
         return;
     }
-    rivals();
+    plain_ways();
     growth();
     scenes();
 }

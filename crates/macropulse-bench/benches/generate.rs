@@ -1,4 +1,4 @@
-//! How long the ticks of a whole scan of `kim-park-2016` take: shot log, echoes, edges, ticks, on
+//! How long the ticks of a whole scan of `kim-park-2016` take: shot log, echoes, detection events, ticks, on
 //! one thread. One element is one scan, so that 60 elements a second keep up with the sensor.
 //!
 //! What the scene makes of the shots is traced beforehand.

@@ -104,7 +104,7 @@ fn seven_each(all: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// The same triangles, three times.
-struct Rivals {
+struct Libraries {
     name: String,
     scene: Scene,
     obvhs: Bvh2,
@@ -112,7 +112,7 @@ struct Rivals {
     parry: TriMesh,
 }
 
-impl Rivals {
+impl Libraries {
     fn new(name: &str, triangles: &[Corners]) -> Self {
         let began = Instant::now();
         let scene = scene(triangles);
@@ -181,22 +181,22 @@ fn scene(triangles: &[Corners]) -> Scene {
 }
 
 /// What is measured, by name.
-type Way = (&'static str, fn(&Rivals, &[[f64; 3]]) -> usize);
+type Way = (&'static str, fn(&Libraries, &[[f64; 3]]) -> usize);
 
 const WAYS: [Way; 4] = [
-    ("packets", Rivals::packets),
-    ("one by one", Rivals::one_by_one),
-    ("obvhs", Rivals::obvhs),
-    ("parry3d", Rivals::parry),
+    ("packets", Libraries::packets),
+    ("one by one", Libraries::one_by_one),
+    ("obvhs", Libraries::obvhs),
+    ("parry3d", Libraries::parry),
 ];
 
 /// Millions of rays per second: the best of several rounds, the ways taking turns.
-fn rates(rivals: &Rivals, rays: &[[f64; 3]]) -> [f64; WAYS.len()] {
+fn rates(libraries: &Libraries, rays: &[[f64; 3]]) -> [f64; WAYS.len()] {
     let mut best = [0.0_f64; WAYS.len()];
     for _ in 0..9 {
         for ((_, way), best) in WAYS.iter().zip(&mut best) {
             let began = clock();
-            black_box(way(rivals, rays));
+            black_box(way(libraries, rays));
             *best = best.max(rays.len() as f64 * 1e-6 / (clock() - began));
         }
     }
@@ -266,17 +266,17 @@ fn main() {
     let patterns = [("rows", &coherent), ("seven each", &seven), ("shuffled", &shuffled)];
     let mut table = vec![];
     for (name, triangles) in scenes {
-        let rivals = Rivals::new(name, &triangles);
+        let libraries = Libraries::new(name, &triangles);
         drop(triangles);
         for (pattern, rays) in patterns {
-            let mut group = criterion.benchmark_group(format!("{} {pattern}", rivals.name));
+            let mut group = criterion.benchmark_group(format!("{} {pattern}", libraries.name));
             group.throughput(Throughput::Elements(rays.len() as u64));
             for (way, cast) in WAYS {
-                group.bench_function(way, |bencher| bencher.iter(|| cast(&rivals, rays)));
+                group.bench_function(way, |bencher| bencher.iter(|| cast(&libraries, rays)));
             }
             group.finish();
             if in_earnest {
-                table.push((format!("{} {pattern}", rivals.name), rates(&rivals, rays)));
+                table.push((format!("{} {pattern}", libraries.name), rates(&libraries, rays)));
             }
         }
     }

@@ -10,7 +10,7 @@ use macropulse_study::{paper, record, sweep};
 /// Why a command did not do what was asked.
 #[derive(Debug)]
 pub enum Fault {
-    /// Somebody wrote a wrong file, name or option.
+    /// A file, name or option that was typed wrong.
     Wrong(String),
     /// As `Wrong`, for several reasons at once: a sentence each.
     AllWrong(Vec<String>),

@@ -24,7 +24,7 @@ pub struct Paper {
     #[arg(short, long, value_name = "DIR", default_value = "paper")]
     output: PathBuf,
 
-    /// Seed of all chance
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 

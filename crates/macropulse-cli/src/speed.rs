@@ -127,11 +127,11 @@ impl Stages {
 /// Whole scans per second on all threads.
 fn scans_per_s(design: &Design, scene: &Scene) -> Result<f64, Fault> {
     let mut scans = Scans::new(design, scene, SEED)?;
-    let nobody = Watch { done: &|_| {}, stop: &|| false };
+    let unwatched = Watch { done: &|_| {}, stop: &|| false };
     let began = Instant::now();
     let mut done = 0;
     while done < 2 || began.elapsed() < LONG_ENOUGH {
-        scans.scan(done, &nobody);
+        scans.scan(done, &unwatched);
         done += 1;
     }
     Ok(done as f64 / began.elapsed().as_secs_f64())
@@ -163,7 +163,7 @@ impl Figures {
         );
         columns.push("generate", format!("{} (street, clean)", multiple(self.generate)));
         columns.push("decode", format!("{} (street, clean)", multiple(self.decode)));
-        let noise = "street, 20 % missed, 1e9 false edges/s";
+        let noise = "street, 20 % missed, 1e9 dark counts/s";
         columns.push("", format!("{} ({noise})", multiple(self.decode_noisy)));
         let threads = self.threads;
         let scans = |figure| format!("{} scans/s, threads: {threads} (car-50m, ", two(figure));

@@ -1,7 +1,7 @@
 //! The codec of Macropulse: what both ends of a pulse-coded lidar link speak, and the receivers.
 //!
-//! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word in a frame
-//! of chips. A receiver is given the **ticks** at which its converters saw light and the **shot
+//! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word laid out on
+//! chips. A receiver is given the **ticks** at which its converters saw light and the **shot
 //! log** of what was sent when, and finds the delay of every shot. Nothing here knows a scene,
 //! light, a file system or a thread pool.
 //!

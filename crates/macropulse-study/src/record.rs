@@ -84,7 +84,7 @@ pub struct Run<'a> {
     pub design: &'a Design,
     /// The scene.
     pub scene: &'a Scene,
-    /// Seed of all chance.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// Scans that are complete.
     pub scans: u64,
@@ -126,7 +126,7 @@ pub fn manifest(run: &Run) -> Manifest {
         ("shots", tally.shots),
         ("surfaces", tally.surfaces),
         ("echoes", tally.echoes),
-        ("edges", tally.edges),
+        ("detections", tally.detections),
         ("ticks", tally.ticks),
         ("returns", tally.returns),
     ] {
@@ -137,7 +137,7 @@ pub fn manifest(run: &Run) -> Manifest {
         manifest.counts.push(format!("returns_{number}"), count);
     }
     if !scene.interferers.is_empty() {
-        manifest.counts.push("foreign", tally.foreign);
+        manifest.counts.push("interferer_shots", tally.interferer_shots);
         manifest.counts.push("ghosts", run.score.ghosts);
     }
     for (kind, count) in Reject::ALL.into_iter().zip(tally.rejects) {

@@ -99,7 +99,7 @@ fn samples_on_the_car_are_those_that_its_silhouette_predicts() {
                 band.contains(&(samples as f64)),
                 "{sensor} at {distance} m: {samples}, predicted {predicted:?}"
             );
-            // Beyond the reach of a sensor there is nothing to sample.
+            // Beyond the rated range of a sensor there is nothing to sample.
             assert_eq!(samples == 0, sensor == "peregrine" && distance == 120, "{sensor}");
         }
     }

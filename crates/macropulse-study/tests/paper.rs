@@ -332,7 +332,7 @@ mod light {
         assert_relative_eq!(background, 947.0, max_relative = 2e-3);
         // Instead, white at 150 m is declared to be seen with 0.99 a mark: −ln 0.01 photons.
         assert_relative_eq!(DERIVED.reference_photons, -0.01_f64.ln(), max_relative = 1e-9);
-        reported("reach", Fails, &["17.8 photons", "0.10 a micropulse", "947 of sunlight"]);
+        reported("rated-range", Fails, &["17.8 photons", "0.10 a micropulse", "947 of sunlight"]);
         reported("parts", Assumed, &["ideal 400 GHz detector"]);
     }
 }

@@ -1,10 +1,9 @@
-//! Chance is addressed, never drawn in sequence.
+//! Counter-based random numbers: Philox4x32-10 \[SMDS11\].
 //!
-//! Every random number belongs to an address (seed, stage, index, part), where the index is a shot
-//! or a time window. Whoever computes that shot, in whatever order, on whatever thread, draws the
-//! same numbers; the overlap between neighbouring bands sees the same edges as their owned band
-//! does. The numbers are a function of their address, Philox4x32-10 \[SMDS11\]; there is no state
-//! that a stage could leave behind.
+//! Every random number is a function of a counter, its address (seed, stage, index, part), where
+//! the index is a shot, a pulse train or a time window. The same shot gets the same numbers on any
+//! thread and in any order, and where neighbouring bands overlap, both see the same detection
+//! events. Nothing is drawn in sequence, and no stage leaves a state behind.
 
 use std::convert::Infallible;
 
@@ -12,13 +11,13 @@ use rand::rand_core::TryRng;
 
 use crate::kernels::{GROUP, philox};
 
-/// Which question chance is asked. Each stage has numbers of its own.
+/// What random numbers are drawn for. Each stage has numbers of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Is this mark seen? Indexed by pulse train.
     Marks = 1,
     /// Dark counts and background. Indexed by time window, parts by channel.
-    FalseEdges = 2,
+    Noise = 2,
     /// The firing of a detector that fires once per shot. Indexed by shot.
     Firing = 3,
     /// How late is a mark that is seen? Indexed by pulse train.
@@ -36,10 +35,10 @@ pub enum Stage {
     Stretch = 9,
 }
 
-/// Where a run of random numbers stands.
+/// The counter at which a run of random numbers begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Address {
-    /// Which question.
+    /// What the numbers are for.
     pub(crate) stage: Stage,
     /// Of which shot or window.
     pub(crate) index: u64,
@@ -47,14 +46,14 @@ pub(crate) struct Address {
     pub(crate) part: u32,
 }
 
-/// All the chance of one run.
+/// All random numbers of one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Chance {
     key: [u32; 2],
 }
 
 impl Chance {
-    /// The chance that belongs to `seed`.
+    /// The random numbers of `seed`.
     pub fn new(seed: u64) -> Self {
         Self { key: [seed as u32, (seed >> 32) as u32] }
     }
@@ -144,7 +143,7 @@ mod tests {
     fn an_address_gives_the_same_numbers_whatever_happened_between() {
         let chance = Chance::new(7);
         let first = chance.at(Stage::Marks, 12).next_u64();
-        let _ = chance.at(Stage::FalseEdges, 12).next_u64();
+        let _ = chance.at(Stage::Noise, 12).next_u64();
         assert_eq!(chance.at(Stage::Marks, 12).next_u64(), first);
     }
 

@@ -1,4 +1,4 @@
-//! The whole flow, as function calls.
+//! The whole chain from shots to points, as function calls.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -29,7 +29,7 @@ pub struct Scan {
     pub tally: Tally,
 }
 
-/// Scan number `number` of the sensor `design` in `scene`, with the chance of `seed`.
+/// Scan number `number` of the sensor `design` in `scene`, with the random numbers of `seed`.
 ///
 /// The bands of the scan are computed side by side on the threads of the current rayon pool; the
 /// result does not depend on how many there are.
@@ -48,12 +48,12 @@ pub fn scan(design: &Design, scene: &Scene, seed: u64, number: u64) -> Result<Sc
 pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> Result<Scan, Error> {
     let mut scans = Scans::new(design, scene, seed)?;
     // A watch that never says stop lets every band through.
-    let nobody = Watch { done: &|_| {}, stop: &|| false };
-    scans.measure(bands, &nobody);
+    let unwatched = Watch { done: &|_| {}, stop: &|| false };
+    scans.measure(bands, &unwatched);
     Ok(scans.scan)
 }
 
-/// As [`scan`], with somebody looking on; `None` if the watch said stop before the end.
+/// As [`scan`], under a `watch`; `None` if it said stop before the end.
 ///
 /// # Errors
 /// As [`scan`].
@@ -69,15 +69,15 @@ pub fn scan_watched(
     Ok(is_whole.then_some(scans.scan))
 }
 
-/// Who looks on while scans are computed. Asked and told from many threads.
+/// Follows the progress of scans and may stop them. Called from many threads.
 pub struct Watch<'a> {
-    /// Is told the shots of each finished band.
+    /// Called with the number of shots of each finished band.
     pub done: &'a (dyn Fn(u64) + Sync),
-    /// Is asked before each band whether to stop; bands that are under way are finished.
+    /// Called before each band, to tell whether to stop; bands that are under way are finished.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Scan after scan of one sensor in one scene, as many as there may be in the memory of one.
+/// Scan after scan of one sensor in one scene, in the memory of a single one.
 pub struct Scans<'a> {
     design: &'a Design,
     scene: &'a Scene,
@@ -88,7 +88,7 @@ pub struct Scans<'a> {
 }
 
 impl<'a> Scans<'a> {
-    /// The scans of the sensor `design` in `scene`, with the chance of `seed`.
+    /// The scans of the sensor `design` in `scene`, with the random numbers of `seed`.
     ///
     /// # Errors
     /// As [`scan`].
@@ -216,7 +216,7 @@ fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<
     let light = channel::light(&setup.seen, &log, &traced);
     lap(&mut tally);
     let detections = detectors.detections(&log, &light, memory);
-    tally.edges = detections.time.len() as u64;
+    tally.detections = detections.time.len() as u64;
     lap(&mut tally);
     let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, detections);
     lap(&mut tally);
@@ -233,7 +233,7 @@ fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<
     for (transmitter, shot) in light.trains.transmitter.iter().zip(&light.trains.shot) {
         match transmitter {
             0 => tally.echoes += u64::from(owned.contains(shot)),
-            _ => tally.foreign += 1,
+            _ => tally.interferer_shots += 1,
         }
     }
     tally.ticks = ticks.tick.len() as u64;
@@ -252,8 +252,8 @@ fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<
 /// The last stage, after those of a band: its points and their score.
 const POINTS: usize = 6;
 
-/// Counts of a run, stage by stage. Foreign light, edges and ticks include the guard shots of the
-/// bands; the other counts are of owned shots alone.
+/// Counts of a run, stage by stage. Those of interferers, detection events and ticks include the
+/// guard shots of the bands; the others are of owned shots alone.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
     /// Shots fired.
@@ -262,15 +262,15 @@ pub struct Tally {
     pub surfaces: u64,
     /// Echoes with any light.
     pub echoes: u64,
-    /// Shots of other lidars whose light arrives, each way on its own.
-    pub foreign: u64,
-    /// Detector edges.
-    pub edges: u64,
+    /// Shots of interferers whose light arrives, each way on its own.
+    pub interferer_shots: u64,
+    /// Detection events.
+    pub detections: u64,
     /// Ticks that reached the decoder.
     pub ticks: u64,
-    /// Edges that fell into the tick of another one.
+    /// Detection events that fell into the tick of another one.
     pub merged: u64,
-    /// Edges that found every converter busy.
+    /// Detection events that found every converter busy.
     pub lost: u64,
     /// Most converters busy at once.
     pub peak_busy: u32,
@@ -295,8 +295,8 @@ impl Tally {
             (&mut self.shots, other.shots),
             (&mut self.surfaces, other.surfaces),
             (&mut self.echoes, other.echoes),
-            (&mut self.foreign, other.foreign),
-            (&mut self.edges, other.edges),
+            (&mut self.interferer_shots, other.interferer_shots),
+            (&mut self.detections, other.detections),
             (&mut self.ticks, other.ticks),
             (&mut self.merged, other.merged),
             (&mut self.lost, other.lost),
@@ -321,10 +321,10 @@ impl Tally {
                 "every surface met is black at this wavelength, or no longer in the field of the \
                  receiver when its light comes",
             ),
-            _ if self.edges == 0 => {
+            _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")
             }
-            _ if self.ticks == 0 => Some("every edge found all converters busy"),
+            _ if self.ticks == 0 => Some("every detection event found all converters busy"),
             _ => Some("the receiver decoded none of the macropulses; the rejects say why"),
         }
     }

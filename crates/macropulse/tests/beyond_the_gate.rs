@@ -32,14 +32,18 @@ fn middle(design: &Design, scene: &Scene) -> Scan {
 fn a_wall_beyond_the_gate_makes_as_many_events_as_one_within() {
     let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
     let [near, far] = [140.0, 161.0].map(|range| middle(&design, &wall(range)));
-    let ratio = far.tally.edges as f64 / near.tally.edges as f64;
+    let ratio = far.tally.detections as f64 / near.tally.detections as f64;
     assert!((0.95..1.05).contains(&ratio), "{ratio}");
     // The near one lies in the gate of 150 m where it is square on: some columns see it farther.
     assert!(near.score.count(Outcome::Right) > 1400, "{:?}", near.score);
     // Control: where light is followed to the gate alone there is nothing behind it.
     let gated = Design::open("kim-park-2016-fixed", &[("scan.light_range_m".into(), "150".into())]);
     let dark = middle(&gated.unwrap(), &wall(161.0));
-    assert!((dark.tally.edges as f64) < 0.01 * far.tally.edges as f64, "{:?}", dark.tally);
+    assert!(
+        (dark.tally.detections as f64) < 0.01 * far.tally.detections as f64,
+        "{:?}",
+        dark.tally
+    );
 }
 
 /// Not one of 1696 shots reports the wall at 161 m, nor one that is barely out of the gate, whose
@@ -49,7 +53,7 @@ fn the_coded_receiver_reports_no_wall_beyond_its_gate() {
     let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
     for range in [150.2, 151.0, 161.0] {
         let scan = middle(&design, &wall(range));
-        assert!(scan.tally.edges > 100_000);
+        assert!(scan.tally.detections > 100_000);
         assert_eq!(scan.score.count(Outcome::False), 0, "{range} m: {:?}", scan.score);
     }
 }

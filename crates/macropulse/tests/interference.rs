@@ -57,7 +57,7 @@ fn score(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Score {
 #[test]
 fn without_others_nothing_changes() {
     let alone = part("none", &[], 0);
-    assert_eq!(alone.score.ghosts + alone.tally.foreign, 0);
+    assert_eq!(alone.score.ghosts + alone.tally.interferer_shots, 0);
     assert_eq!(alone.score.pixels, [1284, 5500, 0, 0, 0, 0]);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/interference");
     let text = std::fs::read_to_string(folder.join("none.toml")).unwrap();
@@ -90,8 +90,8 @@ fn single_pulses_do_nothing_to_a_coded_receiver() {
     for name in ["single-pulse", "dense-pulses"] {
         for keys in [&[][..], &[LITERAL]] {
             let (with, without) = (part(name, keys, 0), part("none", keys, 0));
-            assert!(with.tally.foreign > 100, "{name}: {:?}", with.tally);
-            assert!(with.tally.edges > without.tally.edges + 100, "{name}");
+            assert!(with.tally.interferer_shots > 100, "{name}: {:?}", with.tally);
+            assert!(with.tally.detections > without.tally.detections + 100, "{name}");
             assert_eq!(with.score.ghosts, 0, "{name} {:?}", with.score);
             let right = |scan: &Scan| scan.score.count(Outcome::Right);
             assert!(right(&with) + 7 > right(&without), "{name} {:?}", with.score);
@@ -99,7 +99,7 @@ fn single_pulses_do_nothing_to_a_coded_receiver() {
     }
 }
 
-/// Every macropulse of the other is one that we have just sent ourselves: nobody can tell it. All
+/// Every macropulse of the other is one that we have just sent ourselves: they cannot be told apart. All
 /// pixels of the sky where the other sees its wall get a ghost.
 #[test]
 fn an_identical_lidar_in_phase_deceives_every_receiver() {
@@ -182,10 +182,13 @@ fn a_spinning_lidar_hardly_sees_the_others() {
     let alone = sim::scan(&design, &scenario("none"), SEED, 0).unwrap();
     for name in ["dense-pulses", "coded"] {
         let scan = sim::scan(&design, &scenario(name), SEED, 0).unwrap();
-        assert!((1..50).contains(&scan.tally.foreign), "{name} {:?}", scan.tally);
+        assert!((1..50).contains(&scan.tally.interferer_shots), "{name} {:?}", scan.tally);
         let pixels = ranges(&scan).into_iter().zip(ranges(&alone));
         let changed = pixels.filter(|(a, b)| a.to_bits() != b.to_bits()).count() as u64;
-        assert!(changed <= scan.tally.foreign && scan.score.ghosts <= changed, "{name} {changed}");
+        assert!(
+            changed <= scan.tally.interferer_shots && scan.score.ghosts <= changed,
+            "{name} {changed}"
+        );
     }
 }
 
@@ -197,20 +200,20 @@ fn wall(keys: &str) -> Scene {
     Scene::from_toml(&text, "wall", Path::new("")).unwrap()
 }
 
-/// Foreign light alone in the detector of `design`: edges by absolute time, in parts of a tick.
-fn edges(design: &Design, scene: &Scene, band: &Band, is_alone: bool) -> Vec<i64> {
+/// Light of interferers alone in the detector of `design`: detection events by absolute time, in parts of a tick.
+fn detections(design: &Design, scene: &Scene, band: &Band, is_alone: bool) -> Vec<i64> {
     let log = band.shot_log(design);
     let traced = if is_alone { Traced::default() } else { scene.trace(design, &log) };
     let operating = Operating::of(design, &scene.environment).unwrap();
     let light = channel::light(&Seen { design, scene, operating: &operating }, &log, &traced);
     let detectors = Detectors::new(design, &operating, Chance::new(SEED));
-    let edges = detectors.detections(&log, &light, &mut Memory::default());
-    edges.time.iter().map(|time| edges.epoch * 64 + i64::from(*time)).collect()
+    let found = detectors.detections(&log, &light, &mut Memory::default());
+    found.time.iter().map(|time| found.epoch * 64 + i64::from(*time)).collect()
 }
 
-/// H0: edges come at the rate of the closed form. Mean 1.5e5, seed 1, α = 1e-5 (|z| < 4.4).
+/// H0: detection events come at the rate of the closed form. Mean 1.5e5, seed 1, α = 1e-5 (|z| < 4.4).
 #[test]
-fn foreign_edges_come_at_the_rate_that_theory_says() {
+fn detections_of_interferers_come_at_the_rate_that_theory_says() {
     let design = open("kim-park-2016-fixed", &[("detector.photon-counting.dark_counts_hz", "0")]);
     let scene = wall(
         "diffuse = 0.02\n[[interferers]]\nsensor = \"kim-park-2016-fixed\"\n\
@@ -218,7 +221,7 @@ fn foreign_edges_come_at_the_rate_that_theory_says() {
     );
     // Exactly two lines of the other, whatever the phase.
     let lines = 2.0 * design.scan_period() / 480.0 * 1e15 / (1.0 - 11e-6);
-    let times = edges(&design, &scene, &bands(&design, 0).nth(100).unwrap(), true);
+    let times = detections(&design, &scene, &bands(&design, 0).nth(100).unwrap(), true);
     let from = times[0] + 64 * 20_000;
     let two_lines = from..from + (lines * 64.0 / 2500.0) as i64;
     assert!(*times.last().unwrap() > two_lines.end);
@@ -291,7 +294,7 @@ fn neighbouring_bands_agree_where_they_overlap() {
         let times: Vec<Vec<i64>> = bands(&design, 3)
             .skip(120)
             .take(2)
-            .map(|band| edges(&design, &scene, &band, false))
+            .map(|band| detections(&design, &scene, &band, false))
             .collect();
         let seam = Band { scan: 3, first: 121 * 1696, shots: 1 }.shot_log(&design);
         let seam = seam.fired_at_fs[seam.owned.start] / 2500 * 64;
@@ -313,5 +316,8 @@ fn threads_change_nothing() {
     let (one, three) = (on(1), on(3));
     assert_eq!(columns(&one), columns(&three));
     assert_eq!(one.score, three.score);
-    assert_eq!((one.tally.foreign, one.tally.edges), (three.tally.foreign, three.tally.edges));
+    assert_eq!(
+        (one.tally.interferer_shots, one.tally.detections),
+        (three.tally.interferer_shots, three.tally.detections)
+    );
 }

@@ -50,11 +50,7 @@ const SIMULATOR: Layers = Layers {
     may_name: &["macropulse_codec"],
     modules: &[
         Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
-        Rule {
-            module: "digest",
-            may_name: &[],
-            because: "a hash of bytes asks not whose they are",
-        },
+        Rule { module: "digest", may_name: &[], because: "a hash depends on bytes alone" },
         Rule {
             module: "names",
             may_name: &[],
@@ -63,7 +59,7 @@ const SIMULATOR: Layers = Layers {
         Rule {
             module: "random",
             may_name: &["kernels"],
-            because: "random numbers are addressed, not drawn by a stage",
+            because: "random numbers are a function of their counter",
         },
         Rule {
             module: "units",
@@ -355,7 +351,7 @@ fn every_module_has_a_rule() {
     }
 }
 
-/// A permission that nobody uses is a hole in the wall.
+/// A permission without a use is a hole in the wall.
 #[test]
 fn every_permission_is_used() {
     for layers in CRATES {
@@ -419,22 +415,22 @@ fn physical(text: &str) -> Option<String> {
 }
 
 /// The crate that a line of `use` brings in from outside, beyond those allowed.
-fn foreign(text: &str) -> Option<String> {
+fn from_outside(text: &str) -> Option<String> {
     let code = bare(text);
     let uses = code.lines().filter_map(|line| line.trim().strip_prefix("use "));
     let own = ["crate", "super", "self"];
     let mut roots = uses.map(first_name);
-    let is_foreign = |root: &&str| !own.contains(root) && !CRATES_OF_CODE.contains(root);
+    let is_from_outside = |root: &&str| !own.contains(root) && !CRATES_OF_CODE.contains(root);
     // Tests may use what they like.
     let tests = ["approx", "proptest"];
-    roots.find(|root| is_foreign(root) && !tests.contains(root)).map(str::to_owned)
+    roots.find(|root| is_from_outside(root) && !tests.contains(root)).map(str::to_owned)
 }
 
 #[test]
 fn code_knows_chips_and_marks_alone() {
     for (file, text) in sources(&CODEC, "code") {
         assert_eq!(physical(&text), None, "{file}: chips have no length at this level");
-        assert_eq!(foreign(&text), None, "{file}: a codec depends on next to nothing");
+        assert_eq!(from_outside(&text), None, "{file}: a codec depends on next to nothing");
     }
 }
 
@@ -466,10 +462,10 @@ fn a_breach_is_found() {
     assert_eq!(found("use crate::*;"), "*");
     assert_eq!(found("let q = '\"'; let s = \"a \\\" b\"; use crate::scene::Hits;"), "scene");
     assert_eq!(found("//! Not `crate::scene`.\nconst A: &str = \"crate::sim\";"), "");
-    assert_eq!(found("use crate::design::Tdc;\nuse crate::detect::Edges;"), "");
+    assert_eq!(found("use crate::design::Tdc;\nuse crate::detect::Detections;"), "");
     assert_eq!(physical("// seconds\nlet chip_fs = 1;"), Some("chip_fs".to_owned()));
     assert_eq!(physical("// metres\nlet chips = 1;"), None);
-    assert_eq!(foreign("use std::fmt;\nuse libm::exp;"), Some("libm".to_owned()));
+    assert_eq!(from_outside("use std::fmt;\nuse libm::exp;"), Some("libm".to_owned()));
     assert!(words("cloud.truth: Truth").any(|word| word == "Truth"));
 }
 

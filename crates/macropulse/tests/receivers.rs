@@ -164,7 +164,7 @@ fn decoded_with_other_labels(kind: macropulse::codec::decode::ReceiverKind) -> (
 #[test]
 fn light_with_other_labels_is_rejected() {
     // N = 3392. Few lit bits, all at one end, can fit one end of another payload: the bits beyond
-    // belong to nobody.
+    // belong to no shot.
     let (answers, mismatches, _) = decoded_with_other_labels(Matched);
     assert!(answers < 170 && mismatches > 3200, "{answers} answers, {mismatches} rejects");
     let (answers, _, unknown) = decoded_with_other_labels(Blind);

@@ -23,11 +23,11 @@ pub const SEED: u64 = 20_160_913;
 /// Fractions of the marks that are missed.
 const MISSED: [f64; 4] = [0.0, 0.05, 0.2, 0.4];
 
-/// False edges per second.
+/// Dark and background counts per second.
 const FALSE: [f64; 4] = [0.0, 1e8, 1e9, 1e10];
 
 /// Name and keys of each condition: the detector as declared, and without jitter all that miss so
-/// many marks and add so many false edges.
+/// many marks and add so many dark and background counts.
 pub fn conditions() -> impl Iterator<Item = (String, Vec<(String, String)>)> {
     let both = MISSED.into_iter().flat_map(|missed| FALSE.map(|rate| (missed, rate)));
     let all = both.map(|(missed, rate)| {
@@ -116,7 +116,7 @@ pub fn spread(design: &Design, count: usize) -> Vec<Band> {
 }
 
 /// The keys that make the detector of `kim-park-2016` see marks without jitter, but for a fraction
-/// `missed` of them, and false edges at `rate` per second.
+/// `missed` of them, and dark and background counts at `rate` per second.
 pub fn detector(missed: f64, rate: f64) -> Vec<(String, String)> {
     let set = [
         ("sensitivity.pd", 1.0),

@@ -36,7 +36,7 @@ pub struct Budget {
     #[command(flatten)]
     changes: Changes,
 
-    /// Range of the target, m; the sensor's own reach if not given
+    /// Range of the target, m; the rated range of the sensor if not given
     #[arg(long, value_name = "M", value_parser = positive)]
     range: Option<f64>,
 
@@ -81,7 +81,7 @@ pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
     let environment = Surroundings::alone(&changes)?;
     let wanted = Wanted {
         reflectance: options.reflectance,
-        range: options.range.unwrap_or(design.scan.reach),
+        range: options.range.unwrap_or(design.scan.rated_range),
         pd: options.pd,
         false_points: options.false_points,
     };

@@ -40,14 +40,14 @@ pub fn report(design: &Design, environment: &Environment) -> Result<Report, Faul
     json["conditions"] = environment.conditions().into();
     json["sunlight_hz"] = operating.background.into();
     json["false_rate_hz"] = operating.false_rate.into();
-    json["transmission"] = operating.link.transmission(design.scan.reach).into();
+    json["transmission"] = operating.link.transmission(design.scan.rated_range).into();
     Ok(Report { text, json })
 }
 
 /// What sun and air do to it.
 fn at_work(design: &Design, operating: &Operating) -> Columns {
     let mut columns = Columns::default();
-    let reach = design.scan.reach;
+    let reach = design.scan.rated_range;
     let transmission = short(operating.link.transmission(reach) * 100.0);
     columns.push("air", format!("{transmission} % of the light gets {} m far", short(reach)));
     let counts = format!("{:.3e} counts a second in each detector", operating.background);
@@ -181,7 +181,7 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "shots_in_flight": derived.shots_in_flight,
         "idle_listening_hz": derived.idle_listening_rate,
         "min_range_m": design.scan.min_range,
-        "max_range_m": design.scan.reach,
+        "max_range_m": design.scan.rated_range,
         "unambiguous_range_m": derived.unambiguous_range,
         "tick_mm": derived.tick_range * 1e3,
         "right_within_mm": design.right_within * 1e3,

@@ -71,7 +71,7 @@ pub struct Simulate {
     #[arg(long, value_name = "N")]
     scans: Option<u64>,
 
-    /// Seed of all chance; the same seed gives the same bytes [default: 1]
+    /// Seed of the random numbers; the same seed gives the same bytes [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 

@@ -16,7 +16,7 @@ impl Run<'_> {
         columns.push("shots", grouped(tally.shots));
         columns.push("light", self.light());
         if !self.scene.interferers.is_empty() {
-            columns.push("interferers", self.others());
+            columns.push("interferers", self.interferers());
         }
         columns.push("returns", self.returns());
         columns.push("pixels", self.outcomes());
@@ -73,14 +73,14 @@ impl Run<'_> {
             "{} met, {}, {}, {}",
             counted(self.tally.surfaces, "surface"),
             counted(self.tally.echoes, "echo"),
-            counted(self.tally.edges, "edge"),
+            counted(self.tally.detections, "detection"),
             counted(self.tally.ticks, "tick"),
         )
     }
 
-    fn others(&self) -> String {
+    fn interferers(&self) -> String {
         let lidars = counted(self.scene.interferers.len() as u64, "other lidar");
-        let shots = counted(self.tally.foreign, "shot");
+        let shots = counted(self.tally.interferer_shots, "shot");
         let ghosts = counted(self.score.ghosts, "ghost");
         format!("{lidars}, {shots} of theirs seen, {ghosts}")
     }
@@ -119,7 +119,7 @@ impl Run<'_> {
             "at most {} of {}{of} busy; {} lost, {} merged",
             self.tally.peak_busy,
             grouped(u64::from(per_channel)),
-            counted(self.tally.lost, "edge"),
+            counted(self.tally.lost, "detection"),
             grouped(self.tally.merged),
         )
     }
@@ -165,7 +165,7 @@ impl Run<'_> {
             "shots": tally.shots,
             "surfaces": tally.surfaces,
             "echoes": tally.echoes,
-            "edges": tally.edges,
+            "detections": tally.detections,
             "ticks": tally.ticks,
             "returns": tally.returns,
             "outcomes": outcomes,
@@ -175,8 +175,8 @@ impl Run<'_> {
             "points_on_target": self.score.points_on_target,
             "rejects": rejects,
             "converters_peak_busy": tally.peak_busy,
-            "edges_lost": tally.lost,
-            "edges_merged": tally.merged,
+            "detections_lost": tally.lost,
+            "detections_merged": tally.merged,
             "elapsed_s": self.elapsed,
             "sensor_time_per_elapsed": self.speed(),
             "stages_s": stages,
@@ -197,7 +197,7 @@ impl Run<'_> {
                 .into();
         }
         if !self.scene.interferers.is_empty() {
-            json["foreign"] = tally.foreign.into();
+            json["interferer_shots"] = tally.interferer_shots.into();
             json["ghosts"] = self.score.ghosts.into();
         }
         json

@@ -71,9 +71,9 @@ impl<'a> Band<'a> {
         let late = late(receiver.jitter_ticks);
         let scale = i64::from(receiver.ticks_per_chip);
         let (nearest, farthest) = gate(receiver);
-        let of_home = |shot: Option<usize>| shot.and_then(|shot| fired.get(shot)).copied();
-        let first = of_home(Some(log.owned.start)).unwrap_or(0) + nearest;
-        let last = of_home(log.owned.end.checked_sub(1)).unwrap_or(0) + farthest;
+        let of_owned = |shot: Option<usize>| shot.and_then(|shot| fired.get(shot)).copied();
+        let first = of_owned(Some(log.owned.start)).unwrap_or(0) + nearest;
+        let last = of_owned(log.owned.end.checked_sub(1)).unwrap_or(0) + farthest;
         let span = first..last + scale * i64::from(codebook.chips()) + late + 1;
         let lags = (farthest - nearest).max(0) as f64 + 1.0;
         Self {

@@ -1,6 +1,6 @@
 //! The literal and the blind receiver: one bit after the other, without knowing what was sent.
 //!
-//! 1. The earliest unexplained tick opens a macropulse.
+//! 1. The earliest tick that belongs to no macropulse yet opens one.
 //! 2. A tick at the place of mark 1, 2 or 3 of a code word proposes that word; the proposed word
 //!    with the greatest share of its marks there is taken, if they are enough for a 1 bit.
 //! 3. Each further stretch of one word's length is a 1 bit if enough marks of the word are there.
@@ -203,7 +203,7 @@ impl<'a> Band<'a> {
         self.dequeue(macropulse, best.map_or(0, |(_, _, dark)| dark));
         match best {
             Some((shot, claim, _)) => self.claim(shot, claim),
-            None if self.is_home(macropulse.start) => self.returns.reject(reject),
+            None if self.is_owned(macropulse.start) => self.returns.reject(reject),
             None => {}
         }
     }
@@ -275,7 +275,7 @@ impl<'a> Band<'a> {
 
     /// Whether a macropulse that belongs to no shot is counted here: each one in one band only,
     /// that whose owned shots are fired while it comes.
-    fn is_home(&self, start: i64) -> bool {
+    fn is_owned(&self, start: i64) -> bool {
         let nearest = i64::from(self.receiver.gate_ticks.0);
         let fired = |shot: usize| self.fired.get(shot).map(|fired| fired + nearest);
         let owned = &self.log.owned;
@@ -398,16 +398,16 @@ mod tests {
         assert_eq!(late.rejected(Reject::OutsideGate), 8);
         let mut other = log.clone();
         other.word.rotate_left(1);
-        let foreign = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
-        assert!(foreign.is_empty());
-        assert_eq!(foreign.rejected(Reject::LabelMismatch), 8);
+        let mismatched = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
+        assert!(mismatched.is_empty());
+        assert_eq!(mismatched.rejected(Reject::LabelMismatch), 8);
         other.label = vec![0; 8];
         let unknown = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
         assert_eq!(unknown.rejected(Reject::UnknownShot), 8);
     }
 
     #[test]
-    fn a_macropulse_of_the_halo_is_not_counted() {
+    fn a_macropulse_of_a_guard_shot_is_not_counted() {
         let mut log = log(0);
         let ticks = ticks(&log, 5);
         log.owned = 3..6;

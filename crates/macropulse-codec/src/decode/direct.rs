@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_in_the_gate_is_no_return_and_a_halo_shot_is_none_either() {
+    fn nothing_in_the_gate_is_no_return_and_a_guard_shot_is_none_either() {
         let mut log = log();
         log.owned = 1..2;
         let ticks = Ticks { tick: vec![5, 501, 1009, 1501], ..Ticks::default() };

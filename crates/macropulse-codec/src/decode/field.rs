@@ -4,10 +4,10 @@
 use std::ops::Range;
 
 use super::FARTHEST_JITTER;
-use super::unexplained::Unexplained;
+use super::residual::Residual;
 use crate::kernels::{Pattern, lit_in, look_ahead};
 
-/// Ticks that are turned into bits together, once somebody looks at one of them.
+/// Ticks that are turned into bits together, when one of them is first looked at.
 const CHUNK: i64 = CELLS * CELL;
 const CELLS: i64 = 16;
 
@@ -22,7 +22,7 @@ pub(super) const MARGIN: i64 = 4096;
 
 /// A sorted list of ticks, as a field of bits: lit is where a mark counts as found, which is at
 /// a tick and at the `width` − 1 places before it. Bits are made from the list chunk by chunk, as
-/// they are needed: where everything is clear nobody asks for any.
+/// they are needed: where everything is clear none is.
 #[derive(Debug)]
 pub(super) struct Field<'a> {
     ticks: &'a [u32],
@@ -34,9 +34,10 @@ pub(super) struct Field<'a> {
     /// What is made of each chunk.
     made: Vec<Made>,
     memory: Memory,
-    unexplained: Unexplained,
-    /// Whether nothing was explained to begin with: then what is not yet made is as the ticks are.
-    all_unexplained: bool,
+    residual: Residual,
+    /// Whether nothing was cancelled to begin with: then the residual of a chunk that is not made
+    /// yet is all of its ticks.
+    nothing_cancelled: bool,
 }
 
 /// Memory of a field, whatever is in it.
@@ -46,7 +47,7 @@ pub(super) struct Memory {
     ticks: Vec<u64>,
     /// One for each place at which a mark counts as found, unless that is the same.
     lit: Vec<u64>,
-    unexplained: Vec<u64>,
+    residual: Vec<u64>,
 }
 
 /// How far the bits of a chunk are made.
@@ -58,10 +59,10 @@ enum Made {
 }
 
 impl<'a> Field<'a> {
-    /// The field of `ticks` over `span`, of which those `left` are not explained yet, or all of
-    /// them.
+    /// The field of `ticks` over `span`, of which those in `remaining` are not cancelled yet;
+    /// `None` for all of them.
     pub fn new(
-        (ticks, left): (&'a [u32], Option<&[u32]>),
+        (ticks, remaining): (&'a [u32], Option<&[u32]>),
         width: u32,
         span: Range<i64>,
         mut memory: Memory,
@@ -82,16 +83,16 @@ impl<'a> Field<'a> {
         if width > 1 {
             memory.lit.resize(memory.lit.len().max(chunks * WORDS), 0);
         }
-        let words = std::mem::take(&mut memory.unexplained);
-        let unexplained = match left {
-            Some(left) => Unexplained::new(left, span, words),
+        let words = std::mem::take(&mut memory.residual);
+        let residual = match remaining {
+            Some(remaining) => Residual::new(remaining, span, words),
             None => {
                 let cells = before.windows(2).map(|before| before[1] - before[0]);
-                Unexplained::counted(cells.collect(), span.start, words)
+                Residual::counted(cells.collect(), span.start, words)
             }
         };
-        let (made, all_unexplained) = (vec![Made::Nothing; chunks], left.is_none());
-        Self { ticks, width, origin, before, made, memory, unexplained, all_unexplained }
+        let (made, nothing_cancelled) = (vec![Made::Nothing; chunks], remaining.is_none());
+        Self { ticks, width, origin, before, made, memory, residual, nothing_cancelled }
     }
 
     /// Makes sure that all bits of `span` are there.
@@ -135,22 +136,22 @@ impl<'a> Field<'a> {
             let bit = (i64::from(tick) - start) as usize % CHUNK as usize;
             words[bit / 64] |= 1 << (bit % 64);
         }
-        if self.all_unexplained {
-            self.unexplained.learn(chunk * WORDS, words);
+        if self.nothing_cancelled {
+            self.residual.learn(chunk * WORDS, words);
         }
     }
 
-    /// The ticks that nobody has explained, made known in `span`, elsewhere counted only.
-    pub fn unexplained(&mut self, span: Range<i64>) -> &mut Unexplained {
-        if self.all_unexplained {
+    /// The ticks that are not cancelled, bit by bit in `span`, elsewhere counted only.
+    pub fn residual(&mut self, span: Range<i64>) -> &mut Residual {
+        if self.nothing_cancelled {
             self.chunks(span).for_each(|chunk| self.make_ticks(chunk));
         }
-        &mut self.unexplained
+        &mut self.residual
     }
 
-    /// How many ticks nobody has explained, as counts only.
-    pub fn left(&self) -> &Unexplained {
-        &self.unexplained
+    /// How many ticks are not cancelled, as counts only.
+    pub fn residual_counts(&self) -> &Residual {
+        &self.residual
     }
 
     /// The chunks that touch `span`.
@@ -176,7 +177,7 @@ impl<'a> Field<'a> {
 
     /// Gives its memory back.
     pub fn into_memory(self) -> Memory {
-        Memory { unexplained: self.unexplained.into_words(), ..self.memory }
+        Memory { residual: self.residual.into_words(), ..self.memory }
     }
 
     /// The cells that touch `span`.

@@ -1,31 +1,33 @@
 //! The matched receiver: the lag at which the whole known macropulse of a shot fits best.
 //!
-//! 1. *Peel.* Macropulses of which every mark is there are taken off the stream of ticks one
+//! The receiver cancels successively, as multi-user detectors do: the ticks of each macropulse that
+//! is found are taken out, and the next one is looked for in the residual.
+//!
+//! 1. *Cancel.* Macropulses of which every mark is there are taken off the stream of ticks one
 //!    after another: no lag can have more. In clear weather this is all.
 //! 2. *Track.* Neighbouring pixels see neighbouring ranges: around the lags of the neighbours the
 //!    exact maximum is taken. Half of the marks, or twice what chance can give, with none of the
 //!    lit bits missing, cannot be a sidelobe (an own lobe that far off leaves a bit dark) nor
 //!    another shot.
-//! 3. *Search.* The ticks of a shot that is found need no other explanation; what is left over is
-//!    searched for the shots that no neighbour predicted, the bright ones first: where many
-//!    bright ones overlap, their light could pass for a faint one.
-//! 4. *Contest.* A predicted shot keeps its lag unless unexplained ticks crowd somewhere in its
-//!    gate: then these are searched for a better one. The light of the lesser one is explained,
-//!    too.
+//! 3. *Acquire.* The residual is searched for the shots that no neighbour predicted, first on a
+//!    grid of pixels, the bright ones first: where many bright ones overlap, their light could pass
+//!    for a faint one.
+//! 4. *Test for multipath.* A predicted shot keeps its lag unless the residual is crowded somewhere
+//!    in its gate: then that is searched for a competing return. The light of the weaker one of the
+//!    two is cancelled, too.
 //! 5. *Check.* A bit that should be dark must not be lit, nor a lit one dark.
-//!
-//! 6. *Further surfaces.* Where several returns of a shot are wanted, the light that is left is
-//!    searched for more of it.
+//! 6. *Secondary returns.* Where several returns of a shot are wanted, the residual is searched for
+//!    more of its surfaces.
 //!
 //! A return is believed if chance would not reach its count of marks at any lag of the gate, see
 //! [`super::threshold`].
 
-mod contest;
+mod multipath;
 #[cfg(test)]
 mod exhaustive;
 mod further;
-mod leftover;
-mod peel;
+mod acquisition;
+mod cancellation;
 mod track;
 mod verdict;
 
@@ -41,25 +43,25 @@ use crate::ShotLog;
 use crate::Ticks;
 use crate::code::{CodeWord, Codebook};
 use crate::kernels::{Pattern, WordTicks};
-use leftover::Evidence;
+use acquisition::Evidence;
 
 /// Decodes one band.
 pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
     let sent = Sent::new(receiver, sent, ticks.epoch);
-    let peeled = peel::peel(&sent, &ticks.tick);
-    let mut band = Band::new(&sent, (&ticks.tick, peeled), MEMORY.take());
+    let cancelled = cancellation::cancel(&sent, &ticks.tick);
+    let mut band = Band::new(&sent, (&ticks.tick, cancelled), MEMORY.take());
     if !band.is_dark() {
         // What can be tracked from somewhere need not be searched, and is out of the way then.
-        band.search(Evidence::Overwhelming, SOUNDINGS);
+        band.search(Evidence::Overwhelming, ACQUISITION_GRID);
         band.track_back(Evidence::Overwhelming);
         band.search(Evidence::Overwhelming, 1);
-        // Where light lies upon light everywhere, more stands out when some is explained.
-        while band.search(Evidence::Bright, 1) > band.locks.len() / MANY_FOUND {}
-        // Faint light is one among many ticks everywhere: soundings must do.
-        let every = if sent.is_thorough() { 1 } else { SOUNDINGS };
+        // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
+        while band.search(Evidence::Bright, 1) > band.detections.len() / MANY_FOUND {}
+        // Faint light is one tick among many everywhere: a search of the grid must do.
+        let every = if sent.is_thorough() { 1 } else { ACQUISITION_GRID };
         band.search(Evidence::MoreThanChance, every);
         band.track_back(Evidence::MoreThanChance);
-        band.contest();
+        band.test_multipath();
         band.search_further();
     }
     let returns = band.returns();
@@ -67,9 +69,9 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
     returns
 }
 
-/// Where soundings are taken, one shot in this many in a row is searched for; the rows are
-/// staggered by this many shots.
-const SOUNDINGS: u32 = 16;
+/// The acquisition grid: one shot in this many in a row is searched for in all of its gate; the
+/// rows are staggered by this many shots.
+const ACQUISITION_GRID: u32 = 16;
 const STAGGER: u32 = 5;
 
 /// After one in so many shots was found, the others are searched for once more.
@@ -103,7 +105,7 @@ struct Memory {
 
 /// The lag at which a shot was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Lock {
+struct Detection {
     lag: i64,
     count: u16,
     margin: u16,
@@ -120,17 +122,18 @@ struct Sent<'a> {
     fired: Vec<i64>,
     /// Length of the stretch in which a mark may be found, in ticks.
     width: u32,
-    /// The code words, in ticks, each once somebody asks: one pixel of a flash has a single word.
+    /// The code words, in ticks, each made when it is first needed: one pixel of a flash has a
+    /// single word.
     words: Vec<OnceCell<WordTicks>>,
-    /// The same as bits: where everything is clear nobody asks.
+    /// The same as bits, needed only where light is not clear.
     bits: Vec<OnceCell<Bits>>,
 }
 
 /// A code word, as bits.
 struct Bits {
     pattern: Pattern,
-    /// The ticks that it explains, half a window before each mark and as many behind it.
-    explained: Pattern,
+    /// The ticks that are cancelled with it, half a window before each mark and as many behind it.
+    cancelled: Pattern,
 }
 
 impl<'a> Sent<'a> {
@@ -148,13 +151,13 @@ impl<'a> Sent<'a> {
         &self.as_bits(shot).pattern
     }
 
-    /// The ticks that the code word of `shot` explains, from so many before its start on.
-    fn explains(&self, shot: usize) -> (i64, &Pattern) {
-        (self.farther().into(), &self.as_bits(shot).explained)
+    /// The ticks that are cancelled with the code word of `shot`, from so many before its start on.
+    fn cancels(&self, shot: usize) -> (i64, &Pattern) {
+        (self.farther().into(), &self.as_bits(shot).cancelled)
     }
 
-    /// How many ticks before a mark others are explained by it: one edge in twenty jitters farther
-    /// than marks are looked for.
+    /// How many ticks before a mark are cancelled with it: one tick in twenty jitters farther than
+    /// marks are looked for.
     fn farther(&self) -> u32 {
         self.width / 2
     }
@@ -167,7 +170,7 @@ impl<'a> Sent<'a> {
                 let marks = self.codebook.word(word).marks.iter();
                 Pattern::new(marks.map(|&mark| scale * usize::from(mark)), width as usize)
             };
-            Bits { pattern: pattern(1), explained: pattern(self.width + 2 * self.farther()) }
+            Bits { pattern: pattern(1), cancelled: pattern(self.width + 2 * self.farther()) }
         })
     }
 
@@ -267,13 +270,14 @@ impl<'a> Sent<'a> {
 struct Band<'a> {
     sent: &'a Sent<'a>,
     field: Field<'a>,
-    /// How many there were to begin with in the gate of each shot; empty if nowhere any.
-    left_in_gate: Vec<u32>,
+    /// Ticks of the residual in the gate of each shot, to begin with; empty if there are nowhere
+    /// any.
+    residual_in_gate: Vec<u32>,
     /// The shot at the same column one line earlier.
     above: Vec<Option<u32>>,
-    locks: Vec<Option<Lock>>,
-    /// Further surfaces that each shot was found at.
-    behind: Vec<[Option<Lock>; SURFACES]>,
+    detections: Vec<Option<Detection>>,
+    /// The secondary returns of each shot.
+    secondary: Vec<[Option<Detection>; SURFACES]>,
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
     bit_thresholds: Thresholds,
@@ -281,28 +285,32 @@ struct Band<'a> {
     word_thresholds: Thresholds,
     /// For the first marks of a macropulse, or the last ones.
     end_thresholds: Thresholds,
-    /// For each word, the marks that one tick may count for, once somebody asks.
+    /// For each word, the marks that one tick may count for, worked out when first needed.
     marks_per_tick: Vec<OnceCell<u32>>,
-    /// For each shot, the number of marks that nowhere in its gate are unexplained.
-    barren: Vec<u16>,
+    /// For each shot its known-empty bound: no lag of its gate has so many marks in the residual.
+    known_empty: Vec<u16>,
     counts: Counts,
     /// Memory for the lit bits of a shot.
     bits: Vec<usize>,
-    /// Memory for light nobody has explained.
-    residual: Vec<u64>,
+    /// Memory for the residual of a block.
+    residual_bits: Vec<u64>,
     search: Search,
     /// Photons per mark where all marks are found, by their number.
     all_found: Vec<f32>,
 }
 
 impl<'a> Band<'a> {
-    fn new(sent: &'a Sent<'a>, ticks: (&'a [u32], peel::Peeled), memory: Memory) -> Self {
-        let (ticks, peel::Peeled { locks, mut again, left }) = ticks;
+    fn new(
+        sent: &'a Sent<'a>,
+        ticks: (&'a [u32], cancellation::Cancelled),
+        memory: Memory,
+    ) -> Self {
+        let (ticks, cancellation::Cancelled { detections, mut again, residual }) = ticks;
         if !sent.wants_further() {
             again.clear();
         }
-        // Nobody looks at a field that is explained altogether.
-        let dark = left.as_ref().is_some_and(Vec::is_empty) && again.is_empty();
+        // A field that is cancelled altogether is never looked at.
+        let dark = residual.as_ref().is_some_and(Vec::is_empty) && again.is_empty();
         let span = if dark { 0..0 } else { sent.span() };
         let receiver = sent.receiver;
         let words = if dark { 0 } else { sent.codebook.words() };
@@ -319,26 +327,26 @@ impl<'a> Band<'a> {
             });
         Self {
             sent,
-            field: Field::new((ticks, left.as_deref()), sent.width, span, memory.field),
-            left_in_gate: match &left {
+            field: Field::new((ticks, residual.as_deref()), sent.width, span, memory.field),
+            residual_in_gate: match &residual {
                 _ if dark => vec![],
-                Some(left) => in_gates(sent, left),
+                Some(residual) => in_gates(sent, residual),
                 None => vec![u32::MAX; sent.fired.len()],
             },
             above: if dark { vec![] } else { above(sent.log) },
-            behind: match dark {
+            secondary: match dark {
                 true => vec![],
-                false => further::found_again(locks.len(), again),
+                false => further::found_again(detections.len(), again),
             },
-            locks,
+            detections,
             thresholds,
             bit_thresholds,
             word_thresholds,
             end_thresholds,
             counts: Counts::default(),
             bits: Vec::new(),
-            residual: Vec::new(),
-            barren: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
+            residual_bits: Vec::new(),
+            known_empty: vec![u16::MAX; if dark { 0 } else { sent.fired.len() }],
             marks_per_tick: vec![OnceCell::new(); words],
             search: memory.search,
             all_found: memory.all_found,
@@ -352,7 +360,7 @@ impl<'a> Band<'a> {
         Memory { field, search: self.search, thresholds, all_found }
     }
 
-    /// Most marks of `shot` that one tick may count for; `None` where nobody looks at a field.
+    /// Most marks of `shot` that one tick may count for; `None` where the field is empty.
     fn marks_per_tick(&self, shot: usize) -> Option<u32> {
         let word = self.sent.log.word[shot];
         let cell = self.marks_per_tick.get(usize::from(word))?;
@@ -360,16 +368,17 @@ impl<'a> Band<'a> {
         Some(*cell.get_or_init(|| crowding(self.sent.codebook.word(word), chips)))
     }
 
-    /// Whether nothing is left to be explained.
+    /// Whether the residual is empty.
     fn is_dark(&self) -> bool {
-        self.left_in_gate.is_empty()
+        self.residual_in_gate.is_empty()
     }
 
-    /// Share of lit places around a shot found at `lock`, its own marks apart.
-    fn density_around(&self, shot: usize, lock: Lock) -> f64 {
+    /// Share of lit places around a shot found at `detection`, its own marks apart.
+    fn density_around(&self, shot: usize, detection: Detection) -> f64 {
         let places = usize::from(self.sent.weight(shot)) * self.sent.width as usize;
-        let start = self.sent.fired[shot] + lock.lag;
-        self.field.density_without(start..start + self.sent.length(), (lock.count.into(), places))
+        let start = self.sent.fired[shot] + detection.lag;
+        self.field
+            .density_without(start..start + self.sent.length(), (detection.count.into(), places))
     }
 
     /// Share of lit places in the gate of `shot`.
@@ -379,35 +388,35 @@ impl<'a> Band<'a> {
         self.field.density(fired + nearest..fired + farthest + 1)
     }
 
-    /// The marks that chance does not reach, be it as dense in all the gate as around `lock`. The
-    /// marks found count among the light around: chance finds most where there is most.
-    fn by_chance(&mut self, shot: usize, lock: Lock) -> u16 {
-        let start = self.sent.fired[shot] + lock.lag;
+    /// The marks that chance does not reach, be it as dense in all the gate as around `detection`.
+    /// The marks found count among the light around: chance finds most where there is most.
+    fn by_chance(&mut self, shot: usize, detection: Detection) -> u16 {
+        let start = self.sent.fired[shot] + detection.lag;
         let around = self.field.density(start..start + self.sent.length());
         let density = self.density_in_gate(shot).max(around);
         self.thresholds.least(self.sent.weight(shot), density)
     }
 
-    /// Whether there may be light of `shot` that nobody has explained: two marks at least.
+    /// Whether there may be light of `shot` in the residual: two marks at least.
     fn may_be_lit(&self, shot: usize) -> bool {
-        self.left_in_gate[shot] > 1 && self.sent.weight(shot) > 0
+        self.residual_in_gate[shot] > 1 && self.sent.weight(shot) > 0
     }
 
-    /// Keeps `lock` and explains its ticks.
-    fn lock(&mut self, shot: usize, lock: Lock) {
-        self.explain(shot, lock.lag);
-        self.locks[shot] = Some(lock);
+    /// Keeps `detection` and cancels its ticks.
+    fn keep(&mut self, shot: usize, detection: Detection) {
+        self.cancel(shot, detection.lag);
+        self.detections[shot] = Some(detection);
     }
 
-    /// Explains the ticks of `shot` at `lag`.
-    fn explain(&mut self, shot: usize, lag: i64) {
-        let (farther, pattern) = self.sent.explains(shot);
+    /// Cancels the ticks of `shot` at `lag`.
+    fn cancel(&mut self, shot: usize, lag: i64) {
+        let (farther, pattern) = self.sent.cancels(shot);
         let start = self.sent.fired[shot] + lag - farther;
         let scale = self.sent.scale();
         let bits = self.sent.lit_bits(shot).iter().map(|&bit| start + scale * i64::from(bit));
         let end = start + self.sent.length() + i64::from(self.sent.width) + 2 * farther;
-        let unexplained = self.field.unexplained(start..end);
-        unexplained.explain(bits, pattern);
+        let residual = self.field.residual(start..end);
+        residual.cancel(bits, pattern);
     }
 }
 
@@ -472,12 +481,16 @@ mod tests {
                 tick.dedup();
                 let receiver = Receiver { false_alarm: 1e4, ..receiver(jitter) };
                 let sent = Sent::new(&receiver, (&codebook, &log), 0);
-                let nothing = peel::Peeled { locks: vec![None], again: vec![], left: None };
+                let nothing = cancellation::Cancelled {
+                    detections: vec![None],
+                    again: vec![],
+                    residual: None,
+                };
                 let mut band = Band::new(&sent, (&tick, nothing), Memory::default());
                 let (lag, count) = exhaustive(&sent, &tick, 0);
-                if let Some(lock) = band.searched(0, 1) {
+                if let Some(detection) = band.searched(0, 1) {
                     found += 1;
-                    assert_eq!((lock.lag, lock.count), (lag, count));
+                    assert_eq!((detection.lag, detection.count), (lag, count));
                 }
             }
         }

@@ -12,7 +12,7 @@ mod returns;
 mod search;
 mod threshold;
 mod timeline;
-mod unexplained;
+mod residual;
 
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
@@ -70,8 +70,8 @@ pub struct Receiver {
     pub ticks_per_chip: u32,
     /// Length of a tick, fs.
     pub tick_fs: i64,
-    /// Standard deviation of the timing of one edge, in ticks: how far from its place a mark is
-    /// looked for.
+    /// Standard deviation of the timing of one detection event, in ticks: how far from its place a
+    /// mark is looked for.
     pub jitter_ticks: f64,
     /// False returns accepted per shot; the matched and the balanced receiver derive their
     /// threshold from it.
@@ -103,8 +103,8 @@ impl ReceiverKind {
 }
 
 impl Receiver {
-    /// A matched receiver of ticks of `tick_fs` femtoseconds, a chip to a tick, with edges exact to
-    /// the tick, a gate from 0 to 100 000 ticks, and one false return in a million shots accepted.
+    /// A matched receiver of ticks of `tick_fs` femtoseconds, a chip to a tick, timed exact to the
+    /// tick, a gate from 0 to 100 000 ticks, and one false return in a million shots accepted.
     pub fn matched(tick_fs: i64) -> Self {
         Self {
             kind: ReceiverKind::Matched,
@@ -121,8 +121,8 @@ impl Receiver {
         }
     }
 
-    /// The returns of the owned shots of `log`, out of all the `ticks` of its band, ordered by shot,
-    /// those of one shot by range.
+    /// The returns of the owned shots of `log`, out of all the `ticks` of its band, ordered by
+    /// shot, those of one shot by range.
     ///
     /// `ticks` must cover the whole time in which light of an owned shot can arrive. Guard shots
     /// are decoded too, as their light overlaps, and dropped. Each channel is decoded by itself;
@@ -235,7 +235,7 @@ impl Receiver {
 
 /// Mean number of photons detected per mark, μ = −ln(1 − p), of which the share p of the marks
 /// shows at least one (Poisson); p = (k/N − d)/(1 − d) for k of N marks found where a share d of
-/// all places is lit anyway. All marks found is taken for N − ½: nobody can tell more.
+/// all places is lit anyway. All marks found is taken for N − ½: the count tells no more.
 fn photons_per_mark(peak: u16, marks: u16, density: f64) -> f32 {
     let (found, all) = (f64::from(peak), f64::from(marks));
     let lit = found.min(all - 0.5) / all;

@@ -1,9 +1,9 @@
-//! The lag of a shot when nothing is known of it.
+//! Acquisition of a shot: the lag with most marks, over the whole gate.
 //!
-//! Every unexplained tick votes: one that is a mark of the code word says where the word began. A
-//! macropulse of B lit bits with k marks found has k/B or more of them in one of its code words.
-//! No lag with `least` marks is overlooked where every place with `least`/B votes is looked at,
-//! and the votes at all lit bits added up.
+//! Every tick of the residual votes: one that is a mark of the code word says where the word began.
+//! A macropulse of B lit bits with k marks found has k/B or more of them in one of its code words.
+//! No lag with `least` marks is overlooked where every place with `least`/B votes is looked at, and
+//! the votes at all lit bits added up.
 //!
 //! Where ticks are dense, and so many marks of a word stand out among them, the marks are counted
 //! for blocks of places instead, those with too few ticks left out.
@@ -11,7 +11,7 @@
 use std::ops::Range;
 
 use super::correlator::BLOCK;
-use super::unexplained::Unexplained;
+use super::residual::Residual;
 use crate::kernels::{BALLOT, Marks, Pattern, elect, highest_sum, lit_in, vote, with_marks};
 
 /// What is looked for: a macropulse, taken apart.
@@ -85,7 +85,7 @@ pub(super) struct Search {
     touched: Vec<Range<usize>>,
     /// Places with enough votes.
     elected: Vec<u32>,
-    /// Unexplained ticks where a mark counts as found.
+    /// Places at which a mark counts as found in the residual.
     lit: Vec<u64>,
     /// Blocks of places with enough ticks.
     blocks: Vec<i64>,
@@ -101,12 +101,12 @@ const MOST_VOTES: usize = u8::MAX as usize;
 const FEW: usize = 256;
 
 impl Search {
-    /// The lag, in ticks from `first`, at which most marks of `sought` are unexplained; the
-    /// earliest of several. A mark also counts if one of the `width` − 1 next ticks is lit.
+    /// The lag, in ticks from `first`, at which most marks of `sought` are in the residual;
+    /// the earliest of several. A mark also counts if one of the `width` − 1 next ticks is lit.
     /// `None` where no lag has `least` of them.
     pub fn best(
         &mut self,
-        unexplained: &Unexplained,
+        residual: &Residual,
         at: (i64, u32),
         sought: &Sought,
     ) -> Option<Candidate> {
@@ -116,22 +116,22 @@ impl Search {
         }
         let needed = sought.in_one_word();
         let span = first..first + (sought.places() + sought.reach()) as i64 + i64::from(width);
-        let votes = (unexplained.at_most(span) * width) as usize * sought.word.len();
+        let votes = (residual.at_most(span) * width) as usize * sought.word.len();
         let uncounted = sought.word.len() > MOST_VOTES;
         if needed >= sought.stands_out || uncounted {
-            self.choose_blocks(unexplained, at, sought);
+            self.choose_blocks(residual, at, sought);
             if VOTES_PER_BLOCK * self.blocks.len() < votes || uncounted {
-                return self.by_words(unexplained, at, sought);
+                return self.by_words(residual, at, sought);
             }
         }
-        self.by_votes(unexplained, at, sought)
+        self.by_votes(residual, at, sought)
     }
 
-    /// The blocks of places where enough ticks for a code word are unexplained.
-    fn choose_blocks(&mut self, unexplained: &Unexplained, at: (i64, u32), sought: &Sought) {
+    /// The blocks of places where the residual has enough ticks for a code word.
+    fn choose_blocks(&mut self, residual: &Residual, at: (i64, u32), sought: &Sought) {
         let ((first, width), places) = (at, sought.places() as i64);
         let length = BLOCK + sought.reach() as i64 + i64::from(width);
-        let runs = unexplained.runs(first..first + places + length);
+        let runs = residual.runs(first..first + places + length);
         let needed = u32::from(sought.in_one_word());
         let enough = |block: &i64| {
             let start = first + block;
@@ -143,7 +143,7 @@ impl Search {
 
     fn by_words(
         &mut self,
-        unexplained: &Unexplained,
+        residual: &Residual,
         at: (i64, u32),
         sought: &Sought,
     ) -> Option<Candidate> {
@@ -152,7 +152,7 @@ impl Search {
         }
         let (first, width) = at;
         let length = (sought.places() + sought.reach()) as i64 + 2 * BLOCK;
-        let begin = unexplained.lit(first..first + length, width, &mut self.lit);
+        let begin = residual.lit(first..first + length, width, &mut self.lit);
         self.elected.clear();
         for &block in &self.blocks {
             let place = begin + block as usize;
@@ -170,7 +170,7 @@ impl Search {
 
     fn by_votes(
         &mut self,
-        unexplained: &Unexplained,
+        residual: &Residual,
         at: (i64, u32),
         sought: &Sought,
     ) -> Option<Candidate> {
@@ -184,7 +184,7 @@ impl Search {
         }
         let length = self.ballot.len() * BALLOT;
         self.touched.clear();
-        for_each_tick(unexplained, (first, places + reach), width, |tick| {
+        for_each_tick(residual, (first, places + reach), width, |tick| {
             vote(&mut self.votes, tick, &self.ballot);
             match self.touched.last_mut() {
                 Some(last) if tick <= last.end => last.end = tick + length,
@@ -218,9 +218,10 @@ impl Search {
     }
 }
 
-/// Calls `on_tick` with every place, counted from `stretch.0`, at which a mark would count as found.
+/// Calls `on_tick` with every place, counted from `stretch.0`, at which a mark would count as
+/// found.
 fn for_each_tick(
-    unexplained: &Unexplained,
+    residual: &Residual,
     stretch: (i64, usize),
     width: u32,
     mut on_tick: impl FnMut(usize),
@@ -228,7 +229,7 @@ fn for_each_tick(
     let (first, length) = (stretch.0, stretch.1 as i64);
     let late = i64::from(width) - 1;
     let mut next = 0;
-    unexplained.for_each(first..first + length + late, |tick| {
+    residual.for_each(first..first + length + late, |tick| {
         let place = tick - first;
         for place in next.max(place - late)..=place.min(length - 1) {
             on_tick(place as usize);
@@ -255,14 +256,14 @@ mod tests {
     }
 
     /// Every lag by itself.
-    fn exhaustive(unexplained: &Unexplained, first: i64, width: i64) -> Candidate {
+    fn exhaustive(residual: &Residual, first: i64, width: i64) -> Candidate {
         let pattern = pattern();
         let Sought { bits, lags, .. } = sought(&pattern, 1);
         let count = |lag: usize| {
             let starts = bits.iter().map(|bit| first + (lag + bit) as i64);
             let places =
                 starts.flat_map(|start| WORD.iter().map(move |&mark| start + i64::from(mark)));
-            places.filter(|&place| unexplained.any(place, width as u32)).count()
+            places.filter(|&place| residual.any(place, width as u32)).count()
         };
         let lag = (0..lags).rev().max_by_key(|&lag| count(lag)).unwrap();
         Candidate { lag, count: count(lag) as u16 }
@@ -275,15 +276,15 @@ mod tests {
         for lit in [0, 3, 30, 300] {
             for width in [1, 2, 4] {
                 let lit: Vec<u32> = (0..lit).map(|_| chance.next_u32() % 1050).collect();
-                let unexplained = Unexplained::new(&lit, -50..1100, vec![]);
-                let expected = exhaustive(&unexplained, -7, i64::from(width));
+                let residual = Residual::new(&lit, -50..1100, vec![]);
+                let expected = exhaustive(&residual, -7, i64::from(width));
                 for least in 1..=15 {
                     let (at, sought) = ((-7, width), sought(&pattern, least));
                     let expected = Some(expected).filter(|expected| expected.count >= least);
-                    let found = search.best(&unexplained, at, &sought);
+                    let found = search.best(&residual, at, &sought);
                     assert_eq!(found, expected, "{least} of 15, width {width}");
-                    search.choose_blocks(&unexplained, at, &sought);
-                    let found = search.by_words(&unexplained, at, &sought);
+                    search.choose_blocks(&residual, at, &sought);
+                    let found = search.by_words(&residual, at, &sought);
                     assert_eq!(found, expected, "{least} of 15 by words, width {width}");
                 }
             }
@@ -292,10 +293,10 @@ mod tests {
 
     #[test]
     fn a_shot_without_light_is_not_found() {
-        let unexplained = Unexplained::new(&[], 0..1000, vec![]);
+        let residual = Residual::new(&[], 0..1000, vec![]);
         let pattern = pattern();
         let dark = Sought { bits: &[], ..sought(&pattern, 1) };
-        assert_eq!(Search::default().best(&unexplained, (0, 1), &dark), None);
-        assert_eq!(Search::default().best(&unexplained, (0, 1), &sought(&pattern, 1)), None);
+        assert_eq!(Search::default().best(&residual, (0, 1), &dark), None);
+        assert_eq!(Search::default().best(&residual, (0, 1), &sought(&pattern, 1)), None);
     }
 }

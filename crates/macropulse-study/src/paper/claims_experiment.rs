@@ -209,7 +209,7 @@ fn converters(trials: &[Trial]) -> Claim {
         section: "2.3",
         claim: "1150 converters are needed in the worst case",
         paper: "1149 pulses within a dead time".into(),
-        measured: format!("{peak} busy at most in these scenes, {lost} edges lost"),
+        measured: format!("{peak} busy at most in these scenes, {lost} detections lost"),
         verdict: holds(peak <= 1150 && lost == 0),
     }
 }

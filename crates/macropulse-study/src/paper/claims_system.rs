@@ -257,7 +257,7 @@ pub(super) fn light(
             verdict: Verdict::Assumed,
         },
         Claim {
-            id: "reach",
+            id: "rated-range",
             section: "2.3",
             claim: "The receiver sees a white surface at 150 m",
             paper: "150 m at 100 % remission".into(),

@@ -53,7 +53,7 @@ fn sentences(findings: &Findings) -> Result<Vec<Sentence>, Error> {
     let honest = Design::open("kim-park-2016-physical", &[])?;
     let day = Environment::default();
     let [by_day, by_night] = [&day, &day.at_night()].map(|sky| Forecaster::new(&honest, sky));
-    let range = paper.scan.reach;
+    let range = paper.scan.rated_range;
     let white = Wanted { reflectance: 1.0, range, pd: 0.9, false_points: 1e-4 };
     let failing = checks(&by_day?, &by_night?, &white);
     let failing: Vec<String> = failing

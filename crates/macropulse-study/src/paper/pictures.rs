@@ -244,8 +244,8 @@ pub(super) fn refresh_over_range(design: &Design) -> Figure {
             .series("coded, 1 beam", Style::Line, vec![[1.0, rate], [reuse, rate]]);
     chart.lines.push(Line::AtX(reuse, format!("words return: {reuse:.0} m")));
     chart.notes.push(Note {
-        at: [design.scan.reach, waiting(design.scan.reach, 1.0)],
-        text: format!("{:.2} Hz at 150 m", waiting(design.scan.reach, 1.0)),
+        at: [design.scan.rated_range, waiting(design.scan.rated_range, 1.0)],
+        text: format!("{:.2} Hz at 150 m", waiting(design.scan.rated_range, 1.0)),
     });
     Figure::svg(
         &chart.svg(),

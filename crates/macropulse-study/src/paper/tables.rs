@@ -70,7 +70,7 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
     row("directions", &|d| format!("{} \u{d7} {}", d.scan.columns, d.scan.rows));
     row("field", &|d| field(&d.scan.extent()));
     row("refresh rate", &|d| format!("{} Hz", d.scan.rate_millihertz as f64 / 1e3));
-    row("range", &|d| format!("{} m", d.scan.reach));
+    row("range", &|d| format!("{} m", d.scan.rated_range));
     row("wavelength", &|d| format!("{:.0} nm", d.light.wavelength * 1e9));
     row("light", &|d| {
         let derived = d.derived();

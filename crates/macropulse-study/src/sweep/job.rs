@@ -25,7 +25,7 @@ const DESCRIPTION: &str = "sweep.json";
 pub struct Job<'a> {
     /// What is measured.
     pub point: &'a Point,
-    /// With which chance.
+    /// The seed of its random numbers.
     pub seed: u64,
     pub(super) scene: &'a Scene,
 }
@@ -40,9 +40,9 @@ pub struct Counted {
     pub seed: u64,
     /// How the pixels came out.
     pub score: Score,
-    /// Detector edges, those of the guard shots included.
-    pub edges: u64,
-    /// Edges that found every converter busy.
+    /// Detection events, those of the guard shots included.
+    pub detections: u64,
+    /// Detection events that found every converter busy.
     pub lost: u64,
     /// Most converters busy at once.
     pub peak_busy: u32,
@@ -81,7 +81,7 @@ impl Job<'_> {
             job: self.name(),
             seed: self.seed,
             score: scan.score,
-            edges: scan.tally.edges,
+            detections: scan.tally.detections,
             lost: scan.tally.lost,
             peak_busy: scan.tally.peak_busy,
             right: RangeError::of(&scan.cloud),
@@ -113,13 +113,13 @@ impl Job<'_> {
 impl Counted {
     /// Whether the counts fit together and to the pixels measured.
     fn is_possible(&self, pixels: u64) -> bool {
-        let Self { score, edges, lost, .. } = self;
+        let Self { score, detections, lost, .. } = self;
         let sum = score.pixels.iter().try_fold(0_u64, |sum, count| sum.checked_add(*count));
         sum == Some(pixels)
             && score.dark <= score.count(Outcome::Missed)
             && score.points_on_target <= score.samples_on_target
             && score.samples_on_target <= pixels
-            && lost <= edges
+            && lost <= detections
     }
 }
 
@@ -218,14 +218,17 @@ mod tests {
             shots: None,
         })
         .unwrap();
-        let nobody = Watch { done: &|_| {}, stop: &|| false };
+        let unwatched = Watch { done: &|_| {}, stop: &|| false };
         let counted: Vec<Counted> =
-            plan.jobs().map(|job| job.measure(&nobody).unwrap().unwrap()).collect();
+            plan.jobs().map(|job| job.measure(&unwatched).unwrap().unwrap()).collect();
         let set = [("scan.flash.rows", "8"), ("scan.max_range_m", "60")];
         let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let scan = sim::scan(&Design::open("peregrine", &set).unwrap(), &scene, 2, 0).unwrap();
         let wanted = &counted[3];
-        assert_eq!((wanted.seed, wanted.score, wanted.edges), (2, scan.score, scan.tally.edges));
+        assert_eq!(
+            (wanted.seed, wanted.score, wanted.detections),
+            (2, scan.score, scan.tally.detections)
+        );
         assert_eq!(wanted.right, RangeError::of(&scan.cloud));
         assert!(wanted.right.count > 1000 && wanted.right != counted[2].right);
         // The wall is 50 m away.

@@ -28,7 +28,7 @@ pub enum Metric {
     Precision,
     /// Mean range error.
     Bias,
-    /// Edges lost by the converters.
+    /// Detection events lost by the converters.
     Lost,
     /// Most converters busy.
     Busy,
@@ -83,7 +83,7 @@ impl Metric {
             Self::Points => "returns per scan, or per measured part of it",
             Self::Precision => "standard deviation of the range error of right points, m",
             Self::Bias => "mean range error of right points, m",
-            Self::Lost => "share of the detector's edges that found every converter busy",
+            Self::Lost => "share of the detection events that found every converter busy",
             Self::Busy => "most converters busy at once, mean over the seeds",
         }
     }
@@ -156,7 +156,7 @@ impl Metric {
                 mean(&|counted| counted.right.deviation.unwrap_or(f64::NAN)).at_least(0.0)
             }
             Self::Bias => mean(&|counted| counted.right.mean.unwrap_or(f64::NAN)),
-            Self::Lost => rate(&|counted| [counted.lost, counted.edges]),
+            Self::Lost => rate(&|counted| [counted.lost, counted.detections]),
             Self::Busy => mean(&|counted| f64::from(counted.peak_busy)).at_least(0.0),
         }
     }
@@ -178,7 +178,7 @@ mod tests {
             further: [0; 6],
         };
         let right = RangeError { count: 60, mean: Some(1e-4), deviation: Some(2e-4) };
-        Counted { score, edges: 1000, lost: 5, peak_busy: 7, right, ..Counted::default() }
+        Counted { score, detections: 1000, lost: 5, peak_busy: 7, right, ..Counted::default() }
     }
 
     #[test]

@@ -66,7 +66,7 @@ pub struct Point {
     pub environment: String,
     /// Effects that are left out.
     pub idealisations: Vec<String>,
-    /// Values nobody wrote: dotted key and value.
+    /// Values that the file leaves open: dotted key and value.
     pub defaults: Vec<(String, String)>,
     /// Assumptions of the scene and warnings of the sensor.
     pub notes: Vec<String>,

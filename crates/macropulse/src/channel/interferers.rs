@@ -20,7 +20,7 @@
 
 use std::ops::Range;
 
-use super::{ALL_MARKS, Light, Link, PulseTrain, Trains, Transmitter};
+use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains, Transmitter};
 use crate::design::Design;
 use crate::emit::shot_at;
 use crate::scene::{Illuminated, Interferer, LineOfSight, Material, Scene};
@@ -188,7 +188,7 @@ struct Arrivals<'a> {
     link: Link,
     /// The channel that looks at a pixel.
     channel: &'a dyn Fn((u16, u16)) -> u16,
-    trains: &'a mut Trains,
+    trains: &'a mut PulseTrains,
 }
 
 impl Arrivals<'_> {
@@ -204,7 +204,8 @@ impl Arrivals<'_> {
         }
     }
 
-    /// Adds light of the shots in `log` that shine into the aperture while we `look` back.
+    /// Adds light of the shots in `log` that shine into the aperture while the sensor looks back along
+    /// the line of sight `look`.
     fn add_direct(
         &mut self,
         (other, direct): (&Interferer, &Direct),
@@ -255,7 +256,7 @@ mod tests {
     use std::path::Path;
 
     /// Light of a lidar of 5 x 5 single pulses 50 m ahead that looks at us, in a scene with `more`.
-    fn light(sensor: &str, more: &str) -> Trains {
+    fn light(sensor: &str, more: &str) -> PulseTrains {
         let text = format!(
             "version = 1\nenvironment = \"vacuum-dark\"\n[[interferers]]\nsensor = \"hdl-64e\"\n\
              position_m = [50, 0, 0]\n\
@@ -276,16 +277,16 @@ mod tests {
     /// the aperture: K photons from white at one metre are K/a² in it.
     #[test]
     fn a_beam_that_meets_the_aperture_enters_it_as_a_whole() {
-        let foreign = light("kim-park-2016", "");
-        assert_eq!((foreign.len(), foreign.marks[0]), (1, ALL_MARKS));
-        assert_eq!(foreign.shot[0], 12);
+        let direct = light("kim-park-2016", "");
+        assert_eq!((direct.len(), direct.marks[0]), (1, ALL_MARKS));
+        assert_eq!(direct.shot[0], 12);
         let flight = fs_from_s(50.0 / SPEED_OF_LIGHT);
-        assert_eq!(foreign.arrives_fs[0], 480_000_000_000 + flight);
+        assert_eq!(direct.arrives_fs[0], 480_000_000_000 + flight);
         let hdl = Design::open("hdl-64e", &[]).unwrap();
         let dark = Environment::vacuum_dark();
         let white = Link::of(&hdl, &dark).photons(1.0, 1.0);
         approx::assert_relative_eq!(
-            foreign.photons[0],
+            direct.photons[0],
             white / APERTURE_RADIUS.powi(2),
             max_relative = 1e-9
         );
@@ -303,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn who_declares_no_energy_is_taken_to_be_like_us() {
+    fn an_interferer_without_a_declared_energy_is_taken_to_be_like_the_sensor() {
         let open = |name: &str, set: &[(&str, &str)]| {
             let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
             Design::open(name, &set.iter().map(own).collect::<Vec<_>>()).unwrap()

@@ -1,10 +1,10 @@
-//! Light at the aperture of a sensor while it measures a band: the one seam between everything
-//! that shines and the detectors.
+//! Light at the aperture of a sensor while it measures a band: what every source adds to and every
+//! detector sees.
 //!
 //! Light is pulse trains and background. A **pulse train** is what one shot of one lidar brings
-//! along one way: the marks of a macropulse, or of a part of it, from a surface or straight from
-//! an interferer. The **background** is a rate λ(t): light without pulses, as sunlight. A detector
-//! is a function of both and never asks whose light it is.
+//! along one way: the marks of a macropulse, or of a sub-macropulse, from a surface or straight
+//! from an interferer. The **background** is a rate λ(t): light without pulses, as sunlight. A
+//! detector is a function of both and is not told whose light it is.
 
 use macropulse_codec::code::Codebook;
 
@@ -39,14 +39,14 @@ pub struct Light<'a> {
     /// Whose light it is: the sensor itself first, then the interferers.
     pub transmitters: Vec<Transmitter<'a>>,
     /// The pulse trains of all of them, in no particular order.
-    pub trains: Trains,
+    pub trains: PulseTrains,
     /// What shines without pulses.
     pub background: Background,
 }
 
 /// Pulse trains, as columns: one entry for what one shot sends along one way.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Trains {
+pub struct PulseTrains {
     /// Index of the transmitter.
     pub transmitter: Vec<u16>,
     /// Channel of the detector that sees it.
@@ -64,15 +64,15 @@ pub struct Trains {
     pub marks: Vec<[u16; 2]>,
     /// Number of the shot by its transmitter's own count.
     pub shot: Vec<u64>,
-    /// Which of the ways that light of this shot takes: with transmitter and shot the address of
+    /// Which of the ways that light of this shot takes: with transmitter and shot the counter of
     /// its random numbers.
     pub way: Vec<u16>,
 }
 
-/// Stands in [`Trains::marks`] for a whole macropulse.
+/// Stands in [`PulseTrains::marks`] for a whole macropulse.
 pub const ALL_MARKS: [u16; 2] = [0, u16::MAX];
 
-/// One line of [`Trains`]; fields as there.
+/// One line of [`PulseTrains`]; fields as there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "the columns say it")]
 pub struct PulseTrain {
@@ -87,8 +87,8 @@ pub struct PulseTrain {
     pub way: u16,
 }
 
-impl Trains {
-    /// Number of trains.
+impl PulseTrains {
+    /// Number of pulse trains.
     pub fn len(&self) -> usize {
         self.arrives_fs.len()
     }
@@ -111,14 +111,14 @@ impl Trains {
         self.way.push(train.way);
     }
 
-    /// Which random numbers belong to train `index`, as the index of an address: the way in the
-    /// highest bits, then the transmitter, and the shot, of which 2⁴⁰ are told apart.
+    /// The counter of the random numbers of pulse train `index`: the way in the highest bits, then
+    /// the transmitter, and the shot, of which 2⁴⁰ are told apart.
     pub fn address(&self, index: usize) -> u64 {
         let (way, transmitter) = (u64::from(self.way[index]), u64::from(self.transmitter[index]));
         way << 48 | transmitter << 40 | self.shot[index] & ((1 << 40) - 1)
     }
 
-    /// The train at `index`.
+    /// The pulse train at `index`.
     pub fn at(&self, index: usize) -> PulseTrain {
         PulseTrain {
             transmitter: self.transmitter[index],
@@ -135,7 +135,7 @@ impl Trains {
 }
 
 impl Light<'_> {
-    /// The marks of train `index`, in chips from its first one.
+    /// The marks of pulse train `index`, in chips from its first one.
     pub fn marks(&self, index: usize) -> &[u16] {
         let trains = &self.trains;
         let codebook = self.transmitters[usize::from(trains.transmitter[index])].codebook;
@@ -144,7 +144,7 @@ impl Light<'_> {
         &marks[first.min(marks.len())..end.min(marks.len())]
     }
 
-    /// When the marks of train `index` arrive, fs, ascending.
+    /// When the marks of pulse train `index` arrive, fs, ascending.
     pub fn arrivals_fs(&self, index: usize) -> impl Iterator<Item = i64> {
         let chip_fs = self.transmitters[usize::from(self.trains.transmitter[index])].chip_fs;
         let begins = self.trains.arrives_fs[index];

@@ -37,11 +37,11 @@ impl Link {
     /// The link from the lidar `other` into the receiver of `ours`; `None` where the filter of the
     /// receiver stops the light: ±[`FILTER`] about its own wavelength, unless it is known.
     ///
-    /// What a foreign mark brings follows from the sensitivity that the other declares of itself,
-    /// n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector like its
-    /// own, which ours are taken to be unless both have a link budget. A detector of ours that never
-    /// misses sees every mark; of another that never misses, by which its energy is left open, ours
-    /// is assumed.
+    /// The photons of a mark of the interferer follow from the sensitivity that it declares of
+    /// itself, n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector
+    /// like its own, which ours are taken to be unless both have a link budget. A detector of ours
+    /// that never misses sees every mark; of another that never misses, by which its energy is left
+    /// open, ours is assumed.
     pub fn of_interferer(ours: &Design, other: &Design, environment: &Environment) -> Option<Self> {
         let filter = ours.budget.as_ref().map_or(FILTER, |budget| budget.filter / 2.0);
         if (ours.light.wavelength - other.light.wavelength).abs() > filter {

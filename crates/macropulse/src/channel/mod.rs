@@ -10,8 +10,9 @@
 //! n = n₀ · (ρ_eff / ρ₀) · (R₀ / R)² · T² · w
 //!
 //! with ρ_eff the material's backscatter towards the sensor and w the share of the beam. A sensor
-//! with a link budget has n₀ from it, for a white target at its reach. Where its field follows the
-//! beam, the share of the spot that is still in the field when the echo arrives is a factor too.
+//! with a link budget has n₀ from it, for a white target at its rated range. Where its field of view
+//! is scanned with the beam, the share of the spot that is still in the field when the echo arrives
+//! is a factor too.
 
 mod interferers;
 mod light;
@@ -19,14 +20,14 @@ mod link;
 mod operating;
 
 pub use interferers::APERTURE_RADIUS;
-pub use light::{ALL_MARKS, Background, Light, PulseTrain, Trains, Transmitter};
+pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Transmitter};
 pub use link::{FILTER, Link};
 pub use operating::{Error, FirstFiringSetting, Idealised, LinearSetting, Operating, idealised};
 
 use macropulse_codec::ShotLog;
 
 use crate::design::Design;
-use crate::scene::{Hits, Material, PARTS, Scene, Traced};
+use crate::scene::{Hits, Material, SUB_MACROPULSES, Scene, Traced};
 use crate::units::tof_fs_from_ranges;
 
 /// A sensor in a scene, at work in the environment of the scene.
@@ -48,9 +49,9 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
         background: Background { steady: operating.background, ..Background::default() },
         ..Light::default()
     };
-    match traced.parts.as_slice() {
+    match traced.sub_macropulses.as_slice() {
         [] => echoes(&mut light.trains, (&operating.link, &scene.materials), log, &traced.middle),
-        parts => echoes_of_parts(&mut light.trains, seen, log, parts),
+        each => echoes_of_sub_macropulses(&mut light.trains, seen, log, each),
     }
     interferers::add(&mut light, design, scene, log);
     light
@@ -58,7 +59,7 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
 
 /// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out.
 pub fn echoes(
-    trains: &mut Trains,
+    trains: &mut PulseTrains,
     (link, materials): (&Link, &[Material]),
     log: &ShotLog,
     hits: &Hits,
@@ -96,31 +97,31 @@ pub fn echoes(
     }));
 }
 
-/// Adds the echoes of macropulses whose parts have met `hits` each, the part sent first first;
-/// ordered by shot.
-fn echoes_of_parts(trains: &mut Trains, seen: &Seen, log: &ShotLog, parts: &[Hits]) {
+/// Adds the echoes of the sub-macropulses of all shots, which have met `each`, the one sent first
+/// first; ordered by shot.
+fn echoes_of_sub_macropulses(trains: &mut PulseTrains, seen: &Seen, log: &ShotLog, each: &[Hits]) {
     let (link, materials) = (&seen.operating.link, &seen.scene.materials);
     let codebook = &seen.design.coding.codebook;
     let mut order: Vec<(u32, u8, usize)> = Vec::new();
-    for (part, hits) in parts.iter().enumerate() {
-        order.extend(hits.shot.iter().enumerate().map(|(i, shot)| (*shot, part as u8, i)));
+    for (sub, hits) in each.iter().enumerate() {
+        order.extend(hits.shot.iter().enumerate().map(|(i, shot)| (*shot, sub as u8, i)));
     }
     order.sort_unstable();
     for met in order.chunk_by(|one, next| one.0 == next.0) {
-        for (way, &(shot, part, i)) in met.iter().enumerate() {
-            let hits = &parts[usize::from(part)];
+        for (way, &(shot, sub, i)) in met.iter().enumerate() {
+            let hits = &each[usize::from(sub)];
             let photons = link.echo(materials, hits, i);
             if photons <= 0.0 {
                 continue;
             }
             let shot = shot as usize;
             let marks = codebook.marks(log.label[shot], log.word[shot]);
-            let begins = |part: u8| {
-                let chip = u32::from(part) * codebook.chips() / u32::from(PARTS);
+            let begins = |sub: u8| {
+                let chip = u32::from(sub) * codebook.chips() / u32::from(SUB_MACROPULSES);
                 marks.partition_point(|mark| u32::from(*mark) < chip) as u16
             };
             let delay_fs = tof_fs_from_ranges(&hits.range[i..=i])[0];
-            let marks = [begins(part), begins(part + 1)];
+            let marks = [begins(sub), begins(sub + 1)];
             let train = PulseTrain { photons, marks, way: way as u16, ..WHOLE };
             trains.push(echo(log, shot, delay_fs, train));
         }
@@ -198,7 +199,7 @@ mod tests {
             object: vec![0; 4],
         };
         let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
-        let mut trains = Trains::default();
+        let mut trains = PulseTrains::default();
         let link = Link::of(&design, &crate::environment::Environment::vacuum_dark());
         echoes(&mut trains, (&link, &materials), &log, &hits);
         assert_eq!((&trains.shot[..], &trains.way[..]), (&[3, 5][..], &[0, 0][..]));

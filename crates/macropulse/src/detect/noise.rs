@@ -155,7 +155,7 @@ impl Source<'_> {
     /// The address of the counts of window `index`.
     fn address(&self, index: i64) -> Address {
         let part = u32::from(self.channel) << PART_BITS;
-        Address { stage: Stage::FalseEdges, index: index as u64, part }
+        Address { stage: Stage::Noise, index: index as u64, part }
     }
 }
 

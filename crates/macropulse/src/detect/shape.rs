@@ -2,7 +2,7 @@
 
 use macropulse_codec::statistics::normal_tail;
 
-use crate::channel::{Light, PulseTrain, Trains};
+use crate::channel::{Light, PulseTrain, PulseTrains};
 use crate::design::{Design, Detector};
 use crate::units::{FS_PER_S, fs_from_s};
 
@@ -39,7 +39,7 @@ impl Shape {
     /// Light with every pulse train of the sensor's own as those of its slices, which are detected
     /// independently of each other: photons are.
     pub fn spread<'a>(&self, light: &Light<'a>) -> Light<'a> {
-        let mut spread = Light { trains: Trains::default(), ..light.clone() };
+        let mut spread = Light { trains: PulseTrains::default(), ..light.clone() };
         for index in 0..light.trains.len() {
             let train = light.trains.at(index);
             if train.transmitter != 0 {

@@ -10,8 +10,8 @@ use super::times::{EqualSteps, fired_at_fs};
 use crate::design::Design;
 use macropulse_codec::ShotLog;
 
-/// A band holds about this many shots, in whole lines: few enough for the edges of a coded sensor
-/// to stay in the cache, enough for the guard shots to be a small part of it.
+/// A band holds about this many shots, in whole lines: few enough for the detection events of a
+/// coded sensor to stay in the cache, enough for the guard shots to be a small part of it.
 const SHOTS: u64 = 1700;
 
 /// One band: consecutive shots of one scan.

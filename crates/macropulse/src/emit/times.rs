@@ -21,7 +21,7 @@ pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
 pub(super) struct EqualSteps {
     fs: i64,
     rest: u64,
-    /// How far `fs` lies beyond the edge of the chip clock.
+    /// How far `fs` lies beyond the last tick of the chip clock.
     beyond_fs: i64,
     step: (i64, u64, i64),
     parts: u64,

@@ -26,7 +26,7 @@ pub fn write_atomically(
     attempt().map_err(|cause| Error::write(path, cause))
 }
 
-/// Temporary files are private by default; ours become somebody's results, so they take the
+/// Temporary files are private by default; ours become results to be kept, so they take the
 /// permissions any new file gets.
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();

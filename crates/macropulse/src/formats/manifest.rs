@@ -58,7 +58,7 @@ pub struct Begun {
 pub struct Manifest {
     /// Version of macropulse.
     pub version: String,
-    /// Seed of all chance.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// The sensor.
     pub sensor: Named,
@@ -72,11 +72,11 @@ pub struct Manifest {
     pub idealisations: Vec<String>,
     /// Anything else a reader should know.
     pub notes: Vec<String>,
-    /// Counts from stage to stage: shots, echoes, edges, ticks, returns.
+    /// Counts from stage to stage: shots, echoes, detection events, ticks, returns.
     pub counts: Entries<u64>,
     /// Rejected shots or macropulses by reason.
     pub rejects: Entries<u64>,
-    /// Converters: most busy at once, edges lost.
+    /// Converters: most busy at once, detection events lost.
     pub tdc: Entries<u64>,
     /// Pixels by outcome; empty without truth.
     pub outcomes: Entries<u64>,

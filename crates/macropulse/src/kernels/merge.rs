@@ -9,8 +9,8 @@ use macropulse_codec::level::Level;
 /// Numbers taken at once.
 const STEP: usize = 16;
 
-/// A row ends with so many numbers that are larger than any other, so that nobody need ask
-/// whether it has ended.
+/// A row ends with so many numbers that are larger than any other, so that its end need not be
+/// tested for.
 pub(crate) const PAD: [u32; 3 * STEP] = [u32::MAX; 3 * STEP];
 
 /// Puts `a` and `b`, which ascend and end with [`PAD`], into `merged`, in order and without the
@@ -58,7 +58,7 @@ mod avx512 {
             (lower, rest) = sorted_halves(next, rest);
             // SAFETY: there is room for sixteen numbers.
             unsafe { _mm512_storeu_si512(place.as_mut_ptr().cast(), lower) };
-            // Looked up, not jumped to: nobody can guess which row is next.
+            // Looked up rather than jumped to: no processor can predict which row is next.
             let is_of_b = usize::from(number(a, at[0]) > number(b, at[1]));
             next = load([a, b][is_of_b], at[is_of_b]);
             at[is_of_b] += STEP;

@@ -1,8 +1,8 @@
 //! Rays from one place, many at a time, down a hierarchy.
 //!
 //! Neighbouring rays enter nearly the same boxes. A packet of them descends together: a box is
-//! fetched once and tested against all, and who does not enter it sits out until the packet comes
-//! back. Rays of a packet that point into different octants, or have another main axis, descend
+//! fetched once and tested against all, and a ray that does not enter it sits out until the packet
+//! comes back. Rays of a packet that point into different octants, or have another main axis, descend
 //! one after the other. Each ray meets what it would have met alone, to the last bit.
 
 use super::tree::{

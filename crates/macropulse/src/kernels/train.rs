@@ -1,4 +1,4 @@
-//! Trains: the marks of one macropulse, put in a row.
+//! Pulse trains: the marks of one macropulse, one after the other.
 
 use std::mem::MaybeUninit;
 
@@ -7,7 +7,7 @@ use macropulse_codec::level::Level;
 /// Marks written at once; code words are padded to a multiple of it.
 pub(crate) const STEP: usize = 16;
 
-/// Where the marks of a train come from.
+/// Where the marks of a pulse train come from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Train<'a> {
     /// Times of the marks of the code word, padded to a multiple of [`STEP`].
@@ -18,7 +18,7 @@ pub(crate) struct Train<'a> {
     pub(crate) bit: u32,
     /// The lit bits; the one sent first is the lowest.
     pub(crate) lit: u32,
-    /// When the train begins.
+    /// When the pulse train begins.
     pub(crate) start: u32,
 }
 

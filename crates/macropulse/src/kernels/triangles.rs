@@ -3,7 +3,7 @@
 //! Which triangle a ray passes through is decided in `f32`, in a frame about the sensor so that
 //! nothing is far from its origin. The test is the watertight one of \[WBW13\]: the corners are
 //! sheared so that the ray becomes the depth axis, and the sign of each edge is exact, so two
-//! triangles that share an edge can never both disown a ray. How far the hit is, is then solved
+//! triangles that share an edge can never both miss a ray. How far the hit is, is then solved
 //! in `f64` on the plane of the triangle as it was modelled.
 
 use glam::{DVec3, Vec3A, Vec3Swizzles};
@@ -144,7 +144,7 @@ pub(super) fn passes_exactly(u: [f32; 3], v: [f32; 3]) -> bool {
     let areas = [area(1, 2), area(2, 0), area(0, 1)];
     let left = areas.iter().all(|area| *area >= 0.0);
     let right = areas.iter().all(|area| *area <= 0.0);
-    // All three zero: the triangle is seen edge-on, and its neighbours answer for it.
+    // All three zero: the triangle is seen edge-on, and its neighbours are hit instead.
     left != right
 }
 

@@ -1,4 +1,4 @@
-//! When things happen that know nothing of each other: a Poisson process on a line.
+//! A Poisson process on a line: the times of events that do not depend on each other.
 //!
 //! The waits between its events are exponential, −ln u with u uniform; the sums of them are the
 //! times, in order.

@@ -53,7 +53,7 @@ impl Scene {
         }
         let text = toml::to_string(&table).map_err(|error| refused(error.to_string()))?;
         Self::from_toml(&text, name_or_file, base).map_err(|error| match error {
-            // Its place would be in a text that nobody wrote.
+            // Its place would be in a text that is not that of the file.
             Error::Typed { message, .. } => refused(message),
             error => error,
         })

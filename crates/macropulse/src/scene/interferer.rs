@@ -11,7 +11,7 @@ use crate::design::{Design, preset_text};
 use crate::digest::Digest;
 use crate::emit::Clock;
 
-/// Most lidars beside the sensor: their numbers have eight bits in addresses of random numbers.
+/// Most interferers: their numbers have eight bits in the counters of random numbers.
 pub(super) const MOST: usize = 255;
 
 /// Farthest a clock may be ahead or behind, s.

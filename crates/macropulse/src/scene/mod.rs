@@ -40,7 +40,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use motion::{Motion, Moving};
 pub use pose::{Pose, Transform};
-pub use trace::{PARTS, Traced};
+pub use trace::{SUB_MACROPULSES, Traced};
 
 use crate::digest::Digest;
 use crate::environment::Environment;

@@ -2,8 +2,8 @@
 //!
 //! 1. A beam without width is one ray. A beam with a width is a hexagonal set of rays, weighted
 //!    by the Gaussian irradiance at their place (docs/physics.md#footprint).
-//! 2. Where the mirror moves during a macropulse, its parts leave in different directions: each
-//!    has rays of its own (docs/physics.md#mirror-motion).
+//! 2. Where the mirror moves during a macropulse, it is cut into sub-macropulses that leave in
+//!    different directions: each has rays of its own (docs/physics.md#mirror-motion).
 //! 3. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
 //! 4. Where something moves, all rays of a shot are cast at the time at which it is fired.
@@ -22,11 +22,11 @@ impl Scene {
         let along = |shot: usize| directions.of(log.row[shot], log.column[shot]);
         let middle = self.trace_along(design, log, along);
         if !design.scan.moves {
-            return Traced { middle, parts: Vec::new() };
+            return Traced { middle, sub_macropulses: Vec::new() };
         }
         let mirror = Mirror { design, log };
-        let part = |part| self.trace_along(design, log, |shot| mirror.axis(shot, part));
-        Traced { middle, parts: (0..PARTS).map(part).collect() }
+        let hits = |sub| self.trace_along(design, log, |shot| mirror.axis(shot, sub));
+        Traced { middle, sub_macropulses: (0..SUB_MACROPULSES).map(hits).collect() }
     }
 
     fn trace_along(
@@ -54,13 +54,14 @@ pub struct Traced {
     /// What lies in the direction of each pixel. Its light, where the mirror stands still for a
     /// macropulse; the truth to judge points by, where it moves.
     pub middle: Hits,
-    /// What each of the [`PARTS`] of the macropulses meets, the part sent first first; empty where
-    /// the mirror stands still.
-    pub parts: Vec<Hits>,
+    /// What each of the [`SUB_MACROPULSES`] meets, the one sent first first; empty where the mirror
+    /// stands still.
+    pub sub_macropulses: Vec<Hits>,
 }
 
-/// Parts of a macropulse that leave in directions of their own where the mirror moves.
-pub const PARTS: u8 = 8;
+/// Sub-macropulses of a macropulse: equal parts of it in time that leave in directions of their own
+/// where the mirror moves.
+pub const SUB_MACROPULSES: u8 = 8;
 
 /// Where the beam points while the mirror moves on.
 struct Mirror<'a> {
@@ -69,10 +70,10 @@ struct Mirror<'a> {
 }
 
 impl Mirror<'_> {
-    /// The direction in which the middle of a `part` of `shot` leaves. The middle of the macropulse
+    /// The direction in which the middle of sub-macropulse `sub` of `shot` leaves. The middle of the macropulse
     /// leaves towards the pixel; from there to the next pixel of the line the mirror takes the time
     /// from shot to shot.
-    fn axis(&self, shot: usize, part: u8) -> [f64; 3] {
+    fn axis(&self, shot: usize, sub: u8) -> [f64; 3] {
         let log = self.log;
         let directions = self.design.directions();
         let of = |shot: usize| directions.of(log.row[shot], log.column[shot]);
@@ -85,12 +86,12 @@ impl Mirror<'_> {
         let macropulse =
             i64::from(self.design.coding.codebook.chips()) * self.design.coding.chip_fs;
         let apart = log.fired_at_fs[other] - log.fired_at_fs[shot];
-        let after = (f64::from(part) + 0.5) / f64::from(PARTS) - 0.5;
+        let after = (f64::from(sub) + 0.5) / f64::from(SUB_MACROPULSES) - 0.5;
         let pixels = after * macropulse as f64 / apart as f64;
         let there = of(other);
         let aim = [0, 1, 2].map(|i| axis[i] + pixels * (there[i] - axis[i]));
-        let length = aim.iter().map(|part| part * part).sum::<f64>().sqrt();
-        aim.map(|part| part / length)
+        let length = aim.iter().map(|along| along * along).sum::<f64>().sqrt();
+        aim.map(|along| along / length)
     }
 }
 
@@ -151,7 +152,7 @@ mod tests {
     use super::*;
 
     /// The mirror moves by 0.67 pixel during a macropulse of the paper: an edge that crosses a
-    /// pixel is met by some of its parts, in the order in which they are sent.
+    /// pixel is met by some of its sub-macropulses, in the order in which they are sent.
     #[test]
     fn the_parts_of_a_macropulse_sweep_two_thirds_of_a_pixel() {
         let design = Design::open("kim-park-2016-physical", &[]).unwrap();
@@ -159,10 +160,11 @@ mod tests {
         let mirror = Mirror { design: &design, log: &log };
         let pitch = (43.2_f64 / 848.0).to_radians();
         let shot = log.owned.start + 400;
-        let [first, last] = [0, PARTS - 1].map(|part| mirror.axis(shot, part));
+        let [first, last] = [0, SUB_MACROPULSES - 1].map(|sub| mirror.axis(shot, sub));
         let angle =
             |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
-        let swept = angle(first, last) * f64::from(PARTS) / f64::from(PARTS - 1);
+        let swept =
+            angle(first, last) * f64::from(SUB_MACROPULSES) / f64::from(SUB_MACROPULSES - 1);
         approx::assert_relative_eq!(swept / pitch, 0.6675, max_relative = 0.03);
         let pixel = design.directions().of(log.row[shot], log.column[shot]);
         approx::assert_relative_eq!(angle(first, pixel), angle(last, pixel), max_relative = 0.01);
@@ -170,6 +172,6 @@ mod tests {
         assert!(angle(last, next) < angle(first, next), "it moves towards the next pixel");
         // The last pixel of a line has none after it.
         let end = log.owned.end - 1;
-        assert!(angle(mirror.axis(end, 0), mirror.axis(end, PARTS - 1)) > 0.5 * pitch);
+        assert!(angle(mirror.axis(end, 0), mirror.axis(end, SUB_MACROPULSES - 1)) > 0.5 * pitch);
     }
 }

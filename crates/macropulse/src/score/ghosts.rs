@@ -39,7 +39,7 @@ pub fn ghosts(piece: &Piece, design: &Design, log: &ShotLog, light: &Light) -> u
 /// Pulse trains of interferers, in the order in which they arrive.
 struct Interference<'a> {
     light: &'a Light<'a>,
-    /// Trains by time.
+    /// Indices of the pulse trains, by time.
     order: Vec<usize>,
     /// From the first chip to the last mark, at most, fs.
     longest_fs: i64,
@@ -49,8 +49,8 @@ struct Interference<'a> {
 impl<'a> Interference<'a> {
     fn of(design: &Design, light: &'a Light) -> Self {
         let trains = &light.trains;
-        let is_foreign = |train: &usize| trains.transmitter[*train] > 0;
-        let mut order: Vec<usize> = (0..trains.len()).filter(is_foreign).collect();
+        let is_interference = |train: &usize| trains.transmitter[*train] > 0;
+        let mut order: Vec<usize> = (0..trains.len()).filter(is_interference).collect();
         order.sort_by_key(|train| trains.arrives_fs[*train]);
         let transmitters = light.transmitters.iter();
         let pulse = transmitters.fold(design.light.pulse, |most, from| most.max(from.pulse));
@@ -81,7 +81,7 @@ impl<'a> Interference<'a> {
         own.filter(is_met).count() as u64
     }
 
-    /// The trains, by order, whose first chips arrive in `span`.
+    /// The pulse trains, by order, whose first chips arrive in `span`.
     fn within(&self, span: Range<i64>) -> Range<usize> {
         let arrives_fs = &self.light.trains.arrives_fs;
         let before = |time: i64| self.order.partition_point(|train| arrives_fs[*train] < time);
@@ -96,8 +96,8 @@ mod tests {
     use crate::points::Surface;
     use macropulse_codec::decode::Returns;
 
-    /// One shot of the coded sensor that was answered from 30 m, with `outcome`; foreign light has
-    /// the same marks, `late_fs` behind them.
+    /// One shot of the coded sensor that was answered from 30 m, with `outcome`; light of an interferer
+    /// has the same marks, `late_fs` behind them.
     fn count(outcome: Outcome, late_fs: i64, kept: usize) -> u64 {
         let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);

@@ -1,6 +1,6 @@
 //! Intervals in which a true value lies with 95 % confidence.
 //!
-//! What is repeated is the seed. The pixels of one scan share the surfaces they look at, the marks
+//! What is repeated is the seed: the pixels of one scan share the surfaces they look at, the marks
 //! that fall on each other and the search of the receiver, so they are no independent trials; two
 //! seeds are. Every interval here therefore takes its scatter from seed to seed. It is conditional
 //! on the scene: other surfaces are not part of the chance.

@@ -1,11 +1,11 @@
-//! Edges to ticks: the bank of time-to-digital converters.
+//! Detection events to ticks: the bank of time-to-digital converters (TDC).
 //!
 //! 1. A converter counts whole clock periods in 32 bits and the rest of the way in ticks. The
 //!    counter rolls over every 2³² periods (429.5 ms at 100 ps, \[KP16 §2\]); the receiver knows
 //!    roughly what time it is and undoes that.
-//! 2. Edges within the same tick are one: the hard limiter.
-//! 3. The first free converter takes the next edge and is busy for the dead time. With all of
-//!    them busy the edge is lost.
+//! 2. Detection events within the same tick are one: the hard limiter.
+//! 3. The first free converter takes the next event and is busy for the dead time. With all of
+//!    them busy the event is lost.
 //! 4. Where every detector has its own channel, the bank is divided evenly among them.
 
 use std::ops::Range;
@@ -16,30 +16,30 @@ use crate::design::{Design, PARTS_OF_TICK, Tdc};
 use crate::detect::Detections;
 use crate::kernels::{all_apart, distinct};
 
-/// What the bank of converters makes of the edges of a band.
+/// What the bank of converters makes of the detection events of a band.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Converted {
     /// What the receiver is given.
     pub ticks: Ticks,
     /// Most converters busy at once, in any one channel.
     pub peak_busy: u32,
-    /// Edges that found every converter busy.
+    /// Events that found every converter busy.
     pub lost: u64,
-    /// Edges that fell into the tick of another one.
+    /// Events that fell into the tick of another one.
     pub merged: u64,
 }
 
-/// What one converter puts out for one edge.
+/// What one converter puts out for one detection event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
     /// Whole clock periods since power-up, rolling over in 32 bits.
     pub clock: u32,
-    /// Ticks since the last clock edge.
+    /// Ticks since the last period of the clock began.
     pub fine: u32,
 }
 
 impl Reading {
-    /// The reading for an edge at absolute time `time_fs`.
+    /// The reading for an event at absolute time `time_fs`.
     pub fn at(tdc: &Tdc, time_fs: i64) -> Self {
         Self {
             clock: time_fs.div_euclid(tdc.clock_fs) as u32,
@@ -79,11 +79,11 @@ pub fn ticks(design: &Design, detections: Detections) -> Converted {
     }
 }
 
-/// Edges looked at together.
+/// Detection events looked at together.
 const BLOCK: usize = 512;
 
-/// Converters served first-free, each busy for the same time: an edge finds one free unless as
-/// many edges as there are converters were taken within the last dead time.
+/// Converters served first-free, each busy for the same time: an event finds one free unless as
+/// many events as there are converters were taken within the last dead time.
 #[derive(Debug, Default)]
 struct Bank {
     converters: usize,
@@ -97,7 +97,7 @@ impl Bank {
     /// Makes ticks of `times` and leaves those that find a converter free. Gives how many fell
     /// into the tick of another one.
     ///
-    /// If each of a block of edges is a dead time later than the one `peak` places before it, no
+    /// If each of a block of events is a dead time later than the one `peak` places before it, no
     /// more than `peak` converters are busy at any of them: all are taken, and there is no new
     /// peak. Few blocks are different.
     fn take_all(&mut self, times: &mut Vec<u32>) -> usize {
@@ -118,10 +118,10 @@ impl Bank {
         merged
     }
 
-    /// Takes the edges of `block` one by one; all before it were taken. Gives where those taken
+    /// Takes the events of `block` one by one; all before it were taken. Gives where those taken
     /// end.
     fn take_block(&mut self, ticks: &mut [u32], block: Range<usize>) -> usize {
-        // Of edges before that, none is still busy.
+        // Converters that took events before that are free again.
         let mut busy = block.start.saturating_sub(self.peak)..block.start;
         for read in block {
             let now = ticks[read];
@@ -133,7 +133,7 @@ impl Bank {
         busy.end
     }
 
-    /// Whether an edge at `now` finds a converter free. Of `taken` those in the range `busy` may
+    /// Whether an event at `now` finds a converter free. Of `taken` those in the range `busy` may
     /// still be.
     fn takes(&mut self, now: u32, taken: &[u32], busy: &mut Range<usize>) -> bool {
         while busy.start < busy.end && now - taken[busy.start] >= self.dead {
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_in_one_tick_are_one() {
+    fn events_in_one_tick_are_one() {
         let Converted { ticks, merged, lost, .. } =
             timed(&sensor(&[]), 4000, vec![64 * 400, 64 * 400 + 63, 64 * 401]);
         assert_eq!((ticks.epoch, &ticks.tick[..]), (4000, &[400, 401][..]));
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bank_of_two_loses_the_third_edge_within_the_dead_time() {
+    fn a_bank_of_two_loses_the_third_event_within_the_dead_time() {
         let design = sensor(&[("converters", "2"), ("dead_time_ns", "3.3")]);
         let ns = |t: f64| (t * 400.0 * 64.0) as u32;
         let found = timed(&design, 0, vec![ns(10.0), ns(11.0), ns(12.0), ns(13.4), ns(13.5)]);
@@ -235,13 +235,13 @@ mod tests {
     fn each_channel_has_its_share_of_the_bank() {
         let design =
             Design::open("peregrine", &[("tdc.dead_time_ns".into(), "100".into())]).unwrap();
-        let edges = Detections {
+        let detections = Detections {
             epoch: 0,
             time: vec![6400, 12_800, 6400],
             channel: vec![0, 0, 1],
             amplitude: vec![1.0, 2.0, 3.0],
         };
-        let Converted { ticks, lost, .. } = ticks(&design, edges);
+        let Converted { ticks, lost, .. } = ticks(&design, detections);
         assert_eq!((ticks.tick, lost), (vec![100, 100], 1));
         assert_eq!((ticks.channel, ticks.amplitude), (vec![0, 1], vec![1.0, 3.0]));
     }
@@ -272,7 +272,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn blocks_come_to_the_same_as_one_edge_after_the_other(
+        fn blocks_come_to_the_same_as_one_event_after_the_other(
             gaps in proptest::collection::vec(0..30_000_u32, 0..1000),
             scale in 0..4_u32,
             converters in 1..60_u32,
@@ -290,7 +290,7 @@ mod tests {
             prop_assert_eq!(timed(&design, 0, times), expected);
         }
 
-        /// Sensors with amplitudes go edge by edge.
+        /// Sensors with amplitudes go event by event.
         #[test]
         fn with_and_without_amplitudes_the_bank_is_the_same(
             mut times in proptest::collection::vec(0..1_000_000_u32, 0..300),
@@ -300,8 +300,8 @@ mod tests {
             let design = sensor(&[("converters", &converters.to_string())]);
             let without = timed(&design, 0, times.clone());
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
-            let edges = Detections { time: times, amplitude, ..Detections::default() };
-            let with = ticks(&design, edges);
+            let detections = Detections { time: times, amplitude, ..Detections::default() };
+            let with = ticks(&design, detections);
             let of_ticks: Vec<f32> = with.ticks.tick.iter().map(|tick| *tick as f32).collect();
             prop_assert_eq!(&with.ticks.amplitude, &of_ticks);
             let ticks = Ticks { amplitude: Vec::new(), ..with.ticks.clone() };

@@ -53,9 +53,9 @@ pub fn sky(_: u32, _: u32) -> Option<i64> {
 pub struct Weather {
     /// Share of the marks that is seen.
     pub seen: f64,
-    /// False edges a second.
+    /// Dark and background counts a second.
     pub false_edges: f64,
-    /// Standard deviation of an edge, in ticks.
+    /// Standard deviation of the timing of a detection event, in ticks.
     pub jitter: f64,
 }
 
@@ -109,9 +109,9 @@ impl Sensor {
 
     /// The shots of `rows`, with 26 guard shots at both ends.
     pub fn log(&self, rows: Range<u32>) -> ShotLog {
-        const HALO: u32 = 26;
-        let first = (rows.start * COLUMNS).saturating_sub(HALO);
-        let shots = first..rows.end * COLUMNS + HALO;
+        const GUARD_SHOTS: u32 = 26;
+        let first = (rows.start * COLUMNS).saturating_sub(GUARD_SHOTS);
+        let shots = first..rows.end * COLUMNS + GUARD_SHOTS;
         let owned = (rows.start * COLUMNS - first) as usize..(rows.end * COLUMNS - first) as usize;
         // 6 666 666 666⅔ chips a scan of 407 040 shots.
         let fired = |shot: u32| i64::from(shot) * 20_000_000_000 / (3 * 407_040) * TICK_FS;

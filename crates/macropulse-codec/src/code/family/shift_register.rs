@@ -1,11 +1,11 @@
 //! Sequences of linear feedback shift registers: m-sequences and Gold codes. About half of their
 //! chips are lit.
 //!
-//! An m-sequence of degree n runs through all 2ⁿ − 1 states of its register but the dark one. It
-//! is one word only: its shifts are the same word later, which nobody can tell apart who does not
-//! know the delay. A Gold code \[Gold67\] is an m-sequence u, another one v that takes every q-th
-//! chip of u, q = 5, and u with each shift of v added to it: 2ⁿ + 1 words. For degrees that 4 does
-//! not divide, u and v are a preferred pair: as ±1, any two words correlate to −t, −1 or t − 2
+//! An m-sequence of degree n runs through all 2ⁿ − 1 states of its register but the dark one. It is
+//! one word only: its shifts are the same word later, which no receiver can tell apart that does
+//! not know the delay. A Gold code \[Gold67\] is an m-sequence u, another one v that takes every
+//! q-th chip of u, q = 5, and u with each shift of v added to it: 2ⁿ + 1 words. For degrees that 4
+//! does not divide, u and v are a preferred pair: as ±1, any two words correlate to −t, −1 or t − 2
 //! only, t = 2^⌊(n+2)/2⌋ + 1.
 
 use super::super::{CodeWord, Error};

@@ -86,8 +86,8 @@ fn ticks(book: &Codebook, log: &ShotLog, weather: Weather, seed: u64) -> Ticks {
             continue;
         }
         let is_pane = chance.next_u32() % 100 < weather.panes;
-        let behind = (lag + 700 + chance.next_u32() % 20).min(GATE);
-        for lag in [Some(lag), is_pane.then_some(behind)].into_iter().flatten() {
+        let second = (lag + 700 + chance.next_u32() % 20).min(GATE);
+        for lag in [Some(lag), is_pane.then_some(second)].into_iter().flatten() {
             for &mark in book.marks(log.label[shot], log.word[shot]) {
                 if chance.next_u32() % 100 >= weather.missed {
                     let late = u32::from(chance.next_u32() % 100 < weather.late);
@@ -152,14 +152,14 @@ proptest! {
         let weather = Weather { missed, false_ticks, late, roughness, panes };
         let (returns, mut differ) = differences(&codebook(), weather, seed);
         prop_assert!(returns.len() >= 20, "{:?}", returns.rejects);
-        // With so many of its marks, nobody looks for more elsewhere.
+        // With so many of its marks, a shot is not looked for elsewhere.
         let marks = |shot: usize| {
             let place = returns.shot.iter().position(|&other| other as usize == shot);
             place.map_or(0, |place| returns.marks[place])
         };
         differ.retain(|&(shot, peak, _)| 8 * peak < 7 * marks(shot));
         // Where light lies anywhere upon other light, marks of the better lag may seem to be
-        // explained, and what answers for a shot that met nothing is as good as what does not: one
+        // cancelled, and what answers for a shot that met nothing is as good as what does not: one
         // return in sixteen. Behind panes that is rare, but one return of a case may be it.
         let allowed = match (roughness, panes) {
             (3000, _) => returns.len() / 16,

@@ -1,7 +1,7 @@
 //! Shots whose neighbours have been found are looked for where their neighbours are.
 
-use super::leftover::Evidence;
-use super::{Band, Lock};
+use super::acquisition::Evidence;
+use super::{Band, Detection};
 use crate::decode::correlator::BLOCK;
 use crate::kernels::{Marks, lit_in};
 
@@ -14,12 +14,12 @@ const WIDEST_GAP: usize = 12;
 impl Band<'_> {
     /// Goes from each shot that was found back to those before it.
     pub(super) fn track_back(&mut self, evidence: Evidence) {
-        for shot in (0..self.locks.len()).rev() {
-            if self.locks[shot].is_none()
+        for shot in (0..self.detections.len()).rev() {
+            if self.detections[shot].is_none()
                 && self.may_be_lit(shot)
-                && let Some(lock) = self.predicted(shot, evidence)
+                && let Some(detection) = self.predicted(shot, evidence)
             {
-                self.lock(shot, lock);
+                self.keep(shot, detection);
             }
         }
     }
@@ -28,7 +28,7 @@ impl Band<'_> {
     /// three of them, on the lines through two, and at the lag of one. Where light is faint, gaps
     /// are looked across.
     fn expected(&self, shot: usize, evidence: Evidence) -> [Option<i64>; 6] {
-        let at = |shot: Option<usize>| Some(self.locks.get(shot?)?.as_ref()?.lag);
+        let at = |shot: Option<usize>| Some(self.detections.get(shot?)?.as_ref()?.lag);
         let over = |shot: Option<usize>| {
             self.above.get(shot?).copied().flatten().map(|shot| shot as usize)
         };
@@ -44,7 +44,7 @@ impl Band<'_> {
     }
 
     /// The lag of `shot` if it lies where its neighbours say and the `evidence` is there.
-    pub(super) fn predicted(&mut self, shot: usize, evidence: Evidence) -> Option<Lock> {
+    pub(super) fn predicted(&mut self, shot: usize, evidence: Evidence) -> Option<Detection> {
         let weight = self.sent.weight(shot);
         if weight == 0 {
             return None;
@@ -66,9 +66,9 @@ impl Band<'_> {
                 continue;
             }
             // The flank of a peak just outside would show half as many marks as the peak.
-            let lock = self.best_near(shot, lag, least.div_ceil(2));
-            if lock.is_some_and(|lock| self.is_certain(shot, lock, evidence)) {
-                return lock;
+            let detection = self.best_near(shot, lag, least.div_ceil(2));
+            if detection.is_some_and(|detection| self.is_certain(shot, detection, evidence)) {
+                return detection;
             }
         }
         None
@@ -80,7 +80,7 @@ impl Band<'_> {
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
     /// unless it is bright and its first and last marks are there.
-    pub(super) fn best_near(&mut self, shot: usize, lag: i64, at_least: u16) -> Option<Lock> {
+    pub(super) fn best_near(&mut self, shot: usize, lag: i64, at_least: u16) -> Option<Detection> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
@@ -112,23 +112,25 @@ impl Band<'_> {
         Some(best)
     }
 
-    /// The lag at which more marks of `shot` are found than at `lock`, some of its bits earlier or
-    /// later: there, a part of the lit bits falls upon lit bits. Several such lags: the best.
-    fn whole_bits_away(&mut self, shot: usize, lock: Lock) -> Option<i64> {
+    /// The lag at which more marks of `shot` are found than at `detection`, some of its bits
+    /// earlier or later: there, a part of the lit bits falls upon lit bits. Several such lags: the
+    /// best.
+    fn whole_bits_away(&mut self, shot: usize, detection: Detection) -> Option<i64> {
         let bits = self.sent.bits_of_payload();
         let length = self.sent.length() / bits;
         let (nearest, farthest) = self.sent.gate();
-        let found: Vec<u16> =
-            (-bits..2 * bits).map(|bit| self.found_in_bit(shot, lock.lag + bit * length)).collect();
+        let found: Vec<u16> = (-bits..2 * bits)
+            .map(|bit| self.found_in_bit(shot, detection.lag + bit * length))
+            .collect();
         let mut best = None;
         for away in -bits..=bits {
-            let lag = lock.lag + away * length;
+            let lag = detection.lag + away * length;
             if !(nearest..=farthest).contains(&lag) {
                 continue;
             }
             let lit = self.sent.bits(shot, true).map(|bit| (bits + away + bit / length) as usize);
             let count: u16 = lit.filter_map(|bit| found.get(bit)).sum();
-            if count > best.map_or(lock.count, |(count, _)| count) {
+            if count > best.map_or(detection.count, |(count, _)| count) {
                 best = Some((count, lag));
             }
         }
@@ -136,7 +138,7 @@ impl Band<'_> {
     }
 
     /// The highest peak in the [`BLOCK`] around `middle`.
-    fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Lock> {
+    fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
         let (nearest, farthest) = self.sent.gate();
         let first = middle - BLOCK / 2;
         let allowed = nearest - first..farthest + 1 - first;
@@ -150,12 +152,12 @@ impl Band<'_> {
         self.counts.count(words, bit, Marks { word: &word.marks, bits, scale });
         let peak = self.counts.peak(allowed, self.sent.width.into())?;
         let (lag, margin) = (first + peak.at, peak.count - peak.next);
-        Some(Lock { lag, count: peak.count, margin })
+        Some(Detection { lag, count: peak.count, margin })
     }
 
-    /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`. At
-    /// a sidelobe that far from the peak as the sides of a block are, those at one of the ends have
-    /// nothing to fall upon, and only chance could light them.
+    /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.
+    /// At a sidelobe that far from the peak as the sides of a block are, those at one of the ends
+    /// have nothing to fall upon, and only chance could light them.
     fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
         let (scale, bits) = (self.sent.scale(), self.sent.lit_bits(shot));
         let marks = &self.sent.codebook.word(self.sent.log.word[shot]).marks;
@@ -176,42 +178,49 @@ impl Band<'_> {
         })
     }
 
-    /// Whether chance does not reach `lock`; and, unless faint light is looked for, whether it can
-    /// be no sidelobe and no other shot: half of the marks were found, or twice what chance can
+    /// Whether chance does not reach `detection`; and, unless faint light is looked for, whether it
+    /// can be no sidelobe and no other shot: half of the marks were found, or twice what chance can
     /// give, and no lit bit is much darker than the others.
-    pub(super) fn is_certain(&mut self, shot: usize, lock: Lock, evidence: Evidence) -> bool {
+    pub(super) fn is_certain(
+        &mut self,
+        shot: usize,
+        detection: Detection,
+        evidence: Evidence,
+    ) -> bool {
         let weight = self.sent.weight(shot);
-        if lock.count == weight {
+        if detection.count == weight {
             return true;
         }
-        let by_chance = self.by_chance(shot, lock);
+        let by_chance = self.by_chance(shot, detection);
         if evidence == Evidence::MoreThanChance {
-            return lock.count >= by_chance && self.is_unexplained(shot, lock);
+            return detection.count >= by_chance && self.is_mostly_residual(shot, detection);
         }
-        if lock.count < by_chance || lock.count < weight.div_ceil(2).min(2 * by_chance) {
+        if detection.count < by_chance || detection.count < weight.div_ceil(2).min(2 * by_chance) {
             return false;
         }
         let lit = self.sent.lit_bits(shot).len() as u32;
         // Not so many marks are missing altogether.
         let in_word = self.sent.word(shot).marks() as u32;
-        if u32::from(weight - lock.count) + u32::from(lock.count).div_ceil(3 * lit) < in_word {
+        if u32::from(weight - detection.count) + u32::from(detection.count).div_ceil(3 * lit)
+            < in_word
+        {
             return true;
         }
         let mut lit_bits = self.sent.bits(shot, true);
         lit_bits.all(|bit| {
-            let found = self.found_in_bit(shot, lock.lag + bit);
-            3 * u32::from(found) * lit >= u32::from(lock.count)
+            let found = self.found_in_bit(shot, detection.lag + bit);
+            3 * u32::from(found) * lit >= u32::from(detection.count)
         })
     }
 
-    /// Whether three in four of the marks found at `lock` are not explained by anybody else. Many
-    /// bright shots on top of each other are a worse impostor than chance is.
-    pub(super) fn is_unexplained(&mut self, shot: usize, lock: Lock) -> bool {
-        let start = self.sent.fired[shot] + lock.lag;
+    /// Whether three in four of the marks found at `detection` are in the residual. Where many
+    /// bright shots overlap, they pass for a faint one more easily than chance does.
+    pub(super) fn is_mostly_residual(&mut self, shot: usize, detection: Detection) -> bool {
+        let start = self.sent.fired[shot] + detection.lag;
         let places = self.sent.places(shot).map(|mark| start + mark);
         let end = start + self.sent.length() + i64::from(self.sent.width);
-        let unexplained = self.field.unexplained(start..end);
-        4 * unexplained.count(places, self.sent.width) >= 3 * lock.count
+        let residual = self.field.residual(start..end);
+        4 * residual.count(places, self.sent.width) >= 3 * detection.count
     }
 
     /// Marks of the code word of `shot` that are found if it begins at `lag`.

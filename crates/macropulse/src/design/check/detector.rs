@@ -25,10 +25,10 @@ pub(super) struct Before<'a> {
 }
 
 impl Before<'_> {
-    /// What is detected per mark of the budget: of a white target, at the reach, in clear air.
+    /// What is detected per mark of the budget: of a white target at the rated range in clear air.
     fn honest(&self, budget: &Budget) -> Sensitivity {
         let energy = budget.energy / self.coding.codebook.mean_weight();
-        let range = self.scan.reach;
+        let range = self.scan.rated_range;
         let photons = budget.photons(energy, 1.0, range) * budget.efficiency;
         Sensitivity { photons, range, reflectance: 1.0 }
     }

@@ -93,9 +93,9 @@ pub struct Scan {
     pub rate_millihertz: u64,
     /// Nearest range accepted, m.
     pub min_range: f64,
-    /// Range the sensor is declared to reach, m.
-    pub reach: f64,
-    /// Farthest range accepted, m: the end of the range gate, at or beyond the reach.
+    /// Rated range: the range that the sensor is declared for, m.
+    pub rated_range: f64,
+    /// Farthest range accepted, m: the end of the range gate, at or beyond the rated range.
     pub max_range: f64,
     /// Range to which the light of a shot is followed, m: beyond the gate, because what returns
     /// from there arrives in the gates of later shots.
@@ -181,9 +181,9 @@ struct Sides {
 impl Check<'_> {
     pub(super) fn scan(&self, file: &ScanFile, moves: bool) -> Result<Scan, Error> {
         let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
-        let reach = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
+        let rated_range = self.within("scan.max_range_m", file.max_range_m, 0.01, 1e5)?;
         let beyond = self.within("scan.gate_beyond_m", file.gate_beyond_m, 0.0, 1e5)?;
-        let max_range = reach + beyond;
+        let max_range = rated_range + beyond;
         let light_range = match file.light_range_m {
             Some(typed) => self.within("scan.light_range_m", typed, max_range, 1e5)?,
             None => LIGHT_BEYOND_GATE * max_range,
@@ -213,7 +213,7 @@ impl Check<'_> {
             columns,
             rate_millihertz,
             min_range,
-            reach,
+            rated_range,
             max_range,
             light_range,
             moves,

@@ -1,4 +1,4 @@
-//! The ticks nobody has explained yet.
+//! The residual: the ticks that are left when those of the macropulses found so far are cancelled.
 
 use std::ops::Range;
 
@@ -11,9 +11,9 @@ const CHUNK: i64 = CELL;
 /// Machine words of a chunk.
 const WORDS: usize = CHUNK as usize / 64;
 
-/// The unexplained ticks, one bit each, and how many there are in each [`CHUNK`].
+/// The residual ticks, one bit each, and how many there are in each [`CHUNK`].
 #[derive(Debug)]
-pub(super) struct Unexplained {
+pub(super) struct Residual {
     /// Tick of the first bit.
     origin: i64,
     /// Only to be looked at in chunks that have had ticks.
@@ -23,7 +23,7 @@ pub(super) struct Unexplained {
     were_lit: Vec<u8>,
 }
 
-impl Unexplained {
+impl Residual {
     /// Those of `ticks` that lie in `span`, in the memory `words`, whatever is in it.
     pub fn new(ticks: &[u32], span: Range<i64>, mut words: Vec<u64>) -> Self {
         let chunks = ((2 * MARGIN + span.end - span.start).max(0) / CHUNK + 1) as usize;
@@ -63,8 +63,8 @@ impl Unexplained {
         self.words
     }
 
-    /// Explains the ticks of `pattern`, begun at each of `starts`.
-    pub fn explain(&mut self, starts: impl Iterator<Item = i64>, pattern: &Pattern) {
+    /// Cancels the ticks of `pattern`, begun at each of `starts`.
+    pub fn cancel(&mut self, starts: impl Iterator<Item = i64>, pattern: &Pattern) {
         self.were_lit.resize(pattern.reach(), 0);
         for start in starts {
             let Ok(first) = usize::try_from(start - self.origin) else { continue };
@@ -85,12 +85,12 @@ impl Unexplained {
         }
     }
 
-    /// At how many of `places`, or of the `width` − 1 ticks behind it, a tick is unexplained.
+    /// At how many of `places`, or of the `width` − 1 ticks behind it, a tick is left.
     pub fn count(&self, places: impl Iterator<Item = i64>, width: u32) -> u16 {
         places.filter(|&place| self.any(place, width)).count() as u16
     }
 
-    /// Whether the tick at `place`, or one of the `width` − 1 behind it, is unexplained.
+    /// Whether the tick at `place`, or one of the `width` − 1 behind it, is left.
     pub fn any(&self, place: i64, width: u32) -> bool {
         self.masks(place, width).any(|(word, mask)| {
             self.per_chunk.get(word / WORDS).is_some_and(|lit| *lit > 0)
@@ -109,7 +109,7 @@ impl Unexplained {
         })
     }
 
-    /// Puts into `lit` the places of `span` that are unexplained ticks, or up to `width` − 1 before
+    /// Puts into `lit` the places of `span` that are residual ticks, or up to `width` − 1 before
     /// one, and tells which bit of it is the first of them.
     pub fn lit(&self, span: Range<i64>, width: u32, lit: &mut Vec<u64>) -> usize {
         let chunks = self.chunk_of(span.start)..self.chunk_of(span.end + CHUNK - 1);
@@ -124,7 +124,7 @@ impl Unexplained {
         (span.start - self.origin - CHUNK * chunks.start as i64) as usize
     }
 
-    /// Calls `on_tick` with each unexplained tick of `span`, in order.
+    /// Calls `on_tick` with each residual tick of `span`, in order.
     pub fn for_each(&self, span: Range<i64>, mut on_tick: impl FnMut(i64)) {
         let mut chunk = self.chunk_of(span.start);
         while chunk < self.per_chunk.len() {
@@ -211,21 +211,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn explained_ticks_are_no_longer_counted() {
+    fn cancelled_ticks_are_no_longer_counted() {
         let lit: Vec<u32> = (0..10_000).step_by(10).collect();
-        let mut unexplained = Unexplained::new(&lit, 0..10_240, vec![u64::MAX; 500]);
-        assert_eq!(unexplained.at_most(0..10_240), 1000);
-        unexplained.explain([0, 2560].into_iter(), &Pattern::new((0..2560).step_by(3), 3));
+        let mut residual = Residual::new(&lit, 0..10_240, vec![u64::MAX; 500]);
+        assert_eq!(residual.at_most(0..10_240), 1000);
+        residual.cancel([0, 2560].into_iter(), &Pattern::new((0..2560).step_by(3), 3));
         // The last three end at 5121.
-        assert_eq!(unexplained.at_most(0..5120), 0);
-        assert_eq!(unexplained.at_most(5121..10_240), 487);
+        assert_eq!(residual.at_most(0..5120), 0);
+        assert_eq!(residual.at_most(5121..10_240), 487);
         // Four chunks hold any 2048 ticks.
-        let (emptiest, fullest) = unexplained.runs(0..10_240).emptiest_and_fullest(2048);
+        let (emptiest, fullest) = residual.runs(0..10_240).emptiest_and_fullest(2048);
         assert!((205..=410).contains(&fullest) && emptiest == 0, "{emptiest} {fullest}");
-        assert!(!unexplained.any(5110, 10));
-        assert!(unexplained.any(5110, 21));
+        assert!(!residual.any(5110, 10));
+        assert!(residual.any(5110, 21));
         let mut left = Vec::new();
-        unexplained.for_each(5000..5200, |tick| left.push(tick));
+        residual.for_each(5000..5200, |tick| left.push(tick));
         assert_eq!(left, [5130, 5140, 5150, 5160, 5170, 5180, 5190]);
     }
 }

@@ -1,14 +1,14 @@
-//! The light nobody has explained yet: who else could have sent it?
+//! Acquisition: the shots that have no lag yet are looked for in the residual.
 
-use super::{Band, Lock, SOUNDINGS, STAGGER};
+use super::{ACQUISITION_GRID, Band, Detection, STAGGER};
 use crate::decode::search::Sought;
 use crate::kernels::Marks;
 
-/// How much must speak for a lag.
+/// How many marks must be found before a lag is believed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Evidence {
-    /// Half of the marks, and twice what chance can give: many bright shots on top of each other
-    /// are a worse impostor than chance is.
+    /// Half of the marks, and twice what chance can give: where many bright shots
+    /// overlap, they pass for a faint one more easily than chance does.
     Overwhelming,
     /// Half of the marks.
     Bright,
@@ -27,22 +27,22 @@ const MANY: i64 = 16;
 
 impl Band<'_> {
     /// Looks for the shots that have no lag yet: near their neighbours, and for one in `every` of
-    /// them in all the unexplained light of the gate. Tells how many were found.
+    /// them in the residual of the whole gate. Tells how many were found.
     pub(super) fn search(&mut self, evidence: Evidence, every: u32) -> usize {
         let mut found = 0;
-        for shot in 0..self.locks.len() {
-            if self.locks[shot].is_some() || !self.may_be_lit(shot) {
+        for shot in 0..self.detections.len() {
+            if self.detections[shot].is_some() || !self.may_be_lit(shot) {
                 continue;
             }
-            let lock = match self.predicted(shot, evidence) {
-                Some(lock) => Some(lock),
+            let detection = match self.predicted(shot, evidence) {
+                Some(detection) => Some(detection),
                 None if self.is_among(shot, every * self.rarer(shot, evidence)) => {
                     self.believed(shot, evidence)
                 }
                 None => None,
             };
-            if let Some(lock) = lock {
-                self.lock(shot, lock);
+            if let Some(detection) = detection {
+                self.keep(shot, detection);
                 found += 1;
             }
         }
@@ -52,10 +52,10 @@ impl Band<'_> {
     /// By how much less often `shot` is searched for where light is faint and none of the shots
     /// around was found.
     fn rarer(&self, shot: usize, evidence: Evidence) -> u32 {
-        let around = SOUNDINGS as usize;
+        let around = ACQUISITION_GRID as usize;
         let above = self.above[shot].map(|shot| shot as usize);
         let neighbours = [shot.checked_sub(around), Some(shot + around), above];
-        let is_found = |shot: usize| self.locks.get(shot).is_some_and(Option::is_some);
+        let is_found = |shot: usize| self.detections.get(shot).is_some_and(Option::is_some);
         match evidence {
             Evidence::Overwhelming | Evidence::Bright => 1,
             Evidence::MoreThanChance if self.sent.is_thorough() => 1,
@@ -67,28 +67,28 @@ impl Band<'_> {
     pub(super) fn is_among(&self, shot: usize, every: u32) -> bool {
         let log = self.sent.log;
         let (row, column) = (u32::from(log.row[shot]), u32::from(log.column[shot]));
-        let left = || self.field.left().at_most(self.sent.gate_and_macropulse(shot));
-        (column + STAGGER * row).is_multiple_of(every) || left() < FEW_TICKS
+        let residual = || self.field.residual_counts().at_most(self.sent.gate_and_macropulse(shot));
+        (column + STAGGER * row).is_multiple_of(every) || residual() < FEW_TICKS
     }
 
     /// What a search for `shot` finds, if the `evidence` is there.
-    fn believed(&mut self, shot: usize, evidence: Evidence) -> Option<Lock> {
+    fn believed(&mut self, shot: usize, evidence: Evidence) -> Option<Detection> {
         let weight = self.sent.weight(shot);
         let least = match evidence {
             Evidence::Overwhelming | Evidence::Bright => weight.div_ceil(2),
             Evidence::MoreThanChance => 1,
         };
-        let lock = self.searched(shot, least).filter(|lock| lock.count >= least)?;
-        let by_chance = self.by_chance(shot, lock);
+        let detection = self.searched(shot, least).filter(|detection| detection.count >= least)?;
+        let by_chance = self.by_chance(shot, detection);
         let needed = match evidence {
             Evidence::Overwhelming => by_chance.max(weight.min(2 * by_chance)),
             Evidence::Bright | Evidence::MoreThanChance => by_chance,
         };
-        (lock.count >= needed).then_some(lock)
+        (detection.count >= needed).then_some(detection)
     }
 
-    /// Whether there are so many unexplained ticks in the gate of `shot`, close enough together,
-    /// that they could be `marks` of its marks: within one macropulse, besides those that are
+    /// Whether the residual in the gate of `shot` has so many ticks, close enough together, that
+    /// they could be `marks` of its marks: within one macropulse, besides those that are
     /// everywhere, and for one of its lit bits within one code word.
     pub(super) fn is_crowded(&self, shot: usize, marks: u16) -> bool {
         let sent = self.sent;
@@ -97,7 +97,7 @@ impl Band<'_> {
         let gate = sent.gate_and_macropulse(shot);
         let needed = |bits: u32| u32::from(marks).div_ceil(bits).div_ceil(per_tick).max(1);
         let gate_length = gate.end - gate.start;
-        let runs = self.field.left().runs(gate);
+        let runs = self.field.residual_counts().runs(gate);
         if runs.at_most() < needed(1) {
             return false;
         }
@@ -113,18 +113,17 @@ impl Band<'_> {
         runs.emptiest_and_fullest(word + sent.width).1 >= needed(bits)
     }
 
-    /// The peak near the lag that most unexplained ticks speak for, see
-    /// [`Band::unexplained_lag`].
-    pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Lock> {
-        let lag = self.unexplained_lag(shot, at_least)?;
+    /// The peak near the lag with most marks in the residual, see [`Band::residual_lag`].
+    pub(super) fn searched(&mut self, shot: usize, at_least: u16) -> Option<Detection> {
+        let lag = self.residual_lag(shot, at_least)?;
         self.best_near(shot, lag, at_least)
     }
 
-    /// The lag at which most marks of `shot` are unexplained. `None` where these are fewer than
+    /// The lag at which most marks of `shot` are in the residual. `None` where these are fewer than
     /// `at_least` or chance could as well have put them there.
-    pub(super) fn unexplained_lag(&mut self, shot: usize, at_least: u16) -> Option<i64> {
-        // Ticks only ever become explained.
-        if self.barren[shot] <= at_least {
+    pub(super) fn residual_lag(&mut self, shot: usize, at_least: u16) -> Option<i64> {
+        // The residual only ever gets less.
+        if self.known_empty[shot] <= at_least {
             return None;
         }
         let weight = self.sent.weight(shot);
@@ -132,26 +131,26 @@ impl Band<'_> {
             return None;
         }
         let gate = self.sent.gate_and_macropulse(shot);
-        let ticks = self.field.left().at_most(gate.clone()) * self.sent.width;
-        let left_over = f64::from(ticks) / (gate.end - gate.start) as f64;
-        // Marks under ticks that are explained already are missing here: half are taken to be
+        let ticks = self.field.residual_counts().at_most(gate.clone()) * self.sent.width;
+        let residual_density = f64::from(ticks) / (gate.end - gate.start) as f64;
+        // Marks under ticks that are cancelled already are missing here: half are taken to be
         // visible.
         let density = self.density_in_gate(shot);
         let visible = self.thresholds.least(weight, density).div_ceil(2);
-        let least = self.thresholds.least(weight, left_over).max(visible).max(at_least);
-        // What does not stand out today may do so when more is explained.
+        let least = self.thresholds.least(weight, residual_density).max(visible).max(at_least);
+        // What does not stand out today may do so when more is cancelled.
         if !self.is_crowded(shot, least) {
             return None;
         }
-        let found = self.most_unexplained(shot, least);
+        let found = self.best_residual_lag(shot, least);
         if found.is_none() {
-            self.barren[shot] = at_least;
+            self.known_empty[shot] = at_least;
         }
         found
     }
 
-    /// The lag at which most marks of `shot` are unexplained, if `least` are.
-    pub(super) fn most_unexplained(&mut self, shot: usize, least: u16) -> Option<i64> {
+    /// The lag at which most marks of `shot` are in the residual, if `least` are.
+    pub(super) fn best_residual_lag(&mut self, shot: usize, least: u16) -> Option<i64> {
         let sent = self.sent;
         let (nearest, farthest) = sent.gate();
         let word = sent.codebook.word(sent.log.word[shot]);
@@ -168,8 +167,8 @@ impl Band<'_> {
             stands_out: self.word_thresholds.least(word.marks.len() as u16, density),
         };
         let first = sent.fired[shot] + nearest;
-        let unexplained = self.field.unexplained(sent.gate_and_macropulse(shot));
-        let found = self.search.best(unexplained, (first, sent.width), &sought);
+        let residual = self.field.residual(sent.gate_and_macropulse(shot));
+        let found = self.search.best(residual, (first, sent.width), &sought);
         found.map(|found| nearest + found.lag as i64)
     }
 }

@@ -1,52 +1,53 @@
-//! Clean macropulses are taken off the stream of ticks one after another, as they come.
+//! Cancellation of complete macropulses: those of which no mark is missing are taken off the stream
+//! of ticks one after another, as they come.
 //!
-//! 1. The earliest tick that nobody has explained is taken for the first mark of a macropulse.
+//! 1. The earliest tick that is not cancelled yet is taken for the first mark of a macropulse.
 //!    The shot after the last one found is asked first: in smooth scenes it is the one.
 //! 2. Otherwise each shot in flight is asked whether its second mark is there, too; codes are made
 //!    so that hardly more than one says yes.
 //! 3. All marks of that shot are looked for. If none is missing no lag can have more, and none
-//!    earlier is left: this is the maximum. Its ticks are explained.
+//!    earlier is left: this is the maximum. Its ticks are cancelled.
 //! 4. Marks of one macropulse may be those of another one, too: the first tick that is not
-//!    explained may be the second mark.
+//!    cancelled may be the second mark.
 //!
-//! Light from beyond the gate is peeled off, too, as far as it may come from: it is no return, but
-//! would pass for noise.
+//! Light from beyond the gate is cancelled, too, from as far as it may come: it gives no return,
+//! but would pass for noise.
 //!
 //! A tick of which no macropulse without a gap can begin is left for the receivers that follow.
-//! Where marks are missed everywhere nothing can be peeled: this is soon noticed.
+//! Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
 
-use super::{Lock, Sent};
+use super::{Detection, Sent};
 use crate::kernels::begin_with;
 
-/// Ticks without a macropulse that are put up with before peeling ends, and how many more for
-/// each macropulse that was found.
+/// Ticks without a complete macropulse after which cancellation ends, and how many more for each
+/// macropulse that was found.
 const PATIENCE: (usize, usize) = (256, 4);
 
 /// First marks that may be hidden under another macropulse.
 const MOST_HIDDEN: usize = 2;
 
-/// What was found without a gap, and what is left.
+/// What was found without a gap, and the residual.
 #[derive(Debug)]
-pub(super) struct Peeled {
+pub(super) struct Cancelled {
     /// The lag of each shot that was found.
-    pub locks: Vec<Option<Lock>>,
+    pub detections: Vec<Option<Detection>>,
     /// Shots that were found once more, behind their first lag, and where.
-    pub again: Vec<(usize, Lock)>,
-    /// Ticks that nobody has explained, in order, unless these are all.
-    pub left: Option<Vec<u32>>,
+    pub again: Vec<(usize, Detection)>,
+    /// Ticks that are not cancelled, in order; `None` where that is all of them.
+    pub residual: Option<Vec<u32>>,
 }
 
-/// Peels the macropulses of the shots `sent` off the sorted `ticks`.
-pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
-    let mut peeler = Peeler {
+/// Cancels the complete macropulses of the shots `sent` in the sorted `ticks`.
+pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
+    let mut canceller = Canceller {
         sent,
         ticks,
         gate: sent.gate(),
         light: sent.receiver.light_ticks.into(),
         scale: sent.receiver.ticks_per_chip,
         least: fewest_without_a_gap(sent, ticks),
-        explained: Explained::new(ticks.len()),
-        locks: vec![None; sent.fired.len()],
+        cancelled: CancelledTicks::new(ticks.len()),
+        detections: vec![None; sent.fired.len()],
         again: Vec::new(),
         oldest: 0,
         oldest_beyond: 0,
@@ -56,15 +57,15 @@ pub(super) fn peel(sent: &Sent, ticks: &[u32]) -> Peeled {
     // Marks that jitter are not where they should be.
     let (mut place, mut patience) = (0, if sent.width > 1 { 0 } else { PATIENCE.0 });
     while place < ticks.len() && patience > 0 {
-        match peeler.shot_at(place) {
+        match canceller.shot_at(place) {
             Some(()) => patience += PATIENCE.1,
             None => patience -= 1,
         }
-        place = peeler.explained.next_without(place + 1);
+        place = canceller.cancelled.next_without(place + 1);
     }
-    let found_any = ticks.is_empty() || peeler.explained.any();
-    let left = found_any.then(|| peeler.explained.left(ticks));
-    Peeled { locks: peeler.locks, again: peeler.again, left }
+    let found_any = ticks.is_empty() || canceller.cancelled.any();
+    let residual = found_any.then(|| canceller.cancelled.residual(ticks));
+    Cancelled { detections: canceller.detections, again: canceller.again, residual }
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
@@ -76,18 +77,18 @@ fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> usize {
     (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as usize
 }
 
-struct Peeler<'a> {
+struct Canceller<'a> {
     sent: &'a Sent<'a>,
     ticks: &'a [u32],
     gate: (i64, i64),
-    /// Farthest lag from which light may come: beyond the gate it is explained, and no return.
+    /// Farthest lag from which light may come: beyond the gate it is cancelled, and no return.
     light: i64,
     scale: u32,
     /// Fewest marks with which a shot can be told from chance.
     least: usize,
-    explained: Explained,
-    locks: Vec<Option<Lock>>,
-    again: Vec<(usize, Lock)>,
+    cancelled: CancelledTicks,
+    detections: Vec<Option<Detection>>,
+    again: Vec<(usize, Detection)>,
     /// Light of no shot before this one can come from within the gate any more.
     oldest: usize,
     /// Light of no shot before this one can come any more.
@@ -98,10 +99,10 @@ struct Peeler<'a> {
     places: Vec<usize>,
 }
 
-impl Peeler<'_> {
-    /// Finds the shot whose light begins with the tick at `place`, and explains its ticks.
+impl Canceller<'_> {
+    /// Finds the shot whose light begins with the tick at `place`, and cancels its ticks.
     fn shot_at(&mut self, place: usize) -> Option<()> {
-        if self.next < self.locks.len() && self.fits_in_a_row(self.next, place) {
+        if self.next < self.detections.len() && self.fits_in_a_row(self.next, place) {
             return Some(());
         }
         let tick = i64::from(self.ticks[place]);
@@ -116,7 +117,7 @@ impl Peeler<'_> {
         advance(&mut self.oldest_beyond, self.light + sent.length());
         let in_gate = self.oldest..fired.len();
         let in_gate = in_gate.take_while(|&shot| fired[shot] + nearest <= tick);
-        // Its first marks may lie under those of a macropulse that was peeled off before.
+        // Its first marks may lie under those of a macropulse that was cancelled before.
         for hidden in 0..=MOST_HIDDEN {
             for shot in in_gate.clone() {
                 if self.fits(shot, place, hidden) {
@@ -146,8 +147,8 @@ impl Peeler<'_> {
         if !begin_with(&self.ticks[place..], word, bits, (start as u32, self.scale)) {
             return false;
         }
-        self.explained.run(place, count);
-        self.lock(shot, lag, count);
+        self.cancelled.run(place, count);
+        self.keep(shot, lag, count);
         true
     }
 
@@ -188,13 +189,13 @@ impl Peeler<'_> {
             }
             self.places.push(next);
         }
-        self.explained.each(&self.places);
-        self.lock(shot, lag, marks.len());
+        self.cancelled.each(&self.places);
+        self.keep(shot, lag, marks.len());
         true
     }
 
     /// Keeps `lag`: of several surfaces the first one counts, the others are found again.
-    fn lock(&mut self, shot: usize, lag: i64, count: usize) {
+    fn keep(&mut self, shot: usize, lag: i64, count: usize) {
         let count = count as u16;
         self.next = shot + 1;
         if lag > self.gate.1 {
@@ -202,31 +203,31 @@ impl Peeler<'_> {
         }
         let margin = count
             - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
-        let lock = Lock { lag, count, margin };
-        if self.locks[shot].get_or_insert(lock).lag != lag {
-            self.again.push((shot, lock));
+        let detection = Detection { lag, count, margin };
+        if self.detections[shot].get_or_insert(detection).lag != lag {
+            self.again.push((shot, detection));
         }
     }
 }
 
-/// Which ticks are explained, by their place in the list: one bit each.
+/// Which ticks are cancelled, by their place in the list: one bit each.
 #[derive(Debug)]
-struct Explained {
+struct CancelledTicks {
     words: Vec<u64>,
     ticks: usize,
 }
 
-impl Explained {
+impl CancelledTicks {
     fn new(ticks: usize) -> Self {
         Self { words: vec![0; ticks / 64 + 1], ticks }
     }
 
-    /// Whether any tick is explained.
+    /// Whether any tick is cancelled.
     fn any(&self) -> bool {
         self.words.iter().any(|word| *word != 0)
     }
 
-    /// Explains `count` ticks from `first` on.
+    /// Cancels `count` ticks from `first` on.
     fn run(&mut self, first: usize, count: usize) {
         let end = first + count;
         let (from, to) = (first / 64, end / 64);
@@ -240,37 +241,36 @@ impl Explained {
         self.words[to] |= tail;
     }
 
-    /// Explains the ticks at `places`.
+    /// Cancels the ticks at `places`.
     fn each(&mut self, places: &[usize]) {
         for place in places {
             self.words[place / 64] |= 1 << (place % 64);
         }
     }
 
-    /// The first place from `place` on whose tick is not explained; the number of ticks if all
+    /// The first place from `place` on whose tick is not cancelled; the number of ticks if all
     /// are.
     fn next_without(&self, place: usize) -> usize {
         let mut index = place / 64;
-        let mut unexplained =
-            !self.words[index.min(self.words.len() - 1)] & u64::MAX << (place % 64);
-        while unexplained == 0 && index + 1 < self.words.len() {
+        let mut others = !self.words[index.min(self.words.len() - 1)] & u64::MAX << (place % 64);
+        while others == 0 && index + 1 < self.words.len() {
             index += 1;
-            unexplained = !self.words[index];
+            others = !self.words[index];
         }
-        (64 * index + unexplained.trailing_zeros() as usize).min(self.ticks)
+        (64 * index + others.trailing_zeros() as usize).min(self.ticks)
     }
 
-    /// The ticks that are not explained.
-    fn left(&self, ticks: &[u32]) -> Vec<u32> {
-        let mut left = Vec::new();
-        for (ticks, explained) in ticks.chunks(64).zip(&self.words) {
-            let mut unexplained = !explained;
-            while unexplained != 0 {
-                let Some(&tick) = ticks.get(unexplained.trailing_zeros() as usize) else { break };
-                left.push(tick);
-                unexplained &= unexplained - 1;
+    /// The ticks that are not cancelled.
+    fn residual(&self, ticks: &[u32]) -> Vec<u32> {
+        let mut residual = Vec::new();
+        for (ticks, cancelled) in ticks.chunks(64).zip(&self.words) {
+            let mut others = !cancelled;
+            while others != 0 {
+                let Some(&tick) = ticks.get(others.trailing_zeros() as usize) else { break };
+                residual.push(tick);
+                others &= others - 1;
             }
         }
-        left
+        residual
     }
 }
