@@ -1,14 +1,10 @@
-//! Text for people: aligned columns, numbers one can read.
+//! What is printed: to stdout, with counts and durations one can read.
 
 use std::io::{ErrorKind, Write};
 
+pub use macropulse_study::text::{Columns, NO_BREAK, section, short};
+
 use crate::fault::Fault;
-
-/// Columns at which long values are broken.
-const WIDTH: usize = 96;
-
-/// A blank at which [`Columns`] breaks no line.
-pub const NO_BREAK: char = '\u{a0}';
 
 /// Writes to stdout. A reader who has seen enough (`| head`) is no fault.
 pub fn print(text: &str) -> Result<(), Fault> {
@@ -27,63 +23,6 @@ pub fn print_json(mut values: Vec<serde_json::Value>) -> Result<(), Fault> {
     print(&format!("{value:#}\n"))
 }
 
-/// Names with values beside them, aligned; long values go on below themselves.
-#[derive(Default)]
-pub struct Columns(Vec<(String, String)>);
-
-impl Columns {
-    /// Adds a line.
-    pub fn push(&mut self, name: impl Into<String>, value: impl Into<String>) {
-        self.0.push((name.into(), value.into()));
-    }
-
-    /// Adds a line for each of `values`, with the name before the first.
-    pub fn push_list(&mut self, name: &str, values: impl IntoIterator<Item = String>) {
-        for (i, value) in values.into_iter().enumerate() {
-            self.push(if i == 0 { name } else { "" }, value);
-        }
-    }
-
-    /// All lines, indented by two, with plain blanks.
-    pub fn text(&self) -> String {
-        let width = self.0.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0) + 2;
-        let mut text = String::new();
-        for (name, value) in &self.0 {
-            let mut name = name.as_str();
-            for line in broken(value, WIDTH - 2 - width) {
-                text += format!("  {name:<width$}{line}").trim_end();
-                text.push('\n');
-                name = "";
-            }
-        }
-        text.replace(NO_BREAK, " ")
-    }
-}
-
-/// Lines under a heading; nothing where there are none.
-pub fn section(heading: &str, columns: &Columns) -> String {
-    let lines = columns.text();
-    if lines.is_empty() { lines } else { format!("\n{heading}\n{lines}") }
-}
-
-/// `text` as lines of at most `width` characters where its blanks allow.
-fn broken(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        let last = lines.len() - 1;
-        let full = lines[last].chars().count() + 1 + word.chars().count() > width;
-        if lines[last].is_empty() {
-            lines[last].push_str(word);
-        } else if full {
-            lines.push(word.to_owned());
-        } else {
-            lines[last].push(' ');
-            lines[last].push_str(word);
-        }
-    }
-    lines
-}
-
 /// 1234567 as `1 234 567`, with blanks that keep it on its line.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
@@ -95,21 +34,6 @@ pub fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
-}
-
-/// A number with five digits that count, without trailing zeros.
-pub fn short(number: f64) -> String {
-    if number == 0.0 || !number.is_finite() {
-        return number.to_string();
-    }
-    let before_point = number.abs().log10().floor() as i32 + 1;
-    let decimals = (5 - before_point).clamp(0, 12) as usize;
-    let text = format!("{number:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
 }
 
 /// A duration in the unit that suits it.
@@ -141,27 +65,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_and_grouped() {
+    fn counts_are_grouped_and_durations_have_a_unit() {
         assert_eq!(grouped(407_040).replace(NO_BREAK, " "), "407 040");
         assert_eq!(grouped(99), "99");
-        assert_eq!(short(40.946_540), "40.947");
-        assert_eq!(short(24.0), "24");
-        assert_eq!(short(0.000_374_740), "0.00037474");
-        assert_eq!(short(f64::INFINITY), "inf");
-        assert_eq!(short(1_234_567.8), "1234568");
         let durations = [1.5, 0.0123, 4.2e-5].map(|s| lasted(s).replace(NO_BREAK, " "));
         assert_eq!(durations, ["1.50 s", "12 ms", "42 us"]);
-    }
-
-    #[test]
-    fn columns_are_aligned_and_long_values_stay_in_theirs() {
-        let mut columns = Columns::default();
-        columns.push("a", "1");
-        columns.push("long name", "x ".repeat(60).trim_end());
-        let text = columns.text();
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[0], "  a          1");
-        assert_eq!(lines.len(), 3);
-        assert!(lines[2].starts_with("             x x"));
     }
 }

@@ -1,9 +1,11 @@
 //! What is done with the simulator: the experiment of Kim & Park (2016), sweeps, records of runs,
-//! and the pictures, charts and pages that show them.
+//! link budgets, and the pictures, charts and pages that show them.
 
 #![cfg_attr(test, allow(missing_docs))]
 
+pub mod budget;
 pub mod paper;
 pub mod record;
 pub mod sweep;
+pub mod text;
 pub mod view;

@@ -44,8 +44,7 @@ pub fn write_scan(
     let names = Names { objects: &objects, materials: &materials };
     let mut files = Vec::new();
     for &format in formats {
-        let kind = if format == Format::Png { "range" } else { "scan" };
-        let file = format!("{kind}-{:06}.{}", cloud.scan, format.name());
+        let file = format.file_name(cloud.scan);
         write_cloud(format, cloud, &names, &folder.join(&file))?;
         files.push(file);
         if format == Format::Png {

@@ -137,7 +137,13 @@ const STUDY: Layers = Layers {
     folder: "macropulse-study",
     may_name: &["macropulse"],
     modules: &[
+        Rule { module: "text", may_name: &[], because: "lines of text ask not what they say" },
         Rule { module: "view", may_name: &[], because: "pictures show columns, no physics" },
+        Rule {
+            module: "budget",
+            may_name: &["text", "view"],
+            because: "a budget is a forecast: it needs no run and leaves no file",
+        },
         Rule { module: "record", may_name: &["view"], because: "a run leaves files and pictures" },
         Rule {
             module: "sweep",

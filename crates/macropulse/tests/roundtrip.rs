@@ -88,7 +88,7 @@ fn names() -> [Vec<String>; 2] {
 
 fn write(format: Format, cloud: &PointCloud) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scan").with_extension(format.name());
+    let path = folder.path().join("scan").with_extension(format.extension());
     let [objects, materials] = names();
     let names = Names { objects: &objects, materials: &materials };
     write_cloud(format, cloud, &names, &path).unwrap();

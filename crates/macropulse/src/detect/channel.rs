@@ -19,6 +19,9 @@ pub(super) struct Arrangement {
     order: Vec<u64>,
     /// Channel of each shot, and the shot, in the order of channels, then of time.
     shots: Vec<(u16, u32)>,
+    /// Channel of each stretch of background that has light, and the stretch, in the order of
+    /// channels.
+    stretches: Vec<(u16, u32)>,
 }
 
 /// What the detector of one channel is given of a band.
@@ -35,10 +38,14 @@ pub(super) struct Channel<'a> {
     pub shots: Vec<u32>,
     /// When it listens, in parts of a tick from the epoch on; ascending, and apart.
     pub spans: Vec<RangeInclusive<i64>>,
+    /// The stretches of background that it sees, by their index in the columns; its number stands
+    /// before each.
+    pub stretches: &'a [(u16, u32)],
 }
 
 impl Arrangement {
-    /// Puts the pulse trains of `light` and the shots of `log` in the order of their channels.
+    /// Puts the pulse trains and the background of `light` and the shots of `log` in the order of
+    /// their channels.
     pub fn fill(&mut self, design: &Design, clock: &Clock, log: &ShotLog, light: &Light) {
         // What arrives later than a band is counted arrives when nobody listens.
         let arrival = |(index, arrives_fs): (usize, &i64)| {
@@ -49,6 +56,12 @@ impl Arrangement {
         self.order.extend(light.trains.arrives_fs.iter().enumerate().filter_map(arrival));
         self.trains.clear();
         self.shots.clear();
+        let background = &light.background;
+        let stretches = background.channel.iter().copied().zip(0..);
+        self.stretches.clear();
+        self.stretches
+            .extend(stretches.filter(|(_, index)| background.per_s[*index as usize] > 0.0));
+        self.stretches.sort();
         if design.channels() == 1 {
             if !self.order.is_sorted() {
                 // Made of few runs, which a merging sort makes use of.
@@ -80,6 +93,7 @@ impl Arrangement {
             order: Cow::Borrowed(&self.order),
             shots: (0..log.len() as u32).collect(),
             spans: spans(design, &clock, log, 0..log.len() as u32),
+            stretches: self.stretches_of(0),
         });
         let several = self.shots.chunk_by(|one, next| one.0 == next.0).map(move |shots| {
             let number = shots[0].0;
@@ -95,9 +109,17 @@ impl Arrangement {
                 order: Cow::Owned(trains.map(|train| train.1).collect()),
                 spans: spans(design, &clock, log, shots.iter().copied()),
                 shots,
+                stretches: self.stretches_of(number),
             }
         });
         single.into_iter().chain(several)
+    }
+
+    /// The stretches of background of `channel`.
+    fn stretches_of(&self, channel: u16) -> &[(u16, u32)] {
+        let first = self.stretches.partition_point(|stretch| stretch.0 < channel);
+        let count = self.stretches[first..].partition_point(|stretch| stretch.0 == channel);
+        &self.stretches[first..first + count]
     }
 }
 

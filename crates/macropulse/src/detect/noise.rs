@@ -126,9 +126,8 @@ pub(super) struct Stretch {
 /// The stretches that `channel` sees, those without light left out.
 pub(super) fn stretches(channel: &Channel) -> impl Iterator<Item = Stretch> {
     let background = &channel.light.background;
-    let seen =
-        move |i: &usize| background.channel[*i] == channel.number && background.per_s[*i] > 0.0;
-    (0..background.channel.len()).filter(seen).map(move |i| {
+    channel.stretches.iter().map(move |(_, i)| {
+        let i = *i as usize;
         let (from_fs, until_fs) = (background.from_fs[i], background.until_fs[i]);
         let per_s = background.per_s[i];
         // Stretches that begin at once differ in their end or in their rate.

@@ -41,7 +41,7 @@ impl Format {
     /// All formats, in the order in which they are listed to people.
     pub const ALL: [Self; 4] = [Self::Pcd, Self::Ply, Self::Csv, Self::Png];
 
-    /// Name on the command line, and file extension.
+    /// Name on the command line and in scenario files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pcd => "pcd",
@@ -49,6 +49,26 @@ impl Format {
             Self::Csv => "csv",
             Self::Png => "png",
         }
+    }
+
+    /// What the names of its files end in, after the dot: the program that opens a file goes by it,
+    /// so formats may share one.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Pcd => "pcd",
+            Self::Ply => "ply",
+            Self::Csv => "csv",
+            Self::Png => "png",
+        }
+    }
+
+    /// Name of the file of scan number `scan`, another one for every format.
+    pub fn file_name(self, scan: u64) -> String {
+        let kind = match self {
+            Self::Png => "range",
+            Self::Pcd | Self::Ply | Self::Csv => "scan",
+        };
+        format!("{kind}-{scan:06}.{}", self.extension())
     }
 
     /// The format called `name`, in either case.
@@ -164,6 +184,18 @@ mod tests {
             assert_eq!(Format::parse(format.name()).unwrap(), format);
         }
         assert_eq!(Format::parse(" PCD ").unwrap(), Format::Pcd);
+    }
+
+    #[test]
+    fn formats_share_neither_a_name_nor_the_name_of_a_file() {
+        for (at, one) in Format::ALL.into_iter().enumerate() {
+            for other in &Format::ALL[at + 1..] {
+                assert_ne!(one.name(), other.name());
+                assert_ne!(one.file_name(7), other.file_name(7));
+            }
+        }
+        assert_eq!(Format::Pcd.file_name(7), "scan-000007.pcd");
+        assert_eq!(Format::Png.file_name(1_234_567), "range-1234567.png");
     }
 
     #[test]

@@ -3,9 +3,7 @@
 //! Bands are computed side by side. Each has a piece of its own to write to, so none waits for
 //! another; the pieces are joined in the order of the bands.
 
-use std::iter::repeat_n;
-
-use super::PointCloud;
+use super::{Outcome, PointCloud, Truth};
 use crate::channel::Link;
 use crate::design::Design;
 use crate::units::range_from_tof;
@@ -58,34 +56,45 @@ impl Piece {
         points.marks.extend(&returns.marks);
         points.margin.extend(&returns.margin);
         points.photons.extend(&returns.photons);
-        let mut first = 0;
-        while let Some((_, rest)) = returns.number[first..].split_first() {
-            let further = rest.iter().take_while(|&&number| number > 1).count();
-            points.number_of_returns.extend(repeat_n(further as u8 + 1, further + 1));
-            first += further + 1;
+        // The last number among those of a shot is how many they are.
+        points.number_of_returns.extend(&returns.number);
+        for at in (1..returns.len()).rev().filter(|&at| returns.number[at] > 1) {
+            points.number_of_returns[at - 1] = points.number_of_returns[at];
         }
         let fired = returns.shot.iter().map(|&shot| shot as usize);
         points.row.extend(fired.clone().map(|shot| log.row[shot]));
         points.column.extend(fired.clone().map(|shot| log.column[shot]));
         points.time_ns.extend(fired.map(time_ns));
-        points.range.extend(returns.tof.iter().map(|&tof| range_from_tof(tof) as f32));
-        points.intensity.extend(returns.tof.iter().zip(&returns.photons).map(
-            |(&tof, &photons)| {
-                let white = link.photons(1.0, range_from_tof(tof));
-                if white.is_finite() { (f64::from(photons) / white) as f32 } else { 1.0 }
-            },
-        ));
-        let directions = design.directions();
-        // Written in place: three columns that grow one by one take longer than what they hold.
-        for column in [&mut points.x, &mut points.y, &mut points.z] {
+        // Written in place: columns that grow one by one take longer than what they hold.
+        let reals = [&mut points.x, &mut points.y, &mut points.z];
+        for column in reals.into_iter().chain([&mut points.range, &mut points.intensity]) {
             column.resize(returns.len(), 0.0);
         }
-        let pixels = points.row.iter().zip(&points.column);
-        let places = points.x.iter_mut().zip(points.y.iter_mut().zip(&mut points.z));
-        for (((&row, &column), &tof), (x, (y, z))) in pixels.zip(&returns.tof).zip(places) {
+        let directions = design.directions();
+        for (at, (&tof, &photons)) in returns.tof.iter().zip(&returns.photons).enumerate() {
             let range = range_from_tof(tof);
-            let point = directions.of(row, column).map(|part| (part * range) as f32);
-            [*x, *y, *z] = point;
+            let [x, y, z] = directions.of(points.row[at], points.column[at]);
+            points.x[at] = (x * range) as f32;
+            points.y[at] = (y * range) as f32;
+            points.z[at] = (z * range) as f32;
+            points.range[at] = range as f32;
+            let white = link.photons(1.0, range);
+            let share = || (f64::from(photons) / white) as f32;
+            points.intensity[at] = if white.is_finite() { share() } else { 1.0 };
+        }
+    }
+
+    /// Puts `values`, an entry for each owned shot, at their pixels in `column`.
+    fn scatter<T: Copy>(&self, values: &[T], column: &mut [T]) {
+        let Some(&first) = self.pixel.first() else { return };
+        let row = first as usize..first as usize + values.len();
+        match column.get_mut(row).filter(|_| self.in_a_row) {
+            Some(places) => places.copy_from_slice(values),
+            None => self.pixel.iter().zip(values).for_each(|(&pixel, &value)| {
+                if let Some(place) = column.get_mut(pixel as usize) {
+                    *place = value;
+                }
+            }),
         }
     }
 
@@ -101,8 +110,10 @@ impl PointCloud {
     /// of what was in it before. Of a `whole` scan every pixel is written in any case.
     pub fn start(&mut self, scan: u64, whole: bool) {
         self.scan = scan;
-        self.clear_returns();
         let pixels = self.rows * self.columns;
+        // A column that grows piece by piece is moved time and again.
+        let expected = if whole { pixels } else { 0 };
+        self.columns().clear(Each::Return, expected);
         if !whole || self.fired_ns.len() != pixels || self.truth.pixels.outcome.len() != pixels {
             self.fired_ns.clear();
             self.fired_ns.resize(pixels, f64::NAN);
@@ -112,107 +123,126 @@ impl PointCloud {
 
     /// Empties all columns, and keeps their memory.
     fn clear(&mut self) {
-        self.clear_returns();
-        self.fired_ns.clear();
-        self.truth.pixels.clear();
-    }
-
-    /// Empties the columns of returns.
-    fn clear_returns(&mut self) {
-        let bytes = [&mut self.return_number, &mut self.number_of_returns];
-        let counts = [&mut self.row, &mut self.column, &mut self.peak];
-        let counts = counts.into_iter().chain([&mut self.marks, &mut self.margin]);
-        let reals = [&mut self.x, &mut self.y, &mut self.z, &mut self.intensity];
-        let reals = reals.into_iter().chain([&mut self.range, &mut self.photons]);
-        bytes.into_iter().for_each(Vec::clear);
-        counts.for_each(Vec::clear);
-        reals.for_each(Vec::clear);
-        self.time_ns.clear();
-        self.truth.returns.clear();
+        self.columns().clear(Each::Return, 0);
+        self.columns().clear(Each::Pixel, 0);
     }
 
     /// Adds the next `pieces`, in their order.
     pub fn append(&mut self, pieces: &[Piece]) {
-        let truth = &mut self.truth;
-        let (seen, first) = (&mut truth.returns, &mut truth.pixels);
-        let bytes: [(_, Column<u8>); 2] = [
-            (&mut self.return_number, |points| &points.return_number),
-            (&mut self.number_of_returns, |points| &points.number_of_returns),
-        ];
-        let counts: [(_, Column<u16>); 7] = [
-            (&mut self.row, |points| &points.row),
-            (&mut self.column, |points| &points.column),
-            (&mut self.peak, |points| &points.peak),
-            (&mut self.marks, |points| &points.marks),
-            (&mut self.margin, |points| &points.margin),
-            (&mut seen.object, |points| &points.truth.returns.object),
-            (&mut seen.material, |points| &points.truth.returns.material),
-        ];
-        let reals: [(_, Column<f32>); 8] = [
-            (&mut self.x, |points| &points.x),
-            (&mut self.y, |points| &points.y),
-            (&mut self.z, |points| &points.z),
-            (&mut self.intensity, |points| &points.intensity),
-            (&mut self.range, |points| &points.range),
-            (&mut self.photons, |points| &points.photons),
-            (&mut seen.range, |points| &points.truth.returns.range),
-            (&mut seen.cosine, |points| &points.truth.returns.cosine),
-        ];
-        let real_pixels: [(_, Column<f32>); 2] = [
-            (&mut first.range, |points| &points.truth.pixels.range),
-            (&mut first.cosine, |points| &points.truth.pixels.cosine),
-        ];
-        let named_pixels: [(_, Column<u16>); 2] = [
-            (&mut first.object, |points| &points.truth.pixels.object),
-            (&mut first.material, |points| &points.truth.pixels.material),
-        ];
+        let Columns { bytes, counts, reals, times, outcomes } = self.columns();
         // Each column by itself: which thread takes which makes no difference.
         rayon::scope(|scope| {
-            for (column, of) in bytes {
-                scope.spawn(move |_| append(pieces, column, of));
-            }
-            for (column, of) in counts {
-                scope.spawn(move |_| append(pieces, column, of));
-            }
-            for (column, of) in reals {
-                scope.spawn(move |_| append(pieces, column, of));
-            }
-            for (column, of) in real_pixels {
-                scope.spawn(move |_| scatter(pieces, column, of));
-            }
-            for (column, of) in named_pixels {
-                scope.spawn(move |_| scatter(pieces, column, of));
-            }
-            let (time_ns, fired_ns) = (&mut self.time_ns, &mut self.fired_ns);
-            let (of_returns, of_pixels) = (&mut seen.outcome, &mut first.outcome);
-            scope.spawn(|_| append(pieces, time_ns, |points| &points.time_ns));
-            scope.spawn(|_| scatter(pieces, fired_ns, |points| &points.fired_ns));
-            scope.spawn(|_| append(pieces, of_returns, |points| &points.truth.returns.outcome));
-            scope.spawn(|_| scatter(pieces, of_pixels, |points| &points.truth.pixels.outcome));
+            bytes.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
+            counts.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
+            reals.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
+            times.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
+            outcomes.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
         });
+    }
+
+    /// All columns: the one place where they are listed to be emptied and joined.
+    fn columns(&mut self) -> Columns<'_> {
+        use Each::{Pixel, Return};
+        let Truth { returns: seen, pixels: first } = &mut self.truth;
+        Columns {
+            bytes: [
+                Column::new(Return, &mut self.return_number, |points| &points.return_number),
+                Column::new(Return, &mut self.number_of_returns, |points| {
+                    &points.number_of_returns
+                }),
+            ],
+            counts: [
+                Column::new(Return, &mut self.row, |points| &points.row),
+                Column::new(Return, &mut self.column, |points| &points.column),
+                Column::new(Return, &mut self.peak, |points| &points.peak),
+                Column::new(Return, &mut self.marks, |points| &points.marks),
+                Column::new(Return, &mut self.margin, |points| &points.margin),
+                Column::new(Return, &mut seen.object, |points| &points.truth.returns.object),
+                Column::new(Return, &mut seen.material, |points| &points.truth.returns.material),
+                Column::new(Pixel, &mut first.object, |points| &points.truth.pixels.object),
+                Column::new(Pixel, &mut first.material, |points| &points.truth.pixels.material),
+            ],
+            reals: [
+                Column::new(Return, &mut self.x, |points| &points.x),
+                Column::new(Return, &mut self.y, |points| &points.y),
+                Column::new(Return, &mut self.z, |points| &points.z),
+                Column::new(Return, &mut self.intensity, |points| &points.intensity),
+                Column::new(Return, &mut self.range, |points| &points.range),
+                Column::new(Return, &mut self.photons, |points| &points.photons),
+                Column::new(Return, &mut seen.range, |points| &points.truth.returns.range),
+                Column::new(Return, &mut seen.cosine, |points| &points.truth.returns.cosine),
+                Column::new(Pixel, &mut first.range, |points| &points.truth.pixels.range),
+                Column::new(Pixel, &mut first.cosine, |points| &points.truth.pixels.cosine),
+            ],
+            times: [
+                Column::new(Return, &mut self.time_ns, |points| &points.time_ns),
+                Column::new(Pixel, &mut self.fired_ns, |points| &points.fired_ns),
+            ],
+            outcomes: [
+                Column::new(Return, &mut seen.outcome, |points| &points.truth.returns.outcome),
+                Column::new(Pixel, &mut first.outcome, |points| &points.truth.pixels.outcome),
+            ],
+        }
     }
 }
 
-/// A column of a cloud.
-type Column<T> = fn(&PointCloud) -> &Vec<T>;
-
-/// Adds the column of all `pieces` to `column`, one after the other.
-fn append<T: Copy>(pieces: &[Piece], column: &mut Vec<T>, of: Column<T>) {
-    pieces.iter().for_each(|piece| column.extend_from_slice(of(&piece.points)));
+/// The columns of a cloud by the type of their entries.
+struct Columns<'a> {
+    bytes: [Column<'a, u8>; 2],
+    counts: [Column<'a, u16>; 9],
+    reals: [Column<'a, f32>; 10],
+    times: [Column<'a, f64>; 2],
+    outcomes: [Column<'a, Outcome>; 2],
 }
 
-/// Puts the entries of all `pieces` at their pixels.
-fn scatter<T: Copy>(pieces: &[Piece], column: &mut [T], of: Column<T>) {
-    for piece in pieces {
-        let (values, Some(&first)) = (of(&piece.points), piece.pixel.first()) else { continue };
-        let row = first as usize..first as usize + values.len();
-        match column.get_mut(row).filter(|_| piece.in_a_row) {
-            Some(places) => places.copy_from_slice(values),
-            None => piece.pixel.iter().zip(values).for_each(|(&pixel, &value)| {
-                if let Some(place) = column.get_mut(pixel as usize) {
-                    *place = value;
-                }
-            }),
+impl Columns<'_> {
+    /// Empties those that have an entry for `each`, and makes room for as many as `expected`.
+    fn clear(self, each: Each, expected: usize) {
+        self.bytes.into_iter().for_each(|column| column.clear(each, expected));
+        self.counts.into_iter().for_each(|column| column.clear(each, expected));
+        self.reals.into_iter().for_each(|column| column.clear(each, expected));
+        self.times.into_iter().for_each(|column| column.clear(each, expected));
+        self.outcomes.into_iter().for_each(|column| column.clear(each, expected));
+    }
+}
+
+/// What a column has an entry for.
+#[derive(Clone, Copy, PartialEq)]
+enum Each {
+    Return,
+    Pixel,
+}
+
+/// A column of a cloud.
+struct Column<'a, T> {
+    each: Each,
+    entries: &'a mut Vec<T>,
+    /// The same column of another cloud.
+    of: fn(&PointCloud) -> &Vec<T>,
+}
+
+impl<'a, T: Copy> Column<'a, T> {
+    fn new(each: Each, entries: &'a mut Vec<T>, of: fn(&PointCloud) -> &Vec<T>) -> Self {
+        Self { each, entries, of }
+    }
+
+    /// Empties it if it has an entry for `each`, and makes room for as many as `expected`.
+    fn clear(self, each: Each, expected: usize) {
+        if self.each == each {
+            self.entries.clear();
+            self.entries.reserve(expected);
+        }
+    }
+
+    /// Adds the entries of all `pieces`: those of returns behind each other, those of pixels at
+    /// their places.
+    fn append(self, pieces: &[Piece]) {
+        let Self { each, entries, of } = self;
+        for piece in pieces {
+            match each {
+                Each::Return => entries.extend_from_slice(of(&piece.points)),
+                Each::Pixel => piece.scatter(of(&piece.points), entries),
+            }
         }
     }
 }

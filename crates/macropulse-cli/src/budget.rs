@@ -1,20 +1,17 @@
 //! `macropulse budget`: will it work, how far, and what fails first?
 
-mod figures;
-mod page;
-
 use std::path::PathBuf;
 
 use clap::Args;
 use macropulse::design::Design;
 use macropulse::formats::write_atomically;
 use macropulse::predict::verdict::Wanted;
+use macropulse_study::budget::{Figures, USUAL_FALSE_POINTS, USUAL_PD, USUAL_REFLECTANCE, usual};
 
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::options::{Changes, Common, Surroundings};
 use crate::text::{print, print_json};
-use figures::Figures;
 
 /// Work out the link budget of a sensor: photons, Pd, false points, precision, eye safety
 ///
@@ -41,15 +38,15 @@ pub struct Budget {
     range: Option<f64>,
 
     /// Reflectance of the target; 1 is white
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "SHARE", default_value_t = USUAL_REFLECTANCE, value_parser = positive)]
     reflectance: f64,
 
     /// Probability of a return that is wanted
-    #[arg(long, value_name = "SHARE", default_value_t = 0.9, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = USUAL_PD, value_parser = share)]
     pd: f64,
 
     /// False points per shot that are accepted
-    #[arg(long, value_name = "SHARE", default_value_t = 1e-4, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = USUAL_FALSE_POINTS, value_parser = share)]
     false_points: f64,
 
     /// Folder for budget.html, with the curves; without it only the text is printed
@@ -81,7 +78,7 @@ pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
     let environment = Surroundings::alone(&changes)?;
     let wanted = Wanted {
         reflectance: options.reflectance,
-        range: options.range.unwrap_or(design.scan.rated_range),
+        range: options.range.unwrap_or(usual(&design).range),
         pd: options.pd,
         false_points: options.false_points,
     };
@@ -89,7 +86,7 @@ pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
     if let Some(output) = &options.output {
         let mut folder = Folder::claim(output)?;
         folder.make()?;
-        let html = page::page(&figures).html();
+        let html = figures.page().html();
         write_atomically(&folder.path().join("budget.html"), |out| out.write_all(html.as_bytes()))?;
         folder.keep();
     }
