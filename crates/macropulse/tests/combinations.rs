@@ -48,8 +48,8 @@ fn file(scanned: &str, seen: &str, shots: &str, light: &str) -> String {
     let mut idealised = vec!["footprint", "eye-safety", "mirror-motion"];
     let names = |named: bool, name| if named { vec![name] } else { Vec::new() };
     idealised.extend(names(light == "declared", "link-budget"));
-    idealised.extend(names(["linear", "first-firing"].contains(&seen), "inter-chip"));
-    let unlimited = ["photon-counting", "first-firing"].contains(&seen);
+    idealised.extend(names(["linear", "single-stop"].contains(&seen), "inter-chip"));
+    let unlimited = ["photon-counting", "single-stop"].contains(&seen);
     idealised.extend(names(unlimited, "detector-bandwidth"));
     let optics = match light {
         "budget" => {

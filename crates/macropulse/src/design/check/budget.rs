@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::Check;
+use super::detector::Efficiency;
 use crate::design::budget::{Budget, Field, Trailing, solid_angle};
 use crate::design::file::{EnergyFile, FieldFile, OpticsFile, SafetyFile, SensorFile};
 use crate::design::safety::{Class1, Limit, Sender, exposure, limits, strictest};
@@ -23,7 +24,7 @@ impl Check<'_> {
         &self,
         file: &SensorFile,
         parts: &Parts,
-        efficiency: (&str, Option<f64>),
+        efficiency: &Efficiency,
     ) -> Result<Option<Budget>, Error> {
         let off = |effect| parts.idealised.contains(&effect);
         if off(Effect::LinkBudget) {
@@ -43,8 +44,8 @@ impl Check<'_> {
                  list `idealised`",
             );
         };
-        let (path, efficiency) = efficiency;
-        let Some(efficiency) = efficiency else {
+        let path = &efficiency.path;
+        let Some(efficiency) = efficiency.value else {
             return self.refuse(path, "is needed where the link budget is not idealised");
         };
         let wavelength = parts.light.wavelength;

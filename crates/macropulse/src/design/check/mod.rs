@@ -12,10 +12,11 @@ use std::sync::OnceLock;
 
 pub(super) use code::family;
 
+use super::detectors::Before;
 use super::document::Chain;
 use super::file::SensorFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
-use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 use macropulse_codec::decode::Receiver;
 
 /// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
@@ -104,8 +105,7 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     };
     let light = effects.as_ref().and_then(|effects| {
         faults.0.extend(check.without_effect(file, effects));
-        faults.keep(check.bandwidth(&file.detector, effects));
-        faults.keep(check.chips(&file.detector, effects));
+        faults.0.extend(check.not_followed(&file.detector, effects));
         faults.keep(check.light(file, off))
     });
     let right_within = match file.receiver.right_within_m {
@@ -117,9 +117,9 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let (idealised, scan, tdc, coding, light) = (effects?, scan?, tdc?, coding?, light?);
     let before =
         budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
-    let efficiency = detector::efficiency(&file.detector);
-    let budget = faults.keep(check.budget(file, &before, efficiency));
-    let before = detector::Before {
+    let efficiency = detector::Efficiency::of(&file.detector);
+    let budget = faults.keep(check.budget(file, &before, &efficiency));
+    let before = Before {
         scan: &scan,
         light: &light,
         coding: &coding,
@@ -128,9 +128,10 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
     // Without a detector the receiver has no timing, of which none of its limits depends.
-    let jitter = detector.as_ref().map_or(0.0, Detector::jitter);
+    let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
-    let receiver = faults.keep(check.receiver(file, &scan, &tdc, (&coding, timing)));
+    let given = receiver::Given { scan: &scan, tdc: &tdc, coding: &coding, timing };
+    let receiver = faults.keep(check.receiver(file, &given));
     if !faults.is_empty() {
         return None;
     }
@@ -164,16 +165,9 @@ impl Faults {
 ///
 /// c/2 · 4·√(σ² + tick²)
 ///
-/// σ the jitter with the rms length of a micropulse where its light is followed into neighbouring
-/// chips; of a detector that fires once, with that length over the root of the photons it takes.
+/// σ the jitter with the length of a micropulse as far as it matters to the detector.
 fn resolved(detector: &Detector, light: &Light, tdc: &Tdc) -> f64 {
-    let flank = match detector {
-        Detector::FirstFiring(firing) => {
-            light.pulse * RMS_OF_FWHM / f64::from(firing.firing_photons).sqrt()
-        }
-        _ => light.spread.unwrap_or(0.0),
-    };
-    let sigma = libm::hypot(detector.jitter(), flank);
+    let sigma = detector.model().resolution(light);
     range_from_tof(4.0 * libm::hypot(sigma, s_from_fs(tdc.tick_fs))).min(WIDEST)
 }
 
@@ -224,24 +218,41 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
     chain.error(&path, said)
 }
 
-struct Check<'a> {
+/// Tests values, and tells where those that are wrong stand.
+pub(in crate::design) struct Check<'a> {
     chain: &'a Chain,
 }
 
 impl Check<'_> {
-    fn refuse<T>(&self, path: &str, message: impl Into<String>) -> Result<T, Error> {
+    pub(in crate::design) fn refuse<T>(
+        &self,
+        path: &str,
+        message: impl Into<String>,
+    ) -> Result<T, Error> {
         Err(self.chain.error(path, message))
     }
 
     /// A number in [least, most]; NaN and infinities are refused by the same comparison.
-    fn within(&self, path: &str, value: f64, least: f64, most: f64) -> Result<f64, Error> {
+    pub(in crate::design) fn within(
+        &self,
+        path: &str,
+        value: f64,
+        least: f64,
+        most: f64,
+    ) -> Result<f64, Error> {
         if value >= least && value <= most {
             return Ok(value);
         }
         self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
     }
 
-    fn count(&self, path: &str, value: u32, least: u32, most: u32) -> Result<u32, Error> {
+    pub(in crate::design) fn count(
+        &self,
+        path: &str,
+        value: u32,
+        least: u32,
+        most: u32,
+    ) -> Result<u32, Error> {
         if (least..=most).contains(&value) {
             return Ok(value);
         }
@@ -249,7 +260,7 @@ impl Check<'_> {
     }
 
     /// A duration that must be a whole, positive number of femtoseconds.
-    fn whole_fs(&self, path: &str, picoseconds: f64) -> Result<i64, Error> {
+    pub(in crate::design) fn whole_fs(&self, path: &str, picoseconds: f64) -> Result<i64, Error> {
         let ps = self.within(path, picoseconds, 1e-3, 1e9)?;
         let fs = (ps * 1e3).round();
         if (ps * 1e3 - fs).abs() > 1e-6 * fs {
