@@ -130,8 +130,8 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     // Without a detector the receiver has no timing, of which none of its limits depends.
     let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
-    let given = receiver::Given { scan: &scan, tdc: &tdc, coding: &coding, timing };
-    let receiver = faults.keep(check.receiver(file, &given));
+    let inputs = receiver::Inputs { scan: &scan, tdc: &tdc, coding: &coding, timing };
+    let receiver = faults.keep(check.receiver(file, &inputs));
     if !faults.is_empty() {
         return None;
     }

@@ -7,7 +7,7 @@ use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::decode::{MOST_RETURNS, Pick, Receiver, ReceiverKind};
 
 /// What a receiver is given beside its own section of the file.
-pub(super) struct Given<'a> {
+pub(super) struct Inputs<'a> {
     pub scan: &'a Scan,
     pub tdc: &'a Tdc,
     pub coding: &'a Coding,
@@ -53,8 +53,8 @@ impl Check<'_> {
         self.refuse("tdc.converters", message)
     }
 
-    pub(super) fn receiver(&self, file: &SensorFile, given: &Given) -> Result<Receiver, Error> {
-        let &Given { scan, tdc, coding, timing } = given;
+    pub(super) fn receiver(&self, file: &SensorFile, inputs: &Inputs) -> Result<Receiver, Error> {
+        let &Inputs { scan, tdc, coding, timing } = inputs;
         let kind = match file.receiver.kind {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
             ReceiverKindFile::Blind => ReceiverKind::Blind,
