@@ -4,7 +4,7 @@
 //! How events are drawn stands in [`detect`](crate::detect) and shares nothing with the closed
 //! forms but a detector's settings, so that the one can be held against the other.
 //!
-//! A new kind is a file here with the keys ([`Typed`]) and the answers ([`Model`]), an entry in each
+//! A new kind is a file here with the keys (`Typed`) and the answers ([`Model`]), an entry in each
 //! list of this page, and a file in [`detect`](crate::detect). Nothing else knows the kinds.
 
 mod amplifier;

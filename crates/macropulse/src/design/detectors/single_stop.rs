@@ -193,7 +193,7 @@ impl Model for SingleStop {
     }
 
     /// Of the moment at which the m-th of n photons comes: √m/(n·φ(z)) rms lengths of a Gaussian
-    /// pulse, z = Φ⁻¹(m/n); m at most [`LATEST`] of n.
+    /// pulse, z = Φ⁻¹(m/n); m at most 99 % of n.
     fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64 {
         let needed = f64::from(self.firing_photons);
         let share = (needed / lit.photons).min(LATEST);
