@@ -115,7 +115,7 @@ fn assert_measures(design: &Design, cloud: &PointCloud, pixels: &[Pixel]) {
 
 /// The detector's own jitter, m: no measurement can be better.
 fn jitter(design: &Design) -> f64 {
-    range_from_tof(design.detector.jitter())
+    range_from_tof(design.detector.model().jitter())
 }
 
 /// The built-in wall is 50 m ahead.

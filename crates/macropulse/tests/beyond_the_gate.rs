@@ -65,7 +65,7 @@ fn an_uncoded_sensor_sees_it_the_second_time_around() {
     let open = |rate: &str| {
         let text = "version = 1\nextends = \"hdl-64e\"\nname = \"fast\"\n[scan]\n\
                     max_range_m = 140.0\n[scan.raster]\nrows = 10\ncolumns = 100\n\
-                    horizontal_deg = 4.0\nvertical_deg = 1.0\n[detector.first-firing]\n\
+                    horizontal_deg = 4.0\nvertical_deg = 1.0\n[detector.single-stop]\n\
                     sensitivity = { range_m = 150.0, reflectance = 0.1, pd = 0.99 }\n\
                     false_firing_hz = 0.0\n";
         let rate = [("scan.scans_per_s".to_owned(), rate.to_owned())];

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use macropulse::design::Design;
+use macropulse::design::{Design, Detector};
 use macropulse::emit::bands;
 use macropulse::environment::Environment;
 use macropulse::predict::Forecaster;
@@ -31,26 +31,44 @@ fn pattern(name: &str) -> &'static str {
     }
 }
 
-fn detector(name: &str, light: &str) -> String {
-    let own = match name {
-        "linear" => {
-            "efficiency = 0.7\nbandwidth_mhz = 200.0\namplifier_pa_rthz = 0.3\n\
-             false_alarm_hz = 10.0\n"
-        }
-        _ if light == "budget" => "efficiency = 0.1\n",
-        _ => "sensitivity = { range_m = 20.0, reflectance = 0.1, pd = 0.999 }\n",
-    };
-    format!("[detector.{name}]\n{own}")
+/// The section of `docs/formats.md` on combinations.
+fn section() -> &'static str {
+    let section = FORMATS.split("### Combinations").nth(1).unwrap();
+    section.split("\n### ").next().unwrap()
 }
 
-/// The sensor file of a combination.
+/// The table of a detector: its keys as `docs/formats.md` shows them, or else how much light it gets.
+fn detector(name: &str, light: &str) -> String {
+    let title = format!("[detector.{name}]\n");
+    let shown =
+        section().split(title.as_str()).nth(1).map(|keys| keys.split("```").next().unwrap());
+    let own = match light {
+        _ if shown.is_some() => shown.unwrap(),
+        "budget" => "efficiency = 0.1\n",
+        _ => "sensitivity = { range_m = 20.0, reflectance = 0.1, pd = 0.999 }\n",
+    };
+    format!("{title}{own}")
+}
+
+/// The sensor file of a combination, which declares what it is told to.
 fn file(scanned: &str, seen: &str, shots: &str, light: &str) -> String {
     let mut idealised = vec!["footprint", "eye-safety", "mirror-motion"];
-    let names = |named: bool, name| if named { vec![name] } else { Vec::new() };
-    idealised.extend(names(light == "declared", "link-budget"));
-    idealised.extend(names(["linear", "first-firing"].contains(&seen), "inter-chip"));
-    let unlimited = ["photon-counting", "first-firing"].contains(&seen);
-    idealised.extend(names(unlimited, "detector-bandwidth"));
+    if light == "declared" {
+        idealised.push("link-budget");
+    }
+    let written = |idealised: &[&str]| written(scanned, seen, shots, light, idealised);
+    for effect in ["inter-chip", "detector-bandwidth"] {
+        let opened = Design::from_toml(&written(&idealised), "mine.toml", Path::new(""), &[]);
+        let wanted = format!("add `{effect}` to this list");
+        if opened.is_err_and(|told| told.to_string().contains(&wanted)) {
+            idealised.push(effect);
+        }
+    }
+    written(&idealised)
+}
+
+/// The sensor file of a combination that declares what is `idealised`.
+fn written(scanned: &str, seen: &str, shots: &str, light: &str, idealised: &[&str]) -> String {
     let optics = match light {
         "budget" => {
             "[optics]\naperture_mm = 3.0\ntransmission = 0.7\nfilter_nm = 1.0\n\
@@ -82,9 +100,7 @@ fn file(scanned: &str, seen: &str, shots: &str, light: &str) -> String {
 
 /// The rows of the table of combinations: detector, shots, light, and a cell for each pattern.
 fn table() -> Vec<Vec<&'static str>> {
-    let section = FORMATS.split("### Combinations").nth(1).unwrap();
-    let section = section.split("\n### ").next().unwrap();
-    let rows = section.lines().filter(|line| line.starts_with("| `"));
+    let rows = section().lines().filter(|line| line.starts_with("| `"));
     let cells = |line: &'static str| line.split('|').map(|cell| cell.trim().trim_matches('`'));
     rows.map(|line| cells(line).filter(|cell| !cell.is_empty()).collect()).collect()
 }
@@ -98,11 +114,15 @@ fn sentence(number: &str) -> &'static str {
 
 #[test]
 fn the_table_has_every_combination_once() {
-    let mut rows: Vec<Vec<&str>> = table().iter().map(|row| row[..3].to_vec()).collect();
-    assert_eq!(rows.len(), 4 * 2 * 2);
-    rows.sort();
-    rows.dedup();
-    assert_eq!(rows.len(), 4 * 2 * 2);
+    let rows: Vec<Vec<&str>> = table().iter().map(|row| row[..3].to_vec()).collect();
+    assert_eq!(rows.len(), Detector::NAMES.len() * 2 * 2);
+    for seen in Detector::NAMES {
+        for shots in ["uncoded", "coded"] {
+            for light in ["declared", "budget"] {
+                assert!(rows.contains(&vec![*seen, shots, light]), "{seen}, {shots}, {light}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
 use macropulse::points::{FAINT, Outcome};
-use macropulse::predict::interference::{edges_per_second, ghost_of_single_pulses, walk_per_scan};
+use macropulse::predict::interference::{events_per_second, ghost_of_single_pulses, walk_per_scan};
 use macropulse::random::Chance;
 use macropulse::scene::{Scene, Traced};
 use macropulse::score::Score;
@@ -233,7 +233,7 @@ fn detections_of_interferers_come_at_the_rate_that_theory_says() {
             // n₀ is that of white at 150 m: nine times that at 50 m, where cos i/R² falls as x³.
             let photons = design.derived().reference_photons * 0.02 * 9.0 * x.powi(3) * brighter;
             let marks = design.coding.codebook.marks(column, 1).len() as f64;
-            edges_per_second(2.0, marks, photons, 1.0)
+            events_per_second(2.0, marks, photons, 1.0)
         };
         (0..848).map(of_column).sum()
     };
@@ -264,7 +264,7 @@ fn single_pulses_make_ghosts_as_often_as_theory_says() {
         ("scan.raster.columns", "200"),
         ("scan.raster.horizontal_deg", "21"),
         ("scan.raster.vertical_deg", "11"),
-        ("detector.first-firing.false_firing_hz", "0"),
+        ("detector.single-stop.false_firing_hz", "0"),
     ];
     let design = open("hdl-64e", &keys);
     let scan = sim::scan(&design, &scene, SEED, 0).unwrap();

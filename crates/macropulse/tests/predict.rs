@@ -8,13 +8,14 @@ use std::path::Path;
 
 use macropulse::channel::{Echo, Light, Operating, light_of_echoes};
 use macropulse::codec::ShotLog;
-use macropulse::design::{Design, Detector};
+use macropulse::design::Design;
+use macropulse::design::detectors::Lit;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
-use macropulse::predict::detection::{armed, bank_loss, mark_pd};
+use macropulse::predict::converters::bank_loss;
 use macropulse::random::Chance;
 use macropulse::scene::Scene;
 use macropulse::sim::{self, Scan};
@@ -31,6 +32,13 @@ fn sensor(name: &str, set: &[(&str, &str)]) -> Design {
 /// What follows from a sensor where there is neither air nor sunlight.
 fn in_the_dark(design: &Design) -> Operating {
     Operating::of(design, &Environment::vacuum_dark()).unwrap()
+}
+
+/// Probability that a mark of so many photons makes an event, where nothing else falls on the
+/// detector.
+fn mark_pd(design: &Design, photons: f64) -> f64 {
+    let background = in_the_dark(design).background;
+    design.detector.model().mark_pd(&Lit { photons, background, falling: 0.0 })
 }
 
 /// A hollow sphere of a matt material about the sensor.
@@ -145,7 +153,7 @@ fn lit(design: &Design, photons: f64) -> (ShotLog, Light<'_>) {
     (log, light)
 }
 
-/// A sensor with the detector written in `lines`, without any false edge worth the name.
+/// A sensor with the detector written in `lines`, without any dark count worth the name.
 fn with_detector(lines: &str) -> Design {
     let text = format!(
         "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
@@ -168,10 +176,8 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
     for lines in detectors {
         let design = with_detector(lines);
         // A linear detector takes as many photons as its threshold.
-        let unit = match &design.detector {
-            Detector::Linear(_) => in_the_dark(&design).linear.unwrap().threshold / 3.0,
-            _ => 1.0,
-        };
+        let noise = design.detector.model().noise(0.0);
+        let unit = noise.map_or(1.0, |noise| noise.threshold / 3.0);
         let (mut told_apart, mut some) = (0, 0);
         for step in 0..9 {
             let photons = unit * 10_f64.powf(-3.0 + 0.5 * f64::from(step));
@@ -185,15 +191,15 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(2));
             let found = detectors.detections(&log, &light, &mut Memory::default());
             // Several photons of one mark are one tick.
-            let edges = tdc::ticks(&design, found).ticks.tick.len() as u64;
-            let predicted = mark_pd(&design, &in_the_dark(&design), photons, 0.0);
+            let events = tdc::ticks(&design, found).ticks.tick.len() as u64;
+            let predicted = mark_pd(&design, photons);
             assert!(
-                agrees(edges, marks, predicted),
-                "{lines}: {photons} photons, {edges} of {marks}, predicted {predicted}"
+                agrees(events, marks, predicted),
+                "{lines}: {photons} photons, {events} of {marks}, predicted {predicted}"
             );
-            let brighter = mark_pd(&design, &in_the_dark(&design), 1.1 * photons, 0.0);
+            let brighter = mark_pd(&design, 1.1 * photons);
             some += u32::from((1e-4..0.9999).contains(&predicted));
-            told_apart += u32::from(!agrees(edges, marks, brighter));
+            told_apart += u32::from(!agrees(events, marks, brighter));
         }
         assert!(some >= 3 && told_apart + 1 >= some.min(5), "{lines}: {told_apart} of {some}");
     }
@@ -207,27 +213,26 @@ fn blind_cells_lose_what_is_predicted() {
             "[detector.geiger]\nefficiency = 0.25\ncells = {cells}\ndead_time_ns = 10.0\n\
              dark_counts_hz = {rate}"
         ));
-        let Detector::Geiger(geiger) = &design.detector else { panic!("it was asked for") };
-        let mut edges = 0;
+        let mut events = 0;
         let mut seconds = 0.0;
         for band in bands(&design, 0).take(8) {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(3));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
-            edges += found.time.len();
+            events += found.time.len();
             let lasts = log.fired_at_fs[log.len() - 1] - log.fired_at_fs[0] + design.listening_fs();
             seconds += lasts as f64 * 1e-15;
         }
-        let predicted = rate * armed(geiger, rate) * seconds;
+        let predicted = rate * design.detector.model().ready_share(rate) * seconds;
         // A renewal process with a dead time is no more irregular than Poisson.
-        let deviations = (edges as f64 - predicted).abs() / predicted.sqrt();
-        assert!(deviations < 3.9, "{cells} cells: {edges}, predicted {predicted}");
+        let deviations = (events as f64 - predicted).abs() / predicted.sqrt();
+        assert!(deviations < 3.9, "{cells} cells: {events}, predicted {predicted}");
         let blindless = rate * seconds;
-        assert!((edges as f64 - blindless).abs() / blindless.sqrt() > 10.0);
+        assert!((events as f64 - blindless).abs() / blindless.sqrt() > 10.0);
     }
 }
 
-/// N = 150 000 edges, seed 4. Control: one converter more is rejected.
+/// N = 150 000 events, seed 4. Control: one converter more is rejected.
 #[test]
 fn a_small_bank_loses_what_erlang_says() {
     for converters in [1, 3, 6] {
@@ -239,21 +244,21 @@ fn a_small_bank_loses_what_erlang_says() {
                 ("detector.photon-counting.dark_counts_hz", "1e9"),
             ],
         );
-        let (mut edges, mut lost) = (0, 0);
+        let (mut events, mut lost) = (0, 0);
         for band in bands(&design, 0).take(4) {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(4));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
             let ticks = tdc::ticks(&design, found);
-            edges += ticks.ticks.tick.len() as u64 + ticks.lost;
+            events += ticks.ticks.tick.len() as u64 + ticks.lost;
             lost += ticks.lost;
         }
         let mut bank = design.tdc.clone();
         // Losses come in runs: so many independent ones are in the count.
-        let independent = edges / 10;
+        let independent = events / 10;
         assert!(
             agrees(lost / 10, independent, bank_loss(&bank, 1e9)),
-            "{converters}: {lost} of {edges}, predicted {}",
+            "{converters}: {lost} of {events}, predicted {}",
             bank_loss(&bank, 1e9)
         );
         bank.converters += 1;
@@ -341,7 +346,7 @@ fn false_returns_stay_below_what_is_predicted() {
 #[test]
 fn noise_before_the_target_costs_a_single_firing() {
     for (name, range, rate) in [("hdl-64e", 60.0, "2e5"), ("peregrine", 40.0, "1e6")] {
-        let set = [("detector.first-firing.false_firing_hz", rate)];
+        let set = [("detector.single-stop.false_firing_hz", rate)];
         let design = sensor(name, &set);
         let room = room(range, 0.5, "vacuum-dark");
         let forecaster = Forecaster::new(&design, &room.environment).unwrap();

@@ -133,7 +133,7 @@ fn a_receiver_that_gives_one_return_refuses_more() {
         assert!(sentence.contains(&one), "{sentence}");
     }
     let sentence = refused("hdl-64e", &[two]);
-    assert!(sentence.contains("detector.first-firing fires once per shot"), "{sentence}");
+    assert!(sentence.contains("detector.single-stop gives one event per shot"), "{sentence}");
     let sentence = refused("hdl-64e", &[("receiver.pick", "last")]);
     assert!(sentence.contains("receiver.pick") && sentence.contains("no effect"), "{sentence}");
     let sentence = refused("kim-park-2016", &[("receiver.returns", "5")]);

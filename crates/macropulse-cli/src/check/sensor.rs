@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use macropulse::channel::Operating;
-use macropulse::design::{Derived, Design, Detector};
+use macropulse::design::{Derived, Design};
 use macropulse::environment::Environment;
 use serde_json::{Map, Value, json};
 
@@ -47,35 +47,28 @@ pub fn report(design: &Design, environment: &Environment) -> Result<Report, Faul
 /// What sun and air do to it.
 fn at_work(design: &Design, operating: &Operating) -> Columns {
     let mut columns = Columns::default();
+    let detector = design.detector.model();
     let reach = design.scan.rated_range;
     let transmission = short(operating.link.transmission(reach) * 100.0);
     columns.push("air", format!("{transmission} % of the light gets {} m far", short(reach)));
     let counts = format!("{:.3e} counts a second in each detector", operating.background);
     columns.push(
         "sunlight",
-        match (&design.budget, &design.detector) {
-            (None, _) if operating.background > 0.0 => {
+        match &design.budget {
+            None if operating.background > 0.0 => {
                 format!("{counts}, as declared, whatever the sky")
             }
-            (None, _) => "not counted: the sensor is declared by its sensitivity, whatever the sky"
+            None => "not counted: the sensor is declared by its sensitivity, whatever the sky"
                 .to_owned(),
-            (Some(_), Detector::FirstFiring(firing)) => match firing.firing_photons {
-                1 => format!("{counts}, each of which fires it"),
-                _ => format!("{counts}, which are noise to it"),
-            },
-            (Some(_), _) => counts,
+            Some(_) => format!("{counts}, {}", detector.in_sunlight()),
         },
     );
-    if let Some(linear) = &operating.linear {
-        let (noise, threshold) = (short(linear.noise), short(linear.threshold));
-        columns.push("noise", format!("{noise} photons rms, the threshold at {threshold}"));
-    }
-    if let Some(firing) = operating.first_firing.filter(|firing| firing.noise > 0.0) {
-        let (noise, needed) = (short(firing.noise), firing.needed);
-        columns.push("noise", format!("{noise} photons rms; it fires at {needed}"));
+    if let Some(noise) = detector.noise(operating.background) {
+        let (rms, threshold) = (short(noise.rms), short(noise.threshold));
+        columns.push("noise", format!("{rms} photons rms, the threshold at {threshold}"));
     }
     let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
-    columns.push("false edges", events);
+    columns.push("false detections", events);
     columns
 }
 

@@ -5,7 +5,7 @@ use super::experiment::{DISTANCES, Trial};
 use super::receivers::Comparison;
 use crate::view::{self, Align, Cell, Table};
 use macropulse::codec::code::prime_sequence;
-use macropulse::design::{Design, Detector, Extent};
+use macropulse::design::{Design, Extent};
 use macropulse::points::Outcome;
 use macropulse::units::s_from_fs;
 
@@ -91,45 +91,7 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
         true => "1 flash".into(),
         false => format!("{:.1}", d.derived().shots_in_flight),
     });
-    row("detector", &|d| match d.detector {
-        Detector::PhotonCounting(c) => format!(
-            "photon counting; {:.2} photons a mark from reflectance {} at {} m; {:.0e} dark \
-             counts/s; jitter {} ps",
-            c.sensitivity.photons,
-            c.sensitivity.reflectance,
-            c.sensitivity.range,
-            c.dark,
-            c.jitter * 1e12
-        ),
-        Detector::Geiger(g) => format!(
-            "{} cells in Geiger mode; {:.2} photons a mark from reflectance {} at {} m; dead for \
-             {} ns; {:.0e} dark counts/s",
-            g.cells,
-            g.sensitivity.photons,
-            g.sensitivity.reflectance,
-            g.sensitivity.range,
-            s_from_fs(g.dead_fs) * 1e9,
-            g.dark
-        ),
-        Detector::Linear(l) => format!(
-            "linear; threshold {:.2} times the noise; {:.2} photons a mark from reflectance {} at \
-             {} m; {:.0e} false alarms/s",
-            l.threshold_over_noise,
-            l.sensitivity.photons,
-            l.sensitivity.reflectance,
-            l.sensitivity.range,
-            l.false_alarm
-        ),
-        Detector::FirstFiring(f) => format!(
-            "fires at {} photons, {:.0} from reflectance {} at {} m; noise {} photons; jitter {} ps",
-            f.firing_photons,
-            f.sensitivity.photons,
-            f.sensitivity.reflectance,
-            f.sensitivity.range,
-            f.noise_photons,
-            f.jitter * 1e12
-        ),
-    });
+    row("detector", &|d| d.detector.model().summary());
     row("converters", &|d| {
         format!("{} of {} ps", d.tdc.converters, s_from_fs(d.tdc.tick_fs) * 1e12)
     });

@@ -89,7 +89,7 @@ impl Link {
 
 /// Mean photons that a sensor detects per mark from white at one metre, in clear air.
 fn at_one_metre(design: &Design) -> f64 {
-    let sensitivity = design.detector.sensitivity();
+    let sensitivity = design.detector.model().sensitivity();
     sensitivity.photons * sensitivity.range.powi(2) / sensitivity.reflectance
 }
 

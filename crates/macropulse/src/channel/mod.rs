@@ -22,7 +22,7 @@ mod operating;
 pub use interferers::APERTURE_RADIUS;
 pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Transmitter};
 pub use link::{FILTER, Link};
-pub use operating::{Error, FirstFiringSetting, Idealised, LinearSetting, Operating, idealised};
+pub use operating::{Error, Idealised, Operating, idealised};
 
 use macropulse_codec::ShotLog;
 

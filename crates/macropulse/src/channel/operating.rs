@@ -1,12 +1,8 @@
 //! A sensor at work in an environment: what follows from both.
 
 use super::Link;
-use crate::design::{Design, Detector, FirstFiring, Linear};
+use crate::design::Design;
 use crate::environment::Environment;
-
-/// More counts per second than this are not followed one by one through the cells of a Geiger
-/// detector.
-const MOST_COUNTS: f64 = 1e12;
 
 /// A sensor cannot be simulated in an environment: why, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -26,46 +22,8 @@ pub struct Operating {
     /// as the sensor declares where it has no link budget.
     pub background: f64,
     /// Detection events per second in each channel without the light of any lidar: dark and
-    /// background counts; crossings by noise of a linear detector.
+    /// background counts; crossings of the threshold by noise.
     pub false_rate: f64,
-    /// Noise and threshold of a linear detector.
-    pub linear: Option<LinearSetting>,
-    /// Noise and false firings of a detector that fires once per shot.
-    pub first_firing: Option<FirstFiringSetting>,
-    /// Standard deviation of the timing, s; of a linear detector at its threshold, where it is
-    /// largest.
-    pub jitter: f64,
-}
-
-/// What a linear detector is set to under the light it sees. Amplitudes are in detected photons: in
-/// electrons before multiplication.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearSetting {
-    /// Amplitude that makes an edge.
-    pub threshold: f64,
-    /// Noise without a mark, rms.
-    pub noise: f64,
-    /// Excess noise factor of the multiplication.
-    pub excess: f64,
-    /// Full width at half maximum of a mark behind the amplifier, s.
-    pub response: f64,
-    /// Crossings of the threshold by noise alone, 1/s.
-    pub false_rate: f64,
-    /// Standard deviation of the timing of the converter's input alone, s.
-    pub jitter: f64,
-}
-
-/// What a detector that fires once per shot does under the light it sees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstFiringSetting {
-    /// Photons needed to fire; 1 is a Geiger detector.
-    pub needed: u32,
-    /// White noise integrated over one pulse, photons rms.
-    pub noise: f64,
-    /// Firings without a target, 1/s.
-    pub false_rate: f64,
-    /// Standard deviation of the timing, s.
-    pub jitter: f64,
 }
 
 /// An effect that a run leaves out.
@@ -90,16 +48,17 @@ impl Operating {
     /// The sensor `design` in `environment`.
     ///
     /// # Errors
-    /// If the table of sunlight does not go to the wavelength of a sensor with a link budget, or a
-    /// Geiger detector would count too often to be followed.
+    /// If the table of sunlight does not go to the wavelength of a sensor with a link budget, or its
+    /// detector cannot be followed in so much light.
     pub fn of(design: &Design, environment: &Environment) -> Result<Self, Error> {
         let refuse = |message: String| Error {
             sensor: design.name.clone(),
             environment: environment.name.clone(),
             message,
         };
+        let detector = design.detector.model();
         let background = match &design.budget {
-            None => design.detector.declared_background(),
+            None => detector.declared_background(),
             Some(budget) => {
                 let irradiance = environment.irradiance(budget.wavelength).ok_or_else(|| {
                     refuse(format!(
@@ -112,38 +71,13 @@ impl Operating {
                 budget.background(irradiance, environment.albedo) * budget.efficiency
             }
         };
-        let linear = match &design.detector {
-            Detector::Linear(linear) => Some(LinearSetting::of(linear, background)),
-            _ => None,
-        };
-        let first_firing = match &design.detector {
-            Detector::FirstFiring(firing) => {
-                Some(FirstFiringSetting::of(firing, background, design.light.pulse))
-            }
-            _ => None,
-        };
-        let false_rate = match &design.detector {
-            Detector::PhotonCounting(counting) => counting.dark + background,
-            Detector::Geiger(geiger) => geiger.dark + background,
-            Detector::Linear(linear) => linear.false_alarm,
-            Detector::FirstFiring(firing) => {
-                first_firing.map_or(firing.false_rate, |setting| setting.false_rate)
-            }
-        };
-        if matches!(design.detector, Detector::Geiger(_)) && false_rate > MOST_COUNTS {
-            return Err(refuse(format!(
-                "{false_rate:.1e} counts per second would fire the detector again and again, more \
-                 than are followed one by one ({MOST_COUNTS:.0e}): narrow the field or the filter, \
-                 or take another environment"
-            )));
+        if let Some(why) = detector.refusal(background) {
+            return Err(refuse(why));
         }
         Ok(Self {
             link: Link::of(design, environment),
             background,
-            false_rate,
-            linear,
-            first_firing,
-            jitter: design.detector.jitter(),
+            false_rate: detector.false_rate(background),
         })
     }
 }
@@ -156,47 +90,10 @@ impl Operating {
     }
 }
 
-impl FirstFiringSetting {
-    /// The setting of a detector that sees `background` detections of steady light per second,
-    /// adding light up over a `pulse` of so many seconds.
-    ///
-    /// Where one photon is enough every one of them fires it. Where more are needed, their mean is
-    /// taken off (the amplifier passes no steady current) and their fluctuation is shot noise:
-    /// √(a² + b·τ), a the noise rms without light, b the background, τ the pulse.
-    pub fn of(firing: &FirstFiring, background: f64, pulse: f64) -> Self {
-        let FirstFiring { firing_photons, noise_photons, false_rate, jitter, .. } = *firing;
-        let (noise, false_rate) = match firing_photons {
-            1 => (noise_photons, false_rate + background),
-            _ => ((noise_photons.powi(2) + background * pulse).sqrt(), false_rate),
-        };
-        Self { needed: firing_photons, noise, false_rate, jitter }
-    }
-}
-
-impl LinearSetting {
-    /// The setting of a detector that sees `background` detections of steady light per second.
-    pub fn of(linear: &Linear, background: f64) -> Self {
-        let noise = linear.amplifier.noise_electrons(background);
-        Self {
-            threshold: linear.threshold_over_noise * noise,
-            noise,
-            excess: linear.amplifier.excess(),
-            response: linear.amplifier.response(),
-            false_rate: linear.false_alarm,
-            jitter: linear.jitter,
-        }
-    }
-
-    /// Standard deviation, s, of the time at which a mark of `amplitude` detected photons crosses
-    /// the threshold: noise over the slope, τ·noise/amplitude, with the jitter of the input.
-    pub fn timing(&self, amplitude: f64) -> f64 {
-        libm::hypot(self.jitter, self.response * self.noise / amplitude.max(self.threshold))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::detectors::Lit;
     use approx::assert_relative_eq;
 
     fn sensor(name: &str, set: &[(&str, &str)]) -> Design {
@@ -236,13 +133,16 @@ mod tests {
         let design = sensor("coded-practical", &[]);
         let [day, night] =
             ["clear-day", "night"].map(|name| Operating::of(&design, &environment(name)).unwrap());
-        let [by_day, by_night] = [day, night].map(|operating| operating.linear.unwrap());
-        assert!(by_day.noise > by_night.noise);
+        let model = design.detector.model();
+        let [by_day, by_night] =
+            [day, night].map(|operating| model.noise(operating.background).unwrap());
+        assert!(by_day.rms > by_night.rms);
         // The threshold follows, so that noise crosses it as often.
         assert_eq!(day.false_rate, night.false_rate);
-        let ratio = by_night.threshold / by_night.noise;
-        assert_relative_eq!(by_day.threshold / by_day.noise, ratio, max_relative = 1e-12);
-        assert_relative_eq!(by_day.timing(0.0), day.jitter, max_relative = 1e-12);
+        let ratio = by_night.threshold / by_night.rms;
+        assert_relative_eq!(by_day.threshold / by_day.rms, ratio, max_relative = 1e-12);
+        let faint = Lit { photons: 0.0, background: day.background, falling: 0.0 };
+        assert_relative_eq!(model.mark_jitter(&faint), model.jitter(), max_relative = 1e-12);
     }
 
     #[test]
@@ -251,7 +151,7 @@ mod tests {
             let text = format!(
                 "version = 1\nextends = \"kim-park-2016-physical\"\nname = \"mine\"\n\
                  idealised = [\"detector-bandwidth\", \"inter-chip\", \"mirror-motion\"]\n\
-                 [detector.first-firing]\nefficiency = 1.0\nfiring_photons = {photons}\n\
+                 [detector.single-stop]\nefficiency = 1.0\nfiring_photons = {photons}\n\
                  noise_photons = 3.0\nfalse_firing_hz = 100.0\n[code]\nlabel = \"none\"\n\
                  family = {{ sparse = {{ length = 9, weight = 1, words = 2, seed = 1 }} }}\n\
                  word = {{ first = 0, modulus = 2 }}\n"
@@ -259,18 +159,19 @@ mod tests {
             Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap()
         };
         let setting = |photons: &str, name: &str| {
-            let operating = Operating::of(&sensor(photons), &environment(name)).unwrap();
-            let setting = operating.first_firing.unwrap();
-            assert_eq!(operating.false_rate, setting.false_rate);
-            (operating.background, setting)
+            let design = sensor(photons);
+            let operating = Operating::of(&design, &environment(name)).unwrap();
+            let noise = design.detector.model().noise(operating.background).unwrap();
+            (operating, noise.rms)
         };
-        let (sun, one) = setting("1", "clear-day");
-        assert_eq!((one.false_rate, one.noise), (100.0 + sun, 3.0));
-        let (_, many) = setting("5", "clear-day");
+        let (one, noise) = setting("1", "clear-day");
+        let sun = one.background;
+        assert_eq!((one.false_rate, noise), (100.0 + sun, 3.0));
+        let (many, noise) = setting("5", "clear-day");
         let pulse = sensor("5").light.pulse;
-        assert_relative_eq!(many.noise.powi(2), 9.0 + sun * pulse, max_relative = 1e-12);
+        assert_relative_eq!(noise.powi(2), 9.0 + sun * pulse, max_relative = 1e-12);
         assert_eq!(many.false_rate, 100.0);
-        assert_eq!(setting("5", "night").1.noise, 3.0);
+        assert_eq!(setting("5", "night").1, 3.0);
     }
 
     #[test]

@@ -1,21 +1,16 @@
 //! How long a stretch of time may be that is computed in one go.
 //!
-//! Edges are timed in 32 bits, in parts of a tick. What a band sees must lie within: its shots,
+//! Detection events are timed in 32 bits, in parts of a tick. What a band sees must lie within: its shots,
 //! its guard shots, and their echoes.
 
-use super::{Design, Detector};
+use super::Design;
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
-/// Parts of a tick in which edges are timed. Jitter is rounded to one, by 6 µm for 2.5 ps.
+/// Parts of a tick in which detection events are timed. Jitter is rounded to one, by 6 µm for 2.5 ps.
 pub const PARTS_OF_TICK: u32 = 64;
 
-/// Jitter beyond so many standard deviations does not happen: once in 10¹⁸ edges.
+/// Jitter beyond so many standard deviations does not happen: once in 10¹⁸ events.
 pub const MOST_SIGMA: f64 = 9.0;
-
-/// Cells in Geiger mode start so many dead times before the first owned shot. They start in the
-/// mixture of armed and blind that steady light leaves, and after one dead time without light of
-/// its own a cell is armed whatever it was: four leave less than a percent of a hundredth.
-const DEAD_TIMES: i64 = 4;
 
 impl Design {
     /// Length of a macropulse, fs.
@@ -35,19 +30,15 @@ impl Design {
     }
 
     /// For how long before the first owned shot of a band light must be known, fs: as long as
-    /// light of earlier shots is under way, and for cells of a detector to forget the state they
-    /// are started in.
+    /// light of earlier shots is under way, and for the detector to forget the state it is started
+    /// in.
     pub fn history_fs(&self) -> i64 {
-        let cells = match &self.detector {
-            Detector::Geiger(geiger) => DEAD_TIMES * geiger.dead_fs,
-            _ => 0,
-        };
-        self.light_fs().max(cells)
+        self.light_fs().max(self.detector.model().memory_fs())
     }
 
-    /// How far jitter, and the length of a micropulse, can displace an edge, fs.
+    /// How far jitter, and the length of a micropulse, can displace a detection event, fs.
     pub fn most_jitter_fs(&self) -> i64 {
-        let most = MOST_SIGMA * (self.detector.jitter() + self.light.spread.unwrap_or(0.0));
+        let most = MOST_SIGMA * (self.detector.model().jitter() + self.light.spread.unwrap_or(0.0));
         (most * FS_PER_S as f64).ceil() as i64
     }
 

@@ -68,7 +68,7 @@ impl Derived {
                 .then(|| range_from_tof(word_period(design, channel_period))),
             tick_range: range_from_tof(s_from_fs(design.tdc.tick_fs)),
             idle_listening_rate: at_once / (gate * shots as f64),
-            reference_photons: design.detector.sensitivity().photons,
+            reference_photons: design.detector.model().sensitivity().photons,
         }
     }
 }

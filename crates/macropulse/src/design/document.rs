@@ -7,7 +7,7 @@ use toml::Table;
 
 use super::presets;
 use super::scan::PATTERNS;
-use super::{Effect, Error};
+use super::{Detector, Effect, Error};
 use crate::names::{line_column, offset_of_key, toml_value};
 
 /// Where values come from that are changed on the command line.
@@ -27,11 +27,8 @@ const PROSE: &str = "summary";
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
-const ALTERNATIVES: [(&str, &[&str]); 3] = [
-    ("scan", &PATTERNS),
-    ("detector", &["photon-counting", "geiger", "linear", "first-firing"]),
-    ("family", FAMILIES),
-];
+const ALTERNATIVES: [(&str, &[&str]); 3] =
+    [("scan", &PATTERNS), ("detector", Detector::NAMES), ("family", FAMILIES)];
 
 /// Code families by the names they have in a sensor file.
 pub(super) const FAMILIES: &[&str] = &[
@@ -161,9 +158,9 @@ impl Chain {
     }
 
     /// The same chain without the keys at the dotted `paths`, as far as it is read as one.
-    pub fn without(mut self, paths: &[&str]) -> Self {
+    pub fn without(mut self, paths: &[String]) -> Self {
         for path in paths {
-            let (mut table, mut key) = (Some(&mut self.merged), *path);
+            let (mut table, mut key) = (Some(&mut self.merged), path.as_str());
             while let Some((outer, inner)) = key.split_once('.') {
                 table = table.and_then(|table| table.get_mut(outer)?.as_table_mut());
                 key = inner;

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::detectors::DetectorFile;
 use super::light::LightFile;
 use super::scan::ScanFile;
 use macropulse_codec::decode::{Effort, Pick};
@@ -129,70 +130,6 @@ pub(super) struct CrcFile {
 pub(super) struct WordFile {
     pub first: u32,
     pub modulus: u32,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub(super) struct DetectorFile {
-    pub photon_counting: Option<PhotonCountingFile>,
-    pub geiger: Option<GeigerFile>,
-    pub linear: Option<LinearFile>,
-    pub first_firing: Option<FirstFiringFile>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SensitivityFile {
-    pub range_m: f64,
-    pub reflectance: f64,
-    pub pd: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PhotonCountingFile {
-    pub sensitivity: Option<SensitivityFile>,
-    pub efficiency: Option<f64>,
-    pub missed_marks: f64,
-    pub dark_counts_hz: f64,
-    pub background_hz: f64,
-    pub jitter_ps: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GeigerFile {
-    pub sensitivity: Option<SensitivityFile>,
-    pub efficiency: Option<f64>,
-    pub cells: u32,
-    pub dead_time_ns: f64,
-    pub dark_counts_hz: f64,
-    pub background_hz: f64,
-    pub jitter_ps: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LinearFile {
-    pub efficiency: f64,
-    pub gain: f64,
-    pub ionisation_ratio: f64,
-    pub bandwidth_mhz: f64,
-    pub amplifier_pa_rthz: f64,
-    pub dark_current_na: f64,
-    pub false_alarm_hz: f64,
-    pub jitter_ps: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FirstFiringFile {
-    pub sensitivity: Option<SensitivityFile>,
-    pub efficiency: Option<f64>,
-    pub firing_photons: u32,
-    pub noise_photons: f64,
-    pub false_firing_hz: f64,
-    pub jitter_ps: f64,
 }
 
 #[derive(Debug, Deserialize)]

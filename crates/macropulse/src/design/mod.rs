@@ -11,13 +11,12 @@ mod band;
 mod budget;
 mod check;
 mod derived;
-mod detector;
+pub mod detectors;
 mod document;
 mod effect;
 mod family;
 mod file;
 mod light;
-mod linear;
 mod presets;
 pub mod safety;
 mod scan;
@@ -28,13 +27,12 @@ use std::sync::OnceLock;
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use budget::{Budget, Field, Trailing, solid_angle};
 pub use derived::Derived;
-pub use detector::{Detector, FirstFiring, Geiger, Linear, PhotonCounting, Sensitivity};
+pub use detectors::Detector;
 pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
 pub use family::family_from_toml;
 pub use file::Label;
 pub use light::Light;
-pub use linear::Amplifier;
 pub use presets::{names as preset_names, text as preset_text};
 pub use scan::{Directions, Extent, Firing, Flash, Mirror, Pattern, Raster, Scan, Spinning};
 
@@ -57,9 +55,9 @@ pub struct Design {
     pub coding: Coding,
     /// Where the photons come from; `None` where the detector is declared by its sensitivity.
     pub budget: Option<Budget>,
-    /// From light to edges.
+    /// From light to detection events.
     pub detector: Detector,
-    /// From edges to ticks.
+    /// From detection events to ticks.
     pub tdc: Tdc,
     /// From ticks to returns.
     pub receiver: Receiver,
@@ -111,7 +109,7 @@ pub struct Tdc {
     pub tick_fs: i64,
     /// Period of the counter of whole clock ticks, fs.
     pub clock_fs: i64,
-    /// Time for which a converter is busy with one edge, fs.
+    /// Time for which a converter is busy with one event, fs.
     pub dead_fs: i64,
 }
 

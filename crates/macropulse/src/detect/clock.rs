@@ -14,7 +14,7 @@ pub(super) struct Clock {
 
 impl Clock {
     /// The clock of a band whose first shot is fired at `first_fs`. It starts early enough for an
-    /// edge that jitter puts before that.
+    /// event that jitter puts before that.
     pub fn new(design: &Design, first_fs: i64) -> Self {
         let (tick_fs, clock_fs) = (design.tdc.tick_fs, design.tdc.clock_fs);
         let epoch_fs = (first_fs - design.most_jitter_fs()).div_euclid(clock_fs) * clock_fs;

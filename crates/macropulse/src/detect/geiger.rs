@@ -20,8 +20,8 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::channel::Channel;
 use super::noise::{PART_BITS, counts};
-use super::{Detections, Memory};
-use crate::design::Geiger;
+use super::{Detections, Kind, Memory};
+use crate::design::detectors::Geiger;
 use crate::random::{Address, Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s, s_from_fs};
 
@@ -46,14 +46,10 @@ impl Cells {
     fn steady(&self, channel: &Channel) -> f64 {
         self.geiger.dark + channel.light.background.steady
     }
+}
 
-    /// Adds the events of a channel to those found.
-    pub fn add(
-        &self,
-        channel: &Channel,
-        chance: &Chance,
-        (found, memory): (&mut Detections, &mut Memory),
-    ) {
+impl Kind for Cells {
+    fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         let mut photons = self.photons(channel, chance);
         counts(self.steady(channel), channel, chance, &mut memory.noise);
         for &time in &memory.noise {
@@ -75,7 +71,9 @@ impl Cells {
         }
         found.time[from..].sort_unstable();
     }
+}
 
+impl Cells {
     /// Where the random numbers of a moment stand, given in parts of a tick from the epoch on.
     fn address(&self, stage: Stage, channel: &Channel, time: i64) -> Address {
         let index = (channel.clock.epoch_parts() + time) as u64;

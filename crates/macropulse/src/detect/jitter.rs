@@ -1,4 +1,4 @@
-//! How late an edge is: Gaussian jitter, rounded to parts of a tick.
+//! How late a detection event is: Gaussian jitter, rounded to parts of a tick.
 //!
 //! What is rounded takes only so many values, and Walker's method \[Walker77\] draws one of n
 //! values with one number: it falls into one of n cells of equal size, each shared by two values.

@@ -15,9 +15,9 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::channel::Channel;
 use super::noise::counts;
-use super::{Detections, Memory};
-use crate::channel::LinearSetting;
+use super::{Detections, Kind, Memory};
 use crate::design::Design;
+use crate::design::detectors::LinearSetting;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::fs_from_s;
 
@@ -47,14 +47,10 @@ impl Thresholding {
     pub fn new(linear: LinearSetting, design: &Design) -> Self {
         Self { linear, measures: !design.is_coded() }
     }
+}
 
-    /// Adds the events of a channel to those found.
-    pub fn add(
-        &self,
-        channel: &Channel,
-        chance: &Chance,
-        (found, memory): (&mut Detections, &mut Memory),
-    ) {
+impl Kind for Thresholding {
+    fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         let mut events: Vec<(u32, f32)> = Vec::new();
         let span = channel.whole_span();
         for Together { train, later_fs, photons } in self.gather(channel) {
@@ -79,7 +75,9 @@ impl Thresholding {
             found.amplitude.extend(events.iter().map(|event| event.1));
         }
     }
+}
 
+impl Thresholding {
     /// The pulse trains of a channel, those of one shot that the amplifier cannot tell apart as
     /// one.
     fn gather(&self, channel: &Channel) -> Vec<Together> {
@@ -140,15 +138,15 @@ mod tests {
         let design = Design::open("coded-practical", &quiet).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
         let shot = log.owned.start;
-        let edges = |apart_fs: i64, photons: f64| {
+        let events = |apart_fs: i64, photons: f64| {
             let echo = |ray| Echo { shot, delay_fs: 500_000_000 + ray * apart_fs, photons };
             let light = light_of_echoes(&design, &log, (0..7).map(echo));
             let detectors = Detectors::in_the_dark(&design, Chance::new(1));
             detectors.detections(&log, &light, &mut Memory::default()).time.len()
         };
         // The threshold is at some 300 photons.
-        assert_eq!(edges(10_000, 90.0), 8);
-        assert_eq!(edges(2_000_000, 90.0), 0);
-        assert_eq!(edges(2_000_000, 900.0), 56);
+        assert_eq!(events(10_000, 90.0), 8);
+        assert_eq!(events(2_000_000, 90.0), 0);
+        assert_eq!(events(2_000_000, 900.0), 56);
     }
 }

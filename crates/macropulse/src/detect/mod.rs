@@ -5,7 +5,6 @@
 
 mod channel;
 mod clock;
-mod first_firing;
 mod first_photon;
 mod geiger;
 mod jitter;
@@ -13,8 +12,10 @@ mod linear;
 mod noise;
 mod photon_counting;
 mod shape;
+mod single_stop;
 
 use std::borrow::Cow;
+use std::fmt;
 
 use macropulse_codec::ShotLog;
 
@@ -25,7 +26,7 @@ use linear::Thresholding;
 use photon_counting::Counting;
 use shape::Shape;
 
-use crate::channel::{FirstFiringSetting, Light, LinearSetting, Operating};
+use crate::channel::{Light, Operating};
 use crate::design::{Design, Detector};
 use crate::kernels::GROUP;
 use crate::random::Chance;
@@ -50,34 +51,26 @@ pub struct Detectors<'a> {
     design: &'a Design,
     chance: Chance,
     shape: Option<Shape>,
-    kind: Kind,
+    kind: Box<dyn Kind>,
 }
 
-#[derive(Debug)]
-enum Kind {
-    Counting(Counting),
-    Cells(Cells),
-    Thresholding(Thresholding),
-    Firing(FirstFiringSetting),
+/// A kind of detector at work.
+trait Kind: fmt::Debug + Send + Sync {
+    /// Adds the events of a channel to those found, in the order of time.
+    fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory);
 }
 
 impl<'a> Detectors<'a> {
     /// The detectors of `design` where it is `operating`, with the random numbers of `chance`.
     pub fn new(design: &'a Design, operating: &Operating, chance: Chance) -> Self {
-        let kind = match &design.detector {
-            Detector::PhotonCounting(counting) => Kind::Counting(Counting::new(counting, design)),
-            Detector::Geiger(geiger) => Kind::Cells(Cells::new(geiger)),
+        let sunlight = operating.background;
+        let kind: Box<dyn Kind> = match &design.detector {
+            Detector::PhotonCounting(counting) => Box::new(Counting::new(counting, design)),
+            Detector::Geiger(geiger) => Box::new(Cells::new(geiger)),
             Detector::Linear(linear) => {
-                let setting = operating.linear;
-                let setting =
-                    setting.unwrap_or_else(|| LinearSetting::of(linear, operating.background));
-                Kind::Thresholding(Thresholding::new(setting, design))
+                Box::new(Thresholding::new(linear.setting(sunlight), design))
             }
-            Detector::FirstFiring(firing) => {
-                let of =
-                    || FirstFiringSetting::of(firing, operating.background, design.light.pulse);
-                Kind::Firing(operating.first_firing.unwrap_or_else(of))
-            }
+            Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
         };
         Self { design, chance, shape: Shape::of(design), kind }
     }
@@ -101,7 +94,7 @@ impl<'a> Detectors<'a> {
         let several = self.design.channels() > 1;
         for channel in arrangement.channels(self.design, clock, log, &light) {
             let from = found.time.len();
-            self.channel(&channel, &mut found, memory);
+            self.kind.add(&channel, &self.chance, &mut found, memory);
             if several {
                 found.channel.resize(found.time.len(), channel.number);
                 channel.keep_what_is_listened_to(&mut found, from);
@@ -109,16 +102,6 @@ impl<'a> Detectors<'a> {
         }
         memory.arrangement = arrangement;
         found
-    }
-
-    /// Adds the events of one channel to `found`, in the order of time.
-    fn channel(&self, channel: &Channel, found: &mut Detections, memory: &mut Memory) {
-        match &self.kind {
-            Kind::Counting(counting) => counting.add(channel, &self.chance, (found, memory)),
-            Kind::Cells(cells) => cells.add(channel, &self.chance, (found, memory)),
-            Kind::Thresholding(linear) => linear.add(channel, &self.chance, (found, memory)),
-            Kind::Firing(firing) => first_firing::add(firing, channel, &self.chance, found),
-        }
     }
 }
 

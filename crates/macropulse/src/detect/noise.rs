@@ -23,7 +23,7 @@ use crate::units::FS_PER_S;
 /// A wait is rounded to a fraction of its mean, one in so many at least.
 const FINENESS: f64 = (1 << 18) as f64;
 
-/// So many edges in a tick, on average, are drawn tick by tick.
+/// So many counts in a tick, on average, are drawn tick by tick.
 const CROWDED: f64 = 0.5;
 
 /// Ticks of a window that is drawn tick by tick.
@@ -193,7 +193,7 @@ impl Waits {
             let from = times.len();
             let start = number * window - clock.epoch_parts();
             let events = Events { mean: self.mean, shift: self.shift, start: start as u32 };
-            draw(events, source.address(number), chance, (times, &mut numbers));
+            draw(events, source.address(number), chance, times, &mut numbers);
             if *span.start() <= start && start + window <= *span.end() {
                 continue;
             }
@@ -216,7 +216,8 @@ fn draw(
     events: Events,
     mut address: Address,
     chance: &Chance,
-    (times, numbers): (&mut Vec<u32>, &mut Vec<[u32; GROUP]>),
+    times: &mut Vec<u32>,
+    numbers: &mut Vec<[u32; GROUP]>,
 ) {
     // Enough for five windows in six; the others draw some more.
     let expected = END as f32 / events.mean;

@@ -2,27 +2,28 @@
 //!
 //! 1. Every mark of every pulse train is seen with probability (1 − m)·(1 − exp(−n)), n the mean photons
 //!    detected per mark and m the fraction lost for other reasons (docs/physics.md#photon-counting).
-//! 2. A mark that is seen makes one edge at its arrival, displaced by Gaussian jitter.
+//! 2. A mark that is seen makes one event at its arrival, displaced by Gaussian jitter.
 //! 3. Dark and background counts are Poisson in time.
 //!
-//! Marks that arrive within one tick make one edge in the end: the converters merge them, which is
+//! Marks that arrive within one tick make one event in the end: the converters merge them, which is
 //! the hard limiter of the coding literature.
 //!
-//! Echoes are taken in the order in which they begin to arrive, so that the edges of one follow
+//! Echoes are taken in the order in which they begin to arrive, so that the events of one follow
 //! those of all before it, or are merged with the last few of them.
 
 use super::channel::Channel;
 use super::first_photon::FirstPhoton;
 use super::jitter::Jitter;
 use super::noise::counts;
-use super::{Detections, Memory};
+use super::{Detections, Kind, Memory};
 use crate::channel::ALL_MARKS;
-use crate::design::{Design, PARTS_OF_TICK, PhotonCounting};
+use crate::design::detectors::PhotonCounting;
+use crate::design::{Design, PARTS_OF_TICK};
 use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
 use crate::units::FS_PER_S;
 
-/// Less than one edge in so many is put in its place alone, rather than merging all.
+/// Less than one event in so many is put in its place alone, rather than merging all.
 const FEW: usize = 64;
 
 /// The detector, and the language of the light it sees.
@@ -76,20 +77,16 @@ impl Counting {
             pulse: design.light.pulse,
         }
     }
+}
 
-    /// Adds the events of a channel to those found.
-    pub fn add(
-        &self,
-        channel: &Channel,
-        chance: &Chance,
-        (found, memory): (&mut Detections, &mut Memory),
-    ) {
+impl Kind for Counting {
+    fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         // The times of the channel alone, so that what is merged is no other channel's.
         let mut before = std::mem::take(&mut found.time);
         let alone = before.is_empty();
         let mut time = if alone { std::mem::take(&mut before) } else { Vec::new() };
         for arrival in channel.order.iter() {
-            self.add_train(channel, *arrival, chance, (&mut time, memory));
+            self.add_train(Seen { channel, chance }, *arrival, &mut time, memory);
         }
         let steady = self.dark + channel.light.background.steady;
         counts(steady, channel, chance, &mut memory.noise);
@@ -108,14 +105,23 @@ impl Counting {
             found.time = before;
         }
     }
+}
 
+/// What the detector of a channel is given of a band, and its chance.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    channel: &'a Channel<'a>,
+    chance: &'a Chance,
+}
+
+impl Counting {
     /// Adds the events of one pulse train to `time`.
     fn add_train(
         &self,
-        channel: &Channel,
+        Seen { channel, chance }: Seen,
         arrival: u64,
-        chance: &Chance,
-        (time, memory): (&mut Vec<u32>, &mut Memory),
+        time: &mut Vec<u32>,
+        memory: &mut Memory,
     ) {
         let (start, index) = ((arrival >> 32) as u32, arrival as u32 as usize);
         let (light, trains) = (channel.light, &channel.light.trains);
@@ -181,10 +187,10 @@ impl Counting {
 fn insert(time: &mut Vec<u32>, few: &[u32]) {
     let mut end = time.len();
     time.resize(end + few.len(), 0);
-    for (before, &edge) in few.iter().enumerate().rev() {
-        let place = time[..end].partition_point(|other| *other <= edge);
+    for (before, &event) in few.iter().enumerate().rev() {
+        let place = time[..end].partition_point(|other| *other <= event);
         time.copy_within(place..end, place + before + 1);
-        time[place + before] = edge;
+        time[place + before] = event;
         end = place;
     }
 }
@@ -278,8 +284,8 @@ mod tests {
         (0..log.len()).map(|i| design.coding.codebook.marks(log.label[i], log.word[i]).len()).sum()
     }
 
-    fn absolute(edges: &Detections) -> Vec<i64> {
-        edges.time.iter().map(|time| edges.epoch * 64 + i64::from(*time)).collect()
+    fn absolute(found: &Detections) -> Vec<i64> {
+        found.time.iter().map(|time| found.epoch * 64 + i64::from(*time)).collect()
     }
 
     const CLEAN: [(&str, &str); 3] =
@@ -288,16 +294,16 @@ mod tests {
     #[test]
     fn a_perfect_detector_sees_every_mark_at_its_place() {
         let design = sensor(&CLEAN);
-        let edges = run(&design, f64::INFINITY, 1);
-        assert_eq!(edges.time.len(), marks(&design));
+        let found = run(&design, f64::INFINITY, 1);
+        assert_eq!(found.time.len(), marks(&design));
         // Column 0 is dark; column 1 is 0000000001 011 on word C1, its first mark in bit 9.
         let first = 16_378 * 64 + 200_000_000 * 64 / 2500 + 9 * 841 * 64;
-        assert_eq!(absolute(&edges)[0], first);
+        assert_eq!(absolute(&found)[0], first);
     }
 
-    /// Every edge where the codebook has a mark, whatever the order and overlap of the echoes.
+    /// Every event where the codebook has a mark, whatever the order and overlap of the echoes.
     #[test]
-    fn echoes_in_any_order_and_overlap_make_the_edges_of_their_marks() {
+    fn echoes_in_any_order_and_overlap_make_the_events_of_their_marks() {
         let design = sensor(&CLEAN);
         let log = four_lines(&design);
         let delay_fs = |i: u64| (i.wrapping_mul(0x9E37_79B9) % 1_000_000) as i64 * 1000;
@@ -318,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_edges_find_their_places() {
+    fn a_few_events_find_their_places() {
         let mut time = vec![3, 5, 5, 8, 9];
         insert(&mut time, &[1, 5, 6, 7, 11]);
         assert_eq!(time, [1, 3, 5, 5, 5, 6, 7, 8, 9, 11]);
@@ -343,26 +349,26 @@ mod tests {
         }
     }
 
-    /// H0: false edges are Poisson with the rate given, both in how many there are and in how
+    /// H0: dark counts are Poisson with the rate given, both in how many there are and in how
     /// far apart they are. Mean 4e3 to 1.4e6, seed 3, α = 1e-6.
     #[test]
-    fn false_edges_come_at_their_rate() {
+    fn dark_counts_come_at_their_rate() {
         for rate in ["3e7", "1e9", "1e10"] {
             let design = sensor(&[CLEAN[0], CLEAN[2], ("dark_counts_hz", rate)]);
             let shots = (1e9 / rate.parse::<f64>().unwrap() * 3392.0) as u64;
             let log = crate::emit::Band { scan: 0, first: 848, shots: shots.min(4 * 848) }
                 .shot_log(&design);
-            let edges = detect(&design, &log, &Light::default(), 3);
+            let found = detect(&design, &log, &Light::default(), 3);
             let span = (log.fired_at_fs[log.len() - 1] + design.listening_fs() - log.fired_at_fs[0])
                 as f64;
             let expected = span * 1e-15 * rate.parse::<f64>().unwrap();
-            let z = |mean: f64| (edges.time.len() as f64 - mean) / mean.sqrt();
-            assert!(z(expected).abs() < 4.9, "{} against {expected}", edges.time.len());
+            let z = |mean: f64| (found.time.len() as f64 - mean) / mean.sqrt();
+            assert!(z(expected).abs() < 4.9, "{} against {expected}", found.time.len());
             assert!(z(expected * (1.0 + 10.0 / expected.sqrt())).abs() > 4.9);
             // Of exponential waits 1 − 1/e are shorter than the mean.
             let mean_wait = 64.0 * 1e15 / 2500.0 / rate.parse::<f64>().unwrap();
-            let waits = edges.time.windows(2).map(|pair| f64::from(pair[1] - pair[0]));
-            let n = edges.time.len() as f64 - 1.0;
+            let waits = found.time.windows(2).map(|pair| f64::from(pair[1] - pair[0]));
+            let n = found.time.len() as f64 - 1.0;
             let short = waits.filter(|wait| *wait < mean_wait.round()).count() as f64;
             let z = |p: f64| (short - n * p) / (n * p * (1.0 - p)).sqrt();
             assert!(z(1.0 - (-1.0_f64).exp()).abs() < 4.9, "{rate}: {}", short / n);

@@ -3,7 +3,7 @@
 use macropulse_codec::statistics::normal_tail;
 
 use crate::channel::{Light, PulseTrain, PulseTrains};
-use crate::design::{Design, Detector};
+use crate::design::Design;
 use crate::units::{FS_PER_S, fs_from_s};
 
 /// How far the light of a micropulse is followed, in rms lengths.
@@ -20,13 +20,11 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// The micropulse of a sensor whose light is followed beyond its chip, in front of a detector
-    /// that answers photon by photon; `None` for the others.
+    /// The micropulse of a sensor whose light is followed beyond its chip: its detector sees every
+    /// photon by itself, or the sensor would have had to declare `inter-chip` as left out. `None` for
+    /// the others.
     pub fn of(design: &Design) -> Option<Self> {
         let rms = design.light.spread?;
-        if !matches!(design.detector, Detector::PhotonCounting(_) | Detector::Geiger(_)) {
-            return None;
-        }
         let width = (design.tdc.tick_fs as f64 / FS_PER_S as f64).max(FINEST * rms);
         let reach = (FARTHEST * rms / width).ceil() as i64;
         let below = |place: f64| normal_tail(-place * width / rms);

@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use super::detection::{FirstOfCells, bank_loss};
+use super::converters::bank_loss;
 use super::matched;
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Detector, Tdc};
+use crate::design::detectors::{Awaited, Lit};
+use crate::design::{Design, Tdc};
 use crate::environment::Environment;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 
@@ -24,7 +25,7 @@ pub struct Forecaster<'a> {
     mean_weight: f64,
     /// Factor on the light of the sensor.
     light: f64,
-    /// Factor on the false edges of detector and background.
+    /// Factor on the dark and background counts.
     background: f64,
 }
 
@@ -42,7 +43,7 @@ pub struct Forecast {
     pub detected_per_mark: f64,
     /// Probability that a mark makes a tick where it is looked for.
     pub mark_pd: f64,
-    /// Share of edges that find every converter busy.
+    /// Share of detection events that find every converter busy.
     pub bank_loss: f64,
     /// Probability that a place in the gate is lit by something else.
     pub density: f64,
@@ -96,7 +97,7 @@ impl<'a> Forecaster<'a> {
         Self { light: self.light * factor, ..self.clone() }
     }
 
-    /// The same with so many times the false edges.
+    /// The same with so many times the dark and background counts.
     pub fn with_background(&self, factor: f64) -> Self {
         Self { background: self.background * factor, ..self.clone() }
     }
@@ -104,54 +105,52 @@ impl<'a> Forecaster<'a> {
     /// What it will measure of a target of `reflectance` at `range` metres.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
         let (design, operating) = (self.design, &self.operating);
-        let detector = &design.detector;
+        let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
         let detected = self.light * operating.link.photons(reflectance, range);
         let false_rate = self.background * operating.false_rate;
         let photon_rate = detected * mean_weight / channel_period;
-        let falling = match detector {
-            Detector::Geiger(_) => false_rate + photon_rate,
-            _ => 0.0,
-        };
-        let edge = matched::edges(design, operating, detected, falling);
-        let false_edges = match detector {
-            Detector::Geiger(geiger) => false_rate * super::detection::armed(geiger, falling),
-            _ => false_rate,
-        };
-        // Edges that share a tick keep a single converter busy.
+        let falling = false_rate + photon_rate;
+        let mark = Lit { photons: detected, background: operating.background, falling };
+        let false_events = false_rate * detector.ready_share(falling);
+        // Events that share a tick keep a single converter busy.
         let tick = s_from_fs(design.tdc.tick_fs);
-        let own = edge * mean_weight / channel_period;
-        let edges = -libm::expm1(-(false_edges + own) * tick) / tick;
+        let own = matched::ticks_lit(design, &mark) * mean_weight / channel_period;
+        let events = -libm::expm1(-(false_events + own) * tick) / tick;
         let share = Tdc { converters: design.converters_per_channel(), ..design.tdc.clone() };
-        let loss = bank_loss(&share, edges);
-        let place = matched::Place::of(design, operating, detected);
+        let loss = bank_loss(&share, events);
+        let place = matched::Place::of(design, &mark);
         // Where the bank is overrun, all is lit until the last converter is taken: what is lost
         // then makes the rest no clearer.
-        let density = -libm::expm1(-(false_edges + own) * place.width);
-        let seen = place.seen(design, operating, detected, falling) * (1.0 - loss);
+        let density = -libm::expm1(-(false_events + own) * place.width);
+        let seen = place.seen(design, &mark) * (1.0 - loss);
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - density);
 
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
         let (pd, false_per_shot) = match design.is_coded() {
             true => {
-                let without = -libm::expm1(-false_edges * place.width);
-                matched::chances(design, operating, &self.weights, (mark_pd, density, without))
+                let false_density = -libm::expm1(-false_events * place.width);
+                let found = matched::Found { seen: mark_pd, density, false_density };
+                matched::chances(design, operating.background, &self.weights, &found)
             }
-            false => match detector {
-                Detector::Geiger(geiger) => {
-                    let armed = super::detection::armed(geiger, falling);
-                    let of = |range: f64, photons| {
-                        let since = since_opening(design, range);
-                        FirstOfCells::of(geiger, armed, false_rate, (since, photons))
-                    };
-                    let pd = of(range, detected).seen * (1.0 - loss);
-                    (pd, 1.0 - of(design.scan.max_range, 0.0).silent)
-                }
-                _ => first(design, mark_pd, false_edges, range),
-            },
+            // The first event in the gate is taken.
+            false => {
+                let awaited = Awaited {
+                    since: since_opening(design, range),
+                    photons: detected,
+                    false_rate,
+                    falling,
+                    mark_pd,
+                    converted: 1.0 - loss,
+                };
+                let echo = detector.first_event(&awaited);
+                let since = since_opening(design, design.scan.max_range);
+                let nothing = Awaited { since, photons: 0.0, mark_pd: 0.0, ..awaited };
+                (echo.is_echo, detector.first_event(&nothing).is_false)
+            }
         };
         let spread = (density * (1.0 - density)).max(f64::MIN_POSITIVE).sqrt();
-        let timing = matched::Timing::of(design, operating, detected);
+        let timing = matched::Timing::of(design, &mark);
         let marks_seen = (mean_weight * seen).max(1.0);
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
         Forecast {
@@ -162,9 +161,12 @@ impl<'a> Forecaster<'a> {
             mark_pd,
             bank_loss: loss,
             density,
-            snr: match detector {
-                _ if !design.is_coded() => detected / noise_of_one(operating, detected),
-                _ => (mark_pd - density) * mean_weight.sqrt() / spread,
+            snr: match design.is_coded() {
+                true => (mark_pd - density) * mean_weight.sqrt() / spread,
+                false => {
+                    let noise = detector.noise(operating.background);
+                    detected / noise.map_or(detected.sqrt(), |noise| noise.of_mark(detected))
+                }
             },
             pd,
             false_per_shot,
@@ -217,23 +219,6 @@ fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
         if holds(middle) { high = middle } else { low = middle }
     }
     Some(high)
-}
-
-/// The noise of an amplitude of `photons`, rms.
-fn noise_of_one(operating: &Operating, photons: f64) -> f64 {
-    match (&operating.linear, &operating.first_firing) {
-        (Some(linear), _) => (photons * linear.excess + linear.noise.powi(2)).sqrt(),
-        (_, Some(firing)) => (photons + firing.noise.powi(2)).sqrt(),
-        _ => photons.sqrt(),
-    }
-}
-
-/// The chances of a sensor that takes the first edge in its gate: a target is seen if nothing
-/// came before it, exp(−K), K the false edges until then.
-fn first(design: &Design, seen: f64, false_edges: f64, range: f64) -> (f64, f64) {
-    let since = |range: f64| since_opening(design, range);
-    let nothing_before = libm::exp(-false_edges * since(range));
-    (seen * nothing_before, -libm::expm1(-false_edges * since(design.scan.max_range)))
 }
 
 /// Time, s, from the opening of the range gate to an echo from `range` metres.

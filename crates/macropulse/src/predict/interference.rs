@@ -2,11 +2,11 @@
 
 use crate::units::{range_from_tof, tof_from_range};
 
-/// Edges per second that another lidar makes in a detector that counts photons: r·m·k·(1 − e⁻ⁿ).
+/// Detection events per second that another lidar makes in a detector that counts photons: r·m·k·(1 − e⁻ⁿ).
 ///
 /// r shots per second whose light arrives, each of m `marks` on average with n `photons` per mark,
 /// of which the detector keeps the fraction `kept` (docs/physics.md#photon-counting).
-pub fn edges_per_second(shots_per_second: f64, marks: f64, photons: f64, kept: f64) -> f64 {
+pub fn events_per_second(shots_per_second: f64, marks: f64, photons: f64, kept: f64) -> f64 {
     shots_per_second * marks * kept * -libm::expm1(-photons)
 }
 
@@ -49,10 +49,10 @@ mod tests {
     }
 
     #[test]
-    fn strong_light_makes_an_edge_of_every_mark() {
-        assert_eq!(edges_per_second(1e6, 180.0, f64::INFINITY, 1.0), 1.8e8);
+    fn strong_light_makes_an_event_of_every_mark() {
+        assert_eq!(events_per_second(1e6, 180.0, f64::INFINITY, 1.0), 1.8e8);
         approx::assert_relative_eq!(
-            edges_per_second(1e6, 1.0, 1e-9, 0.5),
+            events_per_second(1e6, 1.0, 1e-9, 0.5),
             5e-4,
             max_relative = 1e-8
         );

@@ -8,19 +8,15 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use macropulse_codec::statistics::{binomial_tail, normal_quantile, normal_tail};
+use macropulse_codec::statistics::{binomial_tail, normal_tail};
 
-use super::detection::mark_pd;
-use crate::channel::Operating;
-use crate::design::{Design, Detector, FirstFiring};
+use crate::design::Design;
+use crate::design::detectors::Lit;
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
 
 /// The light around a macropulse is counted in stretches of so many ticks, and reaches beyond it by
 /// one of them on average.
 const AROUND: f64 = 1024.0;
-
-/// The walk of a firing is calibrated up to this share of the pulse.
-const LATEST: f64 = 0.99;
 
 /// Terms of the sum over harmonics of a tick.
 const HARMONICS: u32 = 16;
@@ -29,69 +25,79 @@ const HARMONICS: u32 = 16;
 pub(super) struct Place {
     /// How long it looks, s.
     pub width: f64,
-    /// Share of the edges of marks that fall within.
+    /// Share of the events of marks that fall within.
     pub share: f64,
 }
 
 impl Place {
-    /// A tick where edges are exact, else one more than four deviations, rounded up; for marks of
-    /// which `detected` photons are detected, whose own deviation may be less than that.
-    pub fn of(design: &Design, operating: &Operating, detected: f64) -> Self {
+    /// A tick where events are exact, else one more than four deviations, rounded up; for a mark
+    /// whose own deviation may be less than that.
+    pub fn of(design: &Design, mark: &Lit) -> Self {
         let tick = s_from_fs(design.tdc.tick_fs);
         let looked_for = design.receiver.jitter_ticks;
         if !design.is_coded() || looked_for <= 0.05 {
             return Self { width: tick, share: 1.0 };
         }
         let ticks = 1.0 + (4.0 * looked_for).ceil();
-        let sigma = Timing::of(design, operating, detected).sigma;
+        let sigma = Timing::of(design, mark).sigma;
         let half = ticks / 2.0 / (sigma * std::f64::consts::SQRT_2);
         Self { width: ticks * tick, share: libm::erf(half) }
     }
 }
 
 impl Place {
-    /// Probability that a mark of which `detected` photons are detected is found where it is
-    /// looked for. Photons of a micropulse that reaches beyond its chip fall there or not each by
-    /// itself; else its one edge does.
-    pub fn seen(&self, design: &Design, operating: &Operating, detected: f64, falling: f64) -> f64 {
-        let lit = |photons: f64| mark_pd(design, operating, photons, falling);
+    /// Probability that a mark is found where it is looked for. Photons of a micropulse that
+    /// reaches beyond its chip fall there or not each by itself; else its one event does.
+    pub fn seen(&self, design: &Design, mark: &Lit) -> f64 {
         match design.light.spread {
-            Some(_) => lit(detected * self.share),
-            None => lit(detected) * self.share,
+            Some(_) => pd_of_share(design, mark, self.share),
+            None => pd_of_share(design, mark, 1.0) * self.share,
         }
     }
 }
 
-/// Ticks that a mark of which `detected` photons are detected lights on average, each with the
-/// share of the light that falls into it.
-pub(super) fn edges(design: &Design, operating: &Operating, detected: f64, falling: f64) -> f64 {
-    let lit = |photons: f64| mark_pd(design, operating, photons, falling);
-    let Some(spread) = design.light.spread else { return lit(detected) };
+/// Probability that the detector sees anything of a `share` of the photons of a mark.
+fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
+    design.detector.model().mark_pd(&Lit { photons: mark.photons * share, ..*mark })
+}
+
+/// Ticks that a mark lights on average, each with the share of the light that falls into it.
+pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
+    let Some(spread) = design.light.spread else { return pd_of_share(design, mark, 1.0) };
     let width = spread / s_from_fs(design.tdc.tick_fs);
     let below = |place: f64| normal_tail(-place / width);
     let farthest = (4.0 * 2_f64.sqrt() * width).ceil() as i32;
     let share = |tick: i32| below(f64::from(tick) + 0.5) - below(f64::from(tick) - 0.5);
-    (-farthest..=farthest).map(|tick| lit(detected * share(tick))).sum()
+    (-farthest..=farthest).map(|tick| pd_of_share(design, mark, share(tick))).sum()
 }
 
-/// Probability of a return from a lit shot and from one that meets nothing, where each of its
-/// marks is found with probability `seen`, and a place in the gate is lit with probability
-/// `density`, by what is no shot's light with `false_density`; the mean over labels, of which so
-/// many have so many marks.
+/// What a receiver finds in a gate.
+#[derive(Clone, Copy)]
+pub(super) struct Found {
+    /// Probability that a mark of the shot is found.
+    pub seen: f64,
+    /// Probability that a place is lit.
+    pub density: f64,
+    /// Probability that it is lit by what is no shot's light.
+    pub false_density: f64,
+}
+
+/// Probability of a return from a lit shot and from one that meets nothing; the mean over labels,
+/// of which so many have so many marks. `background` is the sunlight on the detector, 1/s.
 pub(super) fn chances(
     design: &Design,
-    operating: &Operating,
+    background: f64,
     weights: &BTreeMap<usize, usize>,
-    (seen, density, false_density): (f64, f64, f64),
+    found: &Found,
 ) -> (f64, f64) {
-    let gate = Gate::of(design, operating);
+    let gate = Gate::of(design, background);
     let labels: usize = weights.values().sum();
     let mut sums = (0.0, 0.0);
     for (&marks, &count) in weights {
-        let least = gate.least_marks(marks, (density, false_density));
+        let least = gate.least_marks(marks, found);
         let share = count as f64 / labels as f64;
-        sums.0 += share * binomial_tail(marks, seen, least);
-        sums.1 += share * (gate.lags * binomial_tail(marks, density, least)).min(1.0);
+        sums.0 += share * binomial_tail(marks, found.seen, least);
+        sums.1 += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
     }
     sums
 }
@@ -107,20 +113,22 @@ struct Gate {
 }
 
 impl Gate {
-    fn of(design: &Design, operating: &Operating) -> Self {
+    fn of(design: &Design, background: f64) -> Self {
         let (nearest, farthest) = design.receiver.gate_ticks;
         let chips = i64::from(design.coding.codebook.chips());
         let around =
             s_from_fs(chips * design.coding.chip_fs) + AROUND * s_from_fs(design.tdc.tick_fs);
+        let of_one_photon = Lit { photons: 1.0, background, falling: 0.0 };
         Self {
             lags: f64::from(farthest - nearest) + 1.0,
-            own: Place::of(design, operating, 1.0).width / around,
+            own: Place::of(design, &of_one_photon).width / around,
             false_alarm: design.receiver.false_alarm,
         }
     }
 
     /// The fewest of `marks` that are believed; one more than there are if none will do.
-    fn least_marks(&self, marks: usize, (density, false_density): (f64, f64)) -> usize {
+    fn least_marks(&self, marks: usize, found: &Found) -> usize {
+        let &Found { density, false_density, .. } = found;
         let is_common = |least: usize| {
             // Some of the marks are lit by ticks that others have made.
             let ticks = (least as f64 - marks as f64 * density).max(0.0);
@@ -140,34 +148,25 @@ impl Gate {
 pub(super) struct Timing {
     /// rms length of a micropulse with the jitter, s.
     pub spread: f64,
-    /// Standard deviation of an edge, in ticks.
+    /// Standard deviation of an event, in ticks.
     sigma: f64,
     /// Length of a tick, s.
     tick: f64,
 }
 
 impl Timing {
-    /// Timing of marks of which `detected` photons are detected.
-    pub fn of(design: &Design, operating: &Operating, detected: f64) -> Self {
+    pub fn of(design: &Design, mark: &Lit) -> Self {
+        let (detector, light) = (design.detector.model(), &design.light);
         let tick = s_from_fs(design.tdc.tick_fs);
-        let jitter = match &operating.linear {
-            Some(linear) => linear.timing(detected),
-            None => operating.jitter,
-        };
-        let rms = design.light.pulse * RMS_OF_FWHM;
-        let spread = libm::hypot(rms, jitter);
-        let sigma = match &design.detector {
-            Detector::FirstFiring(firing) => {
-                libm::hypot(rms * firing_time(firing, detected), jitter)
-            }
-            _ => libm::hypot(jitter, design.light.spread.unwrap_or(0.0)),
-        };
+        let jitter = detector.mark_jitter(mark);
+        let spread = libm::hypot(light.pulse * RMS_OF_FWHM, jitter);
+        let sigma = libm::hypot(detector.mark_displacement(mark, light), jitter);
         Self { spread, sigma: sigma / tick, tick }
     }
 
-    /// Standard deviation, m, of the range from the mean of `marks` edges.
+    /// Standard deviation, m, of the range from the mean of `marks` events.
     ///
-    /// Edges are rounded down to ticks, and jitter σ (in ticks) dithers them: of the variance
+    /// Events are rounded down to ticks, and jitter σ (in ticks) dithers them: of the variance
     /// 1/12 of rounding, B = Σ_m exp(−4π²m²σ²)/(2π²m²) is common to all marks, and the rest is
     /// averaged with the jitter: B + (σ² + 1/12 − B)/k \[WKL96\].
     pub fn precision(&self, marks: f64) -> f64 {
@@ -186,16 +185,6 @@ impl Timing {
     }
 }
 
-/// Standard deviation of the moment at which the m-th of n photons comes, in rms lengths of a
-/// Gaussian pulse: √m/(n·φ(z)), z = Φ⁻¹(m/n); m at most [`LATEST`] of n.
-fn firing_time(firing: &FirstFiring, photons: f64) -> f64 {
-    let needed = f64::from(firing.firing_photons);
-    let share = (needed / photons).min(LATEST);
-    let z = normal_quantile(share);
-    let density = libm::exp(-z * z / 2.0) / (2.0 * PI).sqrt();
-    share / needed.sqrt() / density
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -204,12 +193,13 @@ mod tests {
     #[test]
     fn the_least_marks_are_rare_and_one_fewer_is_not() {
         let gate = Gate { lags: 4e5, own: 0.0, false_alarm: 1e-6 };
-        let least = gate.least_marks(180, (0.01, 0.0));
+        let found = |density, false_density| Found { seen: 1.0, density, false_density };
+        let least = gate.least_marks(180, &found(0.01, 0.0));
         assert!(4e5 * binomial_tail(180, 0.01, least) <= 1e-6);
         assert!(4e5 * binomial_tail(180, 0.01, least - 1) > 1e-6);
-        assert_eq!(gate.least_marks(5, (0.5, 0.5)), 6);
+        assert_eq!(gate.least_marks(5, &found(0.5, 0.5)), 6);
         // The marks that are found make the light around denser.
-        assert!(Gate { own: 1e-3, ..gate }.least_marks(180, (0.01, 0.01)) > least);
+        assert!(Gate { own: 1e-3, ..gate }.least_marks(180, &found(0.01, 0.01)) > least);
     }
 
     #[test]

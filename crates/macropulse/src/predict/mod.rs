@@ -1,7 +1,7 @@
 //! Closed form: what theory says a simulation will measure.
 
 pub mod comparison;
-pub mod detection;
+pub mod converters;
 mod forecast;
 pub mod interference;
 pub mod link;

@@ -4,8 +4,8 @@ use std::f64::consts::FRAC_PI_4;
 
 use super::forecast::{Forecast, Forecaster};
 use super::link::spot_depth;
+use crate::design::Design;
 use crate::design::safety::strictest;
-use crate::design::{Design, Detector};
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
 
 /// Share of converters' work that may be lost.
@@ -66,7 +66,7 @@ pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Ve
             "{:.1e} per shot, wanted {:.1e}",
             forecast.false_per_shot, wanted.false_points
         ),
-        remedy: "a smaller false_alarm of the receiver, or fewer false edges".into(),
+        remedy: "a smaller false_alarm of the receiver, or fewer dark and background counts".into(),
     });
     checks.extend(slant(day, wanted.range));
     checks
@@ -122,7 +122,7 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
 
 fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
     let bearable = day.background_bearable(wanted.pd, wanted.reflectance, wanted.range);
-    // In a linear detector the sun is noise: fewer false edges do not help, more light does.
+    // In a linear detector the sun is noise: fewer counts do not help, more light does.
     let brighter = day.light_needed(wanted.pd, wanted.reflectance, wanted.range);
     let shortfall = bearable.map(f64::recip).or(brighter).unwrap_or(f64::INFINITY);
     Check {
@@ -142,11 +142,11 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
         name: "converters",
         shortfall: if loss > LOSS { 1.0 / (1.0 - loss) } else { loss / LOSS },
         finding: format!(
-            "{:.2} % of edges find all {} of a detector's bank busy",
+            "{:.2} % of detection events find all {} of a detector's bank busy",
             loss * 100.0,
             design.converters_per_channel()
         ),
-        remedy: "more converters, a shorter dead time, or fewer false edges".into(),
+        remedy: "more converters, a shorter dead time, or fewer dark and background counts".into(),
     }
 }
 
@@ -162,11 +162,7 @@ fn slant(design: &Design, range: f64) -> Option<Check> {
         true => s_from_fs(design.coding.chip_fs),
         false => design.light.pulse,
     };
-    let chip = match &design.detector {
-        Detector::Linear(linear) => chip.max(linear.amplifier.response()),
-        _ => chip,
-    } * SPEED_OF_LIGHT
-        / 2.0;
+    let chip = chip.max(design.detector.model().response()) * SPEED_OF_LIGHT / 2.0;
     Some(Check {
         name: "slant",
         shortfall: depth / chip,

@@ -54,7 +54,7 @@ impl<'a> Interference<'a> {
         order.sort_by_key(|train| trains.arrives_fs[*train]);
         let transmitters = light.transmitters.iter();
         let pulse = transmitters.fold(design.light.pulse, |most, from| most.max(from.pulse));
-        let jitter_fs = 3.0 * design.detector.jitter() * FS_PER_S as f64;
+        let jitter_fs = 3.0 * design.detector.model().jitter() * FS_PER_S as f64;
         let lasts = |train: &usize| {
             light.arrivals_fs(*train).last().map_or(0, |last| last - trains.arrives_fs[*train])
         };

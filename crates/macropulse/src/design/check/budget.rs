@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_4;
 
 use super::Check;
+use super::detector::Efficiency;
 use crate::design::budget::{Budget, Field, Trailing, solid_angle};
 use crate::design::file::{FieldFile, OpticsFile, SafetyFile, SensorFile};
 use crate::design::light::EnergyFile;
@@ -24,7 +25,7 @@ impl Check<'_> {
         &self,
         file: &SensorFile,
         parts: &Parts,
-        efficiency: (&str, Option<f64>),
+        efficiency: &Efficiency,
     ) -> Result<Option<Budget>, Error> {
         let off = |effect| parts.idealised.contains(&effect);
         if off(Effect::LinkBudget) {
@@ -44,8 +45,8 @@ impl Check<'_> {
                  list `idealised`",
             );
         };
-        let (path, efficiency) = efficiency;
-        let Some(efficiency) = efficiency else {
+        let path = &efficiency.path;
+        let Some(efficiency) = efficiency.value else {
             return self.refuse(path, "is needed where the link budget is not idealised");
         };
         let wavelength = parts.light.wavelength;

@@ -11,7 +11,7 @@ use crate::design::{Effect, Error};
 
 /// A key without effect, the key of the setting that makes it so, and how.
 struct Idle {
-    key: &'static str,
+    key: String,
     by: &'static str,
     why: &'static str,
 }
@@ -20,6 +20,8 @@ const FOOTPRINT: &str = "the beam has no width while \"footprint\" is in this li
                          --with footprint simulates it";
 const BUDGET: &str = "the receiver is declared by its sensitivity while \"link-budget\" is in this \
                       list: --with link-budget counts photons";
+const NO_BUDGET: &str = "photons follow from energy and optics: --without link-budget declares the \
+                         receiver instead";
 
 impl Check<'_> {
     /// The keys that were typed for nothing, each as an error.
@@ -28,52 +30,41 @@ impl Check<'_> {
     }
 
     fn told(&self, idle: &Idle) -> Option<Error> {
-        let because = match self.chain.typed(idle.key)? {
+        let because = match self.chain.typed(&idle.key)? {
             Typed::Set => true,
             // What `--set` has just changed, the file could not know.
             Typed::File => self.chain.typed(idle.by) != Some(Typed::Set),
         };
         let message = format!("has no effect because of `{}`: {}", idle.by, idle.why);
-        because.then(|| self.chain.error(idle.key, message))
+        because.then(|| self.chain.error(&idle.key, message))
     }
 }
 
 /// The keys that mean nothing for such a sensor, typed or not.
-pub(super) fn idle_keys(file: &SensorFile, idealised: &[Effect]) -> Vec<&'static str> {
+pub(super) fn idle_keys(file: &SensorFile, idealised: &[Effect]) -> Vec<String> {
     idle(file, idealised).into_iter().map(|idle| idle.key).collect()
 }
 
 fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     let off = |effect| idealised.contains(&effect);
     let mut found = Vec::new();
-    let mut add = |holds: bool, keys: &[&'static str], by, why| {
+    let mut add = |holds: bool, keys: &[&str], by, why| {
         if holds {
-            found.extend(keys.iter().map(|key| Idle { key, by, why }));
+            found.extend(keys.iter().map(|key| Idle { key: (*key).to_owned(), by, why }));
         }
     };
     let beam = ["light.divergence_mrad", "light.footprint_rays"];
     add(off(Effect::Footprint), &beam, "idealised", FOOTPRINT);
     let declared = off(Effect::LinkBudget);
-    let counted = [
-        "light.energy",
-        "optics",
-        "safety",
-        "detector.photon-counting.efficiency",
-        "detector.geiger.efficiency",
-        "detector.first-firing.efficiency",
-    ];
-    add(declared, &counted, "idealised", BUDGET);
-    let sensitivity = [
-        "detector.photon-counting.sensitivity",
-        "detector.geiger.sensitivity",
-        "detector.first-firing.sensitivity",
-    ];
-    add(
-        !declared,
-        &sensitivity,
-        "idealised",
-        "photons follow from energy and optics: --without link-budget declares the receiver instead",
-    );
+    add(declared, &["light.energy", "optics", "safety"], "idealised", BUDGET);
+    for given in file.detector.given() {
+        let idle = given.file.idle();
+        let (keys, why) =
+            if declared { (idle.declared, BUDGET) } else { (idle.counted, NO_BUDGET) };
+        for key in keys {
+            add(true, &[&format!("detector.{}.{key}", given.name)], "idealised", why);
+        }
+    }
     let kind = file.receiver.kind;
     let bitwise = matches!(kind, ReceiverKindFile::Literal | ReceiverKindFile::Blind);
     let correlating = matches!(kind, ReceiverKindFile::Matched | ReceiverKindFile::Balanced);

@@ -10,10 +10,11 @@ use std::sync::OnceLock;
 
 pub(super) use code::family;
 
+use super::detectors::Before;
 use super::document::Chain;
 use super::file::SensorFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
-use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 use macropulse_codec::decode::Receiver;
 
 /// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
@@ -102,8 +103,7 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     };
     let light = effects.as_ref().and_then(|effects| {
         faults.0.extend(check.without_effect(file, effects));
-        faults.keep(check.bandwidth(&file.detector, effects));
-        faults.keep(check.chips(&file.detector, effects));
+        faults.0.extend(check.not_followed(&file.detector, effects));
         faults.keep(check.light(&file.light, off))
     });
     let right_within = match file.receiver.right_within_m {
@@ -115,9 +115,9 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let (idealised, scan, tdc, coding, light) = (effects?, scan?, tdc?, coding?, light?);
     let before =
         budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
-    let efficiency = detector::efficiency(&file.detector);
-    let budget = faults.keep(check.budget(file, &before, efficiency));
-    let before = detector::Before {
+    let efficiency = detector::Efficiency::of(&file.detector);
+    let budget = faults.keep(check.budget(file, &before, &efficiency));
+    let before = Before {
         scan: &scan,
         light: &light,
         coding: &coding,
@@ -126,9 +126,10 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
     // Without a detector the receiver has no timing, of which none of its limits depends.
-    let jitter = detector.as_ref().map_or(0.0, Detector::jitter);
+    let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
-    let receiver = faults.keep(check.receiver(file, &scan, &tdc, (&coding, timing)));
+    let inputs = receiver::Inputs { scan: &scan, tdc: &tdc, coding: &coding, timing };
+    let receiver = faults.keep(check.receiver(file, &inputs));
     if !faults.is_empty() {
         return None;
     }
@@ -162,16 +163,9 @@ impl Faults {
 ///
 /// c/2 · 4·√(σ² + tick²)
 ///
-/// σ the jitter with the rms length of a micropulse where its light is followed into neighbouring
-/// chips; of a detector that fires once, with that length over the root of the photons it takes.
+/// σ the jitter with the length of a micropulse as far as it matters to the detector.
 fn resolved(detector: &Detector, light: &Light, tdc: &Tdc) -> f64 {
-    let flank = match detector {
-        Detector::FirstFiring(firing) => {
-            light.pulse * RMS_OF_FWHM / f64::from(firing.firing_photons).sqrt()
-        }
-        _ => light.spread.unwrap_or(0.0),
-    };
-    let sigma = libm::hypot(detector.jitter(), flank);
+    let sigma = detector.model().resolution(light);
     range_from_tof(4.0 * libm::hypot(sigma, s_from_fs(tdc.tick_fs))).min(WIDEST)
 }
 
@@ -222,6 +216,7 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
     chain.error(&path, said)
 }
 
+/// Tests values, and tells where those that are wrong stand.
 pub(in crate::design) struct Check<'a> {
     chain: &'a Chain,
 }

@@ -1,10 +1,19 @@
-//! From edges to returns: converters and receiver.
+//! From detection events to returns: converters and receiver.
 
 use super::{Check, TOO_FINE};
 use crate::design::file::{ReceiverKindFile, SensorFile};
 use crate::design::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::decode::{MOST_RETURNS, Pick, Receiver, ReceiverKind};
+
+/// What a receiver is given beside its own section of the file.
+pub(super) struct Inputs<'a> {
+    pub scan: &'a Scan,
+    pub tdc: &'a Tdc,
+    pub coding: &'a Coding,
+    /// Standard deviation of the time of a mark, s.
+    pub timing: f64,
+}
 
 impl Check<'_> {
     pub(super) fn tdc(&self, file: &SensorFile) -> Result<Tdc, Error> {
@@ -44,13 +53,8 @@ impl Check<'_> {
         self.refuse("tdc.converters", message)
     }
 
-    pub(super) fn receiver(
-        &self,
-        file: &SensorFile,
-        scan: &Scan,
-        tdc: &Tdc,
-        (coding, timing): (&Coding, f64),
-    ) -> Result<Receiver, Error> {
+    pub(super) fn receiver(&self, file: &SensorFile, inputs: &Inputs) -> Result<Receiver, Error> {
+        let &Inputs { scan, tdc, coding, timing } = inputs;
         let kind = match file.receiver.kind {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
             ReceiverKindFile::Blind => ReceiverKind::Blind,
@@ -104,16 +108,17 @@ impl Check<'_> {
     fn returns(&self, file: &SensorFile, kind: ReceiverKind) -> Result<(u8, Pick), Error> {
         let wanted =
             self.count("receiver.returns", file.receiver.returns, 1, MOST_RETURNS.into())?;
+        let one_event = file.detector.given().find(|given| given.file.is_single_stop());
+        let of_receiver =
+            |name: &str| Some(format!("receiver.kind = \"{name}\" gives one return per shot"));
         let one_only = match kind {
-            ReceiverKind::Direct if file.detector.first_firing.is_some() => {
-                Some("detector.first-firing fires once per shot")
+            ReceiverKind::Direct => {
+                one_event.map(|given| format!("detector.{} gives one event per shot", given.name))
             }
-            ReceiverKind::Direct | ReceiverKind::Matched => None,
-            ReceiverKind::Literal => Some("receiver.kind = \"literal\" gives one return per shot"),
-            ReceiverKind::Blind => Some("receiver.kind = \"blind\" gives one return per shot"),
-            ReceiverKind::Balanced => {
-                Some("receiver.kind = \"balanced\" gives one return per shot")
-            }
+            ReceiverKind::Matched => None,
+            ReceiverKind::Literal => of_receiver("literal"),
+            ReceiverKind::Blind => of_receiver("blind"),
+            ReceiverKind::Balanced => of_receiver("balanced"),
         };
         if let Some(why) = one_only {
             if wanted > 1 {

@@ -1,4 +1,4 @@
-//! A detector that fires once per shot: the simulation steps of \[KP16 Fig. 7\], after \[OF05\].
+//! Single-stop timing, a detector that fires once per shot: the simulation steps of \[KP16 Fig. 7\], after \[OF05\].
 //!
 //! 1. Each echo of mean energy n (photons) gets white noise: n' = n + a·g, g standard normal.
 //! 2. Its light is spread over a Gaussian pulse of rms length σ, so that Λ(t) = n'·Φ((t − t₀)/σ)
@@ -10,7 +10,7 @@
 //!    light is: an echo of this shot, one of an earlier shot from beyond the gate, an interferer.
 //!    An interferer's marks that come within one micropulse of the detector's own are one flash, in
 //!    the middle of them. Sunlight fires a detector of one photon as false firings do; to one of
-//!    more it is noise ([`FirstFiringSetting`]).
+//!    more it is noise ([`SingleStopSetting`]).
 //! 5. A Gaussian sample of the temporal response is added. The converter quantises.
 //!
 //! \[KP16\] mixes two kinds of detector here: additive Gaussian noise belongs to a linear-mode
@@ -24,10 +24,10 @@ use std::ops::RangeInclusive;
 use macropulse_codec::statistics::normal_quantile;
 use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 
-use super::Detections;
 use super::channel::Channel;
 use super::noise::{Stretch, stretches};
-use crate::channel::FirstFiringSetting;
+use super::{Detections, Kind, Memory};
+use crate::design::detectors::SingleStopSetting;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
 
@@ -46,53 +46,50 @@ struct Flash {
     photons: f64,
 }
 
-/// Adds the events of a channel to those found: for each shot, while its gate is open, the first
-/// firing.
-pub(super) fn add(
-    firing: &FirstFiringSetting,
-    channel: &Channel,
-    chance: &Chance,
-    found: &mut Detections,
-) {
-    let &Channel { clock, design, log, .. } = channel;
-    let scan = &design.scan;
-    let [opens, closes] =
-        [scan.min_range, scan.max_range].map(|range| fs_from_s(tof_from_range(range)));
-    let Some(flash) = Firing::of(firing, channel) else { return };
-    let flashes = flashes(channel);
-    let mut events: Vec<(u32, f32)> = Vec::with_capacity(channel.shots.len());
-    for &shot in &channel.shots {
-        let fired_fs = log.fired_at_fs[shot as usize];
-        let gate = fired_fs + opens..=fired_fs + closes;
-        let mut stream = chance.at(Stage::Firing, log.first + u64::from(shot));
-        let mut earliest = flash.by_itself(&gate, &mut stream);
-        // Light that arrives just before the gate opens may fire the detector just after.
-        let early_fs = fs_from_s(design.light.pulse);
-        let first = flashes.partition_point(|flash| flash.arrives_fs < *gate.start() - early_fs);
-        let open = flashes[first..].iter().take_while(|flash| flash.arrives_fs <= *gate.end());
-        for candidate in open {
-            if let Some(fired) = flash.fires(candidate, &mut stream)
-                && earliest.is_none_or(|earliest| fired.0 < earliest.0)
-            {
-                earliest = Some(fired);
+impl Kind for SingleStopSetting {
+    /// For each shot, while its gate is open, the earliest firing.
+    fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, _: &mut Memory) {
+        let &Channel { clock, design, log, .. } = channel;
+        let scan = &design.scan;
+        let [opens, closes] =
+            [scan.min_range, scan.max_range].map(|range| fs_from_s(tof_from_range(range)));
+        let Some(flash) = Firing::of(self, channel) else { return };
+        let flashes = flashes(channel);
+        let mut events: Vec<(u32, f32)> = Vec::with_capacity(channel.shots.len());
+        for &shot in &channel.shots {
+            let fired_fs = log.fired_at_fs[shot as usize];
+            let gate = fired_fs + opens..=fired_fs + closes;
+            let mut stream = chance.at(Stage::Firing, log.first + u64::from(shot));
+            let mut earliest = flash.by_itself(&gate, &mut stream);
+            // Light that arrives just before the gate opens may fire the detector just after.
+            let early_fs = fs_from_s(design.light.pulse);
+            let first =
+                flashes.partition_point(|flash| flash.arrives_fs < *gate.start() - early_fs);
+            let open = flashes[first..].iter().take_while(|flash| flash.arrives_fs <= *gate.end());
+            for candidate in open {
+                if let Some(fired) = flash.fires(candidate, &mut stream)
+                    && earliest.is_none_or(|earliest| fired.0 < earliest.0)
+                {
+                    earliest = Some(fired);
+                }
+            }
+            if let Some((time_fs, photons)) = earliest {
+                let response: f64 = StandardNormal.sample(&mut stream);
+                let time_fs = time_fs + fs_from_s(response * self.jitter);
+                if gate.contains(&time_fs) {
+                    events.push((clock.time(time_fs) as u32, photons as f32));
+                }
             }
         }
-        if let Some((time_fs, photons)) = earliest {
-            let response: f64 = StandardNormal.sample(&mut stream);
-            let time_fs = time_fs + fs_from_s(response * firing.jitter);
-            if gate.contains(&time_fs) {
-                events.push((clock.time(time_fs) as u32, photons as f32));
-            }
-        }
+        events.sort_by_key(|event| event.0);
+        found.time.extend(events.iter().map(|event| event.0));
+        found.amplitude.extend(events.iter().map(|event| event.1));
     }
-    events.sort_by_key(|event| event.0);
-    found.time.extend(events.iter().map(|event| event.0));
-    found.amplitude.extend(events.iter().map(|event| event.1));
 }
 
 /// How the detector fires.
 struct Firing<'a> {
-    firing: &'a FirstFiringSetting,
+    firing: &'a SingleStopSetting,
     /// Photons needed, and their sum of unit exponentials.
     needed: f64,
     gamma: Gamma<f64>,
@@ -104,7 +101,7 @@ struct Firing<'a> {
 }
 
 impl<'a> Firing<'a> {
-    fn of(firing: &'a FirstFiringSetting, channel: &Channel) -> Option<Self> {
+    fn of(firing: &'a SingleStopSetting, channel: &Channel) -> Option<Self> {
         let needed = f64::from(firing.needed);
         let gamma = Gamma::new(needed, 1.0).ok()?;
         let rms_fs = channel.design.light.pulse * RMS_OF_FWHM * FS_PER_S as f64;
@@ -177,7 +174,7 @@ mod tests {
     use crate::design::Design;
     use macropulse_codec::ShotLog;
 
-    /// The edges of shots that all have an echo of so many photons, in the first nine bands or
+    /// The events of shots that all have an echo of so many photons, in the first nine bands or
     /// what the sensor has of them.
     fn run(design: &Design, photons: f64, seed: u64) -> Vec<(ShotLog, Detections)> {
         let detectors = super::super::Detectors::in_the_dark(design, Chance::new(seed));
@@ -187,9 +184,9 @@ mod tests {
                 let log = band.shot_log(design);
                 let echo = |shot| Echo { shot, delay_fs: 400_000_000, photons };
                 let light = light_of_echoes(design, &log, (0..log.len()).map(echo));
-                let edges =
+                let found =
                     detectors.detections(&log, &light, &mut super::super::Memory::default());
-                (log, edges)
+                (log, found)
             })
             .collect()
     }
@@ -197,7 +194,7 @@ mod tests {
     fn set(name: &str, keys: &[(&str, &str)]) -> Design {
         let keys: Vec<(String, String)> = keys
             .iter()
-            .map(|(key, value)| (format!("detector.first-firing.{key}"), (*value).to_owned()))
+            .map(|(key, value)| (format!("detector.single-stop.{key}"), (*value).to_owned()))
             .collect();
         Design::open(name, &keys).unwrap()
     }
@@ -215,7 +212,7 @@ mod tests {
                 let photons = design.derived().reference_photons * scale;
                 let bands = run(&design, photons, 5);
                 let n = bands.iter().map(|(log, _)| log.len()).sum::<usize>() as f64;
-                let seen = bands.iter().map(|(_, edges)| edges.time.len()).sum::<usize>() as f64;
+                let seen = bands.iter().map(|(_, found)| found.time.len()).sum::<usize>() as f64;
                 let off = (seen / n - 0.9).abs() - 0.004;
                 off / (0.09 / n).sqrt()
             };
@@ -230,10 +227,10 @@ mod tests {
         let bands = run(&design, 3000.0, 9);
         let errors: Vec<f64> = bands
             .iter()
-            .flat_map(|(log, edges)| -> Vec<i64> {
+            .flat_map(|(log, found)| -> Vec<i64> {
                 let fs =
-                    |time: &u32| (64 * edges.epoch + i64::from(*time)) * design.tdc.tick_fs / 64;
-                let times = edges.time.iter().map(fs).zip(&edges.channel);
+                    |time: &u32| (64 * found.epoch + i64::from(*time)) * design.tdc.tick_fs / 64;
+                let times = found.time.iter().map(fs).zip(&found.channel);
                 times
                     .filter_map(|(time, channel)| {
                         let shots = (0..log.len()).filter(|&s| log.channel[s] == *channel);
@@ -255,7 +252,7 @@ mod tests {
     #[test]
     fn nothing_comes_from_nothing() {
         let design = set("peregrine", &[("false_firing_hz", "0")]);
-        assert!(run(&design, 0.0, 1).iter().all(|(_, edges)| edges.time.is_empty()));
+        assert!(run(&design, 0.0, 1).iter().all(|(_, found)| found.time.is_empty()));
     }
 
     /// A macropulse of 27 ns falls on a detector that adds up over 5 ns: six flashes at most, with
@@ -307,7 +304,7 @@ mod tests {
             let text = "version = 1\nextends = \"hdl-64e\"\nname = \"mine\"\n\
                         [scan]\nmax_range_m = 100.0\ngate_beyond_m = 0.0\n\
                         [scan.raster]\nrows = 10\ncolumns = 100\nhorizontal_deg = 10.0\n\
-                        vertical_deg = 1.0\n[detector.first-firing]\nfalse_firing_hz = 0.0\n";
+                        vertical_deg = 1.0\n[detector.single-stop]\nfalse_firing_hz = 0.0\n";
             let set = [("scan.scans_per_s".to_owned(), rate.to_owned())];
             Design::from_toml(text, "mine", std::path::Path::new(""), &set).unwrap()
         };

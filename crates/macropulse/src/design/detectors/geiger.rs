@@ -1,0 +1,198 @@
+//! Cells in Geiger mode (a SPAD array) that share the light: each is blind for a while after it has
+//! fired.
+
+use serde::Deserialize;
+
+use super::table::MOST_COUNTS;
+use super::{
+    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, Sensitivity, SensitivityFile,
+    Table, Typed, length_followed,
+};
+use crate::design::{Error, Light};
+use crate::units::{fs_from_s, s_from_fs};
+
+/// Cells start so many dead times before the first owned shot. They start in the mixture of armed
+/// and blind that steady light leaves, and after one dead time without light of its own a cell is
+/// armed whatever it was: four leave less than a percent of a hundredth.
+const DEAD_TIMES: i64 = 4;
+
+/// `[detector.geiger]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    sensitivity: Option<SensitivityFile>,
+    efficiency: Option<f64>,
+    cells: u32,
+    dead_time_ns: f64,
+    dark_counts_hz: f64,
+    background_hz: f64,
+    jitter_ps: f64,
+}
+
+/// Cells in Geiger mode that share the light: each is blind for a while after it has fired.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Geiger {
+    /// Mean photons detected per mark at the reference target, all cells being armed.
+    pub sensitivity: Sensitivity,
+    /// Cells; light falls on each of them alike.
+    pub cells: u32,
+    /// Time for which a cell that has fired is blind, fs.
+    pub dead_fs: i64,
+    /// Dark counts of all cells together, were they always armed, 1/s.
+    pub dark: f64,
+    /// Background counts of all cells where the file declares them, 1/s; else 0.
+    pub background: f64,
+    /// Standard deviation of the timing, s.
+    pub jitter: f64,
+}
+
+impl Typed for File {
+    fn efficiency(&self) -> Option<f64> {
+        self.efficiency
+    }
+
+    fn idle(&self) -> Idle {
+        Idle::EITHER
+    }
+
+    fn follows(&self) -> Follows {
+        Follows { bandwidth: true, neighbouring_chips: true }
+    }
+
+    fn is_single_stop(&self) -> bool {
+        false
+    }
+
+    fn check(&self, table: &Table) -> Result<Detector, Error> {
+        let sensitivity = table.sensitivity(self.sensitivity.as_ref(), |pd| -(-pd).ln_1p())?;
+        let dark = table.dark(self.dark_counts_hz)?;
+        let background = table.background(self.background_hz)?;
+        let dead = table.within("dead_time_ns", self.dead_time_ns, 0.0, 1e6)?;
+        Ok(Detector::Geiger(Geiger {
+            sensitivity,
+            cells: table.count("cells", self.cells, 1, 1 << 20)?,
+            dead_fs: fs_from_s(dead * 1e-9),
+            dark,
+            background,
+            jitter: table.jitter(self.jitter_ps)?,
+        }))
+    }
+}
+
+impl Geiger {
+    /// Share of the cells that are armed at any moment, 1/(1 + r·τ/N): each of N cells is blind for
+    /// the dead time τ after each of its firings, and r = `falling` photons per second fall on all
+    /// of them.
+    fn armed(&self, falling: f64) -> f64 {
+        let each = falling / f64::from(self.cells);
+        1.0 / (1.0 + each * s_from_fs(self.dead_fs))
+    }
+
+    /// Probability that any of the cells fires at a mark of which `photons` are detected on average,
+    /// where each is armed with probability `armed`, independently of the others:
+    /// 1 − (1 − a·(1 − exp(−n/N)))^N.
+    fn any_cell(&self, armed: f64, photons: f64) -> f64 {
+        let cells = f64::from(self.cells);
+        let fires = -armed * libm::expm1(-photons / cells);
+        -libm::expm1(cells * libm::log1p(-fires))
+    }
+}
+
+impl Model for Geiger {
+    fn sensitivity(&self) -> Sensitivity {
+        self.sensitivity
+    }
+
+    fn declared_background(&self) -> f64 {
+        self.background
+    }
+
+    fn jitter(&self) -> f64 {
+        self.jitter
+    }
+
+    fn resolution(&self, light: &Light) -> f64 {
+        libm::hypot(self.jitter, length_followed(light))
+    }
+
+    fn response(&self) -> f64 {
+        0.0
+    }
+
+    fn memory_fs(&self) -> i64 {
+        DEAD_TIMES * self.dead_fs
+    }
+
+    /// Counts are followed one by one through the cells.
+    fn refusal(&self, background: f64) -> Option<String> {
+        let rate = self.false_rate(background);
+        (rate > MOST_COUNTS).then(|| {
+            format!(
+                "{rate:.1e} counts per second would fire the detector again and again, more \
+                 than are followed one by one ({MOST_COUNTS:.0e}): narrow the field or the filter, \
+                 or take another environment"
+            )
+        })
+    }
+
+    fn false_rate(&self, background: f64) -> f64 {
+        self.dark + background
+    }
+
+    fn noise(&self, _: f64) -> Option<Noise> {
+        None
+    }
+
+    /// An armed cell fires if one photon of those that fall on it is detected.
+    fn mark_pd(&self, lit: &Lit) -> f64 {
+        self.any_cell(self.armed(lit.falling), lit.photons)
+    }
+
+    fn mark_jitter(&self, _: &Lit) -> f64 {
+        self.jitter
+    }
+
+    fn mark_displacement(&self, _: &Lit, light: &Light) -> f64 {
+        length_followed(light)
+    }
+
+    fn ready_share(&self, falling: f64) -> f64 {
+        self.armed(falling)
+    }
+
+    /// In steady light the age A of a cell's last firing has P(A > t) = 1 − r·a·t up to the dead
+    /// time τ and a·exp(−r·(t − τ)) beyond, r the counts per cell and second; a cell is armed when
+    /// A > τ. So with T since the gate opened N cells are silent with q = P(A > T)^N, and each of
+    /// them is armed with h = P(A > max(T, τ))/P(A > T): the echo is seen with
+    /// q·(1 − (1 − h·(1 − exp(−n/N)))^N).
+    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
+        let &Awaited { since, photons, false_rate, falling, converted, .. } = awaited;
+        let cells = f64::from(self.cells);
+        let armed = self.armed(falling);
+        let each = false_rate / cells;
+        let dead = s_from_fs(self.dead_fs);
+        let long_ago = armed * libm::exp(-each * (since - dead).max(0.0));
+        let older = if since < dead { 1.0 - each * armed * since } else { long_ago };
+        let silent = libm::pow(older.clamp(0.0, 1.0), cells);
+        let armed = if older > 0.0 { (long_ago / older).min(1.0) } else { 0.0 };
+        FirstEvent {
+            is_false: 1.0 - silent,
+            is_echo: silent * self.any_cell(armed, photons) * converted,
+        }
+    }
+
+    fn summary(&self) -> String {
+        let Sensitivity { photons, range, reflectance } = self.sensitivity;
+        format!(
+            "{} cells in Geiger mode; {photons:.2} photons a mark from reflectance {reflectance} at \
+             {range} m; dead for {} ns; {:.0e} dark counts/s",
+            self.cells,
+            s_from_fs(self.dead_fs) * 1e9,
+            self.dark
+        )
+    }
+
+    fn in_sunlight(&self) -> &'static str {
+        "each of which fires the cell that it falls on, if that is armed"
+    }
+}

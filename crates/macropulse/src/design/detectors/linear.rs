@@ -1,0 +1,275 @@
+//! A linear detector: a photodiode with an amplifier and a threshold.
+
+use macropulse_codec::statistics::{normal_tail, poisson};
+use serde::Deserialize;
+
+use super::table::MOST_COUNTS;
+use super::{
+    Amplifier, Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, Sensitivity, Table,
+    Typed, length_followed,
+};
+use crate::design::{Error, Light};
+
+/// Terms of a Poisson sum that are less than this share of all are left out.
+const NEGLIGIBLE: f64 = 1e-15;
+
+/// From so many photons on, their number passes for a normal variable.
+const MANY: f64 = 1e4;
+
+/// `[detector.linear]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    efficiency: f64,
+    gain: f64,
+    ionisation_ratio: f64,
+    bandwidth_mhz: f64,
+    amplifier_pa_rthz: f64,
+    dark_current_na: f64,
+    false_alarm_hz: f64,
+    jitter_ps: f64,
+}
+
+/// A photodiode with an amplifier and a threshold. Its noise, and with it the threshold, depends on
+/// the sunlight it sees, too: [`LinearSetting`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear {
+    /// Mean photons detected per mark at the reference target.
+    pub sensitivity: Sensitivity,
+    /// The photodiode and its amplifier.
+    pub amplifier: Amplifier,
+    /// Crossings of the threshold by noise alone that are accepted, 1/s.
+    pub false_alarm: f64,
+    /// The threshold over the rms noise that this takes.
+    pub threshold_over_noise: f64,
+    /// Standard deviation of the timing of the converter's input alone, s.
+    pub jitter: f64,
+}
+
+/// What a linear detector is set to under the light it sees. Amplitudes are in detected photons: in
+/// electrons before multiplication.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearSetting {
+    /// Amplitude that makes an event.
+    pub threshold: f64,
+    /// Noise without a mark, rms.
+    pub noise: f64,
+    /// Excess noise factor of the multiplication.
+    pub excess: f64,
+    /// Full width at half maximum of a mark behind the amplifier, s.
+    pub response: f64,
+    /// Crossings of the threshold by noise alone, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing of the converter's input alone, s.
+    pub jitter: f64,
+}
+
+impl Typed for File {
+    fn efficiency(&self) -> Option<f64> {
+        Some(self.efficiency)
+    }
+
+    fn idle(&self) -> Idle {
+        Idle::NONE
+    }
+
+    fn follows(&self) -> Follows {
+        Follows { bandwidth: true, neighbouring_chips: false }
+    }
+
+    fn is_single_stop(&self) -> bool {
+        false
+    }
+
+    fn check(&self, table: &Table) -> Result<Detector, Error> {
+        let Some(budget) = table.before.budget else {
+            return table.refuse(
+                "counts its noise in electrons, so the light must be counted as well: take \
+                 \"link-budget\" off the list `idealised`",
+            );
+        };
+        let amplifier = Amplifier {
+            gain: table.within("gain", self.gain, 1.0, 1e6)?,
+            ionisation: table.within("ionisation_ratio", self.ionisation_ratio, 0.0, 1.0)?,
+            bandwidth: table.within("bandwidth_mhz", self.bandwidth_mhz, 1e-3, 1e9)? * 1e6,
+            current_noise: table.within("amplifier_pa_rthz", self.amplifier_pa_rthz, 0.0, 1e6)?
+                * 1e-12,
+            dark_current: table.within("dark_current_na", self.dark_current_na, 0.0, 1e6)? * 1e-9,
+            pulse: table.before.light.pulse,
+        };
+        let rate = table.within("false_alarm_hz", self.false_alarm_hz, 1e-3, MOST_COUNTS)?;
+        let Some(tnr) = amplifier.threshold_for(rate) else {
+            let message = format!(
+                "is {rate:.3e}, but noise of this bandwidth crosses even its own mean only \
+                 {:.3e} times per second",
+                amplifier.highest_rate()
+            );
+            return table.refuse_key("false_alarm_hz", message);
+        };
+        Ok(Detector::Linear(Linear {
+            sensitivity: table.honest(budget),
+            amplifier,
+            false_alarm: rate,
+            threshold_over_noise: tnr,
+            jitter: table.jitter(self.jitter_ps)?,
+        }))
+    }
+}
+
+impl Linear {
+    /// The setting of a detector that sees `background` detections of steady light per second.
+    pub fn setting(&self, background: f64) -> LinearSetting {
+        let noise = self.amplifier.noise_electrons(background);
+        LinearSetting {
+            threshold: self.threshold_over_noise * noise,
+            noise,
+            excess: self.amplifier.excess(),
+            response: self.amplifier.response(),
+            false_rate: self.false_alarm,
+            jitter: self.jitter,
+        }
+    }
+}
+
+impl LinearSetting {
+    /// Standard deviation, s, of the time at which a mark of `amplitude` detected photons crosses
+    /// the threshold: noise over the slope, τ·noise/amplitude, with the jitter of the input.
+    pub fn timing(&self, amplitude: f64) -> f64 {
+        libm::hypot(self.jitter, self.response * self.noise / amplitude.max(self.threshold))
+    }
+
+    /// Probability that a mark of which `photons` are detected on average crosses the threshold,
+    /// summed over the photons k that come:
+    /// Σ_k e^(−n)·n^k/k! · Q((threshold − k)/√(k·(F − 1) + noise²)). No photon, no event.
+    ///
+    /// With so much noise of the amplifier that the photons' own does not matter it is the
+    /// ½·erfc((TNR − SNR)/√2) of textbooks.
+    fn crossing(&self, photons: f64) -> f64 {
+        let Self { threshold, noise, excess, .. } = *self;
+        let above = |count: f64, variance: f64| normal_tail((threshold - count) / variance.sqrt());
+        if photons > MANY {
+            return above(photons, photons * excess + noise * noise);
+        }
+        let mut sum = 0.0;
+        let mut k = 1.0;
+        loop {
+            let share = poisson(photons, k);
+            sum += share * above(k, k * (excess - 1.0) + noise * noise);
+            if k > photons && share < NEGLIGIBLE {
+                return sum;
+            }
+            k += 1.0;
+        }
+    }
+}
+
+impl Model for Linear {
+    fn sensitivity(&self) -> Sensitivity {
+        self.sensitivity
+    }
+
+    fn declared_background(&self) -> f64 {
+        0.0
+    }
+
+    /// Of a mark that only just crosses the threshold: noise over the slope, τ·noise/threshold, with
+    /// the jitter of the input. It does not depend on how large the noise is.
+    fn jitter(&self) -> f64 {
+        libm::hypot(self.jitter, self.amplifier.response() / self.threshold_over_noise)
+    }
+
+    fn resolution(&self, light: &Light) -> f64 {
+        libm::hypot(self.jitter(), length_followed(light))
+    }
+
+    fn response(&self) -> f64 {
+        self.amplifier.response()
+    }
+
+    fn memory_fs(&self) -> i64 {
+        0
+    }
+
+    fn refusal(&self, _: f64) -> Option<String> {
+        None
+    }
+
+    /// The threshold follows the noise, so that this crosses it as often in any light.
+    fn false_rate(&self, _: f64) -> f64 {
+        self.false_alarm
+    }
+
+    fn noise(&self, background: f64) -> Option<Noise> {
+        let LinearSetting { noise, threshold, excess, .. } = self.setting(background);
+        Some(Noise { rms: noise, threshold, excess })
+    }
+
+    fn mark_pd(&self, lit: &Lit) -> f64 {
+        self.setting(lit.background).crossing(lit.photons)
+    }
+
+    fn mark_jitter(&self, lit: &Lit) -> f64 {
+        self.setting(lit.background).timing(lit.photons)
+    }
+
+    fn mark_displacement(&self, _: &Lit, light: &Light) -> f64 {
+        length_followed(light)
+    }
+
+    fn ready_share(&self, _: f64) -> f64 {
+        1.0
+    }
+
+    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
+        FirstEvent::without_memory(awaited)
+    }
+
+    fn summary(&self) -> String {
+        let Sensitivity { photons, range, reflectance } = self.sensitivity;
+        format!(
+            "linear; threshold {:.2} times the noise; {photons:.2} photons a mark from reflectance \
+             {reflectance} at {range} m; {:.0e} false alarms/s",
+            self.threshold_over_noise, self.false_alarm
+        )
+    }
+
+    fn in_sunlight(&self) -> &'static str {
+        "which are noise to it"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn linear(threshold: f64, noise: f64, excess: f64) -> LinearSetting {
+        LinearSetting { threshold, noise, excess, response: 1e-9, false_rate: 0.0, jitter: 0.0 }
+    }
+
+    /// TNR 9.78 dB: SNR of 9.8, 12, 13, 14 and 16 dB give 0.50, 0.816, 0.917, 0.973 and 0.9994.
+    #[test]
+    fn a_noisy_amplifier_has_the_curve_of_the_textbook() {
+        let noise = 1000.0;
+        let db = |db: f64| 10_f64.powf(db / 20.0);
+        for (snr, pd) in [(9.776, 0.5), (12.0, 0.816), (13.0, 0.917), (14.0, 0.973), (16.0, 0.9994)]
+        {
+            let found = linear(db(9.776) * noise, noise, 1.0).crossing(db(snr) * noise);
+            assert!((found - pd).abs() < 2e-3, "SNR {snr} dB: {found}");
+        }
+    }
+
+    /// With neither noise nor excess noise an event takes as many photons as the threshold says.
+    #[test]
+    fn without_noise_it_is_the_tail_of_poisson() {
+        let found = linear(2.5, 1e-9, 1.0).crossing(2.0);
+        assert_relative_eq!(found, 1.0 - (-2.0_f64).exp() * 5.0, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn sum_and_normal_approximation_meet() {
+        let detector = linear(MANY, 300.0, 4.0);
+        let (below, above) = (detector.crossing(MANY), detector.crossing(MANY * (1.0 + 1e-9)));
+        assert!((below - above).abs() < 2e-3, "{below}, {above}");
+    }
+}

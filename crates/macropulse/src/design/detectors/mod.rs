@@ -1,0 +1,278 @@
+//! The kinds of detector, a file for each: its keys and their limits, and the law by which it makes
+//! detection events of light, in closed form.
+//!
+//! How events are drawn stands in [`detect`](crate::detect) and shares nothing with the closed
+//! forms but a detector's settings, so that the one can be held against the other.
+//!
+//! A new kind is a file here with the keys (`Typed`) and the answers ([`Model`]), an entry in each
+//! list of this page, and a file in [`detect`](crate::detect). Nothing else knows the kinds.
+
+mod amplifier;
+mod geiger;
+mod linear;
+mod photon_counting;
+mod single_stop;
+mod table;
+
+use serde::Deserialize;
+
+pub use amplifier::Amplifier;
+pub use geiger::Geiger;
+pub use linear::{Linear, LinearSetting};
+pub use photon_counting::PhotonCounting;
+pub use single_stop::{SingleStop, SingleStopSetting};
+pub(in crate::design) use table::{Before, SensitivityFile, Table};
+
+use super::{Error, Light};
+
+/// The list of all kinds: variant, file in this folder, and name in a sensor file. Every other list
+/// of them follows from this one.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $Kind:ident, $file:ident, $name:literal;)+) => {
+        /// Light to detection events.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Detector {
+            $($(#[$doc])* $Kind($Kind),)+
+        }
+
+        impl Detector {
+            /// Names of all kinds: each is a table `[detector.NAME]` of a sensor file.
+            pub const NAMES: &[&str] = &[$($name),+];
+
+            /// What its kind answers.
+            pub fn model(&self) -> &dyn Model {
+                match self {
+                    $(Self::$Kind(detector) => detector,)+
+                }
+            }
+        }
+
+        /// `[detector]` as typed: a table for each kind, of which a sensor has one.
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(in crate::design) struct DetectorFile {
+            $(#[serde(rename = $name)] $file: Option<$file::File>,)+
+        }
+
+        impl DetectorFile {
+            /// The tables that the file has.
+            pub(in crate::design) fn given(&self) -> impl Iterator<Item = Given<'_>> {
+                let all = [
+                    $(self.$file.as_ref().map(|file| Given { name: $name, file: file as &dyn Typed }),)+
+                ];
+                all.into_iter().flatten()
+            }
+        }
+    };
+}
+
+impl DetectorFile {
+    /// The table of the file, if it has exactly one.
+    pub(in crate::design) fn only(&self) -> Option<Given<'_>> {
+        let mut given = self.given();
+        given.next().filter(|_| given.next().is_none())
+    }
+}
+
+kinds! {
+    /// Every mark is a Bernoulli trial of its own.
+    PhotonCounting, photon_counting, "photon-counting";
+    /// Cells that are blind for a while after each count.
+    Geiger, geiger, "geiger";
+    /// An amplified current that crosses a threshold.
+    Linear, linear, "linear";
+    /// One event per shot \[KP16 Fig. 7\].
+    SingleStop, single_stop, "single-stop";
+}
+
+/// The table of one kind in a sensor file.
+#[derive(Clone, Copy)]
+pub(in crate::design) struct Given<'a> {
+    /// Name of the kind.
+    pub name: &'static str,
+    /// Its keys.
+    pub file: &'a dyn Typed,
+}
+
+/// What the keys of a kind say before they are checked.
+pub(in crate::design) trait Typed {
+    /// Detections per photon, if the file says it, under the key `efficiency`.
+    fn efficiency(&self) -> Option<f64>;
+
+    /// Which of its keys are without effect.
+    fn idle(&self) -> Idle;
+
+    /// What of the light it follows. A sensor must declare that it leaves out the rest.
+    fn follows(&self) -> Follows;
+
+    /// Whether it puts out no more than one event per shot.
+    fn is_single_stop(&self) -> bool;
+
+    /// The detector in SI units.
+    ///
+    /// # Errors
+    /// If a value lies outside its limits, or the sensor is one that this kind does not go with.
+    fn check(&self, table: &Table) -> Result<Detector, Error>;
+}
+
+/// Keys in the table of a kind that another setting makes meaningless.
+pub(in crate::design) struct Idle {
+    /// Without a link budget, where the receiver is declared by its sensitivity.
+    pub declared: &'static [&'static str],
+    /// With a link budget, where photons are counted.
+    pub counted: &'static [&'static str],
+}
+
+impl Idle {
+    /// Of a kind that has an efficiency for the one and a sensitivity for the other.
+    const EITHER: Self = Self { declared: &["efficiency"], counted: &["sensitivity"] };
+
+    /// Of a kind that needs all of its keys.
+    const NONE: Self = Self { declared: &[], counted: &[] };
+}
+
+/// The effects on the way from light to events that a kind of detector follows.
+pub(in crate::design) struct Follows {
+    /// How fast it is: it has a response or a dead time of its own.
+    pub bandwidth: bool,
+    /// Light of a micropulse that reaches into neighbouring chips, every photon by itself.
+    pub neighbouring_chips: bool,
+}
+
+/// What every kind of detector answers, SI units throughout. Counts and photons are detected ones;
+/// `background` is the sunlight that it sees, in detections per second.
+pub trait Model {
+    /// How much light it gets.
+    fn sensitivity(&self) -> Sensitivity;
+
+    /// Counts of sunlight per second that the file declares; 0 where they follow from optics and
+    /// environment.
+    fn declared_background(&self) -> f64;
+
+    /// Standard deviation of its timing, s, where it is largest.
+    fn jitter(&self) -> f64;
+
+    /// Standard deviation, s, of the time of a mark that is only just detected, the length of a
+    /// micropulse of `light` included.
+    fn resolution(&self, light: &Light) -> f64;
+
+    /// Full width, s, of what it makes of the shortest mark: marks that follow each other sooner
+    /// are one. 0 where it tells all apart.
+    fn response(&self) -> f64;
+
+    /// For how long, fs, its state depends on the light that it has seen; 0 without memory.
+    fn memory_fs(&self) -> i64;
+
+    /// Why it cannot be simulated in so much sunlight, and what to do, if it cannot.
+    fn refusal(&self, background: f64) -> Option<String>;
+
+    /// Events per second that it would make without the light of any lidar, were it always ready.
+    fn false_rate(&self, background: f64) -> f64;
+
+    /// Noise of the amplitude and the threshold; `None` where there is none.
+    fn noise(&self, background: f64) -> Option<Noise>;
+
+    /// Probability that a mark makes an event.
+    fn mark_pd(&self, lit: &Lit) -> f64;
+
+    /// Standard deviation, s, of its timing of a mark.
+    fn mark_jitter(&self, lit: &Lit) -> f64;
+
+    /// Standard deviation, s, that the length of a micropulse of `light` adds to the time of a mark.
+    fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64;
+
+    /// Share of what falls on it that its dead time leaves, `falling` detections per second in all.
+    fn ready_share(&self, falling: f64) -> f64;
+
+    /// What a receiver finds that takes the first event in its gate.
+    fn first_event(&self, awaited: &Awaited) -> FirstEvent;
+
+    /// What it is, in half a line for people.
+    fn summary(&self) -> String;
+
+    /// What becomes of the counts of sunlight: the end of a sentence about them, for people.
+    fn in_sunlight(&self) -> &'static str;
+}
+
+/// How much light a detector gets, declared by what it can see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// Mean photons detected per mark from a target of `reflectance` at `range`, square on.
+    /// Infinite for a detector that never misses.
+    pub photons: f64,
+    /// Range of the reference target, m.
+    pub range: f64,
+    /// Reflectance of the reference target.
+    pub reflectance: f64,
+}
+
+/// Noise of an amplitude, in detected photons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Without a mark, rms.
+    pub rms: f64,
+    /// Amplitude that makes an event.
+    pub threshold: f64,
+    /// Excess noise factor of the multiplication; 1 where there is none.
+    pub excess: f64,
+}
+
+impl Noise {
+    /// Noise of the amplitude of a mark of `photons`, rms.
+    pub fn of_mark(&self, photons: f64) -> f64 {
+        (photons * self.excess + self.rms.powi(2)).sqrt()
+    }
+}
+
+/// A mark, and the light beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lit {
+    /// Photons of the mark, on average.
+    pub photons: f64,
+    /// Sunlight, 1/s.
+    pub background: f64,
+    /// All that falls on the detector, 1/s: dark counts, sunlight, and the marks of all shots on
+    /// average.
+    pub falling: f64,
+}
+
+/// An echo that a receiver of single pulses waits for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Awaited {
+    /// Time since the range gate opened, s.
+    pub since: f64,
+    /// Photons of the echo, on average.
+    pub photons: f64,
+    /// Dark and background counts, 1/s, were the detector always ready.
+    pub false_rate: f64,
+    /// All that falls on it, 1/s.
+    pub falling: f64,
+    /// Probability that the echo makes a tick, whatever came before it.
+    pub mark_pd: f64,
+    /// Share of events that find a converter free.
+    pub converted: f64,
+}
+
+/// What comes first in a range gate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstEvent {
+    /// Probability that a dark or background count comes before the echo.
+    pub is_false: f64,
+    /// Probability that none does, and that the echo makes a tick.
+    pub is_echo: f64,
+}
+
+impl FirstEvent {
+    /// Of a detector without memory: nothing comes first with exp(−K), K the dark and background
+    /// counts until the echo.
+    fn without_memory(awaited: &Awaited) -> Self {
+        let counts = awaited.false_rate * awaited.since;
+        Self { is_false: -libm::expm1(-counts), is_echo: awaited.mark_pd * libm::exp(-counts) }
+    }
+}
+
+/// Length of a micropulse of `light`, rms, s, as far as it is followed: by so much is one photon of
+/// it displaced.
+fn length_followed(light: &Light) -> f64 {
+    light.spread.unwrap_or(0.0)
+}
