@@ -9,7 +9,7 @@ use std::path::Path;
 use macropulse::channel::{Echo, Light, Operating, light_of_echoes};
 use macropulse::codec::ShotLog;
 use macropulse::design::Design;
-use macropulse::design::detectors::Lit;
+use macropulse::design::detector::Lit;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;

@@ -66,7 +66,7 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
         cells.extend(designs.iter().map(|design| Cell::from(value(design))));
         table = std::mem::take(&mut table).row(cells);
     };
-    row("pattern", &|d| d.scan.describe());
+    row("pattern", &|d| d.scan.summary());
     row("directions", &|d| format!("{} \u{d7} {}", d.scan.columns, d.scan.rows));
     row("field", &|d| field(&d.scan.extent()));
     row("refresh rate", &|d| format!("{} Hz", d.scan.rate_millihertz as f64 / 1e3));

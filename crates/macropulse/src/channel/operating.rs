@@ -93,7 +93,7 @@ impl Operating {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::detectors::Lit;
+    use crate::design::detector::Lit;
     use approx::assert_relative_eq;
 
     fn sensor(name: &str, set: &[(&str, &str)]) -> Design {

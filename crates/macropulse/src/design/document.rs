@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::Table;
 
 use super::presets;
-use super::scan::PATTERNS;
-use super::{Detector, Effect, Error};
+use super::{Detector, Effect, Error, Pattern};
 use crate::names::{line_column, offset_of_key, toml_value};
 
 /// Where values come from that are changed on the command line.
@@ -28,7 +27,7 @@ const PROSE: &str = "summary";
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it.
 const ALTERNATIVES: [(&str, &[&str]); 3] =
-    [("scan", &PATTERNS), ("detector", Detector::NAMES), ("family", FAMILIES)];
+    [("scan", Pattern::NAMES), ("detector", Detector::NAMES), ("family", FAMILIES)];
 
 /// Code families by the names they have in a sensor file.
 pub(super) const FAMILIES: &[&str] = &[

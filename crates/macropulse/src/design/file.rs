@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::detectors::DetectorFile;
+use super::detector::DetectorFile;
 use super::light::LightFile;
 use super::scan::ScanFile;
 use macropulse_codec::decode::{Effort, Pick};

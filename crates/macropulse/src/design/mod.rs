@@ -11,7 +11,7 @@ mod band;
 mod budget;
 mod check;
 mod derived;
-pub mod detectors;
+pub mod detector;
 mod document;
 mod effect;
 mod family;
@@ -27,7 +27,7 @@ use std::sync::OnceLock;
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use budget::{Budget, Field, Trailing, solid_angle};
 pub use derived::Derived;
-pub use detectors::Detector;
+pub use detector::Detector;
 pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
 pub use family::family_from_toml;
@@ -159,7 +159,7 @@ impl Design {
 
     /// Where its pixels lie.
     pub fn directions(&self) -> &Directions {
-        self.directions.get_or_init(|| self.scan.answers().directions())
+        self.directions.get_or_init(|| self.scan.model().directions())
     }
 
     /// Duration of one scan, s.

@@ -21,7 +21,7 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 use super::channel::Channel;
 use super::noise::{PART_BITS, counts};
 use super::{Detections, Kind, Memory};
-use crate::design::detectors::Geiger;
+use crate::design::detector::Geiger;
 use crate::random::{Address, Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s, s_from_fs};
 

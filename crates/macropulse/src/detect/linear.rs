@@ -17,7 +17,7 @@ use super::channel::Channel;
 use super::noise::counts;
 use super::{Detections, Kind, Memory};
 use crate::design::Design;
-use crate::design::detectors::LinearSetting;
+use crate::design::detector::LinearSetting;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::fs_from_s;
 

@@ -17,7 +17,7 @@ use super::jitter::Jitter;
 use super::noise::counts;
 use super::{Detections, Kind, Memory};
 use crate::channel::ALL_MARKS;
-use crate::design::detectors::PhotonCounting;
+use crate::design::detector::PhotonCounting;
 use crate::design::{Design, PARTS_OF_TICK};
 use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};

@@ -27,7 +27,7 @@ use rand_distr::{Distribution, Exp1, Gamma, StandardNormal};
 use super::channel::Channel;
 use super::noise::{Stretch, stretches};
 use super::{Detections, Kind, Memory};
-use crate::design::detectors::SingleStopSetting;
+use crate::design::detector::SingleStopSetting;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
 

@@ -42,7 +42,7 @@ fn shots_of_band(design: &Design) -> u64 {
     if design.scan.is_one_flash() {
         return design.shots_per_scan();
     }
-    let line = design.scan.answers().line();
+    let line = design.scan.model().line();
     let room_fs = design.longest_band_fs();
     let line_fs = design.scan_period() * 1e15 * line as f64 / design.shots_per_scan() as f64;
     let lines = (SHOTS / line).min((room_fs as f64 / line_fs) as u64);
@@ -111,7 +111,7 @@ pub(super) fn log_of(design: &Design, shots: Range<u64>) -> ShotLog {
     for column in [&mut log.row, &mut log.column, &mut log.label, &mut log.word, &mut log.channel] {
         column.reserve_exact(count);
     }
-    match design.scan.answers().draws_from_the_left() {
+    match design.scan.model().draws_from_the_left() {
         true => add_lines(design, shots, &mut log),
         false => add_pixels(design, shots, &mut log),
     }
@@ -123,7 +123,7 @@ fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
     let columns = u64::from(design.scan.columns);
     let mut next = shots.start;
     while next < shots.end {
-        let (row, column) = design.scan.answers().pixel(next % design.shots_per_scan());
+        let (row, column) = design.scan.model().pixel(next % design.shots_per_scan());
         let run = (columns - u64::from(column)).min(shots.end - next) as usize;
         let pixels = column..column + run as u16;
         log.row.extend(repeat_n(row, run));
@@ -144,7 +144,7 @@ fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
 
 /// Pixels, labels, words and detectors in whatever order.
 fn add_pixels(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
-    let pattern = design.scan.answers();
+    let pattern = design.scan.model();
     for shot in shots {
         let order = shot % design.shots_per_scan();
         let (row, column) = pattern.pixel(order);

@@ -28,7 +28,7 @@ pub fn shot_of_pixel(design: &Design, scan: u64, row: u32, column: u32) -> Optio
     }
     let (row, column) = (row as u16, column as u16);
     Some(Shot {
-        fired_at_fs: fired_at_fs(design, scan, design.scan.answers().order_of(row, column)),
+        fired_at_fs: fired_at_fs(design, scan, design.scan.model().order_of(row, column)),
         label: design.coding.label_of(column),
         word: word(design, row, column),
     })
@@ -43,7 +43,7 @@ pub fn most_scans(design: &Design) -> u64 {
 /// there are several.
 pub fn shot_at(design: &Design, log: &ShotLog, (row, column): (u16, u16)) -> Option<usize> {
     let per_scan = design.shots_per_scan();
-    let order = design.scan.answers().order_of(row, column);
+    let order = design.scan.model().order_of(row, column);
     let after = (order + per_scan - log.first % per_scan) % per_scan;
     usize::try_from(after).ok().filter(|shot| *shot < log.len())
 }

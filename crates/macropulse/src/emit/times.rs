@@ -8,7 +8,7 @@ use crate::units::{FS_PER_S, fs_from_s};
 
 /// Absolute time at which shot number `order` of scan `scan` is fired, fs.
 pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
-    let moment = design.scan.answers().moment(order, design.scan_period());
+    let moment = design.scan.model().moment(order, design.scan_period());
     let fs = fraction_of_scan(design, scan, moment.shots) + fs_from_s(moment.then);
     fs - fs.rem_euclid(design.coding.chip_fs)
 }
@@ -32,7 +32,7 @@ impl EqualSteps {
     /// From shot number `first` on, counted from the first one of the first scan; `None` where
     /// shots are not equally far apart.
     pub(super) fn new(design: &Design, first: u64) -> Option<Self> {
-        if !design.scan.answers().equal_steps() {
+        if !design.scan.model().equal_steps() {
             return None;
         }
         let (parts, chip_fs) = (parts_of_fs(design), design.coding.chip_fs);
@@ -189,9 +189,9 @@ mod tests {
     fn every_laser_of_a_spinning_sensor_fires_once_a_column() {
         let design = sensor("hdl-64e");
         let mut rows: Vec<u16> =
-            (0..64).map(|order| design.scan.answers().pixel(64 + order).0).collect();
+            (0..64).map(|order| design.scan.model().pixel(64 + order).0).collect();
         rows.sort_unstable();
         assert_eq!(rows, (0..64).collect::<Vec<u16>>());
-        assert_eq!(design.scan.answers().pixel(64).1, 1);
+        assert_eq!(design.scan.model().pixel(64).1, 1);
     }
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::converters::bank_loss;
 use super::matched;
 use crate::channel::{Error, Operating};
-use crate::design::detectors::{Awaited, Lit};
+use crate::design::detector::{Awaited, Lit};
 use crate::design::{Design, Tdc};
 use crate::environment::Environment;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};

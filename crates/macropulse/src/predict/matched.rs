@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use macropulse_codec::statistics::{binomial_tail, normal_tail};
 
 use crate::design::Design;
-use crate::design::detectors::Lit;
+use crate::design::detector::Lit;
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
 
 /// The light around a macropulse is counted in stretches of so many ticks, and reaches beyond it by

@@ -180,7 +180,7 @@ fn slant(design: &Design, range: f64) -> Option<Check> {
 
 /// Angle, rad, by which the mirror moves on during a macropulse.
 fn swept(design: &Design) -> f64 {
-    let Some(pixel) = design.scan.answers().moves_by().filter(|_| design.scan.moves) else {
+    let Some(pixel) = design.scan.model().moves_by().filter(|_| design.scan.moves) else {
         return 0.0;
     };
     let derived = design.derived();

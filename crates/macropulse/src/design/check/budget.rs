@@ -121,10 +121,10 @@ impl Check<'_> {
     /// its pixel or a cone about it.
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {
         let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
-        let [across, down] = scan.answers().cell();
+        let [across, down] = scan.model().cell();
         let pixel = solid_angle(across, down);
         let pixel_period = scan.channel_period();
-        let follows = scan.answers().follows();
+        let follows = scan.model().follows();
         let trailing = |pixels: f64, solid_angle: f64| Field {
             solid_angle,
             trailing: follows.then_some(Trailing { pixels, pixel_period }),
@@ -133,7 +133,7 @@ impl Check<'_> {
             let angle = self.within("optics.field.cone_mrad", angle, 1e-3, 1e3)? * 1e-3;
             return Ok(trailing(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
         }
-        if let Some([horizontal, vertical]) = scan.answers().shared_field() {
+        if let Some([horizontal, vertical]) = scan.model().shared_field() {
             let strip = |pixels: f64| trailing(pixels, pixels * pixel);
             return Ok(match optics.field {
                 FieldFile::Staring => {

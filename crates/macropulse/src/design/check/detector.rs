@@ -1,7 +1,7 @@
 //! From light to detection events: what holds for every kind of detector.
 
 use super::Check;
-use crate::design::detectors::{Before, DetectorFile, Follows, Table};
+use crate::design::detector::{Before, DetectorFile, Follows, Table};
 use crate::design::{Detector, Effect, Error};
 
 /// The efficiency of a detector, detections per photon, as typed.

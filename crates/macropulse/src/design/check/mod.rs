@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 pub(super) use code::family;
 
-use super::detectors::Before;
+use super::detector::Before;
 use super::document::Chain;
 use super::file::SensorFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};

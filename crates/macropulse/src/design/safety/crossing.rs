@@ -36,7 +36,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
     let chips = i64::from(coding.codebook.chips());
     let energies = Energies::of(scan, coding);
     let openings = class.openings();
-    let (places, passed, brightest) = match scan.answers().beams() {
+    let (places, passed, brightest) = match scan.model().beams() {
         Beams::Flood(sides) => {
             let flood = |opening| sender.flood(opening, sides, &energies);
             let places: Vec<Crossings> = openings.iter().map(flood).collect();

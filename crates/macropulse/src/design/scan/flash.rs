@@ -3,8 +3,8 @@
 use serde::Deserialize;
 
 use super::directions::{Angles, Directions};
-use super::pattern::{Extent, Moment, ScanPattern, cell_at, middles};
-use super::{Pattern, PatternFile, Sides};
+use super::model::{Extent, Model, Moment, cell_at, middles};
+use super::{Pattern, Sides, Typed};
 use crate::design::Error;
 use crate::design::check::Check;
 use crate::design::safety::Beams;
@@ -28,14 +28,14 @@ pub struct Flash {
 /// `[scan.flash]` as typed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct FlashFile {
+pub(super) struct File {
     rows: u32,
     columns: u32,
     horizontal_deg: f64,
     vertical_deg: f64,
 }
 
-impl PatternFile for FlashFile {
+impl Typed for File {
     fn check(&self, check: &Check) -> Result<Pattern, Error> {
         let [rows, columns] = check.pixels("flash", [self.rows, self.columns])?;
         if rows * columns > MOST_DETECTORS {
@@ -48,8 +48,8 @@ impl PatternFile for FlashFile {
     }
 }
 
-impl ScanPattern for Flash {
-    fn describe(&self) -> String {
+impl Model for Flash {
+    fn summary(&self) -> String {
         format!("one flash, {} detectors", self.channels())
     }
 
@@ -78,12 +78,24 @@ impl ScanPattern for Flash {
         Moment { shots: 0, then: 0.0 }
     }
 
+    fn equal_steps(&self) -> bool {
+        false
+    }
+
     fn line(&self) -> u64 {
         self.channels().into()
     }
 
+    fn draws_from_the_left(&self) -> bool {
+        false
+    }
+
     fn shortest_dwell(&self, pixel_period: f64) -> f64 {
         pixel_period * f64::from(self.channels())
+    }
+
+    fn moves_by(&self) -> Option<f64> {
+        None
     }
 
     fn directions(&self) -> Directions {

@@ -1,11 +1,12 @@
 //! Where and when the sensor looks: `[scan]`, and a scan pattern in it.
 //!
-//! Each pattern is one file: its keys, their limits, and its answers to what the workbench asks of
-//! every pattern, [`ScanPattern`]. The lists of those there are stand here and nowhere else.
+//! Each pattern is one file: its keys and their limits (`Typed`), and its answers to what the
+//! workbench asks of every pattern (`Model`). A new one is such a file and an entry in the list of
+//! this page. Nothing else knows which there are.
 
 mod directions;
 mod flash;
-mod pattern;
+mod model;
 mod raster;
 mod spinning;
 
@@ -13,72 +14,73 @@ use serde::Deserialize;
 
 pub use directions::Directions;
 pub use flash::Flash;
-pub use pattern::Extent;
-pub(crate) use pattern::ScanPattern;
+pub use model::Extent;
+pub(crate) use model::Model;
 pub use raster::{Mirror, Raster};
 pub use spinning::{Firing, Spinning};
 
-use self::flash::FlashFile;
-use self::raster::RasterFile;
-use self::spinning::SpinningFile;
 use super::Error;
 use super::check::Check;
 
-/// The tables of patterns, of which `[scan]` has exactly one.
-pub(super) const PATTERNS: [&str; 3] = ["raster", "spinning", "flash"];
-
-/// `[scan]` as typed.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ScanFile {
-    scans_per_s: f64,
-    min_range_m: f64,
-    max_range_m: f64,
-    gate_beyond_m: f64,
-    light_range_m: Option<f64>,
-    raster: Option<RasterFile>,
-    spinning: Option<SpinningFile>,
-    flash: Option<FlashFile>,
-}
-
-impl ScanFile {
-    /// The tables of patterns that are there, in the order of [`PATTERNS`].
-    fn patterns(&self) -> [Option<&dyn PatternFile>; PATTERNS.len()] {
-        fn any(table: &impl PatternFile) -> &dyn PatternFile {
-            table
+/// The list of all patterns: variant, file in this folder, and name in a sensor file. Every other
+/// list of them follows from this one.
+macro_rules! patterns {
+    ($($(#[$doc:meta])* $Kind:ident, $file:ident, $name:literal;)+) => {
+        /// How directions follow each other.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Pattern {
+            $($(#[$doc])* $Kind($Kind),)+
         }
-        [
-            self.raster.as_ref().map(any),
-            self.spinning.as_ref().map(any),
-            self.flash.as_ref().map(any),
-        ]
-    }
+
+        impl Pattern {
+            /// Names of all patterns: each is a table `[scan.NAME]` of a sensor file.
+            pub const NAMES: &[&str] = &[$($name),+];
+
+            /// What it answers.
+            pub(crate) fn model(&self) -> &dyn Model {
+                match self {
+                    $(Self::$Kind(pattern) => pattern,)+
+                }
+            }
+        }
+
+        /// `[scan]` as typed: its own keys, and a table for each pattern, of which it has one.
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct ScanFile {
+            scans_per_s: f64,
+            min_range_m: f64,
+            max_range_m: f64,
+            gate_beyond_m: f64,
+            light_range_m: Option<f64>,
+            $(#[serde(rename = $name)] $file: Option<$file::File>,)+
+        }
+
+        impl ScanFile {
+            /// The tables of patterns that the file has.
+            fn patterns(&self) -> impl Iterator<Item = &dyn Typed> {
+                let all = [$(self.$file.as_ref().map(|file| file as &dyn Typed),)+];
+                all.into_iter().flatten()
+            }
+        }
+    };
 }
 
-/// How directions follow each other.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Pattern {
+patterns! {
     /// One beam, line by line.
-    Raster(Raster),
+    Raster, raster, "raster";
     /// Fixed elevations on a turning head.
-    Spinning(Spinning),
+    Spinning, spinning, "spinning";
     /// Every direction at once.
-    Flash(Flash),
+    Flash, flash, "flash";
 }
 
-impl Pattern {
-    fn answers(&self) -> &dyn ScanPattern {
-        match self {
-            Self::Raster(raster) => raster,
-            Self::Spinning(spinning) => spinning,
-            Self::Flash(flash) => flash,
-        }
-    }
-}
-
-/// The table of a pattern as typed.
-trait PatternFile {
-    /// The pattern, if all limits are kept.
+/// The table of a pattern in a sensor file.
+trait Typed {
+    /// The pattern in SI units.
+    ///
+    /// # Errors
+    /// If a value lies outside its limits.
     fn check(&self, check: &Check) -> Result<Pattern, Error>;
 }
 
@@ -108,13 +110,13 @@ pub struct Scan {
 
 impl Scan {
     /// What its pattern is, in a few words for people.
-    pub fn describe(&self) -> String {
-        self.pattern.answers().describe()
+    pub fn summary(&self) -> String {
+        self.model().summary()
     }
 
     /// What its pattern answers.
-    pub(crate) fn answers(&self) -> &dyn ScanPattern {
-        self.pattern.answers()
+    pub(crate) fn model(&self) -> &dyn Model {
+        self.pattern.model()
     }
 
     /// Shots in a scan.
@@ -125,7 +127,7 @@ impl Scan {
     /// Number of separate detectors: one behind a single beam, one for each laser of a turning
     /// head, one for each pixel of a flash.
     pub fn channels(&self) -> u32 {
-        self.answers().channels()
+        self.model().channels()
     }
 
     /// Duration of one scan, s.
@@ -140,7 +142,7 @@ impl Scan {
 
     /// Whether all shots of a scan are fired at one moment.
     pub fn is_one_flash(&self) -> bool {
-        let moment = |order| self.answers().moment(order, self.period());
+        let moment = |order| self.model().moment(order, self.period());
         moment(0) == moment(self.shots() - 1)
     }
 
@@ -148,18 +150,18 @@ impl Scan {
     /// lies; `None` outside the field of view. A cell reaches half of the way to its neighbours.
     pub fn pixel_at(&self, direction: [f64; 3]) -> Option<(u16, u16)> {
         let [x, y, z] = direction;
-        self.answers().pixel_at(libm::atan2(y, x), libm::asin(z.clamp(-1.0, 1.0)))
+        self.model().pixel_at(libm::atan2(y, x), libm::asin(z.clamp(-1.0, 1.0)))
     }
 
     /// Everything it looks at.
     pub fn extent(&self) -> Extent {
-        self.answers().extent()
+        self.model().extent()
     }
 
     /// Seconds from the beginning of a scan until the shot `order` is fired. The chip clock, for
     /// which a shot waits, is left out.
     pub(super) fn moment(&self, order: u64) -> f64 {
-        let moment = self.answers().moment(order, self.period());
+        let moment = self.model().moment(order, self.period());
         moment.shots as f64 / self.shots() as f64 * self.period() + moment.then
     }
 }
@@ -189,20 +191,21 @@ impl Check<'_> {
             None => LIGHT_BEYOND_GATE * max_range,
         };
         let min_range = self.within("scan.min_range_m", file.min_range_m, 0.0, max_range)?;
-        let mut typed = file.patterns().into_iter().flatten();
+        let mut typed = file.patterns();
         let (Some(pattern), None) = (typed.next(), typed.next()) else {
-            let tables = PATTERNS.map(|name| format!("[scan.{name}]")).join(", ");
-            return self.refuse("scan", format!("needs exactly one of {tables}"));
+            let all: Vec<String> =
+                Pattern::NAMES.iter().map(|name| format!("[scan.{name}]")).collect();
+            return self.refuse("scan", format!("needs exactly one of {}", all.join(", ")));
         };
         let pattern = pattern.check(self)?;
-        if moves && pattern.answers().moves_by().is_none() {
+        if moves && pattern.model().moves_by().is_none() {
             return self.refuse(
                 "idealised",
                 "the motion of the beam is modelled for a raster alone: add \"mirror-motion\" to \
                  this list",
             );
         }
-        let [rows, columns] = pattern.answers().size();
+        let [rows, columns] = pattern.model().size();
         if u64::from(rows) * u64::from(columns) > MOST_PIXELS {
             let message = format!("{rows} x {columns} pixels are more than {MOST_PIXELS}");
             return self.refuse("scan", message);

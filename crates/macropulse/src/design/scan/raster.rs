@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use serde::Deserialize;
 
 use super::directions::{Angles, Directions};
-use super::pattern::{Extent, Moment, ScanPattern, cell_at, middles};
-use super::{Pattern, PatternFile, Sides};
+use super::model::{Extent, Model, Moment, cell_at, middles};
+use super::{Pattern, Sides, Typed};
 use crate::design::Error;
 use crate::design::check::Check;
 use crate::design::safety::{Beams, Line, Lines};
@@ -57,7 +57,7 @@ impl Mirror {
 /// `[scan.raster]` as typed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct RasterFile {
+pub(super) struct File {
     rows: u32,
     columns: u32,
     horizontal_deg: f64,
@@ -66,7 +66,7 @@ pub(super) struct RasterFile {
     duty: f64,
 }
 
-impl PatternFile for RasterFile {
+impl Typed for File {
     fn check(&self, check: &Check) -> Result<Pattern, Error> {
         let [rows, columns] = check.pixels("raster", [self.rows, self.columns])?;
         let sides = Sides { horizontal_deg: self.horizontal_deg, vertical_deg: self.vertical_deg };
@@ -84,8 +84,8 @@ impl Raster {
     }
 }
 
-impl ScanPattern for Raster {
-    fn describe(&self) -> String {
+impl Model for Raster {
+    fn summary(&self) -> String {
         "one beam, mirror raster".to_owned()
     }
 

@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use serde::Deserialize;
 
 use super::directions::{Angles, Directions};
-use super::pattern::{Extent, Moment, ScanPattern};
-use super::{Pattern, PatternFile};
+use super::model::{Extent, Model, Moment};
+use super::{Pattern, Typed};
 use crate::design::Error;
 use crate::design::check::Check;
 use crate::design::safety::{Beams, Line, Lines};
@@ -39,7 +39,7 @@ pub enum Firing {
 /// `[scan.spinning]` as typed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SpinningFile {
+pub(super) struct File {
     azimuth_step_deg: f64,
     blocks: Vec<LaserBlockFile>,
     firing: Firing,
@@ -53,7 +53,7 @@ struct LaserBlockFile {
     step_deg: f64,
 }
 
-impl PatternFile for SpinningFile {
+impl Typed for File {
     fn check(&self, check: &Check) -> Result<Pattern, Error> {
         let path = "scan.spinning.azimuth_step_deg";
         let step = check.within(path, self.azimuth_step_deg, 0.012, 90.0)?;
@@ -119,8 +119,8 @@ impl Spinning {
     }
 }
 
-impl ScanPattern for Spinning {
-    fn describe(&self) -> String {
+impl Model for Spinning {
+    fn summary(&self) -> String {
         format!("{} beams, turning head", self.lasers())
     }
 
@@ -162,8 +162,16 @@ impl ScanPattern for Spinning {
         self.lasers()
     }
 
+    fn draws_from_the_left(&self) -> bool {
+        false
+    }
+
     fn shortest_dwell(&self, pixel_period: f64) -> f64 {
         pixel_period * f64::from(self.channels())
+    }
+
+    fn moves_by(&self) -> Option<f64> {
+        None
     }
 
     /// The head begins to the rear and goes on turning while its lasers fire one after another.

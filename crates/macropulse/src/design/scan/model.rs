@@ -7,9 +7,9 @@ use super::Directions;
 use crate::design::safety::Beams;
 
 /// How the directions of a scan follow each other.
-pub(crate) trait ScanPattern {
+pub(crate) trait Model {
     /// What it is, in a few words for people.
-    fn describe(&self) -> String;
+    fn summary(&self) -> String;
 
     /// Rows and columns of the image: as many pixels as a scan has shots.
     fn size(&self) -> [u32; 2];
@@ -23,7 +23,7 @@ pub(crate) trait ScanPattern {
     /// Row and column of the shot `order` of a scan.
     fn pixel(&self, order: u64) -> (u16, u16);
 
-    /// The place of a pixel in the order of its scan: the inverse of [`ScanPattern::pixel`].
+    /// The place of a pixel in the order of its scan: the inverse of [`Model::pixel`].
     fn order_of(&self, row: u16, column: u16) -> u64;
 
     /// When the shot `order` of a scan that lasts `period` seconds is fired. The chip clock, for
@@ -31,27 +31,21 @@ pub(crate) trait ScanPattern {
     fn moment(&self, order: u64, period: f64) -> Moment;
 
     /// Whether a scan is fired shot by shot, all of them equally far apart.
-    fn equal_steps(&self) -> bool {
-        false
-    }
+    fn equal_steps(&self) -> bool;
 
     /// Shots of a line: of what is computed together where time allows.
     fn line(&self) -> u64;
 
     /// Whether one beam draws every line from column 0 on, row by row.
-    fn draws_from_the_left(&self) -> bool {
-        false
-    }
+    fn draws_from_the_left(&self) -> bool;
 
     /// Shortest time the beam spends on a pixel, s, `pixel_period` being the mean time between
     /// shots.
     fn shortest_dwell(&self, pixel_period: f64) -> f64;
 
     /// Angle, rad, by which the beam moves on from a pixel to the next, where its motion during a
-    /// macropulse is modelled.
-    fn moves_by(&self) -> Option<f64> {
-        None
-    }
+    /// macropulse is modelled; `None` where it is not.
+    fn moves_by(&self) -> Option<f64>;
 
     /// Where the pixels lie.
     fn directions(&self) -> Directions;
