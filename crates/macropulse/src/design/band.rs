@@ -12,6 +12,10 @@ pub const PARTS_OF_TICK: u32 = 64;
 /// Jitter beyond so many standard deviations does not happen: once in 10¹⁸ events.
 pub const MOST_SIGMA: f64 = 9.0;
 
+/// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
+pub(super) const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, if shots are not coded) with the \
+     jitter must be within 67 million ticks; use longer ticks or a shorter max_range_m";
+
 impl Design {
     /// Length of a macropulse, fs.
     pub fn macropulse_fs(&self) -> i64 {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use toml::Table;
 
+use super::family::FAMILIES;
 use super::presets;
 use super::{Detector, Effect, Error, Pattern};
 use crate::names::{line_column, offset_of_key, toml_value};
@@ -28,18 +29,6 @@ const PROSE: &str = "summary";
 /// the parent's table instead of adding to it.
 const ALTERNATIVES: [(&str, &[&str]); 3] =
     [("scan", Pattern::NAMES), ("detector", Detector::NAMES), ("family", FAMILIES)];
-
-/// Code families by the names they have in a sensor file.
-pub(super) const FAMILIES: &[&str] = &[
-    "prime",
-    "extended-prime",
-    "quadratic-congruence",
-    "extended-quadratic-congruence",
-    "orthogonal",
-    "sparse",
-    "m-sequence",
-    "gold",
-];
 
 /// One TOML text with its origin.
 #[derive(Debug, Clone)]

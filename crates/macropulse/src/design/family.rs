@@ -3,11 +3,69 @@
 use serde::Deserialize;
 
 use super::Error;
-use super::check::family;
-use super::document::FAMILIES;
-use super::file::FamilyFile;
 use crate::names::nearest;
-use macropulse_codec::code::Family;
+use macropulse_codec::code::{self, Family};
+
+/// Code families by the names they have in a sensor file.
+pub(super) const FAMILIES: &[&str] = &[
+    "prime",
+    "extended-prime",
+    "quadratic-congruence",
+    "extended-quadratic-congruence",
+    "orthogonal",
+    "sparse",
+    "m-sequence",
+    "gold",
+];
+
+/// `code.family` as typed.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum FamilyFile {
+    Prime(u32),
+    ExtendedPrime(u32),
+    QuadraticCongruence(u32),
+    ExtendedQuadraticCongruence(u32),
+    Orthogonal(OrthogonalFile),
+    Sparse(SparseFile),
+    MSequence(u32),
+    Gold(u32),
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OrthogonalFile {
+    length: u32,
+    weight: u32,
+    words: Option<u32>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SparseFile {
+    length: u32,
+    weight: u32,
+    words: u32,
+    seed: u64,
+}
+
+/// The code family that a sensor file names.
+pub(super) fn family(file: FamilyFile) -> Result<Family, code::Error> {
+    match file {
+        FamilyFile::Prime(p) => Family::prime(p),
+        FamilyFile::ExtendedPrime(p) => Family::extended_prime(p),
+        FamilyFile::QuadraticCongruence(p) => Family::quadratic_congruence(p),
+        FamilyFile::ExtendedQuadraticCongruence(p) => Family::extended_quadratic_congruence(p),
+        FamilyFile::Orthogonal(OrthogonalFile { length, weight, words }) => {
+            Family::orthogonal(length, weight, words)
+        }
+        FamilyFile::Sparse(SparseFile { length, weight, words, seed }) => {
+            Family::sparse(length, weight, words, seed)
+        }
+        FamilyFile::MSequence(degree) => Family::m_sequence(degree),
+        FamilyFile::Gold(degree) => Family::gold(degree),
+    }
+}
 
 /// The code family written as in a sensor file behind `code.family`, without the outer braces:
 /// `prime = 29`, or `orthogonal = { length = 1000, weight = 5 }`.

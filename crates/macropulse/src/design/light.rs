@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::check::Check;
+use super::limits::Check;
 use super::{Effect, Error};
 use crate::units::RMS_OF_FWHM;
 

@@ -10,34 +10,37 @@
 mod band;
 mod budget;
 mod check;
+mod coding;
 mod derived;
 pub mod detector;
 mod document;
 mod effect;
 mod family;
-mod file;
 mod light;
+mod limits;
 mod presets;
+mod receiver;
 pub mod safety;
 mod scan;
+mod tdc;
 
 use std::path::Path;
 use std::sync::OnceLock;
 
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use budget::{Budget, Field, Trailing, solid_angle};
+pub use coding::{Coding, Label};
 pub use derived::Derived;
 pub use detector::Detector;
 pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
 pub use family::family_from_toml;
-pub use file::Label;
 pub use light::Light;
 pub use presets::{names as preset_names, text as preset_text};
 pub use scan::{Directions, Extent, Firing, Flash, Mirror, Pattern, Raster, Scan, Spinning};
+pub use tdc::Tdc;
 
 use crate::digest::Digest;
-use macropulse_codec::code::Codebook;
 use macropulse_codec::decode::Receiver;
 
 /// A sensor, checked, in SI units.
@@ -73,44 +76,6 @@ pub struct Design {
     pub text: String,
     /// Made when first asked for.
     directions: OnceLock<Directions>,
-}
-
-/// How shots are told apart.
-#[derive(Debug, Clone)]
-pub struct Coding {
-    /// Marks of every label and word.
-    pub codebook: Codebook,
-    /// Length of a chip, fs; of the whole shot where it is not coded.
-    pub chip_fs: i64,
-    /// Which number a macropulse carries; `None` where shots are not coded.
-    pub label: Option<Label>,
-    /// The word of pixel `n` of a scan is `first_word + n mod word_modulus`.
-    pub first_word: u32,
-    /// See `first_word`.
-    pub word_modulus: u32,
-}
-
-impl Coding {
-    /// The number that a shot to `column` carries; 0 where it carries none.
-    pub fn label_of(&self, column: u16) -> u16 {
-        match self.label {
-            Some(Label::Column) => column,
-            Some(Label::None) | None => 0,
-        }
-    }
-}
-
-/// The bank of time-to-digital converters.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tdc {
-    /// Converters in the bank (for all detectors together).
-    pub converters: u32,
-    /// Length of a tick, fs.
-    pub tick_fs: i64,
-    /// Period of the counter of whole clock ticks, fs.
-    pub clock_fs: i64,
-    /// Time for which a converter is busy with one event, fs.
-    pub dead_fs: i64,
 }
 
 impl Design {

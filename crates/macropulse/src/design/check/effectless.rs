@@ -4,10 +4,11 @@
 //! where `--set` does not change what makes them meaningless. What a file inherits by `extends` may
 //! lie idle.
 
-use super::Check;
+use super::SensorFile;
 use crate::design::document::Typed;
-use crate::design::file::{Label, ReceiverKindFile, SensorFile};
-use crate::design::{Effect, Error};
+use crate::design::limits::Check;
+use crate::design::receiver::ReceiverKindFile;
+use crate::design::{Effect, Error, Label};
 
 /// A key without effect, the key of the setting that makes it so, and how.
 struct Idle {

@@ -1,25 +1,43 @@
 //! From typed keys to a checked `Design`: every limit is tested here, once.
 
-mod budget;
-mod code;
-mod detector;
 mod effectless;
-mod receiver;
 
 use std::sync::OnceLock;
 
-pub(super) use code::family;
+use serde::Deserialize;
 
-use super::detector::Before;
+use super::band::TOO_FINE;
+use super::budget::{self, BudgetFile, OpticsFile, SafetyFile};
+use super::coding::CodeFile;
+use super::detector::{Before, DetectorFile, Efficiency};
 use super::document::Chain;
-use super::file::SensorFile;
+use super::light::LightFile;
+use super::limits::Check;
+use super::receiver::{Inputs, ReceiverFile};
+use super::scan::ScanFile;
+use super::tdc::TdcFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
 use crate::units::{range_from_tof, s_from_fs};
 use macropulse_codec::decode::Receiver;
 
-/// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
-const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, if shots are not coded) with the \
-     jitter must be within 67 million ticks; use longer ticks or a shorter max_range_m";
+/// A sensor file as typed: keys with units, nothing checked yet but names and types.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::design) struct SensorFile {
+    pub version: u32,
+    pub name: String,
+    #[serde(default)]
+    pub summary: String,
+    pub idealised: Vec<String>,
+    pub scan: ScanFile,
+    pub light: LightFile,
+    pub code: Option<CodeFile>,
+    pub detector: DetectorFile,
+    pub optics: Option<OpticsFile>,
+    pub safety: Option<SafetyFile>,
+    pub tdc: TdcFile,
+    pub receiver: ReceiverFile,
+}
 
 /// The format this program reads.
 const VERSION: u32 = 1;
@@ -93,7 +111,7 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     // Of a list that cannot be read nothing follows for the motion of the beam.
     let moves = effects.is_some() && !off(Effect::MirrorMotion);
     let scan = faults.keep(check.scan(&file.scan, moves));
-    let tdc = faults.keep(check.tdc(file));
+    let tdc = faults.keep(check.tdc(&file.tdc));
     let coding = match (&scan, &tdc) {
         (Some(scan), Some(tdc)) => {
             faults.keep(check.share(tdc, scan));
@@ -115,8 +133,13 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let (idealised, scan, tdc, coding, light) = (effects?, scan?, tdc?, coding?, light?);
     let before =
         budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
-    let efficiency = detector::Efficiency::of(&file.detector);
-    let budget = faults.keep(check.budget(file, &before, &efficiency));
+    let efficiency = Efficiency::of(&file.detector);
+    let typed = BudgetFile {
+        optics: file.optics.as_ref(),
+        safety: file.safety.as_ref(),
+        energy: file.light.energy,
+    };
+    let budget = faults.keep(check.budget(&typed, &before, &efficiency));
     let before = Before {
         scan: &scan,
         light: &light,
@@ -128,8 +151,9 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     // Without a detector the receiver has no timing, of which none of its limits depends.
     let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
-    let inputs = receiver::Inputs { scan: &scan, tdc: &tdc, coding: &coding, timing };
-    let receiver = faults.keep(check.receiver(file, &inputs));
+    let inputs =
+        Inputs { detector: &file.detector, scan: &scan, tdc: &tdc, coding: &coding, timing };
+    let receiver = faults.keep(check.receiver(&file.receiver, &inputs));
     if !faults.is_empty() {
         return None;
     }
@@ -216,58 +240,7 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
     chain.error(&path, said)
 }
 
-/// Tests values, and tells where those that are wrong stand.
-pub(in crate::design) struct Check<'a> {
-    chain: &'a Chain,
-}
-
 impl Check<'_> {
-    pub(in crate::design) fn refuse<T>(
-        &self,
-        path: &str,
-        message: impl Into<String>,
-    ) -> Result<T, Error> {
-        Err(self.chain.error(path, message))
-    }
-
-    /// A number in [least, most]; NaN and infinities are refused by the same comparison.
-    pub(in crate::design) fn within(
-        &self,
-        path: &str,
-        value: f64,
-        least: f64,
-        most: f64,
-    ) -> Result<f64, Error> {
-        if value >= least && value <= most {
-            return Ok(value);
-        }
-        self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
-    }
-
-    pub(in crate::design) fn count(
-        &self,
-        path: &str,
-        value: u32,
-        least: u32,
-        most: u32,
-    ) -> Result<u32, Error> {
-        if (least..=most).contains(&value) {
-            return Ok(value);
-        }
-        self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
-    }
-
-    /// A duration that must be a whole, positive number of femtoseconds.
-    pub(in crate::design) fn whole_fs(&self, path: &str, picoseconds: f64) -> Result<i64, Error> {
-        let ps = self.within(path, picoseconds, 1e-3, 1e9)?;
-        let fs = (ps * 1e3).round();
-        if (ps * 1e3 - fs).abs() > 1e-6 * fs {
-            return self
-                .refuse(path, format!("is {ps} ps, but must be a whole number of femtoseconds"));
-        }
-        Ok(fs as i64)
-    }
-
     fn effects(&self, names: &[String]) -> Result<Vec<Effect>, Error> {
         let mut found = Vec::new();
         for name in names {

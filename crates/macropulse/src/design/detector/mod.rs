@@ -8,6 +8,7 @@
 //! list of this page, and a file in [`detect`](crate::detect). Nothing else knows the kinds.
 
 mod amplifier;
+mod check;
 mod geiger;
 mod linear;
 mod photon_counting;
@@ -17,6 +18,7 @@ mod table;
 use serde::Deserialize;
 
 pub use amplifier::Amplifier;
+pub(in crate::design) use check::Efficiency;
 pub use geiger::Geiger;
 pub use linear::{Linear, LinearSetting};
 pub use photon_counting::PhotonCounting;

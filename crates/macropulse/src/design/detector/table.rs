@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::Sensitivity;
 use crate::design::budget::Budget;
-use crate::design::check::Check;
+use crate::design::limits::Check;
 use crate::design::{Coding, Error, Light, Scan};
 
 /// The most dark counts, or declared background counts, per second.

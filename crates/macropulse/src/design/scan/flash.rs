@@ -6,7 +6,7 @@ use super::directions::{Angles, Directions};
 use super::model::{Extent, Model, Moment, cell_at, middles};
 use super::{Pattern, Sides, Typed};
 use crate::design::Error;
-use crate::design::check::Check;
+use crate::design::limits::Check;
 use crate::design::safety::Beams;
 
 /// Detectors of the largest flash: their numbers are 16 bits wide.

@@ -20,7 +20,7 @@ pub use raster::{Mirror, Raster};
 pub use spinning::{Firing, Spinning};
 
 use super::Error;
-use super::check::Check;
+use super::limits::Check;
 
 /// The list of all patterns: variant, file in this folder, and name in a sensor file. Every other
 /// list of them follows from this one.

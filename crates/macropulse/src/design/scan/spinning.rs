@@ -8,7 +8,7 @@ use super::directions::{Angles, Directions};
 use super::model::{Extent, Model, Moment};
 use super::{Pattern, Typed};
 use crate::design::Error;
-use crate::design::check::Check;
+use crate::design::limits::Check;
 use crate::design::safety::{Beams, Line, Lines};
 
 /// Fixed elevations on a turning head.

@@ -1,18 +1,18 @@
 //! From light to detection events: what holds for every kind of detector.
 
-use super::Check;
-use crate::design::detector::{Before, DetectorFile, Follows, Table};
-use crate::design::{Detector, Effect, Error};
+use super::{Before, Detector, DetectorFile, Follows, Table};
+use crate::design::limits::Check;
+use crate::design::{Effect, Error};
 
 /// The efficiency of a detector, detections per photon, as typed.
-pub(super) struct Efficiency {
+pub(in crate::design) struct Efficiency {
     /// Its dotted key.
     pub path: String,
     pub value: Option<f64>,
 }
 
 impl Efficiency {
-    pub(super) fn of(file: &DetectorFile) -> Self {
+    pub(in crate::design) fn of(file: &DetectorFile) -> Self {
         match file.given().next() {
             Some(given) => Self {
                 path: format!("detector.{}.efficiency", given.name),
@@ -24,7 +24,11 @@ impl Efficiency {
 }
 
 impl Check<'_> {
-    pub(super) fn detector(&self, file: &DetectorFile, before: &Before) -> Result<Detector, Error> {
+    pub(in crate::design) fn detector(
+        &self,
+        file: &DetectorFile,
+        before: &Before,
+    ) -> Result<Detector, Error> {
         if let Some(only) = file.only() {
             return only.file.check(&Table { check: self, name: only.name, before });
         }
@@ -35,7 +39,11 @@ impl Check<'_> {
 
     /// The effects that the detector does not follow and that are not declared as left out, each as
     /// an error.
-    pub(super) fn not_followed(&self, file: &DetectorFile, idealised: &[Effect]) -> Vec<Error> {
+    pub(in crate::design) fn not_followed(
+        &self,
+        file: &DetectorFile,
+        idealised: &[Effect],
+    ) -> Vec<Error> {
         let Some(only) = file.only() else { return Vec::new() };
         let Follows { bandwidth, neighbouring_chips } = only.file.follows();
         let told = |is_followed: bool, effect: Effect, how: &str| {

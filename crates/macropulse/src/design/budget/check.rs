@@ -2,17 +2,59 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use super::Check;
-use super::detector::Efficiency;
-use crate::design::budget::{Budget, Field, Trailing, solid_angle};
-use crate::design::file::{FieldFile, OpticsFile, SafetyFile, SensorFile};
+use serde::Deserialize;
+
+use super::{Budget, Field, Trailing, solid_angle};
+use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
+use crate::design::limits::Check;
 use crate::design::safety::{Class1, Limit, Sender, exposure, limits, strictest};
 use crate::design::{Coding, Effect, Error, Light, Scan};
 use crate::units::tof_from_range;
 
-/// What a budget is made of beside the file.
-pub(super) struct Parts<'a> {
+/// `[optics]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::design) struct OpticsFile {
+    aperture_mm: f64,
+    transmission: f64,
+    filter_nm: f64,
+    field: FieldFile,
+}
+
+/// What a detector looks at, as typed.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+enum FieldFile {
+    #[serde(rename = "staring")]
+    Staring,
+    #[serde(rename = "descanned")]
+    Descanned,
+    #[serde(rename = "in-flight")]
+    InFlight,
+    #[serde(rename = "trailing_pixels")]
+    TrailingPixels(f64),
+    #[serde(rename = "cone_mrad")]
+    ConeMrad(f64),
+}
+
+/// `[safety]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::design) struct SafetyFile {
+    distance_mm: f64,
+    count_lines: bool,
+}
+
+/// What the file says of a budget.
+pub(in crate::design) struct BudgetFile<'a> {
+    pub optics: Option<&'a OpticsFile>,
+    pub safety: Option<&'a SafetyFile>,
+    pub energy: Option<EnergyFile>,
+}
+
+/// What a budget is made of beside that.
+pub(in crate::design) struct Parts<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
     pub coding: &'a Coding,
@@ -21,9 +63,9 @@ pub(super) struct Parts<'a> {
 
 impl Check<'_> {
     /// The link budget; `None` where it is idealised away.
-    pub(super) fn budget(
+    pub(in crate::design) fn budget(
         &self,
-        file: &SensorFile,
+        file: &BudgetFile,
         parts: &Parts,
         efficiency: &Efficiency,
     ) -> Result<Option<Budget>, Error> {
@@ -38,7 +80,7 @@ impl Check<'_> {
             }
             return Ok(None);
         }
-        let (Some(optics), Some(safety)) = (&file.optics, &file.safety) else {
+        let (Some(optics), Some(safety)) = (file.optics, file.safety) else {
             return self.refuse(
                 "optics",
                 "the link budget is not idealised: it needs [optics], or \"link-budget\" in the \
@@ -51,7 +93,7 @@ impl Check<'_> {
         };
         let wavelength = parts.light.wavelength;
         let limits = self.limits(safety, parts)?;
-        let energy = self.energy(file, &limits, off(Effect::EyeSafety))?;
+        let energy = self.energy(file.energy, &limits, off(Effect::EyeSafety))?;
         Ok(Some(Budget {
             wavelength,
             energy,
@@ -64,10 +106,15 @@ impl Check<'_> {
         }))
     }
 
-    fn energy(&self, file: &SensorFile, limits: &[Limit], any_energy: bool) -> Result<f64, Error> {
+    fn energy(
+        &self,
+        typed: Option<EnergyFile>,
+        limits: &[Limit],
+        any_energy: bool,
+    ) -> Result<f64, Error> {
         let path = "light.energy";
         let strictest = strictest(limits);
-        let energy = match &file.light.energy {
+        let energy = match typed {
             None => {
                 return self.refuse(
                     path,
@@ -76,7 +123,7 @@ impl Check<'_> {
                 );
             }
             Some(EnergyFile::ShotNj(shot)) => {
-                self.within("light.energy.shot_nj", *shot, 1e-9, 1e12)? * 1e-9
+                self.within("light.energy.shot_nj", shot, 1e-9, 1e12)? * 1e-9
             }
             Some(EnergyFile::Class1) if any_energy => {
                 return self.refuse(

@@ -1,6 +1,10 @@
 //! Where the photons come from: energy, aperture and optics.
 
+mod check;
+
 use std::f64::consts::PI;
+
+pub(in crate::design) use check::{BudgetFile, OpticsFile, Parts, SafetyFile};
 
 use super::safety::Limit;
 use crate::units::{PLANCK, SPEED_OF_LIGHT};

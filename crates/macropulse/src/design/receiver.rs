@@ -1,13 +1,40 @@
-//! From detection events to returns: converters and receiver.
+//! From ticks to returns: `[receiver]`.
 
-use super::{Check, TOO_FINE};
-use crate::design::file::{ReceiverKindFile, SensorFile};
-use crate::design::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
+use serde::Deserialize;
+
+use super::band::TOO_FINE;
+use super::detector::DetectorFile;
+use super::limits::Check;
+use super::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
-use macropulse_codec::decode::{MOST_RETURNS, Pick, Receiver, ReceiverKind};
+use macropulse_codec::decode::{Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind};
+
+/// `[receiver]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReceiverFile {
+    pub kind: ReceiverKindFile,
+    effort: Effort,
+    false_alarm: f64,
+    bit_threshold: u32,
+    pub right_within_m: Option<f64>,
+    returns: u32,
+    pick: Option<Pick>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum ReceiverKindFile {
+    Literal,
+    Blind,
+    Matched,
+    Balanced,
+    Direct,
+}
 
 /// What a receiver is given beside its own section of the file.
 pub(super) struct Inputs<'a> {
+    pub detector: &'a DetectorFile,
     pub scan: &'a Scan,
     pub tdc: &'a Tdc,
     pub coding: &'a Coding,
@@ -16,46 +43,9 @@ pub(super) struct Inputs<'a> {
 }
 
 impl Check<'_> {
-    pub(super) fn tdc(&self, file: &SensorFile) -> Result<Tdc, Error> {
-        let tick_fs = self.whole_fs("tdc.resolution_ps", file.tdc.resolution_ps)?;
-        let clock_fs = self.whole_fs("tdc.clock_ps", file.tdc.clock_ps)?;
-        let bits = self.count("tdc.bits", file.tdc.bits, 1, 16)?;
-        if clock_fs % tick_fs != 0 {
-            return self.refuse("tdc.clock_ps", "must be a whole number of ticks (resolution_ps)");
-        }
-        if clock_fs / tick_fs > 1 << bits {
-            let message = format!(
-                "{bits} bits hold {} ticks, but a clock period has {}",
-                1 << bits,
-                clock_fs / tick_fs
-            );
-            return self.refuse("tdc.bits", message);
-        }
-        let dead = self.within("tdc.dead_time_ns", file.tdc.dead_time_ns, 0.0, 1e6)?;
-        Ok(Tdc {
-            converters: self.count("tdc.converters", file.tdc.converters, 1, 1 << 24)?,
-            tick_fs,
-            clock_fs,
-            dead_fs: fs_from_s(dead * 1e-9),
-        })
-    }
-
-    /// Whether each detector of `scan` has a converter.
-    pub(super) fn share(&self, tdc: &Tdc, scan: &Scan) -> Result<(), Error> {
-        let (converters, channels) = (tdc.converters, scan.channels());
-        if converters >= channels {
-            return Ok(());
-        }
-        let message = format!(
-            "is {converters}, but the bank is divided evenly among {channels} detectors: write \
-             {channels}, or more"
-        );
-        self.refuse("tdc.converters", message)
-    }
-
-    pub(super) fn receiver(&self, file: &SensorFile, inputs: &Inputs) -> Result<Receiver, Error> {
-        let &Inputs { scan, tdc, coding, timing } = inputs;
-        let kind = match file.receiver.kind {
+    pub(super) fn receiver(&self, file: &ReceiverFile, inputs: &Inputs) -> Result<Receiver, Error> {
+        let &Inputs { detector, scan, tdc, coding, timing } = inputs;
+        let kind = match file.kind {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
             ReceiverKindFile::Blind => ReceiverKind::Blind,
             ReceiverKindFile::Matched => ReceiverKind::Matched,
@@ -69,9 +59,8 @@ impl Check<'_> {
             );
         }
         self.can_read(kind, coding)?;
-        let (returns, pick) = self.returns(file, kind)?;
-        let (threshold, lightest) =
-            (file.receiver.bit_threshold, coding.codebook.lightest_word() as u32);
+        let (returns, pick) = self.returns(file, detector, kind)?;
+        let (threshold, lightest) = (file.bit_threshold, coding.codebook.lightest_word() as u32);
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         let light = ticks(scan.light_range);
@@ -80,18 +69,13 @@ impl Check<'_> {
         }
         Ok(Receiver {
             kind,
-            effort: file.receiver.effort,
+            effort: file.effort,
             gate_ticks: (gate.0 as u32, gate.1 as u32),
             light_ticks: light as u32,
             ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
             tick_fs: tdc.tick_fs,
             jitter_ticks: timing * 1e15 / tdc.tick_fs as f64,
-            false_alarm: self.within(
-                "receiver.false_alarm",
-                file.receiver.false_alarm,
-                1e-30,
-                0.5,
-            )?,
+            false_alarm: self.within("receiver.false_alarm", file.false_alarm, 1e-30, 0.5)?,
             bit_threshold: match kind {
                 ReceiverKind::Literal | ReceiverKind::Blind => {
                     self.count("receiver.bit_threshold", threshold, 1, lightest)? as u16
@@ -105,10 +89,14 @@ impl Check<'_> {
     }
 
     /// How many returns a shot may have at most, and which are kept of more.
-    fn returns(&self, file: &SensorFile, kind: ReceiverKind) -> Result<(u8, Pick), Error> {
-        let wanted =
-            self.count("receiver.returns", file.receiver.returns, 1, MOST_RETURNS.into())?;
-        let one_event = file.detector.given().find(|given| given.file.is_single_stop());
+    fn returns(
+        &self,
+        file: &ReceiverFile,
+        detector: &DetectorFile,
+        kind: ReceiverKind,
+    ) -> Result<(u8, Pick), Error> {
+        let wanted = self.count("receiver.returns", file.returns, 1, MOST_RETURNS.into())?;
+        let one_event = detector.given().find(|given| given.file.is_single_stop());
         let of_receiver =
             |name: &str| Some(format!("receiver.kind = \"{name}\" gives one return per shot"));
         let one_only = match kind {
@@ -125,7 +113,7 @@ impl Check<'_> {
                 let message = format!("is {wanted}, but {why}: leave it at 1");
                 return self.refuse("receiver.returns", message);
             }
-            if file.receiver.pick.is_some() {
+            if file.pick.is_some() {
                 return self
                     .refuse("receiver.pick", format!("has no effect, as {why}: leave it out"));
             }
@@ -138,7 +126,7 @@ impl Check<'_> {
             return self.refuse("receiver.returns", message);
         }
         let otherwise = if kind == ReceiverKind::Direct { Pick::First } else { Pick::Strongest };
-        Ok((wanted as u8, file.receiver.pick.unwrap_or(otherwise)))
+        Ok((wanted as u8, file.pick.unwrap_or(otherwise)))
     }
 
     /// Whether a receiver of this kind understands what is sent.

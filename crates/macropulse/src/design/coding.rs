@@ -1,9 +1,83 @@
-//! How shots are told apart.
+//! How shots are told apart: `[code]`.
 
-use super::Check;
-use crate::design::file::{CodeFile, FamilyFile, KeyingFile, OrthogonalFile, SparseFile};
-use crate::design::{Coding, Error, Label, Scan, Tdc};
-use macropulse_codec::code::{self, Codebook, Crc, Family, Keying, Payload};
+use serde::Deserialize;
+
+use super::family::{FamilyFile, family};
+use super::limits::Check;
+use super::{Error, Scan, Tdc};
+use macropulse_codec::code::{Codebook, Crc, Keying, Payload};
+
+/// `[code]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CodeFile {
+    family: FamilyFile,
+    chip_ps: f64,
+    keying: KeyingFile,
+    pub label: Label,
+    label_bits: u32,
+    crc: CrcFile,
+    sync_bit: bool,
+    allow_dark: bool,
+    word: WordFile,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum KeyingFile {
+    OnOff,
+    Inversion,
+}
+
+/// Which number a macropulse carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Label {
+    /// The column of its pixel.
+    Column,
+    /// None: a macropulse is one bare code word.
+    None,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CrcFile {
+    width: u8,
+    polynomial: u8,
+    init: u8,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WordFile {
+    first: u32,
+    modulus: u32,
+}
+
+/// How shots are told apart.
+#[derive(Debug, Clone)]
+pub struct Coding {
+    /// Marks of every label and word.
+    pub codebook: Codebook,
+    /// Length of a chip, fs; of the whole shot where it is not coded.
+    pub chip_fs: i64,
+    /// Which number a macropulse carries; `None` where shots are not coded.
+    pub label: Option<Label>,
+    /// The word of pixel `n` of a scan is `first_word + n mod word_modulus`.
+    pub first_word: u32,
+    /// See `first_word`.
+    pub word_modulus: u32,
+}
+
+impl Coding {
+    /// The number that a shot to `column` carries; 0 where it carries none.
+    pub fn label_of(&self, column: u16) -> u16 {
+        match self.label {
+            Some(Label::Column) => column,
+            Some(Label::None) | None => 0,
+        }
+    }
+}
 
 impl Check<'_> {
     pub(super) fn coding(
@@ -78,23 +152,5 @@ impl Check<'_> {
             return self.refuse("code.allow_dark", message);
         }
         Ok(payload)
-    }
-}
-
-/// The code family that a sensor file names.
-pub(in crate::design) fn family(file: FamilyFile) -> Result<Family, code::Error> {
-    match file {
-        FamilyFile::Prime(p) => Family::prime(p),
-        FamilyFile::ExtendedPrime(p) => Family::extended_prime(p),
-        FamilyFile::QuadraticCongruence(p) => Family::quadratic_congruence(p),
-        FamilyFile::ExtendedQuadraticCongruence(p) => Family::extended_quadratic_congruence(p),
-        FamilyFile::Orthogonal(OrthogonalFile { length, weight, words }) => {
-            Family::orthogonal(length, weight, words)
-        }
-        FamilyFile::Sparse(SparseFile { length, weight, words, seed }) => {
-            Family::sparse(length, weight, words, seed)
-        }
-        FamilyFile::MSequence(degree) => Family::m_sequence(degree),
-        FamilyFile::Gold(degree) => Family::gold(degree),
     }
 }

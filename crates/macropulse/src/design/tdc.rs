@@ -1,0 +1,70 @@
+//! From detection events to ticks: `[tdc]`.
+
+use serde::Deserialize;
+
+use super::limits::Check;
+use super::{Error, Scan};
+use crate::units::fs_from_s;
+
+/// `[tdc]` as typed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TdcFile {
+    converters: u32,
+    resolution_ps: f64,
+    clock_ps: f64,
+    bits: u32,
+    dead_time_ns: f64,
+}
+
+/// The bank of time-to-digital converters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tdc {
+    /// Converters in the bank (for all detectors together).
+    pub converters: u32,
+    /// Length of a tick, fs.
+    pub tick_fs: i64,
+    /// Period of the counter of whole clock ticks, fs.
+    pub clock_fs: i64,
+    /// Time for which a converter is busy with one event, fs.
+    pub dead_fs: i64,
+}
+
+impl Check<'_> {
+    pub(super) fn tdc(&self, file: &TdcFile) -> Result<Tdc, Error> {
+        let tick_fs = self.whole_fs("tdc.resolution_ps", file.resolution_ps)?;
+        let clock_fs = self.whole_fs("tdc.clock_ps", file.clock_ps)?;
+        let bits = self.count("tdc.bits", file.bits, 1, 16)?;
+        if clock_fs % tick_fs != 0 {
+            return self.refuse("tdc.clock_ps", "must be a whole number of ticks (resolution_ps)");
+        }
+        if clock_fs / tick_fs > 1 << bits {
+            let message = format!(
+                "{bits} bits hold {} ticks, but a clock period has {}",
+                1 << bits,
+                clock_fs / tick_fs
+            );
+            return self.refuse("tdc.bits", message);
+        }
+        let dead = self.within("tdc.dead_time_ns", file.dead_time_ns, 0.0, 1e6)?;
+        Ok(Tdc {
+            converters: self.count("tdc.converters", file.converters, 1, 1 << 24)?,
+            tick_fs,
+            clock_fs,
+            dead_fs: fs_from_s(dead * 1e-9),
+        })
+    }
+
+    /// Whether each detector of `scan` has a converter.
+    pub(super) fn share(&self, tdc: &Tdc, scan: &Scan) -> Result<(), Error> {
+        let (converters, channels) = (tdc.converters, scan.channels());
+        if converters >= channels {
+            return Ok(());
+        }
+        let message = format!(
+            "is {converters}, but the bank is divided evenly among {channels} detectors: write \
+             {channels}, or more"
+        );
+        self.refuse("tdc.converters", message)
+    }
+}
