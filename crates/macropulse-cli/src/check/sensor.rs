@@ -48,9 +48,9 @@ pub fn report(design: &Design, environment: &Environment) -> Result<Report, Faul
 fn at_work(design: &Design, operating: &Operating) -> Columns {
     let mut columns = Columns::default();
     let detector = design.detector.model();
-    let reach = design.scan.rated_range;
-    let transmission = short(operating.link.transmission(reach) * 100.0);
-    columns.push("air", format!("{transmission} % of the light gets {} m far", short(reach)));
+    let rated = design.scan.rated_range;
+    let transmission = short(operating.link.transmission(rated) * 100.0);
+    columns.push("air", format!("{transmission} % of the light gets {} m far", short(rated)));
     let counts = format!("{:.3e} counts a second in each detector", operating.background);
     columns.push(
         "sunlight",

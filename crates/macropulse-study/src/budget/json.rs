@@ -5,7 +5,7 @@ use macropulse::design::safety::{Class1, Limit, Rule};
 use macropulse::predict::verdict::Check;
 use serde_json::{Value, json};
 
-use super::{Figures, Reach};
+use super::{Farthest, Figures};
 
 impl Figures<'_> {
     /// All of it as one JSON object; the names of its keys end in their units.
@@ -48,7 +48,7 @@ impl Figures<'_> {
             "precision_bound_mm": there.bound * 1e3,
             "converter_loss": there.bank_loss,
             "mark_by_mark_shortfall": self.mark_by_mark,
-            "by_reflectance": self.reaches.iter().map(reach_json).collect::<Vec<_>>(),
+            "by_reflectance": self.farthest.iter().map(farthest_json).collect::<Vec<_>>(),
             "checks": self.checks.iter().map(check_json).collect::<Vec<_>>(),
             "first_failure": self.first_failure().map(check_json),
             "closes": self.closes(),
@@ -60,16 +60,16 @@ impl Figures<'_> {
     }
 }
 
-fn reach_json(reach: &Reach) -> Value {
+fn farthest_json(farthest: &Farthest) -> Value {
     json!({
-        "reflectance": reach.reflectance,
-        "photons_per_macropulse": finite(reach.there.photons_per_shot),
-        "snr": finite(reach.there.snr),
-        "pd": reach.there.pd,
-        "false_points_per_shot": reach.there.false_per_shot,
-        "precision_mm": reach.there.precision * 1e3,
-        "range_of_pd_m": reach.range,
-        "range_of_pd_at_night_m": reach.range_at_night,
+        "reflectance": farthest.reflectance,
+        "photons_per_macropulse": finite(farthest.there.photons_per_shot),
+        "snr": finite(farthest.there.snr),
+        "pd": farthest.there.pd,
+        "false_points_per_shot": farthest.there.false_per_shot,
+        "precision_mm": farthest.there.precision * 1e3,
+        "range_of_pd_m": farthest.range,
+        "range_of_pd_at_night_m": farthest.range_at_night,
     })
 }
 

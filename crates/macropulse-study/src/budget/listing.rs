@@ -4,7 +4,7 @@ use macropulse::channel::idealised as idealised_in;
 use macropulse::design::safety::ASSUMED;
 use macropulse::environment::Environment;
 
-use super::{Figures, Reach};
+use super::{Farthest, Figures};
 use crate::text::{Columns, section, short};
 
 impl Figures<'_> {
@@ -128,7 +128,7 @@ impl Figures<'_> {
             "target", "photons", "detected", "SNR", "Pd", "false", "precision", "range", "at night"
         );
         let metres = |range: Option<f64>| range.map_or("-".to_owned(), |r| format!("{r:.1} m"));
-        for Reach { reflectance, range, range_at_night, there } in &self.reaches {
+        for Farthest { reflectance, range, range_at_night, there } in &self.farthest {
             text += &format!(
                 "  {:>4.0} % {:>9} {:>9} {:>8} {:>8.4} {:>9.1e} {:>7.3} mm {:>9} {:>9}\n",
                 reflectance * 100.0,

@@ -26,7 +26,7 @@ pub const USUAL_PD: f64 = 0.9;
 /// False points per shot that are accepted where nothing else is said.
 pub const USUAL_FALSE_POINTS: f64 = 1e-4;
 
-/// What is wanted of `design` where nothing else is said, of a target at the reach of the sensor.
+/// What is wanted of `design` where nothing else is said, of a target at the rated range of the sensor.
 pub fn usual(design: &Design) -> Wanted {
     Wanted {
         reflectance: USUAL_REFLECTANCE,
@@ -57,12 +57,12 @@ pub struct Figures<'a> {
     /// What is to be expected of the target wanted, in the environment chosen.
     pub there: Forecast,
     /// How far each of [`REFLECTANCES`] is seen.
-    pub reaches: Vec<Reach>,
+    pub farthest: Vec<Farthest>,
 }
 
 /// How far a reflectance is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
+pub struct Farthest {
     /// Reflectance of the target; 1 is white.
     pub reflectance: f64,
     /// Farthest range with the Pd wanted in the environment chosen, m; `None` where there is none.
@@ -81,17 +81,17 @@ impl<'a> Figures<'a> {
     pub fn of(design: &'a Design, environment: Environment, wanted: Wanted) -> Result<Self, Error> {
         let chosen = Forecaster::new(design, &environment)?;
         let night = Forecaster::new(design, &environment.at_night())?;
-        let reach = |reflectance: f64| Reach {
+        let farthest = |reflectance: f64| Farthest {
             reflectance,
-            range: chosen.reach(wanted.pd, reflectance),
-            range_at_night: night.reach(wanted.pd, reflectance),
+            range: chosen.farthest(wanted.pd, reflectance),
+            range_at_night: night.farthest(wanted.pd, reflectance),
             there: chosen.forecast(reflectance, wanted.range),
         };
         Ok(Self {
             checks: checks(&chosen, &night, &wanted),
             mark_by_mark: mark_by_mark(&chosen, &wanted),
             there: chosen.forecast(wanted.reflectance, wanted.range),
-            reaches: REFLECTANCES.map(reach).into(),
+            farthest: REFLECTANCES.map(farthest).into(),
             design,
             environment,
             chosen,
@@ -149,6 +149,6 @@ mod tests {
         let figures = Figures::of(&design, Environment::default(), usual(&design)).unwrap();
         assert_eq!(figures.background_per_chip(), 0.0);
         assert!(figures.json()["background_photons_per_chip"].is_null());
-        assert_eq!(figures.reaches.len(), REFLECTANCES.len());
+        assert_eq!(figures.farthest.len(), REFLECTANCES.len());
     }
 }

@@ -114,7 +114,7 @@ fn listens(
     let opens = |shot: usize| log.fired_at_fs[shot] - after;
     let closes = |shot: usize| log.fired_at_fs[shot] + design.listening_fs() + before;
     let field = design.budget.as_ref().map(|budget| budget.field);
-    if let Some(field) = field.filter(|field| field.trailing.is_some()) {
+    if let Some(field) = field.filter(|field| field.co_scanned.is_some()) {
         return shot_at(design, log, pixel).is_some_and(|shot| {
             let since_fs = arrives_fs - log.fired_at_fs[shot];
             since_fs >= 0 && field.share(s_from_fs(since_fs)) > 0.0

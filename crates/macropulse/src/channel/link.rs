@@ -22,7 +22,7 @@ impl Link {
         Self {
             photons_at_one_metre: at_one_metre(design),
             extinction: environment.extinction(design.light.wavelength),
-            field: design.budget.as_ref().map(|b| b.field).filter(|f| f.trailing.is_some()),
+            field: design.budget.as_ref().map(|b| b.field).filter(|f| f.co_scanned.is_some()),
         }
     }
 

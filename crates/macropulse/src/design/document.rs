@@ -158,7 +158,7 @@ impl Chain {
         self
     }
 
-    /// Dotted paths of the values nobody wrote, with the value taken.
+    /// Dotted paths of the values that were left out, with the default taken.
     pub fn defaults_used(&self) -> Vec<(String, String)> {
         let written = &self.documents[..self.documents.len() - 1];
         let mut used = Vec::new();

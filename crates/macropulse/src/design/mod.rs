@@ -2,10 +2,11 @@
 //!
 //! 1. `document`: the text, what it extends, and the defaults become one table, and every value
 //!    remembers its line and column.
-//! 2. `file`: the table is read as typed keys.
-//! 3. `check`: every limit is tested once; what is left is SI units and integers.
+//! 2. Each section is a file of its own here: its keys as typed, their limits, and what they are in
+//!    SI units and integers.
+//! 3. `check` goes through the sections in their order and tells all that is wrong.
 //!
-//! A `Design` that exists is valid, and nobody downstream checks it again.
+//! A `Design` that exists is valid, and no stage checks it again.
 
 mod band;
 mod budget;
@@ -28,7 +29,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
-pub use budget::{Budget, Field, Trailing, solid_angle};
+pub use budget::{Budget, CoScanned, Field, solid_angle};
 pub use coding::{Coding, Label};
 pub use derived::Derived;
 pub use detector::Detector;
@@ -68,7 +69,7 @@ pub struct Design {
     pub right_within: f64,
     /// Effects that are left out.
     pub idealised: Vec<Effect>,
-    /// Values nobody wrote: dotted key and value.
+    /// Values taken from the defaults: dotted key and value.
     pub defaults: Vec<(String, String)>,
     /// What a user should know although it is no error.
     pub warnings: Vec<String>,
@@ -145,7 +146,7 @@ impl Design {
     }
 }
 
-/// Somebody wrote a wrong sensor file: where, and what to do. Where several things are wrong that
+/// A sensor file is wrong: where, and what to do. Where several things are wrong that
 /// do not follow from each other it says all of them, one to a line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}", self.sentences().collect::<Vec<_>>().join("\n"))]

@@ -47,7 +47,7 @@ impl Arrangement {
     /// Puts the pulse trains and the background of `light` and the shots of `log` in the order of
     /// their channels.
     pub fn fill(&mut self, design: &Design, clock: &Clock, log: &ShotLog, light: &Light) {
-        // What arrives later than a band is counted arrives when nobody listens.
+        // What arrives later than a band is counted arrives when no gate is open.
         let arrival = |(index, arrives_fs): (usize, &i64)| {
             let time = u32::try_from(clock.time(*arrives_fs).max(0)).ok()?;
             Some(u64::from(time) << 32 | index as u64)
@@ -156,8 +156,8 @@ impl Channel<'_> {
         self.light.arrivals_fs(index).map(|arrives_fs| self.clock.time(arrives_fs))
     }
 
-    /// Takes those of the last events of `found`, from place `from` on, out that came while nobody
-    /// listened.
+    /// Takes those of the last events of `found`, from place `from` on, out that came while no gate was
+    /// open.
     pub fn keep_what_is_listened_to(&self, found: &mut Detections, from: usize) {
         let mut spans = self.spans.iter().peekable();
         let mut kept = from;

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn the_halo_reaches_into_the_scan_before_and_is_absent_at_the_beginning() {
+    fn guard_shots_lie_in_the_scan_before_and_there_are_none_at_the_beginning() {
         let design = Design::open("kim-park-2016", &[]).unwrap();
         let log = bands(&design, 0).next().unwrap().shot_log(&design);
         assert_eq!((log.first, log.owned.start), (0, 0));

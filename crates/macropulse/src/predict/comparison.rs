@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_word_has_nobody_to_meet() {
+    fn a_single_word_meets_no_other() {
         let found = Comparison::of(Family::m_sequence(7).unwrap());
         assert_eq!((found.compared, found.crosses, found.matrix.len()), (1, (0, 0), 1));
         assert!(found.spread.0.is_nan() && found.users(2).is_none());

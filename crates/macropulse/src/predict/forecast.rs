@@ -193,7 +193,7 @@ impl<'a> Forecaster<'a> {
 
     /// The farthest range, m, at which a target of `reflectance` is seen with probability `pd`;
     /// `None` where it is not seen at the nearest.
-    pub fn reach(&self, pd: f64, reflectance: f64) -> Option<f64> {
+    pub fn farthest(&self, pd: f64, reflectance: f64) -> Option<f64> {
         let scan = &self.design.scan;
         let (nearest, farthest) = (scan.min_range.max(0.1), 20.0 * scan.max_range);
         let lost = |range: f64| self.forecast(reflectance, range).pd < pd;

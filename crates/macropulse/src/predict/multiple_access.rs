@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_disturbs_a_single_user_or_none() {
+    fn a_single_user_or_none_is_not_disturbed() {
         for users in [0, 1] {
             let alone = access(29, users, Words::All);
             assert_eq!(bit_error_gaussian(&alone), 0.0);

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use serde::Deserialize;
 
-use super::{Budget, Field, Trailing, solid_angle};
+use super::{Budget, CoScanned, Field, solid_angle};
 use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
 use crate::design::limits::Check;
@@ -32,8 +32,8 @@ enum FieldFile {
     Descanned,
     #[serde(rename = "in-flight")]
     InFlight,
-    #[serde(rename = "trailing_pixels")]
-    TrailingPixels(f64),
+    #[serde(rename = "co_scanned_pixels")]
+    CoScannedPixels(f64),
     #[serde(rename = "cone_mrad")]
     ConeMrad(f64),
 }
@@ -172,23 +172,23 @@ impl Check<'_> {
         let pixel = solid_angle(across, down);
         let pixel_period = scan.channel_period();
         let follows = scan.model().follows();
-        let trailing = |pixels: f64, solid_angle: f64| Field {
+        let co_scanned = |pixels: f64, solid_angle: f64| Field {
             solid_angle,
-            trailing: follows.then_some(Trailing { pixels, pixel_period }),
+            co_scanned: follows.then_some(CoScanned { pixels, pixel_period }),
         };
         if let FieldFile::ConeMrad(angle) = optics.field {
             let angle = self.within("optics.field.cone_mrad", angle, 1e-3, 1e3)? * 1e-3;
-            return Ok(trailing(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
+            return Ok(co_scanned(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
         }
         if let Some([horizontal, vertical]) = scan.model().shared_field() {
-            let strip = |pixels: f64| trailing(pixels, pixels * pixel);
+            let strip = |pixels: f64| co_scanned(pixels, pixels * pixel);
             return Ok(match optics.field {
                 FieldFile::Staring => {
-                    Field { solid_angle: solid_angle(horizontal, vertical), trailing: None }
+                    Field { solid_angle: solid_angle(horizontal, vertical), co_scanned: None }
                 }
                 FieldFile::InFlight => strip(1.0 + tof_from_range(scan.max_range) / pixel_period),
-                FieldFile::TrailingPixels(pixels) => strip(self.within(
-                    "optics.field.trailing_pixels",
+                FieldFile::CoScannedPixels(pixels) => strip(self.within(
+                    "optics.field.co_scanned_pixels",
                     pixels,
                     1.0,
                     rows * columns,
@@ -197,7 +197,7 @@ impl Check<'_> {
             });
         }
         match optics.field {
-            FieldFile::Descanned => Ok(trailing(1.0, pixel)),
+            FieldFile::Descanned => Ok(co_scanned(1.0, pixel)),
             _ => self.refuse(
                 "optics.field",
                 "each detector of a spinning or flash sensor looks at its own cell: use \
@@ -254,10 +254,10 @@ mod tests {
         let cell = field(UNEVEN, "\"descanned\"");
         // Steps of 1, 1, 4 and 2 degrees.
         assert_relative_eq!(cell.solid_angle, solid_angle(across, down), max_relative = 1e-12);
-        let trailing = cell.trailing.unwrap();
+        let co_scanned = cell.co_scanned.unwrap();
         // 720 columns ten times a second.
-        assert_eq!(trailing.pixels, 1.0);
-        assert_relative_eq!(trailing.pixel_period, 1.0 / 7200.0, max_relative = 1e-12);
+        assert_eq!(co_scanned.pixels, 1.0);
+        assert_relative_eq!(co_scanned.pixel_period, 1.0 / 7200.0, max_relative = 1e-12);
         let alone = field("{ lasers = 1, first_deg = 0.0, step_deg = -1.0 }", "\"descanned\"");
         assert_relative_eq!(alone.solid_angle, solid_angle(across, across), max_relative = 1e-12);
     }
@@ -271,16 +271,16 @@ mod tests {
             let solid_angle = cone(scan).solid_angle;
             assert_relative_eq!(solid_angle, FRAC_PI_4 * 4e-4, max_relative = 1e-12);
         }
-        assert!(cone(FLASH).trailing.is_none());
+        assert!(cone(FLASH).co_scanned.is_none());
         // 20 mrad are 1.15 pixels of a degree.
-        let pixels = cone(raster).trailing.unwrap().pixels;
+        let pixels = cone(raster).co_scanned.unwrap().pixels;
         assert_relative_eq!(pixels, (1.1459 + 1.0) / 2.0, max_relative = 1e-4);
     }
 
     #[test]
     fn fields_behind_a_single_beam_are_for_rasters_alone() {
         for scan in [&head(UNEVEN), FLASH] {
-            for field in ["\"staring\"", "\"in-flight\"", "{ trailing_pixels = 2.0 }"] {
+            for field in ["\"staring\"", "\"in-flight\"", "{ co_scanned_pixels = 2.0 }"] {
                 let told = sensor(scan, field).unwrap_err().to_string();
                 assert!(
                     told.contains("optics.field: each detector of a spinning or flash"),

@@ -36,12 +36,12 @@ pub struct Field {
     /// Solid angle, sr.
     pub solid_angle: f64,
     /// Where it follows the beam.
-    pub trailing: Option<Trailing>,
+    pub co_scanned: Option<CoScanned>,
 }
 
 /// A field that follows the beam along its line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trailing {
+pub struct CoScanned {
     /// Its length in pixels: from the one the beam is on back to those it has left.
     pub pixels: f64,
     /// Time between shots, s.
@@ -90,9 +90,9 @@ impl Field {
     /// after the shot was fired: 1 where the detector stares. A field of W pixels that follows
     /// the beam holds a spot L pixels behind it with the share W − L, between 0 and 1.
     pub fn share(&self, tof: f64) -> f64 {
-        match self.trailing {
+        match self.co_scanned {
             None => 1.0,
-            Some(Trailing { pixels, pixel_period }) => {
+            Some(CoScanned { pixels, pixel_period }) => {
                 (pixels - tof / pixel_period).clamp(0.0, 1.0)
             }
         }

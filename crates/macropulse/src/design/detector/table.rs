@@ -112,7 +112,7 @@ impl Table<'_> {
         })
     }
 
-    /// What is detected per mark of the budget: of a white target, at the reach, in clear air.
+    /// What is detected per mark of the budget: of a white target at the rated range in clear air.
     pub(super) fn honest(&self, budget: &Budget) -> Sensitivity {
         let Before { scan, coding, .. } = self.before;
         let energy = budget.energy / coding.codebook.mean_weight();
