@@ -15,8 +15,8 @@ use super::light::LightFile;
 use super::limits::Check;
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::tdc::TdcFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
+use crate::design::tdc::TdcFile;
 use crate::units::{range_from_tof, s_from_fs};
 use macropulse_codec::decode::Receiver;
 
