@@ -176,8 +176,8 @@ pub(super) fn light(
     let (Some(lax), Some(budget)) = (&lax.budget, &strict.budget) else { return Vec::new() };
     let derived = design.derived();
     let Pattern::Raster(raster) = &design.scan.pattern else { return Vec::new() };
-    let pitch = raster.horizontal / f64::from(raster.columns);
-    let pitch_down = raster.vertical / f64::from(raster.rows);
+    let pitch = raster.grid.horizontal / f64::from(raster.grid.columns);
+    let pitch_down = raster.grid.vertical / f64::from(raster.grid.rows);
     let wavelength = design.light.wavelength;
     let spread = diffraction(wavelength, design.light.beam_diameter);
     let spot = spread * design.scan.max_range;

@@ -38,7 +38,7 @@ pub use effect::Effect;
 pub use family::family_from_toml;
 pub use light::Light;
 pub use presets::{names as preset_names, text as preset_text};
-pub use scan::{Directions, Extent, Firing, Flash, Mirror, Pattern, Raster, Scan, Spinning};
+pub use scan::{Directions, Extent, Firing, Flash, Grid, Mirror, Pattern, Raster, Scan, Spinning};
 pub use tdc::Tdc;
 
 use crate::digest::Digest;

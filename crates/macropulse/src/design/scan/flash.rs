@@ -2,9 +2,9 @@
 
 use serde::Deserialize;
 
-use super::directions::{Angles, Directions};
-use super::model::{Extent, Model, Moment, cell_at, middles};
-use super::{Pattern, Sides, Typed};
+use super::grid::{self, Grid};
+use super::model::{Extent, Model, Moment};
+use super::{Directions, Pattern, Typed};
 use crate::design::Error;
 use crate::design::limits::Check;
 use crate::design::safety::Beams;
@@ -15,14 +15,8 @@ const MOST_DETECTORS: u32 = 1 << 16;
 /// Every direction at once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flash {
-    /// Rows of the image, from the top.
-    pub rows: u32,
-    /// Columns of the image, from the left.
-    pub columns: u32,
-    /// Full horizontal field, rad.
-    pub horizontal: f64,
-    /// Full vertical field, rad.
-    pub vertical: f64,
+    /// Its pixels, each with a detector.
+    pub grid: Grid,
 }
 
 /// `[scan.flash]` as typed.
@@ -37,14 +31,14 @@ pub(super) struct File {
 
 impl Typed for File {
     fn check(&self, check: &Check) -> Result<Pattern, Error> {
-        let [rows, columns] = check.pixels("flash", [self.rows, self.columns])?;
-        if rows * columns > MOST_DETECTORS {
+        let &Self { rows, columns, horizontal_deg, vertical_deg } = self;
+        let grid = grid::Typed { rows, columns, horizontal_deg, vertical_deg };
+        let grid = grid.check(check, "flash")?;
+        if grid.rows * grid.columns > MOST_DETECTORS {
             let message = format!("has more than {MOST_DETECTORS} detectors");
             return check.refuse("scan.flash", message);
         }
-        let sides = Sides { horizontal_deg: self.horizontal_deg, vertical_deg: self.vertical_deg };
-        let [horizontal, vertical] = check.sides("flash", &sides)?;
-        Ok(Pattern::Flash(Flash { rows, columns, horizontal, vertical }))
+        Ok(Pattern::Flash(Flash { grid }))
     }
 }
 
@@ -54,11 +48,11 @@ impl Model for Flash {
     }
 
     fn size(&self) -> [u32; 2] {
-        [self.rows, self.columns]
+        [self.grid.rows, self.grid.columns]
     }
 
     fn channels(&self) -> u32 {
-        self.rows * self.columns
+        self.grid.rows * self.grid.columns
     }
 
     fn channel_of(&self, order: u64, _row: u16) -> u16 {
@@ -66,12 +60,12 @@ impl Model for Flash {
     }
 
     fn pixel(&self, order: u64) -> (u16, u16) {
-        let columns = u64::from(self.columns);
+        let columns = u64::from(self.grid.columns);
         ((order / columns) as u16, (order % columns) as u16)
     }
 
     fn order_of(&self, row: u16, column: u16) -> u64 {
-        u64::from(row) * u64::from(self.columns) + u64::from(column)
+        u64::from(row) * u64::from(self.grid.columns) + u64::from(column)
     }
 
     fn moment(&self, _order: u64, _period: f64) -> Moment {
@@ -99,21 +93,19 @@ impl Model for Flash {
     }
 
     fn directions(&self) -> Directions {
-        let elevations = Angles::by_row(middles(self.vertical, self.rows));
-        Directions::new(&elevations, &Angles::by_column(middles(self.horizontal, self.columns)))
+        self.grid.directions()
     }
 
     fn pixel_at(&self, azimuth: f64, elevation: f64) -> Option<(u16, u16)> {
-        let row = cell_at(elevation, self.vertical, self.rows)?;
-        Some((row, cell_at(azimuth, self.horizontal, self.columns)?))
+        self.grid.cell_at(azimuth, elevation)
     }
 
     fn cell(&self) -> [f64; 2] {
-        [self.horizontal / f64::from(self.columns), self.vertical / f64::from(self.rows)]
+        self.grid.cell()
     }
 
     fn extent(&self) -> Extent {
-        Extent::centred([self.horizontal, self.vertical])
+        self.grid.extent()
     }
 
     fn shared_field(&self) -> Option<[f64; 2]> {
@@ -125,6 +117,6 @@ impl Model for Flash {
     }
 
     fn beams(&self) -> Beams {
-        Beams::Flood([self.horizontal, self.vertical])
+        Beams::Flood(self.grid.sides())
     }
 }

@@ -6,6 +6,7 @@
 
 mod directions;
 mod flash;
+mod grid;
 mod model;
 mod raster;
 mod spinning;
@@ -14,6 +15,7 @@ use serde::Deserialize;
 
 pub use directions::Directions;
 pub use flash::Flash;
+pub use grid::Grid;
 pub use model::Extent;
 pub(crate) use model::Model;
 pub use raster::{Mirror, Raster};
@@ -174,12 +176,6 @@ const MOST_PIXELS: u64 = 1 << 25;
 /// twice the range a surface brings a quarter of the light at most.
 const LIGHT_BEYOND_GATE: f64 = 2.0;
 
-/// Full angles of a field as typed.
-struct Sides {
-    horizontal_deg: f64,
-    vertical_deg: f64,
-}
-
 impl Check<'_> {
     pub(super) fn scan(&self, file: &ScanFile, moves: bool) -> Result<Scan, Error> {
         let rate = self.within("scan.scans_per_s", file.scans_per_s, 1e-3, 1e5)?;
@@ -222,25 +218,5 @@ impl Check<'_> {
             moves,
             pattern,
         })
-    }
-
-    /// Rows and columns of the pattern of this `name`.
-    fn pixels(&self, name: &str, [rows, columns]: [u32; 2]) -> Result<[u32; 2], Error> {
-        Ok([
-            self.count(&format!("scan.{name}.rows"), rows, 1, 1 << 14)?,
-            self.count(&format!("scan.{name}.columns"), columns, 1, 1 << 15)?,
-        ])
-    }
-
-    /// Width and height, rad, of the field of the pattern of this `name`.
-    fn sides(&self, name: &str, typed: &Sides) -> Result<[f64; 2], Error> {
-        let side = |key: &str, typed, most| {
-            let checked = self.within(&format!("scan.{name}.{key}"), typed, 1e-3, most);
-            checked.map(f64::to_radians)
-        };
-        Ok([
-            side("horizontal_deg", typed.horizontal_deg, 360.0)?,
-            side("vertical_deg", typed.vertical_deg, 180.0)?,
-        ])
     }
 }

@@ -96,15 +96,3 @@ impl Extent {
         Self { azimuth, elevation }
     }
 }
-
-/// Middles, rad, of `cells` equal cells of a `field` about the forward direction, from the left to
-/// the right or from the top down.
-pub(super) fn middles(field: f64, cells: u32) -> impl Iterator<Item = f64> {
-    (0..cells).map(move |cell| field * (0.5 - (f64::from(cell) + 0.5) / f64::from(cells)))
-}
-
-/// The cell, of `cells` equal ones of a `field`, in which the direction `angle` lies, rad.
-pub(super) fn cell_at(angle: f64, field: f64, cells: u32) -> Option<u16> {
-    let cell = ((0.5 - angle / field) * f64::from(cells)).floor();
-    (0.0..f64::from(cells)).contains(&cell).then_some(cell as u16)
-}

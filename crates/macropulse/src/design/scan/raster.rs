@@ -4,9 +4,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde::Deserialize;
 
-use super::directions::{Angles, Directions};
-use super::model::{Extent, Model, Moment, cell_at, middles};
-use super::{Pattern, Sides, Typed};
+use super::grid::{self, Grid};
+use super::model::{Extent, Model, Moment};
+use super::{Directions, Pattern, Typed};
 use crate::design::Error;
 use crate::design::limits::Check;
 use crate::design::safety::{Beams, Line, Lines};
@@ -14,14 +14,8 @@ use crate::design::safety::{Beams, Line, Lines};
 /// One beam, line by line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// Rows of the image, from the top.
-    pub rows: u32,
-    /// Columns of the image, from the left.
-    pub columns: u32,
-    /// Full horizontal field, rad.
-    pub horizontal: f64,
-    /// Full vertical field, rad.
-    pub vertical: f64,
+    /// Its pixels: a line is a row.
+    pub grid: Grid,
     /// Motion of the fast axis.
     pub mirror: Mirror,
     /// Fraction of the line time in which shots are fired.
@@ -68,12 +62,11 @@ pub(super) struct File {
 
 impl Typed for File {
     fn check(&self, check: &Check) -> Result<Pattern, Error> {
-        let [rows, columns] = check.pixels("raster", [self.rows, self.columns])?;
-        let sides = Sides { horizontal_deg: self.horizontal_deg, vertical_deg: self.vertical_deg };
-        let [horizontal, vertical] = check.sides("raster", &sides)?;
+        let &Self { rows, columns, horizontal_deg, vertical_deg, mirror, .. } = self;
+        let grid = grid::Typed { rows, columns, horizontal_deg, vertical_deg };
+        let grid = grid.check(check, "raster")?;
         let duty = check.within("scan.raster.duty", self.duty, 0.01, 1.0)?;
-        let mirror = self.mirror;
-        Ok(Pattern::Raster(Raster { rows, columns, horizontal, vertical, mirror, duty }))
+        Ok(Pattern::Raster(Raster { grid, mirror, duty }))
     }
 }
 
@@ -90,7 +83,7 @@ impl Model for Raster {
     }
 
     fn size(&self) -> [u32; 2] {
-        [self.rows, self.columns]
+        [self.grid.rows, self.grid.columns]
     }
 
     fn channels(&self) -> u32 {
@@ -102,14 +95,14 @@ impl Model for Raster {
     }
 
     fn pixel(&self, order: u64) -> (u16, u16) {
-        let columns = u64::from(self.columns);
+        let columns = u64::from(self.grid.columns);
         let (line, across) = (order / columns, order % columns);
         let column = if self.comes_back(line) { columns - 1 - across } else { across };
         (line as u16, column as u16)
     }
 
     fn order_of(&self, row: u16, column: u16) -> u64 {
-        let (line, columns) = (u64::from(row), u64::from(self.columns));
+        let (line, columns) = (u64::from(row), u64::from(self.grid.columns));
         let column = u64::from(column);
         line * columns + if self.comes_back(line) { columns - 1 - column } else { column }
     }
@@ -118,9 +111,9 @@ impl Model for Raster {
         if self.equal_steps() {
             return Moment { shots: order, then: 0.0 };
         }
-        let columns = u64::from(self.columns);
+        let columns = u64::from(self.grid.columns);
         let across = (order % columns) as f64 / columns as f64;
-        let line = period / f64::from(self.rows);
+        let line = period / f64::from(self.grid.rows);
         let then = line * self.mirror.moment(self.duty, across);
         Moment { shots: order / columns * columns, then }
     }
@@ -130,7 +123,7 @@ impl Model for Raster {
     }
 
     fn line(&self) -> u64 {
-        self.columns.into()
+        self.grid.columns.into()
     }
 
     fn draws_from_the_left(&self) -> bool {
@@ -142,7 +135,7 @@ impl Model for Raster {
             Mirror::Uniform => pixel_period * self.duty,
             Mirror::Sinusoidal => {
                 // Position sin(π·s) for s in ±duty/2 of the line time, scaled to ±1 at the ends.
-                let columns = f64::from(self.columns);
+                let columns = f64::from(self.grid.columns);
                 let end = (FRAC_PI_2 * self.duty).sin();
                 pixel_period * columns * 2.0 / PI * (end / columns).asin()
             }
@@ -150,29 +143,27 @@ impl Model for Raster {
     }
 
     fn moves_by(&self) -> Option<f64> {
-        Some(self.horizontal / f64::from(self.columns))
+        Some(self.grid.cell()[0])
     }
 
     fn directions(&self) -> Directions {
-        let elevations = Angles::by_row(middles(self.vertical, self.rows));
-        Directions::new(&elevations, &Angles::by_column(middles(self.horizontal, self.columns)))
+        self.grid.directions()
     }
 
     fn pixel_at(&self, azimuth: f64, elevation: f64) -> Option<(u16, u16)> {
-        let row = cell_at(elevation, self.vertical, self.rows)?;
-        Some((row, cell_at(azimuth, self.horizontal, self.columns)?))
+        self.grid.cell_at(azimuth, elevation)
     }
 
     fn cell(&self) -> [f64; 2] {
-        [self.horizontal / f64::from(self.columns), self.vertical / f64::from(self.rows)]
+        self.grid.cell()
     }
 
     fn extent(&self) -> Extent {
-        Extent::centred([self.horizontal, self.vertical])
+        self.grid.extent()
     }
 
     fn shared_field(&self) -> Option<[f64; 2]> {
-        Some([self.horizontal, self.vertical])
+        Some(self.grid.sides())
     }
 
     fn follows(&self) -> bool {
@@ -180,10 +171,9 @@ impl Model for Raster {
     }
 
     fn beams(&self) -> Beams {
-        let step = self.horizontal / f64::from(self.columns);
-        let first = (self.horizontal - step) / 2.0;
-        let rows = middles(self.vertical, self.rows);
-        let rows = rows.map(|elevation| Line { elevation, first }).collect();
+        let step = self.grid.cell()[0];
+        let first = (self.grid.horizontal - step) / 2.0;
+        let rows = self.grid.elevations().map(|elevation| Line { elevation, first }).collect();
         Beams::Lines(Lines { rows, step, first, one_by_one: true })
     }
 }
