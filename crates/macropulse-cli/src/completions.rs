@@ -1,10 +1,9 @@
 //! `macropulse completions`: what the shell needs to complete commands and options.
 
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
 use crate::fault::Fault;
-use crate::options::Options;
 
 /// Print the completions for a shell
 #[derive(Args)]
@@ -15,8 +14,9 @@ pub struct Completions {
     shell: Shell,
 }
 
-pub fn run(options: &Completions) -> Result<(), Fault> {
+/// Prints the completions of `command`.
+pub fn run(options: &Completions, mut command: clap::Command) -> Result<(), Fault> {
     let mut script = Vec::new();
-    clap_complete::generate(options.shell, &mut Options::command(), "macropulse", &mut script);
+    clap_complete::generate(options.shell, &mut command, "macropulse", &mut script);
     crate::text::print(&String::from_utf8_lossy(&script))
 }

@@ -22,10 +22,40 @@ mod text;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser, Subcommand};
 
 use fault::Fault;
-use options::{Command, Options};
+use options::Common;
+
+/// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
+/// it, get a point cloud.
+#[derive(Parser)]
+#[command(name = "macropulse", version, max_term_width = 100)]
+#[command(after_help = "Example:
+  macropulse simulate --sensor kim-park-2016-fixed --scene car-30m -o out")]
+struct Options {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What there is to do; one file each.
+#[derive(Subcommand)]
+enum Command {
+    Simulate(simulate::Simulate),
+    Sweep(sweep::Sweep),
+    Paper(paper::Paper),
+    Sensors(sensors::Sensors),
+    Scenes(scenes::Scenes),
+    Environments(environments::Environments),
+    Check(check::Check),
+    Budget(budget::Budget),
+    Codes(codes::Codes),
+    Encode(encode::Encode),
+    Speed(speed::Speed),
+    Completions(completions::Completions),
+}
 
 fn main() -> ExitCode {
     let done = match Options::try_parse() {
@@ -56,6 +86,24 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
         Command::Speed(speed) => speed::run(speed, common),
-        Command::Completions(completions) => completions::run(completions),
+        Command::Completions(completions) => completions::run(completions, Options::command()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_options_do_not_contradict_each_other() {
+        Options::command().debug_assert();
+    }
+
+    #[test]
+    fn the_help_of_every_command_ends_with_an_example() {
+        for command in Options::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("  macropulse "), "{}", command.get_name());
+        }
     }
 }

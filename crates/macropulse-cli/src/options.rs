@@ -1,46 +1,12 @@
 //! What every command understands.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, ValueEnum};
 use macropulse::design::{self, WITH, WITHOUT};
 use macropulse::environment::{self, Environment};
 use macropulse::names::nearest;
 use macropulse::scene;
 
 use crate::fault::Fault;
-use crate::{
-    budget, check, codes, completions, encode, environments, paper, scenes, sensors, simulate,
-    speed, sweep,
-};
-
-/// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
-/// it, get a point cloud.
-#[derive(Parser)]
-#[command(name = "macropulse", version, max_term_width = 100)]
-#[command(after_help = "Example:
-  macropulse simulate --sensor kim-park-2016-fixed --scene car-30m -o out")]
-pub struct Options {
-    #[command(flatten)]
-    pub common: Common,
-    #[command(subcommand)]
-    pub command: Command,
-}
-
-/// One file each.
-#[derive(Subcommand)]
-pub enum Command {
-    Simulate(simulate::Simulate),
-    Sweep(sweep::Sweep),
-    Paper(paper::Paper),
-    Sensors(sensors::Sensors),
-    Scenes(scenes::Scenes),
-    Environments(environments::Environments),
-    Check(check::Check),
-    Budget(budget::Budget),
-    Codes(codes::Codes),
-    Encode(encode::Encode),
-    Speed(speed::Speed),
-    Completions(completions::Completions),
-}
 
 /// Options of every command.
 #[derive(Args)]
@@ -222,25 +188,11 @@ fn change(typed: &str) -> Result<(String, String), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
-
-    #[test]
-    fn the_options_do_not_contradict_each_other() {
-        Options::command().debug_assert();
-    }
 
     #[test]
     fn a_change_has_a_key_and_a_value() {
         assert_eq!(change("a.b = 1"), Ok(("a.b".to_owned(), "1".to_owned())));
         assert_eq!(change("a=b=c"), Ok(("a".to_owned(), "b=c".to_owned())));
         assert!(change("a").is_err() && change("=1").is_err() && change("a=").is_err());
-    }
-
-    #[test]
-    fn the_help_of_every_command_ends_with_an_example() {
-        for command in Options::command().get_subcommands() {
-            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-            assert!(help.contains("  macropulse "), "{}", command.get_name());
-        }
     }
 }

@@ -8,6 +8,7 @@
 //! of that one, and the share d of all places that are lit anyway if it is of the other. The return
 //! is given up where the light is of the earlier shot with odds of [`ODDS`] to one.
 
+use std::cell::Cell;
 use std::ops::Range;
 
 use super::timeline::Timeline;
@@ -17,6 +18,15 @@ use crate::{ShotLog, Ticks};
 
 /// One return in so many that is held against an earlier shot may be given up wrongly.
 const ODDS: f64 = 1000.0;
+
+/// Places, in bits beside the begin of a return, at which its code word may be looked for: those of
+/// the bits of an earlier shot that begins as many bits before or behind it.
+const PLACES: usize = 96;
+
+thread_local! {
+    /// Kept from band to band: fresh memory costs more than what is done with it.
+    static MEMORY: Cell<Vec<u64>> = Cell::default();
+}
 
 /// Takes the returns out of `returns` that light from beyond the gate accounts for better.
 pub(super) fn exclude(
@@ -33,7 +43,7 @@ pub(super) fn exclude(
     let fired = receiver.all_fired(log);
     // Half of the window in which a mark is looked for, and rounding.
     let slack = 1 + (2.0 * receiver.jitter_ticks).ceil().min(super::FARTHEST_JITTER / 2.0) as u32;
-    let timeline = receiver.timeline(codebook, &fired, ticks).dilated(slack, slack);
+    let timeline = receiver.timeline(codebook, &fired, ticks, MEMORY.take()).dilated(slack, slack);
     // At most so many are lit: neighbours overlap.
     let lit = ticks.tick.len() as f64 * f64::from(2 * slack + 1);
     let lasts =
@@ -49,6 +59,7 @@ pub(super) fn exclude(
         }
     }
     *returns = kept;
+    MEMORY.set(bench.timeline.into_memory());
 }
 
 /// What a return is held against.
@@ -73,66 +84,131 @@ impl Bench<'_> {
         let bits = self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
         let beyond =
             i64::from(self.receiver.gate_ticks.1) + 1..=i64::from(self.receiver.light_ticks);
+        let word = self.log.word[one.shot];
+        let mut counts = Counts { word, first: arrives - bits * bit, bit, lit: [None; PLACES] };
         self.earlier(one.shot, arrives, bits * bit).any(|shot| {
             (1 - bits..bits).any(|shift| {
                 let begins = arrives + shift * bit;
                 beyond.contains(&(begins - self.fired[shot]))
-                    && self.begins_like(shot, begins, one)
-                    && self
-                        .is_rather(Sent { shot, begins }, Sent { shot: one.shot, begins: arrives })
+                    && self.begins_like(shot, begins, one, &mut counts)
+                    && self.is_rather(
+                        Sent { shot, begins },
+                        Sent { shot: one.shot, begins: arrives },
+                        &mut counts,
+                    )
             })
         })
     }
 
     /// Whether the first bit of `shot`, begun at tick `begins`, is lit at least half as much as the
     /// marks of `one` are. Nearly every shot is refused here.
-    fn begins_like(&self, shot: usize, begins: i64, one: &Return) -> bool {
+    fn begins_like(&self, shot: usize, begins: i64, one: &Return, counts: &mut Counts) -> bool {
+        let lit = match self.bits(shot).next() {
+            Some(bit) if !self.codebook.zeros_are_lit() => {
+                self.lit_at(counts, begins + counts.bit * bit)
+            }
+            _ => self.lit_of(self.first_bit(shot), begins),
+        };
+        2 * lit * usize::from(one.marks) >= self.first_bit(shot).len() * usize::from(one.peak)
+    }
+
+    /// The numbers of the bits of `shot` that are lit, the one sent first being 0; ascending.
+    fn bits(&self, shot: usize) -> impl Iterator<Item = i64> {
+        let first_chips = self.codebook.lit_bits(self.log.label[shot]).iter();
+        first_chips.map(|chip| i64::from(chip / self.codebook.family().length()))
+    }
+
+    /// The marks of the first bit of `shot` that is lit.
+    fn first_bit(&self, shot: usize) -> &[u16] {
         let marks = self.marks(shot);
-        let first = &marks[..marks.len().min(self.codebook.family().weight())];
-        let lit = first.iter().filter(|mark| self.is_lit(begins, **mark)).count();
-        2 * lit * usize::from(one.marks) >= first.len() * usize::from(one.peak)
+        &marks[..marks.len().min(self.codebook.family().weight())]
     }
 
     /// Whether light is rather of the `earlier` macropulse than of the `later` one.
-    fn is_rather(&self, earlier: Sent, later: Sent) -> bool {
-        let scale = i64::from(self.receiver.ticks_per_chip);
-        let places = |sent: Sent| {
-            self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
+    fn is_rather(&self, earlier: Sent, later: Sent, counts: &mut Counts) -> bool {
+        let Compared { both, of_earlier, of_later } = match self.codebook.zeros_are_lit() {
+            true => self.compared_by_marks(earlier, later),
+            false => self.compared_by_bits(earlier, later, counts),
         };
-        let (mut both, mut of_earlier, mut of_later) = ([0; 2], [0; 2], [0; 2]);
-        let count = |counts: &mut [usize; 2], place: i64| {
-            counts[0] += usize::from(self.timeline.has(place));
-            counts[1] += 1;
-        };
-        let (mut earlier, mut later) = (places(earlier).peekable(), places(later).peekable());
-        loop {
-            match (earlier.peek().copied(), later.peek().copied()) {
-                (None, None) => break,
-                (Some(one), Some(other)) if one == other => {
-                    count(&mut both, one);
-                    earlier.next();
-                    later.next();
-                }
-                (Some(one), other) if other.is_none_or(|other| one < other) => {
-                    count(&mut of_earlier, one);
-                    earlier.next();
-                }
-                (_, Some(other)) => {
-                    count(&mut of_later, other);
-                    later.next();
-                }
-                (Some(_), None) => break,
-            }
-        }
-        let lit = (both[0] as f64 + 0.5) / (both[1] as f64 + 1.0);
+        let lit = (both.lit as f64 + 0.5) / (both.all as f64 + 1.0);
         if lit <= self.density {
             return false;
         }
         // What each mark says in favour of a macropulse that has it: ln(c/d), or ln((1 − c)/(1 − d)).
         let (found, missing) =
             (libm::log(lit / self.density), libm::log((1.0 - lit) / (1.0 - self.density)));
-        let speaks = |[lit, all]: [usize; 2]| lit as f64 * found + (all - lit) as f64 * missing;
+        let speaks =
+            |marks: Marks| marks.lit as f64 * found + (marks.all - marks.lit) as f64 * missing;
         speaks(of_earlier) - speaks(of_later) > libm::log(ODDS)
+    }
+
+    /// Bit by bit, where a bit that is 0 is dark: both are in the same word, so that what is lit of
+    /// it at a place is counted once for all shots.
+    fn compared_by_bits(&self, earlier: Sent, later: Sent, counts: &mut Counts) -> Compared {
+        let all_bits = |sent: Sent| self.bits(sent.shot).fold(0_u64, |all, bit| all | 1 << bit);
+        let (of_earlier, of_later) = (all_bits(earlier), all_bits(later));
+        let shift = (earlier.begins - later.begins) / counts.bit;
+        let has = |bits: u64, bit: i64| (0..64).contains(&bit) && bits >> bit & 1 == 1;
+        let all = self.codebook.family().weight();
+        let mut compared = Compared::default();
+        for bit in self.bits(later.shot) {
+            let lit = self.lit_at(counts, later.begins + counts.bit * bit);
+            let shared = has(of_earlier, bit - shift);
+            let marks = if shared { &mut compared.both } else { &mut compared.of_later };
+            marks.add(Marks { lit, all });
+        }
+        for bit in self.bits(earlier.shot).filter(|bit| !has(of_later, bit + shift)) {
+            let lit = self.lit_at(counts, earlier.begins + counts.bit * bit);
+            compared.of_earlier.add(Marks { lit, all });
+        }
+        compared
+    }
+
+    /// Mark by mark.
+    fn compared_by_marks(&self, earlier: Sent, later: Sent) -> Compared {
+        let scale = i64::from(self.receiver.ticks_per_chip);
+        let places = |sent: Sent| {
+            self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
+        };
+        let mut compared = Compared::default();
+        let mark = |place: i64| Marks { lit: usize::from(self.timeline.has(place)), all: 1 };
+        let (mut earlier, mut later) = (places(earlier).peekable(), places(later).peekable());
+        loop {
+            match (earlier.peek().copied(), later.peek().copied()) {
+                (None, None) => return compared,
+                (Some(one), Some(other)) if one == other => {
+                    compared.both.add(mark(one));
+                    earlier.next();
+                    later.next();
+                }
+                (Some(one), other) if other.is_none_or(|other| one < other) => {
+                    compared.of_earlier.add(mark(one));
+                    earlier.next();
+                }
+                (_, Some(other)) => {
+                    compared.of_later.add(mark(other));
+                    later.next();
+                }
+                (Some(_), None) => return compared,
+            }
+        }
+    }
+
+    /// How many marks are lit of the code word of `counts` if it begins at tick `begins`.
+    fn lit_at(&self, counts: &mut Counts, begins: i64) -> usize {
+        let count = || self.lit_of(&self.codebook.word(counts.word).marks, begins);
+        let place = usize::try_from((begins - counts.first) / counts.bit).ok();
+        match place.and_then(|place| counts.lit.get_mut(place)) {
+            Some(known) => *known.get_or_insert_with(count),
+            None => count(),
+        }
+    }
+
+    /// How many of `marks` are lit if what they belong to begins at tick `begins`.
+    fn lit_of(&self, marks: &[u16], begins: i64) -> usize {
+        let scale = i64::from(self.receiver.ticks_per_chip);
+        let is_lit = |mark: &&u16| self.timeline.has(begins + scale * i64::from(**mark));
+        marks.iter().filter(is_lit).count()
     }
 
     /// The shots before `shot`, in the same word, of which light from beyond the gate can arrive
@@ -149,11 +225,40 @@ impl Bench<'_> {
     fn marks(&self, shot: usize) -> &[u16] {
         self.codebook.marks(self.log.label[shot], self.log.word[shot])
     }
+}
 
-    /// Whether light came about where a mark is, of a macropulse begun at tick `begins`.
-    fn is_lit(&self, begins: i64, mark: u16) -> bool {
-        self.timeline.has(begins + i64::from(self.receiver.ticks_per_chip) * i64::from(mark))
+/// How many marks of a code word are lit where it begins whole bits beside a return, as far as
+/// they were counted.
+struct Counts {
+    /// Index of the code word.
+    word: u16,
+    /// The first place, in ticks.
+    first: i64,
+    /// From place to place, in ticks.
+    bit: i64,
+    lit: [Option<usize>; PLACES],
+}
+
+/// Marks, and how many of them are lit.
+#[derive(Clone, Copy, Default)]
+struct Marks {
+    lit: usize,
+    all: usize,
+}
+
+impl Marks {
+    fn add(&mut self, more: Self) {
+        self.lit += more.lit;
+        self.all += more.all;
     }
+}
+
+/// The marks of two macropulses.
+#[derive(Default)]
+struct Compared {
+    both: Marks,
+    of_earlier: Marks,
+    of_later: Marks,
 }
 
 /// A macropulse: of which shot, and when it begins to arrive, in ticks.

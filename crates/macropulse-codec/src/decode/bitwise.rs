@@ -112,7 +112,7 @@ impl<'a> Band<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &Ticks) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.all_fired(log);
-        let queue = receiver.timeline(codebook, &fired, ticks);
+        let queue = receiver.timeline(codebook, &fired, ticks, Vec::new());
         let scale = i64::from(receiver.ticks_per_chip);
         let in_ticks = |word: usize| -> Vec<i64> {
             codebook.word(word as u16).marks.iter().map(|&mark| scale * i64::from(mark)).collect()
@@ -135,7 +135,7 @@ impl<'a> Band<'a> {
             bits,
             bit_length: scale * i64::from(codebook.chips() / bits),
             slack,
-            seen: queue.dilated(slack, slack),
+            seen: queue.clone().dilated(slack, slack),
             queue,
             claims: vec![None; fired.len()],
             runner_up: vec![0; fired.len()],

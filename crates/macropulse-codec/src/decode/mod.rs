@@ -214,8 +214,14 @@ impl Receiver {
         log.fired_at_fs.iter().map(ticks).collect()
     }
 
-    /// The ticks in which light of shots that were `fired` can arrive.
-    fn timeline(&self, codebook: &Codebook, fired: &[i64], ticks: &Ticks) -> Timeline {
+    /// The ticks in which light of shots that were `fired` can arrive; in `memory`, whatever is in it.
+    fn timeline(
+        &self,
+        codebook: &Codebook,
+        fired: &[i64],
+        ticks: &Ticks,
+        memory: Vec<u64>,
+    ) -> Timeline {
         let absolute = |tick: Option<&u32>| ticks.epoch + i64::from(tick.copied().unwrap_or(0));
         let (nearest, farthest) = self.gate_ticks;
         let length = codebook.chips() * self.ticks_per_chip;
@@ -224,7 +230,8 @@ impl Receiver {
         let closed = last + i64::from(farthest) + i64::from(length) + 1;
         let span = open.max(absolute(ticks.tick.first())) - MARGIN
             ..closed.min(absolute(ticks.tick.last()) + 1) + MARGIN;
-        Timeline::new(span, ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick)))
+        let lit = ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick));
+        Timeline::new(memory, span, lit)
     }
 
     /// Two-way time of flight, s, of light that left at `fired_at_fs` and came in tick `tick`.

@@ -13,10 +13,13 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// The ticks of `lit` that lie in `span`.
-    pub fn new(span: Range<i64>, lit: impl IntoIterator<Item = i64>) -> Self {
-        let words = (span.end - span.start).max(0) as usize / 64 + 1;
-        let mut timeline = Self { origin: span.start, words: vec![0; words] };
+    /// The ticks of `lit` that lie in `span`; in `memory`, whatever is in it.
+    pub fn new(memory: Vec<u64>, span: Range<i64>, lit: impl IntoIterator<Item = i64>) -> Self {
+        let count = (span.end - span.start).max(0) as usize / 64 + 1;
+        let mut words = memory;
+        words.clear();
+        words.resize(count, 0);
+        let mut timeline = Self { origin: span.start, words };
         for tick in lit {
             if let Some((word, bit)) = timeline.place(tick) {
                 timeline.words[word] |= bit;
@@ -66,12 +69,16 @@ impl Timeline {
 
     /// The timeline in which a tick is lit if one of the `before` ticks before it, itself or one
     /// of the `after` ticks behind it is lit here.
-    pub fn dilated(&self, before: u32, after: u32) -> Self {
-        let mut dilated = self.clone();
-        look_ahead(&mut dilated.words, (before + after) as usize);
+    pub fn dilated(mut self, before: u32, after: u32) -> Self {
+        look_ahead(&mut self.words, (before + after) as usize);
         // So far a tick sees only what comes after it.
-        dilated.origin += i64::from(before);
-        dilated
+        self.origin += i64::from(before);
+        self
+    }
+
+    /// Its memory, for the next one.
+    pub fn into_memory(self) -> Vec<u64> {
+        self.words
     }
 }
 
@@ -81,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_tick_is_where_it_was_put_and_nothing_is_outside() {
-        let timeline = Timeline::new(-100..100, [-100, -37, 0, 63, 5000, -101]);
+        let timeline = Timeline::new(Vec::new(), -100..100, [-100, -37, 0, 63, 5000, -101]);
         let lit: Vec<i64> = (-300..300).filter(|&tick| timeline.has(tick)).collect();
         assert_eq!(lit, [-100, -37, 0, 63]);
         for tick in [-300, -101, -100, -64, -37, -1, 0, 63, 99, 400] {
@@ -93,9 +100,9 @@ mod tests {
 
     #[test]
     fn a_dilated_tick_reaches_both_ways() {
-        let timeline = Timeline::new(0..400, [64, 130, 300]);
+        let timeline = Timeline::new(Vec::new(), 0..400, [64, 130, 300]);
         for (before, after) in [(0, 0), (1, 2), (2, 0), (0, 1), (7, 4), (70, 70)] {
-            let dilated = timeline.dilated(before, after);
+            let dilated = timeline.clone().dilated(before, after);
             for tick in 71..329 {
                 let around = tick - i64::from(before)..=tick + i64::from(after);
                 let lit = around.clone().any(|tick| timeline.has(tick));
