@@ -1,7 +1,7 @@
 //! A packet against its rays one by one, at every level.
 
 use super::packet::{NONE, Packet, Waiting};
-use super::triangles::{Corners, Met, Triangles};
+use super::triangles::{Corners, Hit, Triangles};
 use super::wide::LANES;
 use macropulse_codec::level::forced::at_each_level;
 use proptest::prelude::*;
@@ -69,7 +69,7 @@ proptest! {
                 let ray = (origin, packet.along(lane));
                 let alone = triangles.nearest(ray, (nearest, farthest));
                 let (range, leaf) = (cast.range[lane], cast.leaf[lane]);
-                let together = (leaf != NONE).then_some(Met { range, leaf });
+                let together = (leaf != NONE).then_some(Hit { range, leaf });
                 prop_assert_eq!(together, alone, "{:?}, ray {}: {:?}", level, lane, ray);
             }
         }

@@ -29,7 +29,7 @@ pub(crate) struct Triangles {
 
 /// A triangle that a ray meets, and how far away.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Met {
+pub(crate) struct Hit {
     pub range: f64,
     /// Index in the order of the leaves.
     pub leaf: u32,
@@ -94,8 +94,8 @@ impl Triangles {
         &self,
         (origin, direction): ([f64; 3], [f64; 3]),
         (nearest, farthest): (f64, f64),
-    ) -> Option<Met> {
-        let mut best = Met { range: farthest, leaf: 0 };
+    ) -> Option<Hit> {
+        let mut best = Hit { range: farthest, leaf: 0 };
         let mut found = false;
         self.tree.along((origin, direction), (nearest, farthest), |leaf, aim| {
             if passes(&self.narrow[leaf as usize], aim) {
@@ -103,7 +103,7 @@ impl Triangles {
                 let range = plane.range(direction);
                 let first = found && range == best.range && leaf < best.leaf;
                 if range > nearest && (range < best.range || first) {
-                    (best, found) = (Met { range, leaf }, true);
+                    (best, found) = (Hit { range, leaf }, true);
                 }
             }
             best.range
