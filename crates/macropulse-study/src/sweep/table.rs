@@ -126,7 +126,8 @@ impl Table {
     /// As comma-separated text, with units in the header. Numbers have as many digits as it takes
     /// to read the same number back; what is not known is an empty cell.
     pub fn csv(&self) -> String {
-        let mut header: Vec<String> = self.axes.iter().map(|axis| quoted(&axis.key)).collect();
+        let mut header: Vec<String> =
+            self.axes.iter().map(|axis| quoted(&axis.key).into_owned()).collect();
         header.extend(["seeds", "pixels"].map(str::to_owned));
         for metric in &self.metrics {
             let column = metric.column();
@@ -134,7 +135,8 @@ impl Table {
         }
         let mut text = header.join(",") + "\n";
         for row in &self.rows {
-            let mut cells: Vec<String> = row.values.iter().map(|value| quoted(value)).collect();
+            let mut cells: Vec<String> =
+                row.values.iter().map(|value| quoted(value).into_owned()).collect();
             cells.extend([row.seeds.to_string(), row.pixels.to_string()]);
             for Estimate { value, low, high } in &row.scores {
                 let known = |number: &f64| match number.is_nan() {

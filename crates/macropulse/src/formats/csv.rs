@@ -3,6 +3,8 @@
 use super::Names;
 use super::attributes::{Attribute, Value, outcome_from_code, returns};
 use crate::points::{NO_OBJECT, PointCloud};
+use std::borrow::Cow;
+use std::fmt::{Display, Write as _};
 use std::io::{self, Write};
 
 /// Writes the returns of a cloud whose columns are even. Numbers have as many digits as it takes
@@ -14,47 +16,54 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
     let mut line = String::new();
     for point in returns(cloud) {
         line.clear();
-        for attribute in &attributes {
-            if !line.is_empty() {
+        for (place, attribute) in attributes.iter().enumerate() {
+            if place > 0 {
                 line.push(',');
             }
-            line.push_str(&cell(*attribute, attribute.value(cloud, point), names));
+            add_cell(&mut line, *attribute, attribute.value(cloud, point), names);
         }
-        writeln!(out, "{line}")?;
+        line.push('\n');
+        out.write_all(line.as_bytes())?;
     }
     Ok(())
 }
 
-fn cell(attribute: Attribute, value: Value, names: &Names) -> String {
+/// Adds the cell of a value to `line`; that of no value is empty, which is what spreadsheets take
+/// for it.
+fn add_cell(line: &mut String, attribute: Attribute, value: Value, names: &Names) {
     match (attribute, value) {
-        (Attribute::Object, Value::U2(at)) => name(names.objects, at),
-        (Attribute::Material, Value::U2(at)) => name(names.materials, at),
+        (Attribute::Object, Value::U2(at)) => add_name(line, names.objects, at),
+        (Attribute::Material, Value::U2(at)) => add_name(line, names.materials, at),
         (Attribute::Outcome, Value::U1(code)) => {
-            outcome_from_code(code).map_or_else(String::new, |outcome| outcome.name().to_owned())
+            line.push_str(outcome_from_code(code).map_or("", |outcome| outcome.name()));
         }
-        (_, Value::U1(value)) => value.to_string(),
-        (_, Value::U2(value)) => value.to_string(),
-        // An empty cell is what spreadsheets take for "no value".
-        (_, Value::F4(value)) if value.is_nan() => String::new(),
-        (_, Value::F4(value)) => value.to_string(),
-        (_, Value::F8(value)) => value.to_string(),
+        (_, Value::F4(value)) if value.is_nan() => {}
+        (_, Value::U1(value)) => add(line, value),
+        (_, Value::U2(value)) => add(line, value),
+        (_, Value::F4(value)) => add(line, value),
+        (_, Value::F8(value)) => add(line, value),
     }
 }
 
-fn name(names: &[String], at: u16) -> String {
+fn add(line: &mut String, value: impl Display) {
+    // Text in memory takes all that is written to it.
+    let _ = write!(line, "{value}");
+}
+
+fn add_name(line: &mut String, names: &[String], at: u16) {
     match names.get(usize::from(at)) {
-        _ if at == NO_OBJECT => String::new(),
-        Some(name) => quoted(name),
-        None => at.to_string(),
+        _ if at == NO_OBJECT => {}
+        Some(name) => line.push_str(&quoted(name)),
+        None => add(line, at),
     }
 }
 
 /// A name in quotes if it would otherwise end its cell \[RFC4180\].
-pub fn quoted(name: &str) -> String {
+pub fn quoted(name: &str) -> Cow<'_, str> {
     if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
+        Cow::Owned(format!("\"{}\"", name.replace('"', "\"\"")))
     } else {
-        name.to_owned()
+        Cow::Borrowed(name)
     }
 }
 
