@@ -20,8 +20,9 @@ use crate::{ShotLog, Ticks};
 const ODDS: f64 = 1000.0;
 
 /// Places, in bits beside the begin of a return, at which its code word may be looked for: those of
-/// the bits of an earlier shot that begins as many bits before or behind it.
-const PLACES: usize = 96;
+/// the bits of an earlier shot that begins up to a payload before or behind it. A payload has 25 bits
+/// at most.
+const PLACES: usize = 3 * 25;
 
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
@@ -103,13 +104,14 @@ impl Bench<'_> {
     /// Whether the first bit of `shot`, begun at tick `begins`, is lit at least half as much as the
     /// marks of `one` are. Nearly every shot is refused here.
     fn begins_like(&self, shot: usize, begins: i64, one: &Return, counts: &mut Counts) -> bool {
+        let first = self.first_bit(shot);
         let lit = match self.bits(shot).next() {
             Some(bit) if !self.codebook.zeros_are_lit() => {
                 self.lit_at(counts, begins + counts.bit * bit)
             }
-            _ => self.lit_of(self.first_bit(shot), begins),
+            _ => self.lit_of(first, begins),
         };
-        2 * lit * usize::from(one.marks) >= self.first_bit(shot).len() * usize::from(one.peak)
+        2 * lit * usize::from(one.marks) >= first.len() * usize::from(one.peak)
     }
 
     /// The numbers of the bits of `shot` that are lit, the one sent first being 0; ascending.
@@ -121,7 +123,8 @@ impl Bench<'_> {
     /// The marks of the first bit of `shot` that is lit.
     fn first_bit(&self, shot: usize) -> &[u16] {
         let marks = self.marks(shot);
-        &marks[..marks.len().min(self.codebook.family().weight())]
+        let bit = |mark: &u16| u32::from(*mark) / self.codebook.family().length();
+        &marks[..marks.partition_point(|mark| bit(mark) == bit(&marks[0]))]
     }
 
     /// Whether light is rather of the `earlier` macropulse than of the `later` one.
@@ -149,7 +152,7 @@ impl Bench<'_> {
         let (of_earlier, of_later) = (all_bits(earlier), all_bits(later));
         let shift = (earlier.begins - later.begins) / counts.bit;
         let has = |bits: u64, bit: i64| (0..64).contains(&bit) && bits >> bit & 1 == 1;
-        let all = self.codebook.family().weight();
+        let all = self.codebook.word(counts.word).weight();
         let mut compared = Compared::default();
         for bit in self.bits(later.shot) {
             let lit = self.lit_at(counts, later.begins + counts.bit * bit);
@@ -240,7 +243,7 @@ struct Counts {
 }
 
 /// Marks, and how many of them are lit.
-#[derive(Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Marks {
     lit: usize,
     all: usize,
@@ -254,7 +257,7 @@ impl Marks {
 }
 
 /// The marks of two macropulses.
-#[derive(Default)]
+#[derive(Debug, Default, PartialEq)]
 struct Compared {
     both: Marks,
     of_earlier: Marks,
@@ -325,5 +328,40 @@ mod tests {
         assert_eq!(judge(&near, &seen, faint), (1, 0));
         let own = ticks(&codebook, &log, 8, 100);
         assert_eq!(judge(&receiver, &own, faint), (1, 0));
+    }
+
+    /// Every shot against every later one in its word, begun at the same place and bits beside it,
+    /// among random ticks; of words that differ in weight, too.
+    #[test]
+    fn bit_by_bit_and_mark_by_mark_macropulses_compare_alike() {
+        for family in [Family::prime(5).unwrap(), Family::gold(5).unwrap()] {
+            let (receiver, _, log) = bench();
+            let payload = Payload::new(4, Crc::default(), true).unwrap();
+            let codebook = Codebook::new(family, Some(payload), 16, Keying::OnOff).unwrap();
+            // Dense and irregular enough for every count to occur.
+            let tick = (0..6000_u32).filter(|tick| tick.wrapping_mul(0x9E37_79B9) >> 30 == 0);
+            let ticks = Ticks { tick: tick.collect(), ..Ticks::default() };
+            let fired = receiver.all_fired(&log);
+            let timeline = receiver.timeline(&codebook, &fired, &ticks, Vec::new());
+            let (codebook, log, density) = (&codebook, &log, 0.25);
+            let bench = Bench { receiver: &receiver, codebook, log, fired, timeline, density };
+            let bit = i64::from(family.length());
+            for (earlier, later) in
+                (0..16).flat_map(|one| (one + 4..20).step_by(4).map(move |two| (one, two)))
+            {
+                let begins = 200 * later as i64 + 100;
+                let word = log.word[later];
+                let mut counts = Counts { word, first: begins - 8 * bit, bit, lit: [None; PLACES] };
+                for shift in -7..8 {
+                    let earlier = Sent { shot: earlier, begins: begins + shift * bit };
+                    let later = Sent { shot: later, begins };
+                    assert_eq!(
+                        bench.compared_by_bits(earlier, later, &mut counts),
+                        bench.compared_by_marks(earlier, later),
+                        "{family:?}: {shift} bits"
+                    );
+                }
+            }
+        }
     }
 }
