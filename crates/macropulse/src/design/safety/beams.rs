@@ -77,25 +77,32 @@ impl<'a> LineBeams<'a> {
 
     /// The shots that cross an aperture with its middle at `aim`, in the order of their times.
     pub fn crossing(&self, share: &Share, aim: Aim) -> Vec<Crossing> {
-        let reach = self.reach(share);
         let mut shots = Vec::new();
+        self.for_each_crossing(share, aim, |[row, column], share| {
+            let order = self.scan.model().order_of(row as u16, column as u16);
+            let (time, energy) = (self.scan.moment(order), share * self.energies.at(column));
+            shots.push(Crossing { time, share, energy });
+        });
+        shots.sort_unstable_by(|a, b| a.time.total_cmp(&b.time));
+        shots
+    }
+
+    /// Calls `visit` with row and column of every shot that crosses an aperture with its middle at
+    /// `aim`, and the share of its light that passes.
+    fn for_each_crossing(&self, share: &Share, aim: Aim, mut visit: impl FnMut([u32; 2], f64)) {
+        let reach = self.reach(share);
         for number in self.rows_within(aim.elevation, reach) {
             let row = &self.lines.rows[number];
             for columns in self.columns_within(row, aim, reach) {
                 for column in columns {
                     let off = row.first - self.lines.step * f64::from(column) - aim.azimuth;
                     let share = share.at(self.off(aim.elevation, row.elevation, off));
-                    let order = self.scan.model().order_of(number as u16, column as u16);
-                    let time = self.scan.moment(order);
-                    let energy = share * self.energies.at(column);
                     if share > 0.0 {
-                        shots.push(Crossing { time, share, energy });
+                        visit([number as u32, column], share);
                     }
                 }
             }
         }
-        shots.sort_unstable_by(|a, b| a.time.total_cmp(&b.time));
-        shots
     }
 
     /// Where an aperture sees most: of a whole scan, and of the shots within `counted` seconds, if
@@ -147,10 +154,18 @@ impl<'a> LineBeams<'a> {
     /// The sum over a few pixels goes up and down with their phase; that over many is smooth, and
     /// then it is estimated, and depends on the elevation alone.
     fn refined(&self, share: &Share, aim: Aim) -> Aim {
-        let few = self.crossing(share, aim).len() <= FEW;
-        let light = |aim: Aim| match few {
-            true => self.crossing(share, aim).iter().map(|shot| shot.energy).sum(),
-            false => self.estimate(share, aim.elevation, FINE),
+        let mut shots = 0;
+        self.for_each_crossing(share, aim, |_, _| shots += 1);
+        let few = shots <= FEW;
+        let light = |aim: Aim| {
+            if !few {
+                return self.estimate(share, aim.elevation, FINE);
+            }
+            let mut light = 0.0;
+            self.for_each_crossing(share, aim, |[_, column], share| {
+                light += share * self.energies.at(column);
+            });
+            light
         };
         let mut best = (light(aim), aim);
         let mut steps = [self.lines.step / 2.0, 2.0 * self.reach(share) / STEPS];
