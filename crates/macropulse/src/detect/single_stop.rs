@@ -1,4 +1,5 @@
-//! Single-stop timing, a detector that fires once per shot: the simulation steps of \[KP16 Fig. 7\], after \[OF05\].
+//! Single-stop timing, a detector that fires once per shot: the simulation steps of
+//! \[KP16 Fig. 7\], after \[OF05\].
 //!
 //! 1. Each echo of mean energy n (photons) gets white noise: n' = n + a·g, g standard normal.
 //! 2. Its light is spread over a Gaussian pulse of rms length σ, so that Λ(t) = n'·Φ((t − t₀)/σ)
