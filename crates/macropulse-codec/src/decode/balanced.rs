@@ -84,7 +84,7 @@ impl<'a> Band<'a> {
             epoch: ticks.epoch,
             late,
             grid: Grid::new(span, (scale, late), ticks.tick.iter().map(|&tick| i64::from(tick))),
-            thresholds: Thresholds::balanced(lags, receiver.false_alarm, codebook.chips() as u16),
+            thresholds: Thresholds::balanced(lags, receiver.false_alarm, codebook.chips()),
             fired,
             chips: Chips::default(),
             last_lag: None,
@@ -114,8 +114,8 @@ impl<'a> Band<'a> {
             marks: weight,
             margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
             photons: photons_per_mark(
-                peak.found as u16,
-                weight,
+                peak.found,
+                weight.into(),
                 f64::from(peak.stray) / f64::from(dark.max(1)) * 0.999,
             ),
         })
@@ -161,7 +161,7 @@ impl<'a> Band<'a> {
         // One more of each, so that few dark chips do not tell that it is darker than can be known.
         let dark = self.codebook.chips() - u32::from(marks);
         let on_dark = (f64::from(stray) + 1.0) / (f64::from(dark) + 1.0);
-        self.thresholds.least(marks, in_gate.max(on_dark).min(1.0))
+        self.thresholds.least(marks.into(), in_gate.max(on_dark).min(1.0)) as u16
     }
 
     /// By how many ticks the marks of a macropulse that begins at `start` are late on average. What

@@ -147,9 +147,9 @@ impl<'a> Band<'a> {
     /// Marks of `word` found if it starts at `start`.
     fn found(&self, word: usize, start: i64) -> u16 {
         let one_by_one = || self.words[word].iter().filter(|&mark| self.seen.has(start + mark));
-        match self.seen.lit_in(start, &self.patterns[word]) {
-            Some(found) => found as u16,
-            None => one_by_one().count() as u16,
+        match start < self.seen.origin() {
+            true => one_by_one().count() as u16,
+            false => self.seen.lit_in(start, &self.patterns[word]) as u16,
         }
     }
 
@@ -294,7 +294,7 @@ impl<'a> Band<'a> {
                 peak: claim.count,
                 marks,
                 margin: claim.count - self.runner_up[shot],
-                photons: photons_per_mark(claim.count, marks, 0.0),
+                photons: photons_per_mark(claim.count.into(), marks.into(), 0.0),
             });
         }
         self.returns

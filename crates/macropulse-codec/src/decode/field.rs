@@ -1,204 +1,219 @@
-//! The ticks of a band as the matched receiver looks at them: one bit each, so that sixty-four
-//! places are looked at in one step, and counted.
+//! The ticks that a correlating receiver looks at: a stretch of time that slides along the band.
 
 use std::ops::Range;
 
-use super::FARTHEST_JITTER;
-use super::residual::Residual;
-use crate::kernels::{Pattern, lit_in, look_ahead};
+use super::timeline::Timeline;
+use crate::kernels::{Pattern, count_each, look_ahead};
 
-/// Ticks that are turned into bits together, when one of them is first looked at.
-const CHUNK: i64 = CELLS * CELL;
-const CELLS: i64 = 16;
+/// Ticks before the stretch that is asked for and behind it, so that whole blocks of lags can be
+/// looked at at its ends.
+const MARGIN: i64 = 2048;
 
-/// Ticks that are counted together: where these begin and end is near enough.
-pub(super) const CELL: i64 = 1 << 10;
+/// Ticks that are laid down together: as bits they fit into a first-level cache.
+const PIECE: i64 = 1 << 16;
 
-/// Machine words of a chunk.
-const WORDS: usize = CHUNK as usize / 64;
-
-/// Dark ticks before the first and behind the last one, so that blocks may reach beyond a gate.
-pub(super) const MARGIN: i64 = 4096;
-
-/// A sorted list of ticks, as a field of bits: lit is where a mark counts as found, which is at
-/// a tick and at the `width` − 1 places before it. Bits are made from the list chunk by chunk, as
-/// they are needed: where everything is clear none is.
+/// The ticks of a stretch, one bit each, three times: as they came; lit wherever a mark counts as
+/// found, which is at a tick and at the `width` − 1 places before it; and the residual, the ticks
+/// that are left when those of the macropulses found so far are cancelled.
 #[derive(Debug)]
 pub(super) struct Field<'a> {
     ticks: &'a [u32],
-    width: usize,
-    /// Tick of the first bit.
-    origin: i64,
-    /// Ticks before each [`CELL`], and before the end.
+    /// Ticks that are laid down already, or were passed by.
+    laid: usize,
+    width: u32,
+    /// Ticks that are counted together, a power of two.
+    cell: i64,
+    /// The first tick of the first cell.
+    begin: i64,
+    /// Ticks of the list before each cell, as far as they are laid down.
     before: Vec<u32>,
-    /// What is made of each chunk.
-    made: Vec<Made>,
-    memory: Memory,
-    residual: Residual,
-    /// Whether nothing was cancelled to begin with: then the residual of a chunk that is not made
-    /// yet is all of its ticks.
-    nothing_cancelled: bool,
+    /// Ticks in each cell that are not cancelled.
+    left: Vec<u32>,
+    seen: Timeline,
+    lit: Timeline,
+    residual: Timeline,
 }
 
 /// Memory of a field, whatever is in it.
-#[derive(Debug, Default)]
-pub(super) struct Memory {
-    /// One bit for each tick.
-    ticks: Vec<u64>,
-    /// One for each place at which a mark counts as found, unless that is the same.
-    lit: Vec<u64>,
-    residual: Vec<u64>,
-}
-
-/// How far the bits of a chunk are made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Made {
-    Nothing,
-    Ticks,
-    Lit,
-}
+pub(super) type Memory = [Timeline; 3];
 
 impl<'a> Field<'a> {
-    /// The field of `ticks` over `span`, of which those in `remaining` are not cancelled yet;
-    /// `None` for all of them.
+    /// The field of the sorted `ticks`, from `begin` on, no longer than `length` ticks at a time;
+    /// ticks are counted in stretches not much longer than `cell`.
     pub fn new(
-        (ticks, remaining): (&'a [u32], Option<&[u32]>),
+        ticks: &'a [u32],
         width: u32,
-        span: Range<i64>,
-        mut memory: Memory,
+        (begin, length): (i64, i64),
+        cell: i64,
+        memory: Memory,
     ) -> Self {
-        let origin = span.start - MARGIN;
-        let chunks = ((span.end + MARGIN - origin).max(0) / CHUNK + 1) as usize;
-        let cells = chunks as i64 * CELLS;
-        let mut before = Vec::with_capacity(cells as usize + 1);
-        let mut passed = 0;
-        for cell in 0..=cells {
-            let end = origin + CELL * cell;
-            let is_before = |tick: &&u32| i64::from(**tick) < end;
-            passed += ticks[passed..].iter().take_while(is_before).count();
-            before.push(passed as u32);
-        }
-        let width = width as usize;
-        memory.ticks.resize(memory.ticks.len().max(chunks * WORDS), 0);
-        if width > 1 {
-            memory.lit.resize(memory.lit.len().max(chunks * WORDS), 0);
-        }
-        let words = std::mem::take(&mut memory.residual);
-        let residual = match remaining {
-            Some(remaining) => Residual::new(remaining, span, words),
-            None => {
-                let cells = before.windows(2).map(|before| before[1] - before[0]);
-                Residual::counted(cells.collect(), span.start, words)
-            }
-        };
-        let (made, nothing_cancelled) = (vec![Made::Nothing; chunks], remaining.is_none());
-        Self { ticks, width, origin, before, made, memory, residual, nothing_cancelled }
-    }
-
-    /// Makes sure that all bits of `span` are there.
-    fn make(&mut self, span: Range<i64>) {
-        for chunk in self.chunks(span) {
-            if self.made[chunk] < Made::Lit {
-                self.make_chunk(chunk);
-            }
-        }
-    }
-
-    fn make_chunk(&mut self, chunk: usize) {
-        const REACH: usize = FARTHEST_JITTER as usize / 64 + 2;
-        self.make_ticks(chunk);
-        self.made[chunk] = Made::Lit;
-        if self.width == 1 {
-            return;
-        }
-        let mut bits = [0; WORDS + REACH];
-        let next = chunk + 1;
-        bits[..WORDS].copy_from_slice(&self.memory.ticks[chunk * WORDS..][..WORDS]);
-        if next < self.made.len() {
-            self.make_ticks(next);
-            bits[WORDS..].copy_from_slice(&self.memory.ticks[next * WORDS..][..REACH]);
-        }
-        look_ahead(&mut bits, self.width - 1);
-        self.memory.lit[chunk * WORDS..][..WORDS].copy_from_slice(&bits[..WORDS]);
-    }
-
-    fn make_ticks(&mut self, chunk: usize) {
-        if self.made[chunk] > Made::Nothing {
-            return;
-        }
-        self.made[chunk] = Made::Ticks;
-        let cells = CELLS as usize;
-        let [from, to] = [chunk, chunk + 1].map(|chunk| self.before[chunk * cells] as usize);
-        let words = &mut self.memory.ticks[chunk * WORDS..][..WORDS];
-        words.fill(0);
-        let start = self.origin + CHUNK * chunk as i64;
-        for &tick in &self.ticks[from..to] {
-            let bit = (i64::from(tick) - start) as usize % CHUNK as usize;
-            words[bit / 64] |= 1 << (bit % 64);
-        }
-        if self.nothing_cancelled {
-            self.residual.learn(chunk * WORDS, words);
-        }
-    }
-
-    /// The ticks that are not cancelled, bit by bit in `span`, elsewhere counted only.
-    pub fn residual(&mut self, span: Range<i64>) -> &mut Residual {
-        if self.nothing_cancelled {
-            self.chunks(span).for_each(|chunk| self.make_ticks(chunk));
-        }
-        &mut self.residual
-    }
-
-    /// How many ticks are not cancelled, as counts only.
-    pub fn residual_counts(&self) -> &Residual {
-        &self.residual
-    }
-
-    /// The chunks that touch `span`.
-    fn chunks(&self, span: Range<i64>) -> Range<usize> {
-        let chunk = |tick: i64| ((tick - self.origin) / CHUNK).max(0) as usize;
-        chunk(span.start)..(chunk(span.end - 1) + 1).min(self.made.len())
-    }
-
-    /// The words of the field and the bit at which `tick` lies in them, with all bits of the
-    /// `length` ticks from there on.
-    pub fn bits(&mut self, tick: i64, length: i64) -> (&[u64], usize) {
-        // Blocks are read a word beyond their end.
-        self.make(tick..tick + length + 64);
-        let words = if self.width == 1 { &self.memory.ticks } else { &self.memory.lit };
-        (words, (tick - self.origin).max(0) as usize)
-    }
-
-    /// How many ticks lie where the pattern, begun at `start`, is lit.
-    pub fn ticks_in(&mut self, start: i64, pattern: &Pattern) -> u32 {
-        self.make(start..start + 64 * pattern.reach() as i64);
-        lit_in(&self.memory.ticks, (start - self.origin).max(0) as usize, pattern)
+        let cell = 1 << (64 - cell.max(64).leading_zeros() - 1);
+        let begin = (begin - MARGIN).div_euclid(cell) * cell;
+        let laid = ticks.partition_point(|&tick| i64::from(tick) < begin);
+        let [mut seen, mut lit, mut residual] = memory;
+        // Twice as long as need be, so that it is moved less often.
+        let length = 2 * (length + 3 * MARGIN + 2 * cell + i64::from(width));
+        seen.clear_all(begin, length);
+        residual.clear_all(begin, length);
+        lit.clear_all(begin, if width > 1 { length } else { 0 });
+        let before = vec![laid as u32];
+        let left = vec![];
+        Self { ticks, laid, width, cell, begin, before, left, seen, lit, residual }
     }
 
     /// Gives its memory back.
     pub fn into_memory(self) -> Memory {
-        Memory { residual: self.residual.into_words(), ..self.memory }
+        [self.seen, self.lit, self.residual]
+    }
+
+    /// Where the ticks that are laid down end.
+    fn end(&self) -> i64 {
+        self.begin + self.cell * (self.before.len() as i64 - 1)
+    }
+
+    /// Lays down the ticks of `span`, and forgets what was before. A span never begins before the one
+    /// asked for last.
+    pub fn cover(&mut self, span: Range<i64>) {
+        let origin = (span.start - MARGIN).max(self.begin).div_euclid(self.cell) * self.cell;
+        // Ticks that nobody asked for are counted only.
+        while self.end() < origin {
+            let end = self.end() + self.cell;
+            let passed = self.ticks[self.laid..].iter();
+            self.laid += passed.take_while(|&&tick| i64::from(tick) < end).count();
+            self.before.push(self.laid as u32);
+            self.left.push(0);
+        }
+        let to = span.end + 2 * MARGIN + i64::from(self.width);
+        if to + self.cell > self.seen.end() {
+            let lit = (self.width > 1).then_some(&mut self.lit);
+            let all = [&mut self.seen, &mut self.residual].into_iter().chain(lit);
+            all.for_each(|timeline| timeline.slide(origin));
+        }
+        while self.end() < to {
+            let from = self.end();
+            let cells = ((to - from).min(PIECE) / self.cell).max(1);
+            let end = from + cells * self.cell;
+            let rest = &self.ticks[self.laid..];
+            let here = &rest[..rest.partition_point(|&tick| i64::from(tick) < end)];
+            self.seen.lay(here);
+            let words = self.seen.words(&(from..end));
+            let known = self.before.len();
+            self.before.resize(known + cells as usize, 0);
+            count_each(words, (self.cell / 64) as usize, &mut self.before[known..]);
+            self.left.extend_from_slice(&self.before[known..]);
+            let mut before = self.laid as u32;
+            for count in &mut self.before[known..] {
+                before += *count;
+                *count = before;
+            }
+            self.laid += here.len();
+            self.residual.words_mut(&(from..end)).copy_from_slice(words);
+            if self.width > 1 {
+                self.widen(from..end);
+            }
+        }
+    }
+
+    /// Lights the places of `span` at which a mark counts as found, and those before it that may
+    /// change by ticks of it.
+    fn widen(&mut self, span: Range<i64>) {
+        let span = span.start - 64 * (i64::from(self.width) / 64 + 1)..span.end;
+        let (seen, lit) = (self.seen.words(&span), self.lit.words_mut(&span));
+        lit.copy_from_slice(seen);
+        look_ahead(lit, self.width as usize - 1);
+    }
+
+    /// Where marks count as found.
+    pub fn lit(&self) -> &Timeline {
+        if self.width == 1 { &self.seen } else { &self.lit }
+    }
+
+    /// The ticks as they came.
+    pub fn seen(&self) -> &Timeline {
+        &self.seen
+    }
+
+    /// Cancels the ticks of `pattern`, begun at each of `starts`, all within `span`.
+    pub fn cancel(
+        &mut self,
+        starts: impl Iterator<Item = i64>,
+        pattern: &Pattern,
+        span: Range<i64>,
+    ) {
+        starts.for_each(|start| self.residual.put_out(start, pattern));
+        let cells = self.cells(&span);
+        let at = |cell: usize| self.begin + self.cell * cell as i64;
+        let first = cells.start.max(((self.residual.origin() - self.begin) / self.cell) as usize);
+        if first < cells.end {
+            let words = self.residual.words(&(at(first)..at(cells.end)));
+            count_each(words, (self.cell / 64) as usize, &mut self.left[first..cells.end]);
+        }
+    }
+
+    /// Puts into `places` where marks count as found in the residual of `span`, and tells which tick
+    /// the first bit is.
+    pub fn lit_in_residual(&self, span: &Range<i64>, places: &mut Vec<u64>) -> i64 {
+        let start = span.start.div_euclid(64) * 64;
+        let words = self.residual.words(&(start..span.end + i64::from(self.width) + 64));
+        places.clear();
+        places.extend_from_slice(words);
+        look_ahead(places, self.width as usize - 1);
+        start.max(self.residual.origin())
     }
 
     /// The cells that touch `span`.
     fn cells(&self, span: &Range<i64>) -> Range<usize> {
         let last = self.before.len() as i64 - 1;
-        let first = (span.start - self.origin).div_euclid(CELL).clamp(0, last);
-        let end = (span.end - self.origin + CELL - 1).div_euclid(CELL).clamp(first, last);
-        first as usize..end as usize
+        let cell = |tick: i64| ((tick - self.begin) / self.cell).clamp(0, last) as usize;
+        cell(span.start)..cell(span.end + self.cell - 1).max(cell(span.start))
     }
 
-    /// Share of lit places in and about `span`, were its ticks spread evenly.
-    pub fn density(&self, span: Range<i64>) -> f64 {
-        self.density_without(span, (0, 0))
+    /// Share of the places in and about `span` at which a mark counts as found, were its ticks
+    /// spread evenly.
+    pub fn density(&self, span: &Range<i64>) -> f64 {
+        self.density_without(span, 0, 0)
     }
 
-    /// Share of lit places in and about `span`, of which (ticks, places) are left out.
-    pub fn density_without(&self, span: Range<i64>, own: (usize, usize)) -> f64 {
-        let cells = self.cells(&span);
-        let places = (cells.len() * CELL as usize).saturating_sub(own.1).max(1);
-        let ticks = (self.before[cells.end] - self.before[cells.start]) as usize;
-        let ticks = ticks.saturating_sub(own.0);
-        (self.width as f64 * ticks as f64 / places as f64).min(1.0)
+    /// The same without so many ticks and places.
+    pub fn density_without(&self, span: &Range<i64>, ticks: u32, places: u32) -> f64 {
+        let cells = self.cells(span);
+        let all = (cells.len() as i64 * self.cell) as u32;
+        let places = all.saturating_sub(places).max(1);
+        let ticks = (self.before[cells.end] - self.before[cells.start]).saturating_sub(ticks);
+        (f64::from(self.width) * f64::from(ticks) / f64::from(places)).min(1.0)
+    }
+
+    /// For each cell of `span`, the residual ticks in the `length` ticks from there on, and some more;
+    /// and the first tick of the first cell.
+    pub fn residual_stretches(&self, span: &Range<i64>, length: i64, sums: &mut Vec<u32>) -> i64 {
+        let cells = self.cells(span);
+        let begin = self.begin + self.cell * cells.start as i64;
+        sums.clear();
+        sums.extend_from_slice(&self.left[cells]);
+        let together = (length / self.cell) as usize + 2;
+        let mut sum: u32 = sums.iter().take(together).sum();
+        for cell in 0..sums.len() {
+            let next = sums.get(cell + together).copied().unwrap_or(0);
+            sum = sum + next - std::mem::replace(&mut sums[cell], sum);
+        }
+        begin
+    }
+
+    /// How many ticks of `span` are not cancelled, and those of the machine words at its ends.
+    pub fn residual_in(&self, span: &Range<i64>) -> u32 {
+        let words = self.residual.words(&(span.start..span.end + 63));
+        let mut count = [0];
+        count_each(words, words.len().max(1), &mut count);
+        count[0]
+    }
+
+    /// All that is at hand.
+    pub fn extent(&self) -> Range<i64> {
+        self.seen.origin()..self.end()
+    }
+
+    /// Ticks that are counted together.
+    pub fn cell(&self) -> i64 {
+        self.cell
     }
 }

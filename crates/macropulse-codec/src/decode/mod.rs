@@ -3,16 +3,13 @@
 mod balanced;
 mod beyond;
 mod bitwise;
-mod correlator;
 mod direct;
 mod field;
 mod matched;
 mod pick;
 mod returns;
-mod search;
 mod threshold;
 mod timeline;
-mod residual;
 
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
@@ -136,7 +133,8 @@ impl Receiver {
         }
         match self.kind {
             ReceiverKind::Direct => direct::decode(self, log, ticks),
-            ReceiverKind::Matched | ReceiverKind::Balanced => self.correlate(codebook, log, ticks),
+            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
+            ReceiverKind::Balanced => self.balance(codebook, log, ticks),
             ReceiverKind::Literal => {
                 bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
             }
@@ -170,20 +168,16 @@ impl Receiver {
         returns
     }
 
-    /// The returns of a receiver that correlates whole macropulses.
+    /// The returns of the balanced receiver.
     ///
     /// It looks beyond the end of the gate by the length of a macropulse: what stands there has
     /// sidelobes within the gate, and is told from them by being higher. Only then is it refused.
-    fn correlate(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+    fn balance(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
         let (nearest, farthest) = self.gate_ticks;
         let length = codebook.chips() * self.ticks_per_chip;
         let gate_ticks = (nearest, farthest.saturating_add(length));
-        let wide =
-            Self { gate_ticks, light_ticks: self.light_ticks.max(gate_ticks.1), ..self.clone() };
-        let mut returns = match self.kind {
-            ReceiverKind::Balanced => balanced::decode(&wide, (codebook, log), ticks),
-            _ => matched::decode(&wide, (codebook, log), ticks),
-        };
+        let wide = Self { gate_ticks, ..self.clone() };
+        let mut returns = balanced::decode(&wide, (codebook, log), ticks);
         let closes = time::s_from_fs((i64::from(farthest) + 1) * self.tick_fs);
         returns.refuse_beyond(closes);
         beyond::exclude(self, (codebook, log), ticks, &mut returns);
@@ -243,7 +237,7 @@ impl Receiver {
 /// Mean number of photons detected per mark, μ = −ln(1 − p), of which the share p of the marks
 /// shows at least one (Poisson); p = (k/N − d)/(1 − d) for k of N marks found where a share d of
 /// all places is lit anyway. All marks found is taken for N − ½: the count tells no more.
-fn photons_per_mark(peak: u16, marks: u16, density: f64) -> f32 {
+fn photons_per_mark(peak: u32, marks: u32, density: f64) -> f32 {
     let (found, all) = (f64::from(peak), f64::from(marks));
     let lit = found.min(all - 0.5) / all;
     let share = ((lit - density) / (1.0 - density)).max(0.0);

@@ -5,9 +5,9 @@ use crate::statistics::{binomial, binomial_tail};
 /// The fewest marks that chance does not reach: the smallest k with
 /// L · P(Bin(N, d) ≥ k) ≤ α, where L is the number of `lags` tried, N the number of `marks`,
 /// d the `density` of lit places and α the false alarms accepted. N + 1 where no k will do.
-pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64) -> u16 {
+pub(super) fn least_marks(lags: f64, marks: u32, density: f64, false_alarm: f64) -> u32 {
     let enough =
-        |least: u16| lags * binomial_tail(marks.into(), density, least.into()) <= false_alarm;
+        |least: u32| lags * binomial_tail(marks as usize, density, least as usize) <= false_alarm;
     let (mut low, mut high) = (1, marks + 1);
     while low < high {
         let middle = low + (high - low) / 2;
@@ -23,15 +23,15 @@ pub(super) fn least_marks(lags: f64, marks: u16, density: f64, false_alarm: f64)
 /// The fewest marks, less the dark chips that are lit, that chance does not reach: the smallest s
 /// with L · P(X − Y ≥ s) ≤ α, X ~ Bin(N, d) for the `marks` and Y ~ Bin(M, d) for the `dark`
 /// chips. N + 1 where no s will do.
-pub(super) fn least_balance(lags: f64, chips: (u16, u16), density: f64, false_alarm: f64) -> u16 {
-    let (marks, dark) = (binomial(chips.0.into(), density), binomial(chips.1.into(), density));
+pub(super) fn least_balance(lags: f64, chips: (u32, u32), density: f64, false_alarm: f64) -> u32 {
+    let [marks, dark] = [chips.0, chips.1].map(|chips| binomial(chips as usize, density));
     // P(X ≥ k), the last one beyond all.
     let mut at_least = vec![0.0; marks.len() + 1];
     for found in (0..marks.len()).rev() {
         at_least[found] = at_least[found + 1] + marks[found];
     }
-    let tail = |least: u16| -> f64 {
-        let beyond = at_least.iter().skip(least.into());
+    let tail = |least: u32| -> f64 {
+        let beyond = at_least.iter().skip(least as usize);
         dark.iter().zip(beyond).map(|(stray, beyond)| stray * beyond).sum()
     };
     (1..=chips.0).find(|&least| lags * tail(least) <= false_alarm).unwrap_or(chips.0 + 1)
@@ -45,9 +45,9 @@ pub(super) struct Thresholds {
     /// Whether densities are taken as they are.
     exact: bool,
     /// Chips of a macropulse, if what falls on the dark ones is taken off.
-    balanced: Option<u16>,
+    balanced: Option<u32>,
     /// By marks, then by step of density; 0 where not yet known.
-    known: Vec<[u16; STEPS]>,
+    known: Vec<Option<Box<[u32; STEPS]>>>,
 }
 
 /// Steps of density, eight to an octave: the exponent and the first three bits of the fraction of
@@ -64,7 +64,7 @@ impl Thresholds {
     }
 
     /// The same for the balance of macropulses of so many `chips`, densities rounded.
-    pub fn balanced(lags: f64, false_alarm: f64, chips: u16) -> Self {
+    pub fn balanced(lags: f64, false_alarm: f64, chips: u32) -> Self {
         Self { balanced: Some(chips), ..Self::new(lags, false_alarm, false) }
     }
 
@@ -75,7 +75,7 @@ impl Thresholds {
 
     /// The fewest of `marks` to believe at `density`; where that need not be exact, it is rounded
     /// up by less than an eighth.
-    pub fn least(&mut self, marks: u16, density: f64) -> u16 {
+    pub fn least(&mut self, marks: u32, density: f64) -> u32 {
         if density <= 0.0 {
             return 1;
         }
@@ -84,10 +84,11 @@ impl Thresholds {
         }
         let above = (density.min(1.0).to_bits() + (1 << STEP_BITS) - 1) >> STEP_BITS;
         let step = above.saturating_sub(FIRST_STEP).min(STEPS as u64 - 1);
-        if self.known.len() <= usize::from(marks) {
-            self.known.resize(usize::from(marks) + 1, [0; STEPS]);
+        if self.known.len() <= marks as usize {
+            self.known.resize(marks as usize + 1, None);
         }
-        let known = &mut self.known[usize::from(marks)][step as usize];
+        let of_marks = self.known[marks as usize].get_or_insert_with(|| Box::new([0; STEPS]));
+        let known = &mut of_marks[step as usize];
         if *known == 0 {
             let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
             let (lags, false_alarm) = (self.lags, self.false_alarm);
@@ -119,7 +120,7 @@ mod tests {
             (0.58, [0.93, 0.79, 0.77]),
         ];
         for (density, shares) in table {
-            for (marks, share) in [58_u16, 174, 232].into_iter().zip(shares) {
+            for (marks, share) in [58_u32, 174, 232].into_iter().zip(shares) {
                 let least = least_marks(4e5, marks, density, 1e-3);
                 let found = f64::from(least) / f64::from(marks);
                 assert!((found - share).abs() < 0.012, "{density} {marks}: {found} not {share}");

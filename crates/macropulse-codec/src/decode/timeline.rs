@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use crate::kernels::{Pattern, lit_in, look_ahead};
+use crate::kernels::{Pattern, lay, light_up, lit_in, look_ahead, put_out};
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Timeline {
     /// Absolute tick of the first bit.
     origin: i64,
@@ -28,6 +28,70 @@ impl Timeline {
         timeline
     }
 
+    /// The tick of the first bit.
+    pub fn origin(&self) -> i64 {
+        self.origin
+    }
+
+    /// The tick behind the last bit.
+    pub fn end(&self) -> i64 {
+        self.origin + 64 * self.words.len() as i64
+    }
+
+    /// Makes it dark, `length` ticks long from `origin` on.
+    pub fn clear_all(&mut self, origin: i64, length: i64) {
+        self.origin = origin;
+        self.words.clear();
+        self.words.resize((length.max(0) / 64 + 1) as usize, 0);
+    }
+
+    /// Lets it begin at `origin`, whole machine words later; dark behind where it ended so far.
+    pub fn slide(&mut self, origin: i64) {
+        let words = ((origin - self.origin) / 64) as usize;
+        let kept = self.words.len().saturating_sub(words);
+        let moved = self.words.len() - kept;
+        self.words.copy_within(moved.., 0);
+        self.words[kept..].fill(0);
+        self.origin = origin;
+    }
+
+    /// Lights the sorted `ticks`. All from the first one on must be dark.
+    pub fn lay(&mut self, ticks: &[u32]) {
+        lay(&mut self.words, self.origin, ticks);
+    }
+
+    /// The machine words of `span`, which begins and ends with one.
+    pub fn words(&self, span: &Range<i64>) -> &[u64] {
+        let word = |tick: i64| (((tick - self.origin) / 64).max(0) as usize).min(self.words.len());
+        &self.words[word(span.start)..word(span.end)]
+    }
+
+    /// The same, to be changed.
+    pub fn words_mut(&mut self, span: &Range<i64>) -> &mut [u64] {
+        let word = |tick: i64| (((tick - self.origin) / 64).max(0) as usize).min(self.words.len());
+        let words = word(span.start)..word(span.end);
+        &mut self.words[words]
+    }
+
+    /// All machine words, and the bit of `tick` in them; bit 0 for a tick before the beginning.
+    pub fn at(&self, tick: i64) -> (&[u64], usize) {
+        (&self.words, (tick - self.origin).max(0) as usize)
+    }
+
+    /// Darkens the ticks of `pattern`, begun at `tick`.
+    pub fn put_out(&mut self, tick: i64, pattern: &Pattern) {
+        if let Ok(bit) = usize::try_from(tick - self.origin) {
+            put_out(&mut self.words, bit, pattern);
+        }
+    }
+
+    /// Lights the ticks of `pattern`, begun at `tick`.
+    pub fn light_up(&mut self, tick: i64, pattern: &Pattern) {
+        if let Ok(bit) = usize::try_from(tick - self.origin) {
+            light_up(&mut self.words, bit, pattern);
+        }
+    }
+
     fn place(&self, tick: i64) -> Option<(usize, u64)> {
         let bit = (tick - self.origin) as u64;
         let word = (bit >> 6) as usize;
@@ -46,10 +110,10 @@ impl Timeline {
         }
     }
 
-    /// How many ticks of `pattern` are lit if it begins at `tick`; `None` if that is before all.
-    pub fn lit_in(&self, tick: i64, pattern: &Pattern) -> Option<u32> {
-        let bit = usize::try_from(tick - self.origin).ok()?;
-        Some(lit_in(&self.words, bit, pattern))
+    /// How many ticks of `pattern` are lit if it begins at `tick`; none if that is before all.
+    pub fn lit_in(&self, tick: i64, pattern: &Pattern) -> u32 {
+        let bit = usize::try_from(tick - self.origin);
+        bit.map_or(0, |bit| lit_in(&self.words, bit, pattern))
     }
 
     /// Sixty-four ticks from `tick` on, the first one in the lowest bit.

@@ -16,101 +16,133 @@ pub(crate) type Block = [u64; BLOCK_WORDS];
 /// Planes of a count; a macropulse has at most 65535 marks.
 pub(crate) const PLANES: usize = 16;
 
-/// The marks of a macropulse: those of one code word, at each of its lit bits.
+/// Counts of a block of lags, in bit planes: plane p has weight 2^p.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Marks<'a> {
-    /// The marks of the code word, in ascending chips.
-    pub word: &'a [u16],
-    /// The first chip of each lit bit, ascending.
-    pub bits: &'a [u32],
-    /// Ticks per chip.
-    pub scale: usize,
+pub(crate) struct Counts {
+    planes: [Block; PLANES],
+    /// Planes that can be lit at all.
+    used: usize,
+    /// Marks that were added, at most what a count can be.
+    added: usize,
 }
 
-impl Marks<'_> {
-    /// Number of marks.
-    pub(crate) fn len(&self) -> usize {
-        self.bits.len() * self.word.len()
-    }
-
-    /// Ticks from the start of the macropulse to its last mark.
-    pub(crate) fn last(&self) -> usize {
-        let bit = self.bits.last().copied().unwrap_or(0) as usize;
-        self.scale * (bit + usize::from(self.word.last().copied().unwrap_or(0)))
-    }
-
-    /// Planes that a count of them may light.
-    pub(crate) fn planes(&self) -> usize {
-        ((usize::BITS - self.len().leading_zeros()) as usize).min(PLANES)
+impl Default for Counts {
+    fn default() -> Self {
+        Self { planes: [[0; BLOCK_WORDS]; PLANES], used: 0, added: 0 }
     }
 }
 
-/// Counts into `planes`, plane p of weight 2^p, for each lag of a block how many of the marks are
-/// lit: bit `first + lag + mark` of `words`, the lowest bit first. Bits beyond the end are dark.
-/// Planes that cannot be lit are left as they are.
-pub(crate) fn count_marks(words: &[u64], first: usize, marks: Marks, planes: &mut [Block; PLANES]) {
-    let reach = (first + marks.last()) / 64 + BLOCK_WORDS + 1;
-    let mut longer = Vec::new();
-    let words = if reach <= words.len() {
-        words
-    } else {
-        longer.extend_from_slice(words);
-        longer.resize(reach, 0);
-        &longer
-    };
-    match Level::here() {
-        // SAFETY: the processor has what this level asks for, the last mark ends within the
-        // words, and a place fits into 32 bits.
-        #[cfg(target_arch = "x86_64")]
-        Level::Avx512 if words.len() < 1 << 26 => unsafe {
-            avx512::count_within(words, first, marks, planes);
-        },
-        _ => count_within(words, first, marks, planes),
+impl Counts {
+    /// Nothing counted yet.
+    pub(crate) fn clear(&mut self) {
+        self.planes[..self.used].fill([0; BLOCK_WORDS]);
+        (self.used, self.added) = (0, 0);
     }
+
+    /// Adds, for each lag of the block, how many of the marks are lit: bit `place + first + lag` of
+    /// `words` for each of `places`, the lowest bit first. Bits beyond the end are dark. At most
+    /// 65535 marks can be added.
+    pub(crate) fn add(&mut self, words: &[u64], first: u32, places: &[u32]) {
+        let farthest = places.iter().fold(0, |most, &place| place.max(most));
+        let reach = (farthest as usize + first as usize) / 64 + BLOCK_WORDS + 1;
+        let mut longer = Vec::new();
+        let words = if reach <= words.len() {
+            words
+        } else {
+            longer.extend_from_slice(words);
+            longer.resize(reach, 0);
+            &longer
+        };
+        self.added += places.len();
+        self.used = ((usize::BITS - self.added.leading_zeros()) as usize).min(PLANES);
+        match Level::here() {
+            // SAFETY: the processor has what this level asks for, every mark lies so that its
+            // block ends within the words, and a place fits into 32 bits.
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 if words.len() < 1 << 26 => unsafe {
+                avx512::add_within(words, first, places, &mut self.planes[..self.used]);
+            },
+            _ => add_within(words, first, places, &mut self.planes[..self.used]),
+        }
+    }
+
+    /// The highest count among the lags of `allowed`, and the first lag that has it; `None` where
+    /// none is allowed.
+    pub(crate) fn highest(&self, mut allowed: Block) -> Option<(u32, u32)> {
+        let mut count = 0;
+        for (weight, plane) in self.planes[..self.used].iter().enumerate().rev() {
+            let lit = and(allowed, *plane);
+            if !is_dark(&lit) {
+                allowed = lit;
+                count |= 1 << weight;
+            }
+        }
+        let lane = allowed.iter().position(|&lane| lane != 0)?;
+        Some((64 * lane as u32 + allowed[lane].trailing_zeros(), count))
+    }
+
+    /// One bit for each lag with `least` marks or more.
+    pub(crate) fn at_least(&self, least: u32) -> Block {
+        if least as usize > self.added {
+            return [0; BLOCK_WORDS];
+        }
+        let mut enough = [u64::MAX; BLOCK_WORDS];
+        for (weight, plane) in self.planes[..self.used].iter().enumerate() {
+            enough = match least >> weight & 1 == 1 {
+                true => and(*plane, enough),
+                false => or(*plane, enough),
+            };
+        }
+        enough
+    }
+
+    /// The count at `lag`.
+    pub(crate) fn at(&self, lag: u32) -> u32 {
+        let (lane, bit) = (lag as usize / 64, lag % 64);
+        let planes = self.planes[..self.used].iter().enumerate();
+        planes.map(|(weight, plane)| ((plane[lane] >> bit & 1) as u32) << weight).sum()
+    }
+}
+
+/// Whether no bit is lit.
+pub(crate) fn is_dark(lanes: &Block) -> bool {
+    lanes.iter().fold(0, |any, lane| any | lane) == 0
 }
 
 on_every_level! {
-    /// [`count_marks`] where no block reaches beyond the end.
-    fn count_within(words: &[u64], first: usize, marks: Marks, planes: &mut [Block; PLANES]) {
-        let used = marks.planes();
-        planes[..used].fill([0; BLOCK_WORDS]);
-        let [mut ones, mut twos, mut fours] = [[0; BLOCK_WORDS]; 3];
-        let (mut eight, mut filled) = ([0; 8], 0);
-        for &bit in marks.bits {
-            for &mark in marks.word {
-                eight[filled] = first + marks.scale * (bit as usize + usize::from(mark));
-                filled += 1;
-                if filled < eight.len() {
-                    continue;
-                }
-                filled = 0;
-                // Seven adders take eight bits in and carry one out, so that most of the work
-                // stays in the three lowest planes. A closure would not be compiled for the level.
-                macro_rules! bits {
-                    ($index:literal) => {
-                        read(words, eight[$index])
-                    };
-                }
-                let (sum, a) = add(ones, bits!(0), bits!(1));
-                let (sum, mut b) = add(sum, bits!(2), bits!(3));
-                let (sum_of_twos, c) = add(twos, a, b);
-                let (sum, a) = add(sum, bits!(4), bits!(5));
-                (ones, b) = add(sum, bits!(6), bits!(7));
-                let d;
-                (twos, d) = add(sum_of_twos, a, b);
-                let mut carried;
-                (fours, carried) = add(fours, c, d);
-                for plane in &mut planes[3..used.max(3)] {
-                    (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
-                }
+    /// [`Counts::add`] where no block reaches beyond the end.
+    fn add_within(words: &[u64], first: u32, places: &[u32], planes: &mut [Block]) {
+        let low = |plane: usize| planes.get(plane).copied().unwrap_or_default();
+        let (mut ones, mut twos, mut fours) = (low(0), low(1), low(2));
+        let whole = places.chunks_exact(8);
+        let rest = whole.remainder();
+        for eight in whole {
+            // Seven adders take eight bits in and carry one out, so that most of the work stays in
+            // the three lowest planes. A closure would not be compiled for the level.
+            macro_rules! bits {
+                ($index:literal) => {
+                    read(words, (eight[$index] + first) as usize)
+                };
+            }
+            let (sum, a) = add(ones, bits!(0), bits!(1));
+            let (sum, mut b) = add(sum, bits!(2), bits!(3));
+            let (sum_of_twos, c) = add(twos, a, b);
+            let (sum, a) = add(sum, bits!(4), bits!(5));
+            (ones, b) = add(sum, bits!(6), bits!(7));
+            let d;
+            (twos, d) = add(sum_of_twos, a, b);
+            let mut carried;
+            (fours, carried) = add(fours, c, d);
+            for plane in planes.iter_mut().skip(3) {
+                (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
             }
         }
-        for (plane, sum) in planes[..used].iter_mut().zip([ones, twos, fours]) {
+        for (plane, sum) in planes.iter_mut().zip([ones, twos, fours]) {
             *plane = sum;
         }
-        for place in &eight[..filled] {
-            let mut carried = read(words, *place);
-            for plane in &mut planes[..used] {
+        for place in rest {
+            let mut carried = read(words, (place + first) as usize);
+            for plane in planes.iter_mut() {
                 (*plane, carried) = (xor(*plane, carried), and(*plane, carried));
             }
         }
@@ -120,7 +152,7 @@ on_every_level! {
 /// The same where a block is one register, and one instruction cuts it out of two.
 #[cfg(target_arch = "x86_64")]
 mod avx512 {
-    use super::{BLOCK_WORDS, Block, Marks, PLANES};
+    use super::{BLOCK_WORDS, Block, PLANES};
     use std::arch::x86_64::{
         __m512i, _mm512_and_si512, _mm512_loadu_si512, _mm512_set1_epi64, _mm512_setzero_si512,
         _mm512_shrdv_epi64, _mm512_storeu_si512, _mm512_ternarylogic_epi64, _mm512_xor_si512,
@@ -129,72 +161,31 @@ mod avx512 {
     /// Marks that are added up before anything is carried beyond the fourth plane.
     const SIXTEEN: usize = 16;
 
-    /// Marks whose places are worked out together, and how many of one code word.
-    const GROUP: usize = 256;
-    const PART: usize = 64;
-
-    /// The four lowest planes, and all of them.
-    struct Sums {
-        low: [__m512i; 4],
-        all: [__m512i; PLANES],
-        used: usize,
-    }
-
     /// # Safety
     ///
     /// The processor must have AVX-512 F and VBMI2, and `words`, fewer than 2^26, must reach
-    /// [`BLOCK_WORDS`] + 1 words beyond the one in which the last mark lies at the first lag.
+    /// [`BLOCK_WORDS`] + 1 words beyond the one in which the bit `first + place` lies, for each of
+    /// `places`.
     #[target_feature(enable = "avx512f,avx512vbmi2")]
-    pub(super) unsafe fn count_within(
+    pub(super) unsafe fn add_within(
         words: &[u64],
-        first: usize,
-        marks: Marks,
-        planes: &mut [Block; PLANES],
+        first: u32,
+        places: &[u32],
+        planes: &mut [Block],
     ) {
         let dark = _mm512_setzero_si512();
-        let mut sums = Sums { low: [dark; 4], all: [dark; PLANES], used: marks.planes() };
-        // Where each mark is, worked out beforehand: compilers would otherwise do it in registers
-        // from which it takes long to get it out again.
-        let (mut places, mut filled) = ([0; GROUP], 0);
-        for &bit in marks.bits {
-            let start = (first + marks.scale * bit as usize) as u32;
-            for word in marks.word.chunks(PART) {
-                if filled + word.len() > GROUP {
-                    // SAFETY: no mark lies behind the last one.
-                    unsafe { add_all(words, &places[..filled], &mut sums) };
-                    filled = 0;
-                }
-                for (place, &mark) in places[filled..].iter_mut().zip(word) {
-                    *place = start + marks.scale as u32 * u32::from(mark);
-                }
-                filled += word.len();
-            }
-        }
-        // SAFETY: as above.
-        unsafe { add_all(words, &places[..filled], &mut sums) };
-        sums.all[..4].copy_from_slice(&sums.low);
-        for (plane, sum) in planes.iter_mut().zip(&sums.all[..sums.used]) {
+        let mut all = [dark; PLANES];
+        for (sum, plane) in all.iter_mut().zip(&*planes) {
             // SAFETY: a plane is as long as a register.
-            unsafe { _mm512_storeu_si512(plane.as_mut_ptr().cast(), *sum) };
+            *sum = unsafe { _mm512_loadu_si512(plane.as_ptr().cast()) };
         }
-    }
-
-    /// Adds the blocks at `places`.
-    ///
-    /// # Safety
-    ///
-    /// As of [`count_within`], for each place.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512vbmi2")]
-    unsafe fn add_all(words: &[u64], places: &[u32], sums: &mut Sums) {
-        let dark = _mm512_setzero_si512();
-        let [mut ones, mut twos, mut fours, mut eights] = sums.low;
+        let [mut ones, mut twos, mut fours, mut eights, ..] = all;
         for places in places.chunks(SIXTEEN) {
             macro_rules! bits {
                 ($index:expr) => {
                     match places.get($index) {
                         // SAFETY: the caller answers for the places.
-                        Some(place) => unsafe { read(words, *place as usize) },
+                        Some(place) => unsafe { read(words, first.wrapping_add(*place)) },
                         None => dark,
                     }
                 };
@@ -217,12 +208,16 @@ mod avx512 {
             let (a, b) = (eight_from!(0), eight_from!(8));
             let mut carried;
             (eights, carried) = add(eights, a, b);
-            for sum in &mut sums.all[4..sums.used.max(4)] {
+            for sum in &mut all[4..planes.len().max(4)] {
                 let both = _mm512_and_si512(*sum, carried);
                 (*sum, carried) = (_mm512_xor_si512(*sum, carried), both);
             }
         }
-        sums.low = [ones, twos, fours, eights];
+        all[..4].copy_from_slice(&[ones, twos, fours, eights]);
+        for (plane, sum) in planes.iter_mut().zip(&all) {
+            // SAFETY: a plane is as long as a register.
+            unsafe { _mm512_storeu_si512(plane.as_mut_ptr().cast(), *sum) };
+        }
     }
 
     /// The block that begins with bit `first`.
@@ -232,15 +227,16 @@ mod avx512 {
     /// There must be [`BLOCK_WORDS`] + 1 words from the one with that bit on.
     #[inline]
     #[target_feature(enable = "avx512f,avx512vbmi2")]
-    unsafe fn read(words: &[u64], first: usize) -> __m512i {
-        let (word, shift) = (first / 64, first % 64);
+    unsafe fn read(words: &[u64], first: u32) -> __m512i {
+        let word = first as usize / 64;
         debug_assert!(word + BLOCK_WORDS < words.len());
         // SAFETY: the caller answers for the words.
         let (low, high) = unsafe {
             let low = words.as_ptr().add(word);
             (_mm512_loadu_si512(low.cast()), _mm512_loadu_si512(low.add(1).cast()))
         };
-        _mm512_shrdv_epi64(low, high, _mm512_set1_epi64(shift as i64))
+        // Only the six lowest bits of the count matter.
+        _mm512_shrdv_epi64(low, high, _mm512_set1_epi64(i64::from(first)))
     }
 
     /// The sum of three bits, in each lag, and what is carried to the next plane.
@@ -252,19 +248,6 @@ mod avx512 {
         let sum = _mm512_ternarylogic_epi64::<ODD>(a, b, c);
         (sum, _mm512_ternarylogic_epi64::<MOST>(a, b, c))
     }
-}
-
-/// One bit for each lag of a block that has `least` or more of the marks, counted as by
-/// [`count_marks`].
-pub(crate) fn with_marks(words: &[u64], first: usize, marks: Marks, least: u16) -> Block {
-    let mut planes = [[0; BLOCK_WORDS]; PLANES];
-    count_marks(words, first, marks, &mut planes);
-    let used = marks.planes().max((u16::BITS - least.leading_zeros()) as usize);
-    let mut enough = [u64::MAX; BLOCK_WORDS];
-    for (weight, plane) in planes.iter().enumerate().take(used) {
-        enough = if least >> weight & 1 == 1 { and(*plane, enough) } else { or(*plane, enough) };
-    }
-    enough
 }
 
 // Whole lanes in, whole lanes out: compilers keep these in one register.
@@ -314,43 +297,41 @@ mod tests {
         #[test]
         fn every_level_counts_what_is_lit(
             lit in proptest::collection::vec(0..6000_usize, 0..3000),
-            word in proptest::collection::btree_set(0..1000_u16, 0..100),
-            bits in proptest::collection::btree_set(0..4_u32, 0..4),
-            first in 0..7000_usize,
-            scale in 1..3_usize,
-            least in 0..200_u16,
+            places in proptest::collection::vec(0..6500_u32, 0..300),
+            then in proptest::collection::vec(0..6500_u32, 0..40),
+            first in 0..1000_u32,
+            least in 0..200_u32,
+            allowed in any::<[u64; BLOCK_WORDS]>(),
         ) {
-            let word: Vec<u16> = word.into_iter().collect();
-            let bits: Vec<u32> = bits.into_iter().map(|bit| 1000 * bit).collect();
-            let marks = Marks { word: &word, bits: &bits, scale };
             let mut words = vec![0_u64; 100];
             lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
             let is_lit = |bit: usize| words.get(bit / 64).is_some_and(|w| w >> (bit % 64) & 1 == 1);
-            let expected: Vec<usize> = (0..64 * BLOCK_WORDS)
+            let expected: Vec<u32> = (0..64 * BLOCK_WORDS as u32)
                 .map(|lag| {
-                    let all = bits.iter().flat_map(|bit| word.iter().map(move |m| bit + u32::from(*m)));
-                    all.filter(|mark| is_lit(first + lag + scale * *mark as usize)).count()
+                    let all = places.iter().chain(&then);
+                    all.filter(|place| is_lit((first + lag + *place) as usize)).count() as u32
                 })
                 .collect();
             let counted = at_each_level(|| {
-                let mut planes = [[0; BLOCK_WORDS]; PLANES];
-                count_marks(&words, first, marks, &mut planes);
-                planes
+                let mut counts = Counts::default();
+                counts.add(&words, first, &places);
+                counts.add(&words, first, &then);
+                counts
             });
-            for (level, planes) in counted {
-                let at = |lag: usize| {
-                    let bit = |plane: &Block| (plane[lag / 64] >> (lag % 64) & 1) as usize;
-                    planes.iter().enumerate().map(|(p, plane)| bit(plane) << p).sum::<usize>()
-                };
-                let counts: Vec<usize> = (0..64 * BLOCK_WORDS).map(at).collect();
-                prop_assert_eq!(&counts, &expected, "{:?}", level);
-            }
-            for (level, lit) in at_each_level(|| with_marks(&words, first, marks, least)) {
-                let is_lit = |lag: &usize| lit[lag / 64] >> (lag % 64) & 1 == 1;
-                let lags: Vec<usize> = (0..64 * BLOCK_WORDS).filter(is_lit).collect();
-                let enough = |lag: &usize| expected[*lag] >= usize::from(least);
-                let expected: Vec<usize> = (0..64 * BLOCK_WORDS).filter(enough).collect();
-                prop_assert_eq!(lags, expected, "{:?}", level);
+            let is_allowed = |lag: &usize| allowed[lag / 64] >> (lag % 64) & 1 == 1;
+            let highest = (0..expected.len()).filter(is_allowed).rev().max_by_key(|lag| expected[*lag]);
+            for (level, counts) in counted {
+                let found: Vec<u32> = (0..expected.len() as u32).map(|lag| counts.at(lag)).collect();
+                prop_assert_eq!(&found, &expected, "{:?}", level);
+                let enough = counts.at_least(least);
+                for (lag, count) in expected.iter().enumerate() {
+                    prop_assert_eq!(enough[lag / 64] >> (lag % 64) & 1 == 1, *count >= least);
+                }
+                let expected = highest.map(|lag| (lag as u32, expected[lag]));
+                prop_assert_eq!(counts.highest(allowed), expected);
+                let mut again = counts;
+                again.clear();
+                prop_assert_eq!(again.highest(allowed).map(|(_, count)| count), highest.map(|_| 0));
             }
         }
     }

@@ -12,16 +12,16 @@
 #![allow(clippy::needless_range_loop)]
 
 mod balance;
-mod ballot;
+mod coarse;
 mod correlate;
+mod lay;
 pub mod level;
 mod marks;
 mod pattern;
-mod runs;
 
 pub(crate) use balance::{Balance, Chips, best_balance};
-pub(crate) use ballot::{BALLOT, elect, highest_sum, vote};
-pub(crate) use correlate::{BLOCK_WORDS, Block, Marks, PLANES, count_marks, with_marks};
+pub(crate) use coarse::{COARSE, coarse};
+pub(crate) use correlate::{BLOCK_WORDS, Block, Counts, is_dark};
+pub(crate) use lay::{count_each, lay};
 pub(crate) use marks::{WordTicks, begin_with};
-pub(crate) use pattern::{Pattern, lit_in, look_ahead, put_out};
-pub(crate) use runs::lowest_and_highest_run;
+pub(crate) use pattern::{Pattern, light_up, lit_in, look_ahead, put_out};

@@ -58,30 +58,35 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// Puts the bits of `pattern`, begun at bit `first`, out in `words`, and calls them lit in
-    /// `were_lit`, one number for each of the [`Pattern::reach`] words from the first one on. What
-    /// reaches beyond the end is dark.
-    pub(crate) fn put_out(words: &mut [u64], first: usize, pattern: &Pattern, were_lit: &mut [u8]) {
-        let (begin, shift) = (first / 64, first % 64);
-        for block in (0..pattern.reach()).step_by(LANES) {
-            let mask = shifted(&pattern.words[block..], shift);
-            let words = words.get_mut(begin + block..).unwrap_or_default();
-            let were_lit = &mut were_lit[block..block + LANES];
-            match words.first_chunk_mut::<LANES>() {
-                Some(words) => {
-                    for lane in 0..LANES {
-                        were_lit[lane] = (words[lane] & mask[lane]).count_ones() as u8;
-                        words[lane] &= !mask[lane];
-                    }
-                }
-                None => {
-                    were_lit.fill(0);
-                    for (lane, word) in words.iter_mut().enumerate() {
-                        were_lit[lane] = (*word & mask[lane]).count_ones() as u8;
-                        *word &= !mask[lane];
-                    }
+    /// Puts the bits of `pattern`, begun at bit `first`, out in `words`. What reaches beyond the end
+    /// is left away.
+    pub(crate) fn put_out(words: &mut [u64], first: usize, pattern: &Pattern) {
+        under(words, first, pattern, |word, mask| *word &= !mask);
+    }
+}
+
+on_every_level! {
+    /// Lights the bits of `pattern`, begun at bit `first`, in `words`. What reaches beyond the end is
+    /// left away.
+    pub(crate) fn light_up(words: &mut [u64], first: usize, pattern: &Pattern) {
+        under(words, first, pattern, |word, mask| *word |= mask);
+    }
+}
+
+/// Does `to_word` with each of the `words` under `pattern`, begun at bit `first`, and its bits.
+#[inline(always)]
+fn under(words: &mut [u64], first: usize, pattern: &Pattern, to_word: impl Fn(&mut u64, u64)) {
+    let (begin, shift) = (first / 64, first % 64);
+    for block in (0..pattern.reach()).step_by(LANES) {
+        let mask = shifted(&pattern.words[block..], shift);
+        let words = words.get_mut(begin + block..).unwrap_or_default();
+        match words.first_chunk_mut::<LANES>() {
+            Some(words) => {
+                for lane in 0..LANES {
+                    to_word(&mut words[lane], mask[lane]);
                 }
             }
+            None => words.iter_mut().zip(mask).for_each(|(word, mask)| to_word(word, mask)),
         }
     }
 }
@@ -149,7 +154,7 @@ mod tests {
         }
 
         #[test]
-        fn every_level_counts_and_puts_out_the_bits_of_a_pattern(
+        fn every_level_counts_puts_out_and_lights_the_bits_of_a_pattern(
             bits in proptest::collection::btree_set(0..900_usize, 0..40),
             width in 1..5_usize,
             lit in proptest::collection::btree_set(0..1500_usize, 0..600),
@@ -165,18 +170,25 @@ mod tests {
             for (level, found) in at_each_level(|| lit_in(&words, first, &pattern)) {
                 prop_assert_eq!(found, count, "{:?}", level);
             }
-            let rest = at_each_level(|| {
-                let (mut rest, mut were_lit) = (words.clone(), vec![7; pattern.reach()]);
-                put_out(&mut rest, first, &pattern, &mut were_lit);
-                (rest, were_lit)
+            let put_out = at_each_level(|| {
+                let mut rest = words.clone();
+                put_out(&mut rest, first, &pattern);
+                rest
             });
-            for (level, (rest, were_lit)) in rest {
-                prop_assert_eq!(&rest, &left, "{:?}", level);
-                for (word, count) in were_lit.iter().enumerate() {
-                    let word = first / 64 + word;
-                    let lit_in = |words: &[u64]| words.get(word).map_or(0, |word| word.count_ones());
-                    prop_assert_eq!(u32::from(*count), lit_in(&words) - lit_in(&left));
+            let mut more = words.clone();
+            within.iter().for_each(|bit| {
+                if let Some(word) = more.get_mut(bit / 64) {
+                    *word |= 1 << (bit % 64);
                 }
+            });
+            let lit_up = at_each_level(|| {
+                let mut more = words.clone();
+                light_up(&mut more, first, &pattern);
+                more
+            });
+            for ((level, rest), (_, all)) in put_out.into_iter().zip(lit_up) {
+                prop_assert_eq!(&rest, &left, "{:?}", level);
+                prop_assert_eq!(&all, &more, "{:?}", level);
             }
         }
     }

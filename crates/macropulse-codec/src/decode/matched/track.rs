@@ -1,77 +1,69 @@
-//! Shots whose neighbours have been found are looked for where their neighbours are.
+//! Tracking: the exact maximum about the lags at which the neighbours of a shot were found.
 
-use super::acquisition::Evidence;
+use super::sent::Sent;
 use super::{Band, Detection};
-use crate::decode::correlator::BLOCK;
-use crate::kernels::{Marks, lit_in};
+use crate::kernels::{BLOCK_WORDS, Block, is_dark};
 
-/// How far from a peak the sides of its block are, at least.
+/// Lags that are counted at once.
+pub(super) const BLOCK: i64 = 64 * BLOCK_WORDS as i64;
+
+/// How far from a peak the lags to both sides are seen with it, at least: a peak nearer to an end
+/// of its block is looked at again in the middle of one.
 const NEAREST_SIDE: i64 = BLOCK / 2 - BLOCK / 8;
 
 /// Where light is faint, a shot is looked for near one that was found so many shots away.
 const WIDEST_GAP: usize = 12;
 
 impl Band<'_> {
-    /// Goes from each shot that was found back to those before it.
-    pub(super) fn track_back(&mut self, evidence: Evidence) {
-        for shot in (0..self.detections.len()).rev() {
-            if self.detections[shot].is_none()
-                && self.may_be_lit(shot)
-                && let Some(detection) = self.predicted(shot, evidence)
-            {
-                self.keep(shot, detection);
-            }
-        }
-    }
-
     /// The lags at which `shot` is to be expected, after its neighbours: on the plane through
-    /// three of them, on the lines through two, and at the lag of one. Where light is faint, gaps
-    /// are looked across.
-    fn expected(&self, shot: usize, evidence: Evidence) -> [Option<i64>; 6] {
-        let at = |shot: Option<usize>| Some(self.detections.get(shot?)?.as_ref()?.lag);
+    /// three of them, on the lines through two, and at the lag of one, which may be so many shots
+    /// away.
+    fn expected(&self, shot: usize, gap: usize) -> [Option<i64>; 7] {
+        let at = |shot: Option<usize>| Some(self.found.get(shot?)?.as_ref()?.lag);
         let over = |shot: Option<usize>| {
             self.above.get(shot?).copied().flatten().map(|shot| shot as usize)
         };
         let before = shot.checked_sub(1);
         let (left, above) = (at(before), at(over(Some(shot))));
-        let plane = || Some(left? + above? - at(over(before))?);
         let across = || Some(2 * left? - at(shot.checked_sub(2))?);
-        let down = || Some(2 * above? - at(over(over(Some(shot))))?);
-        let gap = if evidence == Evidence::MoreThanChance { WIDEST_GAP } else { 1 };
+        let back = || Some(2 * at(Some(shot + 1))? - at(Some(shot + 2))?);
+        let plane = || Some(left? + above? - at(over(before))?);
         let nearest_left = || (1..=gap).find_map(|away| at(shot.checked_sub(away)));
         let nearest_right = || (1..=gap).find_map(|away| at(Some(shot + away)));
-        [plane(), across(), down(), nearest_left(), above, nearest_right()]
+        let down = || Some(2 * above? - at(over(over(Some(shot))))?);
+        [across(), nearest_left(), plane(), above, nearest_right(), back(), down()]
     }
 
-    /// The lag of `shot` if it lies where its neighbours say and the `evidence` is there.
-    pub(super) fn predicted(&mut self, shot: usize, evidence: Evidence) -> Option<Detection> {
-        let weight = self.sent.weight(shot);
-        if weight == 0 {
-            return None;
-        }
-        let expected = self.expected(shot, evidence);
+    /// The best peak that chance does not give about the lags at which `shot` is to be expected. The
+    /// first one at which as many marks are found as is usual is taken.
+    pub(super) fn tracked(&mut self, shot: usize, is_faint: bool) -> Option<Detection> {
+        let expected = self.expected(shot, if is_faint { WIDEST_GAP } else { 1 });
         if expected.iter().all(Option::is_none) {
             return None;
         }
-        let density = self.density_in_gate(shot);
-        let by_chance = self.thresholds.least(weight, density);
-        let least = match evidence {
-            Evidence::MoreThanChance => by_chance,
-            Evidence::Overwhelming | Evidence::Bright => weight.div_ceil(2).min(2 * by_chance),
-        };
+        let weight = self.sent.weight(shot);
+        let (usual, least) = (self.usual.least(weight), self.least_in_gate(shot));
+        let mut best: Option<Detection> = None;
         for (index, lag) in expected.iter().enumerate() {
             let Some(lag) = *lag else { continue };
             let mut tried = expected[..index].iter().flatten();
             if tried.any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
                 continue;
             }
-            // The flank of a peak just outside would show half as many marks as the peak.
-            let detection = self.best_near(shot, lag, least.div_ceil(2));
-            if detection.is_some_and(|detection| self.is_certain(shot, detection, evidence)) {
-                return detection;
+            // A sidelobe of a peak just outside would show half as many marks as the peak.
+            let at_least = if is_faint { least } else { least.max(usual / 2) };
+            let Some(peak) = self.climb(shot, lag, at_least) else { continue };
+            if best.is_none_or(|best| peak.count > best.count)
+                && peak.count >= self.by_chance(shot, peak)
+                && !self.is_of_a_later_shot(shot, peak)
+            {
+                best = Some(peak);
+                if peak.count >= usual {
+                    break;
+                }
             }
         }
-        None
+        best
     }
 
     /// The highest peak that can be climbed to from `lag`. `None` where fewer than `at_least`
@@ -79,10 +71,11 @@ impl Band<'_> {
     ///
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
-    /// unless it is bright and its first and last marks are there.
-    pub(super) fn best_near(&mut self, shot: usize, lag: i64, at_least: u16) -> Option<Detection> {
+    /// unless as many marks as usual are there, and marks at both of its ends.
+    pub(super) fn climb(&mut self, shot: usize, lag: i64, at_least: u32) -> Option<Detection> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
+        let usual = self.usual.least(weight).max(weight.div_ceil(2));
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
@@ -91,8 +84,8 @@ impl Band<'_> {
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
-            let is_bright = 2 * best.count >= weight;
-            if best.count == weight || is_bright && self.both_ends_are_lit(shot, best.lag) {
+            let is_certain = best.count >= usual && self.both_ends_are_lit(shot, best.lag);
+            if best.count == weight || is_certain || self.sent.length() <= NEAREST_SIDE {
                 break;
             }
             let sides = [middle - BLOCK, middle + BLOCK];
@@ -100,134 +93,111 @@ impl Band<'_> {
             let higher = sides.into_iter().flatten().find(|side| {
                 side.count > best.count || (side.count == best.count && side.lag < best.lag)
             });
-            match higher {
+            match higher.or_else(|| self.whole_bits_away(shot, best)) {
                 Some(side) => best = side,
-                None if is_bright => break,
-                None => match self.whole_bits_away(shot, best) {
-                    Some(lag) => (middle, best) = (lag, self.best_in_block(shot, lag)?),
-                    None => break,
-                },
+                None => break,
             }
         }
         Some(best)
     }
 
-    /// The lag at which more marks of `shot` are found than at `detection`, some of its bits
-    /// earlier or later: there, a part of the lit bits falls upon lit bits. Several such lags: the
-    /// best.
-    fn whole_bits_away(&mut self, shot: usize, detection: Detection) -> Option<i64> {
-        let bits = self.sent.bits_of_payload();
-        let length = self.sent.length() / bits;
-        let (nearest, farthest) = self.sent.gate();
-        let found: Vec<u16> = (-bits..2 * bits)
-            .map(|bit| self.found_in_bit(shot, detection.lag + bit * length))
-            .collect();
-        let mut best = None;
+    /// The best peak at which more marks of `shot` are found than at `detection`, some of its bits
+    /// earlier or later: there, a part of the lit bits falls upon lit bits.
+    fn whole_bits_away(&mut self, shot: usize, detection: Detection) -> Option<Detection> {
+        let sent = self.sent;
+        let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
+        let reach = sent.reach();
+        let start = sent.fired[shot] + detection.lag;
+        let pattern = &sent.bits(shot).pattern;
+        let lit = self.field.lit();
+        let found: Vec<u32> =
+            (-bits..2 * bits).map(|bit| lit.lit_in(start + bit * length, pattern)).collect();
+        let mut best = (detection.count, None);
         for away in -bits..=bits {
             let lag = detection.lag + away * length;
-            if !(nearest..=farthest).contains(&lag) {
+            if !reach.contains(&lag) {
                 continue;
             }
-            let lit = self.sent.bits(shot, true).map(|bit| (bits + away + bit / length) as usize);
-            let count: u16 = lit.filter_map(|bit| found.get(bit)).sum();
-            if count > best.map_or(detection.count, |(count, _)| count) {
-                best = Some((count, lag));
+            let bits = sent.lit_from(shot, 0).map(|bit| (bits + away + bit / length) as usize);
+            let count = bits.filter_map(|bit| found.get(bit)).sum();
+            if count > best.0 {
+                best = (count, Some(lag));
             }
         }
-        best.map(|(_, lag)| lag)
+        best.1.and_then(|lag| self.best_in_block(shot, lag))
     }
 
     /// The highest peak in the [`BLOCK`] around `middle`.
-    fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
-        let (nearest, farthest) = self.sent.gate();
+    pub(super) fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
         let first = middle - BLOCK / 2;
-        let allowed = nearest - first..farthest + 1 - first;
-        if allowed.end <= 0 || allowed.start >= BLOCK {
-            return None;
-        }
-        let word = self.sent.codebook.word(self.sent.log.word[shot]);
-        let (bits, scale) = (self.sent.lit_bits(shot), self.sent.scale() as usize);
+        let allowed = lags_allowed(self.sent, first)?;
         let start = self.sent.fired[shot] + first;
-        let (words, bit) = self.field.bits(start, BLOCK + self.sent.length());
-        self.counts.count(words, bit, Marks { word: &word.marks, bits, scale });
-        let peak = self.counts.peak(allowed, self.sent.width.into())?;
-        let (lag, margin) = (first + peak.at, peak.count - peak.next);
-        Some(Detection { lag, count: peak.count, margin })
+        let places = &mut self.search.places;
+        let (words, begin) = self.field.lit().at(start);
+        places_of(self.sent, shot, places);
+        self.counts.clear();
+        self.counts.add(words, begin as u32, places);
+        let (at, count) = self.counts.highest(allowed)?;
+        let plateau = between(i64::from(at), self.sent.width.into());
+        let others = std::array::from_fn(|lane| allowed[lane] & !plateau[lane]);
+        let next = self.counts.highest(others).map_or(0, |(_, count)| count);
+        Some(Detection { lag: first + i64::from(at), count, margin: count - next })
     }
 
     /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.
-    /// At a sidelobe that far from the peak as the sides of a block are, those at one of the ends
+    /// At a sidelobe that far from the peak as the lags beside a block are, those at one of the ends
     /// have nothing to fall upon, and only chance could light them.
     fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
-        let (scale, bits) = (self.sent.scale(), self.sent.lit_bits(shot));
-        let marks = &self.sent.codebook.word(self.sent.log.word[shot]).marks;
-        let (Some(&first), Some(&last)) = (marks.first(), marks.last()) else { return false };
-        let (Some(&first_bit), Some(&last_bit)) = (bits.first(), bits.last()) else { return false };
-        let chips = (NEAREST_SIDE / scale) as u16;
-        let begins = &marks[..marks.partition_point(|&mark| mark - first < chips)];
-        let ends = &marks[marks.partition_point(|&mark| last - mark >= chips)..];
-        let start = self.sent.fired[shot] + lag;
-        let density = self.field.density(start..start + self.sent.length());
-        let (words, place) = self.field.bits(start, self.sent.length());
+        let sent = self.sent;
+        let marks = &sent.bits(shot).marks;
+        let start = sent.fired[shot] + lag;
+        let mut bits = sent.lit_from(shot, start);
+        let (Some(first), Some(last)) = (marks.first(), marks.last()) else { return false };
+        let Some(first_bit) = bits.next() else { return false };
+        let last_bit = bits.last().unwrap_or(first_bit);
+        let side = NEAREST_SIDE as u32;
+        let begins = &marks[..marks.partition_point(|mark| mark - first < side)];
+        let ends = &marks[marks.partition_point(|mark| last - mark >= side)..];
+        let density = self.field.density(&sent.light(shot, lag));
         [(first_bit, begins), (last_bit, ends)].into_iter().all(|(bit, marks)| {
-            let places =
-                marks.iter().map(|&mark| scale as usize * (bit as usize + usize::from(mark)));
-            let places = places.map(|mark| place + mark);
-            let found = places.filter(|place| words[place / 64] >> (place % 64) & 1 == 1).count();
-            found as u16 >= self.end_thresholds.least(marks.len() as u16, density)
+            let lit = self.field.lit();
+            let found = marks.iter().filter(|mark| lit.has(bit + i64::from(**mark))).count();
+            found as u32 >= self.end_thresholds.least(marks.len() as u32, density)
         })
     }
+}
 
-    /// Whether chance does not reach `detection`; and, unless faint light is looked for, whether it
-    /// can be no sidelobe and no other shot: half of the marks were found, or twice what chance can
-    /// give, and no lit bit is much darker than the others.
-    pub(super) fn is_certain(
-        &mut self,
-        shot: usize,
-        detection: Detection,
-        evidence: Evidence,
-    ) -> bool {
-        let weight = self.sent.weight(shot);
-        if detection.count == weight {
-            return true;
-        }
-        let by_chance = self.by_chance(shot, detection);
-        if evidence == Evidence::MoreThanChance {
-            return detection.count >= by_chance && self.is_mostly_residual(shot, detection);
-        }
-        if detection.count < by_chance || detection.count < weight.div_ceil(2).min(2 * by_chance) {
-            return false;
-        }
-        let lit = self.sent.lit_bits(shot).len() as u32;
-        // Not so many marks are missing altogether.
-        let in_word = self.sent.word(shot).marks() as u32;
-        if u32::from(weight - detection.count) + u32::from(detection.count).div_ceil(3 * lit)
-            < in_word
-        {
-            return true;
-        }
-        let mut lit_bits = self.sent.bits(shot, true);
-        lit_bits.all(|bit| {
-            let found = self.found_in_bit(shot, detection.lag + bit);
-            3 * u32::from(found) * lit >= u32::from(detection.count)
-        })
+/// Puts into `places` the ticks from the start of the macropulse of `shot` to each of its marks.
+pub(super) fn places_of(sent: &Sent, shot: usize, places: &mut Vec<u32>) {
+    let marks = &sent.bits(shot).marks;
+    places.clear();
+    for bit in sent.lit_from(shot, 0) {
+        places.extend(marks.iter().map(|mark| bit as u32 + mark));
     }
+}
 
-    /// Whether three in four of the marks found at `detection` are in the residual. Where many
-    /// bright shots overlap, they pass for a faint one more easily than chance does.
-    pub(super) fn is_mostly_residual(&mut self, shot: usize, detection: Detection) -> bool {
-        let start = self.sent.fired[shot] + detection.lag;
-        let places = self.sent.places(shot).map(|mark| start + mark);
-        let end = start + self.sent.length() + i64::from(self.sent.width);
-        let residual = self.field.residual(start..end);
-        4 * residual.count(places, self.sent.width) >= 3 * detection.count
-    }
+/// The lags at which light is looked for among those of the block that begins with lag `first`; `None` if there
+/// are none.
+pub(super) fn lags_allowed(sent: &Sent, first: i64) -> Option<Block> {
+    let reach = sent.reach();
+    let allowed = below(reach.start - first, [u64::MAX; BLOCK_WORDS], false);
+    let allowed = below(reach.end - first, allowed, true);
+    (!is_dark(&allowed)).then_some(allowed)
+}
 
-    /// Marks of the code word of `shot` that are found if it begins at `lag`.
-    pub(super) fn found_in_bit(&mut self, shot: usize, lag: i64) -> u16 {
-        let pattern = self.sent.pattern(shot);
-        let start = self.sent.fired[shot] + lag;
-        let (words, first) = self.field.bits(start, 64 * pattern.reach() as i64);
-        lit_in(words, first, pattern) as u16
-    }
+/// Those of `lags` that are below `end`, or those that are not.
+pub(super) fn below(end: i64, lags: Block, wanted: bool) -> Block {
+    std::array::from_fn(|lane| {
+        let below = match (end - 64 * lane as i64).clamp(0, 64) {
+            64 => u64::MAX,
+            bits => (1 << bits) - 1,
+        };
+        lags[lane] & if wanted { below } else { !below }
+    })
+}
+
+/// The lags of a block that are no farther than `plateau` from lag `at` of it.
+fn between(at: i64, plateau: i64) -> Block {
+    let from = below(at - plateau, [u64::MAX; BLOCK_WORDS], false);
+    below(at + plateau + 1, from, true)
 }

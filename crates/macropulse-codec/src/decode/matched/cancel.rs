@@ -16,7 +16,8 @@
 //! A tick of which no macropulse without a gap can begin is left for the receivers that follow.
 //! Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
 
-use super::{Detection, Sent};
+use super::Detection;
+use super::sent::Sent;
 use crate::kernels::begin_with;
 
 /// Ticks without a complete macropulse after which cancellation ends, and how many more for each
@@ -42,8 +43,8 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
     let mut canceller = Canceller {
         sent,
         ticks,
-        gate: sent.gate(),
-        light: sent.receiver.light_ticks.into(),
+        gate: (sent.gate().start, sent.gate().end - 1),
+        light: sent.reach().end - 1,
         scale: sent.receiver.ticks_per_chip,
         least: fewest_without_a_gap(sent, ticks),
         cancelled: CancelledTicks::new(ticks.len()),
@@ -71,9 +72,10 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
 /// with L · dᴺ ≤ α, d the share of lit ticks. Two at least, as the second mark is asked for.
 fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> usize {
-    let span = sent.span();
-    let density = ticks.len() as f64 / (span.end - span.start).max(1) as f64;
-    let rarity = libm::log(sent.receiver.false_alarm / sent.lags());
+    let time = ticks.last().zip(ticks.first()).map_or(0, |(last, first)| last - first);
+    let density = ticks.len() as f64 / f64::from(time.max(1));
+    let lags = (sent.gate().end - sent.gate().start) as f64;
+    let rarity = libm::log(sent.receiver.false_alarm / lags);
     (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as usize
 }
 
@@ -196,13 +198,10 @@ impl Canceller<'_> {
 
     /// Keeps `lag`: of several surfaces the first one counts, the others are found again.
     fn keep(&mut self, shot: usize, lag: i64, count: usize) {
-        let count = count as u16;
+        let count = count as u32;
         self.next = shot + 1;
-        if lag > self.gate.1 {
-            return;
-        }
-        let margin = count
-            - self.sent.codebook.sidelobe(self.sent.log.label[shot], self.sent.log.word[shot]);
+        let (label, word) = (self.sent.log.label[shot], self.sent.log.word[shot]);
+        let margin = count - u32::from(self.sent.codebook.sidelobe(label, word));
         let detection = Detection { lag, count, margin };
         if self.detections[shot].get_or_insert(detection).lag != lag {
             self.again.push((shot, detection));

@@ -1,0 +1,309 @@
+//! The matched receiver: the lag at which the whole known macropulse of a shot fits best.
+//!
+//! What it is to give is simple to say: for each shot the lag of its gate with most marks, the
+//! earliest of several, if chance does not give so many and no other return accounts for them. To
+//! try every lag with every mark takes tens of microseconds a shot; so the receiver cancels light
+//! that it has explained, as multi-user detectors do, and looks first where light is likely:
+//!
+//! 1. [`cancel`]: macropulses of which every mark is there are taken off the stream of ticks one
+//!    after another: no lag can have more. In clear light this is all.
+//! 2. [`track`]: neighbouring pixels see neighbouring ranges. About them the exact maximum is taken;
+//!    it is believed at once if as large a share of the marks is found as of the shots before.
+//! 3. [`acquire`]: the exact maximum over the gate, of shots that no neighbour predicts and of those
+//!    fainter than their neighbours; and, where light is left over, of further surfaces.
+//! 4. [`verify`]: returns that light of other returns accounts for are excluded, and those of which
+//!    a bit is lit that should be dark, or dark that should be lit.
+//!
+//! A return is believed if chance would not reach its count of marks at any lag of the gate, see
+//! [`super::threshold`].
+//!
+//! The shots go through these steps in blocks, so that the ticks at hand fit into a cache.
+
+mod acquire;
+mod cancel;
+mod look;
+mod sent;
+#[cfg(test)]
+mod tests;
+mod track;
+mod verify;
+
+use std::cell::Cell;
+use std::ops::Range;
+
+use super::field::{self, Field};
+use super::threshold::Thresholds;
+use super::{Receiver, Returns};
+use crate::ShotLog;
+use crate::Ticks;
+use crate::code::Codebook;
+use crate::kernels::Counts;
+use acquire::Search;
+use look::Usual;
+use sent::Sent;
+use verify::Photons;
+
+/// Decodes one band.
+pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
+    let sent = Sent::new(receiver, sent, ticks.epoch);
+    let cancelled = cancel::cancel(&sent, &ticks.tick);
+    Band::new(&sent, &ticks.tick, cancelled).decode()
+}
+
+/// The shots that are fired while light passes the gate so many times go through the steps together:
+/// so many more than are in flight that what is looked at twice, at both ends of a block, costs
+/// little.
+const GATES_PER_BLOCK: i64 = 2;
+
+/// Surfaces that light of a shot may come from beside the one that is taken for its range.
+const SURFACES: usize = 3;
+
+/// Returns of a shot that this receiver can give at most.
+pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
+
+/// How often chance may light an end of a macropulse where there is none.
+const BY_CHANCE: f64 = 1e-3;
+
+thread_local! {
+    /// Kept from band to band: fresh memory costs more than what is done with it.
+    static MEMORY: Cell<Memory> = Cell::default();
+}
+
+/// Memory of a band.
+#[derive(Default)]
+struct Memory {
+    field: field::Memory,
+    search: Search,
+    thresholds: Vec<Thresholds>,
+    photons: Photons,
+}
+
+/// The lag at which a shot was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Detection {
+    lag: i64,
+    /// Marks found there.
+    count: u32,
+    /// The same less those at the best other lag that was looked at.
+    margin: u32,
+}
+
+struct Band<'a> {
+    sent: &'a Sent<'a>,
+    field: Field<'a>,
+    /// Ticks that are not cancelled yet in the gate of each shot, to begin with; `None` if nothing
+    /// was cancelled.
+    residual_in_gate: Option<Vec<u32>>,
+    /// The shot at the same column one line earlier.
+    above: Vec<Option<u32>>,
+    found: Vec<Option<Detection>>,
+    /// Other surfaces of the shots at hand.
+    further: Vec<(usize, Detection)>,
+    /// Whether all of the gate was searched for more marks than were found.
+    searched: Vec<bool>,
+    /// For all lags of a gate.
+    thresholds: Thresholds,
+    /// For the bits of one macropulse instead of the lags of a gate.
+    bit_thresholds: Thresholds,
+    /// For the first marks of a macropulse, or the last ones.
+    end_thresholds: Thresholds,
+    usual: Usual,
+    /// The next shot that is searched for where light does not stand out, and the shots to the one
+    /// behind it.
+    next_even: usize,
+    pause: usize,
+    /// Counts of the block of lags that was looked at last.
+    counts: Counts,
+    search: Search,
+    photons: Photons,
+    /// Memory for the residual of a macropulse.
+    words: Vec<u64>,
+}
+
+impl<'a> Band<'a> {
+    fn new(sent: &'a Sent<'a>, ticks: &'a [u32], cancelled: cancel::Cancelled) -> Self {
+        let cancel::Cancelled { detections: found, again: further, residual } = cancelled;
+        let mut memory = MEMORY.take();
+        let gate = sent.gate();
+        let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
+        let bits = sent.bits_of_payload() as f64;
+        let wanted = [(lags, false_alarm), (bits, false_alarm), (1.0, BY_CHANCE)]
+            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm, sent.is_thorough()));
+        let mut remembered = memory.thresholds;
+        let [thresholds, bit_thresholds, end_thresholds] =
+            wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
+                Some(known) => remembered.swap_remove(known),
+                None => wanted,
+            });
+        // In clear light everything is cancelled, and the field is never looked at.
+        let is_dark = residual.as_ref().is_some_and(Vec::is_empty);
+        let is_dark = is_dark || sent.fired.is_empty();
+        let reach = sent.reach();
+        let light = reach.end - reach.start + sent.length() + i64::from(sent.width);
+        let begin = sent.fired.first().map_or(0, |first| first + reach.start);
+        let extent = match is_dark {
+            true => (0, 0),
+            false => (begin, (GATES_PER_BLOCK + 2) * light + 2 * sent.length()),
+        };
+        let cell = sent.length() / CELLS;
+        memory.search.forget();
+        Self {
+            field: Field::new(ticks, sent.width, extent, cell, memory.field),
+            residual_in_gate: residual.map(|residual| in_gates(sent, &residual)),
+            above: if is_dark { vec![] } else { above(sent.log) },
+            searched: vec![false; found.len()],
+            found,
+            further,
+            thresholds,
+            bit_thresholds,
+            end_thresholds,
+            usual: Usual::new(),
+            next_even: 0,
+            pause: 1,
+            counts: Counts::default(),
+            search: memory.search,
+            photons: memory.photons,
+            words: Vec::new(),
+            sent,
+        }
+    }
+
+    /// All steps for all shots.
+    fn decode(mut self) -> Returns {
+        let mut returns = Returns::with_capacity(self.sent.log.owned.len());
+        let (shots, mut first, mut settled) = (self.found.len(), 0, 0);
+        while first < shots {
+            let block = first..self.end_of_block(first);
+            first = block.end;
+            // What overlaps with the light of the last ones may not be known yet.
+            let end = if block.end == shots { shots } else { self.in_flight_before(block.end) };
+            let closed = settled..end.max(settled);
+            settled = closed.end;
+            if block.clone().chain(closed.clone()).any(|shot| self.is_open(shot)) {
+                self.field.cover(Self::span(self.sent, block.clone()));
+                self.search.forget();
+                self.cancel_found(block.clone());
+                self.look_for(block);
+                self.look_for_leftovers(closed.clone());
+            }
+            self.settle(closed, &mut returns);
+        }
+        MEMORY.set(Memory {
+            field: self.field.into_memory(),
+            search: self.search,
+            photons: self.photons,
+            thresholds: vec![self.thresholds, self.bit_thresholds, self.end_thresholds],
+        });
+        returns
+    }
+
+    /// The end of the block of shots that begins with `first`.
+    fn end_of_block(&self, first: usize) -> usize {
+        let gate = self.sent.arrival(first);
+        let end = self.sent.fired[first] + GATES_PER_BLOCK * (gate.end - gate.start);
+        self.sent.fired.partition_point(|fired| *fired < end).max(first + 1)
+    }
+
+    /// The time that must be at hand for a block of shots: their light, and what it may overlap with.
+    fn span(sent: &Sent, block: Range<usize>) -> Range<i64> {
+        let last = sent.arrival(block.end - 1);
+        let first = sent.arrival(block.start);
+        // Shots that are settled with the block are as old as the light of its first one, and their
+        // light is compared with bits a macropulse before it.
+        first.start - (first.end - first.start) - sent.length()..last.end
+    }
+
+    /// The first shot of which light may still come when that of `shot` does.
+    fn in_flight_before(&self, shot: usize) -> usize {
+        let fired = &self.sent.fired;
+        let gate = self.sent.arrival(0);
+        let earliest = fired[shot.min(fired.len() - 1)] - (gate.end - gate.start);
+        fired.partition_point(|&fired| fired < earliest)
+    }
+
+    /// Whether light of `shot` may be found that was not yet.
+    fn is_open(&self, shot: usize) -> bool {
+        let ticks = self.residual_in_gate.as_ref().map_or(u32::MAX, |ticks| ticks[shot]);
+        // A single mark tells nothing.
+        ticks > 1 && self.sent.weight(shot) > 0
+    }
+
+    /// Cancels what is known of a block of shots.
+    fn cancel_found(&mut self, block: Range<usize>) {
+        if self.residual_in_gate.is_none() {
+            return;
+        }
+        for shot in self.in_flight_before(block.start)..block.end {
+            if let Some(detection) = self.found[shot] {
+                self.cancel(shot, detection.lag);
+            }
+        }
+        for (shot, detection) in self.further.clone() {
+            self.cancel(shot, detection.lag);
+        }
+    }
+
+    /// Keeps `detection` and cancels its ticks.
+    fn keep(&mut self, shot: usize, detection: Detection) {
+        self.cancel(shot, detection.lag);
+        self.found[shot] = Some(detection);
+        self.usual.learn(detection.count, self.sent.weight(shot));
+    }
+
+    /// Cancels the ticks of `shot` at `lag`.
+    fn cancel(&mut self, shot: usize, lag: i64) {
+        let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
+        let light = self.sent.light(shot, lag);
+        let starts = self.sent.lit_from(shot, light.start - farther);
+        self.field.cancel(starts, pattern, light.start - farther..light.end + farther);
+        self.search.grow_stale();
+    }
+
+    /// Share of places that are lit in the gate of `shot`.
+    fn density_in_gate(&self, shot: usize) -> f64 {
+        let (gate, fired) = (self.sent.gate(), self.sent.fired[shot]);
+        self.field.density(&(fired + gate.start..fired + gate.end))
+    }
+
+    /// The marks that chance does not reach, be it as dense in all the gate as around `detection`,
+    /// its own marks apart.
+    fn by_chance(&mut self, shot: usize, detection: Detection) -> u32 {
+        let density = self.density_in_gate(shot).max(self.density_beside(shot, detection));
+        self.thresholds.least(self.sent.weight(shot), density)
+    }
+
+    /// The marks that chance does not reach at the mean density of the gate of `shot`.
+    fn least_in_gate(&mut self, shot: usize) -> u32 {
+        let density = self.density_in_gate(shot);
+        self.thresholds.least(self.sent.weight(shot), density)
+    }
+}
+
+/// Cells in which ticks are counted, to a macropulse.
+const CELLS: i64 = 4;
+
+/// For each shot, how many of the sorted `ticks` lie where its light may be.
+fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {
+    let (mut first, mut last) = (0, 0);
+    let count = |shot| {
+        let gate = sent.arrival(shot);
+        let before = |end: i64| move |tick: &&u32| i64::from(**tick) < end;
+        first += ticks[first..].iter().take_while(before(gate.start)).count();
+        last += ticks[last..].iter().take_while(before(gate.end)).count();
+        (last - first) as u32
+    };
+    (0..sent.fired.len()).map(count).collect()
+}
+
+/// For each shot, the last one before it at the same column of another row.
+fn above(log: &ShotLog) -> Vec<Option<u32>> {
+    let columns = log.column.iter().max().map_or(0, |&column| usize::from(column) + 1);
+    let mut last = vec![None; columns];
+    let mut above = Vec::with_capacity(log.len());
+    for shot in 0..log.len() {
+        let at_column = &mut last[usize::from(log.column[shot])];
+        above.push(at_column.filter(|&other: &u32| log.row[other as usize] != log.row[shot]));
+        *at_column = Some(shot as u32);
+    }
+    above
+}

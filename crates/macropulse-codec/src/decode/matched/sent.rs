@@ -1,0 +1,238 @@
+//! What was sent, as the receiver knows it: shots and code words, counted in ticks.
+
+use std::cell::OnceCell;
+use std::ops::Range;
+
+use super::Detection;
+use crate::ShotLog;
+use crate::code::{CodeWord, Codebook};
+use crate::decode::{Effort, FARTHEST_JITTER, Pick, Receiver};
+use crate::kernels::{Pattern, WordTicks};
+
+/// What was sent.
+pub(super) struct Sent<'a> {
+    pub receiver: &'a Receiver,
+    pub codebook: &'a Codebook,
+    pub log: &'a ShotLog,
+    /// Absolute time of tick 0, in ticks.
+    pub epoch: i64,
+    /// Tick in which each shot was fired.
+    pub fired: Vec<i64>,
+    /// Length of the stretch in which a mark may be found, in ticks.
+    pub width: u32,
+    /// The code words, in ticks, each made when it is first needed: one pixel of a flash has a
+    /// single word.
+    words: Vec<OnceCell<WordTicks>>,
+    /// The same as bits, needed only where light is not clear.
+    bits: Vec<OnceCell<Bits>>,
+}
+
+/// A code word, as bits.
+pub(super) struct Bits {
+    /// Ticks from its start to each mark.
+    pub marks: Vec<u32>,
+    /// One bit for each mark.
+    pub pattern: Pattern,
+    /// The ticks that are cancelled with it, from [`Sent::farther`] before its start on.
+    pub cancelled: Pattern,
+    /// The places at which a mark counts as found because of it, from twice that and a window
+    /// before its start on.
+    pub claimed: Pattern,
+    /// Most marks that one tick may count for.
+    pub per_tick: u32,
+    /// Marks that a tick may count for besides an earlier one.
+    pub shared: u32,
+}
+
+impl<'a> Sent<'a> {
+    pub fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), epoch: i64) -> Self {
+        let (codebook, log) = sent;
+        let fired = receiver.all_fired(log).iter().map(|fired| fired - epoch).collect();
+        let width = window(receiver.jitter_ticks);
+        let words = (0..codebook.words()).map(|_| OnceCell::new()).collect();
+        let bits = (0..codebook.words()).map(|_| OnceCell::new()).collect();
+        Self { receiver, codebook, log, epoch, fired, width, words, bits }
+    }
+
+    /// The code word of `shot`, as ticks in a row.
+    pub fn word(&self, shot: usize) -> &WordTicks {
+        let word = self.log.word[shot];
+        self.words[usize::from(word)].get_or_init(|| {
+            WordTicks::new(&self.codebook.word(word).marks, self.receiver.ticks_per_chip)
+        })
+    }
+
+    /// The code word of `shot`, as bits.
+    pub fn bits(&self, shot: usize) -> &Bits {
+        let word = self.log.word[shot];
+        self.bits[usize::from(word)].get_or_init(|| {
+            let chips = self.codebook.word(word).marks.iter();
+            let scale = self.receiver.ticks_per_chip;
+            let marks: Vec<u32> = chips.map(|&mark| scale * u32::from(mark)).collect();
+            let pattern =
+                |width: u32| Pattern::new(marks.iter().map(|&mark| mark as usize), width as usize);
+            let cancelled = self.width + 2 * self.farther() as u32;
+            let chips = self.width.div_ceil(scale.max(1));
+            Bits {
+                per_tick: crowding(self.codebook.word(word), chips),
+                shared: shared(self.codebook.word(word), chips),
+                pattern: pattern(1),
+                cancelled: pattern(cancelled),
+                claimed: pattern(cancelled + self.width - 1),
+                marks,
+            }
+        })
+    }
+
+    /// How many ticks before a mark are cancelled with it: one tick in twenty jitters farther than
+    /// marks are looked for.
+    pub fn farther(&self) -> i64 {
+        i64::from(self.width / 2)
+    }
+
+    /// The lit chips of `shot`.
+    pub fn marks(&self, shot: usize) -> &'a [u16] {
+        self.codebook.marks(self.log.label[shot], self.log.word[shot])
+    }
+
+    /// Number of marks of `shot`.
+    pub fn weight(&self, shot: usize) -> u32 {
+        (self.lit_bits(shot).len() * self.in_word(shot)) as u32
+    }
+
+    /// Marks of the code word of `shot`.
+    pub fn in_word(&self, shot: usize) -> usize {
+        self.codebook.word(self.log.word[shot]).marks.len()
+    }
+
+    /// The first chip of each lit bit of `shot`.
+    pub fn lit_bits(&self, shot: usize) -> &'a [u32] {
+        self.codebook.lit_bits(self.log.label[shot])
+    }
+
+    /// The first tick of each lit bit of `shot`, if it begins at tick `start`.
+    pub fn lit_from(&self, shot: usize, start: i64) -> impl Iterator<Item = i64> + use<'a> {
+        let scale = self.scale();
+        self.lit_bits(shot).iter().map(move |&bit| start + scale * i64::from(bit))
+    }
+
+    /// The same of each dark bit.
+    pub fn dark_from(&self, shot: usize, start: i64) -> impl Iterator<Item = i64> + use<'a> {
+        let (length, lit) = (self.bit_length(), self.lit_bits(shot));
+        let chips = length / self.scale();
+        let is_dark = move |bit: &i64| !lit.contains(&((bit * chips) as u32));
+        (0..self.bits_of_payload()).filter(is_dark).map(move |bit| start + bit * length)
+    }
+
+    /// Ticks per chip.
+    pub fn scale(&self) -> i64 {
+        i64::from(self.receiver.ticks_per_chip)
+    }
+
+    /// Length of a macropulse, in ticks.
+    pub fn length(&self) -> i64 {
+        i64::from(self.codebook.chips()) * self.scale()
+    }
+
+    /// Length of one bit of it, in ticks.
+    pub fn bit_length(&self) -> i64 {
+        self.length() / self.bits_of_payload()
+    }
+
+    /// Bits of a payload.
+    pub fn bits_of_payload(&self) -> i64 {
+        self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()))
+    }
+
+    /// The lags at which a return is accepted.
+    pub fn gate(&self) -> Range<i64> {
+        let (nearest, farthest) = self.receiver.gate_ticks;
+        i64::from(nearest)..i64::from(farthest) + 1
+    }
+
+    /// The lags at which light is looked for: those of the gate, and all beyond it from which light
+    /// may come, a macropulse farther at least. What stands there has sidelobes within the gate, and
+    /// lights marks of later shots; known, it is told from returns.
+    pub fn reach(&self) -> Range<i64> {
+        let (gate, light) = (self.gate(), i64::from(self.receiver.light_ticks) + 1);
+        (gate.start - self.length()).max(0)..light.max(gate.end + self.length())
+    }
+
+    /// The time in which light of `shot` can arrive.
+    pub fn arrival(&self, shot: usize) -> Range<i64> {
+        let (reach, fired) = (self.reach(), self.fired[shot]);
+        fired + reach.start..fired + reach.end - 1 + self.length() + i64::from(self.width)
+    }
+
+    /// The time that light of `shot` takes up if it comes after `lag`.
+    pub fn light(&self, shot: usize, lag: i64) -> Range<i64> {
+        let start = self.fired[shot] + lag;
+        start..start + self.length() + i64::from(self.width) - 1
+    }
+
+    /// Fewest ticks that can be so many marks of `shot`.
+    pub fn ticks_of(&self, shot: usize, marks: u32) -> u32 {
+        let bits = self.bits(shot);
+        let alone = marks.saturating_sub(bits.shared * self.lit_bits(shot).len() as u32);
+        alone.max(marks.div_ceil(bits.per_tick))
+    }
+
+    /// Whether every shot is searched for in all of its gate.
+    pub fn is_thorough(&self) -> bool {
+        self.receiver.effort == Effort::Thorough
+    }
+
+    /// Whether surfaces of a shot beside the strongest one are asked for.
+    pub fn wants_further(&self) -> bool {
+        self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
+    }
+
+    /// Whether a larger share of the marks was found of one shot than of another one.
+    pub fn is_fuller(&self, one: (usize, Detection), other: (usize, Detection)) -> bool {
+        let crossed = |(_, detection): (usize, Detection), (shot, _): (usize, Detection)| {
+            u64::from(detection.count) * u64::from(self.weight(shot))
+        };
+        crossed(one, other) > crossed(other, one)
+    }
+}
+
+/// For how many ticks from its earliest place on a mark is looked for: ±2 σ of the jitter and the
+/// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
+fn window(jitter: f64) -> u32 {
+    if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(FARTHEST_JITTER) as u32 } else { 1 }
+}
+
+/// Most marks in any `chips` chips of `word`, or of two in a row.
+fn crowding(word: &CodeWord, chips: u32) -> u32 {
+    let once = word.marks.iter().map(|&mark| u32::from(mark));
+    let marks: Vec<u32> = once.clone().chain(once.map(|mark| mark + word.length)).collect();
+    let within = |first: usize| {
+        marks[first..].iter().take_while(|&&mark| mark < marks[first] + chips).count() as u32
+    };
+    (0..word.marks.len()).map(within).max().unwrap_or(1)
+}
+
+/// Marks of `word` less than `chips` chips behind another one, be it of the same word before.
+fn shared(word: &CodeWord, chips: u32) -> u32 {
+    let marks = word.marks.iter().map(|&mark| u32::from(mark));
+    let before = word.marks.last().map(|&mark| u32::from(mark).wrapping_sub(word.length));
+    let pairs = before.into_iter().chain(marks.clone()).zip(marks);
+    pairs.filter(|(before, mark)| mark.wrapping_sub(*before) < chips).count() as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tick_counts_for_all_marks_it_may_be() {
+        let word = CodeWord { length: 20, marks: vec![0, 5, 6, 8, 19] };
+        assert_eq!([1, 2, 3, 4, 8, 9].map(|chips| crowding(&word, chips)), [1, 2, 2, 3, 4, 4]);
+        assert_eq!(crowding(&CodeWord { length: 20, marks: vec![] }, 5), 1);
+    }
+
+    #[test]
+    fn the_window_grows_with_the_jitter() {
+        assert_eq!([0.0, 0.05, 0.1, 0.4, 1.0, 2.0].map(window), [1, 1, 2, 3, 5, 9]);
+    }
+}

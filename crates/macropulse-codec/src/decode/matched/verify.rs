@@ -1,0 +1,338 @@
+//! Exclusion and verification: what becomes of a shot that was found, and what is measured of it.
+
+use std::ops::Range;
+
+use super::{Band, Detection};
+use crate::decode::timeline::Timeline;
+use crate::decode::{Reject, Return, Returns, Strength, photons_per_mark};
+use crate::kernels::lit_in;
+use crate::statistics::binomial_tail;
+use crate::time;
+
+impl Band<'_> {
+    /// Turns what was found of `shots` into returns.
+    pub(super) fn settle(&mut self, shots: Range<usize>, returns: &mut Returns) {
+        let owned = self.sent.log.owned.clone();
+        for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
+            let Some(first) = self.found[shot] else {
+                returns.reject(Reject::NoPeak);
+                continue;
+            };
+            let is_whole = first.count == self.sent.weight(shot);
+            if is_whole
+                && self.sent.gate().contains(&first.lag)
+                && !self.further.iter().any(|(other, _)| *other == shot)
+            {
+                if self.is_open(shot) && !self.carries_its_label(shot, first) {
+                    returns.reject(Reject::LabelMismatch);
+                } else {
+                    returns.push(self.measured(shot, first));
+                }
+                continue;
+            }
+            self.settle_doubtful(shot, first, returns);
+        }
+        // Older light overlaps with nothing that is still to come.
+        let oldest = self.in_flight_before(shots.end);
+        self.further.retain(|(shot, _)| *shot >= oldest);
+    }
+
+    /// The same of a shot of which not all marks, or several surfaces, were found.
+    fn settle_doubtful(&mut self, shot: usize, first: Detection, returns: &mut Returns) {
+        let mut surfaces = vec![first];
+        surfaces.extend(self.further.iter().filter(|(other, _)| *other == shot).map(|(_, d)| d));
+        surfaces.sort_by_key(|surface| (u32::MAX - surface.count, surface.lag));
+        let gate = self.sent.gate();
+        let mut why = match gate.contains(&first.lag) {
+            true => Reject::NoPeak,
+            false => Reject::OutsideGate,
+        };
+        surfaces.retain(|surface| gate.contains(&surface.lag));
+        let mut kept: Vec<Detection> = Vec::with_capacity(surfaces.len());
+        for surface in surfaces {
+            if !self.is_its_own(shot, surface) {
+                continue;
+            }
+            if !self.carries_its_label(shot, surface) {
+                why = Reject::LabelMismatch;
+                continue;
+            }
+            kept.push(surface);
+        }
+        if kept.is_empty() {
+            returns.reject(why);
+            return;
+        }
+        kept.sort_by_key(|surface| surface.lag);
+        let receiver = self.sent.receiver;
+        // Of one shot, as many marks are as much light.
+        let strength =
+            |surface: &Detection| Strength { peak: surface.count as u16, light: f32::NAN };
+        receiver.pick.keep(receiver.returns.into(), &mut kept, strength);
+        for surface in kept {
+            returns.push(self.measured(shot, surface));
+        }
+    }
+
+    /// Whether half of its marks are found of `shot`, and twice what chance gives: chance finds most
+    /// where macropulses overlap, but not as many.
+    pub(super) fn is_overwhelming(&mut self, shot: usize, detection: Detection) -> bool {
+        2 * detection.count >= self.sent.weight(shot)
+            && detection.count >= 2 * self.by_chance(shot, detection)
+    }
+
+    /// Whether light of other returns, of other shots or another surface of this one, does not account
+    /// for `detection`.
+    ///
+    /// Fuller returns claim places. Of those that they claim about the macropulse, a share c is lit,
+    /// of the others a share d. If n of its N marks are claimed, chance finds each with the mean
+    /// probability (n·c + (N − n)·d) / N; it must not find as many at any lag of the gate. Of a shot
+    /// with half of its marks, and twice what chance gives, this is not asked.
+    pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
+        let sent = self.sent;
+        let weight = sent.weight(shot);
+        let is_other = |found: &Detection| found.lag != detection.lag;
+        let of_shot = self.found[shot].is_some_and(|found| is_other(&found))
+            || self.further.iter().any(|(other, found)| *other == shot && is_other(found));
+        if !of_shot && self.is_overwhelming(shot, detection) {
+            return true;
+        }
+        let light = sent.light(shot, detection.lag);
+        let stretch = light.start.div_euclid(64) * 64..light.end.div_euclid(64) * 64 + 64;
+        let mut claimed = Timeline::default();
+        // Words of others may begin before it.
+        let before = (sent.bit_length() + 4 * i64::from(sent.width)).div_euclid(64) * 64 + 64;
+        claimed.clear_all(stretch.start - before, stretch.end - stretch.start + before);
+        let mut is_claimed = false;
+        let fuller = self.overlapping(light.clone());
+        let fuller = fuller.filter(|found| sent.is_fuller(*found, (shot, detection)));
+        let beyond = self.light_from_beyond(shot, light.start, detection.count);
+        for (other, theirs) in fuller.chain(beyond) {
+            is_claimed = true;
+            let bits = sent.bits(other);
+            let before = 2 * sent.farther() + i64::from(sent.width - 1);
+            let start = sent.fired[other] + theirs.lag - before;
+            sent.lit_from(other, start).for_each(|bit| claimed.light_up(bit, &bits.claimed));
+        }
+        if !is_claimed {
+            return true;
+        }
+        let lit = self.field.lit();
+        // Free and claimed places: all of them, those lit, marks of the shot, and those found.
+        let mut places = [[0_u32; 4]; 2];
+        for (claimed, lit) in claimed.words(&stretch).iter().zip(lit.words(&stretch)) {
+            for (places, those) in places.iter_mut().zip([!claimed, *claimed]) {
+                places[0] += those.count_ones();
+                places[1] += (those & lit).count_ones();
+            }
+        }
+        let marks = &sent.bits(shot).marks;
+        for bit in sent.lit_from(shot, light.start) {
+            for place in marks.iter().map(|&mark| bit + i64::from(mark)) {
+                let places = &mut places[usize::from(claimed.has(place))];
+                places[2] += 1;
+                places[3] += u32::from(lit.has(place));
+            }
+        }
+        // Its own marks are no measure of the others.
+        let chance = places.map(|[all, lit, marks, found]| {
+            let own = |marks: u32| marks * sent.width;
+            let all = all.saturating_sub(own(marks)).max(1);
+            let lit = lit.saturating_sub(own(found)).min(all);
+            f64::from(marks) * f64::from(lit) / f64::from(all)
+        });
+        let density = self.density_in_gate(shot).max((chance[0] + chance[1]) / f64::from(weight));
+        detection.count >= self.thresholds.least(weight, density)
+    }
+
+    /// What earlier shots in the word of `shot`, found with `count` marks, would be found with if their
+    /// light came from beyond the gate at tick `start`, or whole bits beside it: those with more marks.
+    fn light_from_beyond(&self, shot: usize, start: i64, count: u32) -> Vec<(usize, Detection)> {
+        let beyond = self.sent.gate().end..i64::from(self.sent.receiver.light_ticks) + 1;
+        let mut found = self.in_the_same_word(shot, start, beyond);
+        found.retain(|(other, theirs)| *other < shot && theirs.count > count);
+        found
+    }
+
+    /// Whether light of `shot` that seems to come from beyond the gate is rather that of a later shot
+    /// from within: one in the same word with as many marks there, or whole bits beside it, and as
+    /// large a share of all its marks but for chance.
+    pub(super) fn is_of_a_later_shot(&self, shot: usize, detection: Detection) -> bool {
+        let (sent, gate) = (self.sent, self.sent.gate());
+        if detection.lag < gate.end + sent.length() {
+            return false;
+        }
+        let found = self.in_the_same_word(shot, sent.fired[shot] + detection.lag, gate);
+        let share = f64::from(detection.count) / f64::from(sent.weight(shot));
+        found.iter().any(|(other, theirs)| {
+            let least = super::look::usual(share, sent.weight(*other)).max(detection.count);
+            *other > shot && theirs.count >= least
+        })
+    }
+
+    /// The marks of other shots in the word of `shot` that begin at tick `start`, or whole bits beside
+    /// it, after one of the `lags`: there, a part of their lit bits falls upon its lit bits.
+    fn in_the_same_word(
+        &self,
+        shot: usize,
+        start: i64,
+        lags: Range<i64>,
+    ) -> Vec<(usize, Detection)> {
+        let sent = self.sent;
+        let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
+        let from = start - bits * length - lags.end;
+        let first = sent.fired.partition_point(|fired| *fired < from);
+        let end = sent.fired.partition_point(|fired| *fired <= start + bits * length - lags.start);
+        let is_alike = |other: &usize| sent.log.word[*other] == sent.log.word[shot];
+        let pattern = &sent.bits(shot).pattern;
+        let lit = self.field.lit();
+        let mut found = Vec::new();
+        for other in (first..end.max(first)).filter(is_alike).filter(|other| *other != shot) {
+            for begins in (1 - bits..bits).map(|bit| start + bit * length) {
+                let lag = begins - sent.fired[other];
+                if lags.contains(&lag) {
+                    let marks = sent.lit_from(other, begins).map(|bit| lit.lit_in(bit, pattern));
+                    found.push((other, Detection { lag, count: marks.sum(), margin: 0 }));
+                }
+            }
+        }
+        found
+    }
+
+    /// The returns found so far of which light overlaps with `light`.
+    fn overlapping(&self, light: Range<i64>) -> impl Iterator<Item = (usize, Detection)> + use<'_> {
+        let sent = self.sent;
+        let reach = sent.reach();
+        let oldest = light.start - reach.end - sent.length();
+        let first = sent.fired.partition_point(|fired| *fired < oldest);
+        let end = sent.fired.partition_point(|fired| fired + reach.start < light.end);
+        let further = self.further.iter().copied();
+        let primary = (first..end.max(first)).filter_map(|shot| Some((shot, self.found[shot]?)));
+        primary.chain(further).filter(move |(shot, detection)| {
+            let theirs = sent.light(*shot, detection.lag);
+            theirs.start < light.end && light.start < theirs.end
+        })
+    }
+
+    /// What is measured of `shot` at `detection`.
+    fn measured(&mut self, shot: usize, detection: Detection) -> Return {
+        let marks = self.sent.weight(shot);
+        let light = self.sent.light(shot, detection.lag);
+        let density =
+            if detection.count == marks { 0.0 } else { self.density_beside(shot, detection) };
+        let photons = self.photons.per_mark(detection.count, marks, density);
+        let (peak, margin) = (detection.count as u16, detection.margin as u16);
+        let sent = self.sent;
+        let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], light.start + sent.epoch)
+            + self.mean_offset(shot, light.start) * time::s_from_fs(sent.receiver.tick_fs);
+        Return { shot, tof, peak, marks: marks as u16, margin, photons }
+    }
+
+    /// Share of lit places around a shot found at `detection`, its own marks apart.
+    pub(super) fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
+        let places = self.sent.weight(shot) * self.sent.width;
+        self.field.density_without(&self.sent.light(shot, detection.lag), detection.count, places)
+    }
+
+    /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
+    ///
+    /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it; only
+    /// the residual counts, as other shots may well shine there. A lit bit is dark if it has
+    /// less than half the marks of the others and chance would not take away so many.
+    pub(super) fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
+        let lit = self.sent.lit_bits(shot).len() as f64;
+        let mean = f64::from(detection.count) / lit;
+        self.lit_bits_are_lit(shot, detection, mean)
+            && self.dark_bits_are_dark(shot, detection, mean)
+    }
+
+    /// Whether no lit bit of `shot` is darker than chance makes it.
+    fn lit_bits_are_lit(&mut self, shot: usize, detection: Detection, mean: f64) -> bool {
+        let sent = self.sent;
+        let in_word = sent.in_word(shot);
+        // Not so many marks are missing altogether.
+        let missing = f64::from(sent.weight(shot) - detection.count);
+        if missing < in_word as f64 - mean / 2.0 {
+            return true;
+        }
+        let start = sent.fired[shot] + detection.lag;
+        let pattern = &sent.bits(shot).pattern;
+        sent.lit_from(shot, start).all(|bit| {
+            let found = self.field.lit().lit_in(bit, pattern) as usize;
+            2.0 * found as f64 >= mean
+                || binomial_tail(in_word, 1.0 - mean / in_word as f64, in_word - found)
+                    > sent.receiver.false_alarm
+        })
+    }
+
+    fn dark_bits_are_dark(&mut self, shot: usize, detection: Detection, mean: f64) -> bool {
+        let sent = self.sent;
+        let light = sent.light(shot, detection.lag);
+        // Half of a lit bit must come from somewhere.
+        let needed = (mean / 2.0).ceil() as u32;
+        if self.field.residual_in(&light) < sent.ticks_of(shot, needed) {
+            return true;
+        }
+        let by_chance = {
+            let density = self.density_beside(shot, detection);
+            self.bit_thresholds.least(sent.in_word(shot) as u32, density)
+        };
+        let pattern = &sent.bits(shot).pattern;
+        let mut words = std::mem::take(&mut self.words);
+        let origin = self.field.lit_in_residual(&light, &mut words);
+        let is_dark = sent.dark_from(shot, light.start).all(|bit| {
+            let found = lit_in(&words, (bit - origin).max(0) as usize, pattern);
+            2.0 * f64::from(found) < mean || found < by_chance
+        });
+        self.words = words;
+        is_dark
+    }
+
+    /// By how many ticks the marks of `shot` are late on average if it begins at `start`. A
+    /// window that is not centred on them would cut one side off, so it is centred again.
+    fn mean_offset(&self, shot: usize, start: i64) -> f64 {
+        const ROUNDS: usize = 3;
+        let width = i64::from(self.sent.width);
+        let reach = width / 2;
+        if reach == 0 {
+            return 0.0;
+        }
+        let pattern = &self.sent.bits(shot).pattern;
+        let late = |by: i64| -> u32 {
+            let bits = self.sent.lit_from(shot, start + by);
+            bits.map(|bit| self.field.seen().lit_in(bit, pattern)).sum()
+        };
+        let mut mean = (width - 1) as f64 / 2.0;
+        for _ in 0..ROUNDS {
+            let middle = mean.round() as i64;
+            let (mut sum, mut count) = (0, 0);
+            for by in middle - reach..=middle + reach {
+                let found = i64::from(late(by));
+                (sum, count) = (sum + by * found, count + found);
+            }
+            mean = sum as f64 / count.max(1) as f64;
+            if mean.round() as i64 == middle {
+                break;
+            }
+        }
+        mean
+    }
+}
+
+/// Photons per mark where all marks were found, by their number: in clear weather a logarithm for
+/// each shot would take longer than the rest.
+#[derive(Debug, Default)]
+pub(super) struct Photons {
+    all_found: Vec<f32>,
+}
+
+impl Photons {
+    fn per_mark(&mut self, count: u32, marks: u32, density: f64) -> f32 {
+        if count < marks {
+            return photons_per_mark(count, marks, density);
+        }
+        let known = self.all_found.len() as u32;
+        self.all_found.extend((known..=marks).map(|marks| photons_per_mark(marks, marks, 0.0)));
+        self.all_found[marks as usize]
+    }
+}

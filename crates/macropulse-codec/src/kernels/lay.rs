@@ -1,0 +1,71 @@
+//! Ticks laid down as bits, and bits counted.
+
+use crate::on_every_level;
+
+on_every_level! {
+    /// Lights, in `words`, of which the first bit is tick `origin`, the sorted `ticks`. Those before
+    /// and behind are left away; the words behind the one of the first tick must be dark.
+    pub(crate) fn lay(words: &mut [u64], origin: i64, ticks: &[u32]) {
+        let Some(first) = ticks.first() else { return };
+        // The word at hand stays in a register: nothing waits for what was stored.
+        let mut at = ((i64::from(*first) - origin) >> 6) as usize;
+        let mut bits = words.get(at).copied().unwrap_or(0);
+        for &tick in ticks {
+            let bit = i64::from(tick) - origin;
+            let word = (bit >> 6) as usize;
+            let before = if word == at { bits } else { 0 };
+            bits = before | 1 << (bit & 63);
+            at = word;
+            if let Some(out) = words.get_mut(word) {
+                *out = bits;
+            }
+        }
+    }
+}
+
+on_every_level! {
+    /// Counts the lit bits of each `length` words.
+    pub(crate) fn count_each(words: &[u64], length: usize, counts: &mut [u32]) {
+        for (words, count) in words.chunks(length).zip(counts) {
+            *count = words.iter().map(|word| u64::from(word.count_ones())).sum::<u64>() as u32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::level::forced::at_each_level;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_level_lays_and_counts(
+            ticks in proptest::collection::btree_set(0..3000_u32, 0..300),
+            again in proptest::collection::btree_set(3000..4000_u32, 0..30),
+            origin in -100..2000_i64,
+        ) {
+            let [ticks, again] = [ticks, again].map(|ticks| ticks.into_iter().collect::<Vec<u32>>());
+            let mut expected = vec![0_u64; 20];
+            for bit in ticks.iter().chain(&again).map(|tick| i64::from(*tick) - origin) {
+                if (0..64 * 20).contains(&bit) {
+                    expected[bit as usize / 64] |= 1 << (bit % 64);
+                }
+            }
+            let laid = at_each_level(|| {
+                let mut words = vec![0_u64; 20];
+                lay(&mut words, origin, &ticks);
+                lay(&mut words, origin, &again);
+                let mut counts = [0; 7];
+                count_each(&words, 3, &mut counts);
+                (counts, words)
+            });
+            let lit = |words: &[u64]| words.iter().map(|word| word.count_ones()).sum::<u32>();
+            let lit: Vec<u32> = expected.chunks(3).map(lit).collect();
+            for (level, found) in laid {
+                prop_assert_eq!(&found.0[..], &lit, "{:?}", level);
+                prop_assert_eq!(&found.1, &expected, "{:?}", level);
+            }
+        }
+    }
+}
