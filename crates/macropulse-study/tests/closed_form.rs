@@ -36,7 +36,7 @@ fn measure(design: &Design, scene: &Scene) -> PointCloud {
         (234..243).contains(&row) || (270..279).contains(&row)
     };
     let part: Vec<Band> = all.filter(|band| !design.is_coded() || around(band)).collect();
-    sim::scan_part(design, scene, 7, &part).unwrap().cloud
+    sim::scan_part(design, scene, 7, &part).unwrap().cloud()
 }
 
 fn written(text: &str) -> Scene {

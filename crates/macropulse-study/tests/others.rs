@@ -61,7 +61,7 @@ impl Seen {
     /// World coordinates of the right points whose ray first meets the object called `name`.
     fn points_on(&self, scene: &Scene, name: &str) -> Vec<Point> {
         let object = scene.objects.iter().position(|object| object.name == name).unwrap();
-        let cloud = &self.scan.cloud;
+        let cloud = &self.scan.cloud();
         let to_world = scene.sensor.pose.world_from_sensor();
         (0..cloud.range.len())
             .filter(|&at| {

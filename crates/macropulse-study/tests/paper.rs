@@ -408,7 +408,7 @@ mod others {
     fn lowest_on_car(distance: u32) -> f64 {
         let design = Design::open("peregrine", &[]).unwrap();
         let scene = Scene::open(&format!("car-{distance}m")).unwrap();
-        let cloud = sim::scan(&design, &scene, 1, 0).unwrap().cloud;
+        let cloud = sim::scan(&design, &scene, 1, 0).unwrap().cloud();
         let image = cloud.image(cloud.pick);
         let heights = (0..image.len()).filter_map(|pixel| {
             let seen = image.surface(&cloud, pixel);

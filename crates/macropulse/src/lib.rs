@@ -10,7 +10,7 @@
 //!     let scene = Scene::open("street")?;
 //!     let scan = sim::scan(&design, &scene, 1, 0)?;
 //!     let right = scan.score.count(Outcome::Right);
-//!     println!("{} points, {right} of them right", scan.cloud.returns());
+//!     println!("{} points, {right} of them right", scan.cloud().returns());
 //!     assert!(scan.score.right_fraction() > 0.99);
 //!     Ok(())
 //! }

@@ -1,6 +1,6 @@
 //! The whole chain from shots to points, as function calls.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Mutex;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -21,12 +21,21 @@ use macropulse_codec::decode::{MOST_RETURNS, Reject, Returns};
 /// One scan, measured.
 #[derive(Debug, Clone)]
 pub struct Scan {
-    /// The points, with the truth beside them.
-    pub cloud: PointCloud,
+    /// The points of its bands, with the truth beside them: read in their order, the cloud.
+    pub pieces: Vec<Piece>,
     /// How the pixels came out.
     pub score: Score,
     /// What was counted on the way.
     pub tally: Tally,
+    /// The cloud without its returns and pixels.
+    frame: PointCloud,
+}
+
+impl Scan {
+    /// The points of all bands in one list, with the truth beside them.
+    pub fn cloud(&self) -> PointCloud {
+        PointCloud::joined(&self.frame, &self.pieces)
+    }
 }
 
 /// Scan number `number` of the sensor `design` in `scene`, with the random numbers of `seed`.
@@ -49,7 +58,7 @@ pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> R
     let mut scans = Scans::new(design, scene, seed)?;
     // A watch that never says stop lets every band through.
     let unwatched = Watch { done: &|_| {}, stop: &|| false };
-    scans.measure(bands, &unwatched);
+    scans.part(bands, &unwatched);
     Ok(scans.scan)
 }
 
@@ -83,7 +92,7 @@ pub struct Scans<'a> {
     scene: &'a Scene,
     operating: Operating,
     detectors: Detectors<'a>,
-    pieces: Vec<Piece>,
+    memories: Vec<Memory>,
     scan: Scan,
 }
 
@@ -95,76 +104,57 @@ impl<'a> Scans<'a> {
     pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Result<Self, Error> {
         let operating = Operating::of(design, &scene.environment)?;
         let detectors = Detectors::new(design, &operating, Chance::new(seed));
-        let cloud = PointCloud::empty(design, 0);
-        let scan = Scan { cloud, score: Score::default(), tally: Tally::default() };
-        Ok(Self { design, scene, operating, detectors, pieces: Vec::new(), scan })
+        let scan = Scan {
+            pieces: Vec::new(),
+            score: Score::default(),
+            tally: Tally::default(),
+            frame: PointCloud::empty(design, 0),
+        };
+        Ok(Self { design, scene, operating, detectors, memories: Vec::new(), scan })
     }
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
     /// its end.
-    pub fn scan(&mut self, number: u64, watch: &Watch) -> Option<&mut Scan> {
+    pub fn scan(&mut self, number: u64, watch: &Watch) -> Option<&Scan> {
         let bands: Vec<Band> = bands(self.design, number).collect();
         self.part(&bands, watch)
     }
 
     /// As [`Scans::scan`], but only the `bands` given, all of one scan; the rest of the cloud
     /// stays empty.
-    pub fn part(&mut self, bands: &[Band], watch: &Watch) -> Option<&mut Scan> {
-        self.measure(bands, watch).then_some(&mut self.scan)
-    }
-
-    /// Measures `bands` of one scan; whether to the end. All of it on threads of the pool: to change
-    /// between them and another one with every step takes as long as the step.
-    fn measure(&mut self, bands: &[Band], watch: &Watch) -> bool {
-        rayon::scope(|_| self.measure_in_pool(bands, watch))
-    }
-
-    fn measure_in_pool(&mut self, bands: &[Band], watch: &Watch) -> bool {
-        let seen = Seen { design: self.design, scene: self.scene, operating: &self.operating };
-        let setup = Setup { seen, detectors: &self.detectors };
-        let stopped = AtomicBool::new(false);
-        let clock = Instant::now();
-        (self.scan.score, self.scan.tally) = Default::default();
+    pub fn part(&mut self, bands: &[Band], watch: &Watch) -> Option<&Scan> {
+        let Self { design, scene, operating, detectors, memories, scan } = self;
+        let setup = Setup { seen: Seen { design, scene, operating }, detectors };
         let number = bands.first().map_or(0, |band| band.scan);
-        let shots: u64 = bands.iter().map(|band| band.shots).sum();
-        self.scan.cloud.start(number, shots == self.design.shots_per_scan());
-        let pose = self.scene.sensor.at(scan_begins_fs(self.design, number));
-        self.scan.cloud.viewpoint = viewpoint(&pose);
-        self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
-        let at_once = BANDS_PER_THREAD * rayon::current_num_threads();
-        self.pieces.resize_with(at_once.min(bands.len()), Piece::default);
-        for bands in bands.chunks(at_once) {
-            let pieces = &mut self.pieces[..bands.len()];
-            let counts = bands.par_iter().zip(pieces);
-            let counts = counts.map_init(Memory::default, |memory, (band, piece)| {
-                if stopped.load(Ordering::Relaxed) || (watch.stop)() {
-                    stopped.store(true, Ordering::Relaxed);
-                    return Default::default();
-                }
-                let measured = measure(&setup, memory, band);
-                let counted = measured.judged(&setup.seen, piece);
+        scan.frame.scan = number;
+        scan.frame.viewpoint = viewpoint(&scene.sensor.at(scan_begins_fs(design, number)));
+        scan.pieces.resize_with(bands.len(), Piece::default);
+        memories.resize_with(rayon::current_num_threads(), Memory::default);
+        // Each thread takes the next band when it is done with the one before.
+        let left = Mutex::new(bands.iter().zip(&mut scan.pieces));
+        let next = || left.lock().ok()?.next();
+        let threads = memories.par_iter_mut().with_max_len(1).map(|memory| {
+            let mut counted = (Score::default(), Tally::default());
+            while !(watch.stop)()
+                && let Some((band, piece)) = next()
+            {
+                let (score, tally) = measure(&setup, memory, band).judged(&setup.seen, piece);
+                counted.0.add(&score);
+                counted.1.add(&tally);
                 (watch.done)(band.shots);
-                counted
-            });
-            let counts: Vec<(Score, Tally)> = counts.collect();
-            if stopped.load(Ordering::Relaxed) {
-                return false;
             }
-            let clock = Instant::now();
-            for (score, tally) in &counts {
-                self.scan.score.add(score);
-                self.scan.tally.add(tally);
-            }
-            self.scan.cloud.append(&self.pieces[..bands.len()]);
-            self.scan.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+            counted
+        });
+        let counts: Vec<(Score, Tally)> = threads.collect();
+        let is_whole = next().is_none();
+        (scan.score, scan.tally) = Default::default();
+        for (score, tally) in &counts {
+            scan.score.add(score);
+            scan.tally.add(tally);
         }
-        true
+        is_whole.then_some(scan)
     }
 }
-
-/// Bands are computed side by side, and then joined while they are still in the cache: so many for
-/// each thread, that hardly any thread waits for the last one.
-const BANDS_PER_THREAD: usize = 4;
 
 /// The pose of a sensor as clouds have it.
 fn viewpoint(pose: &Pose) -> Viewpoint {

@@ -72,11 +72,11 @@ fn an_uncoded_sensor_sees_it_the_second_time_around() {
         Design::from_toml(text, "fast", Path::new(""), &rate).unwrap()
     };
     let scan = sim::scan(&open("1000"), &wall(161.0), 1, 1).unwrap();
-    let ghosts: Vec<f32> = scan.cloud.range.iter().copied().filter(|r| !r.is_nan()).collect();
+    let ghosts: Vec<f32> = scan.cloud().range.into_iter().filter(|r| !r.is_nan()).collect();
     assert!(ghosts.len() > 990, "{} of 1000", ghosts.len());
     let expected = 161.0 - 149.896_23;
     let near = ghosts.iter().filter(|range| (**range - expected).abs() < 0.3).count();
     assert!(near > 990, "{near} of {}", ghosts.len());
     assert_eq!(scan.score.count(Outcome::False), ghosts.len() as u64);
-    assert_eq!(sim::scan(&open("500"), &wall(161.0), 1, 1).unwrap().cloud.returns(), 0);
+    assert_eq!(sim::scan(&open("500"), &wall(161.0), 1, 1).unwrap().cloud().returns(), 0);
 }

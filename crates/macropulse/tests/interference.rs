@@ -76,12 +76,14 @@ fn without_others_nothing_changes() {
 
 /// Ranges and counts of marks, as bits.
 fn columns(scan: &Scan) -> (Vec<u32>, Vec<u16>) {
-    (scan.cloud.range.iter().map(|range| range.to_bits()).collect(), scan.cloud.peak.clone())
+    let cloud = scan.cloud();
+    (cloud.range.iter().map(|range| range.to_bits()).collect(), cloud.peak)
 }
 
 /// The range that each pixel shows, NaN without any.
 fn ranges(scan: &Scan) -> Vec<f32> {
-    scan.cloud.image(scan.cloud.pick).spread(&scan.cloud.range, f32::NAN)
+    let cloud = scan.cloud();
+    cloud.image(cloud.pick).spread(&cloud.range, f32::NAN)
 }
 
 /// One mark in a place is far from the 58 or more of a macropulse.
@@ -136,7 +138,7 @@ fn an_identical_lidar_out_of_step_looks_like_faint_echoes() {
     let scan = part("coded", &[], 0);
     assert!((5..100).contains(&scan.score.ghosts), "{:?}", scan.score);
     let found = |outcome: Outcome| {
-        let cloud = &scan.cloud;
+        let cloud = &scan.cloud();
         let of = (0..cloud.range.len()).filter(|&at| cloud.truth.returns.outcome[at] == outcome);
         let (peak, marks) = of.fold((0.0, 0.0), |(peak, marks), at| {
             (peak + f64::from(cloud.peak[at]), marks + f64::from(cloud.marks[at]))
@@ -144,7 +146,7 @@ fn an_identical_lidar_out_of_step_looks_like_faint_echoes() {
         peak / marks
     };
     let (ghosts, right) = (found(Outcome::False), found(Outcome::Right));
-    let cloud = &scan.cloud;
+    let cloud = &scan.cloud();
     let flags = (0..cloud.range.len())
         .filter(|&at| cloud.truth.returns.outcome[at] == Outcome::False)
         .map(|at| cloud.flags(at) & FAINT);
@@ -159,12 +161,11 @@ fn the_ghosts_of_a_drifting_lidar_walk_past() {
     let scans: Vec<Scan> = (0..5).map(|scan| part("drifting", &[], scan)).collect();
     let ghosts: Vec<u64> = scans.iter().map(|scan| scan.score.ghosts).collect();
     assert!(ghosts[0] > 3500 && ghosts[4] < 100, "{ghosts:?}");
-    let is_false = |scan: &Scan, at: usize| scan.cloud.truth.pixels.outcome[at] == Outcome::False;
+    let outcomes = [0, 1].map(|scan: usize| scans[scan].cloud().truth.pixels.outcome);
+    let is_false = |at: &usize| outcomes.iter().all(|scan| scan[*at] == Outcome::False);
     let [before, after] = [ranges(&scans[0]), ranges(&scans[1])];
-    let mut walked: Vec<f64> = (0..before.len())
-        .filter(|&at| is_false(&scans[0], at) && is_false(&scans[1], at))
-        .map(|at| f64::from(before[at] - after[at]))
-        .collect();
+    let mut walked: Vec<f64> =
+        (0..before.len()).filter(is_false).map(|at| f64::from(before[at] - after[at])).collect();
     walked.sort_by(f64::total_cmp);
     assert!(walked.len() > 1000, "{}", walked.len());
     let design = open("kim-park-2016-fixed", &[]);

@@ -76,7 +76,7 @@ fn a_plate_that_crosses_is_sheared() {
     for velocity in [30.0, 0.0, -30.0] {
         let chosen = some_bands(&design, 0, 10);
         let scan = sim::scan_part(&design, &plate(velocity), 7, &chosen).unwrap();
-        let edge = left_edge(&scan.cloud);
+        let edge = left_edge(&scan.cloud());
         assert!(edge.len() >= 40, "{}", edge.len());
         let sheared = slope(&edge) * period;
         assert!((sheared - velocity * period).abs() < pitch, "{velocity} m/s: {sheared} m");
@@ -92,7 +92,7 @@ fn time_and_motion_run_on_from_scan_to_scan() {
     let pitch = 20.0 * 43.2_f64.to_radians() / 848.0;
     let scans = [0, 1].map(|number| {
         let chosen = some_bands(&design, number, 24);
-        sim::scan_part(&design, &scene, 7, &chosen).unwrap().cloud
+        sim::scan_part(&design, &scene, 7, &chosen).unwrap().cloud()
     });
     let [first, second] = scans.each_ref().map(left_edge);
     assert_eq!(first.len(), second.len());
@@ -114,7 +114,7 @@ fn a_sensor_on_its_way_to_a_wall_measures_from_where_it_is() {
     for velocity in [20.0, 0.0] {
         let scene = scene(&format!("{wall}[{velocity:?}, 0, 0]\n"));
         let chosen = some_bands(&design, 1, 24);
-        let cloud = sim::scan_part(&design, &scene, 7, &chosen).unwrap().cloud;
+        let cloud = sim::scan_part(&design, &scene, 7, &chosen).unwrap().cloud();
         let returns: Vec<usize> =
             (0..cloud.range.len()).filter(|pixel| !cloud.range[*pixel].is_nan()).collect();
         assert!(returns.len() > 10_000, "{}", returns.len());
@@ -280,10 +280,10 @@ fn bytes(scene: &Scene, threads: usize) -> Vec<u8> {
     let design = Design::open("hdl-64e", &[]).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let scan = pool.install(|| sim::scan(&design, scene, 3, 1).unwrap());
-    assert!(scan.cloud.returns() > 1000);
+    assert!(scan.cloud().returns() > 1000);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.pcd");
-    write_cloud(Format::Pcd, &scan.cloud, &Names::default(), &path).unwrap();
+    write_cloud(Format::Pcd, &scan.cloud(), &Names::default(), &path).unwrap();
     std::fs::read(path).unwrap()
 }
 

@@ -277,7 +277,7 @@ fn range_is_as_precise_as_predicted() {
             ("detector.photon-counting.dark_counts_hz", "0.0"),
         ];
         let design = sensor("kim-park-2016-fixed", &set);
-        let cloud = measure(&design, &wall, 1, 3).cloud;
+        let cloud = measure(&design, &wall, 1, 3).cloud();
         let truth = &cloud.truth.returns;
         let right = (0..truth.range.len()).filter(|&i| truth.outcome[i] == Outcome::Right);
         let error = |i| f64::from(cloud.range[i]) - f64::from(truth.range[i]);
@@ -298,7 +298,7 @@ fn range_is_as_precise_as_predicted() {
     }
     for (name, range) in [("hdl-64e", 50.0), ("peregrine", 40.0)] {
         let design = sensor(name, &[]);
-        let cloud = measure(&design, &room(range, 0.5, "vacuum-dark"), 6, usize::MAX).cloud;
+        let cloud = measure(&design, &room(range, 0.5, "vacuum-dark"), 6, usize::MAX).cloud();
         let errors = cloud.range.iter().map(|seen| f64::from(*seen) - range);
         // Firings of noise are no measurement of this target.
         let errors: Vec<f64> = errors.filter(|error| error.abs() < 0.35).collect();

@@ -54,7 +54,7 @@ fn is_aside(cloud: &PointCloud, at: usize) -> bool {
 fn glass_before_a_wall_gives_two_returns() {
     let design = design("kim-park-2016-fixed", &[("receiver.returns", "2")]);
     let scan = measure(&design, &scene(true));
-    let (cloud, shots) = (&scan.cloud, scan.tally.shots);
+    let (cloud, shots) = (&scan.cloud(), scan.tally.shots);
     let is_at = |at: usize, distance: f64| {
         let error = f64::from(cloud.range[at]) - expected(&design, cloud, at, distance);
         error.abs() <= design.right_within
@@ -94,7 +94,7 @@ fn one_return_is_one_return_at_the_surface_that_is_picked() {
     for (pick, distance) in [("first", PANE), ("strongest", WALL), ("last", WALL)] {
         let design = design("kim-park-2016-fixed", &[("receiver.pick", pick)]);
         let scan = measure(&design, &scene(true));
-        let cloud = &scan.cloud;
+        let cloud = &scan.cloud();
         assert!(cloud.number_of_returns.iter().all(|&number| number == 1), "{pick}");
         assert_eq!(cloud.returns() as u64, scan.tally.by_number[0]);
         let aside = (0..cloud.returns()).filter(|&at| is_aside(cloud, at));

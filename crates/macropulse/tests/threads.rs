@@ -97,14 +97,14 @@ fn assert_same_on_any_pool(sensor: &str, part: Part) {
     assert!(alone.tally.returns > 30, "{sensor}: {:?}", alone.tally);
     for threads in [2, 3] {
         let shared = scan(sensor, part, (SEED, threads));
-        assert_eq!(bits(&alone.cloud), bits(&shared.cloud), "{sensor}, {threads} threads");
+        assert_eq!(bits(&alone.cloud()), bits(&shared.cloud()), "{sensor}, {threads} threads");
         assert_eq!(alone.score, shared.score, "{sensor}, {threads} threads");
         assert_eq!(counted(&alone), counted(&shared), "{sensor}, {threads} threads");
-        assert!(pcd(&alone.cloud) == pcd(&shared.cloud), "{sensor}, {threads} threads: PCD");
+        assert!(pcd(&alone.cloud()) == pcd(&shared.cloud()), "{sensor}, {threads} threads: PCD");
     }
     let other = scan(sensor, part, (SEED + 1, 2));
-    assert_ne!(bits(&alone.cloud), bits(&other.cloud), "{sensor}: the seed has no effect");
-    assert!(pcd(&alone.cloud) != pcd(&other.cloud), "{sensor}: the seed has no effect on PCD");
+    assert_ne!(bits(&alone.cloud()), bits(&other.cloud()), "{sensor}: the seed has no effect");
+    assert!(pcd(&alone.cloud()) != pcd(&other.cloud()), "{sensor}: the seed has no effect on PCD");
 }
 
 #[test]
@@ -130,8 +130,8 @@ fn the_flash() {
 /// A band comes out the same alone as among others: guard shots draw what their neighbours draw.
 #[test]
 fn a_band_alone_and_among_its_neighbours() {
-    let both = scan("kim-park-2016", Part::Road(2), (SEED, 2)).cloud;
-    let one = scan("kim-park-2016", Part::Road(1), (SEED, 1)).cloud;
+    let both = scan("kim-park-2016", Part::Road(2), (SEED, 2)).cloud();
+    let one = scan("kim-park-2016", Part::Road(1), (SEED, 1)).cloud();
     let [one, both] =
         [one, both].map(|cloud| cloud.image(cloud.pick).spread(&cloud.range, f32::NAN));
     let returns = (0..one.len()).filter(|&pixel| !one[pixel].is_nan());

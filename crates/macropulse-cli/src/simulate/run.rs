@@ -56,27 +56,24 @@ impl<'a> Run<'a> {
             let Some(scan) = scans.scan(run.scans, &watch) else { break };
             run.score.add(&scan.score);
             run.tally.add(&scan.tally);
-            let mut truth = Truth::default();
-            if !scenario.truth {
-                std::mem::swap(&mut truth, &mut scan.cloud.truth);
-            }
             if let Some(folder) = &mut folder {
                 let writing = Instant::now();
+                let mut cloud = scan.cloud();
+                if !scenario.truth {
+                    cloud.truth = Truth::default();
+                }
                 let files = interrupt.undisturbed(|| {
                     if run.scans == 0 {
                         folder.make()?;
                     }
                     let stage = (design, &scenario.scene);
                     let files =
-                        record::write_scan(folder.path(), &scenario.formats, &scan.cloud, stage)?;
+                        record::write_scan(folder.path(), &scenario.formats, &cloud, stage)?;
                     folder.keep();
                     Ok::<_, Fault>(files)
                 })?;
                 run.files.extend(files);
                 run.writing += writing.elapsed().as_secs_f64();
-            }
-            if !scenario.truth {
-                scan.cloud.truth = truth;
             }
             run.scans += 1;
         }

@@ -58,13 +58,14 @@ pub(super) fn trial(
     let scene = scene(distance)?;
     let began = Instant::now();
     let scan = sim::scan_watched(design, &scene, seed, 0, watch)?.ok_or(Error::Stopped)?;
+    let cloud = scan.cloud();
     let elapsed = began.elapsed().as_secs_f64();
     let folder = folder.join(format!("{sensor}-{distance}m"));
     std::fs::create_dir_all(&folder)
         .map_err(|source| Error::Folder { path: folder.clone(), source })?;
     let formats = [Format::Pcd, Format::Png];
     let writing = Instant::now();
-    let files = record::write_scan(&folder, &formats, &scan.cloud, (design, &scene))?;
+    let files = record::write_scan(&folder, &formats, &cloud, (design, &scene))?;
     let writing = writing.elapsed().as_secs_f64();
     let warnings: Vec<String> =
         scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
@@ -82,13 +83,13 @@ pub(super) fn trial(
     };
     record::manifest(&run).write(&folder)?;
     let samples = samples_on_car(design, &scene);
-    let image = scan.cloud.image(scan.cloud.pick);
+    let image = cloud.image(cloud.pick);
     let found = |sample: &Sample| {
-        let seen = image.surface(&scan.cloud, sample.pixel);
+        let seen = image.surface(&cloud, sample.pixel);
         matches!(seen.outcome, Outcome::Right | Outcome::Near) && is_target(&scene, seen.object)
     };
     let mut rows: Vec<usize> =
-        samples.iter().filter(|s| found(s)).map(|s| s.pixel / scan.cloud.columns).collect();
+        samples.iter().filter(|s| found(s)).map(|s| s.pixel / cloud.columns).collect();
     rows.dedup();
     let lost = samples.iter().filter(|sample| !found(sample));
     Ok(Trial {
@@ -100,7 +101,7 @@ pub(super) fn trial(
         predicted: geometry::predict(design, &scene),
         score: scan.score,
         tally: scan.tally,
-        cloud: scan.cloud,
+        cloud,
     })
 }
 

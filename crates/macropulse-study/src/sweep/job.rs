@@ -84,7 +84,7 @@ impl Job<'_> {
             detections: scan.tally.detections,
             lost: scan.tally.lost,
             peak_busy: scan.tally.peak_busy,
-            right: RangeError::of(&scan.cloud),
+            right: RangeError::of(&scan.cloud()),
             empty: scan.tally.where_all_was_lost().map(str::to_owned),
         }))
     }
@@ -229,7 +229,7 @@ mod tests {
             (wanted.seed, wanted.score, wanted.detections),
             (2, scan.score, scan.tally.detections)
         );
-        assert_eq!(wanted.right, RangeError::of(&scan.cloud));
+        assert_eq!(wanted.right, RangeError::of(&scan.cloud()));
         assert!(wanted.right.count > 1000 && wanted.right != counted[2].right);
         // The wall is 50 m away.
         assert!(counted[0].empty.as_ref().unwrap().contains("range gate"));

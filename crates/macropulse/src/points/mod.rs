@@ -240,7 +240,7 @@ pub const AMBIGUOUS: u8 = 2;
 pub const NO_OBJECT: u16 = u16::MAX;
 
 impl PointCloud {
-    /// A cloud of scan number `scan` without any return yet, nor the truth.
+    /// A cloud of scan number `scan` without any return or pixel yet, nor the truth.
     pub fn empty(design: &Design, scan: u64) -> Self {
         let (rows, columns) = (design.scan.rows as usize, design.scan.columns as usize);
         Self {
@@ -249,7 +249,6 @@ impl PointCloud {
             columns,
             returns_per_shot: design.receiver.returns,
             pick: design.receiver.pick,
-            fired_ns: vec![f64::NAN; rows * columns],
             ..Self::default()
         }
     }

@@ -1,7 +1,8 @@
 //! The points of one band, and how they become those of a scan.
 //!
 //! Bands are computed side by side. Each has a piece of its own to write to, so none waits for
-//! another; the pieces are joined in the order of the bands.
+//! another. The pieces in the order of the bands are the cloud; who wants it as one list has them
+//! joined.
 
 use super::{Outcome, PointCloud, Truth};
 use crate::channel::Link;
@@ -106,38 +107,33 @@ impl Piece {
 }
 
 impl PointCloud {
-    /// Makes it the cloud of scan number `scan`, with no return yet and all pixels empty, in the memory
-    /// of what was in it before. Of a `whole` scan every pixel is written in any case.
-    pub fn start(&mut self, scan: u64, whole: bool) {
-        self.scan = scan;
-        let pixels = self.rows * self.columns;
-        // A column that grows piece by piece is moved time and again.
-        let expected = if whole { pixels } else { 0 };
-        self.columns().clear(Each::Return, expected);
-        if !whole || self.fired_ns.len() != pixels || self.truth.pixels.outcome.len() != pixels {
-            self.fired_ns.clear();
-            self.fired_ns.resize(pixels, f64::NAN);
-            self.truth.pixels.blank(pixels);
-        }
+    /// The cloud of a scan: what `frame` says of all of it, the returns of `pieces` behind each
+    /// other, and their pixels at their places; pixels that are in none of them are empty.
+    pub fn joined(frame: &Self, pieces: &[Piece]) -> Self {
+        let pixels = frame.rows * frame.columns;
+        let mut cloud = frame.clone();
+        cloud.fired_ns.resize(pixels, f64::NAN);
+        cloud.truth.pixels.blank(pixels);
+        let Columns { bytes, counts, reals, times, outcomes } = cloud.columns();
+        // Each column by itself: which thread takes which makes no difference.
+        rayon::scope(|scope| {
+            bytes.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
+            counts.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
+            reals.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
+            times.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
+            outcomes.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
+        });
+        cloud
     }
 
     /// Empties all columns, and keeps their memory.
     fn clear(&mut self) {
-        self.columns().clear(Each::Return, 0);
-        self.columns().clear(Each::Pixel, 0);
-    }
-
-    /// Adds the next `pieces`, in their order.
-    pub fn append(&mut self, pieces: &[Piece]) {
         let Columns { bytes, counts, reals, times, outcomes } = self.columns();
-        // Each column by itself: which thread takes which makes no difference.
-        rayon::scope(|scope| {
-            bytes.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
-            counts.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
-            reals.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
-            times.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
-            outcomes.into_iter().for_each(|column| scope.spawn(|_| column.append(pieces)));
-        });
+        bytes.into_iter().for_each(|column| column.entries.clear());
+        counts.into_iter().for_each(|column| column.entries.clear());
+        reals.into_iter().for_each(|column| column.entries.clear());
+        times.into_iter().for_each(|column| column.entries.clear());
+        outcomes.into_iter().for_each(|column| column.entries.clear());
     }
 
     /// All columns: the one place where they are listed to be emptied and joined.
@@ -195,19 +191,8 @@ struct Columns<'a> {
     outcomes: [Column<'a, Outcome>; 2],
 }
 
-impl Columns<'_> {
-    /// Empties those that have an entry for `each`, and makes room for as many as `expected`.
-    fn clear(self, each: Each, expected: usize) {
-        self.bytes.into_iter().for_each(|column| column.clear(each, expected));
-        self.counts.into_iter().for_each(|column| column.clear(each, expected));
-        self.reals.into_iter().for_each(|column| column.clear(each, expected));
-        self.times.into_iter().for_each(|column| column.clear(each, expected));
-        self.outcomes.into_iter().for_each(|column| column.clear(each, expected));
-    }
-}
-
 /// What a column has an entry for.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 enum Each {
     Return,
     Pixel,
@@ -226,22 +211,19 @@ impl<'a, T: Copy> Column<'a, T> {
         Self { each, entries, of }
     }
 
-    /// Empties it if it has an entry for `each`, and makes room for as many as `expected`.
-    fn clear(self, each: Each, expected: usize) {
-        if self.each == each {
-            self.entries.clear();
-            self.entries.reserve(expected);
-        }
-    }
-
     /// Adds the entries of all `pieces`: those of returns behind each other, those of pixels at
     /// their places.
-    fn append(self, pieces: &[Piece]) {
+    fn join(self, pieces: &[Piece]) {
         let Self { each, entries, of } = self;
-        for piece in pieces {
-            match each {
-                Each::Return => entries.extend_from_slice(of(&piece.points)),
-                Each::Pixel => piece.scatter(of(&piece.points), entries),
+        match each {
+            Each::Return => {
+                entries.reserve_exact(pieces.iter().map(|piece| of(&piece.points).len()).sum());
+                for piece in pieces {
+                    entries.extend_from_slice(of(&piece.points));
+                }
+            }
+            Each::Pixel => {
+                pieces.iter().for_each(|piece| piece.scatter(of(&piece.points), entries));
             }
         }
     }
@@ -291,17 +273,12 @@ mod tests {
     #[test]
     fn pieces_are_joined_in_their_order_and_pixels_find_their_place() {
         let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
-        let mut cloud = PointCloud::empty(&design, 0);
-        // Of a scan before, something is left over.
-        cloud.range = vec![1.0; 9];
         let logs = [log(2, 0), log(2, 4), log(5, 100)];
         let pieces =
             logs.each_ref().map(|log| Piece::of(&design, &dark(&design), log, &returns(log)));
-        cloud.start(0, false);
-        cloud.append(&pieces[..2]);
-        cloud.append(&pieces[2..]);
+        let cloud = PointCloud::joined(&PointCloud::empty(&design, 8), &pieces);
         let expected = logs.iter().map(|log| returns(log).len()).sum::<usize>();
-        assert_eq!((cloud.scan, cloud.returns()), (0, expected));
+        assert_eq!((cloud.scan, cloud.returns()), (8, expected));
         assert!(cloud.time_ns.is_sorted());
         assert_eq!(cloud.fired_ns.iter().filter(|time| !time.is_nan()).count(), 12);
         for at in 0..cloud.returns() {
@@ -311,8 +288,5 @@ mod tests {
             let is_last = cloud.return_number[at] == cloud.number_of_returns[at];
             assert_eq!(is_last, !next_is_further, "{at}");
         }
-        cloud.start(8, false);
-        assert_eq!((cloud.scan, cloud.returns()), (8, 0));
-        assert!(cloud.fired_ns.iter().all(|time| time.is_nan()));
     }
 }
