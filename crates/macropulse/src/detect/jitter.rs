@@ -9,7 +9,7 @@
 use macropulse_codec::statistics::normal_tail;
 
 use crate::design::MOST_SIGMA;
-use crate::kernels::{delay, drawn};
+use crate::kernels::Amounts;
 
 /// Largest standard deviation that is rounded to single parts.
 const EXACT: f64 = 200.0;
@@ -20,10 +20,8 @@ const PLACE_BITS: u32 = 8;
 /// A Gaussian delay.
 #[derive(Debug)]
 pub(super) struct Jitter {
-    /// Of each cell the bound below which its own value is drawn, that value, and the other one.
-    cells: Vec<u64>,
-    /// Leading bits of a random number that choose the cell.
-    bits: u32,
+    /// The values, in steps.
+    amounts: Amounts,
     /// Parts of a tick for a step of the values; 1 where they are exact.
     step: f64,
 }
@@ -41,13 +39,13 @@ impl Jitter {
         let mut shares: Vec<(i16, f64)> =
             values.iter().map(|value| (*value, probability(*value, sigma / step))).collect();
         shares.resize(1 << bits, (0, 0.0));
-        Some(Self { cells: cells(&shares), bits, step })
+        Some(Self { amounts: Amounts::new(cells(&shares))?, step })
     }
 
     /// Delays each of `times` by what the number in the same place says, and sorts them again.
     pub fn delay(&self, times: &mut [u32], numbers: &[u32]) {
         if self.step == 1.0 {
-            let falls = delay(times, numbers, &self.cells, self.bits);
+            let falls = self.amounts.delay(times, numbers);
             sort_again(times, falls);
             return;
         }
@@ -60,7 +58,7 @@ impl Jitter {
     fn coarse(&self, number: u32) -> i32 {
         let all = f64::from(1_u32 << PLACE_BITS);
         let place = (f64::from(number % (1 << PLACE_BITS)) + 0.5) / all - 0.5;
-        let value = f64::from(drawn(number, &self.cells, self.bits));
+        let value = f64::from(self.amounts.drawn(number));
         ((value + place) * self.step).round() as i32
     }
 }
@@ -73,7 +71,8 @@ fn probability(value: i16, sigma: f64) -> f64 {
     beyond(from) - beyond(from + 1.0)
 }
 
-/// Shares out as many cells as there are values: of two values with too small and too large a
+/// Shares out as many cells as there are values, each with the bound below which its own value is
+/// drawn, that value, and the other one: of two values with too small and too large a
 /// share the larger one fills up the cell of the smaller one.
 fn cells(shares: &[(i16, f64)]) -> Vec<u64> {
     let total: f64 = shares.iter().map(|share| share.1).sum();
@@ -128,8 +127,9 @@ mod tests {
     /// What each value gets of 2³² equally likely numbers, from the bounds of its cells.
     fn shares_of(jitter: &Jitter) -> std::collections::HashMap<i16, f64> {
         let mut shares = std::collections::HashMap::new();
-        for cell in &jitter.cells {
-            let all = 1.0 / jitter.cells.len() as f64;
+        let cells = jitter.amounts.cells();
+        for cell in cells {
+            let all = 1.0 / cells.len() as f64;
             let own = (cell >> 32) as f64 / 4_294_967_296.0 * all;
             *shares.entry((cell >> 16) as i16).or_insert(0.0) += own;
             *shares.entry(*cell as i16).or_insert(0.0) += all - own;

@@ -27,7 +27,7 @@ mod waits;
 mod whole;
 mod wide;
 
-pub(crate) use delay::{delay, drawn};
+pub(crate) use delay::Amounts;
 pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
