@@ -3,6 +3,10 @@
 //! Sixteen numbers at a time: the lower half of two sorted vectors goes out, the upper half meets
 //! the next vector of the row whose next number is the smaller one. Two sorted vectors are
 //! separated and sorted by a bitonic network \[Bat68\].
+//!
+//! Each step waits for the one before it, which keeps a processor busy a third of the time. Long
+//! rows are cut into parts that are merged side by side, each where its share of the result begins:
+//! so many numbers of the one row and so many of the other, found by bisection.
 
 use macropulse_codec::level::Level;
 
@@ -13,16 +17,26 @@ const STEP: usize = 16;
 /// tested for.
 pub(crate) const PAD: [u32; 3 * STEP] = [u32::MAX; 3 * STEP];
 
+/// Rows are cut into so many parts: 4096 numbers take 0.46 to 0.52 ns each, and not 0.62 as in one;
+/// eight parts gain no more (Zen 4, twice, in cache).
+const PARTS: usize = 4;
+
+/// Where cutting begins to pay: of 256 numbers bisection takes what it saves, of 512 it saves 10 %.
+const LONG: usize = 512;
+
 /// Puts `a` and `b`, which ascend and end with [`PAD`], into `merged`, in order and without the
 /// padding, in place of what was there.
 pub(crate) fn merge(a: &[u32], b: &[u32], merged: &mut Vec<u32>, from: usize) {
     let all = (a.len() + b.len()).saturating_sub(2 * PAD.len());
     merged.truncate(from);
-    merged.reserve(all + STEP);
+    merged.reserve(all + PARTS * STEP);
     match Level::here() {
         // SAFETY: the processor has what this level asks for.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { avx512::append_merged(a, b, all, merged) },
+        Level::Avx512 if all < LONG => unsafe { avx512::append::<1>(a, b, all, merged) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { avx512::append::<PARTS>(a, b, all, merged) },
         _ => append_one_by_one(a, b, all, merged),
     }
 }
@@ -38,30 +52,61 @@ fn append_one_by_one(a: &[u32], b: &[u32], all: usize, merged: &mut Vec<u32>) {
     }));
 }
 
+/// How many numbers of `a` and how many of `b` are the first `count` of both together.
+#[cfg(target_arch = "x86_64")]
+fn first(count: usize, a: &[u32], b: &[u32]) -> [usize; 2] {
+    let (mut least, mut most) = (count.saturating_sub(b.len()), count.min(a.len()));
+    while least < most {
+        let of_a = least.midpoint(most);
+        match a[of_a] <= b[count - of_a - 1] {
+            true => least = of_a + 1,
+            false => most = of_a,
+        }
+    }
+    [least, count - least]
+}
+
 #[cfg(target_arch = "x86_64")]
 mod avx512 {
-    use super::STEP;
+    use super::{STEP, first};
     use std::arch::x86_64::{
         __m512i, _mm512_loadu_si512, _mm512_mask_max_epu32, _mm512_max_epu32, _mm512_min_epu32,
         _mm512_permutexvar_epi32, _mm512_set_epi32, _mm512_set1_epi32, _mm512_shuffle_epi32,
         _mm512_shuffle_i64x2, _mm512_storeu_si512,
     };
 
+    /// Appends both rows, `all` numbers, merged in so many parts.
     #[target_feature(enable = "avx512f")]
-    pub(super) fn append_merged(a: &[u32], b: &[u32], all: usize, merged: &mut Vec<u32>) {
-        let mut at = [STEP, STEP];
-        let (mut next, mut rest) = (load(a, 0), load(b, 0));
+    pub(super) fn append<const PARTS: usize>(
+        a: &[u32],
+        b: &[u32],
+        all: usize,
+        merged: &mut Vec<u32>,
+    ) {
+        let steps = all.div_ceil(PARTS * STEP);
+        let mut at = [[0; 2]; PARTS];
+        let mut next = [_mm512_set1_epi32(-1); PARTS];
+        let mut rest = next;
+        for part in 0..PARTS {
+            let [of_a, of_b] = first((part * steps * STEP).min(all), a, b);
+            (next[part], rest[part]) = (load(a, of_a), load(b, of_b));
+            at[part] = [of_a + STEP, of_b + STEP];
+        }
         let places = merged.spare_capacity_mut().as_chunks_mut::<STEP>().0;
-        let Some(places) = places.get_mut(..all.div_ceil(STEP)) else { return };
-        for place in places {
-            let lower;
-            (lower, rest) = sorted_halves(next, rest);
-            // SAFETY: there is room for sixteen numbers.
-            unsafe { _mm512_storeu_si512(place.as_mut_ptr().cast(), lower) };
-            // Looked up rather than jumped to: no processor can predict which row is next.
-            let is_of_b = usize::from(number(a, at[0]) > number(b, at[1]));
-            next = load([a, b][is_of_b], at[is_of_b]);
-            at[is_of_b] += STEP;
+        let Some(places) = places.get_mut(..PARTS * steps) else { return };
+        for step in 0..steps {
+            for part in 0..PARTS {
+                let lower;
+                (lower, rest[part]) = sorted_halves(next[part], rest[part]);
+                let place = &mut places[part * steps + step];
+                // SAFETY: there is room for sixteen numbers.
+                unsafe { _mm512_storeu_si512(place.as_mut_ptr().cast(), lower) };
+                // Looked up rather than jumped to: no processor can predict which row is next.
+                let [of_a, of_b] = at[part];
+                let is_of_b = usize::from(number(a, of_a) > number(b, of_b));
+                next[part] = load([a, b][is_of_b], at[part][is_of_b]);
+                at[part][is_of_b] += STEP;
+            }
         }
         let length = merged.len() + all;
         // SAFETY: so many numbers were written one behind the other.
@@ -121,8 +166,8 @@ mod tests {
     proptest! {
         #[test]
         fn two_rows_become_one_at_every_level(
-            mut a in proptest::collection::vec(0..3000_u32, 0..400),
-            mut b in proptest::collection::vec(0..3000_u32, 0..400),
+            mut a in proptest::collection::vec(0..3000_u32, 0..1500),
+            mut b in proptest::collection::vec(0..3000_u32, 0..1500),
             before in proptest::collection::vec(any::<u32>(), 0..5),
         ) {
             let mut expected = [a.clone(), b.clone()].concat();
