@@ -138,7 +138,9 @@ impl<'a> Scans<'a> {
             while !(watch.stop)()
                 && let Some((band, piece)) = next()
             {
-                let (score, tally) = measure(&setup, memory, band).judged(&setup.seen, piece);
+                let known = counted.1.peak_busy;
+                let (score, tally) =
+                    measure(&setup, memory, (band, known)).judged(&setup.seen, piece);
                 counted.0.add(&score);
                 counted.1.add(&tally);
                 (watch.done)(band.shots);
@@ -189,7 +191,12 @@ struct Setup<'a> {
     detectors: &'a Detectors<'a>,
 }
 
-fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<'a> {
+/// Measures a band of a scan of which it is `known` that so many converters were busy at once.
+fn measure<'a>(
+    setup: &Setup<'a>,
+    memory: &mut Memory,
+    (band, known): (&Band, u32),
+) -> Measured<'a> {
     let Setup { seen: Seen { design, scene, .. }, detectors } = *setup;
     let mut tally = Tally::default();
     let mut clock = Instant::now();
@@ -208,7 +215,7 @@ fn measure<'a>(setup: &Setup<'a>, memory: &mut Memory, band: &Band) -> Measured<
     let detections = detectors.detections(&log, &light, memory);
     tally.detections = detections.time.len() as u64;
     lap(&mut tally);
-    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, detections);
+    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, detections, known);
     lap(&mut tally);
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
     lap(&mut tally);

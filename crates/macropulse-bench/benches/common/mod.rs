@@ -91,7 +91,7 @@ impl Met {
         let log = band.shot_log(design);
         let mut light = light_of_echoes(design, &log, []);
         channel::echoes(&mut light.trains, (&operating(design).link, &self.materials), &log, hits);
-        let converted = tdc::ticks(design, detectors.detections(&log, &light, memory));
+        let converted = tdc::ticks(design, detectors.detections(&log, &light, memory), 0);
         (log, converted.ticks)
     }
 }

@@ -21,7 +21,7 @@ use crate::kernels::{all_apart, distinct};
 pub struct Converted {
     /// What the receiver is given.
     pub ticks: Ticks,
-    /// Most converters busy at once, in any one channel.
+    /// Most converters busy at once, in any one channel; no less than was known before.
     pub peak_busy: u32,
     /// Events that found every converter busy.
     pub lost: u64,
@@ -55,15 +55,18 @@ impl Reading {
     }
 }
 
-/// The ticks of the `detections` of one band, in the memory that those had.
-pub fn ticks(design: &Design, detections: Detections) -> Converted {
+/// The ticks of the `detections` of one band, in the memory that those had. In other bands of its
+/// scan `known` converters were busy at once, 0 where none was measured: only more of them are new,
+/// and most of a band is converted without looking for fewer.
+pub fn ticks(design: &Design, detections: Detections, known: u32) -> Converted {
     let tdc = &design.tdc;
     let Detections { epoch, mut time, mut channel, mut amplitude } = detections;
     let found = time.len();
+    let converters = design.converters_per_channel() as usize;
     let mut bank = Bank {
-        converters: design.converters_per_channel() as usize,
+        converters,
         dead: u32::try_from((tdc.dead_fs + tdc.tick_fs - 1) / tdc.tick_fs).unwrap_or(u32::MAX),
-        ..Bank::default()
+        peak: converters.min(known as usize),
     };
     let merged = if channel.is_empty() && amplitude.is_empty() {
         bank.take_all(&mut time)
@@ -84,12 +87,12 @@ const BLOCK: usize = 512;
 
 /// Converters served first-free, each busy for the same time: an event finds one free unless as
 /// many events as there are converters were taken within the last dead time.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Bank {
     converters: usize,
     /// Time for which a converter is busy, ticks.
     dead: u32,
-    /// Most converters that were busy at once.
+    /// Most converters that were busy at once, as far as is known.
     peak: usize,
 }
 
@@ -197,7 +200,7 @@ mod tests {
     }
 
     fn timed(design: &Design, epoch: i64, time: Vec<u32>) -> Converted {
-        ticks(design, Detections { epoch, time, ..Detections::default() })
+        ticks(design, Detections { epoch, time, ..Detections::default() }, 0)
     }
 
     #[test]
@@ -241,7 +244,7 @@ mod tests {
             channel: vec![0, 0, 1],
             amplitude: vec![1.0, 2.0, 3.0],
         };
-        let Converted { ticks, lost, .. } = ticks(&design, detections);
+        let Converted { ticks, lost, .. } = ticks(&design, detections, 0);
         assert_eq!((ticks.tick, lost), (vec![100, 100], 1));
         assert_eq!((ticks.channel, ticks.amplitude), (vec![0, 1], vec![1.0, 3.0]));
     }
@@ -277,6 +280,7 @@ mod tests {
             scale in 0..4_u32,
             converters in 1..60_u32,
             dead_ns in 0..5_u32,
+            known in 0..100_u32,
         ) {
             let set = [
                 ("converters", converters.to_string()), ("dead_time_ns", dead_ns.to_string()),
@@ -287,7 +291,11 @@ mod tests {
                 Some(*time)
             }).collect();
             let expected = told(&design, &times);
-            prop_assert_eq!(timed(&design, 0, times), expected);
+            prop_assert_eq!(timed(&design, 0, times.clone()), expected.clone());
+            let detections = Detections { time: times, ..Detections::default() };
+            let peak_busy = expected.peak_busy.max(known.min(converters));
+            let knowing = ticks(&design, detections, known);
+            prop_assert_eq!(knowing, Converted { peak_busy, ..expected });
         }
 
         /// Sensors with amplitudes go event by event.
@@ -301,7 +309,7 @@ mod tests {
             let without = timed(&design, 0, times.clone());
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
             let detections = Detections { time: times, amplitude, ..Detections::default() };
-            let with = ticks(&design, detections);
+            let with = ticks(&design, detections, 0);
             let of_ticks: Vec<f32> = with.ticks.tick.iter().map(|tick| *tick as f32).collect();
             prop_assert_eq!(&with.ticks.amplitude, &of_ticks);
             let ticks = Ticks { amplitude: Vec::new(), ..with.ticks.clone() };
