@@ -9,6 +9,7 @@ use super::Detections;
 use super::clock::Clock;
 use crate::channel::Light;
 use crate::design::Design;
+use crate::kernels::arrivals;
 
 /// The light and the shots of a band in the order of their channels; kept from band to band.
 #[derive(Debug, Default)]
@@ -151,9 +152,19 @@ impl Channel<'_> {
         first..=self.spans.last().map_or(-1, |span| *span.end())
     }
 
-    /// When the marks of train `index` arrive, in parts of a tick from the epoch on.
-    pub fn marks(&self, index: usize) -> impl Iterator<Item = i64> {
-        self.light.arrivals_fs(index).map(|arrives_fs| self.clock.time(arrives_fs))
+    /// When the marks of train `index` arrive while it listens, in parts of a tick from the epoch
+    /// on, ascending; in `times`, in place of what was there.
+    pub fn arrivals<'t>(&self, index: usize, times: &'t mut Vec<i64>) -> &'t [i64] {
+        let (light, clock) = (self.light, &self.clock);
+        let marks = light.marks(index);
+        let chip_fs = light.transmitters[usize::from(light.trains.transmitter[index])].chip_fs;
+        times.resize(marks.len(), 0);
+        let begins_fs = light.trains.arrives_fs[index] - clock.epoch_fs;
+        arrivals(clock.ruler, begins_fs, chip_fs, marks, times);
+        let span = self.whole_span();
+        let before = times.partition_point(|time| time < span.start());
+        let until = times.partition_point(|time| time <= span.end());
+        times.get(before..until).unwrap_or_default()
     }
 
     /// Takes those of the last events of `found`, from place `from` on, out that came while no gate was

@@ -1,15 +1,16 @@
 //! The time line of a band.
 
 use crate::design::{Design, PARTS_OF_TICK};
+use crate::kernels::Ruler;
 
 /// Counts parts of a tick from a period of the converters' clock on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock {
     /// Ticks from the beginning of the first scan.
     pub epoch: i64,
-    epoch_fs: i64,
-    tick_fs: i64,
-    parts_per_fs: f64,
+    /// The same, fs.
+    pub epoch_fs: i64,
+    pub ruler: Ruler,
 }
 
 impl Clock {
@@ -18,18 +19,12 @@ impl Clock {
     pub fn new(design: &Design, first_fs: i64) -> Self {
         let (tick_fs, clock_fs) = (design.tdc.tick_fs, design.tdc.clock_fs);
         let epoch_fs = (first_fs - design.most_jitter_fs()).div_euclid(clock_fs) * clock_fs;
-        let parts_per_fs = f64::from(PARTS_OF_TICK) / tick_fs as f64;
-        Self { epoch: epoch_fs / tick_fs, epoch_fs, tick_fs, parts_per_fs }
+        Self { epoch: epoch_fs / tick_fs, epoch_fs, ruler: Ruler::new(PARTS_OF_TICK, tick_fs) }
     }
 
     /// Whole parts of a tick in `fs`, rounded down.
     pub fn parts(&self, fs: i64) -> i64 {
-        let rounded = (fs as f64 * self.parts_per_fs) as i64;
-        // At most one off, so that what wraps in between is of no account.
-        let over = fs
-            .wrapping_mul(i64::from(PARTS_OF_TICK))
-            .wrapping_sub(rounded.wrapping_mul(self.tick_fs));
-        rounded + i64::from(over >= self.tick_fs) - i64::from(over < 0)
+        self.ruler.parts(fs)
     }
 
     /// Parts of a tick from the epoch to the absolute time `time_fs`.

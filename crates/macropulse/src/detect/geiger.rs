@@ -82,13 +82,12 @@ impl Cells {
 
     /// The photons of all marks: the time in the upper half, the cell in the lower half.
     fn photons(&self, channel: &Channel, chance: &Chance) -> Vec<u64> {
-        let mut photons = Vec::new();
+        let (mut photons, mut arrivals) = (Vec::new(), Vec::new());
         let trains = &channel.light.trains;
-        let span = channel.whole_span();
         for arrival in channel.order.iter() {
             let index = *arrival as u32 as usize;
             let mut stream = chance.at(Stage::Photons, trains.address(index));
-            let times = channel.marks(index).filter(|time| span.contains(time));
+            let times = channel.arrivals(index, &mut arrivals).iter().copied();
             self.fall(times, trains.photons[index], &mut stream, &mut photons);
         }
         photons

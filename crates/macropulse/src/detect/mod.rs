@@ -122,6 +122,7 @@ pub struct Memory {
     merged: Vec<u32>,
     earlier: Vec<u32>,
     later: Vec<u32>,
+    arrivals: Vec<i64>,
     numbers: Vec<[u32; GROUP]>,
 }
 

@@ -147,9 +147,8 @@ impl Counting {
             };
             append_train(&train, time);
         } else {
-            let span = channel.whole_span();
-            let counted = channel.marks(index).filter(|time| span.contains(time));
-            time.extend(counted.map(|time| time as u32));
+            let counted = channel.arrivals(index, &mut memory.arrivals);
+            time.extend(counted.iter().map(|time| *time as u32));
         }
         let first = FirstPhoton::of(photons, light.transmitters[transmitter].pulse, self.pulse);
         if seen.is_certain() && self.jitter.is_none() && first.is_none() {

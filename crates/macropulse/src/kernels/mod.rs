@@ -18,6 +18,7 @@ mod packet;
 #[cfg(test)]
 mod packet_tests;
 mod philox;
+mod ruler;
 mod shapes;
 mod spacing;
 mod train;
@@ -32,6 +33,7 @@ pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
 pub(crate) use philox::{GROUP, philox};
+pub(crate) use ruler::{Ruler, arrivals};
 pub(crate) use shapes::{Form, meet, meet_packet, turned};
 pub(crate) use spacing::all_apart;
 pub(crate) use train::{STEP, Train, append_train};
