@@ -76,8 +76,8 @@ impl Amounts {
 /// Cells of a short table: so many that sixteen registers hold all of it.
 const SHORT: usize = 256;
 
-/// A table of [`SHORT`] cells whose own amounts count up from `first`, and whose other ones fit into
-/// a byte.
+/// A table of [`SHORT`] cells whose own amounts count up from `first`, and whose other ones fit
+/// into a byte.
 #[derive(Debug)]
 struct Short {
     /// Of each cell the bound in the upper 24 bits, as many as a number has left; the other amount
@@ -330,7 +330,9 @@ mod tests {
         fn times_move_by_a_short_table_at_every_level(
             first in -300..300_i16,
             table in proptest::collection::vec((0..1_u32 << 24, -1..2_i32, any::<i8>()), 256),
-            pairs in proptest::collection::vec((100_000..1_000_000_u32, any::<u8>(), -2..2_i32), 0..100),
+            pairs in proptest::collection::vec(
+                (100_000..1_000_000_u32, any::<u8>(), -2..2_i32), 0..100,
+            ),
         ) {
             let bound = |bits: u32, off: i32| (bits << 8).saturating_add_signed(off);
             let table: Vec<(u32, i16, i16)> = (first..)

@@ -4,7 +4,7 @@
 //! the next vector of the row whose next number is the smaller one. Two sorted vectors are
 //! separated and sorted by a bitonic network \[Bat68\].
 //!
-//! Each step waits for the one before it, which keeps a processor busy a third of the time. Long
+//! Each step waits for the one before it, which leaves a processor idle a quarter of the time. Long
 //! rows are cut into parts that are merged side by side, each where its share of the result begins:
 //! so many numbers of the one row and so many of the other, found by bisection.
 
@@ -21,7 +21,8 @@ pub(crate) const PAD: [u32; 3 * STEP] = [u32::MAX; 3 * STEP];
 /// eight parts gain no more (Zen 4, twice, in cache).
 const PARTS: usize = 4;
 
-/// Where cutting begins to pay: of 256 numbers bisection takes what it saves, of 512 it saves 10 %.
+/// Where cutting begins to pay: of 256 numbers bisection takes what it saves, of 512 about 10 % are
+/// left.
 const LONG: usize = 512;
 
 /// Puts `a` and `b`, which ascend and end with [`PAD`], into `merged`, in order and without the

@@ -37,16 +37,16 @@ impl Ruler {
 /// Added to a number below 2⁵¹, it leaves it rounded in the lowest bits.
 const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
 
-/// `number` rounded to the nearest whole one, if it is below 2⁵¹: what processors convert themselves
-/// is checked for what does not fit, one by one.
+/// `number` rounded to the nearest whole one, if it is below 2⁵¹: conversions that processors have
+/// are checked for what does not fit, one by one.
 #[inline(always)]
 fn nearest(number: f64) -> i64 {
     (number + ROUNDING).to_bits().wrapping_sub(ROUNDING.to_bits()) as i64
 }
 
 on_every_level! {
-    /// Puts what `ruler` counts until each of `marks` in its place in `times`, where a pulse train of
-    /// chips of `chip_fs` begins at `begins_fs`; all of it below 2⁵¹.
+    /// Puts what `ruler` counts until each of `marks` in its place in `times`, where a pulse train
+    /// of chips of `chip_fs` begins at `begins_fs`; all of it below 2⁵¹.
     pub(crate) fn arrivals(
         ruler: Ruler,
         begins_fs: i64,
