@@ -11,6 +11,8 @@
 // Lanes of several arrays are walked in step, by their number.
 #![allow(clippy::needless_range_loop)]
 
+mod beam;
+mod build;
 mod delay;
 mod merge;
 mod pack;
@@ -20,6 +22,7 @@ mod packet_tests;
 mod philox;
 mod ruler;
 mod shapes;
+mod single;
 mod spacing;
 mod train;
 mod tree;
@@ -28,6 +31,7 @@ mod waits;
 mod whole;
 mod wide;
 
+pub(crate) use build::Built;
 pub(crate) use delay::Amounts;
 pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
@@ -37,7 +41,7 @@ pub(crate) use ruler::{Ruler, arrivals};
 pub(crate) use shapes::{Form, meet, meet_packet, turned};
 pub(crate) use spacing::all_apart;
 pub(crate) use train::{STEP, Train, append_train};
-pub(crate) use tree::Tree;
+pub(crate) use tree::{Bounds, Tree};
 pub(crate) use triangles::{Corners, Triangles, cosines, normals};
 pub(crate) use waits::{END, Events};
 pub(crate) use whole::whole;

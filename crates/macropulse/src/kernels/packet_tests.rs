@@ -90,3 +90,43 @@ fn the_soup_is_thick() {
     packet.cast(&triangles, &mut Waiting::default());
     assert!(packet.leaf.iter().filter(|leaf| **leaf != NONE).count() > LANES / 2);
 }
+
+proptest! {
+    /// Neighbours, which descend as a beam, and rays alone against a search of all triangles.
+    #[test]
+    fn neighbours_meet_the_nearest_of_all_triangles(
+        seed in 0..u64::MAX,
+        count in 1..120_usize,
+        spread in prop_oneof![Just(0.0), 0.0..0.03_f64, 0.0..0.5_f64],
+        from_centre in proptest::bool::ANY,
+    ) {
+        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        let corners = soup(&mut chance, count);
+        let centre = [0; 3].map(|_| chance.random_range(-5.0..5.0_f64));
+        let origin = if from_centre { centre } else { corners[0][0] };
+        let aim = corners[count / 2][1];
+        let mut packet = Packet::from(origin);
+        for lane in 0..LANES {
+            let aside = [0; 3].map(|_| chance.random_range(-1.0..=1.0) * spread);
+            let toward = [0, 1, 2].map(|axis| aim[axis] + aside[axis]);
+            packet.set(lane, direction(&mut chance, 2, toward, origin), f64::INFINITY);
+        }
+        let ones: Vec<Triangles> =
+            corners.iter().map(|one| Triangles::new(1, |_| *one, centre).0).collect();
+        let (triangles, _) = Triangles::new(count, |index| corners[index], centre);
+        let nearest = |lane: usize| {
+            let hits = ones.iter().filter_map(|one| {
+                one.nearest((origin, packet.along(lane)), (0.0, f64::INFINITY))
+            });
+            hits.map(|hit| hit.range).fold(f64::INFINITY, f64::min)
+        };
+        let nearest: Vec<f64> = (0..LANES).map(nearest).collect();
+        for (level, cast) in at_each_level(|| {
+            let mut cast = packet.clone();
+            cast.cast(&triangles, &mut Waiting::default());
+            cast
+        }) {
+            prop_assert_eq!(&cast.range[..], &nearest[..], "{:?}", level);
+        }
+    }
+}

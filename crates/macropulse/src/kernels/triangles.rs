@@ -6,12 +6,14 @@
 //! triangles that share an edge can never both miss a ray. How far the hit is, is then solved
 //! in `f64` on the plane of the triangle as it was modelled.
 
-use glam::{DVec3, Vec3A, Vec3Swizzles};
-use obvhs::triangle::Triangle;
+use glam::{DVec3, Vec3A};
 
-use super::packet::{Lanes, Packet};
-use super::tree::{Aim, FARTHEST, Tree};
-use super::wide::LANES;
+use super::beam::Descent;
+use super::build::Built;
+use super::packet::{Lanes, NONE, Packet};
+use super::single::{Aim, Along, RayLeaves};
+use super::tree::{Bounds, FARTHEST, Tree};
+use super::wide::{LANES, Registers, SIDE, Wide, on_level};
 use macropulse_codec::on_every_level;
 
 /// The corners of a triangle, m.
@@ -21,10 +23,21 @@ pub(crate) type Corners = [[f64; 3]; 3];
 #[derive(Debug, Default)]
 pub(crate) struct Triangles {
     pub(super) tree: Tree,
-    /// Local corners in the order of the leaves; by axis, then by corner.
-    pub(super) narrow: Vec<[Vec3A; 3]>,
-    /// The same triangles, as they were modelled.
+    /// The leaves.
+    pub(super) blocks: Vec<Block>,
+    /// The triangles as they were modelled, in the order of the leaves.
     pub(super) corners: Vec<Corners>,
+}
+
+/// Triangles side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// Local; by axis, then by corner, then by triangle.
+    corners: [[[f32; SIDE]; 3]; 3],
+    /// The first of them, in the order of the leaves.
+    pub first: u32,
+    count: u32,
 }
 
 /// A triangle that a ray meets, and how far away.
@@ -45,29 +58,29 @@ impl Triangles {
         corners_of: impl Fn(usize) -> Corners,
         centre: [f64; 3],
     ) -> (Self, Vec<u32>) {
-        let origin = DVec3::from(centre);
-        let mut kept = Vec::with_capacity(count);
-        let mut triangles = Vec::with_capacity(count);
-        for index in 0..count {
-            let corners = corners_of(index);
-            let local = corners.map(|corner| DVec3::from(corner) - origin);
-            let near = local.iter().all(|corner| corner.abs().max_element() < FARTHEST);
-            if near && has_area(&corners) {
-                let [v0, v1, v2] = local.map(|corner| corner.as_vec3a());
-                triangles.push(Triangle { v0, v1, v2 });
-                kept.push(index as u32);
-            }
-        }
-        let (tree, order) = Tree::over(&triangles, centre);
-        let by_axis = |index: &u32| {
-            let Triangle { v0, v1, v2 } = &triangles[*index as usize];
-            [0, 1, 2].map(|axis| Vec3A::new(v0[axis], v1[axis], v2[axis]))
+        let kept: Vec<u32> = (0..count as u32)
+            .filter(|index| {
+                let corners = corners_of(*index as usize);
+                is_near(&corners, centre) && has_area(&corners)
+            })
+            .collect();
+        let bounds = kept.iter().map(|index| {
+            let [a, b, c] = narrow(&corners_of(*index as usize), centre).map(Vec3A::from_array);
+            Bounds { low: a.min(b).min(c), high: a.max(b).max(c) }
+        });
+        let Built { tree, mut order, ends } = Built::over(bounds, SIDE, centre);
+        order.iter_mut().for_each(|index| *index = kept[*index as usize]);
+        drop(kept);
+        let corners: Vec<Corners> = order.iter().map(|index| corners_of(*index as usize)).collect();
+        let mut first = 0;
+        let block = |end: &u32| {
+            let range = first as usize..*end as usize;
+            let block = Block::new(first, &corners[range], centre);
+            first = *end;
+            block
         };
-        let narrow = order.iter().map(by_axis).collect();
-        drop(triangles);
-        let order: Vec<u32> = order.iter().map(|index| kept[*index as usize]).collect();
-        let corners = order.iter().map(|index| corners_of(*index as usize)).collect();
-        (Self { tree, narrow, corners }, order)
+        let blocks = ends.iter().map(block).collect();
+        (Self { tree, blocks, corners }, order)
     }
 
     /// Number of triangles that can be hit.
@@ -88,48 +101,212 @@ impl Triangles {
         normal(&self.corners[leaf as usize])
     }
 
-    /// The nearest triangle on a ray with a range in (`nearest`, `farthest`); of two equally far
-    /// the first leaf.
-    pub(crate) fn nearest(
-        &self,
-        (origin, direction): ([f64; 3], [f64; 3]),
-        (nearest, farthest): (f64, f64),
-    ) -> Option<Hit> {
-        let mut best = Hit { range: farthest, leaf: 0 };
-        let mut found = false;
-        self.tree.along((origin, direction), (nearest, farthest), |leaf, aim| {
-            if passes(&self.narrow[leaf as usize], aim) {
-                let plane = Plane::new(&self.corners[leaf as usize], origin);
-                let range = plane.range(direction);
-                let first = found && range == best.range && leaf < best.leaf;
-                if range > nearest && (range < best.range || first) {
-                    (best, found) = (Hit { range, leaf }, true);
-                }
-            }
-            best.range
-        });
-        found.then_some(best)
+    /// The nearest triangle on a ray, given by origin and direction, with a range between the two;
+    /// of two equally far the first leaf.
+    pub(crate) fn nearest(&self, ray: ([f64; 3], [f64; 3]), between: (f64, f64)) -> Option<Hit> {
+        let mut nearest = Nearest::of(self, ray, between);
+        on_level(Along { tree: &self.tree, ray, between, leaves: &mut nearest });
+        nearest.found()
+    }
+
+    /// Solves for the range of the rays in `passing`, and keeps what is nearer than before;
+    /// whether any was.
+    #[inline(always)]
+    pub(super) fn shorten(&self, packet: &mut Packet, leaf: u32, passing: u32) -> bool {
+        let plane = Plane::new(&self.corners[leaf as usize], packet.origin);
+        let Packet { direction: [x, y, z], nearest, range: ranges, leaf: leaves, .. } = packet;
+        let mut changed = false;
+        for lane in 0..LANES {
+            let range = plane.range([x[lane], y[lane], z[lane]]);
+            let (before, holder) = (ranges[lane], leaves[lane]);
+            let first = (range == before) & (holder != NONE) & (leaf < holder);
+            let nearer = (range < before) | first;
+            let taken = (passing >> lane & 1 == 1) & (range > nearest[lane]) & nearer;
+            ranges[lane] = if taken { range } else { before };
+            leaves[lane] = if taken { leaf } else { holder };
+            changed |= taken;
+        }
+        changed
     }
 }
 
-/// Whether a line passes through the triangle, its edges and corners included, on either side.
-///
-/// Sheared, the ray is the origin of the plane (u, v), and the triangle holds it if it lies
-/// on the same side of all three edges.
-#[inline(always)]
-fn passes(corners: &[Vec3A; 3], aim: &Aim) -> bool {
-    let [u, v, along] = aim.axes;
-    let depth = corners[along] - aim.origin[along];
-    let u = (corners[u] - aim.origin[u]) - aim.shear[0] * depth;
-    let v = (corners[v] - aim.origin[v]) - aim.shear[1] * depth;
-    // Twice the areas that the origin spans with the edges bc, ca, ab.
-    let areas = u.yzx() * v.zxy() - u.zxy() * v.yzx();
-    let left = areas.cmpgt(Vec3A::ZERO);
-    let right = areas.cmplt(Vec3A::ZERO);
-    if left.any() && right.any() {
-        return false;
+/// The nearest triangle on a ray so far.
+pub(super) struct Nearest<'a> {
+    triangles: &'a Triangles,
+    ray: ([f64; 3], [f64; 3]),
+    nearest: f64,
+    best: Hit,
+    found: bool,
+}
+
+impl<'a> Nearest<'a> {
+    /// None yet, of `triangles` with a range in (`nearest`, `farthest`).
+    pub(super) fn of(
+        triangles: &'a Triangles,
+        ray: ([f64; 3], [f64; 3]),
+        (nearest, farthest): (f64, f64),
+    ) -> Self {
+        let best = Hit { range: farthest, leaf: 0 };
+        Self { triangles, ray, nearest, best, found: false }
     }
-    left.all() || right.all() || passes_exactly(u.to_array(), v.to_array())
+
+    pub(super) fn found(self) -> Option<Hit> {
+        self.found.then_some(self.best)
+    }
+}
+
+impl RayLeaves for Nearest<'_> {
+    #[inline(always)]
+    fn meet<R: Registers>(&mut self, leaf: u32, aim: &Aim) -> f64 {
+        let block = &self.triangles.blocks[leaf as usize];
+        let mut passed = block.passed::<R>(aim);
+        while passed != 0 {
+            let leaf = block.first + passed.trailing_zeros();
+            passed &= passed - 1;
+            let (origin, direction) = self.ray;
+            let range = Plane::new(&self.triangles.corners[leaf as usize], origin).range(direction);
+            let first = self.found && range == self.best.range && leaf < self.best.leaf;
+            if range > self.nearest && (range < self.best.range || first) {
+                (self.best, self.found) = (Hit { range, leaf }, true);
+            }
+        }
+        self.best.range
+    }
+}
+
+impl Block {
+    /// Triangles with these corners, of which the first is leaf number `first`.
+    fn new(first: u32, triangles: &[Corners], centre: [f64; 3]) -> Self {
+        let mut block =
+            Self { corners: [[[0.0; SIDE]; 3]; 3], first, count: triangles.len() as u32 };
+        for (slot, triangle) in triangles.iter().enumerate() {
+            for (corner, place) in narrow(triangle, centre).iter().enumerate() {
+                for axis in 0..3 {
+                    block.corners[axis][corner][slot] = place[axis];
+                }
+            }
+        }
+        block
+    }
+
+    /// The set of its triangles.
+    #[inline(always)]
+    pub(super) fn all(&self) -> u32 {
+        (1 << self.count) - 1
+    }
+
+    /// The low and the high planes of the boxes around its triangles, by axis.
+    #[inline(always)]
+    pub(super) fn planes<R: Registers>(&self) -> [[R::Boxes; 2]; 3] {
+        [self.between::<R>(0), self.between::<R>(1), self.between::<R>(2)]
+    }
+
+    #[inline(always)]
+    fn between<R: Registers>(&self, axis: usize) -> [R::Boxes; 2] {
+        let [a, b, c] = &self.corners[axis];
+        let (a, b, c) = (R::Boxes::load(a), R::Boxes::load(b), R::Boxes::load(c));
+        [a.least(b).least(c), a.most(b).most(c)]
+    }
+
+    /// Its triangles that a ray passes through.
+    #[inline(always)]
+    fn passed<R: Registers>(&self, aim: &Aim) -> u32 {
+        let [u, v, along] = aim.axes;
+        let [p, q] = aim.shear;
+        let corners = [self.from::<R>(aim, u), self.from::<R>(aim, v), self.from::<R>(aim, along)];
+        holding_origin(self.all(), corners, [R::Boxes::splat(p), R::Boxes::splat(q)])
+    }
+
+    /// The corners of its triangles on an axis, from the start of a ray.
+    #[inline(always)]
+    fn from<R: Registers>(&self, aim: &Aim, axis: usize) -> [R::Boxes; 3] {
+        let [a, b, c] = &self.corners[axis];
+        let origin = R::Boxes::splat(aim.origin[axis]);
+        [
+            R::Boxes::load(a).minus(origin),
+            R::Boxes::load(b).minus(origin),
+            R::Boxes::load(c).minus(origin),
+        ]
+    }
+
+    /// Rays of `set` that pass through one of its triangles.
+    #[inline(always)]
+    pub(super) fn passed_by<R: Registers, const FROM_CENTRE: bool>(
+        &self,
+        descent: &Descent<R, FROM_CENTRE>,
+        slot: usize,
+        set: u32,
+    ) -> u32 {
+        let [u, v, along] = descent.axes;
+        let corners = [
+            self.one_from(descent, u, slot),
+            self.one_from(descent, v, slot),
+            self.one_from(descent, along, slot),
+        ];
+        holding_origin(set, corners, descent.shear)
+    }
+
+    /// The corners of one of its triangles on an axis, from the start of rays.
+    #[inline(always)]
+    fn one_from<R: Registers, const FROM_CENTRE: bool>(
+        &self,
+        descent: &Descent<R, FROM_CENTRE>,
+        axis: usize,
+        slot: usize,
+    ) -> [R::Rays; 3] {
+        let [a, b, c] = &self.corners[axis];
+        [
+            descent.shifted(axis, R::Rays::splat(a[slot])),
+            descent.shifted(axis, R::Rays::splat(b[slot])),
+            descent.shifted(axis, R::Rays::splat(c[slot])),
+        ]
+    }
+}
+
+/// Lanes of `among` in which a line passes through a triangle, its edges and corners included, on either side.
+///
+/// Sheared, the ray is the origin of the plane (u, v), and the triangle holds it if it lies on the
+/// same side of all three edges. The corners are given by their u, v and depth.
+#[inline(always)]
+fn holding_origin<const N: usize, W: Wide<N>>(
+    among: u32,
+    [mut u, mut v, depth]: [[W; 3]; 3],
+    [p, q]: [W; 2],
+) -> u32 {
+    for corner in 0..3 {
+        u[corner] = u[corner].minus(p.times(depth[corner]));
+        v[corner] = v[corner].minus(q.times(depth[corner]));
+    }
+    // Twice the areas that the origin spans with the edges bc, ca, ab.
+    let a = u[1].times(v[2]).minus(u[2].times(v[1]));
+    let b = u[2].times(v[0]).minus(u[0].times(v[2]));
+    let c = u[0].times(v[1]).minus(u[1].times(v[0]));
+    let zero = W::splat(0.0);
+    let (least, most) = (a.least(b).least(c), a.most(b).most(c));
+    let sure = zero.below(least) | most.below(zero);
+    let outside = least.below(zero) & zero.below(most);
+    let unsure = among & !(sure | outside);
+    if unsure == 0 {
+        return among & sure;
+    }
+    let mut wide = [[0.0; N]; 6];
+    for corner in 0..3 {
+        u[corner].store(&mut wide[corner]);
+        v[corner].store(&mut wide[3 + corner]);
+    }
+    among & sure | settle(&wide, unsure)
+}
+
+/// Of the lanes in `unsure`, those that pass; their u of three corners, then their v.
+#[cold]
+#[inline(never)]
+fn settle<const N: usize>(wide: &[[f32; N]; 6], unsure: u32) -> u32 {
+    let mut passing = 0;
+    for lane in (0..N).filter(|lane| unsure >> lane & 1 == 1) {
+        let of = |first: usize| [wide[first][lane], wide[first + 1][lane], wide[first + 2][lane]];
+        passing |= u32::from(passes_exactly(of(0), of(3))) << lane;
+    }
+    passing
 }
 
 /// The same question where an area came out as zero.
@@ -138,7 +315,7 @@ fn passes(corners: &[Vec3A; 3], aim: &Aim) -> bool {
 /// The products of two `f32` are exact in `f64`, and so is the sign of their difference.
 #[cold]
 #[inline(never)]
-pub(super) fn passes_exactly(u: [f32; 3], v: [f32; 3]) -> bool {
+fn passes_exactly(u: [f32; 3], v: [f32; 3]) -> bool {
     let (u, v) = (u.map(f64::from), v.map(f64::from));
     let area = |a: usize, b: usize| u[a] * v[b] - u[b] * v[a];
     let areas = [area(1, 2), area(2, 0), area(0, 1)];
@@ -149,7 +326,7 @@ pub(super) fn passes_exactly(u: [f32; 3], v: [f32; 3]) -> bool {
 }
 
 /// A triangle seen from a place.
-pub(super) struct Plane {
+struct Plane {
     normal: DVec3,
     /// The corners, from the place.
     corners: [DVec3; 3],
@@ -159,7 +336,7 @@ pub(super) struct Plane {
 
 impl Plane {
     #[inline(always)]
-    pub(super) fn new(corners: &Corners, origin: [f64; 3]) -> Self {
+    fn new(corners: &Corners, origin: [f64; 3]) -> Self {
         let [a, b, c] = corners;
         let (a, b, c) = (DVec3::from(*a), DVec3::from(*b), DVec3::from(*c));
         let normal = (b - a).cross(c - a);
@@ -173,7 +350,7 @@ impl Plane {
     /// `t = n·(a−o) / n·d`, kept within the depths of the three corners: a needle seen edge-on
     /// has no better answer.
     #[inline(always)]
-    pub(super) fn range(&self, direction: [f64; 3]) -> f64 {
+    fn range(&self, direction: [f64; 3]) -> f64 {
         let along = DVec3::from(direction);
         let [a, b, c] = &self.corners;
         let (a, b, c) = (a.dot(along), b.dot(along), c.dot(along));
@@ -198,6 +375,18 @@ pub(super) fn normal([a, b, c]: &Corners) -> [f64; 3] {
     let (a, b, c) = (DVec3::from(*a), DVec3::from(*b), DVec3::from(*c));
     let normal = (b - a).cross(c - a);
     (normal * (1.0 / normal.length())).to_array()
+}
+
+/// The corners from `centre`, as boxes and rays have them.
+#[inline(always)]
+fn narrow(corners: &Corners, centre: [f64; 3]) -> [[f32; 3]; 3] {
+    corners.map(|corner| (DVec3::from(corner) - DVec3::from(centre)).as_vec3().to_array())
+}
+
+fn is_near(corners: &Corners, centre: [f64; 3]) -> bool {
+    corners
+        .iter()
+        .all(|corner| (DVec3::from(*corner) - DVec3::from(centre)).abs().max_element() < FARTHEST)
 }
 
 fn has_area([a, b, c]: &Corners) -> bool {

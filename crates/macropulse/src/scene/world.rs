@@ -9,14 +9,15 @@
 //! last, in the order of the scene file.
 
 use glam::{DVec3, Vec3A};
-use obvhs::aabb::Aabb;
 
 use super::closed_form::Solid;
 use super::hits::{CastRays, Hit, Ray};
 use super::moving::Mover;
 use super::pose::Transform;
 use super::raycast::{Facet, Facets};
-use crate::kernels::{LANES, Lanes, NONE, Packet, Tree, Waiting, cosines, normals, turned};
+use crate::kernels::{
+    Bounds, Built, LANES, Lanes, NONE, Packet, Tree, Waiting, cosines, normals, turned,
+};
 
 /// Every surface of a scene, ready for rays.
 pub(super) struct World {
@@ -79,11 +80,8 @@ impl World {
                 .iter()
                 .map(|copy| Primitive::Copy { copy: *copy, from_world: copy.to_world.inverse() }),
         );
-        let boxes: Vec<Aabb> = primitives[first..]
-            .iter()
-            .map(|primitive| bounds(primitive, &models, centre))
-            .collect();
-        let (tree, order) = Tree::over(&boxes, centre);
+        let boxes = primitives[first..].iter().map(|one| bounds(one, &models, centre));
+        let Built { tree, order, .. } = Built::over(boxes, 1, centre);
         let leaves = order.iter().map(|index| first as u32 + index).collect();
         let facets = Facets::new(facets, centre);
         let movers = Vec::new();
@@ -275,7 +273,7 @@ impl World {
         for index in 0..self.unbounded as u32 {
             limit = meet(index);
         }
-        self.tree.along((ray.origin, ray.direction), (nearest, limit), |leaf, _| {
+        self.tree.along((ray.origin, ray.direction), (nearest, limit), |leaf| {
             meet(self.leaves[leaf as usize])
         });
         self.facets.cast(ray, nearest, farthest).or(best.map(|(_, hit)| hit))
@@ -313,7 +311,7 @@ impl PacketHits {
 }
 
 /// The bounding box of a primitive that has bounds, relative to `centre`.
-fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Aabb {
+fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Bounds {
     let (low, high) = match primitive {
         Primitive::Solid(solid) => {
             let half = solid.half_extent().unwrap_or(DVec3::INFINITY);
@@ -330,7 +328,7 @@ fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Aabb {
     let (low, high) = (low - DVec3::from(centre), high - DVec3::from(centre));
     let wider = WIDE + WIDER * low.abs().max(high.abs()).max_element();
     let narrow = |corner: DVec3| Vec3A::from(corner.as_vec3());
-    Aabb::new(narrow(low - wider), narrow(high + wider))
+    Bounds { low: narrow(low - wider), high: narrow(high + wider) }
 }
 
 #[cfg(test)]

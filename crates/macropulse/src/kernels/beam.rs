@@ -1,0 +1,358 @@
+//! Neighbouring rays down a hierarchy, as a beam: eight boxes at once are tested against the pyramid
+//! around all of them, and only at a leaf is it asked which rays enter.
+
+use super::packet::{Lanes, Leaves, Packet};
+use super::single::put_off;
+use super::tree::{Child, Eight, SLACK, Tree, across, inverse, narrow_above, narrow_below};
+use super::wide::{LANES, Registers, SIDE, Wide};
+
+/// A box: which node, and which of its eight.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Place {
+    eight: u32,
+    slot: u32,
+}
+
+/// Rays are neighbours if their directions differ by no more than this for each of them, summed over
+/// the axes.
+///
+/// Measured on fans of sixteen at a city of 250 000 triangles and at a car of 50 000: there a beam
+/// and rays alone are equally fast at 16 to 32 mrad from ray to ray.
+const NEIGHBOURS: f32 = 0.016;
+
+/// The rays of a packet as boxes and triangles need them.
+pub(super) struct Aims {
+    origin: [f32; 3],
+    direction: [Lanes<f32>; 3],
+    inverse: [Lanes<f32>; 3],
+    /// Rays that point backward, by axis.
+    backward: [u32; 3],
+    /// Rays that have it for their main axis: along which they are longest, the first of equals.
+    main: [u32; 3],
+}
+
+impl Aims {
+    #[inline(always)]
+    pub fn of<R: Registers>(packet: &Packet, origin: [f32; 3]) -> Self {
+        let [x, y, z] = &packet.direction;
+        let direction = [narrow(x), narrow(y), narrow(z)];
+        let [x, y, z] = &direction;
+        let inverse = [inverses(x), inverses(y), inverses(z)];
+        let [x, y, z] = &inverse;
+        let backward = [negative::<R>(x), negative::<R>(y), negative::<R>(z)];
+        Self { origin, main: main_axes::<R>(&direction), direction, inverse, backward }
+    }
+
+    /// Rays that enter the box around all.
+    #[inline(always)]
+    pub fn entering<R: Registers>(&self, packet: &Packet, tree: &Tree) -> u32 {
+        let margin = tree.margin(self.origin);
+        let mut enter = R::Rays::splat(0.0);
+        let mut leave = R::Rays::load(&limits(packet, margin));
+        for axis in 0..3 {
+            let inverse = R::Rays::load(&self.inverse[axis]);
+            let [low, high] = tree.bounds[axis];
+            let low = R::Rays::splat(low - self.origin[axis]).times(inverse);
+            let high = R::Rays::splat(high - self.origin[axis]).times(inverse);
+            enter = low.least(high).most(enter);
+            leave = low.most(high).times(R::Rays::splat(SLACK)).least(leave);
+        }
+        let [x, y, z] = self.main;
+        enter.at_most(leave) & (x | y | z)
+    }
+
+    /// Whether the rays of `set` are neighbours.
+    #[inline(always)]
+    pub fn are_neighbours(&self, set: u32) -> bool {
+        let [x, y, z] = &self.direction;
+        let [x, y, z] = [extremes(x, set), extremes(y, set), extremes(z, set)];
+        let apart = (x[1] - x[0]) + (y[1] - y[0]) + (z[1] - z[0]);
+        apart <= NEIGHBOURS * set.count_ones() as f32
+    }
+
+    /// The rays of `among` that point into the same octant as the first of them, and have the same
+    /// main axis.
+    #[inline(always)]
+    pub fn beam(&self, among: u32) -> Beam {
+        let first = among.trailing_zeros();
+        let like_first = |of: u32| if of >> first & 1 == 1 { of } else { !of };
+        let [x, y, z] = self.backward;
+        let [along_x, along_y, along_z] = self.main;
+        let set = among & like_first(x) & like_first(y) & like_first(z);
+        let set = set & like_first(along_x) & like_first(along_y) & like_first(along_z);
+        let is_first = |of: u32| (of >> first & 1) as usize;
+        let [in_x, in_y, in_z] = &self.inverse;
+        Beam {
+            set,
+            backward: [is_first(x), is_first(y), is_first(z)],
+            along: is_first(along_y) + 2 * is_first(along_z),
+            inverse: [extremes(in_x, set), extremes(in_y, set), extremes(in_z, set)],
+        }
+    }
+}
+
+/// The pyramid around rays of one octant and one main axis.
+pub(super) struct Beam {
+    pub set: u32,
+    /// Which bound of a box is near, by axis.
+    backward: [usize; 3],
+    /// The main axis.
+    along: usize,
+    /// The least and the greatest 1/d, by axis.
+    inverse: [[f32; 2]; 3],
+}
+
+#[inline(always)]
+fn narrow(values: &Lanes<f64>) -> Lanes<f32> {
+    let mut narrow = [0.0; LANES];
+    for lane in 0..LANES {
+        narrow[lane] = values[lane] as f32;
+    }
+    narrow
+}
+
+#[inline(always)]
+fn inverses(slopes: &Lanes<f32>) -> Lanes<f32> {
+    let mut inverses = [0.0; LANES];
+    for lane in 0..LANES {
+        inverses[lane] = inverse(slopes[lane]);
+    }
+    inverses
+}
+
+/// The quotients of two slopes.
+#[inline(always)]
+fn ratios(across: &Lanes<f32>, along: &Lanes<f32>) -> Lanes<f32> {
+    let mut ratios = [0.0; LANES];
+    for lane in 0..LANES {
+        ratios[lane] = across[lane] / along[lane];
+    }
+    ratios
+}
+
+/// Lanes below zero.
+#[inline(always)]
+fn negative<R: Registers>(values: &Lanes<f32>) -> u32 {
+    R::Rays::load(values).below(R::Rays::splat(0.0))
+}
+
+/// Rays by the axis along which they are longest, the first of equals; in no set if they are none:
+/// NaN, infinite, or without direction.
+#[inline(always)]
+fn main_axes<R: Registers>([x, y, z]: &[Lanes<f32>; 3]) -> [u32; 3] {
+    let (x, y, z) = (length::<R>(x), length::<R>(y), length::<R>(z));
+    let (zero, infinity) = (R::Rays::splat(0.0), R::Rays::splat(f32::INFINITY));
+    let finite = x.below(infinity) & y.below(infinity) & z.below(infinity);
+    let rays = finite & (zero.below(x) | zero.below(y) | zero.below(z));
+    let along_x = y.at_most(x) & z.at_most(x);
+    let along_z = !along_x & y.below(z);
+    [rays & along_x, rays & !(along_x | along_z), rays & along_z]
+}
+
+#[inline(always)]
+fn length<R: Registers>(slopes: &Lanes<f32>) -> R::Rays {
+    let slopes = R::Rays::load(slopes);
+    R::Rays::splat(0.0).minus(slopes).most(slopes)
+}
+
+/// The least and the greatest of the lanes in `set`.
+#[inline(always)]
+fn extremes(values: &Lanes<f32>, set: u32) -> [f32; 2] {
+    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+    for lane in 0..LANES {
+        let of_set = set >> lane & 1 == 1;
+        low[lane] = if of_set { values[lane] } else { f32::INFINITY };
+        high[lane] = if of_set { values[lane] } else { f32::NEG_INFINITY };
+    }
+    let mut half = LANES / 2;
+    while half > 0 {
+        for lane in 0..half {
+            low[lane] = if low[lane] < low[lane + half] { low[lane] } else { low[lane + half] };
+            high[lane] =
+                if high[lane] > high[lane + half] { high[lane] } else { high[lane + half] };
+        }
+        half /= 2;
+    }
+    [low[0], high[0]]
+}
+
+/// Behind which nothing matters, by ray.
+#[inline(always)]
+fn limits(packet: &Packet, margin: f32) -> Lanes<f32> {
+    let mut limits = [0.0; LANES];
+    for lane in 0..LANES {
+        limits[lane] = narrow_above(packet.range[lane], margin);
+    }
+    limits
+}
+
+/// Before which nothing matters, by ray.
+#[inline(always)]
+fn starts(packet: &Packet, margin: f32) -> Lanes<f32> {
+    let mut starts = [0.0; LANES];
+    for lane in 0..LANES {
+        starts[lane] = narrow_below(packet.nearest[lane], margin);
+    }
+    starts
+}
+
+#[inline(always)]
+fn both<R: Registers>([least, most]: [f32; 2]) -> [R::Boxes; 2] {
+    [R::Boxes::splat(least), R::Boxes::splat(most)]
+}
+
+/// Rays of one octant and one main axis on their way down.
+pub(super) struct Descent<'a, R: Registers, const FROM_CENTRE: bool> {
+    eights: &'a [Eight],
+    origin: [f32; 3],
+    inverse: [R::Rays; 3],
+    /// The least and the greatest of these.
+    extremes: [[R::Boxes; 2]; 3],
+    /// Which bound of a box is near, by axis.
+    backward: [usize; 3],
+    pub axes: [usize; 3],
+    pub shear: [R::Rays; 2],
+    margin: f32,
+    /// Nothing before it matters.
+    start: R::Rays,
+    /// Nothing before it matters to any.
+    soonest: f32,
+    /// Nothing behind it matters.
+    limit: R::Rays,
+    /// Nothing behind it matters to any.
+    latest: f32,
+    set: u32,
+}
+
+impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
+    #[inline(always)]
+    pub fn new(aims: &Aims, tree: &'a Tree, packet: &Packet, beam: &Beam) -> Self {
+        let axes = across(beam.along);
+        let [u, v, along] = axes;
+        let direction = &aims.direction;
+        let shear =
+            [ratios(&direction[u], &direction[along]), ratios(&direction[v], &direction[along])];
+        let margin = tree.margin(aims.origin);
+        let (starts, limits) = (starts(packet, margin), limits(packet, margin));
+        let [x, y, z] = &aims.inverse;
+        let [in_x, in_y, in_z] = beam.inverse;
+        Self {
+            eights: &tree.eights,
+            origin: aims.origin,
+            inverse: [R::Rays::load(x), R::Rays::load(y), R::Rays::load(z)],
+            extremes: [both::<R>(in_x), both::<R>(in_y), both::<R>(in_z)],
+            backward: beam.backward,
+            axes,
+            shear: [R::Rays::load(&shear[0]), R::Rays::load(&shear[1])],
+            margin,
+            start: R::Rays::load(&starts),
+            soonest: extremes(&starts, beam.set)[0],
+            limit: R::Rays::load(&limits),
+            latest: extremes(&limits, beam.set)[1],
+            set: beam.set,
+        }
+    }
+
+    /// Takes note of ranges that were shortened.
+    #[inline(always)]
+    fn shorten(&mut self, packet: &Packet) {
+        let limits = limits(packet, self.margin);
+        self.limit = R::Rays::load(&limits);
+        self.latest = extremes(&limits, self.set)[1];
+    }
+
+    /// A coordinate on an axis, from the start of the rays.
+    #[inline(always)]
+    pub fn shifted<const N: usize, W: Wide<N>>(&self, axis: usize, coordinate: W) -> W {
+        if FROM_CENTRE { coordinate } else { coordinate.minus(W::splat(self.origin[axis])) }
+    }
+
+    /// The boxes between the planes `[low, high]`, by axis, that rays may enter; and where the
+    /// first of them would.
+    ///
+    /// Each ray crosses a plane p at p·d⁻¹, and so none before the lesser and none behind the
+    /// greater of p·min d⁻¹ and p·max d⁻¹. Rounding is monotone: what holds of the exact products
+    /// holds of the rounded ones, and no box is passed over that a ray alone would enter.
+    #[inline(always)]
+    pub fn may_enter(&self, [x, y, z]: [[R::Boxes; 2]; 3]) -> (u32, R::Boxes) {
+        let [x, y, z] = [self.slab(0, x), self.slab(1, y), self.slab(2, z)];
+        let enter = x[0].most(y[0]).most(z[0].most(R::Boxes::splat(self.soonest)));
+        let leave = x[1].least(y[1]).least(z[1]).times(R::Boxes::splat(SLACK));
+        (enter.at_most(leave.least(R::Boxes::splat(self.latest))), enter)
+    }
+
+    /// Before which no ray crosses the near one of two planes across an axis, and behind which none
+    /// crosses the far one.
+    #[inline(always)]
+    fn slab(&self, axis: usize, [low, high]: [R::Boxes; 2]) -> [R::Boxes; 2] {
+        let (low, high) = (self.shifted(axis, low), self.shifted(axis, high));
+        let (near, far) = if self.backward[axis] == 0 { (low, high) } else { (high, low) };
+        let [least, most] = self.extremes[axis];
+        [near.times(least).least(near.times(most)), far.times(least).most(far.times(most))]
+    }
+
+    /// Where each ray crosses a plane of a box, by axis; the low one or the high one.
+    #[inline(always)]
+    fn reached(&self, Place { eight, slot }: Place, axis: usize, bound: usize) -> R::Rays {
+        let bounds = &self.eights[eight as usize].bounds;
+        let plane = R::Rays::splat(bounds[axis][bound & 1][slot as usize % SIDE]);
+        self.shifted(axis, plane).times(self.inverse[axis])
+    }
+
+    /// Rays that enter a box.
+    #[inline(always)]
+    fn entering(&self, box_at: Place) -> u32 {
+        let [x, y, z] = self.backward;
+        let enter = self.reached(box_at, 0, x).most(self.reached(box_at, 1, y));
+        let enter = enter.most(self.reached(box_at, 2, z).most(self.start));
+        let leave = self.reached(box_at, 0, 1 - x).least(self.reached(box_at, 1, 1 - y));
+        let leave = leave.least(self.reached(box_at, 2, 1 - z));
+        self.set & enter.at_most(leave.times(R::Rays::splat(SLACK)).least(self.limit))
+    }
+
+    #[inline(always)]
+    pub fn run(
+        &mut self,
+        packet: &mut Packet,
+        stack: &mut [(f32, Place)],
+        leaves: &mut impl Leaves,
+    ) {
+        let (mut waiting, mut child, mut place) = (0, Child::eight(0), Place::default());
+        loop {
+            match child.index() {
+                Err(index) => {
+                    let eight = &self.eights[index];
+                    let (entered, enter) = self.may_enter(eight.planes::<R>());
+                    if entered.is_power_of_two() {
+                        place = Place { eight: index as u32, slot: entered.trailing_zeros() };
+                        child = eight.child[place.slot as usize % SIDE];
+                        continue;
+                    }
+                    let mut enters = [0.0; SIDE];
+                    enter.store(&mut enters);
+                    let mut places = [Place { eight: index as u32, slot: 0 }; SIDE];
+                    (0..).zip(&mut places).for_each(|(slot, place)| place.slot = slot);
+                    waiting = put_off(stack, waiting, (entered, &enters), &places);
+                }
+                Ok(leaf) => {
+                    let set = self.entering(place);
+                    if set != 0 && leaves.meet(self, packet, leaf, set) {
+                        self.shorten(packet);
+                    }
+                }
+            }
+            // What was put off may by now lie behind the nearest hits.
+            (child, place) = loop {
+                if waiting == 0 {
+                    return;
+                }
+                waiting -= 1;
+                let (enter, place) = stack[waiting];
+                if enter <= self.latest {
+                    let child = self.eights[place.eight as usize].child[place.slot as usize % SIDE];
+                    break (child, place);
+                }
+            };
+        }
+    }
+}

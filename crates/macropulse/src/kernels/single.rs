@@ -1,0 +1,190 @@
+//! One ray down a hierarchy: eight boxes at once, then eight triangles at once.
+
+use super::tree::{
+    Child, Eight, SLACK, Tree, across, inverse, main_axis, narrow_above, narrow_below,
+};
+use super::wide::{Registers, SIDE, Task, Wide, on_level};
+
+/// Deep enough for the hierarchies of most meshes; the others get a stack on the heap.
+const STACK: usize = 64;
+
+/// A ray as boxes and triangles need it: local, narrow, and sheared along the main axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Aim {
+    pub origin: [f32; 3],
+    /// Nothing before it matters.
+    start: f32,
+    margin: f32,
+    /// 1/d by axis.
+    inverse: [f32; 3],
+    /// Which bound of a box is near, by axis.
+    backward: [usize; 3],
+    /// Axes across (two) and along the ray.
+    pub axes: [usize; 3],
+    /// Shear of the two axes across.
+    pub shear: [f32; 2],
+}
+
+/// What the leaves of a hierarchy are, for a ray that comes by.
+pub(super) trait RayLeaves {
+    /// Lets the ray meet a leaf; the distance behind which nothing matters any more.
+    fn meet<R: Registers>(&mut self, leaf: u32, aim: &Aim) -> f64;
+}
+
+impl Tree {
+    /// Calls `visit` with the leaves whose boxes a ray enters behind `nearest` and before
+    /// `farthest`, roughly the nearest first. It gives the distance behind which nothing matters
+    /// any more.
+    #[inline]
+    pub(crate) fn along(
+        &self,
+        ray: ([f64; 3], [f64; 3]),
+        between: (f64, f64),
+        visit: impl FnMut(u32) -> f64,
+    ) {
+        on_level(Along { tree: self, ray, between, leaves: &mut Visit(visit) });
+    }
+}
+
+/// Leaves that are met by a call.
+struct Visit<V>(V);
+
+impl<V: FnMut(u32) -> f64> RayLeaves for Visit<V> {
+    #[inline(always)]
+    fn meet<R: Registers>(&mut self, leaf: u32, _: &Aim) -> f64 {
+        (self.0)(leaf)
+    }
+}
+
+/// A ray that is to descend a hierarchy.
+pub(super) struct Along<'a, L> {
+    pub tree: &'a Tree,
+    /// Origin and direction.
+    pub ray: ([f64; 3], [f64; 3]),
+    /// The limits of its range.
+    pub between: (f64, f64),
+    pub leaves: &'a mut L,
+}
+
+impl<L: RayLeaves> Task for Along<'_, L> {
+    #[inline(always)]
+    fn run<R: Registers>(&mut self) {
+        let Some(aim) = Aim::of(self.tree, self.ray, self.between.0) else { return };
+        if self.tree.room <= STACK {
+            self.descend::<R>(&aim, &mut [(0.0, Child::eight(0)); STACK]);
+        } else {
+            self.descend::<R>(&aim, &mut vec![(0.0, Child::eight(0)); self.tree.room]);
+        }
+    }
+}
+
+impl<L: RayLeaves> Along<'_, L> {
+    /// Walks the hierarchy, the nearest box first. `stack` holds the boxes put off, and where they
+    /// are entered.
+    #[inline(always)]
+    fn descend<R: Registers>(&mut self, aim: &Aim, stack: &mut [(f32, Child)]) {
+        let eights = &self.tree.eights[..];
+        if eights.is_empty() {
+            return;
+        }
+        let mut limit = narrow_above(self.between.1, aim.margin);
+        let (mut child, mut waiting) = (Child::eight(0), 0);
+        loop {
+            match child.index() {
+                Err(index) => {
+                    let eight = &eights[index];
+                    let (entered, enters) = eight.entered::<R>(aim, limit);
+                    if entered.is_power_of_two() {
+                        child = eight.child[entered.trailing_zeros() as usize % SIDE];
+                        continue;
+                    }
+                    waiting = put_off(stack, waiting, (entered, &enters), &eight.child);
+                }
+                Ok(leaf) => {
+                    limit = narrow_above(self.leaves.meet::<R>(leaf, aim), aim.margin);
+                }
+            }
+            // What was put off may by now lie behind the nearest hit.
+            child = loop {
+                if waiting == 0 {
+                    return;
+                }
+                waiting -= 1;
+                let (enter, child) = stack[waiting];
+                if enter <= limit {
+                    break child;
+                }
+            };
+        }
+    }
+}
+
+/// Adds boxes to those that wait, the nearest last; how many wait then.
+#[inline(always)]
+pub(super) fn put_off<T: Copy>(
+    stack: &mut [(f32, T)],
+    waiting: usize,
+    (mut entered, enters): (u32, &[f32; SIDE]),
+    what: &[T; SIDE],
+) -> usize {
+    let mut end = waiting;
+    while entered != 0 {
+        let slot = entered.trailing_zeros() as usize % SIDE;
+        entered &= entered - 1;
+        let mut place = end;
+        while place > waiting && stack[place - 1].0 < enters[slot] {
+            stack[place] = stack[place - 1];
+            place -= 1;
+        }
+        stack[place] = (enters[slot], what[slot]);
+        end += 1;
+    }
+    end
+}
+
+impl Eight {
+    /// Where a ray crosses the low or the high planes of an axis.
+    #[inline(always)]
+    fn reached<R: Registers>(&self, aim: &Aim, axis: usize, bound: usize) -> R::Boxes {
+        R::Boxes::load(&self.bounds[axis][bound & 1])
+            .minus(R::Boxes::splat(aim.origin[axis]))
+            .times(R::Boxes::splat(aim.inverse[axis]))
+    }
+
+    /// The boxes that a ray enters before `limit`, and where.
+    #[inline(always)]
+    fn entered<R: Registers>(&self, aim: &Aim, limit: f32) -> (u32, [f32; SIDE]) {
+        let [x, y, z] = aim.backward;
+        let start = R::Boxes::splat(aim.start);
+        let enter = self.reached::<R>(aim, 0, x).most(self.reached::<R>(aim, 1, y));
+        let enter = enter.most(self.reached::<R>(aim, 2, z).most(start));
+        let leave = self.reached::<R>(aim, 0, 1 - x).least(self.reached::<R>(aim, 1, 1 - y));
+        let leave = leave.least(self.reached::<R>(aim, 2, 1 - z));
+        let leave = leave.times(R::Boxes::splat(SLACK)).least(R::Boxes::splat(limit));
+        let mut enters = [0.0; SIDE];
+        enter.store(&mut enters);
+        (enter.at_most(leave), enters)
+    }
+}
+
+impl Aim {
+    /// `None` if the ray is not a ray (NaN, infinite, or without direction), or begins too far
+    /// away.
+    #[inline(always)]
+    fn of(tree: &Tree, (origin, direction): ([f64; 3], [f64; 3]), nearest: f64) -> Option<Self> {
+        let origin = tree.local(origin)?;
+        let direction = direction.map(|slope| slope as f32);
+        let axes = across(main_axis(direction)?);
+        let [u, v, along] = axes;
+        let margin = tree.margin(origin);
+        Some(Self {
+            origin,
+            start: narrow_below(nearest, margin),
+            margin,
+            inverse: direction.map(inverse),
+            backward: direction.map(|slope| usize::from(slope.is_sign_negative())),
+            axes,
+            shear: [direction[u] / direction[along], direction[v] / direction[along]],
+        })
+    }
+}
