@@ -50,7 +50,7 @@ pub(crate) struct Hit {
 
 impl Triangles {
     /// Builds the hierarchy of `count` triangles with the corners that `corners_of` gives, exact
-    /// about `centre`. Gives it with the index that each
+    /// about `centre`; what that holds is dropped before. Gives it with the index that each
     /// leaf had; triangles without area or with a coordinate that is not finite cannot be hit and
     /// are left out.
     pub(crate) fn new(
@@ -58,20 +58,25 @@ impl Triangles {
         corners_of: impl Fn(usize) -> Corners,
         centre: [f64; 3],
     ) -> (Self, Vec<u32>) {
-        let kept: Vec<u32> = (0..count as u32)
-            .filter(|index| {
-                let corners = corners_of(*index as usize);
-                is_near(&corners, centre) && has_area(&corners)
-            })
-            .collect();
-        let bounds = kept.iter().map(|index| {
-            let [a, b, c] = narrow(&corners_of(*index as usize), centre).map(Vec3A::from_array);
+        let (mut kept, mut found) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for index in 0..count {
+            let corners = corners_of(index);
+            if is_near(&corners, centre) && has_area(&corners) {
+                kept.push(index as u32);
+                found.push(corners);
+            }
+        }
+        // Of millions of triangles no copy is kept longer than it is needed.
+        drop(corners_of);
+        let bounds = found.iter().map(|corners| {
+            let [a, b, c] = narrow(corners, centre).map(Vec3A::from_array);
             Bounds { low: a.min(b).min(c), high: a.max(b).max(c) }
         });
         let Built { tree, mut order, ends } = Built::over(bounds, SIDE, centre);
+        let corners: Vec<Corners> = order.iter().map(|index| found[*index as usize]).collect();
+        drop(found);
         order.iter_mut().for_each(|index| *index = kept[*index as usize]);
         drop(kept);
-        let corners: Vec<Corners> = order.iter().map(|index| corners_of(*index as usize)).collect();
         let mut first = 0;
         let block = |end: &u32| {
             let range = first as usize..*end as usize;

@@ -41,10 +41,9 @@ pub(super) fn stand(mesh: &Mesh, pose: &Pose, rest: bool) -> Transform {
 impl Placed {
     /// The triangles of the mesh, each corner carried by `place`.
     fn facets(&self, place: impl Fn([f64; 3]) -> [f64; 3]) -> impl Iterator<Item = Facet> {
-        let vertices: Vec<[f64; 3]> = self.mesh.vertices.iter().map(|v| place(*v)).collect();
         let each = self.mesh.triangles.iter().zip(&self.mesh.material_of_triangle);
         each.map(move |(triangle, material)| Facet {
-            corners: triangle.map(|corner| vertices[corner as usize]),
+            corners: triangle.map(|corner| place(self.mesh.vertices[corner as usize])),
             material: self.material_indices[usize::from(*material)],
             object: self.object,
         })
@@ -55,7 +54,7 @@ impl Placed {
         let facets: Vec<Facet> = self.facets(|vertex| vertex).collect();
         let (low, high) = self.mesh.bounds().unwrap_or_default();
         let middle = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
-        Facets::new(&facets, middle)
+        Facets::new(facets, middle)
     }
 
     /// The distance of its farthest corner from the origin of its frame, m.
@@ -98,7 +97,7 @@ pub(super) fn world(placed: Vec<Placed>, solids: Vec<Solid>, centre: [f64; 3]) -
         models.push(one.model());
     }
     drop(placed);
-    World::new(&facets, (models, &copies), solids, centre)
+    World::new(facets, (models, &copies), solids, centre)
 }
 
 /// The meshes among `placed` that move, in their order; each mesh is kept once.

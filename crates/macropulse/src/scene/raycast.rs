@@ -1,5 +1,7 @@
 //! Triangles with what they belong to, in a hierarchy that rays descend.
 
+use std::borrow::Cow;
+
 use super::hits::{CastRays, Hit, Ray};
 use crate::kernels::{Corners, Triangles};
 
@@ -21,14 +23,14 @@ pub(super) struct Facets {
 impl Facets {
     /// Builds the hierarchy of `facets`, exact about `centre` (the sensor). Triangles without
     /// area or with a coordinate that is not finite cannot be hit and are left out.
-    pub(super) fn new(facets: &[Facet], centre: [f64; 3]) -> Self {
-        let (triangles, order) =
-            Triangles::new(facets.len(), |index| facets[index].corners, centre);
-        let pair = |index: &u32| {
-            let Facet { material, object, .. } = facets[*index as usize];
-            [material, object]
-        };
-        Self { triangles, material_and_object: order.iter().map(pair).collect() }
+    pub(super) fn new<'a>(facets: impl Into<Cow<'a, [Facet]>>, centre: [f64; 3]) -> Self {
+        let facets = facets.into();
+        let pairs: Vec<[u16; 2]> =
+            facets.iter().map(|facet| [facet.material, facet.object]).collect();
+        let corners_of = move |index: usize| facets[index].corners;
+        let (triangles, order) = Triangles::new(pairs.len(), corners_of, centre);
+        let material_and_object = order.iter().map(|index| pairs[*index as usize]).collect();
+        Self { triangles, material_and_object }
     }
 
     /// Number of triangles that can be hit.
@@ -94,7 +96,7 @@ mod tests {
 
     #[test]
     fn no_ray_leaks_out_of_a_closed_sphere() {
-        let world = Facets::new(&sphere(DVec3::ZERO, 10.0, 300), [0.0; 3]);
+        let world = Facets::new(sphere(DVec3::ZERO, 10.0, 300), [0.0; 3]);
         let mut chance = ChaCha8Rng::seed_from_u64(1);
         let rays = (0..500_000).map(|_| {
             let origin = (direction(&mut chance) * chance.random_range(0.0..9.9)).to_array();
@@ -199,7 +201,7 @@ mod tests {
         let nowhere = facet([[10.0, f64::NAN, 0.0], [10.0, 1.0, 0.0], [10.0, 0.0, 1.0]]);
         let world = Facets::new(&[point, nowhere], [0.0; 3]);
         assert_eq!(world.len(), 0);
-        let world = Facets::new(&sphere(DVec3::ZERO, 10.0, 8), [0.0; 3]);
+        let world = Facets::new(sphere(DVec3::ZERO, 10.0, 8), [0.0; 3]);
         for direction in [[f64::NAN; 3], [0.0; 3], [f64::INFINITY, 0.0, 0.0]] {
             assert_eq!(world.cast(&Ray { origin: [0.0; 3], direction }, 0.0, 1e3), None);
         }

@@ -8,6 +8,8 @@
 //! What moves is kept apart and asked after all that, ray by ray; of equally far surfaces it comes
 //! last, in the order of the scene file.
 
+use std::borrow::Cow;
+
 use glam::{DVec3, Vec3A};
 
 use super::closed_form::Solid;
@@ -61,8 +63,8 @@ const WIDER: f64 = 1e-6;
 
 impl World {
     /// Puts surfaces together; exact about `centre` (the sensor).
-    pub(super) fn new(
-        facets: &[Facet],
+    pub(super) fn new<'a>(
+        facets: impl Into<Cow<'a, [Facet]>>,
         (models, copies): (Vec<Facets>, &[Copy]),
         solids: Vec<Solid>,
         centre: [f64; 3],
