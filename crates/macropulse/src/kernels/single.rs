@@ -9,9 +9,11 @@ use super::wide::{Registers, SIDE, Task, Wide, on_level};
 const STACK: usize = 64;
 
 /// A ray as boxes and triangles need it: local, narrow, and sheared along the main axis.
+///
+/// From the centre of the hierarchy, nothing has to be subtracted from anything.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Aim {
-    pub origin: [f32; 3],
+pub(super) struct Aim<const FROM_CENTRE: bool> {
+    origin: [f32; 3],
     /// Nothing before it matters.
     start: f32,
     margin: f32,
@@ -28,7 +30,11 @@ pub(super) struct Aim {
 /// What the leaves of a hierarchy are, for a ray that comes by.
 pub(super) trait RayLeaves {
     /// Lets the ray meet a leaf; the distance behind which nothing matters any more.
-    fn meet<R: Registers>(&mut self, leaf: u32, aim: &Aim) -> f64;
+    fn meet<R: Registers, const FROM_CENTRE: bool>(
+        &mut self,
+        leaf: u32,
+        aim: &Aim<FROM_CENTRE>,
+    ) -> f64;
 }
 
 impl Tree {
@@ -51,7 +57,11 @@ struct Visit<V>(V);
 
 impl<V: FnMut(u32) -> f64> RayLeaves for Visit<V> {
     #[inline(always)]
-    fn meet<R: Registers>(&mut self, leaf: u32, _: &Aim) -> f64 {
+    fn meet<R: Registers, const FROM_CENTRE: bool>(
+        &mut self,
+        leaf: u32,
+        _: &Aim<FROM_CENTRE>,
+    ) -> f64 {
         (self.0)(leaf)
     }
 }
@@ -69,20 +79,36 @@ pub(super) struct Along<'a, L> {
 impl<L: RayLeaves> Task for Along<'_, L> {
     #[inline(always)]
     fn run<R: Registers>(&mut self) {
-        let Some(aim) = Aim::of(self.tree, self.ray, self.between.0) else { return };
-        if self.tree.room <= STACK {
-            self.descend::<R>(&aim, &mut [(0.0, Child::eight(0)); STACK]);
+        let Some(origin) = self.tree.local(self.ray.0) else { return };
+        if origin == [0.0; 3] {
+            self.aim::<R, true>(origin);
         } else {
-            self.descend::<R>(&aim, &mut vec![(0.0, Child::eight(0)); self.tree.room]);
+            self.aim::<R, false>(origin);
         }
     }
 }
 
 impl<L: RayLeaves> Along<'_, L> {
+    #[inline(always)]
+    fn aim<R: Registers, const FROM_CENTRE: bool>(&mut self, origin: [f32; 3]) {
+        let margin = self.tree.margin(origin);
+        let start = narrow_below(self.between.0, margin);
+        let Some(aim) = Aim::<FROM_CENTRE>::of(origin, self.ray.1, (start, margin)) else { return };
+        if self.tree.room <= STACK {
+            self.descend::<R, FROM_CENTRE>(&aim, &mut [(0.0, Child::eight(0)); STACK]);
+        } else {
+            self.descend::<R, FROM_CENTRE>(&aim, &mut vec![(0.0, Child::eight(0)); self.tree.room]);
+        }
+    }
+
     /// Walks the hierarchy, the nearest box first. `stack` holds the boxes put off, and where they
     /// are entered.
     #[inline(always)]
-    fn descend<R: Registers>(&mut self, aim: &Aim, stack: &mut [(f32, Child)]) {
+    fn descend<R: Registers, const FROM_CENTRE: bool>(
+        &mut self,
+        aim: &Aim<FROM_CENTRE>,
+        stack: &mut [(f32, Child)],
+    ) {
         let eights = &self.tree.eights[..];
         if eights.is_empty() {
             return;
@@ -93,7 +119,7 @@ impl<L: RayLeaves> Along<'_, L> {
             match child.index() {
                 Err(index) => {
                     let eight = &eights[index];
-                    let (entered, enters) = eight.entered::<R>(aim, limit);
+                    let (entered, enters) = eight.entered::<R, FROM_CENTRE>(aim, limit);
                     if entered.is_power_of_two() {
                         child = eight.child[entered.trailing_zeros() as usize % SIDE];
                         continue;
@@ -101,7 +127,7 @@ impl<L: RayLeaves> Along<'_, L> {
                     waiting = put_off(stack, waiting, (entered, &enters), &eight.child);
                 }
                 Ok(leaf) => {
-                    limit = narrow_above(self.leaves.meet::<R>(leaf, aim), aim.margin);
+                    limit = narrow_above(self.leaves.meet::<R, FROM_CENTRE>(leaf, aim), aim.margin);
                 }
             }
             // What was put off may by now lie behind the nearest hit.
@@ -145,21 +171,33 @@ pub(super) fn put_off<T: Copy>(
 impl Eight {
     /// Where a ray crosses the low or the high planes of an axis.
     #[inline(always)]
-    fn reached<R: Registers>(&self, aim: &Aim, axis: usize, bound: usize) -> R::Boxes {
-        R::Boxes::load(&self.bounds[axis][bound & 1])
-            .minus(R::Boxes::splat(aim.origin[axis]))
-            .times(R::Boxes::splat(aim.inverse[axis]))
+    fn reached<R: Registers, const FROM_CENTRE: bool>(
+        &self,
+        aim: &Aim<FROM_CENTRE>,
+        axis: usize,
+        bound: usize,
+    ) -> R::Boxes {
+        let planes = R::Boxes::load(&self.bounds[axis][bound & 1]);
+        aim.shifted(axis, planes).times(R::Boxes::splat(aim.inverse[axis]))
     }
 
     /// The boxes that a ray enters before `limit`, and where.
     #[inline(always)]
-    fn entered<R: Registers>(&self, aim: &Aim, limit: f32) -> (u32, [f32; SIDE]) {
+    fn entered<R: Registers, const FROM_CENTRE: bool>(
+        &self,
+        aim: &Aim<FROM_CENTRE>,
+        limit: f32,
+    ) -> (u32, [f32; SIDE]) {
         let [x, y, z] = aim.backward;
         let start = R::Boxes::splat(aim.start);
-        let enter = self.reached::<R>(aim, 0, x).most(self.reached::<R>(aim, 1, y));
-        let enter = enter.most(self.reached::<R>(aim, 2, z).most(start));
-        let leave = self.reached::<R>(aim, 0, 1 - x).least(self.reached::<R>(aim, 1, 1 - y));
-        let leave = leave.least(self.reached::<R>(aim, 2, 1 - z));
+        let enter = self
+            .reached::<R, FROM_CENTRE>(aim, 0, x)
+            .most(self.reached::<R, FROM_CENTRE>(aim, 1, y));
+        let enter = enter.most(self.reached::<R, FROM_CENTRE>(aim, 2, z).most(start));
+        let leave = self
+            .reached::<R, FROM_CENTRE>(aim, 0, 1 - x)
+            .least(self.reached::<R, FROM_CENTRE>(aim, 1, 1 - y));
+        let leave = leave.least(self.reached::<R, FROM_CENTRE>(aim, 2, 1 - z));
         let leave = leave.times(R::Boxes::splat(SLACK)).least(R::Boxes::splat(limit));
         let mut enters = [0.0; SIDE];
         enter.store(&mut enters);
@@ -167,24 +205,27 @@ impl Eight {
     }
 }
 
-impl Aim {
-    /// `None` if the ray is not a ray (NaN, infinite, or without direction), or begins too far
-    /// away.
+impl<const FROM_CENTRE: bool> Aim<FROM_CENTRE> {
+    /// `None` if the ray is not a ray: NaN, infinite, or without direction.
     #[inline(always)]
-    fn of(tree: &Tree, (origin, direction): ([f64; 3], [f64; 3]), nearest: f64) -> Option<Self> {
-        let origin = tree.local(origin)?;
+    fn of(origin: [f32; 3], direction: [f64; 3], (start, margin): (f32, f32)) -> Option<Self> {
         let direction = direction.map(|slope| slope as f32);
         let axes = across(main_axis(direction)?);
         let [u, v, along] = axes;
-        let margin = tree.margin(origin);
         Some(Self {
             origin,
-            start: narrow_below(nearest, margin),
+            start,
             margin,
             inverse: direction.map(inverse),
             backward: direction.map(|slope| usize::from(slope.is_sign_negative())),
             axes,
             shear: [direction[u] / direction[along], direction[v] / direction[along]],
         })
+    }
+
+    /// Coordinates on an axis, from the start of the ray.
+    #[inline(always)]
+    pub fn shifted<W: Wide<SIDE>>(&self, axis: usize, coordinates: W) -> W {
+        if FROM_CENTRE { coordinates } else { coordinates.minus(W::splat(self.origin[axis])) }
     }
 }

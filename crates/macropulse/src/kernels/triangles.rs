@@ -162,9 +162,13 @@ impl<'a> Nearest<'a> {
 
 impl RayLeaves for Nearest<'_> {
     #[inline(always)]
-    fn meet<R: Registers>(&mut self, leaf: u32, aim: &Aim) -> f64 {
+    fn meet<R: Registers, const FROM_CENTRE: bool>(
+        &mut self,
+        leaf: u32,
+        aim: &Aim<FROM_CENTRE>,
+    ) -> f64 {
         let block = &self.triangles.blocks[leaf as usize];
-        let mut passed = block.passed::<R>(aim);
+        let mut passed = block.passed::<R, FROM_CENTRE>(aim);
         while passed != 0 {
             let leaf = block.first + passed.trailing_zeros();
             passed &= passed - 1;
@@ -215,22 +219,29 @@ impl Block {
 
     /// Its triangles that a ray passes through.
     #[inline(always)]
-    fn passed<R: Registers>(&self, aim: &Aim) -> u32 {
+    fn passed<R: Registers, const FROM_CENTRE: bool>(&self, aim: &Aim<FROM_CENTRE>) -> u32 {
         let [u, v, along] = aim.axes;
         let [p, q] = aim.shear;
-        let corners = [self.from::<R>(aim, u), self.from::<R>(aim, v), self.from::<R>(aim, along)];
+        let corners = [
+            self.from::<R, FROM_CENTRE>(aim, u),
+            self.from::<R, FROM_CENTRE>(aim, v),
+            self.from::<R, FROM_CENTRE>(aim, along),
+        ];
         holding_origin(self.all(), corners, [R::Boxes::splat(p), R::Boxes::splat(q)])
     }
 
     /// The corners of its triangles on an axis, from the start of a ray.
     #[inline(always)]
-    fn from<R: Registers>(&self, aim: &Aim, axis: usize) -> [R::Boxes; 3] {
+    fn from<R: Registers, const FROM_CENTRE: bool>(
+        &self,
+        aim: &Aim<FROM_CENTRE>,
+        axis: usize,
+    ) -> [R::Boxes; 3] {
         let [a, b, c] = &self.corners[axis];
-        let origin = R::Boxes::splat(aim.origin[axis]);
         [
-            R::Boxes::load(a).minus(origin),
-            R::Boxes::load(b).minus(origin),
-            R::Boxes::load(c).minus(origin),
+            aim.shifted(axis, R::Boxes::load(a)),
+            aim.shifted(axis, R::Boxes::load(b)),
+            aim.shifted(axis, R::Boxes::load(c)),
         ]
     }
 
