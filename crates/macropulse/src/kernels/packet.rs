@@ -130,9 +130,7 @@ impl<L: Leaves> Task for Together<'_, L> {
     #[inline(always)]
     fn run<R: Registers>(&mut self) {
         let Self { packet, waiting, tree, leaves } = self;
-        let Some(origin) = tree.local(packet.origin).filter(|_| !tree.eights.is_empty()) else {
-            return;
-        };
+        let Some(origin) = tree.local(packet.origin) else { return };
         let aims = Aims::of::<R>(packet, origin);
         let mut rest = aims.entering::<R>(packet, tree);
         if rest == 0 {

@@ -110,9 +110,6 @@ impl<L: RayLeaves> Along<'_, L> {
         stack: &mut [(f32, Child)],
     ) {
         let eights = &self.tree.eights[..];
-        if eights.is_empty() {
-            return;
-        }
         let mut limit = narrow_above(self.between.1, aim.margin);
         let (mut child, mut waiting) = (Child::eight(0), 0);
         loop {

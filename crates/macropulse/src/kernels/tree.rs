@@ -118,11 +118,13 @@ impl Tree {
         Self { centre, bounds, reach, eights, room: (SIDE - 1) * depth + 1 }
     }
 
-    /// A place in the local frame; `None` if it is too far away to be exact about anything.
+    /// A place in the local frame; `None` if it is too far away to be exact about anything, or if
+    /// there is nothing to meet.
     #[inline(always)]
     pub(super) fn local(&self, place: [f64; 3]) -> Option<[f32; 3]> {
         let local = DVec3::from(place) - DVec3::from(self.centre);
-        (local.abs().max_element() < FARTHEST).then(|| local.as_vec3().to_array())
+        let near = local.abs().max_element() < FARTHEST;
+        (near && !self.eights.is_empty()).then(|| local.as_vec3().to_array())
     }
 
     /// What a limit in `f64` must be stretched by so that no box before it is passed over: the
