@@ -8,7 +8,7 @@ use macropulse::channel::{self, Operating, Seen};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
-use macropulse::points::{FAINT, Outcome};
+use macropulse::points::Outcome;
 use macropulse::predict::interference::{events_per_second, ghost_of_single_pulses, walk_per_scan};
 use macropulse::random::Chance;
 use macropulse::scene::{Scene, Traced};
@@ -128,31 +128,16 @@ fn other_words_of_the_family_are_nearly_as_good_as_silence() {
     assert!(half.ghosts > 1500, "{half:?}");
 }
 
-/// Out of step the other still sends one of the words of the shots in flight, with another label.
-/// The literal receiver reads every bit and finds the label wrong. The matched one must allow for
-/// missed marks: to it a macropulse that shares the word and some lit bits is a faint echo of ours.
-/// Most of them it takes for complete echoes of earlier shots, from beyond the gate, and cancels.
+/// Out of step the other still sends one of the words of the shots in flight, with another label. The
+/// literal receiver reads every bit and finds the label wrong. The matched one must allow for missed
+/// marks; but a macropulse that shares the word and some lit bits leaves the other ones dark. N = 6784
+/// shots; of those in phase, the control, more than 3500 are ghosts.
 #[test]
-fn an_identical_lidar_out_of_step_looks_like_faint_echoes() {
-    assert!(score("coded", &[LITERAL], 0).ghosts <= 5);
-    let scan = part("coded", &[], 0);
-    assert!((5..100).contains(&scan.score.ghosts), "{:?}", scan.score);
-    let found = |outcome: Outcome| {
-        let cloud = &scan.cloud();
-        let of = (0..cloud.range.len()).filter(|&at| cloud.truth.returns.outcome[at] == outcome);
-        let (peak, marks) = of.fold((0.0, 0.0), |(peak, marks), at| {
-            (peak + f64::from(cloud.peak[at]), marks + f64::from(cloud.marks[at]))
-        });
-        peak / marks
-    };
-    let (ghosts, right) = (found(Outcome::False), found(Outcome::Right));
-    let cloud = &scan.cloud();
-    let flags = (0..cloud.range.len())
-        .filter(|&at| cloud.truth.returns.outcome[at] == Outcome::False)
-        .map(|at| cloud.flags(at) & FAINT);
-    let faint = flags.clone().filter(|flag| *flag == FAINT).count();
-    assert!(100 * faint > 98 * flags.count(), "{faint} faint");
-    assert!(ghosts < 0.5 && right > 0.9, "{ghosts} of the marks of ghosts, {right} of the right");
+fn an_identical_lidar_out_of_step_is_told_by_its_labels() {
+    for keys in [&[][..], &[LITERAL]] {
+        let score = score("coded", keys, 0);
+        assert!(score.ghosts <= 5, "{keys:?} {score:?}");
+    }
 }
 
 /// Ghosts of the sky walk towards us as the clock of the other gains, and are gone at 0 m.

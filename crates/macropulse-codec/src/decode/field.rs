@@ -93,9 +93,7 @@ impl<'a> Field<'a> {
             let from = self.end();
             let cells = ((to - from).min(PIECE) / self.cell).max(1);
             let end = from + cells * self.cell;
-            let rest = &self.ticks[self.laid..];
-            let here = &rest[..rest.partition_point(|&tick| i64::from(tick) < end)];
-            self.seen.lay(here);
+            let laid = self.seen.lay(&self.ticks[self.laid..], end);
             let words = self.seen.words(&(from..end));
             let known = self.before.len();
             self.before.resize(known + cells as usize, 0);
@@ -106,7 +104,7 @@ impl<'a> Field<'a> {
                 before += *count;
                 *count = before;
             }
-            self.laid += here.len();
+            self.laid += laid;
             self.residual.words_mut(&(from..end)).copy_from_slice(words);
             if self.width > 1 {
                 self.widen(from..end);
@@ -168,19 +166,30 @@ impl<'a> Field<'a> {
         cell(span.start)..cell(span.end + self.cell - 1).max(cell(span.start))
     }
 
-    /// Share of the places in and about `span` at which a mark counts as found, were its ticks
-    /// spread evenly.
+    /// Ticks of the list before the machine word of `tick`.
+    fn ticks_before(&self, tick: i64) -> u32 {
+        let last = self.before.len() as i64 - 1;
+        let cell = ((tick - self.begin) / self.cell).clamp(0, last);
+        let start = self.begin + cell * self.cell;
+        let words = self.seen.words(&(start..tick.min(start + self.cell)));
+        self.before[cell as usize] + count_all(words)
+    }
+
+    /// How many ticks there are in `span`, and those of the machine words at its ends.
+    pub fn ticks_in(&self, span: &Range<i64>) -> u32 {
+        self.ticks_before(span.end) - self.ticks_before(span.start)
+    }
+
+    /// Share of the places of `span` at which a mark counts as found, were its ticks spread evenly.
     pub fn density(&self, span: &Range<i64>) -> f64 {
         self.density_without(span, 0, 0)
     }
 
     /// The same without so many ticks and places.
     pub fn density_without(&self, span: &Range<i64>, ticks: u32, places: u32) -> f64 {
-        let cells = self.cells(span);
-        let all = (cells.len() as i64 * self.cell) as u32;
-        let places = all.saturating_sub(places).max(1);
-        let ticks = (self.before[cells.end] - self.before[cells.start]).saturating_sub(ticks);
-        (f64::from(self.width) * f64::from(ticks) / f64::from(places)).min(1.0)
+        let places = ((span.end - span.start) as u32).saturating_sub(places).max(1);
+        let all = self.ticks_in(span).saturating_sub(ticks);
+        (f64::from(self.width) * f64::from(all) / f64::from(places)).min(1.0)
     }
 
     /// For each cell of `span`, the residual ticks in the `length` ticks from there on, and some more;
@@ -201,10 +210,7 @@ impl<'a> Field<'a> {
 
     /// How many ticks of `span` are not cancelled, and those of the machine words at its ends.
     pub fn residual_in(&self, span: &Range<i64>) -> u32 {
-        let words = self.residual.words(&(span.start..span.end + 63));
-        let mut count = [0];
-        count_each(words, words.len().max(1), &mut count);
-        count[0]
+        count_all(self.residual.words(&(span.start..span.end + 63)))
     }
 
     /// All that is at hand.
@@ -216,4 +222,11 @@ impl<'a> Field<'a> {
     pub fn cell(&self) -> i64 {
         self.cell
     }
+}
+
+/// How many bits are lit.
+fn count_all(words: &[u64]) -> u32 {
+    let mut count = [0];
+    count_each(words, words.len().max(1), &mut count);
+    count[0]
 }

@@ -55,9 +55,10 @@ impl Timeline {
         self.origin = origin;
     }
 
-    /// Lights the sorted `ticks`. All from the first one on must be dark.
-    pub fn lay(&mut self, ticks: &[u32]) {
-        lay(&mut self.words, self.origin, ticks);
+    /// Lights those of the sorted `ticks` that are before `end`, and tells how many these are. None may
+    /// be before the beginning, and all from the first one on must be dark.
+    pub fn lay(&mut self, ticks: &[u32], end: i64) -> usize {
+        lay(&mut self.words, self.origin, ticks, end)
     }
 
     /// The machine words of `span`, which begins and ends with one.

@@ -180,14 +180,12 @@ mod avx512 {
             *sum = unsafe { _mm512_loadu_si512(plane.as_ptr().cast()) };
         }
         let [mut ones, mut twos, mut fours, mut eights, ..] = all;
-        for places in places.chunks(SIXTEEN) {
+        let (whole, rest) = places.as_chunks::<SIXTEEN>();
+        for places in whole {
             macro_rules! bits {
                 ($index:expr) => {
-                    match places.get($index) {
-                        // SAFETY: the caller answers for the places.
-                        Some(place) => unsafe { read(words, first.wrapping_add(*place)) },
-                        None => dark,
-                    }
+                    // SAFETY: the caller answers for the places.
+                    unsafe { read(words, first.wrapping_add(places[$index])) }
                 };
             }
             macro_rules! eight_from {
@@ -208,6 +206,18 @@ mod avx512 {
             let (a, b) = (eight_from!(0), eight_from!(8));
             let mut carried;
             (eights, carried) = add(eights, a, b);
+            for sum in &mut all[4..planes.len().max(4)] {
+                let both = _mm512_and_si512(*sum, carried);
+                (*sum, carried) = (_mm512_xor_si512(*sum, carried), both);
+            }
+        }
+        for place in rest {
+            // SAFETY: the caller answers for the places.
+            let mut carried = unsafe { read(words, first.wrapping_add(*place)) };
+            for sum in [&mut ones, &mut twos, &mut fours, &mut eights] {
+                let both = _mm512_and_si512(*sum, carried);
+                (*sum, carried) = (_mm512_xor_si512(*sum, carried), both);
+            }
             for sum in &mut all[4..planes.len().max(4)] {
                 let both = _mm512_and_si512(*sum, carried);
                 (*sum, carried) = (_mm512_xor_si512(*sum, carried), both);

@@ -3,23 +3,27 @@
 use crate::on_every_level;
 
 on_every_level! {
-    /// Lights, in `words`, of which the first bit is tick `origin`, the sorted `ticks`. Those before
-    /// and behind are left away; the words behind the one of the first tick must be dark.
-    pub(crate) fn lay(words: &mut [u64], origin: i64, ticks: &[u32]) {
-        let Some(first) = ticks.first() else { return };
+    /// Lights, in `words`, of which the first bit is tick `origin`, those of the sorted `ticks` that
+    /// are before `end`, and tells how many these are. None may be before the origin; the words behind
+    /// that of the first tick must be dark.
+    pub(crate) fn lay(words: &mut [u64], origin: i64, ticks: &[u32], end: i64) -> usize {
+        let Some(first) = ticks.first() else { return 0 };
+        let until = (end - origin).clamp(0, 64 * words.len() as i64) as u64;
         // The word at hand stays in a register: nothing waits for what was stored.
         let mut at = ((i64::from(*first) - origin) >> 6) as usize;
         let mut bits = words.get(at).copied().unwrap_or(0);
-        for &tick in ticks {
-            let bit = i64::from(tick) - origin;
+        for (count, &tick) in ticks.iter().enumerate() {
+            let bit = (i64::from(tick) - origin) as u64;
+            if bit >= until {
+                return count;
+            }
             let word = (bit >> 6) as usize;
             let before = if word == at { bits } else { 0 };
             bits = before | 1 << (bit & 63);
             at = word;
-            if let Some(out) = words.get_mut(word) {
-                *out = bits;
-            }
+            words[word] = bits;
         }
+        ticks.len()
     }
 }
 
@@ -41,28 +45,31 @@ mod tests {
     proptest! {
         #[test]
         fn every_level_lays_and_counts(
-            ticks in proptest::collection::btree_set(0..3000_u32, 0..300),
+            ticks in proptest::collection::btree_set(2000..3000_u32, 0..300),
             again in proptest::collection::btree_set(3000..4000_u32, 0..30),
-            origin in -100..2000_i64,
+            origin in 1900..2000_i64,
+            end in 2000..5000_i64,
         ) {
             let [ticks, again] = [ticks, again].map(|ticks| ticks.into_iter().collect::<Vec<u32>>());
             let mut expected = vec![0_u64; 20];
             for bit in ticks.iter().chain(&again).map(|tick| i64::from(*tick) - origin) {
-                if (0..64 * 20).contains(&bit) {
+                if bit < (64 * 20).min(end - origin) {
                     expected[bit as usize / 64] |= 1 << (bit % 64);
                 }
             }
             let laid = at_each_level(|| {
                 let mut words = vec![0_u64; 20];
-                lay(&mut words, origin, &ticks);
-                lay(&mut words, origin, &again);
+                let laid = lay(&mut words, origin, &ticks, end);
+                let laid = laid + lay(&mut words, origin, &again, end);
                 let mut counts = [0; 7];
                 count_each(&words, 3, &mut counts);
-                (counts, words)
+                (counts, words, laid)
             });
             let lit = |words: &[u64]| words.iter().map(|word| word.count_ones()).sum::<u32>();
             let lit: Vec<u32> = expected.chunks(3).map(lit).collect();
+            let count = expected.iter().map(|word| word.count_ones() as usize).sum::<usize>();
             for (level, found) in laid {
+                prop_assert_eq!(found.2, count, "{:?}", level);
                 prop_assert_eq!(&found.0[..], &lit, "{:?}", level);
                 prop_assert_eq!(&found.1, &expected, "{:?}", level);
             }

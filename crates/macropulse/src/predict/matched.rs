@@ -1,22 +1,17 @@
 //! What the matched receiver makes of ticks, in closed form.
 //!
 //! It believes the best of L lags if chance would not light so many of its N marks at any: the
-//! least k with L·P(Bin(N, d) ≥ k) ≤ α. d is the share of lit places in the gate or, if that is
-//! more, around the k marks, which count as well: chance finds most where there is most. Shots
-//! that meet the same range do not overlap.
+//! least k with L·P(Bin(N, d) ≥ k) ≤ α. d is the share of places in the gate that other ticks light than
+//! these, and one more. Shots that meet the same range do not overlap.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use macropulse_codec::statistics::{binomial_tail, normal_tail};
+use macropulse_codec::statistics::{binomial_tail, normal_tail, poisson};
 
 use crate::design::Design;
 use crate::design::detector::Lit;
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
-
-/// The light around a macropulse is counted in stretches of so many ticks, and reaches beyond it by
-/// one of them on average.
-const AROUND: f64 = 1024.0;
 
 /// Terms of the sum over harmonics of a tick.
 const HARMONICS: u32 = 16;
@@ -94,10 +89,12 @@ pub(super) fn chances(
     let labels: usize = weights.values().sum();
     let mut sums = (0.0, 0.0);
     for (&marks, &count) in weights {
-        let least = gate.least_marks(marks, found);
-        let share = count as f64 / labels as f64;
-        sums.0 += share * binomial_tail(marks, found.seen, least);
-        sums.1 += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
+        for (noise, probability) in gate.noise(found) {
+            let least = gate.least_marks(marks, found, noise);
+            let share = probability * count as f64 / labels as f64;
+            sums.0 += share * binomial_tail(marks, found.seen, least);
+            sums.1 += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
+        }
     }
     sums
 }
@@ -106,35 +103,50 @@ pub(super) fn chances(
 struct Gate {
     /// Places at which a macropulse may begin.
     lags: f64,
-    /// What each mark found adds to the share of lit places around it.
-    own: f64,
+    /// What one event adds to the share of lit places where marks from within the gate may be.
+    event: f64,
     /// False returns accepted.
     false_alarm: f64,
 }
 
+/// Beyond so many events in a gate their number is taken for its mean.
+const MANY: f64 = 100.0;
+
 impl Gate {
     fn of(design: &Design, background: f64) -> Self {
         let (nearest, farthest) = design.receiver.gate_ticks;
-        let chips = i64::from(design.coding.codebook.chips());
-        let around =
-            s_from_fs(chips * design.coding.chip_fs) + AROUND * s_from_fs(design.tdc.tick_fs);
+        let lags = f64::from(farthest - nearest) + 1.0;
+        let tick = s_from_fs(design.tdc.tick_fs);
         let of_one_photon = Lit { photons: 1.0, background, falling: 0.0 };
+        let chips = i64::from(design.coding.codebook.chips());
+        let macropulse = s_from_fs(chips * design.coding.chip_fs);
         Self {
-            lags: f64::from(farthest - nearest) + 1.0,
-            own: Place::of(design, &of_one_photon).width / around,
+            lags,
+            event: Place::of(design, &of_one_photon).width / (lags * tick + macropulse),
             false_alarm: design.receiver.false_alarm,
         }
     }
 
-    /// The fewest of `marks` that are believed; one more than there are if none will do.
-    fn least_marks(&self, marks: usize, found: &Found) -> usize {
-        let &Found { density, false_density, .. } = found;
-        let is_common = |least: usize| {
-            // Some of the marks are lit by ticks that others have made.
-            let ticks = (least as f64 - marks as f64 * density).max(0.0);
-            let around = (false_density + self.own * ticks).clamp(density, 1.0);
-            self.lags * binomial_tail(marks, around, least) > self.false_alarm
-        };
+    /// The share of places of a gate that events of no shot light, with its probability: their
+    /// number follows Poisson's law.
+    fn noise(&self, found: &Found) -> Vec<(f64, f64)> {
+        let mean = found.false_density / self.event;
+        if mean <= 0.0 || mean > MANY {
+            return vec![(found.false_density, 1.0)];
+        }
+        let most = (mean + 8.0 * mean.sqrt() + 8.0) as u32;
+        let of = |events: u32| (f64::from(events) * self.event, poisson(mean, events.into()));
+        (0..=most).map(of).collect()
+    }
+
+    /// The fewest of `marks` that are believed where `noise` lights such a share of the places; one more
+    /// than there are if none will do.
+    fn least_marks(&self, marks: usize, found: &Found, noise: f64) -> usize {
+        // Light of other shots, and one event more than there are.
+        let shots = (found.density - found.false_density).max(0.0);
+        let density = (noise + shots + self.event).min(1.0);
+        let is_common =
+            |least: usize| self.lags * binomial_tail(marks, density, least) > self.false_alarm;
         let (mut common, mut rare) = (0, marks + 1);
         while rare - common > 1 {
             let middle = usize::midpoint(common, rare);
@@ -192,14 +204,15 @@ mod tests {
 
     #[test]
     fn the_least_marks_are_rare_and_one_fewer_is_not() {
-        let gate = Gate { lags: 4e5, own: 0.0, false_alarm: 1e-6 };
+        let gate = Gate { lags: 4e5, event: 0.0, false_alarm: 1e-6 };
         let found = |density, false_density| Found { seen: 1.0, density, false_density };
-        let least = gate.least_marks(180, &found(0.01, 0.0));
+        let least = gate.least_marks(180, &found(0.01, 0.0), 0.0);
         assert!(4e5 * binomial_tail(180, 0.01, least) <= 1e-6);
         assert!(4e5 * binomial_tail(180, 0.01, least - 1) > 1e-6);
-        assert_eq!(gate.least_marks(5, &found(0.5, 0.5)), 6);
-        // The marks that are found make the light around denser.
-        assert!(Gate { own: 1e-3, ..gate }.least_marks(180, &found(0.01, 0.01)) > least);
+        assert_eq!(gate.least_marks(5, &found(0.5, 0.5), 0.5), 6);
+        // One event more than there are is counted.
+        let few = Gate { event: 1e-3, ..gate };
+        assert!(few.least_marks(180, &found(0.01, 0.01), 0.01) > least);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::acquire::{Leftover, Source};
+use super::track::BLOCK;
 use super::{Band, Detection, SURFACES};
 
 /// So many shots are passed by at most, where nothing was found, before the next one is searched for.
@@ -184,6 +185,9 @@ impl Band<'_> {
         if self.found[shot].is_none() && self.track_leftover(shot) {
             return true;
         }
+        if self.sent.wants_further() && self.track_further(shot) {
+            return true;
+        }
         let (known, gate) = (self.found[shot], self.sent.gate());
         let weight = self.sent.weight(shot);
         let least = match known {
@@ -191,14 +195,11 @@ impl Band<'_> {
                 if self.searched[shot] {
                     return false;
                 }
-                known.count + 1
+                known.count
             }
             // Of light from beyond the gate no more is wanted.
             _ => self.least_in_gate(shot),
         };
-        if least > weight {
-            return false;
-        }
         let is_even = self.sent.is_thorough() || shot >= self.next_even;
         if is_even {
             (self.next_even, self.pause) = (shot + self.pause, (2 * self.pause).min(LONGEST_EVEN));
@@ -219,7 +220,12 @@ impl Band<'_> {
         let Some((lag, _)) = self.maximum(shot, Source::Residual, lags, visible) else {
             return false;
         };
-        let Some(found) = self.climb(shot, lag, least) else {
+        // What was found already may be higher, and near enough to be climbed to.
+        let found = match known {
+            None => self.climb(shot, lag, least),
+            Some(_) => self.found_at(shot, lag),
+        };
+        let Some(found) = found else {
             self.cancel(shot, lag);
             return true;
         };
@@ -228,19 +234,57 @@ impl Band<'_> {
             return true;
         }
         self.cancel(shot, found.lag);
-        match known {
-            None => {
-                self.found[shot] = Some(found);
-                (self.next_even, self.pause) = (shot, 1);
-            }
-            Some(known) => {
-                let is_beyond = !self.sent.gate().contains(&known.lag);
-                let is_better = found.count > known.count || is_beyond;
-                self.found[shot] = Some(if is_better { found } else { known });
-                self.further.push((shot, if is_better { known } else { found }));
+        if known.is_none() {
+            (self.next_even, self.pause) = (shot, 1);
+        }
+        self.add_surface(shot, found);
+        true
+    }
+
+    /// Adds a surface of `shot`: the one with most marks, the nearest of several, stands for it.
+    fn add_surface(&mut self, shot: usize, found: Detection) {
+        let Some(known) = self.found[shot] else {
+            self.found[shot] = Some(found);
+            return;
+        };
+        let is_beyond = !self.sent.gate().contains(&known.lag);
+        let is_earlier = found.count == known.count && found.lag < known.lag;
+        let is_better = found.count > known.count || is_earlier || is_beyond;
+        self.found[shot] = Some(if is_better { found } else { known });
+        self.further.push((shot, if is_better { known } else { found }));
+    }
+
+    /// Looks for further surfaces of `shot` where its neighbours have any, in what is left over;
+    /// whether there is one.
+    fn track_further(&mut self, shot: usize) -> bool {
+        if self.found[shot].is_none() {
+            return false;
+        }
+        let beside = |other: usize| other.abs_diff(shot) == 1;
+        let mut lags: Vec<i64> = self
+            .further
+            .iter()
+            .filter(|(other, _)| beside(*other))
+            .flat_map(|(other, found)| [Some(found.lag), self.found[*other].map(|found| found.lag)])
+            .flatten()
+            .collect();
+        lags.sort_unstable();
+        lags.dedup();
+        let least = self.least_in_gate(shot);
+        for lag in lags {
+            let about = (lag - BLOCK / 2, &self.sent.gate());
+            let found = self.exactly(shot, Source::Residual, about);
+            let Some((lag, _)) = found.filter(|(_, count)| *count >= least.div_ceil(2)) else {
+                continue;
+            };
+            let Some(found) = self.found_at(shot, lag) else { continue };
+            if !self.is_known(shot, found.lag) && self.is_believed(shot, found) {
+                self.cancel(shot, found.lag);
+                self.add_surface(shot, found);
+                return true;
             }
         }
-        true
+        false
     }
 
     /// Looks for `shot` about its neighbours, also farther ones, where light is left over.

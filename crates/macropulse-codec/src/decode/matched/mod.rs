@@ -38,6 +38,7 @@ use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
 use crate::kernels::Counts;
+use crate::statistics::normal_quantile;
 use acquire::Search;
 use look::Usual;
 use sent::Sent;
@@ -88,14 +89,25 @@ struct Detection {
     margin: u32,
 }
 
+/// Of which shots light may be found that was not cancelled to begin with.
+#[derive(Debug)]
+enum Open {
+    /// Of all: nothing was cancelled.
+    All,
+    /// Of none: all light was cancelled.
+    None,
+    /// Of those that have ticks left in their gate: so many for each shot.
+    Left(Vec<u32>),
+}
+
 struct Band<'a> {
     sent: &'a Sent<'a>,
     field: Field<'a>,
-    /// Ticks that are not cancelled yet in the gate of each shot, to begin with; `None` if nothing
-    /// was cancelled.
-    residual_in_gate: Option<Vec<u32>>,
-    /// The shot at the same column one line earlier.
+    open: Open,
+    /// The last shot before each one at the same column of another row.
     above: Vec<Option<u32>>,
+    /// The last shot before each one at the same row of another column.
+    left: Vec<Option<u32>>,
     found: Vec<Option<Detection>>,
     /// Other surfaces of the shots at hand.
     further: Vec<(usize, Detection)>,
@@ -108,6 +120,8 @@ struct Band<'a> {
     /// For the first marks of a macropulse, or the last ones.
     end_thresholds: Thresholds,
     usual: Usual,
+    /// A normal variable exceeds it as rarely as false returns are accepted.
+    rare: f64,
     /// The next shot that is searched for where light does not stand out, and the shots to the one
     /// behind it.
     next_even: usize,
@@ -135,22 +149,32 @@ impl<'a> Band<'a> {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
-        // In clear light everything is cancelled, and the field is never looked at.
-        let is_dark = residual.as_ref().is_some_and(Vec::is_empty);
-        let is_dark = is_dark || sent.fired.is_empty();
+        let open = match &residual {
+            Some(residual) if residual.is_empty() => Open::None,
+            Some(residual) => Open::Left(in_gates(sent, residual)),
+            None if sent.fired.is_empty() => Open::None,
+            None => Open::All,
+        };
         let reach = sent.reach();
         let light = reach.end - reach.start + sent.length() + i64::from(sent.width);
         let begin = sent.fired.first().map_or(0, |first| first + reach.start);
-        let extent = match is_dark {
-            true => (0, 0),
-            false => (begin, (GATES_PER_BLOCK + 2) * light + 2 * sent.length()),
+        // In clear light everything is cancelled, and the field is never looked at.
+        let (rows, columns) = (&sent.log.row, &sent.log.column);
+        let (extent, above, left) = match open {
+            Open::None => ((0, 0), vec![], vec![]),
+            _ => (
+                (begin, (GATES_PER_BLOCK + 2) * light + 2 * sent.length()),
+                last_beside(columns, rows),
+                last_beside(rows, columns),
+            ),
         };
         let cell = sent.length() / CELLS;
         memory.search.forget();
         Self {
             field: Field::new(ticks, sent.width, extent, cell, memory.field),
-            residual_in_gate: residual.map(|residual| in_gates(sent, &residual)),
-            above: if is_dark { vec![] } else { above(sent.log) },
+            open,
+            above,
+            left,
             searched: vec![false; found.len()],
             found,
             further,
@@ -158,6 +182,7 @@ impl<'a> Band<'a> {
             bit_thresholds,
             end_thresholds,
             usual: Usual::new(),
+            rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
             next_even: 0,
             pause: 1,
             counts: Counts::default(),
@@ -172,6 +197,10 @@ impl<'a> Band<'a> {
     fn decode(mut self) -> Returns {
         let mut returns = Returns::with_capacity(self.sent.log.owned.len());
         let (shots, mut first, mut settled) = (self.found.len(), 0, 0);
+        if matches!(self.open, Open::None) {
+            self.settle(0..shots, &mut returns);
+            first = shots;
+        }
         while first < shots {
             let block = first..self.end_of_block(first);
             first = block.end;
@@ -223,14 +252,18 @@ impl<'a> Band<'a> {
 
     /// Whether light of `shot` may be found that was not yet.
     fn is_open(&self, shot: usize) -> bool {
-        let ticks = self.residual_in_gate.as_ref().map_or(u32::MAX, |ticks| ticks[shot]);
-        // A single mark tells nothing.
-        ticks > 1 && self.sent.weight(shot) > 0
+        let may_be_left = match &self.open {
+            Open::All => true,
+            Open::None => false,
+            // A single mark tells nothing.
+            Open::Left(ticks) => ticks[shot] > 1,
+        };
+        may_be_left && self.sent.weight(shot) > 0
     }
 
     /// Cancels what is known of a block of shots.
     fn cancel_found(&mut self, block: Range<usize>) {
-        if self.residual_in_gate.is_none() {
+        if matches!(self.open, Open::All) {
             return;
         }
         for shot in self.in_flight_before(block.start)..block.end {
@@ -259,23 +292,69 @@ impl<'a> Band<'a> {
         self.search.grow_stale();
     }
 
-    /// Share of places that are lit in the gate of `shot`.
-    fn density_in_gate(&self, shot: usize) -> f64 {
+    /// Ticks where marks of `shot` may be that come from within the gate, and the share of places that
+    /// each of them lights.
+    fn in_gate(&self, shot: usize) -> (u32, f64) {
         let (gate, fired) = (self.sent.gate(), self.sent.fired[shot]);
-        self.field.density(&(fired + gate.start..fired + gate.end))
+        let span = fired + gate.start..fired + gate.end + self.sent.length();
+        let places = (span.end - span.start).max(1) as f64;
+        (self.field.ticks_in(&span), f64::from(self.sent.width) / places)
     }
 
-    /// The marks that chance does not reach, be it as dense in all the gate as around `detection`,
-    /// its own marks apart.
-    fn by_chance(&mut self, shot: usize, detection: Detection) -> u32 {
-        let density = self.density_in_gate(shot).max(self.density_beside(shot, detection));
-        self.thresholds.least(self.sent.weight(shot), density)
+    /// Share of places that are lit in the gate of `shot` by other ticks than so many of its marks;
+    /// one more, so that few ticks do not tell that it is darker than can be known.
+    fn density_beyond(&self, shot: usize, count: u32) -> f64 {
+        let (ticks, share) = self.in_gate(shot);
+        (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
     }
 
-    /// The marks that chance does not reach at the mean density of the gate of `shot`.
+    /// The fewest marks of `shot` that chance does not reach in what they leave of the light of its
+    /// gate.
     fn least_in_gate(&mut self, shot: usize) -> u32 {
-        let density = self.density_in_gate(shot);
-        self.thresholds.least(self.sent.weight(shot), density)
+        let (ticks, share) = self.in_gate(shot);
+        let weight = self.sent.weight(shot);
+        let mut is_enough = |count: u32| {
+            let density = f64::from(ticks.saturating_sub(count) + 1) * share;
+            self.thresholds.least(weight, density.min(1.0)) <= count
+        };
+        let (mut low, mut high) = (1, weight + 1);
+        while low < high {
+            let middle = low.midpoint(high);
+            if is_enough(middle) { high = middle } else { low = middle + 1 }
+        }
+        low
+    }
+
+    /// The marks that chance does not reach where `detection` is, in the density of the gate or of that
+    /// around it, its own marks apart.
+    fn by_chance(&mut self, shot: usize, detection: Detection) -> u32 {
+        let weight = self.sent.weight(shot);
+        let density = self.density_about(shot, detection, detection.count);
+        let least = self.thresholds.least(weight, density);
+        if least <= detection.count {
+            return least;
+        }
+        // A long pulse makes several ticks of a mark.
+        let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
+        let start = self.sent.fired[shot] + detection.lag - farther;
+        let bits = self.sent.lit_from(shot, start);
+        let own = bits.map(|bit| self.field.seen().lit_in(bit, pattern)).sum();
+        let density = self.density_about(shot, detection, own);
+        self.thresholds.least(weight, density)
+    }
+
+    /// The density that chance has where `detection` is, `own` ticks apart: that of the gate or, if
+    /// that is so much more that chance would hardly make it so, that around it.
+    fn density_about(&self, shot: usize, detection: Detection, own: u32) -> f64 {
+        let sent = self.sent;
+        let (light, places) = (sent.light(shot, detection.lag), sent.weight(shot) * sent.width);
+        let gate = self.density_beyond(shot, own);
+        let beside = self.field.density_without(&light, own, places);
+        let ticks = (light.end - light.start) as f64 / f64::from(sent.width);
+        match (beside - gate) * ticks > 3.0 * (gate * ticks + 1.0).sqrt() {
+            true => beside,
+            false => gate,
+        }
     }
 }
 
@@ -295,15 +374,15 @@ fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {
     (0..sent.fired.len()).map(count).collect()
 }
 
-/// For each shot, the last one before it at the same column of another row.
-fn above(log: &ShotLog) -> Vec<Option<u32>> {
-    let columns = log.column.iter().max().map_or(0, |&column| usize::from(column) + 1);
-    let mut last = vec![None; columns];
-    let mut above = Vec::with_capacity(log.len());
-    for shot in 0..log.len() {
-        let at_column = &mut last[usize::from(log.column[shot])];
-        above.push(at_column.filter(|&other: &u32| log.row[other as usize] != log.row[shot]));
-        *at_column = Some(shot as u32);
+/// For each shot, the last one before it that is the `same` in one coordinate and not in the `other`.
+fn last_beside(same: &[u16], other: &[u16]) -> Vec<Option<u32>> {
+    let places = same.iter().max().map_or(0, |&place| usize::from(place) + 1);
+    let mut last: Vec<Option<u32>> = vec![None; places];
+    let mut beside = Vec::with_capacity(same.len());
+    for shot in 0..same.len() {
+        let here = &mut last[usize::from(same[shot])];
+        beside.push(here.filter(|&before| other[before as usize] != other[shot]));
+        *here = Some(shot as u32);
     }
-    above
+    beside
 }

@@ -255,7 +255,7 @@ proptest! {
         let log = sensor.log(48);
         let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
         let receiver = sensor.receiver(if late > 0 { 0.2 } else { 0.0 });
-        let receiver = Receiver { effort: Effort::Thorough, ..receiver };
+        let receiver = Receiver { effort: Effort::Thorough, false_alarm: 1e-4, ..receiver };
         let returns = sensor.decode(&receiver, &log, &ticks);
         let sent = Sent::new(&receiver, (&sensor.book, &log), 0);
         for (place, &shot) in returns.shot.iter().enumerate() {
@@ -345,6 +345,29 @@ fn shots_in_flight_do_not_hide_each_others_maximum() {
     }
     let lit = surfaces.iter().filter(|lags| !lags.is_empty()).count();
     assert!(wrong == 0 && returns.len() * 100 > lit * 98, "{wrong} of {} of {lit}", returns.len());
+}
+
+/// A lidar that waits long between shots, as one pixel of a flash does.
+#[test]
+fn shots_far_apart_are_found() {
+    for scale in [1, 20] {
+        let sensor = Sensor { period: 30_000_000, ..Sensor::crowded(codebook()) };
+        let log = sensor.log(100);
+        let weather = Weather { missed: 20, false_ticks: 0, ..CLEAR };
+        let (mut ticks, surfaces) = sensor.ticks(&log, weather, 1);
+        for (shot, lags) in surfaces.iter().enumerate().filter(|_| scale > 1) {
+            for tick in &mut ticks.tick {
+                let start = shot as u32 * sensor.period + lags.first().copied().unwrap_or(0);
+                if *tick >= start && *tick < start + 5000 {
+                    *tick = start + scale * (*tick - start);
+                }
+            }
+        }
+        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(0.4) };
+        let returns = sensor.decode(&receiver, &log, &ticks);
+        let lit = surfaces.iter().filter(|lags| !lags.is_empty()).count();
+        assert!(returns.len() + 1 >= lit, "{scale}: {} of {lit}", returns.len());
+    }
 }
 
 fn several(sensor: &Sensor, jitter: f64) -> Receiver {

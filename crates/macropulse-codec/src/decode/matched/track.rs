@@ -20,17 +20,20 @@ impl Band<'_> {
     /// away.
     fn expected(&self, shot: usize, gap: usize) -> [Option<i64>; 7] {
         let at = |shot: Option<usize>| Some(self.found.get(shot?)?.as_ref()?.lag);
-        let over = |shot: Option<usize>| {
-            self.above.get(shot?).copied().flatten().map(|shot| shot as usize)
+        let beside = |of: &[Option<u32>], shot: Option<usize>| {
+            of.get(shot?).copied().flatten().map(|shot| shot as usize)
         };
-        let before = shot.checked_sub(1);
-        let (left, above) = (at(before), at(over(Some(shot))));
-        let across = || Some(2 * left? - at(shot.checked_sub(2))?);
+        let left_of = |shot| beside(&self.left, shot);
+        let over = |shot| beside(&self.above, shot);
+        let here = Some(shot);
+        let (left, above) = (at(left_of(here)), at(over(here)));
+        let across = || Some(2 * left? - at(left_of(left_of(here)))?);
         let back = || Some(2 * at(Some(shot + 1))? - at(Some(shot + 2))?);
-        let plane = || Some(left? + above? - at(over(before))?);
-        let nearest_left = || (1..=gap).find_map(|away| at(shot.checked_sub(away)));
+        let plane = || Some(left? + above? - at(over(left_of(here)))?);
+        let before = || (1..=gap).find_map(|away| at(shot.checked_sub(away)));
+        let nearest_left = || left.or_else(before);
         let nearest_right = || (1..=gap).find_map(|away| at(Some(shot + away)));
-        let down = || Some(2 * above? - at(over(over(Some(shot))))?);
+        let down = || Some(2 * above? - at(over(over(here)))?);
         [across(), nearest_left(), plane(), above, nearest_right(), back(), down()]
     }
 
@@ -129,19 +132,38 @@ impl Band<'_> {
 
     /// The highest peak in the [`BLOCK`] around `middle`.
     pub(super) fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
+        let allowed = self.count_about(shot, middle)?;
+        let (at, count) = self.counts.highest(allowed)?;
+        Some(self.detection(middle, (at, count), allowed))
+    }
+
+    /// What is found of `shot` at exactly `lag`.
+    pub(super) fn found_at(&mut self, shot: usize, lag: i64) -> Option<Detection> {
+        let allowed = self.count_about(shot, lag)?;
+        let at = (BLOCK / 2) as u32;
+        Some(self.detection(lag, (at, self.counts.at(at)), allowed))
+    }
+
+    /// Counts the marks found of `shot` in the [`BLOCK`] around lag `middle`; the lags that are looked
+    /// at, if there are any.
+    fn count_about(&mut self, shot: usize, middle: i64) -> Option<Block> {
         let first = middle - BLOCK / 2;
         let allowed = lags_allowed(self.sent, first)?;
-        let start = self.sent.fired[shot] + first;
         let places = &mut self.search.places;
-        let (words, begin) = self.field.lit().at(start);
+        let (words, begin) = self.field.lit().at(self.sent.fired[shot] + first);
         places_of(self.sent, shot, places);
         self.counts.clear();
         self.counts.add(words, begin as u32, places);
-        let (at, count) = self.counts.highest(allowed)?;
+        Some(allowed)
+    }
+
+    /// The detection with so many marks at a place of the block around `middle`.
+    fn detection(&self, middle: i64, (at, count): (u32, u32), allowed: Block) -> Detection {
         let plateau = between(i64::from(at), self.sent.width.into());
         let others = std::array::from_fn(|lane| allowed[lane] & !plateau[lane]);
         let next = self.counts.highest(others).map_or(0, |(_, count)| count);
-        Some(Detection { lag: first + i64::from(at), count, margin: count - next })
+        let lag = middle - BLOCK / 2 + i64::from(at);
+        Detection { lag, count, margin: count.saturating_sub(next) }
     }
 
     /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.

@@ -6,7 +6,6 @@ use super::{Band, Detection};
 use crate::decode::timeline::Timeline;
 use crate::decode::{Reject, Return, Returns, Strength, photons_per_mark};
 use crate::kernels::lit_in;
-use crate::statistics::binomial_tail;
 use crate::time;
 
 impl Band<'_> {
@@ -31,6 +30,9 @@ impl Band<'_> {
                 continue;
             }
             self.settle_doubtful(shot, first, returns);
+        }
+        if self.further.is_empty() {
+            return;
         }
         // Older light overlaps with nothing that is still to come.
         let oldest = self.in_flight_before(shots.end);
@@ -87,15 +89,23 @@ impl Band<'_> {
     /// Fuller returns claim places. Of those that they claim about the macropulse, a share c is lit,
     /// of the others a share d. If n of its N marks are claimed, chance finds each with the mean
     /// probability (n·c + (N − n)·d) / N; it must not find as many at any lag of the gate. Of a shot
-    /// with half of its marks, and twice what chance gives, this is not asked.
+    /// with as many marks as the others, half of them, and twice what chance gives, this is not asked.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let weight = sent.weight(shot);
+        // A macropulse of which no mark is missing accounts for itself.
+        if detection.count == weight {
+            return true;
+        }
         let is_other = |found: &Detection| found.lag != detection.lag;
         let of_shot = self.found[shot].is_some_and(|found| is_other(&found))
             || self.further.iter().any(|(other, found)| *other == shot && is_other(found));
-        if !of_shot && self.is_overwhelming(shot, detection) {
+        let is_usual = detection.count >= self.usual.least(weight);
+        if !of_shot && is_usual && self.is_overwhelming(shot, detection) {
             return true;
+        }
+        if !self.is_spread(shot, detection) {
+            return false;
         }
         let light = sent.light(shot, detection.lag);
         let stretch = light.start.div_euclid(64) * 64..light.end.div_euclid(64) * 64 + 64;
@@ -141,8 +151,30 @@ impl Band<'_> {
             let lit = lit.saturating_sub(own(found)).min(all);
             f64::from(marks) * f64::from(lit) / f64::from(all)
         });
-        let density = self.density_in_gate(shot).max((chance[0] + chance[1]) / f64::from(weight));
+        let gate = self.density_beyond(shot, detection.count);
+        let density = gate.max((chance[0] + chance[1]) / f64::from(weight));
         detection.count >= self.thresholds.least(weight, density)
+    }
+
+    /// Whether the marks found are spread over the code word. Light of another word meets the same one
+    /// or two of its marks in every bit, and makes many marks of few.
+    ///
+    /// Where a share q is found in each of B bits, a mark of the word is found in one bit at least with
+    /// probability p = 1 − (1 − q)ᴮ; of its W marks no fewer than W·p − 3·√(W·p·(1 − p)) may be.
+    fn is_spread(&self, shot: usize, detection: Detection) -> bool {
+        let sent = self.sent;
+        let bits = sent.lit_bits(shot).len();
+        if bits < 2 {
+            return true;
+        }
+        let start = sent.fired[shot] + detection.lag;
+        let lit = self.field.lit();
+        let is_found =
+            |mark: &&u32| sent.lit_from(shot, start).any(|bit| lit.has(bit + i64::from(**mark)));
+        let found = sent.bits(shot).marks.iter().filter(is_found).count() as f64;
+        let share = f64::from(detection.count) / f64::from(sent.weight(shot));
+        let (word, any) = (sent.in_word(shot) as f64, 1.0 - (1.0 - share).powi(bits as i32));
+        found >= word * any - 3.0 * (word * any * (1.0 - any)).sqrt()
     }
 
     /// What earlier shots in the word of `shot`, found with `count` marks, would be found with if their
@@ -246,23 +278,25 @@ impl Band<'_> {
             && self.dark_bits_are_dark(shot, detection, mean)
     }
 
-    /// Whether no lit bit of `shot` is darker than chance makes it.
-    fn lit_bits_are_lit(&mut self, shot: usize, detection: Detection, mean: f64) -> bool {
+    /// Whether the lit bits of `shot` are as bright as each other, but for chance.
+    ///
+    /// Of W marks a share q is found in each of B bits; χ² = Σ(n − W·q)²/(W·q·(1 − q)) over the counts
+    /// n has B − 1 degrees of freedom. Light of another label lights some of the bits and leaves
+    /// others dark.
+    fn lit_bits_are_lit(&self, shot: usize, detection: Detection, mean: f64) -> bool {
         let sent = self.sent;
-        let in_word = sent.in_word(shot);
+        let in_word = sent.in_word(shot) as f64;
         // Not so many marks are missing altogether.
         let missing = f64::from(sent.weight(shot) - detection.count);
-        if missing < in_word as f64 - mean / 2.0 {
+        if missing < in_word - mean / 2.0 {
             return true;
         }
         let start = sent.fired[shot] + detection.lag;
         let pattern = &sent.bits(shot).pattern;
-        sent.lit_from(shot, start).all(|bit| {
-            let found = self.field.lit().lit_in(bit, pattern) as usize;
-            2.0 * found as f64 >= mean
-                || binomial_tail(in_word, 1.0 - mean / in_word as f64, in_word - found)
-                    > sent.receiver.false_alarm
-        })
+        let found = sent.lit_from(shot, start).map(|bit| self.field.lit().lit_in(bit, pattern));
+        let squares: f64 = found.map(|found| (f64::from(found) - mean).powi(2)).sum();
+        let degrees = sent.lit_bits(shot).len() as f64 - 1.0;
+        squares <= chi_square(degrees, self.rare) * mean * (1.0 - mean / in_word)
     }
 
     fn dark_bits_are_dark(&mut self, shot: usize, detection: Detection, mean: f64) -> bool {
@@ -335,4 +369,11 @@ impl Photons {
         self.all_found.extend((known..=marks).map(|marks| photons_per_mark(marks, marks, 0.0)));
         self.all_found[marks as usize]
     }
+}
+
+/// What χ² of so many `degrees` of freedom exceeds as rarely as a normal variable exceeds z, after
+/// Wilson and Hilferty: k·(1 − 2/(9k) + z·√(2/(9k)))³ \[WH31\].
+fn chi_square(degrees: f64, z: f64) -> f64 {
+    let part = 2.0 / (9.0 * degrees.max(1.0));
+    degrees.max(1.0) * (1.0 - part + z * part.sqrt()).powi(3)
 }
