@@ -313,8 +313,12 @@ impl Leftover {
             fullest = ticks.max(fullest);
         }
         let mean = f64::from(sum) / stretches.len().max(1) as f64;
-        // In a short gate it may be full everywhere of light that is sought.
-        let is_long = lags.end - lags.start > MANY * sent.length() && !sent.is_thorough();
+        // In a short gate it may be full everywhere of light that is sought; and what is soon searched
+        // need not stand out.
+        let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
+        let is_long = lags.end - lags.start > MANY * sent.length()
+            && blocks * i64::from(sent.weight(shot)) > SOON
+            && !sent.is_thorough();
         let sigma = mean.sqrt();
         let stands_out = f64::from(fullest) > mean + 5.0 * sigma;
         let may_be = is_even && f64::from(fullest) >= mean + f64::from(enough) - 3.0 * sigma;
@@ -332,6 +336,10 @@ impl Leftover {
 /// If more bits of a block of a picture may be the maximum, all ticks of it are looked at: to order
 /// them would take longer.
 const MANY_HITS: u32 = 32;
+
+/// A search takes hardly any time if so many blocks of lags, each with all its marks, are counted: at
+/// a nanosecond each, a microsecond.
+const SOON: i64 = 1000;
 
 /// A gate of so many macropulses is taken to be dark on average.
 const MANY: i64 = 16;

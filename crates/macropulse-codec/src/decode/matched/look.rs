@@ -83,6 +83,7 @@ impl Band<'_> {
             let leftover = Leftover::new(self.sent, &self.field, &gate);
             let lags = leftover.lags((self.sent, shot), self.sent.reach(), least, true);
             let acquired = self.nearest_first(shot, lags, least);
+            let acquired = acquired.filter(|found| self.stands_alone(shot, *found));
             match acquired.or(tracked).filter(|found| self.is_believed(shot, *found)) {
                 Some(found) => {
                     self.searched[shot] = true;
@@ -120,6 +121,7 @@ impl Band<'_> {
             let least = self.least_in_gate(shot).max(self.sent.weight(shot).div_ceil(2));
             let lags = leftover.lags((self.sent, shot), self.sent.reach(), least, is_even);
             let found = self.nearest_first(shot, lags, least);
+            let found = found.filter(|found| self.stands_alone(shot, *found));
             if let Some(found) = found.filter(|found| self.is_believed(shot, *found)) {
                 self.keep(shot, found);
             }
@@ -229,7 +231,9 @@ impl Band<'_> {
             self.cancel(shot, lag);
             return true;
         };
-        if self.is_known(shot, found.lag) || !self.is_believed(shot, found) {
+        let is_new =
+            !self.is_known(shot, found.lag) && (known.is_some() || self.stands_alone(shot, found));
+        if !is_new || !self.is_believed(shot, found) {
             self.cancel(shot, lag);
             return true;
         }
@@ -302,6 +306,24 @@ impl Band<'_> {
         let is_here = |found: Detection| found.lag.abs_diff(lag) < self.sent.width.into();
         self.found[shot].is_some_and(is_here)
             || self.further.iter().any(|(other, found)| *other == shot && is_here(*found))
+    }
+
+    /// Whether `detection` needs no other shot to be known to be believed: light of no other can arrive
+    /// then, or all its marks are there, or so many that chance does not give them where all light
+    /// around it is another shot's, its own marks too.
+    fn stands_alone(&mut self, shot: usize, detection: Detection) -> bool {
+        let weight = self.sent.weight(shot);
+        let light = self.sent.light(shot, detection.lag);
+        let arrives = |other: usize| {
+            let arrival = self.sent.arrival(other);
+            arrival.start < light.end && light.start < arrival.end
+        };
+        let beside = [shot.checked_sub(1), Some(shot + 1).filter(|&next| next < self.found.len())];
+        if !beside.into_iter().flatten().any(arrives) || detection.count == weight {
+            return true;
+        }
+        let around = self.field.density(&light);
+        detection.count >= self.thresholds.least(weight, around)
     }
 
     /// Whether neither chance nor light of other returns gives `detection`.

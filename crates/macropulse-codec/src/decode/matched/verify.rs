@@ -127,30 +127,29 @@ impl Band<'_> {
         if !is_claimed {
             return true;
         }
+        // Where its own marks are found tells nothing of the others.
+        let mut own = Timeline::default();
+        own.clear_all(claimed.origin(), stretch.end - claimed.origin());
+        let (marks, pattern) = (&sent.bits(shot).marks, &sent.bits(shot).cancelled);
+        let start = light.start - sent.farther();
+        sent.lit_from(shot, start).for_each(|bit| own.light_up(bit, pattern));
         let lit = self.field.lit();
-        // Free and claimed places: all of them, those lit, marks of the shot, and those found.
-        let mut places = [[0_u32; 4]; 2];
-        for (claimed, lit) in claimed.words(&stretch).iter().zip(lit.words(&stretch)) {
-            for (places, those) in places.iter_mut().zip([!claimed, *claimed]) {
+        // Free and claimed places: all of them, those lit, and marks of the shot.
+        let mut places = [[0_u32; 3]; 2];
+        let words = claimed.words(&stretch).iter().zip(own.words(&stretch));
+        for ((claimed, own), lit) in words.zip(lit.words(&stretch)) {
+            for (places, those) in places.iter_mut().zip([!claimed & !own, claimed & !own]) {
                 places[0] += those.count_ones();
                 places[1] += (those & lit).count_ones();
             }
         }
-        let marks = &sent.bits(shot).marks;
         for bit in sent.lit_from(shot, light.start) {
             for place in marks.iter().map(|&mark| bit + i64::from(mark)) {
-                let places = &mut places[usize::from(claimed.has(place))];
-                places[2] += 1;
-                places[3] += u32::from(lit.has(place));
+                places[usize::from(claimed.has(place))][2] += 1;
             }
         }
-        // Its own marks are no measure of the others.
-        let chance = places.map(|[all, lit, marks, found]| {
-            let own = |marks: u32| marks * sent.width;
-            let all = all.saturating_sub(own(marks)).max(1);
-            let lit = lit.saturating_sub(own(found)).min(all);
-            f64::from(marks) * f64::from(lit) / f64::from(all)
-        });
+        let chance = places
+            .map(|[all, lit, marks]| f64::from(marks) * f64::from(lit) / f64::from(all.max(1)));
         let gate = self.density_beyond(shot, detection.count);
         let density = gate.max((chance[0] + chance[1]) / f64::from(weight));
         detection.count >= self.thresholds.least(weight, density)
