@@ -199,7 +199,7 @@ impl<'a> Field<'a> {
         let begin = self.begin + self.cell * cells.start as i64;
         sums.clear();
         sums.extend_from_slice(&self.left[cells]);
-        let together = (length / self.cell) as usize + 2;
+        let together = self.stretch(length);
         let mut sum: u32 = sums.iter().take(together).sum();
         for cell in 0..sums.len() {
             let next = sums.get(cell + together).copied().unwrap_or(0);
@@ -216,6 +216,11 @@ impl<'a> Field<'a> {
     /// All that is at hand.
     pub fn extent(&self) -> Range<i64> {
         self.seen.origin()..self.end()
+    }
+
+    /// Cells that hold `length` ticks wherever in the first one these begin.
+    pub fn stretch(&self, length: i64) -> usize {
+        (length / self.cell) as usize + 2
     }
 
     /// Ticks that are counted together.

@@ -61,7 +61,7 @@ pub struct Receiver {
     /// Nearest and farthest round trip accepted, in ticks.
     pub gate_ticks: (u32, u32),
     /// Farthest round trip from which light of the shots may come although it is not accepted, in
-    /// ticks: the matched receiver cancels complete macropulses up to there.
+    /// ticks: the matched receiver finds and cancels light up to there.
     pub light_ticks: u32,
     /// TDC ticks per chip.
     pub ticks_per_chip: u32,

@@ -63,15 +63,19 @@ impl Timeline {
 
     /// The machine words of `span`, which begins and ends with one.
     pub fn words(&self, span: &Range<i64>) -> &[u64] {
-        let word = |tick: i64| (((tick - self.origin) / 64).max(0) as usize).min(self.words.len());
-        &self.words[word(span.start)..word(span.end)]
+        &self.words[self.places(span)]
     }
 
     /// The same, to be changed.
     pub fn words_mut(&mut self, span: &Range<i64>) -> &mut [u64] {
+        let places = self.places(span);
+        &mut self.words[places]
+    }
+
+    /// Where the machine words of `span` are.
+    fn places(&self, span: &Range<i64>) -> Range<usize> {
         let word = |tick: i64| (((tick - self.origin) / 64).max(0) as usize).min(self.words.len());
-        let words = word(span.start)..word(span.end);
-        &mut self.words[words]
+        word(span.start)..word(span.end)
     }
 
     /// All machine words, and the bit of `tick` in them; bit 0 for a tick before the beginning.

@@ -125,9 +125,9 @@ impl Band<'_> {
         places_of(sent, shot, &mut search.places);
         let (places, stride) = (&search.places, search.stride * 64);
         search.coarse_places.clear();
-        search
-            .coarse_places
-            .extend(places.iter().map(|&mark| (mark % 8) * stride as u32 + mark / COARSE as u32));
+        search.coarse_places.extend(
+            places.iter().map(|&mark| mark % COARSE as u32 * stride as u32 + mark / COARSE as u32),
+        );
         search.seen.clear();
         let begin = fired + lags.start - origin;
         let first = begin / COARSE as i64;
@@ -274,7 +274,7 @@ impl Leftover {
         let length = sent.length() + i64::from(sent.width);
         let begin = field.residual_stretches(span, length, &mut stretches);
         let fullest = stretches.iter().copied().max().unwrap_or(0);
-        let (cell, together) = (field.cell(), length / field.cell() + 2);
+        let (cell, together) = (field.cell(), field.stretch(length) as i64);
         Self { stretches, begin, cell, together, fullest }
     }
 

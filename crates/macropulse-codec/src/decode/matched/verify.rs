@@ -268,8 +268,8 @@ impl Band<'_> {
     /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
     ///
     /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it; only
-    /// the residual counts, as other shots may well shine there. A lit bit is dark if it has
-    /// less than half the marks of the others and chance would not take away so many.
+    /// the residual counts, as other shots may well shine there. Lit bits must be as bright as each
+    /// other.
     pub(super) fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
         let lit = self.sent.lit_bits(shot).len() as f64;
         let mean = f64::from(detection.count) / lit;
