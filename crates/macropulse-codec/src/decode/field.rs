@@ -27,11 +27,18 @@ pub(super) struct Field<'a> {
     begin: i64,
     /// Ticks of the list before each cell, as far as they are laid down.
     before: Vec<u32>,
-    /// Ticks in each cell that are not cancelled.
-    left: Vec<u32>,
     seen: Timeline,
     lit: Timeline,
     residual: Timeline,
+}
+
+/// Which ticks are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// All of them.
+    Seen,
+    /// Those that are not cancelled.
+    Residual,
 }
 
 /// Memory of a field, whatever is in it.
@@ -57,8 +64,7 @@ impl<'a> Field<'a> {
         residual.clear_all(begin, length);
         lit.clear_all(begin, if width > 1 { length } else { 0 });
         let before = vec![laid as u32];
-        let left = vec![];
-        Self { ticks, laid, width, cell, begin, before, left, seen, lit, residual }
+        Self { ticks, laid, width, cell, begin, before, seen, lit, residual }
     }
 
     /// Gives its memory back.
@@ -81,7 +87,6 @@ impl<'a> Field<'a> {
             let passed = self.ticks[self.laid..].iter();
             self.laid += passed.take_while(|&&tick| i64::from(tick) < end).count();
             self.before.push(self.laid as u32);
-            self.left.push(0);
         }
         let to = span.end + 2 * MARGIN + i64::from(self.width);
         if to + self.cell > self.seen.end() {
@@ -93,12 +98,11 @@ impl<'a> Field<'a> {
             let from = self.end();
             let cells = ((to - from).min(PIECE) / self.cell).max(1);
             let end = from + cells * self.cell;
-            let laid = self.seen.lay(&self.ticks[self.laid..], end);
+            let laid = self.seen.lay_anew(&self.ticks[self.laid..], from..end);
             let words = self.seen.words(&(from..end));
             let known = self.before.len();
             self.before.resize(known + cells as usize, 0);
             count_each(words, (self.cell / 64) as usize, &mut self.before[known..]);
-            self.left.extend_from_slice(&self.before[known..]);
             let mut before = self.laid as u32;
             for count in &mut self.before[known..] {
                 before += *count;
@@ -131,32 +135,30 @@ impl<'a> Field<'a> {
         &self.seen
     }
 
-    /// Cancels the ticks of `pattern`, begun at each of `starts`, all within `span`.
-    pub fn cancel(
-        &mut self,
-        starts: impl Iterator<Item = i64>,
-        pattern: &Pattern,
-        span: Range<i64>,
-    ) {
+    /// Cancels the ticks of `pattern`, begun at each of `starts`.
+    pub fn cancel(&mut self, starts: impl Iterator<Item = i64>, pattern: &Pattern) {
         starts.for_each(|start| self.residual.put_out(start, pattern));
-        let cells = self.cells(&span);
-        let at = |cell: usize| self.begin + self.cell * cell as i64;
-        let first = cells.start.max(((self.residual.origin() - self.begin) / self.cell) as usize);
-        if first < cells.end {
-            let words = self.residual.words(&(at(first)..at(cells.end)));
-            count_each(words, (self.cell / 64) as usize, &mut self.left[first..cells.end]);
-        }
     }
 
-    /// Puts into `places` where marks count as found in the residual of `span`, and tells which tick
-    /// the first bit is.
-    pub fn lit_in_residual(&self, span: &Range<i64>, places: &mut Vec<u64>) -> i64 {
-        let start = span.start.div_euclid(64) * 64;
-        let words = self.residual.words(&(start..span.end + i64::from(self.width) + 64));
-        places.clear();
-        places.extend_from_slice(words);
-        look_ahead(places, self.width as usize - 1);
-        start.max(self.residual.origin())
+    /// Where marks count as found in the `source`, for all of `span`; made in `memory` where need be.
+    pub fn lit_in<'b>(
+        &'b self,
+        source: Source,
+        span: &Range<i64>,
+        memory: &'b mut Timeline,
+    ) -> &'b Timeline {
+        match source {
+            Source::Seen => self.lit(),
+            Source::Residual if self.width == 1 => &self.residual,
+            Source::Residual => {
+                let words =
+                    self.residual.words(&(span.start..span.end + i64::from(self.width) + 64));
+                let start = span.start.div_euclid(64) * 64;
+                memory.copy(start.max(self.residual.origin()), words);
+                look_ahead(memory.all_words_mut(), self.width as usize - 1);
+                memory
+            }
+        }
     }
 
     /// The cells that touch `span`.
@@ -166,51 +168,38 @@ impl<'a> Field<'a> {
         cell(span.start)..cell(span.end + self.cell - 1).max(cell(span.start))
     }
 
-    /// Ticks of the list before the machine word of `tick`.
-    fn ticks_before(&self, tick: i64) -> u32 {
-        let last = self.before.len() as i64 - 1;
-        let cell = ((tick - self.begin) / self.cell).clamp(0, last);
-        let start = self.begin + cell * self.cell;
-        let words = self.seen.words(&(start..tick.min(start + self.cell)));
-        self.before[cell as usize] + count_all(words)
+    /// How many ticks there are in the cells that touch `span`, and how long these are.
+    pub fn ticks_about(&self, span: &Range<i64>) -> (u32, i64) {
+        let cells = self.cells(span);
+        let ticks = self.before[cells.end] - self.before[cells.start];
+        (ticks, self.cell * (cells.end - cells.start) as i64)
     }
 
-    /// How many ticks there are in `span`, and those of the machine words at its ends.
-    pub fn ticks_in(&self, span: &Range<i64>) -> u32 {
-        self.ticks_before(span.end) - self.ticks_before(span.start)
-    }
-
-    /// Share of the places of `span` at which a mark counts as found, were its ticks spread evenly.
-    pub fn density(&self, span: &Range<i64>) -> f64 {
-        self.density_without(span, 0, 0)
-    }
-
-    /// The same without so many ticks and places.
+    /// Share of the places about `span` at which a mark counts as found, were its ticks spread evenly,
+    /// without so many ticks and places.
     pub fn density_without(&self, span: &Range<i64>, ticks: u32, places: u32) -> f64 {
-        let places = ((span.end - span.start) as u32).saturating_sub(places).max(1);
-        let all = self.ticks_in(span).saturating_sub(ticks);
-        (f64::from(self.width) * f64::from(all) / f64::from(places)).min(1.0)
+        let (all, length) = self.ticks_about(span);
+        let places = (length - i64::from(places)).max(1) as f64;
+        (f64::from(self.width) * f64::from(all.saturating_sub(ticks)) / places).min(1.0)
     }
 
-    /// For each cell of `span`, the residual ticks in the `length` ticks from there on, and some more;
-    /// and the first tick of the first cell.
+    /// For each cell about `span`, the residual ticks in the `length` ticks from there on, and some
+    /// more; and the first tick of the first cell.
     pub fn residual_stretches(&self, span: &Range<i64>, length: i64, sums: &mut Vec<u32>) -> i64 {
         let cells = self.cells(span);
-        let begin = self.begin + self.cell * cells.start as i64;
+        let at = |cell: usize| self.begin + self.cell * cell as i64;
+        let begin = at(cells.start).max(self.residual.origin());
+        let words = self.residual.words(&(begin..at(cells.end)));
+        let (each, together) = ((self.cell / 64) as usize, self.stretch(length));
         sums.clear();
-        sums.extend_from_slice(&self.left[cells]);
-        let together = self.stretch(length);
+        sums.resize(words.len() / each, 0);
+        count_each(words, each, sums);
         let mut sum: u32 = sums.iter().take(together).sum();
         for cell in 0..sums.len() {
             let next = sums.get(cell + together).copied().unwrap_or(0);
             sum = sum + next - std::mem::replace(&mut sums[cell], sum);
         }
         begin
-    }
-
-    /// How many ticks of `span` are not cancelled, and those of the machine words at its ends.
-    pub fn residual_in(&self, span: &Range<i64>) -> u32 {
-        count_all(self.residual.words(&(span.start..span.end + 63)))
     }
 
     /// All that is at hand.
@@ -227,11 +216,4 @@ impl<'a> Field<'a> {
     pub fn cell(&self) -> i64 {
         self.cell
     }
-}
-
-/// How many bits are lit.
-fn count_all(words: &[u64]) -> u32 {
-    let mut count = [0];
-    count_each(words, words.len().max(1), &mut count);
-    count[0]
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::kernels::{Pattern, lay, light_up, lit_in, look_ahead, put_out};
+use crate::kernels::{Pattern, lay, light_up, lit_in, lit_in_each, look_ahead, put_out};
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
 #[derive(Debug, Clone, Default)]
@@ -45,20 +45,56 @@ impl Timeline {
         self.words.resize((length.max(0) / 64 + 1) as usize, 0);
     }
 
-    /// Lets it begin at `origin`, whole machine words later; dark behind where it ended so far.
+    /// Makes it the `words` that begin at `origin`.
+    pub fn copy(&mut self, origin: i64, words: &[u64]) {
+        self.origin = origin;
+        self.words.clear();
+        self.words.extend_from_slice(words);
+    }
+
+    /// All of its machine words, to be changed.
+    pub fn all_words_mut(&mut self) -> &mut [u64] {
+        &mut self.words
+    }
+
+    /// Lets it begin at `origin`, whole machine words later; what is behind where it ended so far is
+    /// not told.
     pub fn slide(&mut self, origin: i64) {
-        let words = ((origin - self.origin) / 64) as usize;
-        let kept = self.words.len().saturating_sub(words);
-        let moved = self.words.len() - kept;
+        let moved = (((origin - self.origin) / 64) as usize).min(self.words.len());
         self.words.copy_within(moved.., 0);
-        self.words[kept..].fill(0);
         self.origin = origin;
     }
 
     /// Lights those of the sorted `ticks` that are before `end`, and tells how many these are. None may
     /// be before the beginning, and all from the first one on must be dark.
-    pub fn lay(&mut self, ticks: &[u32], end: i64) -> usize {
+    fn lay(&mut self, ticks: &[u32], end: i64) -> usize {
         lay(&mut self.words, self.origin, ticks, end)
+    }
+
+    /// Makes `span`, whole machine words, dark, and lights those of the sorted `ticks` that are before
+    /// its end; tells how many these are. None may be before its beginning.
+    pub fn lay_anew(&mut self, ticks: &[u32], span: Range<i64>) -> usize {
+        let end = span.end;
+        self.words_mut(&span).fill(0);
+        self.lay(ticks, end)
+    }
+
+    /// The first tick of `span` that is lit.
+    pub fn next_lit(&self, span: Range<i64>) -> Option<i64> {
+        let bit = (span.start - self.origin).max(0) as usize;
+        let mut from = u64::MAX << (bit % 64);
+        for (index, word) in self.words.iter().enumerate().skip(bit / 64) {
+            let start = self.origin + 64 * index as i64;
+            if start >= span.end {
+                return None;
+            }
+            if word & from != 0 {
+                let tick = start + i64::from((word & from).trailing_zeros());
+                return Some(tick).filter(|tick| *tick < span.end);
+            }
+            from = u64::MAX;
+        }
+        None
     }
 
     /// The machine words of `span`, which begins and ends with one.
@@ -119,6 +155,16 @@ impl Timeline {
     pub fn lit_in(&self, tick: i64, pattern: &Pattern) -> u32 {
         let bit = usize::try_from(tick - self.origin);
         bit.map_or(0, |bit| lit_in(&self.words, bit, pattern))
+    }
+
+    /// The same if it begins so many ticks `after` `tick`, for each of these; put into `counts`. There
+    /// must be a tick `tick`.
+    pub fn lit_in_each(&self, tick: i64, after: &[u32], pattern: &Pattern, counts: &mut Vec<u32>) {
+        counts.clear();
+        counts.resize(after.len(), 0);
+        if let Ok(first) = usize::try_from(tick - self.origin) {
+            lit_in_each(&self.words, first, after, pattern, counts);
+        }
     }
 
     /// Sixty-four ticks from `tick` on, the first one in the lowest bit.

@@ -27,11 +27,6 @@ impl WordTicks {
         Self { marks: marks.len(), ticks, used }
     }
 
-    /// Ticks from the beginning of the word to its first mark, if it has any.
-    pub(crate) fn first(&self) -> Option<i64> {
-        self.ticks.first().map(|ticks| i64::from(ticks[0]))
-    }
-
     /// Number of marks.
     pub(crate) fn marks(&self) -> usize {
         self.marks

@@ -21,7 +21,7 @@ mod pattern;
 
 pub(crate) use balance::{Balance, Chips, best_balance};
 pub(crate) use coarse::{COARSE, coarse};
-pub(crate) use correlate::{BLOCK_WORDS, Block, Counts, is_dark};
+pub(crate) use correlate::{Counts, NARROW, WIDE, is_dark};
 pub(crate) use lay::{count_each, lay};
 pub(crate) use marks::{WordTicks, begin_with};
-pub(crate) use pattern::{Pattern, light_up, lit_in, look_ahead, put_out};
+pub(crate) use pattern::{Pattern, light_up, lit_in, lit_in_each, look_ahead, put_out};

@@ -33,28 +33,45 @@ impl Pattern {
 }
 
 on_every_level! {
-    /// How many bits of `pattern`, begun at bit `first`, are lit in `words`. What reaches beyond
-    /// the end is dark.
-    pub(crate) fn lit_in(words: &[u64], first: usize, pattern: &Pattern) -> u32 {
-        let (begin, shift) = (first / 64, first % 64);
-        let mut sums = [0_u64; LANES];
-        for block in (0..pattern.reach()).step_by(LANES) {
-            let mask = shifted(&pattern.words[block..], shift);
-            let words = words.get(begin + block..).unwrap_or_default();
-            let words = match words.first_chunk::<LANES>() {
-                Some(words) => *words,
-                None => {
-                    let mut last = [0; LANES];
-                    last[..words.len()].copy_from_slice(words);
-                    last
+    /// How many bits of `pattern`, begun so many bits `after` bit `first`, are lit in `words`, for each
+    /// of these. What reaches beyond the end is dark.
+    pub(crate) fn lit_in_each(
+        words: &[u64],
+        first: usize,
+        after: &[u32],
+        pattern: &Pattern,
+        counts: &mut [u32],
+    ) {
+        for (count, after) in counts.iter_mut().zip(after) {
+            let first = first + *after as usize;
+            let (begin, shift) = (first / 64, first % 64);
+            let mut sums = [0_u64; LANES];
+            for block in (0..pattern.reach()).step_by(LANES) {
+                let mask = shifted(&pattern.words[block..], shift);
+                let words = words.get(begin + block..).unwrap_or_default();
+                let words = match words.first_chunk::<LANES>() {
+                    Some(words) => *words,
+                    None => {
+                        let mut last = [0; LANES];
+                        last[..words.len()].copy_from_slice(words);
+                        last
+                    }
+                };
+                for lane in 0..LANES {
+                    sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
                 }
-            };
-            for lane in 0..LANES {
-                sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
             }
+            *count = sums.iter().sum::<u64>() as u32;
         }
-        sums.iter().sum::<u64>() as u32
     }
+}
+
+/// How many bits of `pattern`, begun at bit `first`, are lit in `words`. What reaches beyond the end is
+/// dark.
+pub(crate) fn lit_in(words: &[u64], first: usize, pattern: &Pattern) -> u32 {
+    let mut count = [0];
+    lit_in_each(words, first, &[0], pattern, &mut count);
+    count[0]
 }
 
 on_every_level! {

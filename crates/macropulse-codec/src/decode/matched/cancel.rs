@@ -1,23 +1,24 @@
-//! Cancellation of complete macropulses: those of which no mark is missing are taken off the stream
-//! of ticks one after another, as they come.
+//! Cancellation of complete macropulses: those of which no mark is missing are taken off the ticks one
+//! after another, as they come.
 //!
-//! 1. The earliest tick that is not cancelled yet is taken for the first mark of a macropulse.
-//!    The shot after the last one found is asked first: in smooth scenes it is the one.
-//! 2. Otherwise each shot in flight is asked whether its second mark is there, too; codes are made
-//!    so that hardly more than one says yes.
-//! 3. All marks of that shot are looked for. If none is missing no lag can have more, and none
-//!    earlier is left: this is the maximum. Its ticks are cancelled.
-//! 4. Marks of one macropulse may be those of another one, too: the first tick that is not
-//!    cancelled may be the second mark.
+//! 1. In a row: the earliest tick that is not cancelled is taken for the first mark of a macropulse of
+//!    which all marks follow with nothing between them. The shot after the last one found is asked
+//!    first: in smooth scenes it is the one. Otherwise the distance to the next tick tells which word
+//!    it may be.
+//! 2. Woven: where macropulses overlap, the ticks are laid down as bits. Each shot in flight whose
+//!    second mark is there, too, is asked for all of its marks; found, they are put out. The first
+//!    marks may lie under those of one that was cancelled before.
 //!
-//! Light from beyond the gate is cancelled, too, from as far as it may come: it gives no return,
-//! but would pass for noise.
-//!
-//! A tick of which no macropulse without a gap can begin is left for the receivers that follow.
-//! Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
+//! If no mark is missing no lag can have more, and none earlier is left: this is the maximum. Light
+//! from beyond the gate is cancelled, too, from as far as it may come: it gives no return, but would
+//! pass for noise. A tick of which no macropulse without a gap can begin is left for the receivers
+//! that follow. Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
+
+use std::ops::Range;
 
 use super::Detection;
 use super::sent::Sent;
+use crate::decode::timeline::Timeline;
 use crate::kernels::begin_with;
 
 /// Ticks without a complete macropulse after which cancellation ends, and how many more for each
@@ -43,233 +44,247 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
     let mut canceller = Canceller {
         sent,
         ticks,
-        gate: (sent.gate().start, sent.gate().end - 1),
-        light: sent.reach().end - 1,
-        scale: sent.receiver.ticks_per_chip,
         least: fewest_without_a_gap(sent, ticks),
-        cancelled: CancelledTicks::new(ticks.len()),
-        detections: vec![None; sent.fired.len()],
-        again: Vec::new(),
+        cancelled: Cancelled {
+            detections: vec![None; sent.fired.len()],
+            again: Vec::new(),
+            residual: Some(Vec::new()),
+        },
+        // Marks that jitter are not where they should be.
+        patience: if sent.width > 1 { 0 } else { PATIENCE.0 },
         oldest: 0,
-        oldest_beyond: 0,
         next: 0,
-        places: Vec::new(),
+        seen: Timeline::default(),
+        residual: Timeline::default(),
     };
-    // Marks that jitter are not where they should be.
-    let (mut place, mut patience) = (0, if sent.width > 1 { 0 } else { PATIENCE.0 });
-    while place < ticks.len() && patience > 0 {
-        match canceller.shot_at(place) {
-            Some(()) => patience += PATIENCE.1,
-            None => patience -= 1,
-        }
-        place = canceller.cancelled.next_without(place + 1);
+    let mut place = 0;
+    while place < ticks.len() && canceller.patience > 0 {
+        place += match canceller.in_a_row(place) {
+            0 => canceller.woven(place),
+            count => count,
+        };
     }
-    let found_any = ticks.is_empty() || canceller.cancelled.any();
-    let residual = found_any.then(|| canceller.cancelled.residual(ticks));
-    Cancelled { detections: canceller.detections, again: canceller.again, residual }
+    let found_any = ticks.is_empty() || canceller.cancelled.detections.iter().any(Option::is_some);
+    let mut cancelled = canceller.cancelled;
+    match &mut cancelled.residual {
+        Some(residual) if found_any => residual.extend_from_slice(&ticks[place..]),
+        residual => *residual = None,
+    }
+    cancelled
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
 /// with L · dᴺ ≤ α, d the share of lit ticks. Two at least, as the second mark is asked for.
-fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> usize {
+fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> u32 {
     let time = ticks.last().zip(ticks.first()).map_or(0, |(last, first)| last - first);
     let density = ticks.len() as f64 / f64::from(time.max(1));
     let lags = (sent.gate().end - sent.gate().start) as f64;
     let rarity = libm::log(sent.receiver.false_alarm / lags);
-    (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as usize
+    (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as u32
 }
 
 struct Canceller<'a> {
     sent: &'a Sent<'a>,
     ticks: &'a [u32],
-    gate: (i64, i64),
-    /// Farthest lag from which light may come: beyond the gate it is cancelled, and no return.
-    light: i64,
-    scale: u32,
     /// Fewest marks with which a shot can be told from chance.
-    least: usize,
-    cancelled: CancelledTicks,
-    detections: Vec<Option<Detection>>,
-    again: Vec<(usize, Detection)>,
-    /// Light of no shot before this one can come from within the gate any more.
-    oldest: usize,
+    least: u32,
+    cancelled: Cancelled,
+    patience: usize,
     /// Light of no shot before this one can come any more.
-    oldest_beyond: usize,
+    oldest: usize,
     /// The shot after the last one found.
     next: usize,
-    /// Where the marks of a shot were found.
-    places: Vec<usize>,
+    /// The ticks where macropulses overlap, and those of them that are not cancelled.
+    seen: Timeline,
+    residual: Timeline,
 }
 
 impl Canceller<'_> {
-    /// Finds the shot whose light begins with the tick at `place`, and cancels its ticks.
-    fn shot_at(&mut self, place: usize) -> Option<()> {
-        if self.next < self.detections.len() && self.fits_in_a_row(self.next, place) {
-            return Some(());
-        }
+    /// Finds the shot of which all marks are the ticks from `place` on, and tells how many they are; 0
+    /// if there is none.
+    fn in_a_row(&mut self, place: usize) -> usize {
+        let count = self.fits_in_a_row(self.next, place);
+        let Some(next) = self.ticks.get(place + 1).filter(|_| count == 0) else { return count };
+        let (tick, sent) = (i64::from(self.ticks[place]), self.sent);
+        let gap = next - self.ticks[place];
+        self.forget_before(tick);
+        let in_flight = self.oldest..sent.fired.len();
+        let in_flight = in_flight.take_while(|&shot| sent.fired[shot] <= tick);
+        let shot = self.nearest_first().into_iter().find_map(|lags| {
+            in_flight.clone().find(|&shot| {
+                let marks = &sent.bits(shot).marks;
+                marks.len() > 1
+                    && marks[1] - marks[0] == gap
+                    && self.start(shot, tick, (0, &lags)).is_some()
+            })
+        });
+        shot.map_or(0, |shot| self.fits_in_a_row(shot, place))
+    }
+
+    /// The lags of the gate, and those beyond: light from there is rare, and thought of last.
+    fn nearest_first(&self) -> [Range<i64>; 2] {
+        let (gate, reach) = (self.sent.gate(), self.sent.reach());
+        [gate.clone(), gate.end..reach.end]
+    }
+
+    /// How many marks `shot` has, if they are the ticks from `place` on with nothing between them.
+    fn fits_in_a_row(&mut self, shot: usize, place: usize) -> usize {
+        let lags = self.sent.gate().start..self.sent.reach().end;
         let tick = i64::from(self.ticks[place]);
-        let (sent, nearest) = (self.sent, self.gate.0);
-        let fired = &sent.fired;
-        let advance = |oldest: &mut usize, farthest: i64| {
-            while *oldest < fired.len() && fired[*oldest] + farthest < tick {
-                *oldest += 1;
+        let Some(start) = self.start(shot, tick, (0, &lags)) else { return 0 };
+        let (word, bits) = (self.sent.word(shot), self.sent.lit_bits(shot));
+        let scale = self.sent.receiver.ticks_per_chip;
+        if !begin_with(&self.ticks[place..], word, bits, (start as u32, scale)) {
+            return 0;
+        }
+        self.keep(shot, start);
+        bits.len() * word.marks()
+    }
+
+    /// The tick in which the macropulse of `shot` begins if `tick` is its first mark but for those
+    /// `hidden`, comes after one of the `lags`, and could be told from chance.
+    fn start(&self, shot: usize, tick: i64, (hidden, lags): (usize, &Range<i64>)) -> Option<i64> {
+        let sent = self.sent;
+        let fired = sent.fired.get(shot)?;
+        let (bit, mark) = (sent.lit_from(shot, 0).next()?, sent.bits(shot).marks.get(hidden)?);
+        let start = tick - bit - i64::from(*mark);
+        let possible = lags.contains(&(start - fired)) && sent.weight(shot) >= self.least;
+        possible.then_some(start)
+    }
+
+    /// Moves on to the first shot of which light may come at `tick`.
+    fn forget_before(&mut self, tick: i64) {
+        let sent = self.sent;
+        let farthest = sent.reach().end + sent.length();
+        while sent.fired.get(self.oldest).is_some_and(|fired| fired + farthest < tick) {
+            self.oldest += 1;
+        }
+    }
+
+    /// Finds all shots from `place` on that overlap with others, and tells how many ticks they are,
+    /// cancelled or left; one at least.
+    fn woven(&mut self, place: usize) -> usize {
+        let (sent, ticks) = (self.sent, self.ticks);
+        let first = i64::from(ticks[place]);
+        // Macropulses may have begun under one that was cancelled.
+        let begin = (first - sent.bit_length()).div_euclid(64) * 64;
+        let before = ticks[..place].iter().rev().take_while(|tick| i64::from(**tick) >= begin);
+        let mut laid = place - before.count();
+        let room = ROOM * sent.length().max(64) + 128;
+        for timeline in [&mut self.seen, &mut self.residual] {
+            timeline.clear_all(begin, room);
+        }
+        let (mut end, mut last, mut tick) = (begin, first, first);
+        while self.patience > 0 {
+            // All that a macropulse may reach that begins here.
+            let reach = tick + sent.length() + 128;
+            if reach > end {
+                if reach > self.seen.end() {
+                    let origin = (tick - sent.bit_length()).div_euclid(64) * 64;
+                    self.seen.slide(origin);
+                    self.residual.slide(origin);
+                }
+                let to = ((end + room / 4).max(reach) + 63).div_euclid(64) * 64;
+                let to = to.min(self.seen.end());
+                let count = self.seen.lay_anew(&ticks[laid..], end..to);
+                self.residual.lay_anew(&ticks[laid..], end..to);
+                (laid, end) = (laid + count, to);
             }
-        };
-        advance(&mut self.oldest, self.gate.1 + sent.length());
-        advance(&mut self.oldest_beyond, self.light + sent.length());
-        let in_gate = self.oldest..fired.len();
-        let in_gate = in_gate.take_while(|&shot| fired[shot] + nearest <= tick);
-        // Its first marks may lie under those of a macropulse that was cancelled before.
-        for hidden in 0..=MOST_HIDDEN {
-            for shot in in_gate.clone() {
-                if self.fits(shot, place, hidden) {
-                    return Some(());
+            match self.residual.next_lit(tick..end) {
+                Some(next) => tick = next,
+                None if laid == ticks.len() => return laid - place,
+                None => tick = end,
+            }
+            if tick > last {
+                return ticks[place..].partition_point(|other| i64::from(*other) < tick);
+            }
+            if tick + sent.length() + 128 > end {
+                continue;
+            }
+            match self.shot_at(tick) {
+                Some(ends) => last = last.max(ends),
+                None => {
+                    self.residual.clear(tick);
+                    self.patience -= 1;
+                    self.leave(tick);
                 }
             }
         }
-        // Light from beyond the gate is rare: it is thought of last.
-        for hidden in 0..=MOST_HIDDEN {
-            for shot in self.oldest_beyond..self.oldest {
-                if self.fits(shot, place, hidden) {
-                    return Some(());
+        while let Some(left) = self.residual.next_lit(tick..end) {
+            self.leave(left);
+            tick = left + 1;
+        }
+        laid - place
+    }
+
+    /// Leaves `tick` to others.
+    fn leave(&mut self, tick: i64) {
+        if let Some(residual) = &mut self.cancelled.residual {
+            residual.push(tick as u32);
+        }
+    }
+
+    /// Finds the shot of which `tick` is the first mark that is not cancelled, cancels its marks, and
+    /// tells when its light ends.
+    fn shot_at(&mut self, tick: i64) -> Option<i64> {
+        self.forget_before(tick);
+        let fired = &self.sent.fired;
+        let in_flight = self.oldest..fired.len();
+        let in_flight = in_flight.take_while(|&shot| fired[shot] <= tick);
+        for lags in self.nearest_first() {
+            for hidden in 0..=MOST_HIDDEN {
+                for shot in std::iter::once(self.next).chain(in_flight.clone()) {
+                    if let Some(start) = self.fits(shot, tick, (hidden, &lags)) {
+                        self.keep(shot, start);
+                        return Some(start + self.sent.length());
+                    }
                 }
             }
         }
         None
     }
 
-    /// Whether the ticks from `place` on are all the marks of `shot`, with nothing between them.
-    fn fits_in_a_row(&mut self, shot: usize, place: usize) -> bool {
-        let (word, bits) = (self.sent.word(shot), self.sent.lit_bits(shot));
-        let (Some(bit), Some(mark)) = (bits.first(), word.first()) else { return false };
-        let first = i64::from(self.scale * bit) + mark;
-        let start = i64::from(self.ticks[place]) - first;
-        let count = bits.len() * word.marks();
-        let Some(lag) = self.lag(shot, start, count) else { return false };
-        if !begin_with(&self.ticks[place..], word, bits, (start as u32, self.scale)) {
-            return false;
-        }
-        self.cancelled.run(place, count);
-        self.keep(shot, lag, count);
-        true
-    }
-
-    /// The lag of `shot` if its macropulse begins at `start` and could be told from chance.
-    fn lag(&self, shot: usize, start: i64, marks: usize) -> Option<i64> {
-        let lag = start - self.sent.fired[shot];
-        let possible = marks >= self.least && (self.gate.0..=self.light).contains(&lag);
-        possible.then_some(lag)
-    }
-
-    /// Whether all marks of `shot` are there if the tick at `place` is the first one of them that
-    /// is not `hidden`.
-    fn fits(&mut self, shot: usize, place: usize, hidden: usize) -> bool {
-        let marks = self.sent.marks(shot);
-        let Some(&[shown, second]) = marks.get(hidden..hidden + 2) else { return false };
-        let scale = i64::from(self.scale);
-        let start = i64::from(self.ticks[place]) - scale * i64::from(shown);
-        let Some(lag) = self.lag(shot, start, marks.len()) else { return false };
+    /// Where the macropulse of `shot` begins, if all its marks are there and `tick` is the first of them
+    /// that is not `hidden`; they are cancelled then.
+    fn fits(
+        &mut self,
+        shot: usize,
+        tick: i64,
+        (hidden, lags): (usize, &Range<i64>),
+    ) -> Option<i64> {
+        let start = self.start(shot, tick, (hidden, lags))?;
+        let bits = self.sent.bits(shot);
         // Nearly every shot is refused here.
-        let next = start + scale * i64::from(second);
-        let follower = self.ticks[place + 1..].iter().find(|&&tick| i64::from(tick) >= next);
-        if follower.map(|&tick| i64::from(tick)) != Some(next) {
-            return false;
-        }
-        let first = start + scale * i64::from(marks[0]);
-        let before = self.ticks[..place].iter().rev();
-        let from = place - before.take_while(|&&tick| i64::from(tick) >= first).count();
-        self.places.clear();
-        let mut next = from;
-        for &mark in marks {
-            // Beyond the last tick that can be counted there is none: it is looked for in vain.
-            let tick = (start as u32).wrapping_add(self.scale.wrapping_mul(u32::from(mark)));
-            while self.ticks.get(next).is_some_and(|&other| other < tick) {
-                next += 1;
+        if let Some(second) = bits.marks.get(hidden + 1) {
+            let after = i64::from(second - bits.marks[hidden]);
+            if !self.seen.has(tick + after) {
+                return None;
             }
-            if self.ticks.get(next) != Some(&tick) {
-                return false;
-            }
-            self.places.push(next);
         }
-        self.cancelled.each(&self.places);
-        self.keep(shot, lag, marks.len());
-        true
+        let in_word = bits.marks.len() as u32;
+        let lit_bits = || self.sent.lit_from(shot, start);
+        if lit_bits().any(|bit| self.seen.lit_in(bit, &bits.pattern) < in_word) {
+            return None;
+        }
+        lit_bits().for_each(|bit| self.residual.put_out(bit, &bits.pattern));
+        Some(start)
     }
 
-    /// Keeps `lag`: of several surfaces the first one counts, the others are found again.
-    fn keep(&mut self, shot: usize, lag: i64, count: usize) {
-        let count = count as u32;
+    /// Keeps `shot`, which begins at `start`: of several surfaces the first one counts, the others are
+    /// found again.
+    fn keep(&mut self, shot: usize, start: i64) {
+        let sent = self.sent;
+        let (label, word) = (sent.log.label[shot], sent.log.word[shot]);
+        let (lag, count) = (start - sent.fired[shot], sent.weight(shot));
+        let margin = count - u32::from(sent.codebook.sidelobe(label, word));
+        let detection = Detection { lag, count, margin, is_sure: true };
+        if self.cancelled.detections[shot].get_or_insert(detection).lag != lag {
+            self.cancelled.again.push((shot, detection));
+        }
         self.next = shot + 1;
-        let (label, word) = (self.sent.log.label[shot], self.sent.log.word[shot]);
-        let margin = count - u32::from(self.sent.codebook.sidelobe(label, word));
-        let detection = Detection { lag, count, margin };
-        if self.detections[shot].get_or_insert(detection).lag != lag {
-            self.again.push((shot, detection));
-        }
+        self.patience += PATIENCE.1;
     }
 }
 
-/// Which ticks are cancelled, by their place in the list: one bit each.
-#[derive(Debug)]
-struct CancelledTicks {
-    words: Vec<u64>,
-    ticks: usize,
-}
-
-impl CancelledTicks {
-    fn new(ticks: usize) -> Self {
-        Self { words: vec![0; ticks / 64 + 1], ticks }
-    }
-
-    /// Whether any tick is cancelled.
-    fn any(&self) -> bool {
-        self.words.iter().any(|word| *word != 0)
-    }
-
-    /// Cancels `count` ticks from `first` on.
-    fn run(&mut self, first: usize, count: usize) {
-        let end = first + count;
-        let (from, to) = (first / 64, end / 64);
-        let (head, tail) = (u64::MAX << (first % 64), !(u64::MAX << (end % 64)));
-        if from == to {
-            self.words[from] |= head & tail;
-            return;
-        }
-        self.words[from] |= head;
-        self.words[from + 1..to].fill(u64::MAX);
-        self.words[to] |= tail;
-    }
-
-    /// Cancels the ticks at `places`.
-    fn each(&mut self, places: &[usize]) {
-        for place in places {
-            self.words[place / 64] |= 1 << (place % 64);
-        }
-    }
-
-    /// The first place from `place` on whose tick is not cancelled; the number of ticks if all
-    /// are.
-    fn next_without(&self, place: usize) -> usize {
-        let mut index = place / 64;
-        let mut others = !self.words[index.min(self.words.len() - 1)] & u64::MAX << (place % 64);
-        while others == 0 && index + 1 < self.words.len() {
-            index += 1;
-            others = !self.words[index];
-        }
-        (64 * index + others.trailing_zeros() as usize).min(self.ticks)
-    }
-
-    /// The ticks that are not cancelled.
-    fn residual(&self, ticks: &[u32]) -> Vec<u32> {
-        let mut residual = Vec::new();
-        for (ticks, cancelled) in ticks.chunks(64).zip(&self.words) {
-            let mut others = !cancelled;
-            while others != 0 {
-                let Some(&tick) = ticks.get(others.trailing_zeros() as usize) else { break };
-                residual.push(tick);
-                others &= others - 1;
-            }
-        }
-        residual
-    }
-}
+/// Macropulses that fit into the stretch of time that is laid down where they overlap.
+const ROOM: i64 = 16;

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use super::acquire::{Leftover, Source};
-use super::track::BLOCK;
+use super::acquire::Leftover;
+use super::track::WIDEST_GAP;
 use super::{Band, Detection, SURFACES};
+use crate::decode::field::Source;
 
 /// So many shots are passed by at most, where nothing was found, before the next one is searched for.
 const LONGEST_PAUSE: usize = 16;
@@ -55,99 +56,102 @@ impl Band<'_> {
         }
     }
 
-    /// Tracks the shots of a block, and acquires those that are no fainter than the others but were not
-    /// expected where they are.
+    /// Tracks the shots of a block from both sides, and acquires those that are no fainter than the
+    /// others but were not expected where they are.
     fn look_where_expected(&mut self, block: Range<usize>) {
         let (mut next, mut pause) = (block.start, 1);
         for shot in block.clone() {
-            if self.found[shot].is_some() || !self.is_open(shot) {
+            if !self.is_sought(shot) {
                 continue;
             }
-            let weight = self.sent.weight(shot);
-            let tracked = self.tracked(shot, false);
-            let is_bright = |found: &Detection| {
-                found.count >= self.usual.least(weight) || self.is_overwhelming(shot, *found)
-            };
-            if let Some(tracked) = tracked.filter(is_bright) {
-                self.keep(shot, tracked);
+            let tracked = self.tracked(shot, 1);
+            if let Some(bright) = tracked.filter(|found| self.is_bright(shot, *found)) {
+                self.keep(shot, bright);
                 (next, pause) = (shot + 1, 1);
-                continue;
-            }
-            if shot < next {
-                continue;
-            }
-            let half = self.usual.least(weight).min(weight.div_ceil(2));
-            let least = self.least_in_gate(shot).max(half);
-            let least = tracked.map_or(least, |tracked| least.max(tracked.count + 1));
-            let gate = self.sent.arrival(shot);
-            let leftover = Leftover::new(self.sent, &self.field, &gate);
-            let lags = leftover.lags((self.sent, shot), self.sent.reach(), least, true);
-            let acquired = self.nearest_first(shot, lags, least);
-            let acquired = acquired.filter(|found| self.stands_alone(shot, *found));
-            match acquired.or(tracked).filter(|found| self.is_believed(shot, *found)) {
-                Some(found) => {
-                    self.searched[shot] = true;
+            } else if shot >= next {
+                let found = self.acquire(shot, tracked, None);
+                if let Some(found) = found {
                     self.keep(shot, found);
-                    (next, pause) = (shot + 1, 1);
                 }
-                None => {
-                    (next, pause) = (shot + pause, (2 * pause).min(LONGEST_PAUSE));
-                }
+                (next, pause) = match found {
+                    Some(_) => (shot + 1, 1),
+                    None => (shot + pause, (2 * pause).min(LONGEST_PAUSE)),
+                };
             }
         }
         for shot in block.clone().rev() {
-            if self.found[shot].is_none()
-                && self.is_open(shot)
-                && let Some(found) = self.tracked(shot, false)
-                && found.count >= self.usual.least(self.sent.weight(shot))
+            if self.is_sought(shot)
+                && let Some(found) = self.tracked(shot, 1)
+                && self.is_usual(shot, found)
             {
                 self.keep(shot, found);
             }
         }
-        self.look_for_passed_by(block);
-    }
-
-    /// Searches for the shots of a block that were passed by: of those in flight together, all bright
-    /// ones must be known, as some that overlap would pass for a faint one.
-    fn look_for_passed_by(&mut self, block: Range<usize>) {
+        // Of those in flight together all bright ones must be known, as some that overlap would pass
+        // for a faint one: now those that were passed by.
+        if !block.clone().any(|shot| self.is_sought(shot)) {
+            return;
+        }
         let span = self.sent.arrival(block.start).start..self.sent.arrival(block.end - 1).end;
         let leftover = Leftover::new(self.sent, &self.field, &span);
         for shot in block {
-            if self.found[shot].is_some() || !self.is_open(shot) {
-                continue;
-            }
-            let around = shot.saturating_sub(2)..(shot + 3).min(self.found.len());
-            let is_even = self.found[around].iter().any(Option::is_some);
-            let least = self.least_in_gate(shot).max(self.sent.weight(shot).div_ceil(2));
-            let lags = leftover.lags((self.sent, shot), self.sent.reach(), least, is_even);
-            let found = self.nearest_first(shot, lags, least);
-            let found = found.filter(|found| self.stands_alone(shot, *found));
-            if let Some(found) = found.filter(|found| self.is_believed(shot, *found)) {
+            if self.is_sought(shot)
+                && let Some(found) = self.acquire(shot, None, Some(&leftover))
+            {
                 self.keep(shot, found);
             }
         }
     }
 
-    /// The peak that most marks of `shot` in the residual lead to, of the `lags` within its gate or, if
-    /// there are not `least`, beyond: light of a later shot, from near by, may pass for light of this
-    /// one from far away.
-    fn nearest_first(&mut self, shot: usize, lags: Range<i64>, least: u32) -> Option<Detection> {
-        let closes = self.sent.gate().end + self.sent.length();
-        let [near, far] = [lags.start..lags.end.min(closes), lags.start.max(closes)..lags.end];
-        let found = self.acquired(shot, Source::Residual, near, least);
-        found.or_else(|| self.acquired(shot, Source::Residual, far, least))
+    /// The most marks of `shot` that the residual leads to, if no fewer than usual or half of them and
+    /// more than were `tracked`, of the lags within its gate or else beyond: light of a later shot,
+    /// from near by, may pass for light of this one from far away.
+    fn acquire(
+        &mut self,
+        shot: usize,
+        tracked: Option<Detection>,
+        leftover: Option<&Leftover>,
+    ) -> Option<Detection> {
+        let sent = self.sent;
+        let weight = sent.weight(shot);
+        let bright = match leftover {
+            None => self.usual.least(weight).min(weight.div_ceil(2)),
+            Some(_) => weight.div_ceil(2),
+        };
+        let more = tracked.map_or(0, |tracked| tracked.count + 1);
+        let least = self.least_in_gate(shot).max(bright).max(more);
+        let around = shot.saturating_sub(2)..(shot + 3).min(self.found.len());
+        let is_even = leftover.is_none() || self.found[around].iter().any(Option::is_some);
+        let here;
+        let leftover = match leftover {
+            Some(leftover) => leftover,
+            None => {
+                here = Leftover::new(sent, &self.field, &sent.arrival(shot));
+                &here
+            }
+        };
+        let (reach, closes) = (sent.reach(), sent.gate().end + sent.length());
+        let parts = [reach.start..reach.end.min(closes), closes.max(reach.start)..reach.end];
+        let mut lags = std::mem::take(&mut self.lags);
+        // What comes from beyond must stand out.
+        let found = parts.into_iter().zip([is_even, false]).find_map(|(part, is_even)| {
+            leftover.lags((sent, shot), part, least, is_even, &mut lags);
+            let (lag, _) = self.maximum(shot, Source::Residual, &lags, least)?;
+            self.climb(shot, lag, 1)
+        });
+        self.lags = lags;
+        let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);
+        found.filter(|found| self.is_believed(shot, *found))
     }
 
     /// Takes the maximum over the gate for each shot of a block, and cancels the light of those that no
     /// fuller one accounts for.
     fn look_everywhere(&mut self, block: Range<usize>) {
         for shot in block.clone() {
-            if self.found[shot].is_some() || !self.is_open(shot) {
-                continue;
-            }
-            let least = self.least_in_gate(shot);
-            if let Some((lag, _)) = self.maximum(shot, Source::Seen, self.sent.gate(), least) {
-                let found = self.best_in_block(shot, lag).filter(|found| found.lag == lag);
+            if self.is_sought(shot) {
+                let least = self.least_in_gate(shot);
+                let found = self.maximum(shot, Source::Seen, &[self.sent.gate()], least);
+                let found = found.and_then(|(lag, _)| self.found_at(shot, lag));
                 self.found[shot] =
                     found.filter(|found| found.count >= self.by_chance(shot, *found));
             }
@@ -176,7 +180,7 @@ impl Band<'_> {
             }
         }
         for shot in shots.rev() {
-            if self.found[shot].is_none() && self.is_open(shot) {
+            if self.is_sought(shot) {
                 self.track_leftover(shot);
             }
         }
@@ -187,61 +191,56 @@ impl Band<'_> {
         if self.found[shot].is_none() && self.track_leftover(shot) {
             return true;
         }
-        if self.sent.wants_further() && self.track_further(shot) {
-            return true;
-        }
-        let (known, gate) = (self.found[shot], self.sent.gate());
-        let weight = self.sent.weight(shot);
-        let least = match known {
-            Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
-                if self.searched[shot] {
-                    return false;
-                }
-                known.count
+        let (known, gate, weight) = (self.found[shot], self.sent.gate(), self.sent.weight(shot));
+        let wants_further = self.sent.wants_further();
+        // Half of the marks may lie under ticks that are cancelled already, or a quarter of those that
+        // must replace another return.
+        let (least, visible) = match known {
+            Some(known) if !wants_further && gate.contains(&known.lag) => {
+                (known.count, known.count - known.count / 4)
             }
             // Of light from beyond the gate no more is wanted.
-            _ => self.least_in_gate(shot),
+            _ => {
+                let least = self.least_in_gate(shot);
+                (least, least.div_ceil(2))
+            }
         };
-        let is_even = self.sent.is_thorough() || shot >= self.next_even;
+        if leftover.is_empty_of(self.sent.ticks_of(shot, visible)) {
+            return false;
+        }
+        let may_be_even = known.is_none() && shot >= self.next_even;
+        let is_even = wants_further || self.sent.is_thorough() || may_be_even;
         if is_even {
             (self.next_even, self.pause) = (shot + self.pause, (2 * self.pause).min(LONGEST_EVEN));
         }
-        // Marks under ticks that are cancelled already are missing: half are taken to be visible, or
-        // three in four of what must replace another return.
-        let visible = match known {
-            Some(_) if !self.sent.wants_further() => least - least / 4,
-            _ => least.div_ceil(2),
+        let mut lags = std::mem::take(&mut self.lags);
+        let most = match leftover.lags((self.sent, shot), gate.clone(), visible, is_even, &mut lags)
+        {
+            true => {
+                let left = leftover.density(self.sent, shot, &gate);
+                let visible = self.thresholds.least(weight, left).max(visible);
+                self.maximum(shot, Source::Residual, &lags, visible)
+            }
+            false => None,
         };
-        let lags = leftover.lags((self.sent, shot), gate, visible, is_even);
-        if lags.is_empty() {
-            return false;
-        }
-        let left = leftover.density(self.sent, &self.sent.arrival(shot));
-        let visible = self.thresholds.least(weight, left).max(visible);
-        let lags = leftover.lags((self.sent, shot), lags, visible, is_even);
-        let Some((lag, _)) = self.maximum(shot, Source::Residual, lags, visible) else {
-            return false;
-        };
+        self.lags = lags;
+        let Some((lag, _)) = most else { return false };
         // What was found already may be higher, and near enough to be climbed to.
         let found = match known {
             None => self.climb(shot, lag, least),
             Some(_) => self.found_at(shot, lag),
         };
-        let Some(found) = found else {
-            self.cancel(shot, lag);
-            return true;
-        };
-        let is_new =
-            !self.is_known(shot, found.lag) && (known.is_some() || self.stands_alone(shot, found));
-        if !is_new || !self.is_believed(shot, found) {
-            self.cancel(shot, lag);
-            return true;
+        let is_new = |found: &Detection| !self.is_known(shot, found.lag);
+        let found = found.filter(is_new);
+        let found = found.filter(|found| known.is_some() || self.stands_alone(shot, *found));
+        let found = found.filter(|found| self.is_believed(shot, *found));
+        self.cancel(shot, found.map_or(lag, |found| found.lag));
+        if let Some(found) = found {
+            if known.is_none() {
+                (self.next_even, self.pause) = (shot, 1);
+            }
+            self.add_surface(shot, found);
         }
-        self.cancel(shot, found.lag);
-        if known.is_none() {
-            (self.next_even, self.pause) = (shot, 1);
-        }
-        self.add_surface(shot, found);
         true
     }
 
@@ -258,47 +257,20 @@ impl Band<'_> {
         self.further.push((shot, if is_better { known } else { found }));
     }
 
-    /// Looks for further surfaces of `shot` where its neighbours have any, in what is left over;
-    /// whether there is one.
-    fn track_further(&mut self, shot: usize) -> bool {
-        if self.found[shot].is_none() {
-            return false;
-        }
-        let beside = |other: usize| other.abs_diff(shot) == 1;
-        let mut lags: Vec<i64> = self
-            .further
-            .iter()
-            .filter(|(other, _)| beside(*other))
-            .flat_map(|(other, found)| [Some(found.lag), self.found[*other].map(|found| found.lag)])
-            .flatten()
-            .collect();
-        lags.sort_unstable();
-        lags.dedup();
-        let least = self.least_in_gate(shot);
-        for lag in lags {
-            let about = (lag - BLOCK / 2, &self.sent.gate());
-            let found = self.exactly(shot, Source::Residual, about);
-            let Some((lag, _)) = found.filter(|(_, count)| *count >= least.div_ceil(2)) else {
-                continue;
-            };
-            let Some(found) = self.found_at(shot, lag) else { continue };
-            if !self.is_known(shot, found.lag) && self.is_believed(shot, found) {
-                self.cancel(shot, found.lag);
-                self.add_surface(shot, found);
-                return true;
-            }
-        }
-        false
-    }
-
     /// Looks for `shot` about its neighbours, also farther ones, where light is left over.
     fn track_leftover(&mut self, shot: usize) -> bool {
-        let tracked = self.tracked(shot, true).filter(|found| self.is_believed(shot, *found));
+        let tracked = self.tracked(shot, WIDEST_GAP);
+        let tracked = tracked.filter(|found| self.is_believed(shot, *found));
         if let Some(found) = tracked {
             self.cancel(shot, found.lag);
             self.found[shot] = Some(found);
         }
         tracked.is_some()
+    }
+
+    /// Whether `shot` was not found yet, and may be.
+    fn is_sought(&self, shot: usize) -> bool {
+        self.found[shot].is_none() && self.is_open(shot)
     }
 
     /// Whether a surface of `shot` was found at `lag`.
@@ -308,9 +280,19 @@ impl Band<'_> {
             || self.further.iter().any(|(other, found)| *other == shot && is_here(*found))
     }
 
+    /// Whether as many marks were found as of the shots before.
+    pub(super) fn is_usual(&self, shot: usize, detection: Detection) -> bool {
+        detection.count >= self.usual.least(self.sent.weight(shot))
+    }
+
+    /// Whether as many marks were found as is usual, or so many that other light does not give them.
+    fn is_bright(&mut self, shot: usize, detection: Detection) -> bool {
+        self.is_usual(shot, detection) || self.is_overwhelming(shot, detection)
+    }
+
     /// Whether `detection` needs no other shot to be known to be believed: light of no other can arrive
-    /// then, or all its marks are there, or so many that chance does not give them where all light
-    /// around it is another shot's, its own marks too.
+    /// then, or all its marks are there, or so many that chance does not give them where all light around
+    /// it is another shot's, its own marks too.
     fn stands_alone(&mut self, shot: usize, detection: Detection) -> bool {
         let weight = self.sent.weight(shot);
         let light = self.sent.light(shot, detection.lag);
@@ -322,7 +304,7 @@ impl Band<'_> {
         if !beside.into_iter().flatten().any(arrives) || detection.count == weight {
             return true;
         }
-        let around = self.field.density(&light);
+        let around = self.field.density_without(&light, 0, 0);
         detection.count >= self.thresholds.least(weight, around)
     }
 

@@ -33,11 +33,12 @@ use std::ops::Range;
 
 use super::field::{self, Field};
 use super::threshold::Thresholds;
+use super::timeline::Timeline;
 use super::{Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
-use crate::kernels::Counts;
+use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
 use acquire::Search;
 use look::Usual;
@@ -87,6 +88,8 @@ struct Detection {
     count: u32,
     /// The same less those at the best other lag that was looked at.
     margin: u32,
+    /// Whether light of other shots does not give so many.
+    is_sure: bool,
 }
 
 /// Of which shots light may be found that was not cancelled to begin with.
@@ -111,8 +114,6 @@ struct Band<'a> {
     found: Vec<Option<Detection>>,
     /// Other surfaces of the shots at hand.
     further: Vec<(usize, Detection)>,
-    /// Whether all of the gate was searched for more marks than were found.
-    searched: Vec<bool>,
     /// For all lags of a gate.
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
@@ -127,11 +128,15 @@ struct Band<'a> {
     next_even: usize,
     pause: usize,
     /// Counts of the block of lags that was looked at last.
-    counts: Counts,
+    counts: Counts<NARROW>,
+    /// Memory for the marks of a macropulse, and for lags that are searched.
+    places: Vec<u32>,
+    lags: Vec<Range<i64>>,
     search: Search,
     photons: Photons,
-    /// Memory for the residual of a macropulse.
-    words: Vec<u64>,
+    /// Memory for the residual of a macropulse, and for the marks found in each of its bits.
+    residual: Timeline,
+    found_in_bits: Vec<u32>,
 }
 
 impl<'a> Band<'a> {
@@ -175,7 +180,6 @@ impl<'a> Band<'a> {
             open,
             above,
             left,
-            searched: vec![false; found.len()],
             found,
             further,
             thresholds,
@@ -186,9 +190,12 @@ impl<'a> Band<'a> {
             next_even: 0,
             pause: 1,
             counts: Counts::default(),
+            places: Vec::new(),
+            lags: Vec::new(),
             search: memory.search,
             photons: memory.photons,
-            words: Vec::new(),
+            residual: Timeline::default(),
+            found_in_bits: Vec::new(),
             sent,
         }
     }
@@ -279,31 +286,30 @@ impl<'a> Band<'a> {
     /// Keeps `detection` and cancels its ticks.
     fn keep(&mut self, shot: usize, detection: Detection) {
         self.cancel(shot, detection.lag);
-        self.found[shot] = Some(detection);
+        let is_sure = self.is_usual(shot, detection) && self.is_overwhelming(shot, detection);
+        self.found[shot] = Some(Detection { is_sure, ..detection });
         self.usual.learn(detection.count, self.sent.weight(shot));
     }
 
     /// Cancels the ticks of `shot` at `lag`.
     fn cancel(&mut self, shot: usize, lag: i64) {
-        let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
-        let light = self.sent.light(shot, lag);
-        let starts = self.sent.lit_from(shot, light.start - farther);
-        self.field.cancel(starts, pattern, light.start - farther..light.end + farther);
+        let start = self.sent.fired[shot] + lag - self.sent.farther();
+        self.field.cancel(self.sent.lit_from(shot, start), &self.sent.bits(shot).cancelled);
         self.search.grow_stale();
     }
 
-    /// Ticks where marks of `shot` may be that come from within the gate, and the share of places that
-    /// each of them lights.
+    /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of
+    /// places that each of them lights.
     fn in_gate(&self, shot: usize) -> (u32, f64) {
         let (gate, fired) = (self.sent.gate(), self.sent.fired[shot]);
         let span = fired + gate.start..fired + gate.end + self.sent.length();
-        let places = (span.end - span.start).max(1) as f64;
-        (self.field.ticks_in(&span), f64::from(self.sent.width) / places)
+        let (ticks, places) = self.field.ticks_about(&span);
+        (ticks, f64::from(self.sent.width) / places.max(1) as f64)
     }
 
     /// Share of places that are lit in the gate of `shot` by other ticks than so many of its marks;
     /// one more, so that few ticks do not tell that it is darker than can be known.
-    fn density_beyond(&self, shot: usize, count: u32) -> f64 {
+    fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
         let (ticks, share) = self.in_gate(shot);
         (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
     }
@@ -348,7 +354,7 @@ impl<'a> Band<'a> {
     fn density_about(&self, shot: usize, detection: Detection, own: u32) -> f64 {
         let sent = self.sent;
         let (light, places) = (sent.light(shot, detection.lag), sent.weight(shot) * sent.width);
-        let gate = self.density_beyond(shot, own);
+        let gate = self.density_in_gate(shot, own);
         let beside = self.field.density_without(&light, own, places);
         let ticks = (light.end - light.start) as f64 / f64::from(sent.width);
         match (beside - gate) * ticks > 3.0 * (gate * ticks + 1.0).sqrt() {

@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::ops::Range;
 
 use super::Detection;
+use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook};
 use crate::decode::{Effort, FARTHEST_JITTER, Pick, Receiver};
@@ -38,6 +39,9 @@ pub(super) struct Bits {
     /// The places at which a mark counts as found because of it, from twice that and a window
     /// before its start on.
     pub claimed: Pattern,
+    /// The first marks and the last ones, no farther apart than the lags beside a block, and how many
+    /// these are.
+    pub ends: [(u32, Pattern); 2],
     /// Most marks that one tick may count for.
     pub per_tick: u32,
     /// Marks that a tick may count for besides an earlier one.
@@ -73,9 +77,19 @@ impl<'a> Sent<'a> {
                 |width: u32| Pattern::new(marks.iter().map(|&mark| mark as usize), width as usize);
             let cancelled = self.width + 2 * self.farther() as u32;
             let chips = self.width.div_ceil(scale.max(1));
+            let (first, last) = (marks.first().copied(), marks.last().copied());
+            let of_end = |is_at_end: &dyn Fn(u32) -> bool| {
+                let marks = marks.iter().filter(|mark| is_at_end(**mark));
+                (marks.clone().count() as u32, Pattern::new(marks.map(|mark| *mark as usize), 1))
+            };
+            let ends = [
+                of_end(&|mark| first.is_some_and(|first| i64::from(mark - first) < NEAREST_SIDE)),
+                of_end(&|mark| last.is_some_and(|last| i64::from(last - mark) < NEAREST_SIDE)),
+            ];
             Bits {
                 per_tick: crowding(self.codebook.word(word), chips),
                 shared: shared(self.codebook.word(word), chips),
+                ends,
                 pattern: pattern(1),
                 cancelled: pattern(cancelled),
                 claimed: pattern(cancelled + self.width - 1),
@@ -90,19 +104,14 @@ impl<'a> Sent<'a> {
         i64::from(self.width / 2)
     }
 
-    /// The lit chips of `shot`.
-    pub fn marks(&self, shot: usize) -> &'a [u16] {
-        self.codebook.marks(self.log.label[shot], self.log.word[shot])
-    }
-
     /// Number of marks of `shot`.
     pub fn weight(&self, shot: usize) -> u32 {
-        (self.lit_bits(shot).len() * self.in_word(shot)) as u32
+        self.lit_bits(shot).len() as u32 * self.in_word(shot)
     }
 
     /// Marks of the code word of `shot`.
-    pub fn in_word(&self, shot: usize) -> usize {
-        self.codebook.word(self.log.word[shot]).marks.len()
+    pub fn in_word(&self, shot: usize) -> u32 {
+        self.codebook.word(self.log.word[shot]).marks.len() as u32
     }
 
     /// The first chip of each lit bit of `shot`.
@@ -116,12 +125,18 @@ impl<'a> Sent<'a> {
         self.lit_bits(shot).iter().map(move |&bit| start + scale * i64::from(bit))
     }
 
-    /// The same of each dark bit.
-    pub fn dark_from(&self, shot: usize, start: i64) -> impl Iterator<Item = i64> + use<'a> {
-        let (length, lit) = (self.bit_length(), self.lit_bits(shot));
-        let chips = length / self.scale();
-        let is_dark = move |bit: &i64| !lit.contains(&((bit * chips) as u32));
-        (0..self.bits_of_payload()).filter(is_dark).map(move |bit| start + bit * length)
+    /// Puts into `after` the ticks from the start of a macropulse of `shot` to each bit of it that is
+    /// lit, or dark.
+    pub fn bits_that_are(&self, is_lit: bool, shot: usize, after: &mut Vec<u32>) {
+        let (scale, lit) = (self.receiver.ticks_per_chip, self.lit_bits(shot));
+        after.clear();
+        if is_lit {
+            after.extend(lit.iter().map(|bit| scale * bit));
+            return;
+        }
+        let chips = self.codebook.chips() / self.bits_of_payload() as u32;
+        let all = (0..self.bits_of_payload() as u32).map(|bit| bit * chips);
+        after.extend(all.filter(|bit| !lit.contains(bit)).map(|bit| scale * bit));
     }
 
     /// Ticks per chip.
@@ -187,12 +202,12 @@ impl<'a> Sent<'a> {
         self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
     }
 
-    /// Whether a larger share of the marks was found of one shot than of another one.
-    pub fn is_fuller(&self, one: (usize, Detection), other: (usize, Detection)) -> bool {
+    /// Whether no smaller share of the marks was found of one shot than of another one.
+    pub fn is_as_full(&self, one: (usize, Detection), other: (usize, Detection)) -> bool {
         let crossed = |(_, detection): (usize, Detection), (shot, _): (usize, Detection)| {
             u64::from(detection.count) * u64::from(self.weight(shot))
         };
-        crossed(one, other) > crossed(other, one)
+        crossed(one, other) >= crossed(other, one)
     }
 }
 

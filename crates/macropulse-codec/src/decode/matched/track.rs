@@ -2,23 +2,32 @@
 
 use super::sent::Sent;
 use super::{Band, Detection};
-use crate::kernels::{BLOCK_WORDS, Block, is_dark};
+use crate::kernels::{NARROW, is_dark};
 
 /// Lags that are counted at once.
-pub(super) const BLOCK: i64 = 64 * BLOCK_WORDS as i64;
+pub(super) const BLOCK: i64 = 64 * NARROW as i64;
 
-/// How far from a peak the lags to both sides are seen with it, at least: a peak nearer to an end
-/// of its block is looked at again in the middle of one.
-const NEAREST_SIDE: i64 = BLOCK / 2 - BLOCK / 8;
+/// A peak farther from the middle of its block than this is looked at again in the middle of one.
+const CENTRED: i64 = BLOCK / 4;
+
+/// The lags to both sides of a peak that are always seen with it.
+pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - CENTRED;
+
+/// Blocks to each side of a peak in which a higher one is looked for: with the one of the peak they
+/// hold all sidelobes of words of up to 832 ticks.
+const SIDES: i64 = 3;
+
+/// A peak so near to where it was expected is no sidelobe of one elsewhere.
+const SAME: u64 = 4;
 
 /// Where light is faint, a shot is looked for near one that was found so many shots away.
-const WIDEST_GAP: usize = 12;
+pub(super) const WIDEST_GAP: usize = 12;
 
 impl Band<'_> {
-    /// The lags at which `shot` is to be expected, after its neighbours: on the plane through
-    /// three of them, on the lines through two, and at the lag of one, which may be so many shots
-    /// away.
-    fn expected(&self, shot: usize, gap: usize) -> [Option<i64>; 7] {
+    /// The lag at which `shot` is to be expected after its neighbours, in so many ways: on the lines
+    /// through two of them and the plane through three, and at the lag of one, which may be `gap`
+    /// shots away.
+    fn expected(&self, shot: usize, gap: usize, way: usize) -> Option<i64> {
         let at = |shot: Option<usize>| Some(self.found.get(shot?)?.as_ref()?.lag);
         let beside = |of: &[Option<u32>], shot: Option<usize>| {
             of.get(shot?).copied().flatten().map(|shot| shot as usize)
@@ -26,36 +35,38 @@ impl Band<'_> {
         let left_of = |shot| beside(&self.left, shot);
         let over = |shot| beside(&self.above, shot);
         let here = Some(shot);
-        let (left, above) = (at(left_of(here)), at(over(here)));
-        let across = || Some(2 * left? - at(left_of(left_of(here)))?);
-        let back = || Some(2 * at(Some(shot + 1))? - at(Some(shot + 2))?);
-        let plane = || Some(left? + above? - at(over(left_of(here)))?);
-        let before = || (1..=gap).find_map(|away| at(shot.checked_sub(away)));
-        let nearest_left = || left.or_else(before);
-        let nearest_right = || (1..=gap).find_map(|away| at(Some(shot + away)));
-        let down = || Some(2 * above? - at(over(over(here)))?);
-        [across(), nearest_left(), plane(), above, nearest_right(), back(), down()]
+        let left = || at(left_of(here));
+        let above = || at(over(here));
+        match way {
+            0 => Some(2 * left()? - at(left_of(left_of(here)))?),
+            1 => left().or_else(|| (1..=gap).find_map(|away| at(shot.checked_sub(away)))),
+            2 => Some(left()? + above()? - at(over(left_of(here)))?),
+            3 => above(),
+            4 => (1..=gap).find_map(|away| at(Some(shot + away))),
+            5 => Some(2 * at(Some(shot + 1))? - at(Some(shot + 2))?),
+            _ => Some(2 * above()? - at(over(over(here)))?),
+        }
     }
 
-    /// The best peak that chance does not give about the lags at which `shot` is to be expected. The
-    /// first one at which as many marks are found as is usual is taken.
-    pub(super) fn tracked(&mut self, shot: usize, is_faint: bool) -> Option<Detection> {
-        let expected = self.expected(shot, if is_faint { WIDEST_GAP } else { 1 });
-        if expected.iter().all(Option::is_none) {
-            return None;
-        }
+    /// The best peak that chance does not give about the lags at which `shot` is to be expected, one
+    /// of its neighbours at most `gap` shots away. The first one at which as many marks are found as
+    /// is usual is taken.
+    pub(super) fn tracked(&mut self, shot: usize, gap: usize) -> Option<Detection> {
         let weight = self.sent.weight(shot);
-        let (usual, least) = (self.usual.least(weight), self.least_in_gate(shot));
+        let usual = self.usual.least(weight);
+        // Fewer are nowhere believed.
+        let least = self.thresholds.least(weight, self.density_in_gate(shot, weight));
+        // A sidelobe of a peak just outside would show half as many marks as the peak.
+        let least = if gap > 1 { least } else { least.max(usual / 2) };
         let mut best: Option<Detection> = None;
-        for (index, lag) in expected.iter().enumerate() {
-            let Some(lag) = *lag else { continue };
-            let mut tried = expected[..index].iter().flatten();
-            if tried.any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
+        let mut tried = [i64::MIN; 7];
+        for way in 0..tried.len() {
+            let Some(lag) = self.expected(shot, gap, way) else { continue };
+            if tried[..way].iter().any(|other| lag.abs_diff(*other) < CENTRED as u64) {
                 continue;
             }
-            // A sidelobe of a peak just outside would show half as many marks as the peak.
-            let at_least = if is_faint { least } else { least.max(usual / 2) };
-            let Some(peak) = self.climb(shot, lag, at_least) else { continue };
+            tried[way] = lag;
+            let Some(peak) = self.climb(shot, lag, least) else { continue };
             if best.is_none_or(|best| peak.count > best.count)
                 && peak.count >= self.by_chance(shot, peak)
                 && !self.is_of_a_later_shot(shot, peak)
@@ -82,24 +93,35 @@ impl Band<'_> {
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
-            if best.lag.abs_diff(middle) > BLOCK as u64 / 8 {
+            if best.lag.abs_diff(middle) > CENTRED as u64 {
                 middle = best.lag;
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
-            let is_certain = best.count >= usual && self.both_ends_are_lit(shot, best.lag);
-            if best.count == weight || is_certain || self.sent.length() <= NEAREST_SIDE {
+            let is_certain = best.count >= usual
+                && (best.lag.abs_diff(lag) <= SAME || self.both_ends_are_lit(shot, best.lag));
+            if best.count == weight || is_certain {
                 break;
             }
-            let sides = [middle - BLOCK, middle + BLOCK];
-            let sides = sides.map(|side| self.best_in_block(shot, side));
-            let higher = sides.into_iter().flatten().find(|side| {
-                side.count > best.count || (side.count == best.count && side.lag < best.lag)
-            });
-            match higher.or_else(|| self.whole_bits_away(shot, best)) {
-                Some(side) => best = side,
-                None => break,
+            let word = self.sent.bit_length();
+            let sides = (1..=SIDES).filter(|side| side * BLOCK - BLOCK / 2 < word);
+            let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
+            let mut higher = best;
+            for side in sides {
+                let peak = self.best_in_block(shot, side);
+                let is_higher = |peak: &Detection| {
+                    peak.count > higher.count
+                        || (peak.count == higher.count && peak.lag < higher.lag)
+                };
+                higher = peak.filter(is_higher).unwrap_or(higher);
             }
+            if higher.lag == best.lag {
+                match self.whole_bits_away(shot, best) {
+                    Some(away) => higher = away,
+                    None => break,
+                }
+            }
+            best = higher;
         }
         Some(best)
     }
@@ -109,61 +131,58 @@ impl Band<'_> {
     fn whole_bits_away(&mut self, shot: usize, detection: Detection) -> Option<Detection> {
         let sent = self.sent;
         let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
-        let reach = sent.reach();
-        let start = sent.fired[shot] + detection.lag;
-        let pattern = &sent.bits(shot).pattern;
-        let lit = self.field.lit();
-        let found: Vec<u32> =
-            (-bits..2 * bits).map(|bit| lit.lit_in(start + bit * length, pattern)).collect();
-        let mut best = (detection.count, None);
-        for away in -bits..=bits {
-            let lag = detection.lag + away * length;
-            if !reach.contains(&lag) {
-                continue;
-            }
-            let bits = sent.lit_from(shot, 0).map(|bit| (bits + away + bit / length) as usize);
-            let count = bits.filter_map(|bit| found.get(bit)).sum();
-            if count > best.0 {
-                best = (count, Some(lag));
-            }
+        if bits == 1 {
+            return None;
         }
-        best.1.and_then(|lag| self.best_in_block(shot, lag))
+        let start = sent.fired[shot] + detection.lag - bits * length;
+        let each: Vec<u32> = (0..3 * bits).map(|bit| (bit * length) as u32).collect();
+        let mut found = Vec::new();
+        self.field.lit().lit_in_each(start, &each, &sent.bits(shot).pattern, &mut found);
+        let count = |away: i64| {
+            let bits = sent.lit_from(shot, 0).map(|bit| (bits + away + bit / length) as usize);
+            bits.filter_map(|bit| found.get(bit)).sum::<u32>()
+        };
+        let reach = sent.reach();
+        let lags = (-bits..=bits).map(|away| (count(away), detection.lag + away * length));
+        let higher = lags.filter(|(count, lag)| *count > detection.count && reach.contains(lag));
+        let (_, lag) = higher.max_by_key(|(count, lag)| (*count, -lag))?;
+        self.best_in_block(shot, lag)
     }
 
     /// The highest peak in the [`BLOCK`] around `middle`.
     pub(super) fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
-        let allowed = self.count_about(shot, middle)?;
-        let (at, count) = self.counts.highest(allowed)?;
-        Some(self.detection(middle, (at, count), allowed))
+        self.best_of(shot, middle, [u64::MAX; NARROW])
     }
 
     /// What is found of `shot` at exactly `lag`.
     pub(super) fn found_at(&mut self, shot: usize, lag: i64) -> Option<Detection> {
-        let allowed = self.count_about(shot, lag)?;
-        let at = (BLOCK / 2) as u32;
-        Some(self.detection(lag, (at, self.counts.at(at)), allowed))
+        let mut only = [0; NARROW];
+        only[NARROW / 2] = 1;
+        self.best_of(shot, lag, only)
     }
 
-    /// Counts the marks found of `shot` in the [`BLOCK`] around lag `middle`; the lags that are looked
-    /// at, if there are any.
-    fn count_about(&mut self, shot: usize, middle: i64) -> Option<Block> {
-        let first = middle - BLOCK / 2;
-        let allowed = lags_allowed(self.sent, first)?;
-        let places = &mut self.search.places;
+    /// The highest peak among the `wanted` lags of the block around `middle`.
+    fn best_of(&mut self, shot: usize, middle: i64, wanted: [u64; NARROW]) -> Option<Detection> {
+        let (first, reach) = (middle - BLOCK / 2, self.sent.reach());
+        let allowed = below(reach.start - first, [u64::MAX; NARROW], false);
+        let allowed = below(reach.end - first, allowed, true);
+        if is_dark(&allowed) {
+            return None;
+        }
         let (words, begin) = self.field.lit().at(self.sent.fired[shot] + first);
-        places_of(self.sent, shot, places);
+        places_of(self.sent, shot, &mut self.places);
         self.counts.clear();
-        self.counts.add(words, begin as u32, places);
-        Some(allowed)
-    }
-
-    /// The detection with so many marks at a place of the block around `middle`.
-    fn detection(&self, middle: i64, (at, count): (u32, u32), allowed: Block) -> Detection {
-        let plateau = between(i64::from(at), self.sent.width.into());
-        let others = std::array::from_fn(|lane| allowed[lane] & !plateau[lane]);
+        let farthest = self.places.last().copied().unwrap_or(0);
+        self.counts.add(words, begin as u32, &self.places, farthest);
+        let of_both = std::array::from_fn(|lane| allowed[lane] & wanted[lane]);
+        let (at, count) = self.counts.highest(of_both)?;
+        let (at, width) = (i64::from(at), i64::from(self.sent.width));
+        let before = below(at - width, allowed, true);
+        let behind = below(at + width + 1, allowed, false);
+        let others = std::array::from_fn(|lane| before[lane] | behind[lane]);
         let next = self.counts.highest(others).map_or(0, |(_, count)| count);
-        let lag = middle - BLOCK / 2 + i64::from(at);
-        Detection { lag, count, margin: count.saturating_sub(next) }
+        let margin = count.saturating_sub(next);
+        Some(Detection { lag: first + at, count, margin, is_sure: false })
     }
 
     /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.
@@ -171,20 +190,14 @@ impl Band<'_> {
     /// have nothing to fall upon, and only chance could light them.
     fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
         let sent = self.sent;
-        let marks = &sent.bits(shot).marks;
         let start = sent.fired[shot] + lag;
         let mut bits = sent.lit_from(shot, start);
-        let (Some(first), Some(last)) = (marks.first(), marks.last()) else { return false };
-        let Some(first_bit) = bits.next() else { return false };
-        let last_bit = bits.last().unwrap_or(first_bit);
-        let side = NEAREST_SIDE as u32;
-        let begins = &marks[..marks.partition_point(|mark| mark - first < side)];
-        let ends = &marks[marks.partition_point(|mark| last - mark >= side)..];
-        let density = self.field.density(&sent.light(shot, lag));
-        [(first_bit, begins), (last_bit, ends)].into_iter().all(|(bit, marks)| {
-            let lit = self.field.lit();
-            let found = marks.iter().filter(|mark| lit.has(bit + i64::from(**mark))).count();
-            found as u32 >= self.end_thresholds.least(marks.len() as u32, density)
+        let Some(first) = bits.next() else { return false };
+        let last = bits.last().unwrap_or(first);
+        let density = self.field.density_without(&sent.light(shot, lag), 0, 0);
+        [first, last].into_iter().zip(&sent.bits(shot).ends).all(|(bit, (marks, pattern))| {
+            let found = self.field.lit().lit_in(bit, pattern);
+            found >= self.end_thresholds.least(*marks, density)
         })
     }
 }
@@ -198,17 +211,8 @@ pub(super) fn places_of(sent: &Sent, shot: usize, places: &mut Vec<u32>) {
     }
 }
 
-/// The lags at which light is looked for among those of the block that begins with lag `first`; `None` if there
-/// are none.
-pub(super) fn lags_allowed(sent: &Sent, first: i64) -> Option<Block> {
-    let reach = sent.reach();
-    let allowed = below(reach.start - first, [u64::MAX; BLOCK_WORDS], false);
-    let allowed = below(reach.end - first, allowed, true);
-    (!is_dark(&allowed)).then_some(allowed)
-}
-
 /// Those of `lags` that are below `end`, or those that are not.
-pub(super) fn below(end: i64, lags: Block, wanted: bool) -> Block {
+pub(super) fn below<const W: usize>(end: i64, lags: [u64; W], wanted: bool) -> [u64; W] {
     std::array::from_fn(|lane| {
         let below = match (end - 64 * lane as i64).clamp(0, 64) {
             64 => u64::MAX,
@@ -216,10 +220,4 @@ pub(super) fn below(end: i64, lags: Block, wanted: bool) -> Block {
         };
         lags[lane] & if wanted { below } else { !below }
     })
-}
-
-/// The lags of a block that are no farther than `plateau` from lag `at` of it.
-fn between(at: i64, plateau: i64) -> Block {
-    let from = below(at - plateau, [u64::MAX; BLOCK_WORDS], false);
-    below(at + plateau + 1, from, true)
 }

@@ -3,33 +3,52 @@
 use std::ops::Range;
 
 use super::{Band, Detection};
+use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
 use crate::decode::{Reject, Return, Returns, Strength, photons_per_mark};
-use crate::kernels::lit_in;
 use crate::time;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
     pub(super) fn settle(&mut self, shots: Range<usize>, returns: &mut Returns) {
         let owned = self.sent.log.owned.clone();
+        let mut surfaces = Vec::new();
+        self.further.sort_by_key(|(shot, _)| *shot);
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
             let Some(first) = self.found[shot] else {
                 returns.reject(Reject::NoPeak);
                 continue;
             };
-            let is_whole = first.count == self.sent.weight(shot);
-            if is_whole
-                && self.sent.gate().contains(&first.lag)
-                && !self.further.iter().any(|(other, _)| *other == shot)
-            {
-                if self.is_open(shot) && !self.carries_its_label(shot, first) {
-                    returns.reject(Reject::LabelMismatch);
-                } else {
-                    returns.push(self.measured(shot, first));
-                }
+            surfaces.push(first);
+            let further = self.further.partition_point(|(other, _)| *other < shot)..;
+            let further = self.further[further].iter().take_while(|(other, _)| *other == shot);
+            surfaces.extend(further.map(|(_, surface)| surface));
+            if surfaces.len() > 1 {
+                surfaces.sort_by_key(|surface| (u32::MAX - surface.count, surface.lag));
+            }
+            let mut why = None;
+            surfaces.retain(|surface| {
+                let wrong = self.what_is_wrong(shot, *surface);
+                why = why.or(wrong);
+                wrong.is_none()
+            });
+            if surfaces.is_empty() {
+                // Light of others claims nothing.
+                self.found[shot] = self.found[shot].filter(|_| why != Some(Reject::NoPeak));
+                returns.reject(why.unwrap_or(Reject::NoPeak));
                 continue;
             }
-            self.settle_doubtful(shot, first, returns);
+            if surfaces.len() > 1 {
+                surfaces.sort_by_key(|surface| surface.lag);
+                let receiver = self.sent.receiver;
+                // Of one shot, as many marks are as much light.
+                let strength =
+                    |surface: &Detection| Strength { peak: surface.count as u16, light: f32::NAN };
+                receiver.pick.keep(receiver.returns.into(), &mut surfaces, strength);
+            }
+            for surface in surfaces.drain(..) {
+                returns.push(self.measured(shot, surface));
+            }
         }
         if self.further.is_empty() {
             return;
@@ -39,41 +58,20 @@ impl Band<'_> {
         self.further.retain(|(shot, _)| *shot >= oldest);
     }
 
-    /// The same of a shot of which not all marks, or several surfaces, were found.
-    fn settle_doubtful(&mut self, shot: usize, first: Detection, returns: &mut Returns) {
-        let mut surfaces = vec![first];
-        surfaces.extend(self.further.iter().filter(|(other, _)| *other == shot).map(|(_, d)| d));
-        surfaces.sort_by_key(|surface| (u32::MAX - surface.count, surface.lag));
-        let gate = self.sent.gate();
-        let mut why = match gate.contains(&first.lag) {
-            true => Reject::NoPeak,
-            false => Reject::OutsideGate,
-        };
-        surfaces.retain(|surface| gate.contains(&surface.lag));
-        let mut kept: Vec<Detection> = Vec::with_capacity(surfaces.len());
-        for surface in surfaces {
-            if !self.is_its_own(shot, surface) {
-                continue;
-            }
-            if !self.carries_its_label(shot, surface) {
-                why = Reject::LabelMismatch;
-                continue;
-            }
-            kept.push(surface);
+    /// Why a `surface` of `shot` gives no return, if it does not.
+    fn what_is_wrong(&mut self, shot: usize, surface: Detection) -> Option<Reject> {
+        if !self.sent.gate().contains(&surface.lag) {
+            return Some(Reject::OutsideGate);
         }
-        if kept.is_empty() {
-            returns.reject(why);
-            return;
+        // Where all light was cancelled, it was as macropulses without a gap.
+        let is_clear = !self.is_open(shot) && surface.count == self.sent.weight(shot);
+        if is_clear {
+            return None;
         }
-        kept.sort_by_key(|surface| surface.lag);
-        let receiver = self.sent.receiver;
-        // Of one shot, as many marks are as much light.
-        let strength =
-            |surface: &Detection| Strength { peak: surface.count as u16, light: f32::NAN };
-        receiver.pick.keep(receiver.returns.into(), &mut kept, strength);
-        for surface in kept {
-            returns.push(self.measured(shot, surface));
+        if !surface.is_sure && !self.is_its_own(shot, surface) {
+            return Some(Reject::NoPeak);
         }
+        (!self.carries_its_label(shot, surface)).then_some(Reject::LabelMismatch)
     }
 
     /// Whether half of its marks are found of `shot`, and twice what chance gives: chance finds most
@@ -93,15 +91,10 @@ impl Band<'_> {
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let weight = sent.weight(shot);
-        // A macropulse of which no mark is missing accounts for itself.
-        if detection.count == weight {
-            return true;
-        }
         let is_other = |found: &Detection| found.lag != detection.lag;
         let of_shot = self.found[shot].is_some_and(|found| is_other(&found))
             || self.further.iter().any(|(other, found)| *other == shot && is_other(found));
-        let is_usual = detection.count >= self.usual.least(weight);
-        if !of_shot && is_usual && self.is_overwhelming(shot, detection) {
+        if !of_shot && self.is_usual(shot, detection) && self.is_overwhelming(shot, detection) {
             return true;
         }
         if !self.is_spread(shot, detection) {
@@ -115,7 +108,10 @@ impl Band<'_> {
         claimed.clear_all(stretch.start - before, stretch.end - stretch.start + before);
         let mut is_claimed = false;
         let fuller = self.overlapping(light.clone());
-        let fuller = fuller.filter(|found| sent.is_fuller(*found, (shot, detection)));
+        let is_itself =
+            |found: &(usize, Detection)| found.0 == shot && found.1.lag == detection.lag;
+        let fuller =
+            fuller.filter(|found| !is_itself(found) && sent.is_as_full(*found, (shot, detection)));
         let beyond = self.light_from_beyond(shot, light.start, detection.count);
         for (other, theirs) in fuller.chain(beyond) {
             is_claimed = true;
@@ -150,7 +146,7 @@ impl Band<'_> {
         }
         let chance = places
             .map(|[all, lit, marks]| f64::from(marks) * f64::from(lit) / f64::from(all.max(1)));
-        let gate = self.density_beyond(shot, detection.count);
+        let gate = self.density_in_gate(shot, detection.count);
         let density = gate.max((chance[0] + chance[1]) / f64::from(weight));
         detection.count >= self.thresholds.least(weight, density)
     }
@@ -172,7 +168,7 @@ impl Band<'_> {
             |mark: &&u32| sent.lit_from(shot, start).any(|bit| lit.has(bit + i64::from(**mark)));
         let found = sent.bits(shot).marks.iter().filter(is_found).count() as f64;
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
-        let (word, any) = (sent.in_word(shot) as f64, 1.0 - (1.0 - share).powi(bits as i32));
+        let (word, any) = (f64::from(sent.in_word(shot)), 1.0 - (1.0 - share).powi(bits as i32));
         found >= word * any - 3.0 * (word * any * (1.0 - any)).sqrt()
     }
 
@@ -223,7 +219,10 @@ impl Band<'_> {
                 let lag = begins - sent.fired[other];
                 if lags.contains(&lag) {
                     let marks = sent.lit_from(other, begins).map(|bit| lit.lit_in(bit, pattern));
-                    found.push((other, Detection { lag, count: marks.sum(), margin: 0 }));
+                    found.push((
+                        other,
+                        Detection { lag, count: marks.sum(), margin: 0, is_sure: false },
+                    ));
                 }
             }
         }
@@ -260,65 +259,45 @@ impl Band<'_> {
     }
 
     /// Share of lit places around a shot found at `detection`, its own marks apart.
-    pub(super) fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
+    fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
         let places = self.sent.weight(shot) * self.sent.width;
         self.field.density_without(&self.sent.light(shot, detection.lag), detection.count, places)
     }
 
     /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
     ///
-    /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it; only
-    /// the residual counts, as other shots may well shine there. Lit bits must be as bright as each
-    /// other.
-    pub(super) fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
-        let lit = self.sent.lit_bits(shot).len() as f64;
-        let mean = f64::from(detection.count) / lit;
-        self.lit_bits_are_lit(shot, detection, mean)
-            && self.dark_bits_are_dark(shot, detection, mean)
-    }
-
-    /// Whether the lit bits of `shot` are as bright as each other, but for chance.
-    ///
-    /// Of W marks a share q is found in each of B bits; χ² = Σ(n − W·q)²/(W·q·(1 − q)) over the counts
-    /// n has B − 1 degrees of freedom. Light of another label lights some of the bits and leaves
-    /// others dark.
-    fn lit_bits_are_lit(&self, shot: usize, detection: Detection, mean: f64) -> bool {
+    /// Of W marks a share q is found in each of B lit bits; χ² = Σ(n − W·q)²/(W·q·(1 − q)) over the
+    /// counts n has B − 1 degrees of freedom, and chance does not exceed it: light of another label
+    /// lights some of the bits and leaves others dark. A dark bit is lit if it has half the marks of a
+    /// lit one and more than chance gives it; only the residual counts, as other shots may well shine
+    /// there.
+    fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
-        let in_word = sent.in_word(shot) as f64;
-        // Not so many marks are missing altogether.
-        let missing = f64::from(sent.weight(shot) - detection.count);
-        if missing < in_word - mean / 2.0 {
+        if sent.bits_of_payload() == 1 {
             return true;
         }
-        let start = sent.fired[shot] + detection.lag;
-        let pattern = &sent.bits(shot).pattern;
-        let found = sent.lit_from(shot, start).map(|bit| self.field.lit().lit_in(bit, pattern));
-        let squares: f64 = found.map(|found| (f64::from(found) - mean).powi(2)).sum();
-        let degrees = sent.lit_bits(shot).len() as f64 - 1.0;
-        squares <= chi_square(degrees, self.rare) * mean * (1.0 - mean / in_word)
-    }
-
-    fn dark_bits_are_dark(&mut self, shot: usize, detection: Detection, mean: f64) -> bool {
-        let sent = self.sent;
         let light = sent.light(shot, detection.lag);
-        // Half of a lit bit must come from somewhere.
-        let needed = (mean / 2.0).ceil() as u32;
-        if self.field.residual_in(&light) < sent.ticks_of(shot, needed) {
-            return true;
-        }
-        let by_chance = {
-            let density = self.density_beside(shot, detection);
-            self.bit_thresholds.least(sent.in_word(shot) as u32, density)
-        };
         let pattern = &sent.bits(shot).pattern;
-        let mut words = std::mem::take(&mut self.words);
-        let origin = self.field.lit_in_residual(&light, &mut words);
-        let is_dark = sent.dark_from(shot, light.start).all(|bit| {
-            let found = lit_in(&words, (bit - origin).max(0) as usize, pattern);
-            2.0 * f64::from(found) < mean || found < by_chance
-        });
-        self.words = words;
-        is_dark
+        let found = &mut self.found_in_bits;
+        let (in_word, lit) = (f64::from(sent.in_word(shot)), sent.lit_bits(shot).len() as f64);
+        let mean = f64::from(detection.count) / lit;
+        if detection.count < sent.weight(shot) {
+            sent.bits_that_are(true, shot, &mut self.places);
+            self.field.lit().lit_in_each(light.start, &self.places, pattern, found);
+            let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
+            let squares: f64 = found.iter().map(square).sum();
+            if squares > chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word) {
+                return false;
+            }
+        }
+        let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
+        sent.bits_that_are(false, shot, &mut self.places);
+        residual.lit_in_each(light.start, &self.places, pattern, found);
+        let most = found.iter().copied().max().unwrap_or(0);
+        2.0 * f64::from(most) < mean || {
+            let density = self.density_beside(shot, detection);
+            most < self.bit_thresholds.least(sent.in_word(shot), density)
+        }
     }
 
     /// By how many ticks the marks of `shot` are late on average if it begins at `start`. A
