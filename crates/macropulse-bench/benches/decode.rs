@@ -61,7 +61,7 @@ impl<'a> Sample<'a> {
     fn decode(&self) -> Vec<Returns> {
         let receiver = &self.design.receiver;
         let decode = |(log, ticks, _): &(ShotLog, Ticks, _)| {
-            receiver.decode(&self.design.coding.codebook, log, ticks)
+            receiver.decode(&self.design.coding.codebook, log, ticks).unwrap()
         };
         self.bands.iter().map(decode).collect()
     }

@@ -54,7 +54,7 @@ fn best(design: &Design, scene: &Scene, scans: u64) -> (f64, [f64; Tally::STAGES
     let all = Instant::now();
     for number in 1..=scans {
         let began = Instant::now();
-        let tally = stream.scan(number, &watch).unwrap().tally;
+        let tally = stream.scan(number, &watch).unwrap().unwrap().tally;
         let rate = 1.0 / began.elapsed().as_secs_f64();
         if rate > best.0 {
             best = (rate, tally.seconds);

@@ -4,7 +4,7 @@ use std::io;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use macropulse::{channel, design, environment, formats, scene};
+use macropulse::{channel, design, environment, formats, scene, sim};
 use macropulse_study::{paper, record, sweep};
 
 /// Why a command did not do what was asked.
@@ -115,6 +115,15 @@ impl From<channel::Error> for Fault {
     }
 }
 
+impl From<sim::Error> for Fault {
+    fn from(error: sim::Error) -> Self {
+        match error {
+            sim::Error::Operating(error) => error.into(),
+            sim::Error::Decode(_) => Self::Ours(error.to_string()),
+        }
+    }
+}
+
 impl From<formats::Error> for Fault {
     fn from(error: formats::Error) -> Self {
         match error {
@@ -138,6 +147,7 @@ impl From<sweep::Error> for Fault {
         match error {
             sweep::Error::Formats(error) => error.into(),
             sweep::Error::View(error) => Self::Ours(error.to_string()),
+            sweep::Error::Simulation(error) => error.into(),
             wrong => Self::Wrong(wrong.to_string()),
         }
     }

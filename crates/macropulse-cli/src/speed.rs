@@ -131,7 +131,7 @@ fn scans_per_s(design: &Design, scene: &Scene) -> Result<f64, Fault> {
     let began = Instant::now();
     let mut done = 0;
     while done < 2 || began.elapsed() < LONG_ENOUGH {
-        scans.scan(done, &unwatched);
+        scans.scan(done, &unwatched)?;
         done += 1;
     }
     Ok(done as f64 / began.elapsed().as_secs_f64())

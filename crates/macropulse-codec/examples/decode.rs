@@ -1,10 +1,12 @@
 //! Finds two shots in the ticks of one detector.
 
-use macropulse_codec::code::{Codebook, Error, Family, Keying};
+use std::error::Error;
+
+use macropulse_codec::code::{Codebook, Family, Keying};
 use macropulse_codec::decode::Receiver;
 use macropulse_codec::{ShotLog, Ticks};
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), Box<dyn Error>> {
     // Bare words of 29 marks in 841 chips of 2.5 ps, a chip to a tick.
     let codebook = Codebook::new(Family::prime(29)?, None, 1, Keying::OnOff)?;
     let receiver = Receiver { gate_ticks: (0, 400_000), ..Receiver::matched(2_500) };
@@ -17,7 +19,7 @@ fn main() -> Result<(), Error> {
     }
     tick.sort_unstable();
     tick.dedup();
-    let returns = receiver.decode(&codebook, &log, &Ticks { tick, ..Ticks::default() });
+    let returns = receiver.decode(&codebook, &log, &Ticks { tick, ..Ticks::default() })?;
     for (shot, tof) in returns.shot.iter().zip(&returns.tof) {
         println!("shot {shot}: {:.4} ns", tof * 1e9);
     }

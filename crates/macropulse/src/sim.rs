@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::channel::{Error, Light, Operating, Seen};
+use crate::channel::{Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands, scan_begins_fs};
@@ -16,7 +16,18 @@ use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
 use macropulse_codec::ShotLog;
-use macropulse_codec::decode::{MOST_RETURNS, Reject, Returns};
+use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
+
+/// Why there is no scan.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The sensor cannot be simulated in the environment of the scene.
+    #[error(transparent)]
+    Operating(#[from] channel::Error),
+    /// The receiver cannot decode what the stages before it made: a fault of the simulator.
+    #[error("{0}; this is a fault of Macropulse and not of its input: please report it")]
+    Decode(#[from] decode::Error),
+}
 
 /// One scan, measured.
 #[derive(Debug, Clone)]
@@ -44,7 +55,8 @@ impl Scan {
 /// result does not depend on how many there are.
 ///
 /// # Errors
-/// If the sensor cannot be simulated in the environment of the scene, as [`Operating::of`].
+/// If the sensor cannot be simulated in the environment of the scene, as [`Operating::of`]; if the
+/// receiver refuses what the simulator made, which is a fault of the latter.
 pub fn scan(design: &Design, scene: &Scene, seed: u64, number: u64) -> Result<Scan, Error> {
     let bands: Vec<Band> = bands(design, number).collect();
     scan_part(design, scene, seed, &bands)
@@ -58,7 +70,7 @@ pub fn scan_part(design: &Design, scene: &Scene, seed: u64, bands: &[Band]) -> R
     let mut scans = Scans::new(design, scene, seed)?;
     // A watch that never says stop lets every band through.
     let unwatched = Watch { done: &|_| {}, stop: &|| false };
-    scans.part(bands, &unwatched);
+    scans.part(bands, &unwatched)?;
     Ok(scans.scan)
 }
 
@@ -74,7 +86,7 @@ pub fn scan_watched(
     watch: &Watch,
 ) -> Result<Option<Scan>, Error> {
     let mut scans = Scans::new(design, scene, seed)?;
-    let is_whole = scans.scan(number, watch).is_some();
+    let is_whole = scans.scan(number, watch)?.is_some();
     Ok(is_whole.then_some(scans.scan))
 }
 
@@ -115,14 +127,20 @@ impl<'a> Scans<'a> {
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
     /// its end.
-    pub fn scan(&mut self, number: u64, watch: &Watch) -> Option<&Scan> {
+    ///
+    /// # Errors
+    /// If the receiver refuses what the simulator made.
+    pub fn scan(&mut self, number: u64, watch: &Watch) -> Result<Option<&Scan>, Error> {
         let bands: Vec<Band> = bands(self.design, number).collect();
         self.part(&bands, watch)
     }
 
     /// As [`Scans::scan`], but only the `bands` given, all of one scan; the rest of the cloud
     /// stays empty.
-    pub fn part(&mut self, bands: &[Band], watch: &Watch) -> Option<&Scan> {
+    ///
+    /// # Errors
+    /// As [`Scans::scan`].
+    pub fn part(&mut self, bands: &[Band], watch: &Watch) -> Result<Option<&Scan>, Error> {
         let Self { design, scene, operating, detectors, memories, scan } = self;
         let setup = Setup { seen: Seen { design, scene, operating }, detectors };
         let number = bands.first().map_or(0, |band| band.scan);
@@ -140,21 +158,21 @@ impl<'a> Scans<'a> {
             {
                 let known = counted.1.peak_busy;
                 let (score, tally) =
-                    measure(&setup, memory, (band, known)).judged(&setup.seen, piece);
+                    measure(&setup, memory, (band, known))?.judged(&setup.seen, piece);
                 counted.0.add(&score);
                 counted.1.add(&tally);
                 (watch.done)(band.shots);
             }
-            counted
+            Ok(counted)
         });
-        let counts: Vec<(Score, Tally)> = threads.collect();
+        let counts = threads.collect::<Result<Vec<(Score, Tally)>, Error>>()?;
         let is_whole = next().is_none();
         (scan.score, scan.tally) = Default::default();
         for (score, tally) in &counts {
             scan.score.add(score);
             scan.tally.add(tally);
         }
-        is_whole.then_some(scan)
+        Ok(is_whole.then_some(scan))
     }
 }
 
@@ -196,7 +214,7 @@ fn measure<'a>(
     setup: &Setup<'a>,
     memory: &mut Memory,
     (band, known): (&Band, u32),
-) -> Measured<'a> {
+) -> Result<Measured<'a>, Error> {
     let Setup { seen: Seen { design, scene, .. }, detectors } = *setup;
     let mut tally = Tally::default();
     let mut clock = Instant::now();
@@ -217,7 +235,7 @@ fn measure<'a>(
     lap(&mut tally);
     let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, detections, known);
     lap(&mut tally);
-    let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
+    let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
     lap(&mut tally);
     let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
     let hits = traced.middle;
@@ -243,7 +261,7 @@ fn measure<'a>(
     }
     tally.rejects = returns.rejects;
     memory.take_back(ticks.tick);
-    Measured { log, hits, light, returns, tally }
+    Ok(Measured { log, hits, light, returns, tally })
 }
 
 /// The last stage, after those of a band: its points and their score.

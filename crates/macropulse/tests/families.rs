@@ -240,7 +240,7 @@ fn other_words_are_not_found() {
     let detectors = Detectors::new(&design, &operating, Chance::new(1));
     let detections = detectors.detections(&log, &light, &mut Default::default());
     let ticks = macropulse::tdc::ticks(&design, detections, 0).ticks;
-    let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).len();
+    let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).unwrap().len();
     let mut wrong = log.clone();
     wrong.word.iter_mut().for_each(|word| *word = (*word + 50) % 100);
     assert!(found(&log) > log.owned.len() * 9 / 10);

@@ -142,7 +142,7 @@ fn false_edges_alone_are_no_return() {
     careless.receiver.false_alarm = 1e3;
     let log = careless.log(0..1);
     let ticks = careless.ticks(&log, sky, weather);
-    let returns = careless.receiver.decode(&careless.codebook, &log, &ticks);
+    let returns = careless.receiver.decode(&careless.codebook, &log, &ticks).unwrap();
     // Among so many ticks one shot in sixteen is searched for faint light.
     assert!(returns.rejected(Reject::NoPeak) < 848 - 848 / 16, "{:?}", returns.rejects);
 }
@@ -155,7 +155,7 @@ fn decoded_with_other_labels(kind: macropulse::codec::decode::ReceiverKind) -> (
     for label in &mut log.label {
         *label = (*label + 341) % 848;
     }
-    let returns = sensor.receiver.decode(&sensor.codebook, &log, &ticks);
+    let returns = sensor.receiver.decode(&sensor.codebook, &log, &ticks).unwrap();
     let score = Score::new(&sensor.codebook, (&log, slope), &returns);
     let rejected = |reject| returns.rejected(reject);
     (score.right + score.wrong, rejected(Reject::LabelMismatch), rejected(Reject::UnknownShot))
@@ -176,7 +176,7 @@ fn every_home_shot_of_the_matched_receiver_is_accounted_for() {
     let sensor = Sensor::printed(Matched);
     let log = sensor.log(10..13);
     let ticks = sensor.ticks(&log, car, Weather { seen: 0.7, ..CLEAR });
-    let returns = sensor.receiver.decode(&sensor.codebook, &log, &ticks);
+    let returns = sensor.receiver.decode(&sensor.codebook, &log, &ticks).unwrap();
     let rejects: u64 = returns.rejects.iter().sum();
     assert_eq!(returns.len() as u64 + rejects, 3 * 848);
     assert!(returns.shot.is_sorted());
@@ -196,7 +196,7 @@ fn bands_find_what_the_whole_finds() {
     let decoded = |rows| {
         let log = sensor.log(rows);
         let ticks = sensor.ticks(&log, slope, CLEAR);
-        let returns = sensor.receiver.decode(&sensor.codebook, &log, &ticks);
+        let returns = sensor.receiver.decode(&sensor.codebook, &log, &ticks).unwrap();
         let shots = returns.shot.iter().map(|&shot| log.first + u64::from(shot));
         shots.zip(returns.tof).collect::<Vec<_>>()
     };
@@ -208,13 +208,18 @@ fn bands_find_what_the_whole_finds() {
 fn a_log_without_shots_and_ticks_without_ticks_give_nothing() {
     for kind in [Matched, Blind, Literal] {
         let sensor = Sensor::printed(kind);
-        let nothing =
-            sensor.receiver.decode(&sensor.codebook, &Default::default(), &Default::default());
+        let nothing = sensor
+            .receiver
+            .decode(&sensor.codebook, &Default::default(), &Default::default())
+            .unwrap();
         assert_eq!(nothing, Default::default());
         let log = sensor.log(0..1);
-        assert!(sensor.receiver.decode(&sensor.codebook, &log, &Default::default()).is_empty());
+        assert!(
+            sensor.receiver.decode(&sensor.codebook, &log, &Default::default()).unwrap().is_empty()
+        );
         let ticks = sensor.ticks(&log, slope, CLEAR);
-        let nothing = sensor.receiver.decode(&Codebook::single(), &Default::default(), &ticks);
+        let nothing =
+            sensor.receiver.decode(&Codebook::single(), &Default::default(), &ticks).unwrap();
         assert!(nothing.is_empty());
     }
 }

@@ -53,7 +53,7 @@ impl<'a> Run<'a> {
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
-            let Some(scan) = scans.scan(run.scans, &watch) else { break };
+            let Some(scan) = scans.scan(run.scans, &watch)? else { break };
             run.score.add(&scan.score);
             run.tally.add(&scan.tally);
             if let Some(folder) = &mut folder {

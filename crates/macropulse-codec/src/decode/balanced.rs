@@ -346,7 +346,7 @@ mod tests {
             .collect();
         tick.sort_unstable();
         let ticks = Ticks { tick, ..Ticks::default() };
-        let returns = receiver.decode(book, &log, &ticks);
+        let returns = receiver.decode(book, &log, &ticks).unwrap();
         assert_eq!(returns.len(), 20);
         assert_eq!(returns.peak, returns.marks);
         for (shot, tof) in returns.tof.iter().enumerate() {
@@ -388,8 +388,9 @@ mod tests {
     fn an_empty_sky_and_an_empty_log_give_nothing() {
         let book = &books()[0];
         let (receiver, log) = (receiver(2, 0.0), log(3, (100, 1, 33)));
-        let returns = receiver.decode(book, &log, &Ticks::default());
+        let returns = receiver.decode(book, &log, &Ticks::default()).unwrap();
         assert_eq!((returns.len(), returns.rejected(Reject::NoPeak)), (0, 3));
-        assert!(receiver.decode(book, &ShotLog::default(), &Ticks::default()).is_empty());
+        let nothing = receiver.decode(book, &ShotLog::default(), &Ticks::default()).unwrap();
+        assert!(nothing.is_empty());
     }
 }

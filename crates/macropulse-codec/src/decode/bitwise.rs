@@ -14,8 +14,8 @@
 
 use std::array;
 
-use super::timeline::Timeline;
-use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns, photons_per_mark};
+use super::field::{Field, Memory};
+use super::{FARTHEST_JITTER, MARGIN, Receiver, Reject, Return, Returns, photons_per_mark};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -38,9 +38,13 @@ pub(super) fn decode(
 ) -> Returns {
     let (ticks, opening) = heard;
     let mut band = Band::new(receiver, sent, ticks);
-    for tick in &ticks.tick {
-        let tick = ticks.epoch + i64::from(*tick);
-        if band.queue.has(tick)
+    let mut at_hand = i64::MIN;
+    for tick in band.ticks.iter().map(|&tick| i64::from(tick)) {
+        if tick >= at_hand {
+            at_hand = tick + STRETCH;
+            band.field.cover(tick - band.before()..at_hand + band.behind());
+        }
+        if band.field.is_left(tick)
             && let Some(macropulse) = band.recognise(tick)
         {
             band.settle(&macropulse, opening);
@@ -48,6 +52,9 @@ pub(super) fn decode(
     }
     band.returns()
 }
+
+/// Opening ticks for which all that may be of their macropulses is at hand together, in ticks.
+const STRETCH: i64 = 1 << 16;
 
 /// What was read from an opening tick on.
 struct Macropulse {
@@ -85,11 +92,18 @@ struct Band<'a> {
     receiver: &'a Receiver,
     codebook: &'a Codebook,
     log: &'a ShotLog,
+    /// Absolute time of tick 0, in ticks.
+    epoch: i64,
+    /// Those that may be light of the shots.
+    ticks: &'a [u32],
+    /// Tick in which each shot was fired, from the epoch on.
     fired: Vec<i64>,
     /// The marks of each word, in ticks.
     words: Vec<Vec<i64>>,
     /// The same as bits.
     patterns: Vec<Pattern>,
+    /// The places of each word, from so many ticks before its start on, at which its ticks may be.
+    around: Vec<Pattern>,
     /// For each word, which of the ticks from its first mark on are its next three marks; `None`
     /// where these are farther.
     nearest: Vec<Option<[u64; NEAR]>>,
@@ -98,10 +112,8 @@ struct Band<'a> {
     bit_length: i64,
     /// How far from its place a mark may lie, to both sides.
     slack: u32,
-    /// Lit where a mark counts as found.
-    seen: Timeline,
-    /// Ticks that belong to no macropulse yet.
-    queue: Timeline,
+    /// The ticks at hand; its residual are those that belong to no macropulse yet.
+    field: Field<'a>,
     claims: Vec<Option<Claim>>,
     /// Count of the best claim on each shot that was not the best of all.
     runner_up: Vec<u16>,
@@ -109,10 +121,10 @@ struct Band<'a> {
 }
 
 impl<'a> Band<'a> {
-    fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &Ticks) -> Self {
+    fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
         let (codebook, log) = sent;
-        let fired = receiver.all_fired(log);
-        let queue = receiver.timeline(codebook, &fired, ticks, Vec::new());
+        let epoch = ticks.epoch;
+        let fired: Vec<i64> = receiver.all_fired(log).iter().map(|fired| fired - epoch).collect();
         let scale = i64::from(receiver.ticks_per_chip);
         let in_ticks = |word: usize| -> Vec<i64> {
             codebook.word(word as u16).marks.iter().map(|&mark| scale * i64::from(mark)).collect()
@@ -122,21 +134,30 @@ impl<'a> Band<'a> {
         // Both the opening tick and the mark jitter: √2 σ between them, of which 2 σ are allowed.
         let slack = (8_f64.sqrt() * receiver.jitter_ticks).min(FARTHEST_JITTER);
         let slack = if receiver.jitter_ticks > 0.05 { slack.ceil() as u32 } else { 0 };
+        let width = 2 * slack + 1;
+        let patterns = |width: u32| {
+            let bits = |word: &Vec<i64>| word.iter().map(|&mark| mark as usize).collect::<Vec<_>>();
+            let pattern = |word| Pattern::new(bits(word).into_iter(), width as usize);
+            words.iter().map(pattern).collect()
+        };
+        let ticks = in_time(receiver, codebook, (&fired, &ticks.tick));
+        let (length, bit_length) = length_of(receiver, codebook);
+        let begin = ticks.first().map_or(0, |&tick| i64::from(tick)) - bit_length;
+        let extent = (begin, STRETCH + 2 * length + 2 * i64::from(width));
         Self {
             receiver,
             codebook,
             log,
-            patterns: words
-                .iter()
-                .map(|word| Pattern::new(word.iter().map(|&mark| mark as usize), 1))
-                .collect(),
+            epoch,
+            patterns: patterns(1),
+            around: patterns(width),
             nearest: words.iter().map(|word| nearest(word)).collect(),
             words,
             bits,
-            bit_length: scale * i64::from(codebook.chips() / bits),
+            bit_length,
             slack,
-            seen: queue.clone().dilated(slack, slack),
-            queue,
+            field: Field::new(ticks, width, extent, bit_length, Memory::default()),
+            ticks,
             claims: vec![None; fired.len()],
             runner_up: vec![0; fired.len()],
             fired,
@@ -144,26 +165,34 @@ impl<'a> Band<'a> {
         }
     }
 
+    /// Ticks before the one that opens a macropulse at which some of it may lie.
+    fn before(&self) -> i64 {
+        self.bit_length + i64::from(self.slack)
+    }
+
+    /// Ticks from the beginning of a macropulse to its end, and to what may be its last tick.
+    fn behind(&self) -> i64 {
+        self.bit_length * i64::from(self.bits) + 2 * i64::from(self.slack) + 1
+    }
+
     /// Marks of `word` found if it starts at `start`.
     fn found(&self, word: usize, start: i64) -> u16 {
-        let one_by_one = || self.words[word].iter().filter(|&mark| self.seen.has(start + mark));
-        match start < self.seen.origin() {
-            true => one_by_one().count() as u16,
-            false => self.seen.lit_in(start, &self.patterns[word]) as u16,
-        }
+        self.field.lit().lit_in(start - i64::from(self.slack), &self.patterns[word]) as u16
     }
 
     /// The macropulse that `tick` opens, its ticks taken off the queue. `None` where no word has
     /// enough marks.
     fn recognise(&mut self, tick: i64) -> Option<Macropulse> {
         let mut best = (0, 0, tick);
-        let near: [u64; NEAR] = array::from_fn(|part| self.seen.from(tick + 64 * part as i64));
+        // A place counts for ticks up to twice the slack later.
+        let (lit, earlier) = (self.field.lit(), i64::from(self.slack));
+        let near: [u64; NEAR] = array::from_fn(|part| lit.from(tick - earlier + 64 * part as i64));
         for (index, word) in self.words.iter().enumerate() {
             let Some((first, others)) = word.split_first() else { continue };
             let start = tick - first;
             let is_proposed = match &self.nearest[index] {
                 Some(nearest) => nearest.iter().zip(&near).any(|(marks, seen)| marks & seen != 0),
-                None => others.iter().take(PROPOSALS).any(|mark| self.seen.has(start + mark)),
+                None => others.iter().take(PROPOSALS).any(|mark| lit.has(start + mark - earlier)),
             };
             if !others.is_empty() && !is_proposed {
                 continue;
@@ -248,17 +277,12 @@ impl<'a> Band<'a> {
 
     /// Takes the ticks of the lit bits off the queue, `dark` bits having gone before.
     fn dequeue(&mut self, macropulse: &Macropulse, dark: u32) {
-        let slack = i64::from(self.slack);
         let own = macropulse.found.iter().take((self.bits - dark) as usize);
-        for (bit, _) in own.enumerate().filter(|&(_, &found)| found >= self.receiver.bit_threshold)
-        {
-            let start = macropulse.start + bit as i64 * self.bit_length;
-            for mark in &self.words[usize::from(macropulse.word)] {
-                for tick in start + mark - slack..=start + mark + slack {
-                    self.queue.clear(tick);
-                }
-            }
-        }
+        let is_lit = |found: u16| found >= self.receiver.bit_threshold;
+        let lit = own.enumerate().filter(|&(_, &found)| is_lit(found));
+        let first = macropulse.start - i64::from(self.slack);
+        let starts = lit.map(|(bit, _)| first + bit as i64 * self.bit_length);
+        self.field.cancel(starts, &self.around[usize::from(macropulse.word)]);
     }
 
     /// Keeps the claim with most marks on each shot; of equals, the first one.
@@ -290,7 +314,7 @@ impl<'a> Band<'a> {
             let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]).len() as u16;
             self.returns.push(Return {
                 shot,
-                tof: self.receiver.tof(self.log.fired_at_fs[shot], start),
+                tof: self.receiver.tof(self.log.fired_at_fs[shot], start + self.epoch),
                 peak: claim.count,
                 marks,
                 margin: claim.count - self.runner_up[shot],
@@ -299,6 +323,28 @@ impl<'a> Band<'a> {
         }
         self.returns
     }
+}
+
+/// Those of the `ticks` at which light of the shots `fired` can arrive, and some more.
+fn in_time<'a>(
+    receiver: &Receiver,
+    codebook: &Codebook,
+    (fired, ticks): (&[i64], &'a [u32]),
+) -> &'a [u32] {
+    let (Some(first), Some(last)) = (fired.first(), fired.last()) else { return &[] };
+    let (nearest, farthest) = receiver.gate_ticks;
+    let (length, _) = length_of(receiver, codebook);
+    let opens = first + i64::from(nearest) - MARGIN;
+    let closes = last + i64::from(farthest) + length + 1 + MARGIN;
+    let before = |end: i64| ticks.partition_point(|&tick| i64::from(tick) < end);
+    &ticks[before(opens)..before(closes)]
+}
+
+/// Length of a macropulse and of a bit of it, in ticks.
+fn length_of(receiver: &Receiver, codebook: &Codebook) -> (i64, i64) {
+    let length = i64::from(codebook.chips()) * i64::from(receiver.ticks_per_chip);
+    let bits = codebook.payload().map_or(1, |payload| payload.bits());
+    (length, length / i64::from(bits))
 }
 
 /// How far a macropulse got that was rejected.
@@ -363,7 +409,7 @@ mod tests {
             returns: 1,
             pick: crate::decode::Pick::Strongest,
         };
-        receiver.decode(&codebook(), log, ticks)
+        receiver.decode(&codebook(), log, ticks).unwrap()
     }
 
     #[test]

@@ -75,7 +75,7 @@ mod tests {
             returns,
             pick,
         };
-        receiver.decode(&Codebook::single(), log, ticks)
+        receiver.decode(&Codebook::single(), log, ticks).unwrap()
     }
 
     /// Three shots, a microsecond apart, on detectors 0, 1 and 1.

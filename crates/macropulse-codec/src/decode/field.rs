@@ -23,9 +23,9 @@ pub(super) struct Field<'a> {
     width: u32,
     /// Ticks that are counted together, a power of two.
     cell: i64,
-    /// The first tick of the first cell.
+    /// The first tick of the first cell, and of all that is at hand.
     begin: i64,
-    /// Ticks of the list before each cell, as far as they are laid down.
+    /// Ticks of the list before each cell, and before their end.
     before: Vec<u32>,
     seen: Timeline,
     lit: Timeline,
@@ -81,18 +81,9 @@ impl<'a> Field<'a> {
     /// asked for last.
     pub fn cover(&mut self, span: Range<i64>) {
         let origin = (span.start - MARGIN).max(self.begin).div_euclid(self.cell) * self.cell;
-        // Ticks that nobody asked for are counted only.
-        while self.end() < origin {
-            let end = self.end() + self.cell;
-            let passed = self.ticks[self.laid..].iter();
-            self.laid += passed.take_while(|&&tick| i64::from(tick) < end).count();
-            self.before.push(self.laid as u32);
-        }
         let to = span.end + 2 * MARGIN + i64::from(self.width);
         if to + self.cell > self.seen.end() {
-            let lit = (self.width > 1).then_some(&mut self.lit);
-            let all = [&mut self.seen, &mut self.residual].into_iter().chain(lit);
-            all.for_each(|timeline| timeline.slide(origin));
+            self.forget_before(origin);
         }
         while self.end() < to {
             let from = self.end();
@@ -116,6 +107,24 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// Lets all that is at hand begin at `origin`, a whole number of cells later.
+    fn forget_before(&mut self, origin: i64) {
+        let lit = (self.width > 1).then_some(&mut self.lit);
+        let all = [&mut self.seen, &mut self.residual].into_iter().chain(lit);
+        all.for_each(|timeline| timeline.slide(origin));
+        if self.end() > origin {
+            let passed = ((origin - self.begin) / self.cell) as usize;
+            self.before.drain(..passed);
+        } else {
+            // Ticks between are asked for by nobody.
+            let ticks = &self.ticks[self.laid..];
+            self.laid += ticks.partition_point(|&tick| i64::from(tick) < origin);
+            self.before.clear();
+            self.before.push(self.laid as u32);
+        }
+        self.begin = origin;
+    }
+
     /// Lights the places of `span` at which a mark counts as found, and those before it that may
     /// change by ticks of it.
     fn widen(&mut self, span: Range<i64>) {
@@ -133,6 +142,11 @@ impl<'a> Field<'a> {
     /// The ticks as they came.
     pub fn seen(&self) -> &Timeline {
         &self.seen
+    }
+
+    /// Whether there is a tick at `tick` that is not cancelled.
+    pub fn is_left(&self, tick: i64) -> bool {
+        self.residual.has(tick)
     }
 
     /// Cancels the ticks of `pattern`, begun at each of `starts`.

@@ -3,7 +3,9 @@
 mod balanced;
 mod beyond;
 mod bitwise;
+mod check;
 mod direct;
+mod error;
 mod field;
 mod matched;
 mod pick;
@@ -11,6 +13,7 @@ mod returns;
 mod threshold;
 mod timeline;
 
+pub use error::Error;
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 
@@ -127,7 +130,26 @@ impl Receiver {
     ///
     /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
     /// does not bring everything nearer.
-    pub fn decode(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+    ///
+    /// # Errors
+    /// If what is given cannot be decoded by any receiver: columns of unequal length, ticks or shots
+    /// out of order, shots that are not in the codebook, times that are not counted, settings out of
+    /// their limits. Light in which nothing is found is no error.
+    pub fn decode(
+        &self,
+        codebook: &Codebook,
+        log: &ShotLog,
+        ticks: &Ticks,
+    ) -> Result<Returns, Error> {
+        check::check(self, (codebook, log), ticks)?;
+        Ok(self.decode_checked(codebook, log, ticks))
+    }
+
+    /// The returns, of what was checked.
+    fn decode_checked(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+        if ticks.tick.is_empty() || log.is_empty() {
+            return self.nothing_of(log.owned.len());
+        }
         if self.kind != ReceiverKind::Direct && !ticks.channel.is_empty() {
             return self.decode_each_channel(codebook, log, ticks);
         }
@@ -144,6 +166,16 @@ impl Receiver {
         }
     }
 
+    /// What comes of so many owned shots where it is dark. A receiver that goes from tick to tick
+    /// counts none of them.
+    fn nothing_of(&self, shots: usize) -> Returns {
+        let mut returns = Returns::default();
+        if !matches!(self.kind, ReceiverKind::Literal | ReceiverKind::Blind) {
+            returns.rejects[Reject::NoPeak as usize] = shots as u64;
+        }
+        returns
+    }
+
     /// The returns of a sensor whose shots do not all have the same detector.
     fn decode_each_channel(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
         let mut found: Vec<Return> = Vec::new();
@@ -158,7 +190,7 @@ impl Receiver {
                 channel: Vec::new(),
                 amplitude: ticks.amplitude.get(from..to).map(<[f32]>::to_vec).unwrap_or_default(),
             };
-            let of_channel = self.decode(codebook, &log, &seen);
+            let of_channel = self.decode_checked(codebook, &log, &seen);
             found.extend(of_channel.each().map(|one| Return { shot: shots[one.shot], ..one }));
             returns.add_rejects(&of_channel);
         }

@@ -11,6 +11,7 @@
 // Lanes of several arrays are walked in step, by their number.
 #![allow(clippy::needless_range_loop)]
 
+mod ascend;
 mod balance;
 mod coarse;
 mod correlate;
@@ -19,6 +20,7 @@ pub mod level;
 mod marks;
 mod pattern;
 
+pub(crate) use ascend::ascends;
 pub(crate) use balance::{Balance, Chips, best_balance};
 pub(crate) use coarse::{COARSE, coarse};
 pub(crate) use correlate::{Counts, NARROW, WIDE, is_dark};

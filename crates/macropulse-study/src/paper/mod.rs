@@ -47,9 +47,12 @@ pub enum Error {
     /// A ready scene was refused.
     #[error(transparent)]
     Scene(#[from] macropulse::scene::Error),
-    /// A ready sensor cannot be simulated in a ready scene.
+    /// A ready sensor cannot work in a ready environment.
     #[error(transparent)]
     Operating(#[from] macropulse::channel::Error),
+    /// A scan could not be made.
+    #[error(transparent)]
+    Simulation(#[from] macropulse::sim::Error),
     /// A ready environment was refused.
     #[error(transparent)]
     Environment(#[from] macropulse::environment::Error),

@@ -76,7 +76,7 @@ impl Job<'_> {
     pub fn measure(&self, watch: &Watch) -> Result<Option<Counted>, Error> {
         let design = self.point.design()?;
         let mut scans = Scans::new(&design, self.scene, self.seed)?;
-        let Some(scan) = scans.part(&self.point.bands, watch) else { return Ok(None) };
+        let Some(scan) = scans.part(&self.point.bands, watch)? else { return Ok(None) };
         Ok(Some(Counted {
             job: self.name(),
             seed: self.seed,

@@ -37,6 +37,9 @@ pub enum Error {
     /// The sensor cannot be simulated in the environment of the scene.
     #[error(transparent)]
     Operating(#[from] macropulse::channel::Error),
+    /// A scan could not be made.
+    #[error(transparent)]
+    Simulation(#[from] macropulse::sim::Error),
     /// A file could not be written or read.
     #[error(transparent)]
     Formats(#[from] macropulse::formats::Error),

@@ -171,7 +171,7 @@ impl Sensor {
     pub fn score(&self, rows: Range<u32>, scene: Scene, weather: Weather) -> Score {
         let log = self.log(rows);
         let ticks = self.ticks(&log, scene, weather);
-        let returns = self.receiver.decode(&self.codebook, &log, &ticks);
+        let returns = self.receiver.decode(&self.codebook, &log, &ticks).unwrap();
         Score::new(&self.codebook, (&log, scene), &returns)
     }
 }

@@ -1,0 +1,176 @@
+//! What a receiver must be given; all else is refused before it is looked at.
+
+use super::{Error, MOST_RETURNS, Receiver, ReceiverKind};
+use crate::ShotLog;
+use crate::Ticks;
+use crate::code::Codebook;
+use crate::kernels::ascends;
+
+/// Ticks of a macropulse that a correlating receiver can keep: 65535 chips of 256 ticks. The bits
+/// of a code word are kept several times, 2 MB each at this length.
+const LONGEST: u64 = 1 << 24;
+
+/// Ticks over which light may be looked for, with the length of a macropulse. The matched receiver
+/// keeps as many as twenty-four bits for each: 200 MB.
+const FARTHEST: u64 = 1 << 26;
+
+/// How far from the epoch of the ticks a shot may be fired, in ticks: as far as these are counted.
+const COUNTED: i128 = 1 << 32;
+
+/// Ticks that times may be beyond the light of a shot, by rounding and jitter.
+const SLACK: i128 = 1 << 13;
+
+/// Refuses what cannot be decoded. All ticks are read once; nothing else is as long as they are.
+pub(super) fn check(
+    receiver: &Receiver,
+    (codebook, log): (&Codebook, &ShotLog),
+    ticks: &Ticks,
+) -> Result<(), Error> {
+    settings(receiver, codebook)?;
+    columns(log, ticks)?;
+    in_order(log, ticks)?;
+    in_codebook(log, codebook)?;
+    in_time(receiver, (codebook, log), ticks)
+}
+
+fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
+    let refuse = |setting: &'static str, value: String, possible: &'static str| {
+        Err(Error::Setting { setting, value, possible })
+    };
+    let (nearest, farthest) = receiver.gate_ticks;
+    if farthest < nearest {
+        return Err(Error::Gate { nearest, farthest });
+    }
+    if receiver.tick_fs < 1 {
+        return refuse("tick_fs", receiver.tick_fs.to_string(), "1 or more");
+    }
+    if receiver.ticks_per_chip < 1 {
+        return refuse("ticks_per_chip", receiver.ticks_per_chip.to_string(), "1 or more");
+    }
+    let jitter = receiver.jitter_ticks;
+    if !(jitter.is_finite() && jitter >= 0.0) {
+        return refuse("jitter_ticks", jitter.to_string(), "0 or a positive number");
+    }
+    let false_alarm = receiver.false_alarm;
+    if !(false_alarm.is_finite() && false_alarm > 0.0) {
+        return refuse("false_alarm", false_alarm.to_string(), "a positive number");
+    }
+    if !(1..=MOST_RETURNS).contains(&receiver.returns) {
+        return refuse("returns", receiver.returns.to_string(), "1 to 8");
+    }
+    if receiver.kind == ReceiverKind::Direct {
+        return Ok(());
+    }
+    if codebook.zeros_are_lit() && receiver.kind != ReceiverKind::Balanced {
+        return Err(Error::LitZeros);
+    }
+    let (length, reach) = (length(receiver, codebook), reach(receiver, codebook));
+    let too_long = |what, ticks, possible| Err(Error::TooLong { what, ticks, possible });
+    match () {
+        () if length > LONGEST => too_long("a macropulse", length, LONGEST),
+        () if reach > FARTHEST => too_long("a time of flight, with a macropulse,", reach, FARTHEST),
+        () => Ok(()),
+    }
+}
+
+/// Length of a macropulse, in ticks.
+fn length(receiver: &Receiver, codebook: &Codebook) -> u64 {
+    u64::from(codebook.chips()) * u64::from(receiver.ticks_per_chip)
+}
+
+/// Ticks after firing in which light is looked for.
+fn reach(receiver: &Receiver, codebook: &Codebook) -> u64 {
+    u64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + length(receiver, codebook)
+}
+
+fn columns(log: &ShotLog, ticks: &Ticks) -> Result<(), Error> {
+    let (shots, events) = (log.len(), ticks.tick.len());
+    let uneven =
+        |column, length, wanted, of, or| Err(Error::Column { column, length, wanted, of, or });
+    let of_log = [
+        ("row", log.row.len()),
+        ("column", log.column.len()),
+        ("label", log.label.len()),
+        ("word", log.word.len()),
+        ("channel", log.channel.len()),
+    ];
+    if let Some((column, length)) = of_log.into_iter().find(|(_, length)| *length != shots) {
+        return uneven(column, length, shots, "shots", "");
+    }
+    let of_ticks = [("channel", ticks.channel.len()), ("amplitude", ticks.amplitude.len())];
+    let is_uneven = |(_, length): &(_, usize)| *length != events && *length != 0;
+    if let Some((column, length)) = of_ticks.into_iter().find(is_uneven) {
+        return uneven(column, length, events, "ticks", ", or none at all");
+    }
+    let owned = &log.owned;
+    if owned.start > owned.end || owned.end > shots {
+        return Err(Error::Owned { start: owned.start, end: owned.end, shots });
+    }
+    Ok(())
+}
+
+fn in_order(log: &ShotLog, ticks: &Ticks) -> Result<(), Error> {
+    let fired = &log.fired_at_fs;
+    if let Some(before) = fired.windows(2).position(|pair| pair[1] < pair[0]) {
+        return Err(Error::ShotsDoNotAscend { shot: before + 1 });
+    }
+    let channels = &ticks.channel;
+    if let Some(before) = channels.windows(2).position(|pair| pair[1] < pair[0]) {
+        let (before, channel, place) = (channels[before], channels[before + 1], before + 1);
+        return Err(Error::ChannelsDoNotAscend { place, channel, before });
+    }
+    let mut begin = 0;
+    while begin < ticks.tick.len() {
+        let end = match channels.get(begin) {
+            Some(channel) => channels.partition_point(|other| other <= channel),
+            None => ticks.tick.len(),
+        };
+        let of_channel = &ticks.tick[begin..end];
+        if !ascends(of_channel) {
+            let falls = of_channel.windows(2).position(|pair| pair[1] <= pair[0]).unwrap_or(0);
+            let (before, place) = (ticks.tick[begin + falls], begin + falls + 1);
+            return Err(Error::TicksDoNotAscend { place, tick: ticks.tick[place], before });
+        }
+        begin = end;
+    }
+    Ok(())
+}
+
+fn in_codebook(log: &ShotLog, codebook: &Codebook) -> Result<(), Error> {
+    let columns =
+        [("label", &log.label, codebook.labels()), ("word", &log.word, codebook.words() as u32)];
+    for (what, column, there_are) in columns {
+        let highest = column.iter().fold(0, |highest, number| highest.max(*number));
+        if !column.is_empty() && u32::from(highest) >= there_are {
+            let shot = column.iter().position(|number| *number == highest).unwrap_or(0);
+            let last = there_are.saturating_sub(1);
+            return Err(Error::NotInCodebook { shot, what, number: highest, last });
+        }
+    }
+    Ok(())
+}
+
+/// Whether all times can be counted: those of light in femtoseconds, and of shots in ticks.
+fn in_time(
+    receiver: &Receiver,
+    (codebook, log): (&Codebook, &ShotLog),
+    ticks: &Ticks,
+) -> Result<(), Error> {
+    let ends = [log.fired_at_fs.first(), log.fired_at_fs.last()];
+    for (shot, fired_at_fs) in [0, log.len().wrapping_sub(1)].into_iter().zip(ends) {
+        let Some(&fired_at_fs) = fired_at_fs else { continue };
+        let tick_fs = i128::from(receiver.tick_fs);
+        let fired = i128::from(fired_at_fs);
+        let light = i128::from(reach(receiver, codebook)) + SLACK;
+        let is_counted = |time: i128| i64::try_from(time).is_ok();
+        if !is_counted(fired - light * tick_fs) || !is_counted(fired + light * tick_fs) {
+            return Err(Error::Time { shot, fired_at_fs });
+        }
+        let after = fired.div_euclid(tick_fs) - i128::from(ticks.epoch);
+        if !ticks.tick.is_empty() && !(-COUNTED..=COUNTED).contains(&after) {
+            let ticks = i64::try_from(after).unwrap_or(if after < 0 { i64::MIN } else { i64::MAX });
+            return Err(Error::FarFromTicks { shot, ticks });
+        }
+    }
+    Ok(())
+}
