@@ -41,4 +41,5 @@ pub mod random;
 pub mod units;
 pub mod names;
 pub mod digest;
+pub mod clock;
 mod kernels;

@@ -1,11 +1,11 @@
 //! The whole chain from shots to points, as function calls.
 
 use std::sync::Mutex;
-use std::time::Instant;
 
 use rayon::prelude::*;
 
 use crate::channel::{Light, Operating, Seen};
+use crate::clock::thread_seconds;
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands, scan_begins_fs};
@@ -194,11 +194,11 @@ impl Measured<'_> {
     /// Makes the returns of a band the points of `piece`, and counts.
     fn judged(mut self, seen: &Seen, piece: &mut Piece) -> (Score, Tally) {
         let Seen { design, scene, operating } = *seen;
-        let clock = Instant::now();
+        let began = thread_seconds();
         piece.fill(design, &operating.link, &self.log, &self.returns);
         let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
         score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
-        self.tally.seconds[POINTS] += clock.elapsed().as_secs_f64();
+        self.tally.seconds[POINTS] += thread_seconds() - began;
         (score, self.tally)
     }
 }
@@ -217,12 +217,13 @@ fn measure<'a>(
 ) -> Result<Measured<'a>, Error> {
     let Setup { seen: Seen { design, scene, .. }, detectors } = *setup;
     let mut tally = Tally::default();
-    let mut clock = Instant::now();
+    let mut began = thread_seconds();
     let mut stages = 0..POINTS;
     let mut lap = |tally: &mut Tally| {
         let stage = stages.next().unwrap_or(POINTS);
-        tally.seconds[stage] += clock.elapsed().as_secs_f64();
-        clock = Instant::now();
+        let ended = thread_seconds();
+        tally.seconds[stage] += ended - began;
+        began = ended;
     };
     let log = band.shot_log(design);
     lap(&mut tally);
@@ -295,7 +296,7 @@ pub struct Tally {
     pub by_number: [u64; MOST_RETURNS as usize],
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
-    /// Seconds spent in each of [`Tally::STAGES`], summed over threads.
+    /// Seconds of processor time spent in each of [`Tally::STAGES`], summed over threads.
     pub seconds: [f64; POINTS + 1],
 }
 

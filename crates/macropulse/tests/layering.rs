@@ -51,6 +51,7 @@ const SIMULATOR: Layers = Layers {
     modules: &[
         Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
         Rule { module: "digest", may_name: &[], because: "a hash depends on bytes alone" },
+        Rule { module: "clock", may_name: &[], because: "time passes whatever it is spent on" },
         Rule {
             module: "names",
             may_name: &[],
@@ -126,7 +127,8 @@ const SIMULATOR: Layers = Layers {
         Rule {
             module: "sim",
             may_name: &[
-                "channel", "design", "detect", "emit", "points", "random", "scene", "score", "tdc",
+                "channel", "clock", "design", "detect", "emit", "points", "random", "scene",
+                "score", "tdc",
             ],
             because: "the chain calls the stages and nothing else",
         },

@@ -140,13 +140,15 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Stages with the seconds they took, summed over threads; writing on one.
+    /// Stages with the seconds of processor time they took, summed over threads; writing in wall
+    /// time.
     pub fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> {
         Tally::STAGES.into_iter().zip(self.tally.seconds).chain([("write", self.writing)])
     }
 
-    /// Seconds of the sensor's time simulated per second.
+    /// The time of the sensor over ours.
     pub fn speed(&self) -> f64 {
-        self.scans as f64 * self.design.scan_period() / self.elapsed.max(1e-9)
+        let shots = self.scans * self.design.shots_per_scan();
+        self.design.speed(shots as f64, self.elapsed.max(1e-9))
     }
 }

@@ -58,7 +58,7 @@ impl Run<'_> {
 
     fn headline(&self) -> String {
         format!(
-            "{} in {}: {}, seed {}, {:.2} s ({} x real time)",
+            "{} in {}: {}, seed {}, {:.2} s (speed {})",
             self.design.name,
             self.scene.name,
             if self.scans == 1 { "1 scan".to_owned() } else { format!("{} scans", self.scans) },
@@ -178,7 +178,7 @@ impl Run<'_> {
             "detections_lost": tally.lost,
             "detections_merged": tally.merged,
             "elapsed_s": self.elapsed,
-            "sensor_time_per_elapsed": self.speed(),
+            "speed": self.speed(),
             "stages_s": stages,
             "idealised": idealised,
             "defaults": defaults,

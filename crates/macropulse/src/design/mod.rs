@@ -133,6 +133,12 @@ impl Design {
         self.scan.period()
     }
 
+    /// Speed at which `shots` of its shots, or what follows from them, took `seconds`: the time
+    /// that the sensor takes for them over that. Above 1 is faster than the sensor.
+    pub fn speed(&self, shots: f64, seconds: f64) -> f64 {
+        shots / self.shots_per_scan() as f64 * self.scan_period() / seconds
+    }
+
     /// A hash of everything the sensor file says, defaults included.
     pub fn digest(&self) -> String {
         let mut hash = Digest::new();
@@ -197,5 +203,19 @@ impl Error {
 
     fn key(&self) -> String {
         if self.path.is_empty() { String::new() } else { format!("{}: ", self.path) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speed_is_the_time_of_the_sensor_over_ours() {
+        let design = Design::open("kim-park-2016", &[]).unwrap();
+        let (shots, period) = (design.shots_per_scan() as f64, design.scan_period());
+        assert_eq!(design.speed(shots, period), 1.0);
+        assert_eq!(design.speed(shots, 4.0 * period), 0.25);
+        assert_eq!(design.speed(3.0 * shots, period), 3.0);
     }
 }
