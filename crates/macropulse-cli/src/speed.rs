@@ -46,7 +46,7 @@ struct Effort {
     rounds: u64,
 }
 
-const USUAL: Effort = Effort { clean: 1, noisy: 10, time: Duration::from_millis(3_500), rounds: 2 };
+const USUAL: Effort = Effort { clean: 1, noisy: 10, time: Duration::from_millis(4_500), rounds: 2 };
 
 /// What was measured.
 struct Figures {
@@ -149,8 +149,8 @@ const UNWATCHED: Watch<'static> = Watch { done: &|_| {}, stop: &|| false };
 /// Does something as often as the effort asks for, and says how often.
 fn repeat(
     effort: &Effort,
-    mut run: impl FnMut(u64) -> Result<(), sim::Error>,
-) -> Result<u64, sim::Error> {
+    mut run: impl FnMut(u64) -> Result<(), macropulse::sim::Error>,
+) -> Result<u64, macropulse::sim::Error> {
     let began = Instant::now();
     let mut done = 0;
     while done < effort.rounds || began.elapsed() < effort.time {

@@ -1,0 +1,34 @@
+//! The machine, in words, and how often to measure on it.
+
+use std::fs;
+
+use macropulse::clock::thread_seconds;
+use macropulse::codec::level::Level;
+
+/// What the figures depend on.
+pub fn words() -> String {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let processors = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = processors.lines().find_map(|line| {
+        line.strip_prefix("model name").map(|rest| rest.trim_start_matches([' ', '\t', ':']))
+    });
+    format!(
+        "Macropulse {} on {}, {threads} threads, {} kernels.",
+        env!("CARGO_PKG_VERSION"),
+        model.unwrap_or(std::env::consts::ARCH),
+        Level::here().name()
+    )
+}
+
+/// Seconds of this thread for `run`: the least of the rounds that add up to a second. What
+/// takes longer is run once.
+pub fn least_seconds(mut run: impl FnMut()) -> f64 {
+    let (mut least, mut sum) = (f64::INFINITY, 0.0);
+    while sum < 1.0 {
+        let began = thread_seconds();
+        run();
+        let seconds = thread_seconds() - began;
+        (least, sum) = (seconds.min(least), sum + seconds);
+    }
+    least
+}

@@ -1,0 +1,96 @@
+//! The benchmarks of Macropulse: measures how fast it is and writes the tables of
+//! docs/performance.md.
+//!
+//! `cargo run --release -p macropulse-bench` measures everything, in less than ten minutes;
+//! `… -- rays decode` measures and writes these sections alone.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+mod decode;
+mod embree;
+mod generate;
+mod goals;
+mod machine;
+mod meshes;
+mod page;
+mod plain;
+mod rays;
+mod sample;
+mod scans;
+
+/// What may fail for a reason worth a sentence.
+type Fallible<T> = Result<T, Box<dyn Error>>;
+
+/// The sections that are written, in the order in which they are measured.
+const SECTIONS: [&str; 7] = ["rays", "generate", "decode", "plain", "growth", "scans", "goals"];
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    match run(&words) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("{why}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(words: &[&str]) -> Fallible<()> {
+    match words {
+        // What this program has processes of its own do, whose memory is measured.
+        ["load", folder] => println!("{}", rays::load(Path::new(folder))?),
+        ["sixty"] => {
+            scans::sixty()?;
+            println!("{}", 1e-6 * rays::peak());
+        }
+        [] => everything()?,
+        _ => words.iter().try_for_each(|word| section(word))?,
+    }
+    Ok(())
+}
+
+/// Measures and writes one section.
+fn section(name: &str) -> Fallible<()> {
+    let text = match name {
+        "rays" => rays::measure()?.text(),
+        "generate" => generate::measure()?.text(),
+        "decode" => decode::measure()?.text(),
+        "plain" => plain::text()?,
+        "growth" => decode::growth()?,
+        "scans" => scans::measure()?.text(),
+        "goals" => return Err("goals needs all sections: name none".into()),
+        _ => return Err(format!("{name} is none of: {}", SECTIONS.join(", ")).into()),
+    };
+    write(name, &text)
+}
+
+/// Measures and writes all sections.
+fn everything() -> Fallible<()> {
+    let rays = rays::measure()?;
+    write("rays", &rays.text())?;
+    let generating = generate::measure()?;
+    write("generate", &generating.text())?;
+    let decoding = decode::measure()?;
+    write("decode", &decoding.text())?;
+    section("plain")?;
+    section("growth")?;
+    let scans = scans::measure()?;
+    write("scans", &scans.text())?;
+    let measured = goals::Measured {
+        rays: &rays,
+        generating: &generating,
+        decoding: &decoding,
+        scans: &scans,
+    };
+    write("goals", &goals::text(&measured)?)
+}
+
+/// Prints what was measured and puts it into the page.
+fn write(name: &str, text: &str) -> Fallible<()> {
+    let text = format!("{}\n\n{}", machine::words(), text.trim());
+    println!("{name}\n\n{text}\n");
+    page::write(name, &text)
+}

@@ -1,0 +1,281 @@
+//! Rays per second, beside other libraries on the same triangles and rays; what it takes to load
+//! them; and rays that leak out of a closed surface.
+
+use std::fs;
+use std::hint::black_box;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use glam::{DVec3, Vec3A};
+use macropulse::clock::thread_seconds;
+use macropulse::scene::{Ray, Scene};
+use obvhs::BvhBuildParams;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2_from_tris;
+use obvhs::ray::{Ray as ObvhsRay, RayHit};
+use obvhs::triangle::Triangle;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::Fallible;
+use crate::embree::{self, Embree};
+use crate::meshes::{self, Corners, Direction, EYE};
+use crate::page::{self, three};
+
+/// The orders in which rays are cast.
+const ORDERS: [&str; 2] = ["rows", "shuffled"];
+
+/// The mesh whose loading is measured.
+pub const LARGEST: &str = "4.8 M parked cars";
+
+/// The mesh on which rays are held against Embree's.
+pub const CITY: &str = "250 k city";
+
+/// A mesh by name, and what makes it.
+type Maker = (&'static str, fn() -> Vec<Corners>);
+
+const MESHES: [Maker; 3] =
+    [("50 k car", meshes::car), (CITY, meshes::city), (LARGEST, meshes::parked)];
+
+/// Farthest that rays look, m.
+const FARTHEST: f64 = 1e4;
+
+/// Rays at one mesh.
+struct Mesh {
+    name: &'static str,
+    /// By order and way, millions per second.
+    rates: [[f64; WAYS.len()]; ORDERS.len()],
+    embree: Option<embree::Figures>,
+    /// Processor time to load it, s, and the most memory of the program that does, bytes.
+    load: (f64, f64),
+}
+
+/// All that was measured of rays.
+pub struct Rays {
+    meshes: Vec<Mesh>,
+    /// Why there is no Embree.
+    pub no_embree: Option<String>,
+    /// Rays out of [`LEAKED_OF`] that leak out of a closed sphere, and out of one that lacks a
+    /// triangle.
+    pub leaks: [usize; 2],
+}
+
+/// Rays cast from inside the sphere.
+pub const LEAKED_OF: usize = 20_000_000;
+
+/// The same triangles, twice.
+struct Libraries {
+    scene: Scene,
+    obvhs: Bvh2,
+    ordered: Vec<Triangle>,
+}
+
+impl Libraries {
+    fn new(scene: Scene, triangles: &[Corners]) -> Self {
+        let vertex = |corner: [f32; 3]| Vec3A::from(corner);
+        let triangle =
+            |[a, b, c]: &Corners| Triangle { v0: vertex(*a), v1: vertex(*b), v2: vertex(*c) };
+        let narrow: Vec<Triangle> = triangles.iter().map(triangle).collect();
+        let plan = BvhBuildParams { pre_split: false, ..BvhBuildParams::medium_build() };
+        let obvhs = build_bvh2_from_tris(&narrow, plan, &mut Duration::default());
+        let ordered = obvhs.primitive_indices.iter().map(|i| narrow[*i as usize]).collect();
+        Self { scene, obvhs, ordered }
+    }
+
+    fn packets(&self, rays: &Directions) -> usize {
+        let ranges = self.scene.cast_all(EYE.map(f64::from), &rays.wide, FARTHEST);
+        ranges.iter().filter(|range| range.is_finite()).count()
+    }
+
+    fn one_by_one(&self, rays: &Directions) -> usize {
+        let ray = |direction: &[f64; 3]| Ray { origin: EYE.map(f64::from), direction: *direction };
+        let is_hit =
+            |direction: &&[f64; 3]| self.scene.cast(&ray(direction), 0.0, FARTHEST).is_some();
+        rays.wide.iter().filter(is_hit).count()
+    }
+
+    fn obvhs(&self, rays: &Directions) -> usize {
+        let is_hit = |direction: &&Direction| {
+            let ray = ObvhsRay::new_inf(Vec3A::from(EYE), Vec3A::from(**direction));
+            let mut hit = RayHit::none();
+            self.obvhs.ray_traverse(ray, &mut hit, |ray, leaf| self.ordered[leaf].intersect(ray))
+        };
+        rays.narrow.iter().filter(is_hit).count()
+    }
+}
+
+/// The same directions as each library takes them.
+struct Directions {
+    narrow: Vec<Direction>,
+    wide: Vec<[f64; 3]>,
+}
+
+impl Directions {
+    fn new(narrow: Vec<Direction>) -> Self {
+        let wide =
+            |direction: &Direction| DVec3::from(direction.map(f64::from)).normalize().to_array();
+        Self { wide: narrow.iter().map(wide).collect(), narrow }
+    }
+}
+
+/// What is measured, by name.
+type Way = (&'static str, fn(&Libraries, &Directions) -> usize);
+
+const WAYS: [Way; 3] = [
+    ("packets", Libraries::packets),
+    ("one by one", Libraries::one_by_one),
+    ("obvhs", Libraries::obvhs),
+];
+
+/// Millions of rays per second: the best of several rounds, the ways taking turns. The rays that
+/// hit are `hits` by all of them, but for a few that touch an edge.
+fn rates(libraries: &Libraries, rays: &Directions, hits: Option<usize>) -> Fallible<[f64; 3]> {
+    let mut best = [0.0_f64; WAYS.len()];
+    let hits = hits.unwrap_or_else(|| libraries.packets(rays));
+    for _ in 0..9 {
+        for ((name, way), best) in WAYS.iter().zip(&mut best) {
+            let began = thread_seconds();
+            let found = black_box(way(libraries, rays));
+            *best = best.max(1e-6 * rays.wide.len() as f64 / (thread_seconds() - began));
+            if found.abs_diff(hits) > rays.wide.len() / 10_000 {
+                return Err(format!("{name}: {found} hits instead of {hits}").into());
+            }
+        }
+    }
+    Ok(best)
+}
+
+/// Measures them.
+pub fn measure() -> Fallible<Rays> {
+    let folder = tempfile::tempdir()?;
+    let embree = Embree::prepare(folder.path());
+    let orders = [meshes::in_rows(), meshes::shuffled()].map(Directions::new);
+    let mut measured = Vec::new();
+    for (name, make) in MESHES {
+        let triangles = make();
+        meshes::write(&triangles, folder.path())?;
+        let narrow: Vec<&[Direction]> = orders.iter().map(|rays| &*rays.narrow).collect();
+        let embree = embree.as_ref().ok().map(|embree| embree.run(folder.path(), &narrow));
+        let embree = embree.transpose()?;
+        let load = load_apart(folder.path())?;
+        let libraries = Libraries::new(meshes::open(folder.path())?, &triangles);
+        let mut by_order = [[0.0; WAYS.len()]; ORDERS.len()];
+        for (number, (rays, found)) in orders.iter().zip(&mut by_order).enumerate() {
+            let hits = embree.as_ref().and_then(|embree| embree.hits.get(number).copied());
+            *found = rates(&libraries, rays, hits)?;
+        }
+        measured.push(Mesh { name, rates: by_order, embree, load });
+    }
+    let leaks = [leaks(folder.path(), 0)?, leaks(folder.path(), 1)?];
+    Ok(Rays { meshes: measured, no_embree: embree.err(), leaks })
+}
+
+/// Loads the scene in `folder` in a process of its own, and says what that took.
+fn load_apart(folder: &Path) -> Fallible<(f64, f64)> {
+    let output = Command::new(std::env::current_exe()?).arg("load").arg(folder).output()?;
+    let text = String::from_utf8(output.stdout)?;
+    let (seconds, peak) = text.trim().split_once(' ').ok_or("loading a mesh failed")?;
+    Ok((seconds.parse()?, peak.parse()?))
+}
+
+/// What that process does and prints.
+pub fn load(folder: &Path) -> Fallible<String> {
+    let began = thread_seconds();
+    let scene = meshes::open(folder)?;
+    let seconds = thread_seconds() - began;
+    drop(black_box(scene));
+    Ok(format!("{seconds} {}", peak()))
+}
+
+/// Most memory of this process so far, bytes; 0 where the system does not say.
+pub fn peak() -> f64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kibibytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+    1024.0 * kibibytes.unwrap_or_default()
+}
+
+/// Rays that leave a sphere of which some triangles are `missing`.
+fn leaks(folder: &Path, missing: usize) -> Fallible<usize> {
+    let mut triangles = meshes::sphere();
+    // From the middle: those at the end are slivers about the pole.
+    triangles.drain(180_000..180_000 + missing);
+    meshes::write(&triangles, folder)?;
+    let scene = meshes::open(folder)?;
+    let mut chance = ChaCha8Rng::seed_from_u64(1);
+    let mut inside = || {
+        loop {
+            let point = DVec3::from([0; 3].map(|_| chance.random_range(-1.0..1.0)));
+            if (1e-3..1.0).contains(&point.length_squared()) {
+                return point;
+            }
+        }
+    };
+    let mut leaked = 0;
+    for _ in 0..LEAKED_OF / 160 {
+        let origin = (inside() * 9.9).to_array();
+        let rays: Vec<[f64; 3]> = (0..160).map(|_| inside().normalize().to_array()).collect();
+        let ranges = scene.cast_all(origin, &rays, 1e9);
+        leaked += ranges.iter().filter(|range| range.is_infinite()).count();
+    }
+    Ok(leaked)
+}
+
+impl Rays {
+    fn mesh(&self, name: &str) -> Option<&Mesh> {
+        self.meshes.iter().find(|mesh| mesh.name == name)
+    }
+
+    /// The rate of packets over that of Embree's fastest way, at the city in rows (0) or shuffled
+    /// (1).
+    pub fn beside_embree(&self, order: usize) -> Option<f64> {
+        let city = self.mesh(CITY)?;
+        let fastest = city.embree.as_ref()?.rates.get(order)?.iter().copied().fold(0.0, f64::max);
+        Some(city.rates[order][0] / fastest)
+    }
+
+    /// Time and memory to load the largest mesh, over Embree's.
+    pub fn load_beside_embree(&self) -> Option<[f64; 2]> {
+        let mesh = self.mesh(LARGEST)?;
+        let embree = mesh.embree.as_ref()?;
+        Some([mesh.load.0 / embree.load_s, mesh.load.1 / embree.peak])
+    }
+
+    /// The tables.
+    pub fn text(&self) -> String {
+        let (mut rays, mut loads) = (Vec::new(), Vec::new());
+        for mesh in &self.meshes {
+            for (number, order) in ORDERS.iter().enumerate() {
+                let ours = mesh.rates[number].iter().map(|rate| three(*rate));
+                let rates = mesh.embree.as_ref().and_then(|embree| embree.rates.get(number));
+                let theirs = rates.map_or(["–"; 3].map(str::to_owned), |rates| rates.map(three));
+                let name = format!("{}, {order}", mesh.name);
+                rays.push(std::iter::once(name).chain(ours).chain(theirs).collect());
+            }
+            let embree = mesh.embree.as_ref();
+            let theirs = embree.map(|embree| (embree.load_s, embree.peak));
+            let shown = |load: Option<(f64, f64)>| match load {
+                Some((seconds, peak)) => [three(seconds), three(1e-6 * peak)],
+                None => ["–", "–"].map(str::to_owned),
+            };
+            let cells = shown(Some(mesh.load)).into_iter().chain(shown(theirs));
+            loads.push(std::iter::once(mesh.name.to_owned()).chain(cells).collect());
+        }
+        let ways = ["Embree, one by one", "16 at once", "16 at once, coherent"];
+        let head = ["triangles, order"].into_iter().chain(WAYS.map(|(name, _)| name)).chain(ways);
+        let rays = page::table(&head.collect::<Vec<_>>(), &rays);
+        let head = ["triangles", "s", "MB", "Embree, s", "MB"];
+        let loads = page::table(&head, &loads);
+        let [closed, open] = self.leaks;
+        let lacking = self.no_embree.as_ref().map(|why| format!(" {why}."));
+        format!(
+            "Millions of rays per second.{}\n\n{rays}\nTo load the same STL file and build what \
+             rays are cast against; most memory of the program that does.\n\n{loads}\n\
+             Of {} million rays from inside a closed sphere of 360 000 triangles {closed} get out; \
+             with one triangle missing, {open}.",
+            lacking.unwrap_or_default(),
+            LEAKED_OF / 1_000_000
+        )
+    }
+}

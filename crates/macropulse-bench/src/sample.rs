@@ -1,0 +1,215 @@
+//! What is measured: bands spread over a scan of `kim-park-2016`, with what they meet and the
+//! ticks of it, under detectors of every quality.
+
+use macropulse::channel::{self, Operating, light_of_echoes};
+use macropulse::codec::decode::Returns;
+use macropulse::codec::{ShotLog, Ticks};
+use macropulse::design::Design;
+use macropulse::detect::{Detectors, Memory};
+use macropulse::emit::{Band, bands};
+use macropulse::environment::Environment;
+use macropulse::random::{Chance, Stage};
+use macropulse::scene::{Hits, Material, Scene};
+use macropulse::{tdc, units};
+use rand::RngExt;
+
+use crate::Fallible;
+use crate::page;
+
+/// Seed of all that is drawn.
+pub const SEED: u64 = 20_160_913;
+
+/// What is scanned; `random` is a white target for every shot, anywhere in the range gate.
+pub const SCENES: [&str; 3] = ["car-50m", "street", "random"];
+
+/// Farther from all surfaces of its shot than this, m, a return is wrong.
+const NEAR: f64 = 0.35;
+
+/// A detector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Condition {
+    /// As the sensor file declares it.
+    Declared,
+    /// Without jitter, and no light from beyond the gate; of the marks a fraction is `missed`, and
+    /// `counts` are dark and background counts per second.
+    Noise { missed: f64, counts: f64 },
+}
+
+impl Condition {
+    /// All marks and nothing else.
+    pub const CLEAN: Self = Self::Noise { missed: 0.0, counts: 0.0 };
+
+    const MISSED: [f64; 4] = [0.0, 0.05, 0.2, 0.4];
+    const COUNTS: [f64; 4] = [0.0, 1e8, 1e9, 1e10];
+
+    /// All that are measured.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let noise = |missed| Self::COUNTS.map(|counts| Self::Noise { missed, counts });
+        Self::MISSED.into_iter().flat_map(noise).chain([Self::Declared])
+    }
+
+    /// The sensor with this detector.
+    pub fn design(self) -> Fallible<Design> {
+        self.design_to(150.0)
+    }
+
+    /// The same with a range gate to so many metres.
+    pub fn design_to(self, gate: f64) -> Fallible<Design> {
+        let Self::Noise { missed, counts } = self else {
+            return Ok(Design::open("kim-park-2016", &[])?);
+        };
+        let keys = [
+            ("detector.photon-counting.sensitivity.pd", 1.0),
+            ("detector.photon-counting.jitter_ps", 0.0),
+            ("detector.photon-counting.missed_marks", missed),
+            ("detector.photon-counting.dark_counts_hz", counts),
+            ("scan.max_range_m", gate),
+            ("scan.light_range_m", gate),
+        ];
+        let keys = keys.map(|(key, value)| (key.to_owned(), format!("{value:?}")));
+        Ok(Design::open("kim-park-2016", &keys)?)
+    }
+
+    /// A table of `cell`s, in the order of [`Condition::all`].
+    pub fn table(scene: &str, cells: &[String]) -> String {
+        let head = [&*format!("`{scene}`, missed"), "no dark counts", "10⁸/s", "10⁹/s", "10¹⁰/s"];
+        let missed = Self::MISSED.map(|missed| format!("{:.0} %", 100.0 * missed));
+        let names = missed.into_iter().chain(["as declared".to_owned()]);
+        let rows = names.zip(cells.chunks(Self::COUNTS.len())).map(|(name, cells)| {
+            let mut row = [vec![name], cells.to_vec()].concat();
+            row.resize(head.len(), String::new());
+            row
+        });
+        page::table(&head, &rows.collect::<Vec<_>>())
+    }
+}
+
+/// Bands of a scan and what they meet, seen by one detector.
+pub struct Sample {
+    /// The sensor.
+    pub design: Design,
+    operating: Operating,
+    materials: Vec<Material>,
+    bands: Vec<(Band, Hits)>,
+}
+
+/// What the receiver is given of a band.
+pub type Given = (ShotLog, Ticks);
+
+impl Sample {
+    /// One band in `every` of a scan of `scene`, where there is neither air nor sunlight. It is
+    /// the second scan: its first band has guard shots before it.
+    pub fn of(design: Design, scene: &str, every: usize) -> Fallible<Self> {
+        let bands = bands(&design, 1).step_by(every);
+        let (materials, bands) = if scene == "random" {
+            let met = |band: Band| (band, anywhere(&design, &band.shot_log(&design)));
+            (vec![Material::matt("white", 1.0)], bands.map(met).collect())
+        } else {
+            let scene = Scene::open(scene)?;
+            let met = |band: Band| (band, scene.trace(&design, &band.shot_log(&design)).middle);
+            let bands = bands.map(met).collect();
+            (scene.materials, bands)
+        };
+        let operating = Operating::of(&design, &Environment::vacuum_dark())?;
+        Ok(Self { design, operating, materials, bands })
+    }
+
+    /// Shots of which returns are wanted.
+    pub fn shots(&self) -> f64 {
+        self.bands.iter().map(|(band, _)| band.shots as f64).sum()
+    }
+
+    /// The speed at which they took so many seconds.
+    pub fn speed(&self, seconds: f64) -> f64 {
+        self.design.speed(self.shots(), seconds)
+    }
+
+    /// From shot log to ticks, band by band.
+    pub fn ticks(&self, mut done: impl FnMut(&mut Memory, Given)) {
+        let detectors = Detectors::new(&self.design, &self.operating, Chance::new(SEED));
+        let mut memory = Memory::default();
+        for (band, hits) in &self.bands {
+            let log = band.shot_log(&self.design);
+            let mut light = light_of_echoes(&self.design, &log, []);
+            let surfaces = (&self.operating.link, &*self.materials);
+            channel::echoes(&mut light.trains, surfaces, &log, hits);
+            let detections = detectors.detections(&log, &light, &mut memory);
+            let ticks = tdc::ticks(&self.design, detections, 0).ticks;
+            done(&mut memory, (log, ticks));
+        }
+    }
+
+    /// What the receiver is given.
+    pub fn given(&self) -> Vec<Given> {
+        let mut given = Vec::new();
+        self.ticks(|_, band| given.push(band));
+        given
+    }
+
+    /// What it makes of that.
+    pub fn decode(&self, given: &[Given]) -> Vec<Returns> {
+        let Design { receiver, coding, .. } = &self.design;
+        given.iter().map(|(log, ticks)| receiver.decode(&coding.codebook, log, ticks)).collect()
+    }
+
+    /// How it did.
+    pub fn score(&self, given: &[Given], returns: &[Returns]) -> Score {
+        let mut score = Score::default();
+        for (((_, hits), (log, _)), returns) in self.bands.iter().zip(given).zip(returns) {
+            score.add(&self.design, log, (hits, returns));
+        }
+        score
+    }
+}
+
+/// One white target for every shot, anywhere in the gate: as much overlap as there can be.
+fn anywhere(design: &Design, log: &ShotLog) -> Hits {
+    let range = |shot: u32| {
+        let mut chance = Chance::new(SEED).at(Stage::Firing, log.first + u64::from(shot));
+        chance.random_range(design.scan.min_range..design.scan.max_range)
+    };
+    let shots = log.len();
+    Hits {
+        shot: (0..shots as u32).collect(),
+        weight: vec![1.0; shots],
+        range: (0..shots as u32).map(range).collect(),
+        cosine: vec![1.0; shots],
+        material: vec![0; shots],
+        object: vec![0; shots],
+    }
+}
+
+/// How shots came out.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Score {
+    /// Shots with an echo from within the gate.
+    pub echoes: usize,
+    /// Those of them found as near to a surface of theirs as the sensor file asks for, 1.5 mm.
+    pub right: usize,
+    /// Returns farther than 0.35 m from every surface of their shot.
+    pub wrong: usize,
+}
+
+impl Score {
+    fn add(&mut self, design: &Design, log: &ShotLog, (hits, returns): (&Hits, &Returns)) {
+        let gate = design.scan.min_range..=design.scan.max_range;
+        for shot in log.owned.clone() {
+            let own = hits.shot.partition_point(|&other| (other as usize) < shot)
+                ..hits.shot.partition_point(|&other| other as usize <= shot);
+            let ranges = hits.range[own].iter().filter(|range| gate.contains(range));
+            let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+            let has_echo = ranges.clone().next().is_some() && !marks.is_empty();
+            self.echoes += usize::from(has_echo);
+            let Ok(at) = returns.shot.binary_search(&(shot as u32)) else { continue };
+            let measured = units::range_from_tof(returns.tof[at]);
+            let off = ranges.map(|range| (range - measured).abs()).fold(f64::INFINITY, f64::min);
+            self.right += usize::from(off <= design.right_within);
+            self.wrong += usize::from(off > NEAR);
+        }
+    }
+
+    /// The shots right, in per cent of those with an echo.
+    pub fn percent(&self) -> f64 {
+        100.0 * self.right as f64 / self.echoes as f64
+    }
+}

@@ -1,0 +1,102 @@
+//! Whole scans, from rays to scored points, and the memory of many.
+
+use std::time::Instant;
+
+use macropulse::scene::Scene;
+use macropulse::sim::{Scans, Tally, Watch};
+use rayon::ThreadPoolBuilder;
+
+use crate::Fallible;
+use crate::page::{self, three};
+use crate::sample::{Condition, SEED};
+
+/// Scans are made for so long, s, and two at least.
+const ENOUGH: f64 = 6.0;
+
+const UNWATCHED: Watch<'static> = Watch { done: &|_| {}, stop: &|| false };
+
+/// Scans of one scene with one detector.
+struct Measured {
+    scene: &'static str,
+    condition: Condition,
+    /// Scans per second of wall time with one thread and with two.
+    per_second: [f64; 2],
+    /// Processor time of each stage in a scan, s, with one thread.
+    stages: [f64; Tally::STAGES.len()],
+}
+
+/// All of them.
+pub struct WholeScans(Vec<Measured>);
+
+/// Measures them.
+pub fn measure() -> Fallible<WholeScans> {
+    let mut all = Vec::new();
+    for scene in ["car-50m", "street"] {
+        for condition in [Condition::CLEAN, Condition::Declared] {
+            let (one, stages) = run(scene, condition, 1)?;
+            let (two, _) = run(scene, condition, 2)?;
+            all.push(Measured { scene, condition, per_second: [one, two], stages });
+        }
+    }
+    Ok(WholeScans(all))
+}
+
+/// Scans per second on so many threads, and seconds of a scan in each stage.
+fn run(
+    scene: &str,
+    condition: Condition,
+    threads: usize,
+) -> Fallible<(f64, [f64; Tally::STAGES.len()])> {
+    let (design, scene) = (condition.design()?, Scene::open(scene)?);
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let mut scans = Scans::new(&design, &scene, SEED)?;
+    let (mut seconds, mut number) = ([0.0; Tally::STAGES.len()], 0);
+    let measured = pool.install(|| {
+        // The first scan finds cold memory.
+        scans.scan(0, &UNWATCHED);
+        let began = Instant::now();
+        while number < 2 || began.elapsed().as_secs_f64() < ENOUGH {
+            number += 1;
+            let taken = scans.scan(number, &UNWATCHED).map_or(seconds, |scan| scan.tally.seconds);
+            seconds.iter_mut().zip(taken).for_each(|(sum, more)| *sum += more);
+        }
+        let scans = number as f64;
+        (scans / began.elapsed().as_secs_f64(), seconds.map(|sum| sum / scans))
+    });
+    Ok(measured)
+}
+
+impl WholeScans {
+    /// Scans per second with two threads.
+    pub fn on_two_threads(&self, scene: &str, condition: Condition) -> Option<f64> {
+        let is_it = |one: &&Measured| one.scene == scene && one.condition == condition;
+        self.0.iter().find(is_it).map(|one| one.per_second[1])
+    }
+
+    /// The table.
+    pub fn text(&self) -> String {
+        let head = [&["scene", "one thread", "two threads"][..], &Tally::STAGES].concat();
+        let rows = self.0.iter().map(|one| {
+            let condition = if one.condition == Condition::Declared { "declared" } else { "clean" };
+            let name = format!("`{}` {condition}", one.scene);
+            let rates = one.per_second.iter().map(|rate| three(*rate));
+            let stages = one.stages.iter().map(|seconds| three(1e3 * seconds));
+            std::iter::once(name).chain(rates).chain(stages).collect()
+        });
+        format!(
+            "Scans per second of wall time; and of one thread the milliseconds that each stage \
+             takes of a scan.\n\n{}",
+            page::table(&head, &rows.collect::<Vec<_>>())
+        )
+    }
+}
+
+/// Sixty clean scans of the car: for a process of which the memory is looked at afterwards.
+pub fn sixty() -> Fallible<()> {
+    let (design, scene) = (Condition::CLEAN.design()?, Scene::open("car-50m")?);
+    let mut scans = Scans::new(&design, &scene, SEED)?;
+    for number in 0..60 {
+        scans.scan(number, &UNWATCHED);
+    }
+    Ok(())
+}
