@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use macropulse::clock::thread_seconds;
 use macropulse::codec::level::Level;
+use macropulse::processor::thread_seconds;
 
 /// What the figures depend on.
 pub fn words() -> String {

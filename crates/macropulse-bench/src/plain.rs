@@ -2,9 +2,9 @@
 
 use std::hint::black_box;
 
-use macropulse::clock::thread_seconds;
 use macropulse::codec::decode::Returns;
 use macropulse::design::Design;
+use macropulse::processor::thread_seconds;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 

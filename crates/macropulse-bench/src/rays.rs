@@ -8,7 +8,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3A};
-use macropulse::clock::thread_seconds;
+use macropulse::processor::thread_seconds;
 use macropulse::scene::{Ray, Scene};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;

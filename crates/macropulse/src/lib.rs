@@ -41,5 +41,5 @@ pub mod random;
 pub mod units;
 pub mod names;
 pub mod digest;
-pub mod clock;
+pub mod processor;
 mod kernels;

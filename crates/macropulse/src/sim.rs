@@ -5,11 +5,11 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use crate::channel::{Light, Operating, Seen};
-use crate::clock::thread_seconds;
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands, scan_begins_fs};
 use crate::points::{Piece, PointCloud, Viewpoint};
+use crate::processor::thread_seconds;
 use crate::random::Chance;
 use crate::scene::{Hits, Pose, Scene};
 use crate::score::{self, Score};

@@ -51,7 +51,7 @@ const SIMULATOR: Layers = Layers {
     modules: &[
         Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
         Rule { module: "digest", may_name: &[], because: "a hash depends on bytes alone" },
-        Rule { module: "clock", may_name: &[], because: "time passes whatever it is spent on" },
+        Rule { module: "processor", may_name: &[], because: "time passes whatever it is for" },
         Rule {
             module: "names",
             may_name: &[],
@@ -127,8 +127,16 @@ const SIMULATOR: Layers = Layers {
         Rule {
             module: "sim",
             may_name: &[
-                "channel", "clock", "design", "detect", "emit", "points", "random", "scene",
-                "score", "tdc",
+                "channel",
+                "design",
+                "detect",
+                "emit",
+                "points",
+                "processor",
+                "random",
+                "scene",
+                "score",
+                "tdc",
             ],
             because: "the chain calls the stages and nothing else",
         },
