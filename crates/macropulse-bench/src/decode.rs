@@ -33,8 +33,9 @@ fn one(scene: &str, condition: Condition) -> Fallible<Decoded> {
     let every = EVERY[usize::from(scene == "random")];
     let sample = Sample::of(condition.design()?, scene, every)?;
     let given = sample.given();
-    let mut returns = Vec::new();
+    let mut returns = Ok(Vec::new());
     let seconds = least_seconds(|| returns = black_box(sample.decode(&given)));
+    let returns = returns?;
     Ok(Decoded { speed: sample.speed(seconds), score: sample.score(&given, &returns) })
 }
 
@@ -42,7 +43,7 @@ fn one(scene: &str, condition: Condition) -> Fallible<Decoded> {
 pub fn whole(scene: &str, condition: Condition) -> Fallible<Score> {
     let sample = Sample::of(condition.design()?, scene, 1)?;
     let given = sample.given();
-    Ok(sample.score(&given, &sample.decode(&given)))
+    Ok(sample.score(&given, &sample.decode(&given)?))
 }
 
 impl Decoding {

@@ -123,8 +123,9 @@ impl<'a> Sought<'a> {
 pub fn text() -> Fallible<String> {
     let sample = Sample::of(Condition::CLEAN.design()?, "street", 24)?;
     let given = sample.given();
-    let mut returns = Vec::new();
+    let mut returns = Ok(Vec::new());
     let seconds = least_seconds(|| returns = black_box(sample.decode(&given)));
+    let returns = returns?;
     let receiver = sample.design.scan_period() / sample.speed(seconds);
     let sought: Vec<Sought> = given
         .iter()

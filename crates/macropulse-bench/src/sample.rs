@@ -2,7 +2,7 @@
 //! ticks of it, under detectors of every quality.
 
 use macropulse::channel::{self, Operating, light_of_echoes};
-use macropulse::codec::decode::Returns;
+use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
@@ -133,8 +133,8 @@ impl Sample {
             let mut light = light_of_echoes(&self.design, &log, []);
             let surfaces = (&self.operating.link, &*self.materials);
             channel::echoes(&mut light.trains, surfaces, &log, hits);
-            let detections = detectors.detections(&log, &light, &mut memory);
-            let ticks = tdc::ticks(&self.design, detections, 0).ticks;
+            let response = detectors.response(&log, &light, &mut memory);
+            let ticks = tdc::ticks(&self.design, response, 0).ticks;
             done(&mut memory, (log, ticks));
         }
     }
@@ -147,7 +147,7 @@ impl Sample {
     }
 
     /// What it makes of that.
-    pub fn decode(&self, given: &[Given]) -> Vec<Returns> {
+    pub fn decode(&self, given: &[Given]) -> Result<Vec<Returns>, decode::Error> {
         let Design { receiver, coding, .. } = &self.design;
         given.iter().map(|(log, ticks)| receiver.decode(&coding.codebook, log, ticks)).collect()
     }

@@ -51,19 +51,18 @@ fn run(
     let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
     let mut scans = Scans::new(&design, &scene, SEED)?;
     let (mut seconds, mut number) = ([0.0; Tally::STAGES.len()], 0);
-    let measured = pool.install(|| {
+    pool.install(|| {
         // The first scan finds cold memory.
-        scans.scan(0, &UNWATCHED);
+        scans.scan(0, &UNWATCHED)?;
         let began = Instant::now();
         while number < 2 || began.elapsed().as_secs_f64() < ENOUGH {
             number += 1;
-            let taken = scans.scan(number, &UNWATCHED).map_or(seconds, |scan| scan.tally.seconds);
+            let taken = scans.scan(number, &UNWATCHED)?.map_or(seconds, |scan| scan.tally.seconds);
             seconds.iter_mut().zip(taken).for_each(|(sum, more)| *sum += more);
         }
         let scans = number as f64;
-        (scans / began.elapsed().as_secs_f64(), seconds.map(|sum| sum / scans))
-    });
-    Ok(measured)
+        Ok((scans / began.elapsed().as_secs_f64(), seconds.map(|sum| sum / scans)))
+    })
 }
 
 impl WholeScans {
@@ -96,7 +95,7 @@ pub fn sixty() -> Fallible<()> {
     let (design, scene) = (Condition::CLEAN.design()?, Scene::open("car-50m")?);
     let mut scans = Scans::new(&design, &scene, SEED)?;
     for number in 0..60 {
-        scans.scan(number, &UNWATCHED);
+        scans.scan(number, &UNWATCHED)?;
     }
     Ok(())
 }

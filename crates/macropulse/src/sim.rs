@@ -231,10 +231,9 @@ fn measure<'a>(
     lap(&mut tally);
     let light = channel::light(&setup.seen, &log, &traced);
     lap(&mut tally);
-    let detections = detectors.detections(&log, &light, memory);
-    tally.detections = detections.time.len() as u64;
+    let response = detectors.response(&log, &light, memory);
     lap(&mut tally);
-    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, detections, known);
+    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, response, known);
     lap(&mut tally);
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
     lap(&mut tally);
@@ -253,6 +252,7 @@ fn measure<'a>(
         }
     }
     tally.ticks = ticks.tick.len() as u64;
+    tally.detections = tally.ticks + merged + lost;
     tally.merged = merged;
     tally.lost = lost;
     tally.peak_busy = peak_busy;

@@ -69,28 +69,32 @@ pub fn echoes(
     trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(materials, hits, i)));
     let lit = &trains.photons[from..];
     // Nearly always all of them.
-    let dark = lit.iter().any(|&photons| photons <= 0.0);
-    let kept: Vec<u32> = match dark {
-        true => (0..).zip(lit).filter(|(_, photons)| **photons > 0.0).map(|(i, _)| i).collect(),
-        false => (0..hits.shot.len() as u32).collect(),
-    };
-    if dark {
-        let photons: Vec<f64> = kept.iter().map(|i| lit[*i as usize]).collect();
-        trains.photons.truncate(from);
-        trains.photons.extend(photons);
+    if lit.iter().all(|&photons| photons > 0.0) {
+        return add_columns(trains, log, &hits.shot, &delay_fs);
     }
+    let kept: Vec<usize> = (0..lit.len()).filter(|i| lit[*i] > 0.0).collect();
+    let photons: Vec<f64> = kept.iter().map(|i| lit[*i]).collect();
+    trains.photons.truncate(from);
+    trains.photons.extend(photons);
+    let shots: Vec<u32> = kept.iter().map(|i| hits.shot[*i]).collect();
+    let delay_fs: Vec<i64> = kept.iter().map(|i| delay_fs[*i]).collect();
+    add_columns(trains, log, &shots, &delay_fs);
+}
+
+/// Adds all columns but the photons of the echoes of `shots`, so long after each was fired.
+fn add_columns(trains: &mut PulseTrains, log: &ShotLog, shots: &[u32], delay_fs: &[i64]) {
     // Column by column: rows would take three times as long.
-    let shots = || kept.iter().map(|i| hits.shot[*i as usize] as usize);
-    trains.transmitter.resize(from + kept.len(), 0);
-    trains.marks.resize(from + kept.len(), ALL_MARKS);
-    trains.channel.extend(shots().map(|shot| log.channel[shot]));
-    trains.label.extend(shots().map(|shot| log.label[shot]));
-    trains.word.extend(shots().map(|shot| log.word[shot]));
-    trains.shot.extend(shots().map(|shot| log.first + shot as u64));
-    let arrives_fs = |(shot, i): (usize, &u32)| log.fired_at_fs[shot] + delay_fs[*i as usize];
-    trains.arrives_fs.extend(shots().zip(&kept).map(arrives_fs));
-    let (mut way, mut before) = (0, usize::MAX);
-    trains.way.extend(shots().map(|shot| {
+    let all = trains.photons.len();
+    trains.transmitter.resize(all, 0);
+    trains.marks.resize(all, ALL_MARKS);
+    let each = || shots.iter().map(|shot| *shot as usize);
+    trains.channel.extend(each().map(|shot| log.channel[shot]));
+    trains.label.extend(each().map(|shot| log.label[shot]));
+    trains.word.extend(each().map(|shot| log.word[shot]));
+    trains.shot.extend(each().map(|shot| log.first + shot as u64));
+    trains.arrives_fs.extend(each().zip(delay_fs).map(|(shot, late)| log.fired_at_fs[shot] + late));
+    let (mut way, mut before) = (0, u32::MAX);
+    trains.way.extend(shots.iter().map(|&shot| {
         way = if shot == before { way + 1 } else { 0 };
         before = shot;
         way

@@ -30,6 +30,13 @@ pub struct Tdc {
     pub dead_fs: i64,
 }
 
+impl Tdc {
+    /// Ticks for which a converter is busy with one event, rounded up.
+    pub fn dead_ticks(&self) -> u32 {
+        u32::try_from((self.dead_fs + self.tick_fs - 1) / self.tick_fs).unwrap_or(u32::MAX)
+    }
+}
+
 impl Check<'_> {
     pub(super) fn tdc(&self, file: &TdcFile) -> Result<Tdc, Error> {
         let tick_fs = self.whole_fs("tdc.resolution_ps", file.resolution_ps)?;

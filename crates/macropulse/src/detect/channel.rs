@@ -77,6 +77,11 @@ impl Arrangement {
         self.shots.sort();
     }
 
+    /// The pulse trains at a sensor with a single channel, as [`Channel::order`] has them.
+    pub fn order(&self) -> &[u64] {
+        &self.order
+    }
+
     /// The channels that listen, in their order.
     pub fn channels<'a>(
         &'a self,

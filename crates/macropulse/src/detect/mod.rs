@@ -9,6 +9,7 @@ mod first_photon;
 mod geiger;
 mod jitter;
 mod linear;
+mod marks;
 mod noise;
 mod photon_counting;
 mod shape;
@@ -17,18 +18,21 @@ mod single_stop;
 use std::borrow::Cow;
 use std::fmt;
 
+pub use marks::{Marks, Response};
+
 use macropulse_codec::ShotLog;
 
 use channel::{Arrangement, Channel};
 use clock::Clock;
 use geiger::Cells;
 use linear::Thresholding;
+use marks::ExactWords;
 use photon_counting::Counting;
 use shape::Shape;
 
 use crate::channel::{Light, Operating};
 use crate::design::{Design, Detector};
-use crate::kernels::GROUP;
+use crate::kernels::{GROUP, Macropulse};
 use crate::random::Chance;
 
 /// Detection events: what detectors put out. Sorted by channel, then by time.
@@ -58,6 +62,13 @@ pub struct Detectors<'a> {
 trait Kind: fmt::Debug + Send + Sync {
     /// Adds the events of a channel to those found, in the order of time.
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory);
+
+    /// The macropulses of `light` in the `order` in which they begin to arrive, as
+    /// [`Channel::order`] has it, if every mark of them makes one event in its tick, and nothing
+    /// else does; `None` where it may be otherwise.
+    fn marks(&self, _order: &[u64], _light: &Light) -> Option<(&ExactWords, Vec<Macropulse>)> {
+        None
+    }
 }
 
 impl<'a> Detectors<'a> {
@@ -73,6 +84,23 @@ impl<'a> Detectors<'a> {
             Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
         };
         Self { design, chance, shape: Shape::of(design), kind }
+    }
+
+    /// What `light` makes while the sensor listens to the shots of `log`: marks alone where no
+    /// detection event is anything else, as of a detector that never misses.
+    pub fn response(&self, log: &ShotLog, light: &Light, memory: &mut Memory) -> Response<'_> {
+        if let Some(first) = log.fired_at_fs.first()
+            && self.shape.is_none()
+            && self.design.channels() == 1
+        {
+            let clock = Clock::new(self.design, *first);
+            memory.arrangement.fill(self.design, &clock, log, light);
+            if let Some((words, macropulses)) = self.kind.marks(memory.arrangement.order(), light) {
+                let ticks = std::mem::take(&mut memory.times);
+                return Response::Marks(Marks { epoch: clock.epoch, words, macropulses, ticks });
+            }
+        }
+        Response::Events(self.detections(log, light, memory))
     }
 
     /// The events that `light` makes while the sensor listens to the shots of `log`.

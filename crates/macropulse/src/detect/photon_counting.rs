@@ -14,12 +14,13 @@
 use super::channel::Channel;
 use super::first_photon::FirstPhoton;
 use super::jitter::Jitter;
+use super::marks::ExactWords;
 use super::noise::counts;
 use super::{Detections, Kind, Memory};
-use crate::channel::ALL_MARKS;
+use crate::channel::{ALL_MARKS, Light, PulseTrains};
 use crate::design::detector::PhotonCounting;
 use crate::design::{Design, PARTS_OF_TICK};
-use crate::kernels::{PAD, STEP, Train, append_train, keep_below, merge};
+use crate::kernels::{Macropulse, PAD, Words, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
 use crate::units::FS_PER_S;
 
@@ -29,15 +30,12 @@ const FEW: usize = 64;
 /// The detector, and the language of the light it sees.
 #[derive(Debug)]
 pub(super) struct Counting {
-    /// Times of the marks of all code words, each padded to `padded` numbers.
-    words: Vec<u32>,
-    padded: usize,
-    /// Marks of each code word.
-    weights: Vec<usize>,
+    /// The code words, in parts of a tick.
+    words: Words,
+    /// The same in ticks, where nothing moves a mark and nothing but marks makes events.
+    exact: Option<ExactWords>,
     /// Lit bits of each label, the one sent first the lowest.
     lit: Vec<u32>,
-    /// Length of a bit, in parts of a tick.
-    bit: u32,
     /// Fraction of the marks that are not missed for another reason than lack of light.
     kept: f64,
     jitter: Option<Jitter>,
@@ -50,27 +48,24 @@ pub(super) struct Counting {
 impl Counting {
     pub fn new(counting: &PhotonCounting, design: &Design) -> Self {
         let codebook = &design.coding.codebook;
-        let chip = (design.coding.chip_fs / design.tdc.tick_fs) as u32 * PARTS_OF_TICK;
-        let weights: Vec<usize> =
-            (0..codebook.words()).map(|word| codebook.word(word as u16).weight()).collect();
-        let padded = codebook.family().weight().next_multiple_of(STEP);
-        let mut words = Vec::new();
-        for word in 0..codebook.words() {
-            let marks = codebook.word(word as u16).marks.iter();
-            words.extend(marks.map(|mark| u32::from(*mark) * chip));
-            words.resize((word + 1) * padded, 0);
-        }
+        let chip = (design.coding.chip_fs / design.tdc.tick_fs) as u32;
+        let words = |chip: u32| {
+            let family = codebook.family();
+            let marks = (0..codebook.words()).map(|word| &codebook.word(word as u16).marks[..]);
+            Words::new(marks, family.weight(), (chip, family.length()))
+        };
         let lit = |label: u32| match codebook.payload() {
             Some(payload) => payload.encode(label as u16).reverse_bits() >> (32 - payload.bits()),
             None => 1,
         };
         let parts = FS_PER_S as f64 / design.tdc.tick_fs as f64 * f64::from(PARTS_OF_TICK);
+        let is_exact = counting.jitter <= 0.0 && counting.missed_marks <= 0.0;
+        let is_exact = is_exact && counting.dark <= 0.0 && !codebook.zeros_are_lit();
+        let exact = || ExactWords::of(words(chip), design);
         Self {
-            words,
-            padded,
-            weights,
+            exact: is_exact.then(exact),
+            words: words(chip * PARTS_OF_TICK),
             lit: (0..codebook.labels()).map(lit).collect(),
-            bit: codebook.family().length() * chip,
             kept: 1.0 - counting.missed_marks,
             jitter: Jitter::new(counting.jitter * parts),
             dark: counting.dark,
@@ -105,7 +100,27 @@ impl Kind for Counting {
             found.time = before;
         }
     }
+
+    fn marks(&self, order: &[u64], light: &Light) -> Option<(&ExactWords, Vec<Macropulse>)> {
+        let exact = self.exact.as_ref()?;
+        let (trains, background) = (&light.trains, &light.background);
+        let is_certain = |photons: &f64| *photons >= PLAIN;
+        let is_exact = background.steady <= 0.0
+            && background.per_s.iter().all(|rate| *rate <= 0.0)
+            && trains.transmitter.iter().all(|transmitter| *transmitter == 0)
+            && trains.marks.iter().all(|marks| *marks == ALL_MARKS)
+            && trains.photons.iter().all(is_certain);
+        let parts = PARTS_OF_TICK.trailing_zeros();
+        let macropulse = |arrival: &u64| {
+            self.macropulse(trains, *arrival as u32 as usize, (arrival >> 32) as u32 >> parts)
+        };
+        is_exact.then(|| (exact, order.iter().map(macropulse).collect()))
+    }
 }
+
+/// So many photons of a mark are always seen: what is lost beside 1 is far below the 2⁻³² that is
+/// drawn with.
+const PLAIN: f64 = 40.0;
 
 /// What the detector of a channel is given of a band, and its chance.
 #[derive(Clone, Copy)]
@@ -115,6 +130,13 @@ struct Seen<'a> {
 }
 
 impl Counting {
+    /// What pulse train `index`, a whole macropulse of the sensor's own, is if it begins at `start`.
+    #[inline]
+    fn macropulse(&self, trains: &PulseTrains, index: usize, start: u32) -> Macropulse {
+        let lit = self.lit[usize::from(trains.label[index])];
+        Macropulse { start, word: trains.word[index], lit }
+    }
+
     /// Adds the events of one pulse train to `time`.
     fn add_train(
         &self,
@@ -137,15 +159,7 @@ impl Counting {
         let is_own = transmitter == 0;
         let is_whole = trains.marks[index] == ALL_MARKS;
         if is_own && is_whole && !channel.design.coding.codebook.zeros_are_lit() {
-            let word = usize::from(trains.word[index]);
-            let train = Train {
-                word: &self.words[word * self.padded..][..self.padded],
-                weight: self.weights[word],
-                bit: self.bit,
-                lit: self.lit[usize::from(trains.label[index])],
-                start,
-            };
-            append_train(&train, time);
+            append_train(&self.words.train(&self.macropulse(trains, index, start)), time);
         } else {
             let counted = channel.arrivals(index, &mut memory.arrivals);
             time.extend(counted.iter().map(|time| *time as u32));

@@ -8,13 +8,15 @@
 //!    them busy the event is lost.
 //! 4. Where every detector has its own channel, the bank is divided evenly among them.
 
-use std::ops::Range;
+mod bank;
+mod marks;
 
 use macropulse_codec::Ticks;
 
-use crate::design::{Design, PARTS_OF_TICK, Tdc};
-use crate::detect::Detections;
-use crate::kernels::{all_apart, distinct};
+use bank::Bank;
+
+use crate::design::{Design, Tdc};
+use crate::detect::{Detections, Response};
 
 /// What the bank of converters makes of the detection events of a band.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -55,136 +57,32 @@ impl Reading {
     }
 }
 
-/// The ticks of the `detections` of one band, in the memory that those had. In other bands of its
-/// scan `known` converters were busy at once, 0 where none was measured: only more of them are new,
-/// and most of a band is converted without looking for fewer.
-pub fn ticks(design: &Design, detections: Detections, known: u32) -> Converted {
-    let tdc = &design.tdc;
-    let Detections { epoch, mut time, mut channel, mut amplitude } = detections;
-    let found = time.len();
+/// The ticks of the `response` of the detectors to one band, in the memory that it had. In other bands
+/// of its scan `known` converters were busy at once, 0 where none was measured: only more of them
+/// are new, and most of a band is converted without looking for fewer.
+pub fn ticks<'a>(design: &Design, response: impl Into<Response<'a>>, known: u32) -> Converted {
     let converters = design.converters_per_channel() as usize;
-    let mut bank = Bank {
-        converters,
-        dead: u32::try_from((tdc.dead_fs + tdc.tick_fs - 1) / tdc.tick_fs).unwrap_or(u32::MAX),
-        peak: converters.min(known as usize),
+    let mut bank =
+        Bank { converters, dead: design.tdc.dead_ticks(), peak: converters.min(known as usize) };
+    let (ticks, found, merged) = match response.into() {
+        Response::Events(events) => of_events(&mut bank, events),
+        Response::Marks(marks) => marks::ticks(&mut bank, marks),
     };
+    let lost = (found - merged - ticks.tick.len()) as u64;
+    Converted { ticks, peak_busy: bank.peak as u32, lost, merged: merged as u64 }
+}
+
+/// The ticks of detection events; how many those were, and how many fell into the tick of another
+/// one.
+fn of_events(bank: &mut Bank, events: Detections) -> (Ticks, usize, usize) {
+    let Detections { epoch, mut time, mut channel, mut amplitude } = events;
+    let found = time.len();
     let merged = if channel.is_empty() && amplitude.is_empty() {
         bank.take_all(&mut time)
     } else {
         bank.take_by_channel(&mut time, &mut channel, &mut amplitude)
     };
-    let lost = (found - merged - time.len()) as u64;
-    Converted {
-        ticks: Ticks { epoch, tick: time, channel, amplitude },
-        peak_busy: bank.peak as u32,
-        lost,
-        merged: merged as u64,
-    }
-}
-
-/// Detection events looked at together.
-const BLOCK: usize = 512;
-
-/// Converters served first-free, each busy for the same time: an event finds one free unless as
-/// many events as there are converters were taken within the last dead time.
-#[derive(Debug)]
-struct Bank {
-    converters: usize,
-    /// Time for which a converter is busy, ticks.
-    dead: u32,
-    /// Most converters that were busy at once, as far as is known.
-    peak: usize,
-}
-
-impl Bank {
-    /// Makes ticks of `times` and leaves those that find a converter free. Gives how many fell
-    /// into the tick of another one.
-    ///
-    /// If each of a block of events is a dead time later than the one `peak` places before it, no
-    /// more than `peak` converters are busy at any of them: all are taken, and there is no new
-    /// peak. Few blocks are different.
-    fn take_all(&mut self, times: &mut Vec<u32>) -> usize {
-        let (mut taken, mut merged, mut last) = (0, 0, u32::MAX);
-        for read in (0..times.len()).step_by(BLOCK) {
-            let from = read..times.len().min(read + BLOCK);
-            let found = from.len();
-            let end = distinct(times, from, taken, PARTS_OF_TICK.trailing_zeros(), &mut last);
-            let block = taken..end;
-            merged += found - block.len();
-            let is_free = self.peak > 0
-                && taken.checked_sub(self.peak).is_some_and(|back| {
-                    all_apart(&times[back..][..block.len()], &times[block.clone()], self.dead)
-                });
-            taken = if is_free { block.end } else { self.take_block(times, block) };
-        }
-        times.truncate(taken);
-        merged
-    }
-
-    /// Takes the events of `block` one by one; all before it were taken. Gives where those taken
-    /// end.
-    fn take_block(&mut self, ticks: &mut [u32], block: Range<usize>) -> usize {
-        // Converters that took events before that are free again.
-        let mut busy = block.start.saturating_sub(self.peak)..block.start;
-        for read in block {
-            let now = ticks[read];
-            if self.takes(now, ticks, &mut busy) {
-                ticks[busy.end] = now;
-                busy.end += 1;
-            }
-        }
-        busy.end
-    }
-
-    /// Whether an event at `now` finds a converter free. Of `taken` those in the range `busy` may
-    /// still be.
-    fn takes(&mut self, now: u32, taken: &[u32], busy: &mut Range<usize>) -> bool {
-        while busy.start < busy.end && now - taken[busy.start] >= self.dead {
-            busy.start += 1;
-        }
-        if busy.len() == self.converters {
-            return false;
-        }
-        self.peak = self.peak.max(busy.len() + 1);
-        true
-    }
-
-    /// Makes ticks of `times` and leaves those that find one of the converters of their channel
-    /// free, and what belongs to them. Gives how many fell into the tick of another one.
-    fn take_by_channel(
-        &mut self,
-        times: &mut Vec<u32>,
-        channels: &mut Vec<u16>,
-        amplitudes: &mut Vec<f32>,
-    ) -> usize {
-        let (mut merged, mut busy, mut before) = (0, 0..0, None);
-        for read in 0..times.len() {
-            let channel = channels.get(read).copied().unwrap_or(0);
-            let now = times[read] / PARTS_OF_TICK;
-            if before == Some((channel, now)) {
-                merged += 1;
-                continue;
-            }
-            if before.is_some_and(|(other, _)| other != channel) {
-                busy.start = busy.end;
-            }
-            before = Some((channel, now));
-            if self.takes(now, times, &mut busy) {
-                times[busy.end] = now;
-                if let Some(place) = channels.get_mut(busy.end) {
-                    *place = channel;
-                }
-                if read < amplitudes.len() {
-                    amplitudes[busy.end] = amplitudes[read];
-                }
-                busy.end += 1;
-            }
-        }
-        times.truncate(busy.end);
-        channels.truncate(busy.end);
-        amplitudes.truncate(busy.end);
-        merged
-    }
+    (Ticks { epoch, tick: time, channel, amplitude }, found, merged)
 }
 
 #[cfg(test)]

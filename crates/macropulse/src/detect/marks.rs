@@ -1,0 +1,53 @@
+//! Events that are marks and nothing else.
+//!
+//! Where no mark is missed or moved and nothing else makes events, what a detector puts out is
+//! known from the code words: it need not be written down mark by mark, sorted and rounded, to be
+//! made ticks.
+
+use super::Detections;
+use crate::design::Design;
+use crate::kernels::{Macropulse, Words};
+
+/// What the detectors of a sensor make of the light of a band.
+#[derive(Debug)]
+pub enum Response<'a> {
+    /// Detection events, one by one.
+    Events(Detections),
+    /// Macropulses of which every mark makes one event at its arrival.
+    Marks(Marks<'a>),
+}
+
+impl From<Detections> for Response<'_> {
+    fn from(events: Detections) -> Self {
+        Self::Events(events)
+    }
+}
+
+/// Macropulses at a sensor with a single channel of which every mark makes an event in the tick in
+/// which it arrives.
+#[derive(Debug)]
+pub struct Marks<'a> {
+    /// As [`Detections::epoch`].
+    pub(crate) epoch: i64,
+    pub(crate) words: &'a ExactWords,
+    /// In the order in which their first chips arrive; times in ticks since the epoch.
+    pub(crate) macropulses: Vec<Macropulse>,
+    /// Memory for the ticks.
+    pub(crate) ticks: Vec<u32>,
+}
+
+/// Code words in ticks.
+#[derive(Debug)]
+pub(crate) struct ExactWords {
+    pub(crate) words: Words,
+    /// The most marks of one macropulse within the dead time of a converter.
+    pub(crate) busiest: usize,
+}
+
+impl ExactWords {
+    /// The `words` of `design`.
+    pub(super) fn of(words: Words, design: &Design) -> Self {
+        let bits = design.coding.codebook.payload().map_or(1, |payload| payload.bits());
+        Self { busiest: words.most_within(design.tdc.dead_ticks(), bits), words }
+    }
+}

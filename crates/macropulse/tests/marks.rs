@@ -1,0 +1,82 @@
+//! A detector that sees marks and nothing else: its ticks are those of its events, made one by one.
+#![allow(clippy::unwrap_used)]
+
+use macropulse::channel::{Echo, Light, Operating, light_of_echoes};
+use macropulse::codec::ShotLog;
+use macropulse::design::Design;
+use macropulse::detect::{Detectors, Memory, Response};
+use macropulse::emit::Band;
+use macropulse::environment::Environment;
+use macropulse::random::Chance;
+use macropulse::tdc::{self, Converted};
+use proptest::prelude::*;
+
+const COUNTING: [(&str, &str); 3] =
+    [("sensitivity.pd", "1.0"), ("dark_counts_hz", "0"), ("jitter_ps", "0")];
+
+fn sensor(name: &str, counting: &[(&str, &str)], tdc: &[(&str, String)]) -> Design {
+    let counting = counting
+        .iter()
+        .map(|(key, value)| (format!("detector.photon-counting.{key}"), (*value).into()));
+    let tdc = tdc.iter().map(|(key, value)| (format!("tdc.{key}"), value.clone()));
+    Design::open(name, &counting.chain(tdc).collect::<Vec<(String, String)>>()).unwrap()
+}
+
+/// The ticks of `light` in both ways; `None` where marks are not all there is.
+fn both_ways(design: &Design, log: &ShotLog, light: &Light, known: u32) -> Option<[Converted; 2]> {
+    let operating = Operating::of(design, &Environment::vacuum_dark()).unwrap();
+    let detectors = Detectors::new(design, &operating, Chance::new(1));
+    let memory = &mut Memory::default();
+    let marks = detectors.response(log, light, memory);
+    let by_marks = matches!(marks, Response::Marks(_)).then(|| tdc::ticks(design, marks, known))?;
+    Some([by_marks, tdc::ticks(design, detectors.detections(log, light, memory), known)])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn ticks_of_marks_are_those_of_their_events(
+        late in proptest::collection::vec(0..1_u32 << 30, 1..80),
+        scale in 0..20_u32,
+        converters in 1..300_u32,
+        dead_ns in 0..6_u32,
+        known in 0..300_u32,
+        fixed: bool,
+    ) {
+        let name = if fixed { "kim-park-2016-fixed" } else { "kim-park-2016" };
+        let bank = [("converters", converters.to_string()), ("dead_time_ns", dead_ns.to_string())];
+        let design = sensor(name, &COUNTING, &bank);
+        let log = Band { scan: 0, first: 500, shots: 40 }.shot_log(&design);
+        // From all at once to far apart; the first shots are dark ones before their columns.
+        let echo = |(index, late): (usize, &u32)| Echo {
+            shot: index % log.len(),
+            delay_fs: i64::from(late >> scale) * 2,
+            photons: f64::INFINITY,
+        };
+        let mut echoes: Vec<Echo> = late.iter().enumerate().map(echo).collect();
+        echoes.sort_by_key(|echo| echo.shot);
+        let light = light_of_echoes(&design, &log, echoes);
+        let [marks, events] = both_ways(&design, &log, &light, known).unwrap();
+        prop_assert_eq!(marks, events);
+    }
+}
+
+/// Whatever makes an event beside marks, or none of a mark, or moves one, is noticed.
+#[test]
+fn marks_are_not_all_there_is_where_anything_else_is() {
+    let photons = |design: &Design, photons| {
+        let log = Band { scan: 0, first: 0, shots: 40 }.shot_log(design);
+        let light = light_of_echoes(design, &log, [Echo { shot: 3, delay_fs: 5000, photons }]);
+        both_ways(design, &log, &light, 0)
+    };
+    assert!(photons(&sensor("kim-park-2016", &COUNTING, &[]), f64::INFINITY).is_some());
+    assert!(photons(&sensor("kim-park-2016", &COUNTING, &[]), 3.0).is_none());
+    for (key, value) in [("dark_counts_hz", "1"), ("jitter_ps", "0.1"), ("missed_marks", "0.1")] {
+        let mut keys = COUNTING.to_vec();
+        keys.retain(|(known, _)| *known != key);
+        keys.push((key, value));
+        assert!(photons(&sensor("kim-park-2016", &keys, &[]), f64::INFINITY).is_none(), "{key}");
+    }
+    let complement = sensor("bipolar-gold", &[], &[]);
+    assert!(photons(&complement, f64::INFINITY).is_none());
+}
