@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use macropulse::scene::Scene;
-use macropulse::sim::{Scans, Tally, Watch};
+use macropulse::sim::{self, Scans, Tally, Watch};
 use rayon::ThreadPoolBuilder;
 
 use crate::Fallible;
@@ -51,7 +51,7 @@ fn run(
     let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
     let mut scans = Scans::new(&design, &scene, SEED)?;
     let (mut seconds, mut number) = ([0.0; Tally::STAGES.len()], 0);
-    pool.install(|| {
+    let measured = pool.install(|| {
         // The first scan finds cold memory.
         scans.scan(0, &UNWATCHED)?;
         let began = Instant::now();
@@ -61,8 +61,9 @@ fn run(
             seconds.iter_mut().zip(taken).for_each(|(sum, more)| *sum += more);
         }
         let scans = number as f64;
-        Ok((scans / began.elapsed().as_secs_f64(), seconds.map(|sum| sum / scans)))
-    })
+        Ok::<_, sim::Error>((scans / began.elapsed().as_secs_f64(), seconds.map(|sum| sum / scans)))
+    });
+    Ok(measured?)
 }
 
 impl WholeScans {

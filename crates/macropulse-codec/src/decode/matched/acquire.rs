@@ -194,8 +194,8 @@ impl Band<'_> {
 }
 
 /// Where light that is left over may be looked for.
-#[derive(Debug, Default)]
-pub(super) struct Leftover {
+pub(super) struct Leftover<'a> {
+    sent: &'a Sent<'a>,
     /// For each cell of a stretch of time, the residual ticks in a macropulse that begins there, and
     /// some more.
     stretches: Vec<u32>,
@@ -213,15 +213,15 @@ const SOON: i64 = 1000;
 /// In a gate of so many macropulses or more one of them raises the mean hardly.
 const MANY: usize = 16;
 
-impl Leftover {
+impl<'a> Leftover<'a> {
     /// Of the light that arrives in `span`.
-    pub fn new(sent: &Sent, field: &Field, span: &Range<i64>) -> Self {
+    pub fn new(sent: &'a Sent<'a>, field: &Field, span: &Range<i64>) -> Self {
         let mut stretches = Vec::new();
         let length = sent.length() + i64::from(sent.width);
         let begin = field.residual_stretches(span, length, &mut stretches);
         let fullest = stretches.iter().copied().max().unwrap_or(0);
         let together = field.stretch(length);
-        Self { stretches, begin, cell: field.cell(), together, fullest }
+        Self { sent, stretches, begin, cell: field.cell(), together, fullest }
     }
 
     /// Whether there are nowhere so many ticks.
@@ -237,28 +237,28 @@ impl Leftover {
     }
 
     /// Share of places that are lit by what is left over where light of `shot` may begin.
-    pub fn density(&self, sent: &Sent, shot: usize, lags: &Range<i64>) -> f64 {
-        let stretches = &self.stretches[self.cells(sent.fired[shot], lags)];
+    pub fn density(&self, shot: usize, lags: &Range<i64>) -> f64 {
+        let stretches = &self.stretches[self.cells(self.sent.fired[shot], lags)];
         let ticks = stretches.iter().map(|&ticks| f64::from(ticks)).sum::<f64>();
         let places = (stretches.len().max(1) * self.together) as f64 * self.cell as f64;
-        (ticks * f64::from(sent.width) / places).min(1.0)
+        (ticks * f64::from(self.sent.width) / places).min(1.0)
     }
 
-    /// Puts into `places` those of the `lags` of `shot` at which `least` of its marks may be left over;
-    /// none where hardly anything is left but what chance spreads evenly. With `is_even` light is
-    /// looked for that does not stand out, too. Whether there are any.
+    /// Those of the `lags` of `shot` at which `least` of its marks may be left over; none where hardly
+    /// anything is left but what chance spreads evenly. With `is_even` light is looked for that does
+    /// not stand out, too.
     pub fn lags(
         &self,
-        (sent, shot): (&Sent, usize),
+        shot: usize,
         lags: Range<i64>,
         least: u32,
         is_even: bool,
-        places: &mut Vec<Range<i64>>,
-    ) -> bool {
-        places.clear();
+    ) -> Vec<Range<i64>> {
+        let mut places: Vec<Range<i64>> = Vec::new();
+        let sent = self.sent;
         let (enough, fired) = (sent.ticks_of(shot, least), sent.fired[shot]);
         if self.fullest < enough || lags.is_empty() {
-            return false;
+            return places;
         }
         let cells = self.cells(fired, &lags);
         let stretches = &self.stretches[cells.clone()];
@@ -275,7 +275,7 @@ impl Leftover {
         let may_be = mean + f64::from(enough) - 3.0 * mean.sqrt();
         let stands_out = fullest > mean + 5.0 * mean.sqrt();
         if is_long && !stands_out && !(is_even && fullest >= may_be) {
-            return false;
+            return places;
         }
         let at = |cell: usize| self.begin + self.cell * (cells.start + cell) as i64 - fired;
         for (cell, _) in stretches.iter().enumerate().filter(|(_, ticks)| **ticks >= enough) {
@@ -285,6 +285,6 @@ impl Leftover {
                 _ => places.push(from..to),
             }
         }
-        !places.is_empty()
+        places
     }
 }

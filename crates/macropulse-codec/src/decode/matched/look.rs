@@ -132,14 +132,12 @@ impl Band<'_> {
         };
         let (reach, closes) = (sent.reach(), sent.gate().end + sent.length());
         let parts = [reach.start..reach.end.min(closes), closes.max(reach.start)..reach.end];
-        let mut lags = std::mem::take(&mut self.lags);
         // What comes from beyond must stand out.
         let found = parts.into_iter().zip([is_even, false]).find_map(|(part, is_even)| {
-            leftover.lags((sent, shot), part, least, is_even, &mut lags);
+            let lags = leftover.lags(shot, part, least, is_even);
             let (lag, _) = self.maximum(shot, Source::Residual, &lags, least)?;
             self.climb(shot, lag, 1)
         });
-        self.lags = lags;
         let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);
         found.filter(|found| self.is_believed(shot, *found))
     }
@@ -213,17 +211,13 @@ impl Band<'_> {
         if is_even {
             (self.next_even, self.pause) = (shot + self.pause, (2 * self.pause).min(LONGEST_EVEN));
         }
-        let mut lags = std::mem::take(&mut self.lags);
-        let most = match leftover.lags((self.sent, shot), gate.clone(), visible, is_even, &mut lags)
-        {
-            true => {
-                let left = leftover.density(self.sent, shot, &gate);
-                let visible = self.thresholds.least(weight, left).max(visible);
-                self.maximum(shot, Source::Residual, &lags, visible)
-            }
-            false => None,
-        };
-        self.lags = lags;
+        let lags = leftover.lags(shot, gate.clone(), visible, is_even);
+        if lags.is_empty() {
+            return false;
+        }
+        let left = leftover.density(shot, &gate);
+        let visible = self.thresholds.least(weight, left).max(visible);
+        let most = self.maximum(shot, Source::Residual, &lags, visible);
         let Some((lag, _)) = most else { return false };
         // What was found already may be higher, and near enough to be climbed to.
         let found = match known {

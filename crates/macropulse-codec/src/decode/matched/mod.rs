@@ -129,9 +129,8 @@ struct Band<'a> {
     pause: usize,
     /// Counts of the block of lags that was looked at last.
     counts: Counts<NARROW>,
-    /// Memory for the marks of a macropulse, and for lags that are searched.
+    /// Memory for the marks of a macropulse.
     places: Vec<u32>,
-    lags: Vec<Range<i64>>,
     search: Search,
     photons: Photons,
     /// Memory for the residual of a macropulse, and for the marks found in each of its bits.
@@ -191,7 +190,6 @@ impl<'a> Band<'a> {
             pause: 1,
             counts: Counts::default(),
             places: Vec::new(),
-            lags: Vec::new(),
             search: memory.search,
             photons: memory.photons,
             residual: Timeline::default(),
