@@ -544,3 +544,70 @@ fn meshes_and_formulas_agree() {
         assert!(disagreements <= grazing, "{mesh}: {disagreements} of {hits}");
     }
 }
+
+/// Copies in a row along y, each seen from above; and objects of one mesh are as cheap as copies.
+#[test]
+fn twenty_thousand_copies_are_met_where_they_stand() {
+    let copies: String =
+        (1..20_000).map(|i| format!("{{ position_m = [0, {}, 0] }},\n", 4 * i)).collect();
+    let scene = object(
+        Path::new(""),
+        &format!("car = {{}}\nposition_m = [0, 0, 0]\nrest_on_ground = true\ncopies = [{copies}]"),
+    )
+    .unwrap();
+    let one = object(Path::new(""), "car = {}\nposition_m = [0, 0, 0]").unwrap();
+    assert_eq!(scene.triangles(), 20_000 * one.triangles());
+    let down = |y: f64| Ray { origin: [0.3, y + 0.2, 5.0], direction: [0.0, 0.0, -1.0] };
+    let roof = one.cast(&down(0.0), 0.0, 10.0).unwrap().range;
+    for copy in [0, 1, 777, 19_999] {
+        let range = scene.cast(&down(f64::from(4 * copy)), 0.0, 10.0).unwrap().range;
+        assert!((range - roof).abs() < 1e-6, "{copy}: {range}, not {roof}");
+    }
+    assert_eq!(scene.cast(&down(2.0), 0.0, 10.0), None);
+}
+
+#[test]
+fn objects_share_a_mesh_only_if_it_is_read_the_same_way() {
+    let folder = folder(&[("tetra.obj", OBJ.as_bytes()), ("tetra.mtl", MTL.as_bytes())]);
+    let of = |more: [&str; 2]| {
+        let object = |more: &str| {
+            format!(
+                "[[object]]\nmesh = \"tetra.obj\"\nmaterial = \"brick\"\nunit = \"m\"\n{more}\n"
+            )
+        };
+        let text = format!("version = 1\n{}{}", object(more[0]), object(more[1]));
+        Scene::from_toml(&text, "test.toml", folder.path()).unwrap()
+    };
+    let down = |x: f64| Ray { origin: [x + 0.1, 0.1, 9.0], direction: [0.0, 0.0, -1.0] };
+    let ranges = |scene: &Scene| {
+        [0.0, 20.0].map(|x| scene.cast(&down(x), 0.0, 20.0).map_or(0.0, |hit| hit.range))
+    };
+    let same = of(["", "position_m = [20, 0, 0]"]);
+    let [near, far] = ranges(&same);
+    assert!((near - 8.2).abs() < 1e-6 && (far - near).abs() < 1e-6, "{near} {far}");
+    let larger = of(["", "position_m = [20, 0, 0]\nscale = 2.0"]);
+    let [near, far] = ranges(&larger);
+    assert!((near - 8.2).abs() < 1e-6 && (far - 7.2).abs() < 1e-6, "{near} {far}");
+    assert_ne!(same.digest(), larger.digest());
+    assert_ne!(same.digest(), of(["position_m = [20, 0, 0]", ""]).digest());
+}
+
+#[test]
+fn rays_in_any_order_have_the_ranges_they_have_alone() {
+    let scene = Scene::open("car-50m").unwrap();
+    let origin = [0.0, 0.0, 2.0];
+    let ray = |index: usize| {
+        let [left, up] = [index * 7919 % 2003, index * 104_729 % 1999];
+        let (azimuth, elevation) = (left as f64 / 2003.0 - 0.5, (up as f64 / 1999.0 - 0.5) * 0.3);
+        let level = elevation.cos();
+        [level * azimuth.cos(), level * azimuth.sin(), elevation.sin()]
+    };
+    let directions: Vec<[f64; 3]> = (0..5000).map(ray).collect();
+    let ranges = scene.cast_all(origin, &directions, 300.0);
+    let alone = |direction: &[f64; 3]| {
+        let ray = Ray { origin, direction: *direction };
+        scene.cast(&ray, 0.0, 300.0).map_or(f64::INFINITY, |hit| hit.range)
+    };
+    assert!(directions.iter().map(alone).eq(ranges.iter().copied()));
+    assert!(ranges.iter().any(|range| range.is_finite()));
+}

@@ -16,6 +16,7 @@ use super::inside;
 use super::interferer;
 use super::material::{self, Material, plain};
 use super::mesh::Mesh;
+use super::meshes::{Meshes, Origin};
 use super::motion::{Motion, Moving};
 use super::moving::{Mover, MovingShape};
 use super::placed::{self, Placed, stand};
@@ -39,8 +40,7 @@ struct Assembly<'a> {
     moving_shapes: Vec<MovingShape>,
     moving: Vec<Moving>,
     notes: Vec<String>,
-    /// The mesh of the car, once there is one.
-    car: Option<Rc<Mesh>>,
+    meshes: Meshes,
 }
 
 /// Makes the scene that `source` describes; meshes are looked for in `base`.
@@ -61,7 +61,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         moving_shapes: vec![],
         moving: vec![],
         notes: vec![],
-        car: None,
+        meshes: Meshes::default(),
     };
     assembly.define(&file)?;
     let environment = assembly.environment(&file)?;
@@ -103,7 +103,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
         assembly;
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Digest::new();
-    placed.iter().for_each(|placed| surfaces.placed(placed));
+    surfaces.all_placed(&placed);
     solids.iter().for_each(|solid| surfaces.solid(solid));
     for MovingShape { solid, motion } in &moving_shapes {
         surfaces.solid(solid);
@@ -264,11 +264,19 @@ impl Assembly<'_> {
             }
             return Ok(());
         }
-        let mesh = self.mesh(&name, written)?;
-        let material_indices = self.material_indices(&name, written, &mesh)?;
-        let (mut at, mut moving) = (Vec::new(), Vec::new());
+        let origin = self.mesh_origin(&name, written)?;
+        let known = self.meshes.of(&origin, || read(&origin))?;
+        let mesh = Rc::clone(&known.mesh);
+        if matches!(origin, Origin::File { .. }) {
+            let ([x, y, z], count) = (known.size, mesh.triangles.len());
+            self.notes.push(format!(
+                "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
+            ));
+        }
+        let mut at = Vec::new();
+        let mut moving = Vec::new();
         for mut motion in motions {
-            let place = stand(&mesh, &motion.pose, written.rest_on_ground);
+            let place = stand(&mut known.footing, &motion.pose, written.rest_on_ground);
             if motion.moves() {
                 motion.pose.position = place.point([0.0; 3]);
                 moving.push(motion);
@@ -276,42 +284,25 @@ impl Assembly<'_> {
                 at.push(place);
             }
         }
+        let material_indices = self.material_indices(&name, written, &mesh)?;
         self.placed.push(Placed { mesh, material_indices, at, moving, object });
         Ok(())
     }
 
-    /// The mesh of an object in metres, x forward, z up.
-    fn mesh(&mut self, name: &str, written: &ObjectTyped) -> Result<Rc<Mesh>, Error> {
+    /// Where the mesh of an object comes from.
+    fn mesh_origin(&mut self, name: &str, written: &ObjectTyped) -> Result<Origin, Error> {
         let Some(path) = &written.mesh else {
             self.source.refuse_mesh_keys(written)?;
-            let car = match self.car.take() {
-                Some(car) => car,
-                None => Rc::new(car::mesh()?),
-            };
-            return Ok(Rc::clone(self.car.insert(car)));
+            return Ok(Origin::Car);
         };
         let without = match written.material {
             Some(_) => WithoutMaterials::Fine,
             None => WithoutMaterials::Refused,
         };
         let path = self.base.join(path.get_ref());
-        let mut mesh = readers::read(&path, without)?;
-        let gltf = readers::is_gltf(&path);
         let metres = self.metres_per_unit(name, written)?;
-        let (up, forward) = self.axes(name, written, gltf)?;
-        let left = up.cross(forward);
-        for vertex in &mut mesh.vertices {
-            let place = DVec3::from(*vertex) * metres;
-            *vertex = [place.dot(forward), place.dot(left), place.dot(up)];
-        }
-        if let Some((low, high)) = mesh.bounds() {
-            let [x, y, z] = [0, 1, 2].map(|axis| high[axis] - low[axis]);
-            let count = mesh.triangles.len();
-            self.notes.push(format!(
-                "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
-            ));
-        }
-        Ok(Rc::new(mesh))
+        let (up, forward) = self.axes(name, written, readers::is_gltf(&path))?;
+        Ok(Origin::File { path, without, metres, up, forward })
     }
 
     fn metres_per_unit(&mut self, name: &str, written: &ObjectTyped) -> Result<f64, Error> {
@@ -463,5 +454,13 @@ impl Assembly<'_> {
             self.materials.len() - 1
         });
         u16::try_from(index).unwrap_or(u16::MAX)
+    }
+}
+
+/// The mesh of this origin, as its file has it.
+fn read(origin: &Origin) -> Result<Mesh, Error> {
+    match origin {
+        Origin::Car => car::mesh(),
+        Origin::File { path, without, .. } => readers::read(path, *without),
     }
 }

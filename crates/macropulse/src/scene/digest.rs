@@ -43,14 +43,32 @@ impl Digest {
         }
     }
 
-    /// Takes in a mesh, what it is made of, and where it stands.
-    pub(super) fn placed(&mut self, placed: &Placed) {
-        let Placed { mesh, material_indices, at, moving, object } = placed;
+    /// Takes in all meshes, what they are made of, and where they stand. One that many objects share
+    /// is taken in by the first of them.
+    pub(super) fn all_placed(&mut self, placed: &[Placed]) {
+        for (index, one) in placed.iter().enumerate() {
+            match placed[..index].iter().position(|other| other.shares_with(one)) {
+                Some(first) => {
+                    self.bytes(b"as");
+                    self.bytes(&(first as u64).to_le_bytes());
+                }
+                None => self.model(one),
+            }
+            self.places(one);
+        }
+    }
+
+    /// Takes in a mesh and what it is made of.
+    fn model(&mut self, Placed { mesh, material_indices, .. }: &Placed) {
         mesh.vertices.iter().flatten().for_each(|value| self.number(*value));
         for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
             triangle.iter().for_each(|corner| self.bytes(&corner.to_le_bytes()));
             self.bytes(&material_indices[usize::from(*material)].to_le_bytes());
         }
+    }
+
+    /// Takes in where a mesh stands and how it moves.
+    fn places(&mut self, Placed { at, moving, object, .. }: &Placed) {
         for place in at {
             let origin = place.point([0.0; 3]);
             let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

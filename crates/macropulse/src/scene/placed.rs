@@ -1,12 +1,14 @@
 //! Meshes where they stand: each triangle laid out in the world, or a mesh that occurs more than
 //! once kept once.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::closed_form::Solid;
+use super::footing::Footing;
 use super::mesh::Mesh;
 use super::motion::Motion;
 use super::moving::Mover;
@@ -26,16 +28,14 @@ pub(super) struct Placed {
     pub object: u16,
 }
 
-/// The map that carries `mesh` to `pose`; its lowest corner to the position if it is to `rest`.
-pub(super) fn stand(mesh: &Mesh, pose: &Pose, rest: bool) -> Transform {
+/// The map that carries a mesh with this `footing` to `pose`; its lowest corner to the position if it
+/// is to `rest`.
+pub(super) fn stand(footing: &mut Footing, pose: &Pose, rest: bool) -> Transform {
     let place = pose.world_from_sensor();
     if !rest {
         return place;
     }
-    let corners = mesh.triangles.iter().flatten();
-    let heights = corners.map(|corner| place.point(mesh.vertices[*corner as usize])[2]);
-    let lowest = heights.fold(f64::INFINITY, f64::min);
-    place.shifted([0.0, 0.0, pose.position[2] - lowest])
+    place.shifted([0.0, 0.0, pose.position[2] - footing.lowest(&place)])
 }
 
 impl Placed {
@@ -63,41 +63,59 @@ impl Placed {
         lengths.filter(|length| length.is_finite()).fold(0.0, f64::max)
     }
 
+    /// Whether both are one model in two places.
     fn is_like(&self, other: &Self) -> bool {
         self.material_indices == other.material_indices
             && (Rc::ptr_eq(&self.mesh, &other.mesh) || self.mesh == other.mesh)
     }
+
+    /// Whether the `other` is known to be like it, without looking at their meshes.
+    pub(super) fn shares_with(&self, other: &Self) -> bool {
+        Rc::ptr_eq(&self.mesh, &other.mesh) && self.material_indices == other.material_indices
+    }
+}
+
+/// Those of one model together: by the first of each, in the order of the list.
+fn models(placed: &[Placed]) -> Vec<Vec<&Placed>> {
+    let mut models: Vec<Vec<&Placed>> = Vec::new();
+    // Meshes are compared once, and not for each place at which one stands.
+    let mut known: HashMap<(*const Mesh, &[u16]), usize> = HashMap::new();
+    for one in placed.iter().filter(|one| !one.at.is_empty()) {
+        let key = (Rc::as_ptr(&one.mesh), &one.material_indices[..]);
+        let model = *known.entry(key).or_insert_with(|| {
+            let like = models.iter().position(|model| model[0].is_like(one));
+            like.unwrap_or_else(|| {
+                models.push(Vec::new());
+                models.len() - 1
+            })
+        });
+        models[model].push(one);
+    }
+    models
 }
 
 /// The world of all that is placed, exact about `centre` (the sensor).
 pub(super) fn world(placed: Vec<Placed>, solids: Vec<Solid>, centre: [f64; 3]) -> World {
     let mut facets = Vec::new();
-    let (mut models, mut copies) = (Vec::new(), Vec::new());
-    let mut seen: Vec<bool> = vec![false; placed.len()];
-    for (index, one) in placed.iter().enumerate() {
-        if seen[index] || one.at.is_empty() {
+    let mut copies = Vec::new();
+    let mut kept = Vec::new();
+    for alike in self::models(&placed) {
+        let places = || alike.iter().flat_map(|one| one.at.iter().map(move |place| (one, place)));
+        if places().count() == 1 {
+            places().for_each(|(one, place)| facets.extend(one.facets(|v| place.point(v))));
             continue;
         }
-        let like = |other: &usize| placed[*other].is_like(one);
-        let alike: Vec<usize> = (index..placed.len()).filter(like).collect();
-        let total: usize = alike.iter().map(|other| placed[*other].at.len()).sum();
-        alike.iter().for_each(|other| seen[*other] = true);
-        if total == 1 {
-            one.at.iter().for_each(|place| facets.extend(one.facets(|v| place.point(v))));
-            continue;
-        }
-        for other in alike.iter().map(|other| &placed[*other]) {
-            let copy = |to_world: &Transform| Copy {
-                model: models.len(),
-                to_world: *to_world,
-                object: other.object,
-            };
-            copies.extend(other.at.iter().map(copy));
-        }
-        models.push(one.model());
+        let model = kept.len();
+        let copy = |(one, place): (&&Placed, &Transform)| Copy {
+            model,
+            to_world: *place,
+            object: one.object,
+        };
+        copies.extend(places().map(copy));
+        kept.push(alike[0].model());
     }
     drop(placed);
-    World::new(facets, (models, &copies), solids, centre)
+    World::new(facets, (kept, &copies), solids, centre)
 }
 
 /// The meshes among `placed` that move, in their order; each mesh is kept once.

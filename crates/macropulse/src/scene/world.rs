@@ -82,7 +82,10 @@ impl World {
                 .iter()
                 .map(|copy| Primitive::Copy { copy: *copy, from_world: copy.to_world.inverse() }),
         );
-        let boxes = primitives[first..].iter().map(|one| bounds(one, &models, centre));
+        // To measure a model takes as long as its triangles are many: once, not for each copy.
+        let extents: Vec<Extent> =
+            models.iter().map(|model| model.triangles.middle_and_half()).collect();
+        let boxes = primitives[first..].iter().map(|one| bounds(one, &extents, centre));
         let Built { tree, order, .. } = Built::over(boxes, 1, centre);
         let leaves = order.iter().map(|index| first as u32 + index).collect();
         let facets = Facets::new(facets, centre);
@@ -312,8 +315,12 @@ impl PacketHits {
     }
 }
 
-/// The bounding box of a primitive that has bounds, relative to `centre`.
-fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Bounds {
+/// The middle of the box around a model, in its own frame, and half its size.
+type Extent = ([f64; 3], [f64; 3]);
+
+/// The bounding box of a primitive that has bounds, relative to `centre`; those of models are
+/// `extents`.
+fn bounds(primitive: &Primitive, extents: &[Extent], centre: [f64; 3]) -> Bounds {
     let (low, high) = match primitive {
         Primitive::Solid(solid) => {
             let half = solid.half_extent().unwrap_or(DVec3::INFINITY);
@@ -321,7 +328,7 @@ fn bounds(primitive: &Primitive, models: &[Facets], centre: [f64; 3]) -> Bounds 
             (middle - half, middle + half)
         }
         Primitive::Copy { copy, .. } => {
-            let (middle, half) = models[copy.model].triangles.middle_and_half();
+            let (middle, half) = extents[copy.model];
             let middle = DVec3::from(copy.to_world.point(middle));
             let half = copy.to_world.rotation().abs() * DVec3::from(half);
             (middle - half, middle + half)

@@ -1,0 +1,73 @@
+//! The meshes of a scene: each is read, measured and kept once, however many objects share it.
+
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use glam::DVec3;
+
+use super::error::Error;
+use super::footing::Footing;
+use super::mesh::Mesh;
+use super::readers::WithoutMaterials;
+
+/// What decides how a mesh comes out.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Origin {
+    Car,
+    /// A file, read `without` materials or not, its unit in metres, and its axes.
+    File {
+        path: PathBuf,
+        without: WithoutMaterials,
+        metres: f64,
+        up: DVec3,
+        forward: DVec3,
+    },
+}
+
+/// A mesh in metres, x forward, z up.
+pub(super) struct Known {
+    origin: Origin,
+    pub mesh: Rc<Mesh>,
+    pub footing: Footing,
+    /// Length, width and height, m.
+    pub size: [f64; 3],
+}
+
+/// The meshes that there are so far.
+#[derive(Default)]
+pub(super) struct Meshes(Vec<Known>);
+
+impl Meshes {
+    /// The mesh of this origin, which `read` gives if it is new.
+    pub fn of(
+        &mut self,
+        origin: &Origin,
+        read: impl FnOnce() -> Result<Mesh, Error>,
+    ) -> Result<&mut Known, Error> {
+        let known = match self.0.iter().position(|known| known.origin == *origin) {
+            Some(known) => known,
+            None => {
+                self.0.push(Known::new(origin.clone(), read()?));
+                self.0.len() - 1
+            }
+        };
+        Ok(&mut self.0[known])
+    }
+}
+
+impl Known {
+    /// A `mesh` as its file has it.
+    fn new(origin: Origin, mut mesh: Mesh) -> Self {
+        if let Origin::File { metres, up, forward, .. } = origin {
+            let left = up.cross(forward);
+            for vertex in &mut mesh.vertices {
+                let place = DVec3::from(*vertex) * metres;
+                *vertex = [place.dot(forward), place.dot(left), place.dot(up)];
+            }
+        }
+        let (low, high) = mesh.bounds().unwrap_or_default();
+        let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let footing = Footing::of(&mesh);
+        Self { origin, mesh: Rc::new(mesh), footing, size }
+    }
+}
