@@ -46,3 +46,58 @@ pub struct Hits {
     /// Index into `Scene::objects`.
     pub object: Vec<u16>,
 }
+
+impl Hits {
+    /// The same hits by shot, of which there are `shots`; those of one shot stay in their order.
+    pub(super) fn by_shot(self, shots: usize) -> Self {
+        let mut next = vec![0_u32; shots + 1];
+        self.shot.iter().for_each(|shot| next[*shot as usize + 1] += 1);
+        (0..shots).for_each(|shot| next[shot + 1] += next[shot]);
+        let mut order = vec![0_u32; self.shot.len()];
+        for (index, shot) in (0..).zip(&self.shot) {
+            let place = &mut next[*shot as usize];
+            order[*place as usize] = index;
+            *place += 1;
+        }
+        Self {
+            shot: ordered(&self.shot, &order),
+            weight: ordered(&self.weight, &order),
+            range: ordered(&self.range, &order),
+            cosine: ordered(&self.cosine, &order),
+            material: ordered(&self.material, &order),
+            object: ordered(&self.object, &order),
+        }
+    }
+}
+
+/// The values of a column in the `order` of their indices.
+fn ordered<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
+    order.iter().map(|index| column[*index as usize]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hits_come_by_shot_and_then_as_they_were() {
+        let shot = vec![2, 0, 2, 3, 0, 0];
+        let range: Vec<f64> = (0..6).map(f64::from).collect();
+        let column = |of: fn(usize) -> u16| (0..6).map(of).collect::<Vec<u16>>();
+        let hits = Hits {
+            weight: vec![1.0; 6],
+            cosine: range.iter().map(|range| *range as f32).collect(),
+            material: column(|i| i as u16),
+            object: column(|i| 9 - i as u16),
+            shot,
+            range,
+        };
+        let by_shot = hits.by_shot(5);
+        assert_eq!(by_shot.shot, [0, 0, 0, 2, 2, 3]);
+        assert_eq!(by_shot.range, [1.0, 4.0, 5.0, 0.0, 2.0, 3.0]);
+        assert_eq!(by_shot.cosine, [1.0, 4.0, 5.0, 0.0, 2.0, 3.0]);
+        assert_eq!(by_shot.material, [1, 4, 5, 0, 2, 3]);
+        assert_eq!(by_shot.object, [8, 5, 4, 9, 7, 6]);
+        assert_eq!(Hits::default().by_shot(3), Hits::default());
+    }
+}

@@ -6,6 +6,7 @@ mod builtin;
 mod car;
 mod change;
 mod closed_form;
+mod coherence;
 mod digest;
 mod error;
 mod file;
@@ -49,6 +50,9 @@ use crate::environment::Environment;
 use crate::kernels::{LANES, Packet};
 use file::Source;
 use world::{PacketHits, World};
+
+/// So many rays at most are put in order together.
+const ORDERED: usize = 1 << 20;
 
 /// Everything the light can meet, and where the sensor stands.
 ///
@@ -149,22 +153,45 @@ impl Scene {
 
     /// How far the nearest surface lies on each of many rays from one place in the world, given
     /// by unit vectors, m; infinite where there is none before `farthest`. Several times as fast
-    /// as [`Scene::cast`] if neighbours in the list point nearly the same way, with the same
-    /// ranges.
+    /// as [`Scene::cast`], with the same ranges; fastest where neighbours in the list point nearly
+    /// the same way, for rays that do not are put in order first.
     pub fn cast_all(&self, origin: [f64; 3], directions: &[[f64; 3]], farthest: f64) -> Vec<f64> {
-        let mut ranges = Vec::with_capacity(directions.len());
+        let mut ranges = vec![f64::INFINITY; directions.len()];
+        for (ranges, directions) in ranges.chunks_mut(ORDERED).zip(directions.chunks(ORDERED)) {
+            if coherence::are_neighbours(directions.len(), |index| directions[index]) {
+                self.cast_in_turn((origin, farthest), directions, |index, range| {
+                    ranges[index] = range;
+                });
+                continue;
+            }
+            let order = coherence::order(directions.iter().copied());
+            let ordered: Vec<[f64; 3]> =
+                order.iter().map(|index| directions[*index as usize]).collect();
+            self.cast_in_turn((origin, farthest), &ordered, |index, range| {
+                ranges[order[index] as usize] = range;
+            });
+        }
+        ranges
+    }
+
+    /// Calls `met` with the index and the range of every ray that meets a surface.
+    fn cast_in_turn(
+        &self,
+        (origin, farthest): ([f64; 3], f64),
+        directions: &[[f64; 3]],
+        mut met: impl FnMut(usize, f64),
+    ) {
         let (mut packet, mut hits) = (Packet::from(origin), PacketHits::default());
-        for some in directions.chunks(LANES) {
+        for (from, some) in (0..).step_by(LANES).zip(directions.chunks(LANES)) {
             packet.range = [f64::NAN; LANES];
             for (lane, direction) in some.iter().enumerate() {
                 packet.set(lane, *direction, farthest);
             }
             self.world.cast_packet_at(&mut packet, &[0; LANES], &mut hits);
-            let range =
-                |lane| if hits.is_hit(&packet, lane) { packet.range[lane] } else { f64::INFINITY };
-            ranges.extend((0..some.len()).map(range));
+            for lane in (0..some.len()).filter(|lane| hits.is_hit(&packet, *lane)) {
+                met(from + lane, packet.range[lane]);
+            }
         }
-        ranges
     }
 
     /// Number of triangles; closed-form shapes have none.

@@ -9,6 +9,7 @@
 //! 4. Where something moves, all rays of a shot are cast at the time at which it is fired.
 
 use super::batch::Batch;
+use super::coherence;
 use super::{Hits, Scene};
 use crate::design::Design;
 use crate::emit::beam_axes;
@@ -36,15 +37,31 @@ impl Scene {
         axis: impl Fn(usize) -> [f64; 3],
     ) -> Hits {
         let footprint = Footprint::of(design);
+        // Where the sensor moves, each shot has a place of its own, and no neighbours.
+        let by_row = !self.sensor.moves()
+            && (footprint.offsets.len() > 1 || self.world.is_fine())
+            && !coherence::are_in_rows(&log.row);
+        self.trace_with((design, log), &footprint, axis, by_row)
+    }
+
+    /// What all shots meet, cast row `by_row` or as they come, in the order of the log.
+    #[inline(always)]
+    fn trace_with(
+        &self,
+        (design, log): (&Design, &ShotLog),
+        footprint: &Footprint,
+        axis: impl Fn(usize) -> [f64; 3],
+        by_row: bool,
+    ) -> Hits {
+        let order = if by_row { coherence::order_of_rows(&log.row) } else { Vec::new() };
         let mut batch = Batch::new(self, design.scan.light_range);
-        for shot in 0..log.len() {
-            let axis = axis(shot);
+        for place in 0..log.len() {
+            let shot = order.get(place).map_or(place, |shot| *shot as usize);
             batch.leave_at(log.fired_at_fs[shot]);
-            footprint.rays(axis, |aim, weight| {
-                batch.add(shot as u32, weight, aim);
-            });
+            footprint.rays(axis(shot), |aim, weight| batch.add(shot as u32, weight, aim));
         }
-        batch.finish()
+        let hits = batch.finish();
+        if by_row { hits.by_shot(log.len()) } else { hits }
     }
 }
 
@@ -150,6 +167,25 @@ impl Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Shots of a turning head meet the same laser by laser, with one ray or with seven, and are told
+    /// in the order in which they are fired.
+    #[test]
+    fn shots_meet_the_same_in_whatever_order_they_are_cast() {
+        let design = Design::open("hdl-64e", &[]).unwrap();
+        let scene = Scene::open("street").unwrap();
+        let log = crate::emit::Band { scan: 0, first: 64 * 2000, shots: 1000 }.shot_log(&design);
+        assert!(!coherence::are_in_rows(&log.row));
+        let axis = |shot: usize| design.directions().of(log.row[shot], log.column[shot]);
+        let around = (0..7).map(|ray| ([1e-3 * f64::from(ray), -5e-4 * f64::from(ray)], 0.125));
+        for offsets in [vec![([0.0, 0.0], 1.0)], around.collect()] {
+            let footprint = Footprint { offsets };
+            let [as_they_come, by_row] = [false, true]
+                .map(|by_row| scene.trace_with((&design, &log), &footprint, axis, by_row));
+            assert!(by_row.shot.len() > 900 * footprint.offsets.len());
+            assert_eq!(by_row, as_they_come);
+        }
+    }
 
     /// The mirror moves by 0.67 pixel during a macropulse of the paper: an edge that crosses a
     /// pixel is met by some of its sub-macropulses, in the order in which they are sent.

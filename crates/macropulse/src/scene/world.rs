@@ -61,6 +61,9 @@ enum Primitive {
 const WIDE: f64 = 0.01;
 const WIDER: f64 = 1e-6;
 
+/// Triangles with which a scene is fine.
+const FINE: usize = 50_000;
+
 impl World {
     /// Puts surfaces together; exact about `centre` (the sensor).
     pub(super) fn new<'a>(
@@ -106,6 +109,14 @@ impl World {
         };
         let moving = self.movers.iter().map(Mover::triangles).sum::<usize>();
         self.facets.len() + self.primitives.iter().map(of_primitive).sum::<usize>() + moving
+    }
+
+    /// Whether a ray on its way down takes longer than to put it in order: with the city of
+    /// [`coherence`](super::coherence) half as long as before, with a car of 9 700 triangles and a
+    /// street of its copies up to 1.5 times as long.
+    pub(super) fn is_fine(&self) -> bool {
+        let models: usize = self.models.iter().map(Facets::len).sum();
+        self.facets.len() + models >= FINE
     }
 
     /// What each ray of `packet` meets first at its own time, as [`World::cast_at`] has it; the
