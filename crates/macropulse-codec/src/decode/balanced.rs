@@ -15,12 +15,12 @@
 mod grid;
 
 use super::threshold::Thresholds;
-use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns, photons_per_mark};
+use super::timing::{self, Known};
+use super::{FARTHEST_JITTER, MIDDLE, Receiver, Reject, Return, Returns, photons_per_mark};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
 use crate::kernels::{Balance, Chips};
-use crate::time;
 use grid::Grid;
 
 /// How far from the lag of the shot before the beginning of the next macropulse is looked for
@@ -106,18 +106,15 @@ impl<'a> Band<'a> {
         self.last_lag = Some(start - self.fired[shot]);
         let dark = self.codebook.chips() - u32::from(weight);
         let fired_at_fs = self.log.fired_at_fs[shot];
-        let offset = self.mean_offset(start, marks) * time::s_from_fs(self.receiver.tick_fs);
+        let others = f64::from(peak.stray) / f64::from(dark.max(1)) * 0.999;
+        let late = self.late(start, marks, others);
         Some(Return {
             shot,
-            tof: self.receiver.tof(fired_at_fs, start + self.epoch) + offset,
+            tof: self.receiver.tof(fired_at_fs, start + self.epoch, late),
             peak: score,
             marks: weight,
             margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
-            photons: photons_per_mark(
-                peak.found,
-                weight.into(),
-                f64::from(peak.stray) / f64::from(dark.max(1)) * 0.999,
-            ),
+            photons: photons_per_mark(peak.found, weight.into(), others),
         })
     }
 
@@ -164,33 +161,34 @@ impl<'a> Band<'a> {
         self.thresholds.least(marks.into(), in_gate.max(on_dark).min(1.0)) as u16
     }
 
-    /// By how many ticks the marks of a macropulse that begins at `start` are late on average. What
-    /// is looked at is centred on them again, as otherwise one side would be cut off.
-    fn mean_offset(&self, start: i64, marks: &[u16]) -> f64 {
-        const ROUNDS: usize = 3;
+    /// How late the marks of a macropulse that begins at `start` are, in ticks, where others light
+    /// the share `others` of the places of a mark.
+    fn late(&self, start: i64, marks: &[u16], others: f64) -> f64 {
         if self.late == 0 {
-            return 0.0;
+            return MIDDLE;
         }
+        let width = self.late as u32 + 1;
+        let places = timing::lateness(width);
         let scale = i64::from(self.receiver.ticks_per_chip);
-        let mut mean = self.late as f64 / 2.0;
-        for _ in 0..ROUNDS {
-            let middle = mean.round() as i64;
-            let (mut sum, mut count) = (0, 0);
-            for &mark in marks {
-                let place = start + scale * i64::from(mark);
-                let from = place + middle - self.late / 2;
-                let first = self.ticks.partition_point(|&tick| i64::from(tick) < from);
-                let ticks = self.ticks[first..].iter().map(|&tick| i64::from(tick));
-                for tick in ticks.take_while(|&tick| tick <= from + self.late) {
-                    (sum, count) = (sum + tick - place, count + 1);
-                }
-            }
-            mean = sum as f64 / f64::from(count.max(1));
-            if mean.round() as i64 == middle {
-                break;
-            }
+        let marks: Vec<i64> = marks.iter().map(|&mark| scale * i64::from(mark)).collect();
+        let room = (places.end - places.start) as usize;
+        let mut counts = vec![0; room];
+        for mark in &marks {
+            let from = start + mark + places.start;
+            let first = self.ticks.partition_point(|&tick| i64::from(tick) < from);
+            let late = self.ticks[first..].iter().map(|&tick| (i64::from(tick) - from) as usize);
+            late.take_while(|late| *late < room).for_each(|late| counts[late] += 1);
         }
-        mean
+        let (counts, first) = timing::about(width, self.receiver.jitter_ticks, |place| {
+            counts.get((place - places.start) as usize).copied().unwrap_or(0)
+        });
+        let known = Known {
+            sigma: self.receiver.jitter_ticks,
+            marks: marks.len() as f64,
+            others: others / f64::from(width),
+            neighbours: &timing::neighbours(&marks, places.end - places.start),
+        };
+        timing::late_by(&counts, first, &known)
     }
 }
 

@@ -15,7 +15,7 @@
 use std::array;
 
 use super::field::{Field, Memory};
-use super::{FARTHEST_JITTER, MARGIN, Receiver, Reject, Return, Returns, photons_per_mark};
+use super::{FARTHEST_JITTER, MARGIN, MIDDLE, Receiver, Reject, Return, Returns, photons_per_mark};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -314,7 +314,7 @@ impl<'a> Band<'a> {
             let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]).len() as u16;
             self.returns.push(Return {
                 shot,
-                tof: self.receiver.tof(self.log.fired_at_fs[shot], start + self.epoch),
+                tof: self.receiver.tof(self.log.fired_at_fs[shot], start + self.epoch, MIDDLE),
                 peak: claim.count,
                 marks,
                 margin: claim.count - self.runner_up[shot],

@@ -1,6 +1,6 @@
 //! The receiver of a sensor that is not coded: each detector listens for the ticks of its shot.
 
-use super::{Receiver, Reject, Return, Returns, Strength};
+use super::{MIDDLE, Receiver, Reject, Return, Returns, Strength};
 use crate::ShotLog;
 use crate::Ticks;
 
@@ -39,7 +39,7 @@ pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Retur
         for &place in &found {
             returns.push(Return {
                 shot,
-                tof: receiver.tof(log.fired_at_fs[shot], fired + lag(place)),
+                tof: receiver.tof(log.fired_at_fs[shot], fired + lag(place), MIDDLE),
                 peak: 1,
                 marks: 1,
                 margin: 1,

@@ -12,6 +12,7 @@ mod pick;
 mod returns;
 mod threshold;
 mod timeline;
+mod timing;
 
 pub use error::Error;
 pub use pick::{MOST_RETURNS, Pick, Strength};
@@ -87,6 +88,9 @@ pub struct Receiver {
 
 /// Dark ticks at both ends of a timeline, so that a mark may jitter off its end.
 const MARGIN: i64 = 2048;
+
+/// Where in its tick light comes that only one tick tells of.
+const MIDDLE: f64 = 0.5;
 
 /// How far from its place a mark is looked for at most, in ticks.
 const FARTHEST_JITTER: f64 = 1023.0;
@@ -260,9 +264,10 @@ impl Receiver {
         Timeline::new(memory, span, lit)
     }
 
-    /// Two-way time of flight, s, of light that left at `fired_at_fs` and came in tick `tick`.
-    fn tof(&self, fired_at_fs: i64, tick: i64) -> f64 {
-        time::s_from_fs(tick * self.tick_fs - fired_at_fs) + 0.5 * time::s_from_fs(self.tick_fs)
+    /// Two-way time of flight, s, of light that left at `fired_at_fs` and came `late` ticks after
+    /// `tick` began: half a tick, where no more is known.
+    fn tof(&self, fired_at_fs: i64, tick: i64, late: f64) -> f64 {
+        time::s_from_fs(tick * self.tick_fs - fired_at_fs) + late * time::s_from_fs(self.tick_fs)
     }
 }
 

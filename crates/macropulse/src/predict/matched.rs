@@ -7,7 +7,10 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use macropulse_codec::statistics::{binomial_tail, normal_tail, poisson};
+use macropulse_codec::decode::ReceiverKind;
+use macropulse_codec::statistics::{
+    binomial, binomial_tail, normal_quantile, normal_tail, poisson,
+};
 
 use crate::design::Design;
 use crate::design::detector::Lit;
@@ -15,6 +18,13 @@ use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
 
 /// Terms of the sum over harmonics of a tick.
 const HARMONICS: u32 = 16;
+
+/// Jitter, in ticks, of which hardly any event is farther than a tick from the others: ±½ tick is
+/// ±2 σ.
+const NARROW: f64 = 0.25;
+
+/// Places in half a tick over which an error is averaged.
+const PHASES: u32 = 12;
 
 /// Where the receiver looks for a mark.
 pub(super) struct Place {
@@ -164,6 +174,8 @@ pub(super) struct Timing {
     sigma: f64,
     /// Length of a tick, s.
     tick: f64,
+    /// Whether the receiver knows of jitter that leaves the events in two ticks.
+    undoes_rounding: bool,
 }
 
 impl Timing {
@@ -173,15 +185,29 @@ impl Timing {
         let jitter = detector.mark_jitter(mark);
         let spread = libm::hypot(light.pulse * RMS_OF_FWHM, jitter);
         let sigma = libm::hypot(detector.mark_displacement(mark, light), jitter);
-        Self { spread, sigma: sigma / tick, tick }
+        let known = design.receiver.jitter_ticks;
+        let correlates =
+            matches!(design.receiver.kind, ReceiverKind::Matched | ReceiverKind::Balanced);
+        let undoes_rounding = correlates && known > 0.05 && known < NARROW;
+        Self { spread, sigma: sigma / tick, tick, undoes_rounding }
     }
 
-    /// Standard deviation, m, of the range from the mean of `marks` events.
+    /// Standard deviation, m, of the range from `marks` events.
     ///
-    /// Events are rounded down to ticks, and jitter σ (in ticks) dithers them: of the variance
-    /// 1/12 of rounding, B = Σ_m exp(−4π²m²σ²)/(2π²m²) is common to all marks, and the rest is
-    /// averaged with the jitter: B + (σ² + 1/12 − B)/k \[WKL96\].
+    /// Events are rounded down to ticks, and jitter σ (in ticks) dithers them. In the mean of k of
+    /// them the part B = Σ_m exp(−4π²m²σ²)/(2π²m²) of the variance 1/12 of rounding is common to all,
+    /// and the rest is averaged with the jitter: B + (σ² + 1/12 − B)/k \[WKL96\]. A coded receiver that
+    /// knows of jitter far below a tick undoes the rounding, see [`beside_an_edge`].
     pub fn precision(&self, marks: f64) -> f64 {
+        let variance = match self.undoes_rounding {
+            true => beside_an_edge(self.sigma, marks),
+            false => self.of_mean(marks),
+        };
+        SPEED_OF_LIGHT / 2.0 * self.tick * variance.sqrt()
+    }
+
+    /// Variance of the mean of `marks` events, square ticks.
+    fn of_mean(&self, marks: f64) -> f64 {
         let harmonic = |m: u32| {
             let m = f64::from(m) * PI;
             libm::exp(-4.0 * (m * self.sigma).powi(2)) / (2.0 * m * m)
@@ -192,9 +218,30 @@ impl Timing {
             _ => (1..=HARMONICS).map(harmonic).sum(),
         };
         let own = self.sigma.powi(2) + 1.0 / 12.0 - common;
-        let ticks = (common + own.max(0.0) / marks).sqrt();
-        SPEED_OF_LIGHT / 2.0 * self.tick * ticks
+        common + own.max(0.0) / marks
     }
+}
+
+/// Variance of the time told by `marks` events of jitter `sigma`, square ticks, where it is so small
+/// that they fall into two neighbouring ticks.
+///
+/// Light that is x before the end of a tick, x ≤ ½, has n ~ Bin(k, Φ(−x/σ)) of its k events behind
+/// it. The receiver takes it to be −σ·Φ⁻¹(n/k) before that end, ½ at most; the middle of the tick
+/// where all are in one. The square of the error is averaged over n and x.
+fn beside_an_edge(sigma: f64, marks: f64) -> f64 {
+    let all = (marks.round() as usize).max(1);
+    let told = |behind: usize| match behind {
+        0 => 0.5,
+        _ if behind == all => -0.5,
+        _ => (-sigma * normal_quantile(behind as f64 / all as f64)).clamp(-0.5, 0.5),
+    };
+    let told: Vec<f64> = (0..=all).map(told).collect();
+    let square = |phase: u32| -> f64 {
+        let before = (f64::from(phase) + 0.5) / f64::from(PHASES) / 2.0;
+        let chances = binomial(all, normal_tail(before / sigma));
+        chances.iter().zip(&told).map(|(chance, told)| chance * (told - before).powi(2)).sum()
+    };
+    (0..PHASES).map(square).sum::<f64>() / f64::from(PHASES)
 }
 
 #[cfg(test)]
@@ -217,12 +264,25 @@ mod tests {
 
     #[test]
     fn rounding_alone_has_the_variance_of_a_twelfth() {
-        let timing = |sigma| Timing { spread: 0.0, sigma, tick: 2.0 / SPEED_OF_LIGHT };
+        let undoes_rounding = false;
+        let timing =
+            |sigma| Timing { spread: 0.0, sigma, tick: 2.0 / SPEED_OF_LIGHT, undoes_rounding };
         let rounding = 12_f64.sqrt().recip();
         assert_relative_eq!(timing(0.0).precision(100.0), rounding, max_relative = 1e-12);
         assert_relative_eq!(timing(1e-3).precision(1e9), rounding, max_relative = 0.02);
         // Jitter of many ticks is averaged, and rounding with it.
         let wide = (100.0 + 1.0 / 12.0_f64).sqrt() / 10.0;
         assert_relative_eq!(timing(10.0).precision(100.0), wide, max_relative = 1e-12);
+    }
+
+    /// Simulated: k = 174 events at random phases, the maximum of the likelihood, 600 times: 0.155,
+    /// 0.068 and 0.031 ticks at σ = 0.06, 0.12 and 0.2, each known to 3 %; of 58 to 319 events.
+    #[test]
+    fn rounding_is_undone_by_a_little_jitter() {
+        for (sigma, simulated) in [(0.06, 0.155), (0.12, 0.068), (0.2, 0.031)] {
+            let found = beside_an_edge(sigma, 174.0).sqrt();
+            assert!((found / simulated - 1.0).abs() < 0.06, "{sigma}: {found}");
+        }
+        assert!(beside_an_edge(0.2, 1.0) > beside_an_edge(0.2, 10.0));
     }
 }

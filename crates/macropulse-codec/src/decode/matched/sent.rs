@@ -7,6 +7,7 @@ use super::Detection;
 use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook};
+use crate::decode::timing;
 use crate::decode::{Effort, FARTHEST_JITTER, Pick, Receiver};
 use crate::kernels::{Pattern, WordTicks};
 
@@ -46,6 +47,9 @@ pub(super) struct Bits {
     pub per_tick: u32,
     /// Marks that a tick may count for besides an earlier one.
     pub shared: u32,
+    /// How far other marks of the word are from a mark, and from what share of them, as far as their
+    /// ticks may be counted with its own.
+    pub neighbours: Vec<(i64, f64)>,
 }
 
 impl<'a> Sent<'a> {
@@ -93,9 +97,16 @@ impl<'a> Sent<'a> {
                 pattern: pattern(1),
                 cancelled: pattern(cancelled),
                 claimed: pattern(cancelled + self.width - 1),
+                neighbours: self.neighbours(&marks),
                 marks,
             }
         })
+    }
+
+    fn neighbours(&self, marks: &[u32]) -> Vec<(i64, f64)> {
+        let places = timing::lateness(self.width);
+        let marks: Vec<i64> = marks.iter().map(|&mark| i64::from(mark)).collect();
+        timing::neighbours(&marks, places.end - places.start)
     }
 
     /// How many ticks before a mark are cancelled with it: one tick in twenty jitters farther than

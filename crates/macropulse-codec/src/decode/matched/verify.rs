@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::{Band, Detection};
 use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
-use crate::decode::{Reject, Return, Returns, Strength, photons_per_mark};
-use crate::time;
+use crate::decode::timing::{self, Known};
+use crate::decode::{MIDDLE, Reject, Return, Returns, Strength, photons_per_mark};
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
@@ -253,8 +253,9 @@ impl Band<'_> {
         let photons = self.photons.per_mark(detection.count, marks, density);
         let (peak, margin) = (detection.count as u16, detection.margin as u16);
         let sent = self.sent;
-        let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], light.start + sent.epoch)
-            + self.mean_offset(shot, light.start) * time::s_from_fs(sent.receiver.tick_fs);
+        let start = light.start + sent.epoch;
+        let late = self.late(shot, detection);
+        let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start, late);
         Return { shot, tof, peak, marks: marks as u16, margin, photons }
     }
 
@@ -300,34 +301,26 @@ impl Band<'_> {
         }
     }
 
-    /// By how many ticks the marks of `shot` are late on average if it begins at `start`. A
-    /// window that is not centred on them would cut one side off, so it is centred again.
-    fn mean_offset(&self, shot: usize, start: i64) -> f64 {
-        const ROUNDS: usize = 3;
-        let width = i64::from(self.sent.width);
-        let reach = width / 2;
-        if reach == 0 {
-            return 0.0;
+    /// How late the marks of `shot` are, in ticks, if it is found at `detection`.
+    fn late(&self, shot: usize, detection: Detection) -> f64 {
+        let sent = self.sent;
+        if sent.width == 1 {
+            return MIDDLE;
         }
-        let pattern = &self.sent.bits(shot).pattern;
-        let late = |by: i64| -> u32 {
-            let bits = self.sent.lit_from(shot, start + by);
-            bits.map(|bit| self.field.seen().lit_in(bit, pattern)).sum()
+        let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
+        let count = |place: i64| -> u32 {
+            let starts = sent.lit_from(shot, light.start + place);
+            starts.map(|bit| self.field.seen().lit_in(bit, &bits.pattern)).sum()
         };
-        let mut mean = (width - 1) as f64 / 2.0;
-        for _ in 0..ROUNDS {
-            let middle = mean.round() as i64;
-            let (mut sum, mut count) = (0, 0);
-            for by in middle - reach..=middle + reach {
-                let found = i64::from(late(by));
-                (sum, count) = (sum + by * found, count + found);
-            }
-            mean = sum as f64 / count.max(1) as f64;
-            if mean.round() as i64 == middle {
-                break;
-            }
-        }
-        mean
+        let (counts, first) = timing::about(sent.width, sent.receiver.jitter_ticks, count);
+        let beside = self.field.density_without(&light, detection.count, 0);
+        let known = Known {
+            sigma: sent.receiver.jitter_ticks,
+            marks: f64::from(sent.weight(shot)),
+            others: beside / f64::from(sent.width),
+            neighbours: &bits.neighbours,
+        };
+        timing::late_by(&counts, first, &known)
     }
 }
 
