@@ -11,12 +11,13 @@
 //! half the chips are lit. So does the light of other shots, if their words are made for it.
 //!
 //! The maximum is exact. It is found soon because its light lies whole chips apart: see [`grid`].
+//! The ticks of some gates are at hand together, so that memory does not grow with the band.
 
 mod grid;
 
 use super::threshold::Thresholds;
 use super::timing::{self, Known};
-use super::{FARTHEST_JITTER, MIDDLE, Receiver, Reject, Return, Returns, photons_per_mark};
+use super::{GATES_PER_BLOCK, MIDDLE, Receiver, Reject, Return, Returns, photons_per_mark, window};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -66,15 +67,10 @@ struct Band<'a> {
 impl<'a> Band<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
         let (codebook, log) = sent;
-        let fired: Vec<i64> =
-            receiver.all_fired(log).iter().map(|fired| fired - ticks.epoch).collect();
-        let late = late(receiver.jitter_ticks);
+        let fired = receiver.fired_since(log, ticks.epoch);
+        let late = i64::from(window(receiver.jitter_ticks)) - 1;
         let scale = i64::from(receiver.ticks_per_chip);
         let (nearest, farthest) = gate(receiver);
-        let of_owned = |shot: Option<usize>| shot.and_then(|shot| fired.get(shot)).copied();
-        let first = of_owned(Some(log.owned.start)).unwrap_or(0) + nearest;
-        let last = of_owned(log.owned.end.checked_sub(1)).unwrap_or(0) + farthest;
-        let span = first..last + scale * i64::from(codebook.chips()) + late + 1;
         let lags = (farthest - nearest).max(0) as f64 + 1.0;
         Self {
             receiver,
@@ -83,7 +79,7 @@ impl<'a> Band<'a> {
             ticks: &ticks.tick,
             epoch: ticks.epoch,
             late,
-            grid: Grid::new(span, (scale, late), ticks.tick.iter().map(|&tick| i64::from(tick))),
+            grid: Grid::new((scale, late)),
             thresholds: Thresholds::balanced(lags, receiver.false_alarm, codebook.chips()),
             fired,
             chips: Chips::default(),
@@ -98,6 +94,7 @@ impl<'a> Band<'a> {
             return None;
         }
         self.chips.set(self.codebook.chips() as usize, marks);
+        self.cover(shot);
         let (start, peak) = self.peak(shot, marks)?;
         let (weight, score) = (marks.len() as u16, peak.score() as u16);
         if score < self.least(shot, (weight, peak.stray)) {
@@ -116,6 +113,23 @@ impl<'a> Band<'a> {
             margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
             photons: photons_per_mark(peak.found, weight.into(), others),
         })
+    }
+
+    /// Lays down the ticks of the gate of `shot`, and of a macropulse before it and behind it; those of
+    /// the next shots with them.
+    fn cover(&mut self, shot: usize) {
+        let (nearest, farthest) = gate(self.receiver);
+        let length = i64::from(self.codebook.chips() * self.receiver.ticks_per_chip);
+        let beside = length + 64 * i64::from(self.receiver.ticks_per_chip) + self.late + 1;
+        let light = |shot: usize| {
+            self.fired[shot] + nearest - beside..self.fired[shot] + farthest + length + beside
+        };
+        let span = light(shot);
+        if !self.grid.covers(&span) {
+            let last = light(self.log.owned.end.max(shot + 1) - 1);
+            let ahead = span.end + GATES_PER_BLOCK * (span.end - span.start);
+            self.grid.cover(span.start..ahead.min(last.end), self.ticks);
+        }
     }
 
     /// The highest balance in the gate of `shot`, the earliest of several, if it can be believed at
@@ -195,11 +209,6 @@ impl<'a> Band<'a> {
 /// Nearest and farthest lag.
 fn gate(receiver: &Receiver) -> (i64, i64) {
     (receiver.gate_ticks.0.into(), receiver.gate_ticks.1.into())
-}
-
-/// As the matched receiver: ±2 σ of the jitter, which hold 19 of 20 marks.
-fn late(jitter: f64) -> i64 {
-    if jitter > 0.05 { (4.0 * jitter).ceil().min(FARTHEST_JITTER) as i64 } else { 0 }
 }
 
 #[cfg(test)]
@@ -371,6 +380,7 @@ mod tests {
         for shot in 0..400 {
             let own = book.marks(0, log.word[shot]);
             band.chips.set(127, own);
+            band.cover(shot);
             let seen = band.grid.at(band.fired[shot] + 100, &band.chips).unwrap();
             balance += f64::from(seen.score()) / 400.0;
             count += f64::from(seen.found) / 400.0;

@@ -11,8 +11,8 @@
 use std::cell::Cell;
 use std::ops::Range;
 
-use super::timeline::Timeline;
-use super::{Receiver, Reject, Return, Returns};
+use super::field::{self, Field};
+use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns};
 use crate::code::Codebook;
 use crate::{ShotLog, Ticks};
 
@@ -26,7 +26,7 @@ const PLACES: usize = 3 * 25;
 
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
-    static MEMORY: Cell<Vec<u64>> = Cell::default();
+    static MEMORY: Cell<field::Memory> = Cell::default();
 }
 
 /// Takes the returns out of `returns` that light from beyond the gate accounts for better.
@@ -41,26 +41,41 @@ pub(super) fn exclude(
     {
         return;
     }
-    let fired = receiver.all_fired(log);
+    let fired = receiver.fired_since(log, ticks.epoch);
     // Half of the window in which a mark is looked for, and rounding.
-    let slack = 1 + (2.0 * receiver.jitter_ticks).ceil().min(super::FARTHEST_JITTER / 2.0) as u32;
-    let timeline = receiver.timeline(codebook, &fired, ticks, MEMORY.take()).dilated(slack, slack);
+    let slack = 1 + (2.0 * receiver.jitter_ticks).ceil().min(FARTHEST_JITTER / 2.0) as u32;
+    let width = 2 * slack + 1;
+    let length = i64::from(codebook.chips() * receiver.ticks_per_chip);
+    // What is asked of a return: its macropulse, and as much to both sides.
+    let light = |shot: usize| {
+        let (nearest, farthest) = receiver.gate_ticks;
+        let fired: i64 = fired[shot];
+        fired + i64::from(nearest) - 2 * length..fired + i64::from(farthest) + 3 * length
+    };
+    let first = light(returns.shot[0] as usize);
+    let extent = (first.start, first.end - first.start);
+    let mut field = Field::new(&ticks.tick, width, extent, length, MEMORY.take());
     // At most so many are lit: neighbours overlap.
-    let lit = ticks.tick.len() as f64 * f64::from(2 * slack + 1);
+    let lit = ticks.tick.len() as f64 * f64::from(width);
     let lasts =
         ticks.tick.last().zip(ticks.tick.first()).map_or(1, |(last, first)| last - first + 1);
     let density = (lit / f64::from(lasts)).clamp(1e-6, 0.999);
-    let bench = Bench { receiver, codebook, log, fired, timeline, density };
     let mut kept = Returns::with_capacity(returns.len());
     kept.add_rejects(returns);
     for one in returns.each() {
-        match is_doubtful(&one) && bench.is_of_an_earlier_shot(&one) {
+        let is_other = is_doubtful(&one) && {
+            field.cover(light(one.shot));
+            let fired = &fired;
+            let bench = Bench { receiver, codebook, log, fired, field: &field, slack, density };
+            bench.is_of_an_earlier_shot(&one)
+        };
+        match is_other {
             true => kept.reject(Reject::OutsideGate),
             false => kept.push(one),
         }
     }
     *returns = kept;
-    MEMORY.set(bench.timeline.into_memory());
+    MEMORY.set(field.into_memory());
 }
 
 /// What a return is held against.
@@ -68,9 +83,11 @@ struct Bench<'a> {
     receiver: &'a Receiver,
     codebook: &'a Codebook,
     log: &'a ShotLog,
-    fired: Vec<i64>,
-    /// A tick is lit if light came about then.
-    timeline: Timeline,
+    /// Tick in which each shot was fired, from the epoch on.
+    fired: &'a [i64],
+    /// A place is lit if light came so many ticks behind it, or so many about that.
+    field: &'a Field<'a>,
+    slack: u32,
     /// Share of the ticks that are.
     density: f64,
 }
@@ -174,7 +191,7 @@ impl Bench<'_> {
             self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
         };
         let mut compared = Compared::default();
-        let mark = |place: i64| Marks { lit: usize::from(self.timeline.has(place)), all: 1 };
+        let mark = |place: i64| Marks { lit: usize::from(self.has(place)), all: 1 };
         let (mut earlier, mut later) = (places(earlier).peekable(), places(later).peekable());
         loop {
             match (earlier.peek().copied(), later.peek().copied()) {
@@ -197,6 +214,11 @@ impl Bench<'_> {
         }
     }
 
+    /// Whether light came about tick `place`.
+    fn has(&self, place: i64) -> bool {
+        self.field.lit().has(place - i64::from(self.slack))
+    }
+
     /// How many marks are lit of the code word of `counts` if it begins at tick `begins`.
     fn lit_at(&self, counts: &mut Counts, begins: i64) -> usize {
         let count = || self.lit_of(&self.codebook.word(counts.word).marks, begins);
@@ -210,7 +232,7 @@ impl Bench<'_> {
     /// How many of `marks` are lit if what they belong to begins at tick `begins`.
     fn lit_of(&self, marks: &[u16], begins: i64) -> usize {
         let scale = i64::from(self.receiver.ticks_per_chip);
-        let is_lit = |mark: &&u16| self.timeline.has(begins + scale * i64::from(**mark));
+        let is_lit = |mark: &&u16| self.has(begins + scale * i64::from(**mark));
         marks.iter().filter(is_lit).count()
     }
 
@@ -341,10 +363,12 @@ mod tests {
             // Dense and irregular enough for every count to occur.
             let tick = (0..6000_u32).filter(|tick| tick.wrapping_mul(0x9E37_79B9) >> 30 == 0);
             let ticks = Ticks { tick: tick.collect(), ..Ticks::default() };
-            let fired = receiver.all_fired(&log);
-            let timeline = receiver.timeline(&codebook, &fired, &ticks, Vec::new());
-            let (codebook, log, density) = (&codebook, &log, 0.25);
-            let bench = Bench { receiver: &receiver, codebook, log, fired, timeline, density };
+            let fired = receiver.fired_since(&log, 0);
+            let mut field = Field::new(&ticks.tick, 1, (-3000, 9000), 64, Default::default());
+            field.cover(-3000..6000);
+            let (codebook, log, density, slack) = (&codebook, &log, 0.25, 0);
+            let (receiver, fired, field) = (&receiver, &fired, &field);
+            let bench = Bench { receiver, codebook, log, fired, field, slack, density };
             let bit = i64::from(family.length());
             for (earlier, later) in
                 (0..16).flat_map(|one| (one + 4..20).step_by(4).map(move |two| (one, two)))

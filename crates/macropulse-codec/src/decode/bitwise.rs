@@ -124,7 +124,7 @@ impl<'a> Band<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
         let (codebook, log) = sent;
         let epoch = ticks.epoch;
-        let fired: Vec<i64> = receiver.all_fired(log).iter().map(|fired| fired - epoch).collect();
+        let fired = receiver.fired_since(log, epoch);
         let scale = i64::from(receiver.ticks_per_chip);
         let in_ticks = |word: usize| -> Vec<i64> {
             codebook.word(word as u16).marks.iter().map(|&mark| scale * i64::from(mark)).collect()

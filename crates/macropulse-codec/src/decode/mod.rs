@@ -25,7 +25,6 @@ use crate::Ticks;
 use crate::code::Codebook;
 use crate::time;
 use returns::Return;
-use timeline::Timeline;
 
 /// Which receiver decodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +85,11 @@ pub struct Receiver {
     pub pick: Pick,
 }
 
-/// Dark ticks at both ends of a timeline, so that a mark may jitter off its end.
+/// The shots that are fired while light passes the gate so many times are decoded together: so many
+/// more than are in flight that what is looked at twice, at both ends of a block, costs little.
+const GATES_PER_BLOCK: i64 = 2;
+
+/// Ticks before the first light and behind the last that are looked at, so that a mark may jitter.
 const MARGIN: i64 = 2048;
 
 /// Where in its tick light comes that only one tick tells of.
@@ -225,6 +228,11 @@ impl Receiver {
         log.fired_at_fs[shot].div_euclid(self.tick_fs)
     }
 
+    /// The ticks in which the shots were fired, from tick `epoch` on.
+    fn fired_since(&self, log: &ShotLog, epoch: i64) -> Vec<i64> {
+        self.all_fired(log).iter().map(|fired| fired - epoch).collect()
+    }
+
     /// The absolute ticks in which the shots were fired.
     fn all_fired(&self, log: &ShotLog) -> Vec<i64> {
         // Whole numbers up to here are exact as floating-point ones, and a quotient of two is
@@ -244,31 +252,17 @@ impl Receiver {
         log.fired_at_fs.iter().map(ticks).collect()
     }
 
-    /// The ticks in which light of shots that were `fired` can arrive; in `memory`, whatever is in it.
-    fn timeline(
-        &self,
-        codebook: &Codebook,
-        fired: &[i64],
-        ticks: &Ticks,
-        memory: Vec<u64>,
-    ) -> Timeline {
-        let absolute = |tick: Option<&u32>| ticks.epoch + i64::from(tick.copied().unwrap_or(0));
-        let (nearest, farthest) = self.gate_ticks;
-        let length = codebook.chips() * self.ticks_per_chip;
-        let (first, last) = (fired.first().unwrap_or(&0), fired.last().unwrap_or(&0));
-        let open = first + i64::from(nearest);
-        let closed = last + i64::from(farthest) + i64::from(length) + 1;
-        let span = open.max(absolute(ticks.tick.first())) - MARGIN
-            ..closed.min(absolute(ticks.tick.last()) + 1) + MARGIN;
-        let lit = ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick));
-        Timeline::new(memory, span, lit)
-    }
-
     /// Two-way time of flight, s, of light that left at `fired_at_fs` and came `late` ticks after
     /// `tick` began: half a tick, where no more is known.
     fn tof(&self, fired_at_fs: i64, tick: i64, late: f64) -> f64 {
         time::s_from_fs(tick * self.tick_fs - fired_at_fs) + late * time::s_from_fs(self.tick_fs)
     }
+}
+
+/// For how many ticks from its earliest place on a mark is looked for: ±2 σ of the jitter and the
+/// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
+fn window(jitter: f64) -> u32 {
+    if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(FARTHEST_JITTER) as u32 } else { 1 }
 }
 
 /// Mean number of photons detected per mark, μ = −ln(1 − p), of which the share p of the marks
@@ -307,6 +301,11 @@ mod tests {
             let log = ShotLog { fired_at_fs, ..ShotLog::default() };
             assert_eq!(receiver.all_fired(&log), expected);
         }
+    }
+
+    #[test]
+    fn the_window_grows_with_the_jitter() {
+        assert_eq!([0.0, 0.05, 0.1, 0.4, 1.0, 2.0].map(window), [1, 1, 2, 3, 5, 9]);
     }
 
     #[test]

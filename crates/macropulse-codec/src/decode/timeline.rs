@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::kernels::{Pattern, lay, light_up, lit_in, lit_in_each, look_ahead, put_out};
+use crate::kernels::{Pattern, lay, light_up, lit_in, lit_in_each, put_out};
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
 #[derive(Debug, Clone, Default)]
@@ -13,21 +13,6 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// The ticks of `lit` that lie in `span`; in `memory`, whatever is in it.
-    pub fn new(memory: Vec<u64>, span: Range<i64>, lit: impl IntoIterator<Item = i64>) -> Self {
-        let count = (span.end - span.start).max(0) as usize / 64 + 1;
-        let mut words = memory;
-        words.clear();
-        words.resize(count, 0);
-        let mut timeline = Self { origin: span.start, words };
-        for tick in lit {
-            if let Some((word, bit)) = timeline.place(tick) {
-                timeline.words[word] |= bit;
-            }
-        }
-        timeline
-    }
-
     /// The tick of the first bit.
     pub fn origin(&self) -> i64 {
         self.origin
@@ -181,20 +166,6 @@ impl Timeline {
         // Two shifts, because a shift by 64 does not give 0.
         word(index) >> shift | word(index + 1) << 1 << (63 - shift)
     }
-
-    /// The timeline in which a tick is lit if one of the `before` ticks before it, itself or one
-    /// of the `after` ticks behind it is lit here.
-    pub fn dilated(mut self, before: u32, after: u32) -> Self {
-        look_ahead(&mut self.words, (before + after) as usize);
-        // So far a tick sees only what comes after it.
-        self.origin += i64::from(before);
-        self
-    }
-
-    /// Its memory, for the next one.
-    pub fn into_memory(self) -> Vec<u64> {
-        self.words
-    }
 }
 
 #[cfg(test)]
@@ -203,26 +174,15 @@ mod tests {
 
     #[test]
     fn a_tick_is_where_it_was_put_and_nothing_is_outside() {
-        let timeline = Timeline::new(Vec::new(), -100..100, [-100, -37, 0, 63, 5000, -101]);
+        let mut timeline = Timeline::default();
+        timeline.clear_all(-100, 200);
+        assert_eq!(timeline.lay(&[0, 5, 63, 5000], 100), 3);
         let lit: Vec<i64> = (-300..300).filter(|&tick| timeline.has(tick)).collect();
-        assert_eq!(lit, [-100, -37, 0, 63]);
+        assert_eq!(lit, [0, 5, 63]);
         for tick in [-300, -101, -100, -64, -37, -1, 0, 63, 99, 400] {
             let expected =
                 (0..64).fold(0, |word, bit| word | u64::from(timeline.has(tick + bit)) << bit);
             assert_eq!(timeline.from(tick), expected, "from {tick}");
-        }
-    }
-
-    #[test]
-    fn a_dilated_tick_reaches_both_ways() {
-        let timeline = Timeline::new(Vec::new(), 0..400, [64, 130, 300]);
-        for (before, after) in [(0, 0), (1, 2), (2, 0), (0, 1), (7, 4), (70, 70)] {
-            let dilated = timeline.clone().dilated(before, after);
-            for tick in 71..329 {
-                let around = tick - i64::from(before)..=tick + i64::from(after);
-                let lit = around.clone().any(|tick| timeline.has(tick));
-                assert_eq!(dilated.has(tick), lit, "{tick} in {around:?}");
-            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The lit places of a band, chip by chip at each phase of the chip clock.
+//! The lit places of a stretch of time, chip by chip at each phase of the chip clock.
 //!
 //! The marks of one macropulse lie whole chips apart. So all places that can hold them, begun at
 //! one tick, are side by side here, and a shift by a chip is a shift by one bit.
@@ -10,8 +10,9 @@ use crate::kernels::{Balance, Chips, best_balance};
 /// Which places are lit, by phase.
 #[derive(Debug)]
 pub(super) struct Grid {
-    /// Tick of the first bit of phase 0.
+    /// Tick of the first bit of phase 0, and the one behind all that is at hand.
     origin: i64,
+    end: i64,
     /// Ticks per chip, that is phases.
     scale: i64,
     /// How many ticks before another one a place is lit.
@@ -24,33 +25,43 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The ticks of `lit` that lie in `span`, each of them with the `late` places before it, as a
-    /// mark counts that is so late.
-    pub fn new(
-        span: Range<i64>,
-        (scale, late): (i64, i64),
-        lit: impl Iterator<Item = i64>,
-    ) -> Self {
-        let chips = (span.end - span.start).max(0) / scale + 2;
-        let width = chips as usize / 64 + 1;
-        let mut words = vec![0; width * scale as usize];
-        let origin = span.start;
-        for tick in lit.filter(|tick| span.contains(tick)) {
-            for place in (tick - late).max(origin)..=tick {
-                let (chip, phase) = ((place - origin) / scale, (place - origin) % scale);
-                words[phase as usize * width + chip as usize / 64] |= 1 << (chip % 64);
+    /// Nothing, with so many ticks per chip, and where a tick lights as many places before its own as
+    /// a mark may be late.
+    pub fn new((scale, late): (i64, i64)) -> Self {
+        Self { origin: 0, end: 0, scale, late, width: 0, words: Vec::new(), before: Vec::new() }
+    }
+
+    /// Whether all of `span` is at hand.
+    pub fn covers(&self, span: &Range<i64>) -> bool {
+        self.origin <= span.start && span.end <= self.end
+    }
+
+    /// Lays down those of the sorted `ticks` that lie in `span`, in place of what was before.
+    pub fn cover(&mut self, span: Range<i64>, ticks: &[u32]) {
+        let chips = (span.end - span.start).max(0) / self.scale + 2;
+        self.width = chips as usize / 64 + 1;
+        (self.origin, self.end) = (span.start, span.end);
+        self.words.clear();
+        self.words.resize(self.width * self.scale as usize, 0);
+        let first = ticks.partition_point(|&tick| i64::from(tick) < span.start);
+        let ticks = ticks[first..].iter().map(|&tick| i64::from(tick) - span.start);
+        for tick in ticks.take_while(|tick| *tick < span.end - span.start) {
+            let (mut chip, mut phase) = (tick / self.scale, tick % self.scale);
+            for _ in 0..=self.late.min(tick) {
+                self.words[phase as usize * self.width + chip as usize / 64] |= 1 << (chip % 64);
+                (chip, phase) =
+                    if phase > 0 { (chip, phase - 1) } else { (chip - 1, self.scale - 1) };
             }
         }
-        let mut before = Vec::with_capacity(words.len() + scale as usize);
-        for phase in words.chunks(width) {
+        self.before.clear();
+        for phase in self.words.chunks(self.width) {
             let mut sum = 0;
-            before.push(0);
-            before.extend(phase.iter().map(|word: &u64| {
+            self.before.push(0);
+            self.before.extend(phase.iter().map(|word: &u64| {
                 sum += word.count_ones();
                 sum
             }));
         }
-        Self { origin, scale, late, width, words, before }
     }
 
     /// What is lit if a macropulse begins at tick `start`.

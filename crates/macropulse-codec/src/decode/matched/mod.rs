@@ -34,7 +34,7 @@ use std::ops::Range;
 use super::field::{self, Field};
 use super::threshold::Thresholds;
 use super::timeline::Timeline;
-use super::{Receiver, Returns};
+use super::{GATES_PER_BLOCK, Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -51,11 +51,6 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
     let cancelled = cancel::cancel(&sent, &ticks.tick);
     Band::new(&sent, &ticks.tick, cancelled).decode()
 }
-
-/// The shots that are fired while light passes the gate so many times go through the steps together:
-/// so many more than are in flight that what is looked at twice, at both ends of a block, costs
-/// little.
-const GATES_PER_BLOCK: i64 = 2;
 
 /// Surfaces that light of a shot may come from beside the one that is taken for its range.
 const SURFACES: usize = 3;

@@ -8,7 +8,7 @@ use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook};
 use crate::decode::timing;
-use crate::decode::{Effort, FARTHEST_JITTER, Pick, Receiver};
+use crate::decode::{Effort, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
 
 /// What was sent.
@@ -55,7 +55,7 @@ pub(super) struct Bits {
 impl<'a> Sent<'a> {
     pub fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), epoch: i64) -> Self {
         let (codebook, log) = sent;
-        let fired = receiver.all_fired(log).iter().map(|fired| fired - epoch).collect();
+        let fired = receiver.fired_since(log, epoch);
         let width = window(receiver.jitter_ticks);
         let words = (0..codebook.words()).map(|_| OnceCell::new()).collect();
         let bits = (0..codebook.words()).map(|_| OnceCell::new()).collect();
@@ -222,12 +222,6 @@ impl<'a> Sent<'a> {
     }
 }
 
-/// For how many ticks from its earliest place on a mark is looked for: ±2 σ of the jitter and the
-/// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
-fn window(jitter: f64) -> u32 {
-    if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(FARTHEST_JITTER) as u32 } else { 1 }
-}
-
 /// Most marks in any `chips` chips of `word`, or of two in a row.
 fn crowding(word: &CodeWord, chips: u32) -> u32 {
     let once = word.marks.iter().map(|&mark| u32::from(mark));
@@ -255,10 +249,5 @@ mod tests {
         let word = CodeWord { length: 20, marks: vec![0, 5, 6, 8, 19] };
         assert_eq!([1, 2, 3, 4, 8, 9].map(|chips| crowding(&word, chips)), [1, 2, 2, 3, 4, 4]);
         assert_eq!(crowding(&CodeWord { length: 20, marks: vec![] }, 5), 1);
-    }
-
-    #[test]
-    fn the_window_grows_with_the_jitter() {
-        assert_eq!([0.0, 0.05, 0.1, 0.4, 1.0, 2.0].map(window), [1, 1, 2, 3, 5, 9]);
     }
 }
