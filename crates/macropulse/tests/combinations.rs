@@ -156,10 +156,11 @@ fn every_combination_is_what_the_table_says() {
     }
 }
 
-/// H0: returns come as often as the forecast says, of a wall by day that is seen by about half; with
+/// H0: returns come as often as the forecast says, of a wall by day that is seen by about half. With
 /// a code, whose bare short words the receiver believes less often than is forecast when they are
-/// faint, as often with every pattern as with a raster. N = 2048 shots, seed 1: a share is known to
-/// 0.011, and three of those are granted. Control: four times the light is told from it.
+/// faint, at least half as often, and no pixel is found more often alone, in a flash, than where
+/// neighbours tell where to look. N = 2048 shots, seed 1: a share is known to 0.011, and three of those
+/// are granted. Control: four times the light is told from it.
 #[test]
 fn the_forecast_holds_for_every_combination() {
     let day = Environment::named("clear-day").unwrap();
@@ -198,8 +199,11 @@ fn the_forecast_holds_for_every_combination() {
                 }
                 _ => {
                     let as_raster = *of_raster.get_or_insert(seen);
-                    assert!((seen - as_raster).abs() < 0.05, "{which}: {seen}, not {as_raster}");
-                    assert!((0.1..expected + 0.035).contains(&seen), "{which}: {seen}, {expected}");
+                    assert!(seen < as_raster + 0.035, "{which}: {seen}, not {as_raster}");
+                    let possible = expected / 2.0..expected + 0.035;
+                    assert!(possible.contains(&seen), "{which}: {seen}, {expected}");
+                    let brighter = found((4.0 * reflectance).min(1.0));
+                    assert!(brighter > seen + 0.1, "{which}: control");
                 }
             }
         }

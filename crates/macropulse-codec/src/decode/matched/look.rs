@@ -215,7 +215,7 @@ impl Band<'_> {
         if lags.is_empty() {
             return false;
         }
-        let left = leftover.density(shot, &gate);
+        let left = leftover.density(shot, &self.sent.reach());
         let visible = self.thresholds.least(weight, left).max(visible);
         let most = self.maximum(shot, Source::Residual, &lags, visible);
         let Some((lag, _)) = most else { return false };
