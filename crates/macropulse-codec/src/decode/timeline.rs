@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::kernels::{Pattern, lay, light_up, lit_in, lit_in_each, put_out};
+use crate::kernels::{Pattern, lay, light_up, lit_in, lit_in_all, lit_in_each, put_out};
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
 #[derive(Debug, Clone, Default)]
@@ -27,6 +27,12 @@ impl Timeline {
     pub fn clear_all(&mut self, origin: i64, length: i64) {
         self.origin = origin;
         self.words.clear();
+        self.words.resize((length.max(0) / 64 + 1) as usize, 0);
+    }
+
+    /// Lets it begin at `origin`, `length` ticks long; which of these are lit is not told.
+    pub fn begin(&mut self, origin: i64, length: i64) {
+        self.origin = origin;
         self.words.resize((length.max(0) / 64 + 1) as usize, 0);
     }
 
@@ -140,6 +146,12 @@ impl Timeline {
     pub fn lit_in(&self, tick: i64, pattern: &Pattern) -> u32 {
         let bit = usize::try_from(tick - self.origin);
         bit.map_or(0, |bit| lit_in(&self.words, bit, pattern))
+    }
+
+    /// The same of it begun so many ticks `after` `tick`, for all of these together.
+    pub fn lit_in_all(&self, tick: i64, after: &[u32], pattern: &Pattern) -> u32 {
+        let first = usize::try_from(tick - self.origin);
+        first.map_or(0, |first| lit_in_all(&self.words, first, after, pattern))
     }
 
     /// The same if it begins so many ticks `after` `tick`, for each of these; put into `counts`. There

@@ -26,4 +26,4 @@ pub(crate) use coarse::{COARSE, coarse};
 pub(crate) use correlate::{Counts, NARROW, WIDE, is_dark};
 pub(crate) use lay::{count_each, lay};
 pub(crate) use marks::{WordTicks, begin_with};
-pub(crate) use pattern::{Pattern, light_up, lit_in, lit_in_each, look_ahead, put_out};
+pub(crate) use pattern::{Pattern, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, put_out};

@@ -43,25 +43,47 @@ on_every_level! {
         counts: &mut [u32],
     ) {
         for (count, after) in counts.iter_mut().zip(after) {
-            let first = first + *after as usize;
-            let (begin, shift) = (first / 64, first % 64);
-            let mut sums = [0_u64; LANES];
-            for block in (0..pattern.reach()).step_by(LANES) {
-                let mask = shifted(&pattern.words[block..], shift);
-                let words = words.get(begin + block..).unwrap_or_default();
-                let words = match words.first_chunk::<LANES>() {
-                    Some(words) => *words,
-                    None => {
-                        let mut last = [0; LANES];
-                        last[..words.len()].copy_from_slice(words);
-                        last
-                    }
-                };
-                for lane in 0..LANES {
-                    sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
-                }
-            }
+            let mut sums = [0; LANES];
+            add_lit(&mut sums, words, first + *after as usize, pattern);
             *count = sums.iter().sum::<u64>() as u32;
+        }
+    }
+}
+
+on_every_level! {
+    /// The sum of what [`lit_in_each`] counts.
+    pub(crate) fn lit_in_all(
+        words: &[u64],
+        first: usize,
+        after: &[u32],
+        pattern: &Pattern,
+    ) -> u32 {
+        let mut sums = [0; LANES];
+        for after in after {
+            add_lit(&mut sums, words, first + *after as usize, pattern);
+        }
+        sums.iter().sum::<u64>() as u32
+    }
+}
+
+/// Adds to `sums` how many bits of `pattern`, begun at bit `first`, are lit in `words`, by their place
+/// in a block.
+#[inline(always)]
+fn add_lit(sums: &mut [u64; LANES], words: &[u64], first: usize, pattern: &Pattern) {
+    let (begin, shift) = (first / 64, first % 64);
+    for block in (0..pattern.reach()).step_by(LANES) {
+        let mask = shifted(&pattern.words[block..], shift);
+        let words = words.get(begin + block..).unwrap_or_default();
+        let words = match words.first_chunk::<LANES>() {
+            Some(words) => *words,
+            None => {
+                let mut last = [0; LANES];
+                last[..words.len()].copy_from_slice(words);
+                last
+            }
+        };
+        for lane in 0..LANES {
+            sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
         }
     }
 }
@@ -69,9 +91,7 @@ on_every_level! {
 /// How many bits of `pattern`, begun at bit `first`, are lit in `words`. What reaches beyond the end is
 /// dark.
 pub(crate) fn lit_in(words: &[u64], first: usize, pattern: &Pattern) -> u32 {
-    let mut count = [0];
-    lit_in_each(words, first, &[0], pattern, &mut count);
-    count[0]
+    lit_in_all(words, first, &[0], pattern)
 }
 
 on_every_level! {
@@ -186,6 +206,17 @@ mod tests {
             lit.difference(&within).for_each(|bit| left[bit / 64] |= 1 << (bit % 64));
             for (level, found) in at_each_level(|| lit_in(&words, first, &pattern)) {
                 prop_assert_eq!(found, count, "{:?}", level);
+            }
+            let after = [0, 70, 700];
+            let each = at_each_level(|| {
+                let mut counts = [0; 3];
+                lit_in_each(&words, first, &after, &pattern, &mut counts);
+                (counts, lit_in_all(&words, first, &after, &pattern))
+            });
+            for (level, (counts, all)) in each {
+                let one_by_one = after.map(|after| lit_in(&words, first + after as usize, &pattern));
+                prop_assert_eq!(counts, one_by_one, "{:?}", level);
+                prop_assert_eq!(all, one_by_one.iter().sum::<u32>(), "{:?}", level);
             }
             let put_out = at_each_level(|| {
                 let mut rest = words.clone();

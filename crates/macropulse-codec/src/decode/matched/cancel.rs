@@ -172,7 +172,7 @@ impl Canceller<'_> {
         let mut laid = place - before.count();
         let room = ROOM * sent.length().max(64) + 128;
         for timeline in [&mut self.seen, &mut self.residual] {
-            timeline.clear_all(begin, room);
+            timeline.begin(begin, room);
         }
         let (mut end, mut last, mut tick) = (begin, first, first);
         while self.patience > 0 {
@@ -184,7 +184,7 @@ impl Canceller<'_> {
                     self.seen.slide(origin);
                     self.residual.slide(origin);
                 }
-                let to = ((end + room / 4).max(reach) + 63).div_euclid(64) * 64;
+                let to = (reach + sent.length() + 63).div_euclid(64) * 64;
                 let to = to.min(self.seen.end());
                 let count = self.seen.lay_anew(&ticks[laid..], end..to);
                 self.residual.lay_anew(&ticks[laid..], end..to);

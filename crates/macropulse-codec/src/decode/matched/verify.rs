@@ -302,15 +302,15 @@ impl Band<'_> {
     }
 
     /// How late the marks of `shot` are, in ticks, if it is found at `detection`.
-    fn late(&self, shot: usize, detection: Detection) -> f64 {
+    fn late(&mut self, shot: usize, detection: Detection) -> f64 {
         let sent = self.sent;
         if sent.width == 1 {
             return MIDDLE;
         }
         let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
-        let count = |place: i64| -> u32 {
-            let starts = sent.lit_from(shot, light.start + place);
-            starts.map(|bit| self.field.seen().lit_in(bit, &bits.pattern)).sum()
+        sent.bits_that_are(true, shot, &mut self.places);
+        let count = |place: i64| {
+            self.field.seen().lit_in_all(light.start + place, &self.places, &bits.pattern)
         };
         let (counts, first) = timing::about(sent.width, sent.receiver.jitter_ticks, count);
         let beside = self.field.density_without(&light, detection.count, 0);
