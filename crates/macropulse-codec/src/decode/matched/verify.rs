@@ -84,10 +84,11 @@ impl Band<'_> {
     /// Whether light of other returns, of other shots or another surface of this one, does not account
     /// for `detection`.
     ///
-    /// Fuller returns claim places. Of those that they claim about the macropulse, a share c is lit,
-    /// of the others a share d. If n of its N marks are claimed, chance finds each with the mean
+    /// Returns that are as full or fuller claim places; where two claim each other's, the later shot
+    /// stays, which is settled when the earlier one is gone: light is rather near than far. Of the
+    /// places that are claimed about the macropulse a share c is lit, of the others a share d. If n of its N marks are claimed, chance finds each with the mean
     /// probability (n·c + (N − n)·d) / N; it must not find as many at any lag of the gate. Of a shot
-    /// with as many marks as the others, half of them, and twice what chance gives, this is not asked.
+    /// with as many marks as usual, half of them, and twice what chance gives, this is not asked.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let weight = sent.weight(shot);
