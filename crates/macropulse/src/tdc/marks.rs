@@ -13,8 +13,13 @@ use crate::kernels::{Macropulse, PAD, Words, distinct, merge};
 
 /// The ticks of `marks`; how many marks those were, and how many fell into the tick of another one.
 pub(super) fn ticks(bank: &mut Bank, marks: Marks) -> (Ticks, usize, usize) {
-    let Marks { epoch, words: exact, macropulses, ticks } = marks;
+    let Marks { epoch, words: exact, mut macropulses, ticks } = marks;
     let words = &exact.words;
+    // Bits that are dark to begin with may let one that begins later come first.
+    let first = |sent: &Macropulse| words.ends(sent).map_or(sent.start, |[first, _]| first);
+    if !macropulses.is_sorted_by_key(first) {
+        macropulses.sort_by_key(first);
+    }
     let mut layout = Layout { words, ticks, rows: Default::default(), found: 0, merged: 0 };
     layout.ticks.clear();
     let mut at = 0;
