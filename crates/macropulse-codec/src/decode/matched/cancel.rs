@@ -47,11 +47,9 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
         sent,
         ticks,
         least: fewest_without_a_gap(sent, ticks),
-        cancelled: Cancelled {
-            detections: vec![None; sent.fired.len()],
-            again: Vec::new(),
-            residual: Some(Vec::new()),
-        },
+        detections: vec![None; sent.fired.len()],
+        again: Vec::new(),
+        left: Vec::new(),
         // Marks that jitter are not where they should be.
         patience: if sent.width > 1 { 0 } else { PATIENCE.0 },
         oldest: 0,
@@ -66,13 +64,10 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
             count => count,
         };
     }
-    let found_any = ticks.is_empty() || canceller.cancelled.detections.iter().any(Option::is_some);
-    let mut cancelled = canceller.cancelled;
-    match &mut cancelled.residual {
-        Some(residual) if found_any => residual.extend_from_slice(&ticks[place..]),
-        residual => *residual = None,
-    }
-    cancelled
+    let Canceller { detections, again, mut left, .. } = canceller;
+    left.extend_from_slice(&ticks[place..]);
+    let found_any = ticks.is_empty() || detections.iter().any(Option::is_some);
+    Cancelled { detections, again, residual: found_any.then_some(left) }
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
@@ -90,7 +85,11 @@ struct Canceller<'a> {
     ticks: &'a [u32],
     /// Fewest marks with which a shot can be told from chance.
     least: u32,
-    cancelled: Cancelled,
+    /// As [`Cancelled`] has them.
+    detections: Vec<Option<Detection>>,
+    again: Vec<(usize, Detection)>,
+    /// Ticks of which no macropulse without a gap can begin, in order.
+    left: Vec<u32>,
     patience: usize,
     /// Light of no shot before this one can come any more.
     oldest: usize,
@@ -109,9 +108,7 @@ impl Canceller<'_> {
         let Some(next) = self.ticks.get(place + 1).filter(|_| count == 0) else { return count };
         let (tick, sent) = (i64::from(self.ticks[place]), self.sent);
         let gap = next - self.ticks[place];
-        self.forget_before(tick);
-        let in_flight = self.oldest..sent.fired.len();
-        let in_flight = in_flight.take_while(|&shot| sent.fired[shot] <= tick);
+        let in_flight = self.in_flight(tick);
         let shot = self.nearest_first().into_iter().find_map(|lags| {
             in_flight.clone().find(|&shot| {
                 let marks = &sent.bits(shot).marks;
@@ -154,13 +151,15 @@ impl Canceller<'_> {
         possible.then_some(start)
     }
 
-    /// Moves on to the first shot of which light may come at `tick`.
-    fn forget_before(&mut self, tick: i64) {
-        let sent = self.sent;
-        let farthest = sent.reach().end + sent.length();
-        while sent.fired.get(self.oldest).is_some_and(|fired| fired + farthest < tick) {
+    /// The shots of which light may come at `tick`, no earlier one than that asked for last.
+    fn in_flight(&mut self, tick: i64) -> Range<usize> {
+        let fired = &self.sent.fired;
+        let farthest = self.sent.reach().end + self.sent.length();
+        while fired.get(self.oldest).is_some_and(|fired| fired + farthest < tick) {
             self.oldest += 1;
         }
+        let behind = fired[self.oldest..].iter().take_while(|fired| **fired <= tick);
+        self.oldest..self.oldest + behind.count()
     }
 
     /// Finds all shots from `place` on that overlap with others, and tells how many ticks they are,
@@ -208,31 +207,21 @@ impl Canceller<'_> {
                 None => {
                     self.residual.clear(tick);
                     self.patience -= 1;
-                    self.leave(tick);
+                    self.left.push(tick as u32);
                 }
             }
         }
         while let Some(left) = self.residual.next_lit(tick..end) {
-            self.leave(left);
+            self.left.push(left as u32);
             tick = left + 1;
         }
         laid - place
     }
 
-    /// Leaves `tick` to others.
-    fn leave(&mut self, tick: i64) {
-        if let Some(residual) = &mut self.cancelled.residual {
-            residual.push(tick as u32);
-        }
-    }
-
     /// Finds the shot of which `tick` is the first mark that is not cancelled, cancels its marks, and
     /// tells when its light ends.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
-        self.forget_before(tick);
-        let fired = &self.sent.fired;
-        let in_flight = self.oldest..fired.len();
-        let in_flight = in_flight.take_while(|&shot| fired[shot] <= tick);
+        let in_flight = self.in_flight(tick);
         for lags in self.nearest_first() {
             for hidden in 0..=MOST_HIDDEN {
                 for shot in std::iter::once(self.next).chain(in_flight.clone()) {
@@ -280,8 +269,8 @@ impl Canceller<'_> {
         let (lag, count) = (start - sent.fired[shot], sent.weight(shot));
         let margin = count - u32::from(sent.codebook.sidelobe(label, word));
         let detection = Detection { lag, count, margin, is_sure: true };
-        if self.cancelled.detections[shot].get_or_insert(detection).lag != lag {
-            self.cancelled.again.push((shot, detection));
+        if self.detections[shot].get_or_insert(detection).lag != lag {
+            self.again.push((shot, detection));
         }
         self.next = shot + 1;
         self.patience += PATIENCE.1;
