@@ -151,7 +151,7 @@ pub fn write(triangles: &[Corners], folder: &Path) -> Result<(), Box<dyn Error>>
     Ok(fs::write(folder.join("scene.toml"), text)?)
 }
 
-/// The scene that [`write`] has written.
+/// The scene that [`write()`] has written.
 pub fn open(folder: &Path) -> Result<Scene, Box<dyn Error>> {
     Ok(Scene::from_file(&folder.join("scene.toml"))?)
 }
