@@ -21,8 +21,9 @@ pub(super) struct Field<'a> {
     /// Ticks that are laid down already, or were passed by.
     laid: usize,
     width: u32,
-    /// Ticks that are counted together, a power of two.
+    /// Ticks that are counted together, a power of two, and which.
     cell: i64,
+    cell_bits: u32,
     /// The first tick of the first cell, and of all that is at hand.
     begin: i64,
     /// Ticks of the list before each cell, and before their end.
@@ -54,7 +55,8 @@ impl<'a> Field<'a> {
         cell: i64,
         memory: Memory,
     ) -> Self {
-        let cell = 1 << (64 - cell.max(64).leading_zeros() - 1);
+        let cell_bits = cell.max(64).ilog2();
+        let cell = 1 << cell_bits;
         let begin = (begin - MARGIN).div_euclid(cell) * cell;
         let laid = ticks.partition_point(|&tick| i64::from(tick) < begin);
         let [mut seen, mut lit, mut residual] = memory;
@@ -64,7 +66,7 @@ impl<'a> Field<'a> {
         residual.clear_all(begin, length);
         lit.clear_all(begin, if width > 1 { length } else { 0 });
         let before = vec![laid as u32];
-        Self { ticks, laid, width, cell, begin, before, seen, lit, residual }
+        Self { ticks, laid, width, cell, cell_bits, begin, before, seen, lit, residual }
     }
 
     /// Gives its memory back.
@@ -178,7 +180,8 @@ impl<'a> Field<'a> {
     /// The cells that touch `span`.
     fn cells(&self, span: &Range<i64>) -> Range<usize> {
         let last = self.before.len() as i64 - 1;
-        let cell = |tick: i64| ((tick - self.begin) / self.cell).clamp(0, last) as usize;
+        // Rounds down where a division would round towards 0; both are clamped to it.
+        let cell = |tick: i64| ((tick - self.begin) >> self.cell_bits).clamp(0, last) as usize;
         cell(span.start)..cell(span.end + self.cell - 1).max(cell(span.start))
     }
 
@@ -197,22 +200,16 @@ impl<'a> Field<'a> {
         (f64::from(self.width) * f64::from(all.saturating_sub(ticks)) / places).min(1.0)
     }
 
-    /// For each cell about `span`, the residual ticks in the `length` ticks from there on, and some
-    /// more; and the first tick of the first cell.
-    pub fn residual_stretches(&self, span: &Range<i64>, length: i64, sums: &mut Vec<u32>) -> i64 {
+    /// Makes `counts` the residual ticks in each cell about `span`, and tells where the first one begins.
+    pub fn residual_cells(&self, span: &Range<i64>, counts: &mut Vec<u32>) -> i64 {
         let cells = self.cells(span);
         let at = |cell: usize| self.begin + self.cell * cell as i64;
         let begin = at(cells.start).max(self.residual.origin());
         let words = self.residual.words(&(begin..at(cells.end)));
-        let (each, together) = ((self.cell / 64) as usize, self.stretch(length));
-        sums.clear();
-        sums.resize(words.len() / each, 0);
-        count_each(words, each, sums);
-        let mut sum: u32 = sums.iter().take(together).sum();
-        for cell in 0..sums.len() {
-            let next = sums.get(cell + together).copied().unwrap_or(0);
-            sum = sum + next - std::mem::replace(&mut sums[cell], sum);
-        }
+        let each = (self.cell / 64) as usize;
+        counts.clear();
+        counts.resize(words.len() / each, 0);
+        count_each(words, each, counts);
         begin
     }
 

@@ -1,6 +1,7 @@
 //! Pictures of a timeline with one bit for every eight of its own.
 
 use super::level::Level;
+use crate::on_every_level;
 
 /// Bits of a timeline that one bit of its picture stands for.
 pub(crate) const COARSE: usize = 8;
@@ -29,6 +30,17 @@ pub(crate) fn coarse(words: &[u64], shift: usize, picture: &mut [u64]) {
         let there = &behind[from..behind.len().min(from + COARSE + 1)];
         last[..there.len()].copy_from_slice(there);
         plain(&last, shift, std::slice::from_mut(out));
+    }
+}
+
+on_every_level! {
+    /// Makes `places` those of the `ticks` in pictures that follow one another every `stride` bits, each
+    /// made a tick later.
+    pub(crate) fn in_pictures(ticks: &[u32], stride: u32, places: &mut Vec<u32>) {
+        places.resize(ticks.len(), 0);
+        for (place, tick) in places.iter_mut().zip(ticks) {
+            *place = tick % COARSE as u32 * stride + tick / COARSE as u32;
+        }
     }
 }
 
@@ -95,7 +107,7 @@ mod tests {
                 coarse(&words, shift, &mut picture);
                 picture
             });
-            for (level, picture) in pictures {
+            for (level, picture) in pictures.clone() {
                 let bit = |cell: usize| picture[cell / 64] >> (cell % 64) & 1 == 1;
                 let found: Vec<bool> = (0..64 * length).map(bit).collect();
                 prop_assert_eq!(&found, &expected, "{:?}", level);

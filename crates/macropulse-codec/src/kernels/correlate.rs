@@ -46,7 +46,10 @@ impl<const W: usize> Counts<W> {
     /// 65535 marks can be added, none behind the `farthest` place.
     pub(crate) fn add(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
         debug_assert!(places.iter().all(|place| *place <= farthest));
-        let reach = (farthest as usize + first as usize) / 64 + W + 1;
+        // Nothing before the first lag is looked at.
+        let words = words.get(first as usize / 64..).unwrap_or_default();
+        let first = first % 64;
+        let reach = (farthest + first) as usize / 64 + W + 1;
         let mut longer = Vec::new();
         let words = if reach <= words.len() {
             words
@@ -201,7 +204,7 @@ fn add_within<const W: usize>(words: &[u64], first: u32, places: &[u32], planes:
 /// The same where a block is one register, and one instruction cuts it out of two.
 #[cfg(target_arch = "x86_64")]
 mod avx512 {
-    use super::{NARROW, PLANES, WIDE};
+    use super::{NARROW, WIDE};
     use std::arch::x86_64::*;
 
     /// Marks that are added up before anything is carried beyond the fourth plane.
@@ -225,12 +228,13 @@ mod avx512 {
                 planes: &mut [u64],
             ) {
                 let (planes, _) = planes.as_chunks_mut::<$lanes>();
-                let mut all = [$dark(); PLANES];
-                for (sum, plane) in all.iter_mut().zip(&*planes) {
+                let (low, high) = planes.split_at_mut(planes.len().min(4));
+                let mut sums = [$dark(); 4];
+                for (sum, plane) in sums.iter_mut().zip(&*low) {
                     // SAFETY: a plane is as long as a register.
                     *sum = unsafe { $load(plane.as_ptr().cast()) };
                 }
-                let [mut ones, mut twos, mut fours, mut eights, ..] = all;
+                let [mut ones, mut twos, mut fours, mut eights] = sums;
                 // Three bits are summed in each lag, and carried to the next plane.
                 macro_rules! add {
                     ($a:expr, $b:expr, $c:expr) => {{
@@ -252,14 +256,15 @@ mod avx512 {
                         $cut(low, high, $shift(i64::from(bit)))
                     }};
                 }
+                // The blocks of eight marks are added, and one is carried to the fourth plane.
                 macro_rules! eight_from {
-                    ($eight:expr) => {{
+                    ($eight:expr, $block:ident) => {{
                         let eight = $eight;
-                        let (sum, a) = add!(ones, bits!(eight[0]), bits!(eight[1]));
-                        let (sum, b) = add!(sum, bits!(eight[2]), bits!(eight[3]));
+                        let (sum, a) = add!(ones, $block!(eight[0]), $block!(eight[1]));
+                        let (sum, b) = add!(sum, $block!(eight[2]), $block!(eight[3]));
                         let (sum_of_twos, c) = add!(twos, a, b);
-                        let (sum, a) = add!(sum, bits!(eight[4]), bits!(eight[5]));
-                        let (sum, b) = add!(sum, bits!(eight[6]), bits!(eight[7]));
+                        let (sum, a) = add!(sum, $block!(eight[4]), $block!(eight[5]));
+                        let (sum, b) = add!(sum, $block!(eight[6]), $block!(eight[7]));
                         ones = sum;
                         let (sum, d) = add!(sum_of_twos, a, b);
                         twos = sum;
@@ -268,31 +273,42 @@ mod avx512 {
                         carried
                     }};
                 }
+                macro_rules! sixteen_from {
+                    ($sixteen:expr, $block:ident) => {{
+                        let sixteen = $sixteen;
+                        let a = eight_from!(&sixteen[..8], $block);
+                        let b = eight_from!(&sixteen[8..], $block);
+                        let mut carried;
+                        (eights, carried) = add!(eights, a, b);
+                        for plane in &mut *high {
+                            // SAFETY: a plane is as long as a register.
+                            unsafe {
+                                let sum = $load(plane.as_ptr().cast());
+                                $store(plane.as_mut_ptr().cast(), $xor(sum, carried));
+                                carried = $and(sum, carried);
+                            }
+                        }
+                    }};
+                }
                 let (whole, rest) = places.as_chunks::<SIXTEEN>();
                 for places in whole {
-                    let (a, b) = (eight_from!(&places[..8]), eight_from!(&places[8..]));
-                    let mut carried;
-                    (eights, carried) = add!(eights, a, b);
-                    for sum in &mut all[4..planes.len().max(4)] {
-                        let both = $and(*sum, carried);
-                        (*sum, carried) = ($xor(*sum, carried), both);
-                    }
+                    sixteen_from!(places, bits);
                 }
-                for place in rest {
-                    let mut carried = bits!(*place);
-                    for sum in [&mut ones, &mut twos, &mut fours, &mut eights] {
-                        let both = $and(*sum, carried);
-                        (*sum, carried) = ($xor(*sum, carried), both);
+                if !rest.is_empty() {
+                    let mut last = [$dark(); SIXTEEN];
+                    for (block, place) in last.iter_mut().zip(rest) {
+                        *block = bits!(*place);
                     }
-                    for sum in &mut all[4..planes.len().max(4)] {
-                        let both = $and(*sum, carried);
-                        (*sum, carried) = ($xor(*sum, carried), both);
+                    macro_rules! known {
+                        ($block:expr) => {
+                            $block
+                        };
                     }
+                    sixteen_from!(&last, known);
                 }
-                all[..4].copy_from_slice(&[ones, twos, fours, eights]);
-                for (plane, sum) in planes.iter_mut().zip(&all) {
+                for (plane, sum) in low.iter_mut().zip([ones, twos, fours, eights]) {
                     // SAFETY: a plane is as long as a register.
-                    unsafe { $store(plane.as_mut_ptr().cast(), *sum) };
+                    unsafe { $store(plane.as_mut_ptr().cast(), sum) };
                 }
             }
         };
@@ -350,9 +366,9 @@ fn add<const W: usize>(a: [u64; W], b: [u64; W], c: [u64; W]) -> ([u64; W], [u64
     (xor(xor(a, b), c), or(and(a, b), and(c, or(a, b))))
 }
 
-/// The block of bits that begins with bit `first`.
+/// The block of bits that begins with bit `first`; dark where it does not end within the words.
 #[inline(always)]
-fn read<const W: usize>(words: &[u64], first: usize) -> [u64; W] {
+pub(crate) fn read<const W: usize>(words: &[u64], first: usize) -> [u64; W] {
     let (word, shift) = (first / 64, first % 64);
     let mut lanes = [0; W];
     let Some(words) = words.get(word..word + W + 1) else { return lanes };

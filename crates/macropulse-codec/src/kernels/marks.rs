@@ -34,6 +34,23 @@ impl WordTicks {
 }
 
 on_every_level! {
+    /// Makes `places` the marks of `word`, begun at `scale` · bit for each of `bits`.
+    pub(crate) fn places_of(word: &WordTicks, bits: &[u32], scale: u32, places: &mut Vec<u32>) {
+        // The filling of a word is written over by the next one.
+        places.resize(bits.len() * word.marks + LANES, 0);
+        for (index, &bit) in bits.iter().enumerate() {
+            let rest = &mut places[index * word.marks..];
+            for (block, marks) in rest.as_chunks_mut::<LANES>().0.iter_mut().zip(&word.ticks) {
+                for lane in 0..LANES {
+                    block[lane] = scale * bit + marks[lane];
+                }
+            }
+        }
+        places.truncate(bits.len() * word.marks);
+    }
+}
+
+on_every_level! {
     /// Whether the first ticks are the marks of `word`, begun at `begun.0 + begun.1 · bit` for
     /// each of `bits`, with no tick between them. `false` where there are too few ticks.
     pub(crate) fn begin_with(
@@ -105,6 +122,16 @@ mod tests {
             let word = WordTicks::new(&marks, scale);
             for (level, fits) in at_each_level(|| begin_with(&ticks, &word, &bits, (start, scale))) {
                 prop_assert_eq!(fits, wrong.is_none(), "{:?}", level);
+            }
+            let expected: Vec<u32> =
+                bits.iter().flat_map(|bit| marks.iter().map(move |m| scale * (bit + u32::from(*m)))).collect();
+            let places = at_each_level(|| {
+                let mut places = vec![7; more as usize];
+                places_of(&word, &bits, scale, &mut places);
+                places
+            });
+            for (level, places) in places {
+                prop_assert_eq!(&places, &expected, "{:?}", level);
             }
             let few = &ticks[..marks.len() * bits.len() - 1];
             prop_assert!(!begin_with(few, &word, &bits, (start, scale)));

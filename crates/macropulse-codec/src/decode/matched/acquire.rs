@@ -5,127 +5,172 @@
 //! tick later, so that a mark of any place is met by exactly the eight ticks it may fall on. Only
 //! where the bound is high enough are the lags counted one by one. What is skipped cannot be the
 //! maximum.
+//!
+//! Before that, the pictures are asked for the code word alone: of a macropulse with k marks, one of
+//! its B lit bits has k/B of them at least. This is a fraction of the marks, looked up once for all
+//! bits, and where light is bright it leaves next to nothing to be counted.
 
 use std::ops::Range;
 
 use super::Band;
 use super::sent::Sent;
-use super::track::{below, places_of};
+use super::track::below;
 use crate::decode::field::{Field, Source};
 use crate::decode::timeline::Timeline;
-use crate::kernels::{COARSE, Counts, WIDE, coarse, is_dark};
+use crate::kernels::{COARSE, Counts, WIDE, coarse, in_pictures, is_dark, read};
 
 /// Lags that are counted at once.
 const BLOCK: i64 = 64 * WIDE as i64;
 
-/// Macropulses that are cancelled before the pictures of the residual are made anew: till then they
-/// show ticks that are no longer there, which costs time and nothing else.
-const STALE: usize = 32;
-
 /// Marks after which it is asked whether enough can still be found.
 const CHUNK: usize = 48;
+
+/// Macropulses that are cancelled before pictures of the residual are made anew: till then they show
+/// ticks that are no longer there, which costs time and nothing else.
+const STALE: usize = 32;
 
 /// Memory kept from search to search.
 #[derive(Debug, Default)]
 pub(super) struct Search {
-    /// The marks of the macropulse at hand in the pictures.
-    places: Vec<u32>,
-    farthest: u32,
+    /// The marks of the macropulse at hand in the pictures, and those of its code word.
+    places: Marks,
+    word: Marks,
+    /// Where the word may begin in the pictures, from the first lag of a range on.
+    words: Vec<u64>,
     counts: Counts<WIDE>,
-    /// Pictures of shorter stretches, and of whole gates.
-    pictures: [Pictures; 2],
+    pictures: Pictures,
     /// Where marks count as found.
     lit: Timeline,
-    /// Macropulses that were cancelled since the pictures of whole gates were made.
-    stale: usize,
+    /// Macropulses that were cancelled.
+    cancelled: usize,
 }
 
-/// The pictures of a stretch of time, one for each shift.
+/// Marks in the pictures, and the farthest of them.
+#[derive(Debug, Default)]
+struct Marks {
+    places: Vec<u32>,
+    farthest: u32,
+}
+
+impl Marks {
+    /// Makes them those of so many `ticks`, in pictures of so many bits.
+    fn set(&mut self, ticks: &[u32], stride: u32) {
+        in_pictures(ticks, stride, &mut self.places);
+        self.farthest = self.places.iter().copied().max().unwrap_or(0);
+    }
+}
+
+/// The pictures of all that is at hand, one for each shift, made where they are asked for.
 #[derive(Debug, Default)]
 struct Pictures {
     /// One behind the other.
     words: Vec<u64>,
     /// Machine words of each.
     stride: usize,
-    /// What they show.
-    shown: Option<(Source, Range<i64>)>,
+    /// What they show: which ticks, and from which one on.
+    shown: Option<(Source, i64)>,
+    /// Of each segment, how many macropulses had been cancelled when it was made.
+    made: Vec<Option<usize>>,
 }
+
+/// Ticks of a segment: a fifth of the gate of a lidar that sees 100 m at 2.5 ps a tick, and one machine
+/// word of a picture at least.
+const SEGMENT: i64 = 1 << 15;
 
 impl Pictures {
-    /// Makes them of `span`.
-    fn make(&mut self, field: &Field, source: Source, span: &Range<i64>, memory: &mut Timeline) {
-        let lit = field.lit_in(source, span, memory);
-        let start = (span.start.div_euclid(64) * 64).max(lit.origin());
-        let words = lit.words(&(start..span.end + 64 * WIDE as i64));
-        // Blocks of lags are read beyond their end.
-        self.stride = words.len() / COARSE + 2 * WIDE;
-        self.words.resize(self.stride * COARSE, 0);
-        for (shift, picture) in self.words.chunks_exact_mut(self.stride).enumerate() {
-            coarse(words, shift, picture);
+    /// Makes those of `span`, where there are none yet or `cancelled` tells that they are stale.
+    fn show(
+        &mut self,
+        (field, source): (&Field, Source),
+        span: &Range<i64>,
+        (cancelled, memory): (usize, &mut Timeline),
+    ) {
+        let extent = field.extent();
+        if self.shown != Some((source, extent.start)) {
+            self.shown = Some((source, extent.start));
+            let segments = ((extent.end - extent.start) / SEGMENT + 1) as usize;
+            self.made.clear();
+            self.made.resize(segments, None);
+            // Blocks of lags are read beyond their end.
+            self.stride = segments * (SEGMENT / PER_WORD) as usize + 4 * WIDE;
+            self.words.resize(self.stride * COARSE, 0);
         }
-        self.shown = Some((source, start..span.end));
-    }
-
-    /// Whether they show all of `span`.
-    fn show(&self, source: Source, span: &Range<i64>) -> bool {
-        self.shown.as_ref().is_some_and(|(shown, extent)| {
-            *shown == source && extent.start <= span.start && span.end <= extent.end
-        })
+        let first = (span.start - extent.start).max(0) / SEGMENT;
+        let segments = first..((span.end - extent.start) / SEGMENT + 1).min(self.made.len() as i64);
+        for segment in segments {
+            let made = &mut self.made[segment as usize];
+            if made.is_some_and(|made| cancelled - made < STALE) {
+                continue;
+            }
+            *made = Some(cancelled);
+            let start = extent.start + segment * SEGMENT;
+            let ticks = start..start + SEGMENT + 64;
+            let words = field.lit_in(source, &ticks, memory).words(&ticks);
+            let begin = (segment * SEGMENT / PER_WORD) as usize;
+            for (shift, picture) in self.words.chunks_exact_mut(self.stride).enumerate() {
+                coarse(words, shift, &mut picture[begin..begin + (SEGMENT / PER_WORD) as usize]);
+            }
+        }
     }
 }
+
+/// Ticks that a machine word of a picture stands for.
+const PER_WORD: i64 = 64 * COARSE as i64;
 
 impl Search {
     /// Forgets the pictures.
     pub fn forget(&mut self) {
-        self.pictures.iter_mut().for_each(|pictures| pictures.shown = None);
-        self.stale = 0;
+        self.pictures.shown = None;
+        self.cancelled = 0;
     }
 
     /// Tells that a macropulse was cancelled.
     pub fn grow_stale(&mut self) {
-        self.stale += 1;
-        if self.stale == STALE {
-            self.forget();
-        }
-    }
-
-    /// Makes pictures of `span`, unless there are, and tells which these are. Those of more than half
-    /// of a `gate` are kept, and show some more: the next shots will be searched for in much the same
-    /// time.
-    fn show(&mut self, field: &Field, source: Source, span: &Range<i64>, gate: i64) -> usize {
-        let is_long = span.end - span.start > gate / 2;
-        let which = usize::from(is_long || self.pictures[1].show(source, span));
-        if !self.pictures[which].show(source, span) {
-            let ahead = if is_long { gate / 4 } else { 0 };
-            let end = (span.end + ahead).min(field.extent().end).max(span.end);
-            self.pictures[which].make(field, source, &(span.start..end), &mut self.lit);
-        }
-        which
+        self.cancelled += 1;
     }
 
     /// Those of the `valid` bits from bit `first` of the pictures on that may have `needed` marks.
-    fn bounded(
-        &mut self,
-        first: u32,
-        needed: u32,
-        (which, valid): (usize, [u64; WIDE]),
-    ) -> [u64; WIDE] {
-        let pictures = &self.pictures[which];
+    fn bounded(&mut self, first: u32, needed: u32, valid: [u64; WIDE]) -> [u64; WIDE] {
         self.counts.clear();
-        let mut left = self.places.len() as u32;
-        let mut hits = valid;
-        for places in self.places.chunks(CHUNK) {
-            self.counts.add(&pictures.words, first, places, self.farthest);
-            left -= places.len() as u32;
-            if needed > left {
-                let enough = self.counts.at_least(needed - left);
-                hits = std::array::from_fn(|lane| enough[lane] & valid[lane]);
-                if is_dark(&hits) {
-                    break;
-                }
+        let (marks, mut hits) = (&self.places, valid);
+        let mut left = marks.places.len() as u32;
+        for places in marks.places.chunks(CHUNK) {
+            if is_dark(&hits) {
+                break;
             }
+            self.counts.add(&self.pictures.words, first, places, marks.farthest);
+            left -= places.len() as u32;
+            let enough = self.counts.at_least(needed.saturating_sub(left));
+            hits = std::array::from_fn(|lane| enough[lane] & valid[lane]);
         }
         hits
+    }
+
+    /// Notes where `needed` marks of the code word may be, in so many `bits` of the pictures from bit
+    /// `first` on.
+    fn note_words(&mut self, first: u32, bits: u32, needed: u32) {
+        self.words.clear();
+        for block in (first..first + bits).step_by(BLOCK as usize) {
+            self.counts.clear();
+            let marks = &self.word;
+            self.counts.add(&self.pictures.words, block, &marks.places, marks.farthest);
+            self.words.extend(self.counts.at_least(needed));
+        }
+        // Blocks are read from anywhere.
+        self.words.extend([0; WIDE + 1]);
+    }
+
+    /// The bits of a block, `first` bits behind the first one noted, of which any of the lit bits, so
+    /// many ticks `after` the beginning, is where the word may be.
+    fn with_words(&self, first: usize, after: impl Iterator<Item = i64>) -> [u64; WIDE] {
+        after.fold([0; WIDE], |mut any, after| {
+            // Eight lags are, so many ticks later, met by two neighbouring bits.
+            for bit in [after, after + COARSE as i64 - 1] {
+                let noted = read::<WIDE>(&self.words, first + bit as usize / COARSE);
+                any.iter_mut().zip(noted).for_each(|(any, noted)| *any |= noted);
+            }
+            any
+        })
     }
 }
 
@@ -145,25 +190,33 @@ impl Band<'_> {
             return None;
         }
         let span = fired + from.start..fired + to.end + sent.length() + i64::from(sent.width);
+        self.lay_out(shot);
         let search = &mut self.search;
-        let gate = self.sent.gate();
-        let which = search.show(&self.field, source, &span, gate.end - gate.start);
-        let pictures = &search.pictures[which];
-        let origin = pictures.shown.as_ref().map_or(0, |(_, extent)| extent.start);
-        places_of(sent, shot, &mut self.places);
-        let stride = 64 * pictures.stride as u32;
-        let in_pictures = |mark: &u32| mark % COARSE as u32 * stride + mark / COARSE as u32;
-        search.places.clear();
-        search.places.extend(self.places.iter().map(in_pictures));
-        search.farthest = search.places.iter().copied().max().unwrap_or(0);
+        let memory = (search.cancelled, &mut search.lit);
+        search.pictures.show((&self.field, source), &span, memory);
+        let origin = self.field.extent().start;
+        let stride = 64 * search.pictures.stride as u32;
+        search.places.set(&self.marks, stride);
+        let bits = sent.lit_bits(shot).len() as u32;
+        search.word.set(&sent.bits(shot).marks, stride);
         let bit_of = |lag: i64| (fired + lag - origin) / COARSE as i64;
         let mut best = None;
         let mut needed = least.max(1);
         for lags in lags {
             let (first, last) = (bit_of(lags.start), bit_of(lags.end - 1));
+            if bits > 1 {
+                let behind = last + 1 - first + sent.length() / COARSE as i64 + 1;
+                let in_one = needed.div_ceil(bits);
+                self.search.note_words(first as u32, behind as u32, in_one);
+            }
             for block in (first..=last).step_by(BLOCK as usize) {
-                let valid = below(last + 1 - block, [u64::MAX; WIDE], true);
-                let hits = self.search.bounded(block as u32, needed, (which, valid));
+                let mut hits = below(last + 1 - block, [u64::MAX; WIDE], true);
+                if bits > 1 {
+                    let after = sent.lit_from(shot, 0);
+                    let with_words = self.search.with_words((block - first) as usize, after);
+                    hits = std::array::from_fn(|lane| hits[lane] & with_words[lane]);
+                }
+                hits = self.search.bounded(block as u32, needed, hits);
                 // A machine word of the picture stands for one block of lags.
                 for lane in (0..WIDE).filter(|lane| hits[*lane] != 0) {
                     let first = origin + COARSE as i64 * (block + 64 * lane as i64) - fired;
@@ -183,9 +236,9 @@ impl Band<'_> {
         let span = start..start + BLOCK + self.sent.length();
         let search = &mut self.search;
         let (words, begin) = self.field.lit_in(source, &span, &mut search.lit).at(start);
-        let farthest = self.places.last().copied().unwrap_or(0);
+        let farthest = self.marks.last().copied().unwrap_or(0);
         search.counts.clear();
-        search.counts.add(words, begin as u32, &self.places, farthest);
+        search.counts.add(words, begin as u32, &self.marks, farthest);
         let allowed = below(lags.start - first, [u64::MAX; WIDE], false);
         let allowed = below(lags.end - first, allowed, true);
         let highest = search.counts.highest(allowed);
@@ -196,14 +249,18 @@ impl Band<'_> {
 /// Where light that is left over may be looked for.
 pub(super) struct Leftover<'a> {
     sent: &'a Sent<'a>,
-    /// For each cell of a stretch of time, the residual ticks in a macropulse that begins there, and
-    /// some more.
+    /// Residual ticks in each cell of a stretch of time.
+    cells: Vec<u32>,
+    /// The same in a macropulse that begins in a cell, and some more.
     stretches: Vec<u32>,
     begin: i64,
     cell: i64,
     /// Cells that a macropulse takes up.
     together: usize,
+    /// The highest of the stretches when they were last asked for it.
     fullest: u32,
+    /// Memory for cells that are counted anew.
+    counts: Vec<u32>,
 }
 
 /// A search takes hardly any time if so many blocks of lags, each with all its marks, are counted: at
@@ -214,14 +271,45 @@ const SOON: i64 = 1000;
 const MANY: usize = 16;
 
 impl<'a> Leftover<'a> {
-    /// Of the light that arrives in `span`.
-    pub fn new(sent: &'a Sent<'a>, field: &Field, span: &Range<i64>) -> Self {
-        let mut stretches = Vec::new();
-        let length = sent.length() + i64::from(sent.width);
-        let begin = field.residual_stretches(span, length, &mut stretches);
-        let fullest = stretches.iter().copied().max().unwrap_or(0);
-        let together = field.stretch(length);
-        Self { sent, stretches, begin, cell: field.cell(), together, fullest }
+    /// Of all ticks at hand.
+    pub fn new(sent: &'a Sent<'a>, field: &Field) -> Self {
+        let mut cells = Vec::new();
+        let begin = field.residual_cells(&field.extent(), &mut cells);
+        let together = field.stretch(sent.length() + i64::from(sent.width));
+        let stretches = vec![0; cells.len()];
+        let all = 0..cells.len();
+        let cell = field.cell();
+        let mut leftover =
+            Self { sent, cells, stretches, begin, cell, together, fullest: 0, counts: vec![] };
+        leftover.sum(all);
+        leftover.find_fullest();
+        leftover
+    }
+
+    /// Asks which of the stretches is the highest.
+    pub fn find_fullest(&mut self) {
+        self.fullest = self.stretches.iter().copied().max().unwrap_or(0);
+    }
+
+    /// Counts anew what is left in `light`.
+    pub fn renew(&mut self, field: &Field, light: &Range<i64>) {
+        let begin = field.residual_cells(light, &mut self.counts);
+        let first = ((begin - self.begin) / self.cell) as usize;
+        let known = self.cells.get_mut(first..).unwrap_or_default();
+        let end = first + self.counts.len().min(known.len());
+        known.iter_mut().zip(&self.counts).for_each(|(known, count)| *known = *count);
+        self.sum((first + 1).saturating_sub(self.together)..end);
+    }
+
+    /// Sums up the cells of each of the `stretches`.
+    fn sum(&mut self, stretches: Range<usize>) {
+        let from = |cell: usize| self.cells.get(cell..).unwrap_or_default();
+        let mut sum: u32 = from(stretches.start).iter().take(self.together).sum();
+        for cell in stretches {
+            self.stretches[cell] = sum;
+            let next = self.cells.get(cell + self.together).copied().unwrap_or(0);
+            sum = sum + next - self.cells[cell];
+        }
     }
 
     /// Whether there are nowhere so many ticks.

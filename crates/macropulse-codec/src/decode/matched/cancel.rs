@@ -25,7 +25,7 @@ use crate::kernels::begin_with;
 /// macropulse that was found. With four more, four dark counts to a macropulse are borne for ever, and
 /// each asks all shots in flight: a street with 10⁸ of them a second takes 330 times the sensor's time
 /// instead of 59, where the steps that follow do the rest.
-const PATIENCE: (usize, usize) = (256, 1);
+const PATIENCE: (usize, usize) = (16, 2);
 
 /// First marks that may be hidden under another macropulse.
 const MOST_HIDDEN: usize = 2;
@@ -65,9 +65,12 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
         };
     }
     let Canceller { detections, again, mut left, .. } = canceller;
-    left.extend_from_slice(&ticks[place..]);
     let found_any = ticks.is_empty() || detections.iter().any(Option::is_some);
-    Cancelled { detections, again, residual: found_any.then_some(left) }
+    let residual = found_any.then(|| {
+        left.extend_from_slice(&ticks[place..]);
+        left
+    });
+    Cancelled { detections, again, residual }
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
@@ -268,7 +271,7 @@ impl Canceller<'_> {
         let (label, word) = (sent.log.label[shot], sent.log.word[shot]);
         let (lag, count) = (start - sent.fired[shot], sent.weight(shot));
         let margin = count - u32::from(sent.codebook.sidelobe(label, word));
-        let detection = Detection { lag, count, margin, is_sure: true };
+        let detection = Detection { lag, count, margin, stands_out: true, is_sure: true };
         if self.detections[shot].get_or_insert(detection).lag != lag {
             self.again.push((shot, detection));
         }

@@ -2,16 +2,24 @@
 
 use std::ops::Range;
 
-use super::acquire::Leftover;
 use super::track::WIDEST_GAP;
 use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
 
 /// So many shots are passed by at most, where nothing was found, before the next one is searched for.
-const LONGEST_PAUSE: usize = 16;
+const LONGEST_PAUSE: usize = 64;
 
 /// The same where light does not stand out among what is spread evenly.
-const LONGEST_EVEN: usize = 64;
+pub(super) const LONGEST_EVEN: usize = 256;
+
+/// Which shots of a block are acquired.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Pass {
+    /// Those that are tracked no more, some passed by, as long as others may lie over them.
+    First,
+    /// Those that were passed by, where all that is bright is known but them.
+    Second,
+}
 
 /// The share of their marks that was found of the shots before: a running mean.
 #[derive(Debug, Clone, Copy)]
@@ -69,7 +77,7 @@ impl Band<'_> {
                 self.keep(shot, bright);
                 (next, pause) = (shot + 1, 1);
             } else if shot >= next {
-                let found = self.acquire(shot, tracked, None);
+                let found = self.acquire(shot, tracked, Pass::First);
                 if let Some(found) = found {
                     self.keep(shot, found);
                 }
@@ -92,12 +100,14 @@ impl Band<'_> {
         if !block.clone().any(|shot| self.is_sought(shot)) {
             return;
         }
-        let span = self.sent.arrival(block.start).start..self.sent.arrival(block.end - 1).end;
-        let leftover = Leftover::new(self.sent, &self.field, &span);
+        self.leftover().find_fullest();
         for shot in block {
-            if self.is_sought(shot)
-                && let Some(found) = self.acquire(shot, None, Some(&leftover))
-            {
+            if !self.is_sought(shot) {
+                continue;
+            }
+            let tracked = self.tracked(shot, 1).filter(|found| self.is_bright(shot, *found));
+            let found = tracked.or_else(|| self.acquire(shot, None, Pass::Second));
+            if let Some(found) = found {
                 self.keep(shot, found);
             }
         }
@@ -110,36 +120,28 @@ impl Band<'_> {
         &mut self,
         shot: usize,
         tracked: Option<Detection>,
-        leftover: Option<&Leftover>,
+        pass: Pass,
     ) -> Option<Detection> {
         let sent = self.sent;
         let weight = sent.weight(shot);
-        let bright = match leftover {
-            None => self.usual.least(weight).min(weight.div_ceil(2)),
-            Some(_) => weight.div_ceil(2),
+        let bright = match pass {
+            Pass::First => self.usual.least(weight).min(weight.div_ceil(2)),
+            Pass::Second => weight.div_ceil(2),
         };
         let more = tracked.map_or(0, |tracked| tracked.count + 1);
         let least = self.least_in_gate(shot).max(bright).max(more);
         let around = shot.saturating_sub(2)..(shot + 3).min(self.found.len());
-        let is_even = leftover.is_none() || self.found[around].iter().any(Option::is_some);
-        let here;
-        let leftover = match leftover {
-            Some(leftover) => leftover,
-            None => {
-                here = Leftover::new(sent, &self.field, &sent.arrival(shot));
-                &here
-            }
-        };
+        let is_even = pass == Pass::First || self.found[around].iter().any(Option::is_some);
         let (reach, closes) = (sent.reach(), sent.gate().end + sent.length());
         let parts = [reach.start..reach.end.min(closes), closes.max(reach.start)..reach.end];
         // What comes from beyond must stand out.
         let found = parts.into_iter().zip([is_even, false]).find_map(|(part, is_even)| {
-            let lags = leftover.lags(shot, part, least, is_even);
+            let lags = self.leftover().lags(shot, part, least, is_even);
             let (lag, _) = self.maximum(shot, Source::Residual, &lags, least)?;
             self.climb(shot, lag, 1)
         });
         let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);
-        found.filter(|found| self.is_believed(shot, *found))
+        found.and_then(|found| self.believed(shot, found))
     }
 
     /// Takes the maximum over the gate for each shot of a block, and cancels the light of those that no
@@ -150,8 +152,7 @@ impl Band<'_> {
                 let least = self.least_in_gate(shot);
                 let found = self.maximum(shot, Source::Seen, &[self.sent.gate()], least);
                 let found = found.and_then(|(lag, _)| self.found_at(shot, lag));
-                self.found[shot] =
-                    found.filter(|found| found.count >= self.by_chance(shot, *found));
+                self.found[shot] = found.and_then(|found| self.told_from_chance(shot, found));
             }
         }
         for shot in block {
@@ -169,12 +170,11 @@ impl Band<'_> {
         if shots.is_empty() {
             return;
         }
-        let span = self.sent.arrival(shots.start).start..self.sent.arrival(shots.end - 1).end;
-        let leftover = Leftover::new(self.sent, &self.field, &span);
+        self.leftover().find_fullest();
         for shot in shots.clone() {
             if self.is_open(shot) {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
-                (0..=SURFACES).find(|_| !self.look_for_leftover(shot, &leftover));
+                (0..=SURFACES).find(|_| !self.look_for_leftover(shot));
             }
         }
         for shot in shots.rev() {
@@ -185,7 +185,7 @@ impl Band<'_> {
     }
 
     /// Looks for light of `shot` that is left over; whether there is some.
-    fn look_for_leftover(&mut self, shot: usize, leftover: &Leftover) -> bool {
+    fn look_for_leftover(&mut self, shot: usize) -> bool {
         if self.found[shot].is_none() && self.track_leftover(shot) {
             return true;
         }
@@ -203,7 +203,8 @@ impl Band<'_> {
                 (least, least.div_ceil(2))
             }
         };
-        if leftover.is_empty_of(self.sent.ticks_of(shot, visible)) {
+        let ticks = self.sent.ticks_of(shot, visible);
+        if self.leftover().is_empty_of(ticks) {
             return false;
         }
         let may_be_even = known.is_none() && shot >= self.next_even;
@@ -211,11 +212,12 @@ impl Band<'_> {
         if is_even {
             (self.next_even, self.pause) = (shot + self.pause, (2 * self.pause).min(LONGEST_EVEN));
         }
-        let lags = leftover.lags(shot, gate.clone(), visible, is_even);
+        let lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
         if lags.is_empty() {
             return false;
         }
-        let left = leftover.density(shot, &self.sent.reach());
+        let reach = self.sent.reach();
+        let left = self.leftover().density(shot, &reach);
         let visible = self.thresholds.least(weight, left).max(visible);
         let most = self.maximum(shot, Source::Residual, &lags, visible);
         let Some((lag, _)) = most else { return false };
@@ -227,7 +229,7 @@ impl Band<'_> {
         let is_new = |found: &Detection| !self.is_known(shot, found.lag);
         let found = found.filter(is_new);
         let found = found.filter(|found| known.is_some() || self.stands_alone(shot, *found));
-        let found = found.filter(|found| self.is_believed(shot, *found));
+        let found = found.and_then(|found| self.believed(shot, found));
         self.cancel(shot, found.map_or(lag, |found| found.lag));
         if let Some(found) = found {
             if known.is_none() {
@@ -254,7 +256,7 @@ impl Band<'_> {
     /// Looks for `shot` about its neighbours, also farther ones, where light is left over.
     fn track_leftover(&mut self, shot: usize) -> bool {
         let tracked = self.tracked(shot, WIDEST_GAP);
-        let tracked = tracked.filter(|found| self.is_believed(shot, *found));
+        let tracked = tracked.and_then(|found| self.believed(shot, found));
         if let Some(found) = tracked {
             self.cancel(shot, found.lag);
             self.found[shot] = Some(found);
@@ -280,8 +282,8 @@ impl Band<'_> {
     }
 
     /// Whether as many marks were found as is usual, or so many that other light does not give them.
-    fn is_bright(&mut self, shot: usize, detection: Detection) -> bool {
-        self.is_usual(shot, detection) || self.is_overwhelming(shot, detection)
+    fn is_bright(&self, shot: usize, detection: Detection) -> bool {
+        detection.stands_out || self.is_usual(shot, detection)
     }
 
     /// Whether `detection` needs no other shot to be known to be believed: light of no other can arrive
@@ -302,10 +304,10 @@ impl Band<'_> {
         detection.count >= self.thresholds.least(weight, around)
     }
 
-    /// Whether neither chance nor light of other returns gives `detection`.
-    fn is_believed(&mut self, shot: usize, detection: Detection) -> bool {
-        detection.count >= self.by_chance(shot, detection)
-            && !self.is_of_a_later_shot(shot, detection)
-            && self.is_its_own(shot, detection)
+    /// `detection`, if neither chance nor light of other returns gives it.
+    fn believed(&mut self, shot: usize, detection: Detection) -> Option<Detection> {
+        let found = self.told_from_chance(shot, detection)?;
+        let is_own = !self.is_of_a_later_shot(shot, found) && self.is_its_own(shot, found);
+        is_own.then_some(found)
     }
 }

@@ -40,7 +40,7 @@ use crate::Ticks;
 use crate::code::Codebook;
 use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
-use acquire::Search;
+use acquire::{Leftover, Search};
 use look::Usual;
 use sent::Sent;
 use verify::Photons;
@@ -83,7 +83,11 @@ struct Detection {
     count: u32,
     /// The same less those at the best other lag that was looked at.
     margin: u32,
-    /// Whether light of other shots does not give so many.
+    /// Whether that is half of all marks, and twice what chance gives: chance finds most where
+    /// macropulses overlap, but not as many.
+    stands_out: bool,
+    /// Whether it stands out, and no fewer marks are found than of the shots before, as many in each
+    /// of its bits: light of other shots does not give that.
     is_sure: bool,
 }
 
@@ -116,6 +120,8 @@ struct Band<'a> {
     /// For the first marks of a macropulse, or the last ones.
     end_thresholds: Thresholds,
     usual: Usual,
+    /// What is left over of the ticks at hand, once it is asked for.
+    leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
     /// The next shot that is searched for where light does not stand out, and the shots to the one
@@ -124,8 +130,11 @@ struct Band<'a> {
     pause: usize,
     /// Counts of the block of lags that was looked at last.
     counts: Counts<NARROW>,
-    /// Memory for the marks of a macropulse.
-    places: Vec<u32>,
+    /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
+    marks: Vec<u32>,
+    marks_of: Option<usize>,
+    /// Memory for the bits of a macropulse.
+    bits: Vec<u32>,
     search: Search,
     photons: Photons,
     /// Memory for the residual of a macropulse, and for the marks found in each of its bits.
@@ -180,11 +189,14 @@ impl<'a> Band<'a> {
             bit_thresholds,
             end_thresholds,
             usual: Usual::new(),
+            leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
             next_even: 0,
-            pause: 1,
+            pause: look::LONGEST_EVEN,
             counts: Counts::default(),
-            places: Vec::new(),
+            marks: Vec::new(),
+            marks_of: None,
+            bits: Vec::new(),
             search: memory.search,
             photons: memory.photons,
             residual: Timeline::default(),
@@ -211,6 +223,7 @@ impl<'a> Band<'a> {
             if block.clone().chain(closed.clone()).any(|shot| self.is_open(shot)) {
                 self.field.cover(Self::span(self.sent, block.clone()));
                 self.search.forget();
+                self.leftover = None;
                 self.cancel_found(block.clone());
                 self.look_for(block);
                 self.look_for_leftovers(closed.clone());
@@ -279,7 +292,8 @@ impl<'a> Band<'a> {
     /// Keeps `detection` and cancels its ticks.
     fn keep(&mut self, shot: usize, detection: Detection) {
         self.cancel(shot, detection.lag);
-        let is_sure = self.is_usual(shot, detection) && self.is_overwhelming(shot, detection);
+        let is_sure =
+            detection.stands_out && self.is_usual(shot, detection) && self.is_even(shot, detection);
         self.found[shot] = Some(Detection { is_sure, ..detection });
         self.usual.learn(detection.count, self.sent.weight(shot));
     }
@@ -289,6 +303,14 @@ impl<'a> Band<'a> {
         let start = self.sent.fired[shot] + lag - self.sent.farther();
         self.field.cancel(self.sent.lit_from(shot, start), &self.sent.bits(shot).cancelled);
         self.search.grow_stale();
+        if let Some(leftover) = &mut self.leftover {
+            leftover.renew(&self.field, &self.sent.light(shot, lag));
+        }
+    }
+
+    /// What is left over of the ticks at hand.
+    fn leftover(&mut self) -> &mut Leftover<'a> {
+        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &self.field))
     }
 
     /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of
@@ -322,6 +344,13 @@ impl<'a> Band<'a> {
             if is_enough(middle) { high = middle } else { low = middle + 1 }
         }
         low
+    }
+
+    /// `detection`, if chance does not give it.
+    fn told_from_chance(&mut self, shot: usize, detection: Detection) -> Option<Detection> {
+        let least = self.by_chance(shot, detection);
+        let stands_out = 2 * detection.count >= self.sent.weight(shot).max(4 * least);
+        (detection.count >= least).then_some(Detection { stands_out, ..detection })
     }
 
     /// The marks that chance does not reach where `detection` is, in the density of the gate or of that

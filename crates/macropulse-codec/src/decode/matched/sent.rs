@@ -20,6 +20,8 @@ pub(super) struct Sent<'a> {
     pub epoch: i64,
     /// Tick in which each shot was fired.
     pub fired: Vec<i64>,
+    /// Number of marks of each shot.
+    pub weights: Vec<u32>,
     /// Length of the stretch in which a mark may be found, in ticks.
     pub width: u32,
     /// The code words, in ticks, each made when it is first needed: one pixel of a flash has a
@@ -59,7 +61,14 @@ impl<'a> Sent<'a> {
         let width = window(receiver.jitter_ticks);
         let words = (0..codebook.words()).map(|_| OnceCell::new()).collect();
         let bits = (0..codebook.words()).map(|_| OnceCell::new()).collect();
-        Self { receiver, codebook, log, epoch, fired, width, words, bits }
+        let in_words: Vec<u32> = (0..codebook.words())
+            .map(|word| codebook.word(word as u16).marks.len() as u32)
+            .collect();
+        let weight = |(label, word): (&u16, &u16)| {
+            codebook.lit_bits(*label).len() as u32 * in_words[usize::from(*word)]
+        };
+        let weights = log.label.iter().zip(&log.word).map(weight).collect();
+        Self { receiver, codebook, log, epoch, fired, weights, width, words, bits }
     }
 
     /// The code word of `shot`, as ticks in a row.
@@ -117,7 +126,7 @@ impl<'a> Sent<'a> {
 
     /// Number of marks of `shot`.
     pub fn weight(&self, shot: usize) -> u32 {
-        self.lit_bits(shot).len() as u32 * self.in_word(shot)
+        self.weights[shot]
     }
 
     /// Marks of the code word of `shot`.
@@ -145,9 +154,10 @@ impl<'a> Sent<'a> {
             after.extend(lit.iter().map(|bit| scale * bit));
             return;
         }
-        let chips = self.codebook.chips() / self.bits_of_payload() as u32;
-        let all = (0..self.bits_of_payload() as u32).map(|bit| bit * chips);
-        after.extend(all.filter(|bit| !lit.contains(bit)).map(|bit| scale * bit));
+        let bits = self.bits_of_payload() as u32;
+        let (chips, mut lit) = (self.codebook.chips() / bits, lit.iter().peekable());
+        let all = (0..bits).map(|bit| bit * chips);
+        after.extend(all.filter(|bit| lit.next_if_eq(&bit).is_none()).map(|bit| scale * bit));
     }
 
     /// Ticks per chip.

@@ -1,24 +1,22 @@
 //! Tracking: the exact maximum about the lags at which the neighbours of a shot were found.
 
-use super::sent::Sent;
 use super::{Band, Detection};
-use crate::kernels::{NARROW, is_dark};
+use crate::decode::field::Source;
+use crate::kernels::{NARROW, is_dark, places_of};
 
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
 
-/// A peak farther from the middle of its block than this is looked at again in the middle of one.
-const CENTRED: i64 = BLOCK / 4;
-
 /// The lags to both sides of a peak that are always seen with it.
-pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - CENTRED;
+pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - SAME;
 
 /// Blocks to each side of a peak in which a higher one is looked for: with the one of the peak they
-/// hold all sidelobes of words of up to 832 ticks.
+/// hold all sidelobes of words of up to 892 ticks.
 const SIDES: i64 = 3;
 
-/// A peak so near to where it was expected is no sidelobe of one elsewhere.
-const SAME: u64 = 4;
+/// A peak so near to where it was expected is no sidelobe of one elsewhere; one that is not is looked
+/// at again in the middle of a block.
+const SAME: i64 = 4;
 
 /// Where light is faint, a shot is looked for near one that was found so many shots away.
 pub(super) const WIDEST_GAP: usize = 12;
@@ -62,13 +60,16 @@ impl Band<'_> {
         let mut tried = [i64::MIN; 7];
         for way in 0..tried.len() {
             let Some(lag) = self.expected(shot, gap, way) else { continue };
-            if tried[..way].iter().any(|other| lag.abs_diff(*other) < CENTRED as u64) {
+            if tried[..way].iter().any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
                 continue;
             }
             tried[way] = lag;
+            if gap > 1 && !self.is_left_about(shot, lag, least.div_ceil(2)) {
+                continue;
+            }
             let Some(peak) = self.climb(shot, lag, least) else { continue };
+            let Some(peak) = self.told_from_chance(shot, peak) else { continue };
             if best.is_none_or(|best| peak.count > best.count)
-                && peak.count >= self.by_chance(shot, peak)
                 && !self.is_of_a_later_shot(shot, peak)
             {
                 best = Some(peak);
@@ -93,37 +94,33 @@ impl Band<'_> {
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
-            if best.lag.abs_diff(middle) > CENTRED as u64 {
+            if best.lag.abs_diff(middle) > SAME as u64 {
                 middle = best.lag;
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
             let is_certain = best.count >= usual
-                && (best.lag.abs_diff(lag) <= SAME || self.both_ends_are_lit(shot, best.lag));
+                && (best.lag.abs_diff(lag) <= SAME as u64
+                    || self.both_ends_are_lit(shot, best.lag));
             if best.count == weight || is_certain {
                 break;
             }
-            let word = self.sent.bit_length();
-            let sides = (1..=SIDES).filter(|side| side * BLOCK - BLOCK / 2 < word);
-            let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
-            let mut higher = best;
-            for side in sides {
-                let peak = self.best_in_block(shot, side);
-                let is_higher = |peak: &Detection| {
-                    peak.count > higher.count
-                        || (peak.count == higher.count && peak.lag < higher.lag)
-                };
-                higher = peak.filter(is_higher).unwrap_or(higher);
-            }
-            if higher.lag == best.lag {
-                match self.whole_bits_away(shot, best) {
-                    Some(away) => higher = away,
-                    None => break,
-                }
-            }
+            let higher = self.whole_bits_away(shot, best);
+            let Some(higher) = higher.or_else(|| self.beside(shot, middle, best)) else { break };
             best = higher;
         }
         Some(best)
+    }
+
+    /// The highest of the peaks to both sides of the block around `middle`, if more marks of `shot` are
+    /// found there than at `detection`, or as many earlier.
+    fn beside(&mut self, shot: usize, middle: i64, detection: Detection) -> Option<Detection> {
+        let word = self.sent.bit_length();
+        let sides = (1..=SIDES).take_while(|side| side * BLOCK - BLOCK / 2 < word);
+        let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
+        let of = |peak: &Detection| (peak.count, std::cmp::Reverse(peak.lag));
+        let peaks = sides.filter_map(|side| self.best_in_block(shot, side));
+        peaks.max_by_key(of).filter(|peak| of(peak) > of(&detection))
     }
 
     /// The best peak at which more marks of `shot` are found than at `detection`, some of its bits
@@ -149,6 +146,19 @@ impl Band<'_> {
         self.best_in_block(shot, lag)
     }
 
+    /// Whether so many marks of `shot` are left anywhere in the block around `middle`.
+    fn is_left_about(&mut self, shot: usize, middle: i64, least: u32) -> bool {
+        let first = self.sent.fired[shot] + middle - BLOCK / 2;
+        self.lay_out(shot);
+        let farthest = self.marks.last().copied().unwrap_or(0);
+        let span = first..first + BLOCK + i64::from(farthest);
+        let left = self.field.lit_in(Source::Residual, &span, &mut self.residual);
+        let (words, begin) = left.at(first);
+        self.counts.clear();
+        self.counts.add(words, begin as u32, &self.marks, farthest);
+        !is_dark(&self.counts.at_least(least))
+    }
+
     /// The highest peak in the [`BLOCK`] around `middle`.
     pub(super) fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
         self.best_of(shot, middle, [u64::MAX; NARROW])
@@ -161,6 +171,15 @@ impl Band<'_> {
         self.best_of(shot, lag, only)
     }
 
+    /// Has the marks of `shot` at hand.
+    pub(super) fn lay_out(&mut self, shot: usize) {
+        if self.marks_of != Some(shot) {
+            let (sent, scale) = (self.sent, self.sent.receiver.ticks_per_chip);
+            places_of(sent.word(shot), sent.lit_bits(shot), scale, &mut self.marks);
+            self.marks_of = Some(shot);
+        }
+    }
+
     /// The highest peak among the `wanted` lags of the block around `middle`.
     fn best_of(&mut self, shot: usize, middle: i64, wanted: [u64; NARROW]) -> Option<Detection> {
         let (first, reach) = (middle - BLOCK / 2, self.sent.reach());
@@ -169,11 +188,11 @@ impl Band<'_> {
         if is_dark(&allowed) {
             return None;
         }
+        self.lay_out(shot);
         let (words, begin) = self.field.lit().at(self.sent.fired[shot] + first);
-        places_of(self.sent, shot, &mut self.places);
         self.counts.clear();
-        let farthest = self.places.last().copied().unwrap_or(0);
-        self.counts.add(words, begin as u32, &self.places, farthest);
+        let farthest = self.marks.last().copied().unwrap_or(0);
+        self.counts.add(words, begin as u32, &self.marks, farthest);
         let of_both = std::array::from_fn(|lane| allowed[lane] & wanted[lane]);
         let (at, count) = self.counts.highest(of_both)?;
         let (at, width) = (i64::from(at), i64::from(self.sent.width));
@@ -182,7 +201,7 @@ impl Band<'_> {
         let others = std::array::from_fn(|lane| before[lane] | behind[lane]);
         let next = self.counts.highest(others).map_or(0, |(_, count)| count);
         let margin = count.saturating_sub(next);
-        Some(Detection { lag: first + at, count, margin, is_sure: false })
+        Some(Detection { lag: first + at, count, margin, stands_out: false, is_sure: false })
     }
 
     /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.
@@ -199,15 +218,6 @@ impl Band<'_> {
             let found = self.field.lit().lit_in(bit, pattern);
             found >= self.end_thresholds.least(*marks, density)
         })
-    }
-}
-
-/// Puts into `places` the ticks from the start of the macropulse of `shot` to each of its marks.
-pub(super) fn places_of(sent: &Sent, shot: usize, places: &mut Vec<u32>) {
-    let marks = &sent.bits(shot).marks;
-    places.clear();
-    for bit in sent.lit_from(shot, 0) {
-        places.extend(marks.iter().map(|mark| bit as u32 + mark));
     }
 }
 

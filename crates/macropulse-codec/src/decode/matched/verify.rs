@@ -74,13 +74,6 @@ impl Band<'_> {
         (!self.carries_its_label(shot, surface)).then_some(Reject::LabelMismatch)
     }
 
-    /// Whether half of its marks are found of `shot`, and twice what chance gives: chance finds most
-    /// where macropulses overlap, but not as many.
-    pub(super) fn is_overwhelming(&mut self, shot: usize, detection: Detection) -> bool {
-        2 * detection.count >= self.sent.weight(shot)
-            && detection.count >= 2 * self.by_chance(shot, detection)
-    }
-
     /// Whether light of other returns, of other shots or another surface of this one, does not account
     /// for `detection`.
     ///
@@ -95,7 +88,7 @@ impl Band<'_> {
         let is_other = |found: &Detection| found.lag != detection.lag;
         let of_shot = self.found[shot].is_some_and(|found| is_other(&found))
             || self.further.iter().any(|(other, found)| *other == shot && is_other(found));
-        if !of_shot && self.is_usual(shot, detection) && self.is_overwhelming(shot, detection) {
+        if !of_shot && detection.stands_out && self.is_usual(shot, detection) {
             return true;
         }
         if !self.is_spread(shot, detection) {
@@ -222,7 +215,13 @@ impl Band<'_> {
                     let marks = sent.lit_from(other, begins).map(|bit| lit.lit_in(bit, pattern));
                     found.push((
                         other,
-                        Detection { lag, count: marks.sum(), margin: 0, is_sure: false },
+                        Detection {
+                            lag,
+                            count: marks.sum(),
+                            margin: 0,
+                            stands_out: false,
+                            is_sure: false,
+                        },
                     ));
                 }
             }
@@ -268,38 +267,47 @@ impl Band<'_> {
 
     /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
     ///
-    /// Of W marks a share q is found in each of B lit bits; χ² = Σ(n − W·q)²/(W·q·(1 − q)) over the
-    /// counts n has B − 1 degrees of freedom, and chance does not exceed it: light of another label
-    /// lights some of the bits and leaves others dark. A dark bit is lit if it has half the marks of a
-    /// lit one and more than chance gives it; only the residual counts, as other shots may well shine
-    /// there.
+    /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it; only the
+    /// residual counts, as other shots may well shine there.
     fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         if sent.bits_of_payload() == 1 {
             return true;
         }
-        let light = sent.light(shot, detection.lag);
-        let pattern = &sent.bits(shot).pattern;
-        let found = &mut self.found_in_bits;
-        let (in_word, lit) = (f64::from(sent.in_word(shot)), sent.lit_bits(shot).len() as f64);
-        let mean = f64::from(detection.count) / lit;
-        if detection.count < sent.weight(shot) {
-            sent.bits_that_are(true, shot, &mut self.places);
-            self.field.lit().lit_in_each(light.start, &self.places, pattern, found);
-            let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
-            let squares: f64 = found.iter().map(square).sum();
-            if squares > chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word) {
-                return false;
-            }
+        if !detection.is_sure && !self.is_even(shot, detection) {
+            return false;
         }
+        let light = sent.light(shot, detection.lag);
         let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
-        sent.bits_that_are(false, shot, &mut self.places);
-        residual.lit_in_each(light.start, &self.places, pattern, found);
+        sent.bits_that_are(false, shot, &mut self.bits);
+        let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
+        residual.lit_in_each(light.start, &self.bits, pattern, found);
         let most = found.iter().copied().max().unwrap_or(0);
-        2.0 * f64::from(most) < mean || {
+        2 * most * (sent.lit_bits(shot).len() as u32) < detection.count || {
             let density = self.density_beside(shot, detection);
             most < self.bit_thresholds.least(sent.in_word(shot), density)
         }
+    }
+
+    /// Whether as many marks are found in each lit bit of `shot` as in the others.
+    ///
+    /// Of W marks a share q is found in each of B lit bits; χ² = Σ(n − W·q)²/(W·q·(1 − q)) over the
+    /// counts n has B − 1 degrees of freedom, and chance does not exceed it: light of another label
+    /// lights some of the bits and leaves others dark.
+    pub(super) fn is_even(&mut self, shot: usize, detection: Detection) -> bool {
+        let sent = self.sent;
+        if detection.count == sent.weight(shot) {
+            return true;
+        }
+        let start = sent.fired[shot] + detection.lag;
+        let (in_word, lit) = (f64::from(sent.in_word(shot)), sent.lit_bits(shot).len() as f64);
+        let mean = f64::from(detection.count) / lit;
+        sent.bits_that_are(true, shot, &mut self.bits);
+        let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
+        self.field.lit().lit_in_each(start, &self.bits, pattern, found);
+        let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
+        let squares: f64 = found.iter().map(square).sum();
+        squares <= chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word)
     }
 
     /// How late the marks of `shot` are, in ticks, if it is found at `detection`.
@@ -309,9 +317,9 @@ impl Band<'_> {
             return MIDDLE;
         }
         let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
-        sent.bits_that_are(true, shot, &mut self.places);
+        sent.bits_that_are(true, shot, &mut self.bits);
         let count = |place: i64| {
-            self.field.seen().lit_in_all(light.start + place, &self.places, &bits.pattern)
+            self.field.seen().lit_in_all(light.start + place, &self.bits, &bits.pattern)
         };
         let (counts, first) = timing::about(sent.width, sent.receiver.jitter_ticks, count);
         let beside = self.field.density_without(&light, detection.count, 0);
