@@ -31,6 +31,11 @@ impl WordTicks {
     pub(crate) fn marks(&self) -> usize {
         self.marks
     }
+
+    /// The tick of each mark, in order.
+    pub(crate) fn get(&self, mark: usize) -> Option<u32> {
+        self.ticks.as_flattened()[..self.marks].get(mark).copied()
+    }
 }
 
 on_every_level! {

@@ -17,7 +17,7 @@
 use std::ops::Range;
 
 use super::Detection;
-use super::sent::Sent;
+use super::sent::{FIRST, Sent};
 use crate::decode::timeline::Timeline;
 use crate::kernels::begin_with;
 
@@ -26,9 +26,6 @@ use crate::kernels::begin_with;
 /// each asks all shots in flight: a street with 10⁸ of them a second takes 330 times the sensor's time
 /// instead of 59, where the steps that follow do the rest.
 const PATIENCE: (usize, usize) = (16, 2);
-
-/// First marks that may be hidden under another macropulse.
-const MOST_HIDDEN: usize = 2;
 
 /// What was found without a gap, and the residual.
 #[derive(Debug)]
@@ -53,6 +50,7 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
         // Marks that jitter are not where they should be.
         patience: if sent.width > 1 { 0 } else { PATIENCE.0 },
         oldest: 0,
+        end: 0,
         next: 0,
         seen: Timeline::default(),
         residual: Timeline::default(),
@@ -96,6 +94,8 @@ struct Canceller<'a> {
     patience: usize,
     /// Light of no shot before this one can come any more.
     oldest: usize,
+    /// This one, and those after it, are not fired yet.
+    end: usize,
     /// The shot after the last one found.
     next: usize,
     /// The ticks where macropulses overlap, and those of them that are not cancelled.
@@ -114,10 +114,7 @@ impl Canceller<'_> {
         let in_flight = self.in_flight(tick);
         let shot = self.nearest_first().into_iter().find_map(|lags| {
             in_flight.clone().find(|&shot| {
-                let marks = &sent.bits(shot).marks;
-                marks.len() > 1
-                    && marks[1] - marks[0] == gap
-                    && self.start(shot, tick, (0, &lags)).is_some()
+                sent.gaps(shot)[0] == gap && self.start(shot, tick, (0, &lags)).is_some()
             })
         });
         shot.map_or(0, |shot| self.fits_in_a_row(shot, place))
@@ -148,8 +145,8 @@ impl Canceller<'_> {
     fn start(&self, shot: usize, tick: i64, (hidden, lags): (usize, &Range<i64>)) -> Option<i64> {
         let sent = self.sent;
         let fired = sent.fired.get(shot)?;
-        let (bit, mark) = (sent.lit_from(shot, 0).next()?, sent.bits(shot).marks.get(hidden)?);
-        let start = tick - bit - i64::from(*mark);
+        let (bit, mark) = (sent.lit_from(shot, 0).next()?, sent.word(shot).get(hidden)?);
+        let start = tick - bit - i64::from(mark);
         let possible = lags.contains(&(start - fired)) && sent.weight(shot) >= self.least;
         possible.then_some(start)
     }
@@ -161,8 +158,10 @@ impl Canceller<'_> {
         while fired.get(self.oldest).is_some_and(|fired| fired + farthest < tick) {
             self.oldest += 1;
         }
-        let behind = fired[self.oldest..].iter().take_while(|fired| **fired <= tick);
-        self.oldest..self.oldest + behind.count()
+        while fired.get(self.end).is_some_and(|fired| *fired <= tick) {
+            self.end += 1;
+        }
+        self.oldest..self.end.max(self.oldest)
     }
 
     /// Finds all shots from `place` on that overlap with others, and tells how many ticks they are,
@@ -191,7 +190,8 @@ impl Canceller<'_> {
                 let to = (reach + sent.length() + 63).div_euclid(64) * 64;
                 let to = to.min(self.seen.end());
                 let count = self.seen.lay_anew(&ticks[laid..], end..to);
-                self.residual.lay_anew(&ticks[laid..], end..to);
+                let words = self.seen.words(&(end..to));
+                self.residual.words_mut(&(end..to)).copy_from_slice(words);
                 (laid, end) = (laid + count, to);
             }
             match self.residual.next_lit(tick..end) {
@@ -224,10 +224,20 @@ impl Canceller<'_> {
     /// Finds the shot of which `tick` is the first mark that is not cancelled, cancels its marks, and
     /// tells when its light ends.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
-        let in_flight = self.in_flight(tick);
+        let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
         for lags in self.nearest_first() {
-            for hidden in 0..=MOST_HIDDEN {
-                for shot in std::iter::once(self.next).chain(in_flight.clone()) {
+            for hidden in 0..FIRST {
+                let next = Some(self.next).filter(|next| *next < self.detections.len());
+                for shot in next.into_iter().chain(in_flight.clone()) {
+                    // Nearly every shot is refused here.
+                    let gap = self.sent.gaps(shot)[hidden];
+                    let is_next_there = match gap {
+                        0..64 => ahead >> gap & 1 == 1,
+                        _ => self.seen.has(tick + i64::from(gap)),
+                    };
+                    if !is_next_there {
+                        continue;
+                    }
                     if let Some(start) = self.fits(shot, tick, (hidden, &lags)) {
                         self.keep(shot, start);
                         return Some(start + self.sent.length());
@@ -248,13 +258,6 @@ impl Canceller<'_> {
     ) -> Option<i64> {
         let start = self.start(shot, tick, (hidden, lags))?;
         let bits = self.sent.bits(shot);
-        // Nearly every shot is refused here.
-        if let Some(second) = bits.marks.get(hidden + 1) {
-            let after = i64::from(second - bits.marks[hidden]);
-            if !self.seen.has(tick + after) {
-                return None;
-            }
-        }
         let in_word = bits.marks.len() as u32;
         let lit_bits = || self.sent.lit_from(shot, start);
         if lit_bits().any(|bit| self.seen.lit_in(bit, &bits.pattern) < in_word) {

@@ -42,14 +42,17 @@ use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
 use acquire::{Leftover, Search};
 use look::Usual;
-use sent::Sent;
+use sent::{Sent, Words};
 use verify::Photons;
 
 /// Decodes one band.
 pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
-    let sent = Sent::new(receiver, sent, ticks.epoch);
+    let mut memory = MEMORY.take();
+    let sent = Sent::new(receiver, sent, (ticks.epoch, std::mem::take(&mut memory.words)));
     let cancelled = cancel::cancel(&sent, &ticks.tick);
-    Band::new(&sent, &ticks.tick, cancelled).decode()
+    let (returns, memory) = Band::new(&sent, (&ticks.tick, cancelled), memory).decode();
+    MEMORY.set(Memory { words: sent.words, ..memory });
+    returns
 }
 
 /// Surfaces that light of a shot may come from beside the one that is taken for its range.
@@ -69,6 +72,7 @@ thread_local! {
 /// Memory of a band.
 #[derive(Default)]
 struct Memory {
+    words: Words,
     field: field::Memory,
     search: Search,
     thresholds: Vec<Thresholds>,
@@ -143,9 +147,12 @@ struct Band<'a> {
 }
 
 impl<'a> Band<'a> {
-    fn new(sent: &'a Sent<'a>, ticks: &'a [u32], cancelled: cancel::Cancelled) -> Self {
+    fn new(
+        sent: &'a Sent<'a>,
+        (ticks, cancelled): (&'a [u32], cancel::Cancelled),
+        mut memory: Memory,
+    ) -> Self {
         let cancel::Cancelled { detections: found, again: further, residual } = cancelled;
-        let mut memory = MEMORY.take();
         let gate = sent.gate();
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
@@ -205,8 +212,8 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// All steps for all shots.
-    fn decode(mut self) -> Returns {
+    /// All steps for all shots; and the memory back.
+    fn decode(mut self) -> (Returns, Memory) {
         let mut returns = Returns::with_capacity(self.sent.log.owned.len());
         let (shots, mut first, mut settled) = (self.found.len(), 0, 0);
         if matches!(self.open, Open::None) {
@@ -230,13 +237,14 @@ impl<'a> Band<'a> {
             }
             self.settle(closed, &mut returns);
         }
-        MEMORY.set(Memory {
+        let memory = Memory {
+            words: Words::default(),
             field: self.field.into_memory(),
             search: self.search,
             photons: self.photons,
             thresholds: vec![self.thresholds, self.bit_thresholds, self.end_thresholds],
-        });
-        returns
+        };
+        (returns, memory)
     }
 
     /// The end of the block of shots that begins with `first`.

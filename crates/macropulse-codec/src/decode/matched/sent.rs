@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::Detection;
 use super::track::NEAREST_SIDE;
 use crate::ShotLog;
-use crate::code::{CodeWord, Codebook};
+use crate::code::{CodeWord, Codebook, Family};
 use crate::decode::timing;
 use crate::decode::{Effort, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
@@ -20,15 +20,52 @@ pub(super) struct Sent<'a> {
     pub epoch: i64,
     /// Tick in which each shot was fired.
     pub fired: Vec<i64>,
+    /// The lags at which light is looked for: see [`Self::reach`].
+    reach: Range<i64>,
     /// Number of marks of each shot.
     pub weights: Vec<u32>,
     /// Length of the stretch in which a mark may be found, in ticks.
     pub width: u32,
-    /// The code words, in ticks, each made when it is first needed: one pixel of a flash has a
-    /// single word.
-    words: Vec<OnceCell<WordTicks>>,
+    pub words: Words,
+}
+
+/// The first marks of a word, of which one may be the first that is not hidden under another
+/// macropulse.
+pub(super) const FIRST: usize = 3;
+
+/// The code words of a family, each made when it is first needed: one pixel of a flash has a single
+/// word.
+#[derive(Default)]
+pub(super) struct Words {
+    /// Of which family, with so many ticks to a chip and places to a mark.
+    of: Option<(Family, u32, u32)>,
+    /// From each of the first marks to the next one, in ticks; 0 where there is none.
+    gaps: Vec<[u32; FIRST]>,
+    /// In ticks.
+    ticks: Vec<OnceCell<WordTicks>>,
     /// The same as bits, needed only where light is not clear.
     bits: Vec<OnceCell<Bits>>,
+}
+
+impl Words {
+    /// Makes them those of the `codebook`. Kept from band to band: there are hundreds.
+    fn of(mut self, codebook: &Codebook, scale: u32, width: u32) -> Self {
+        let of = Some((codebook.family(), scale, width));
+        if self.of != of {
+            let words = codebook.words();
+            let gaps = (0..words).map(|word| {
+                let marks = &codebook.word(word as u16).marks;
+                std::array::from_fn(|mark| {
+                    let pair = marks.get(mark).zip(marks.get(mark + 1));
+                    pair.map_or(0, |(mark, next)| scale * u32::from(next - mark))
+                })
+            });
+            let gaps = gaps.collect();
+            self = Self { of, gaps, ticks: vec![OnceCell::new(); words], bits: Vec::new() };
+            self.bits.resize_with(words, OnceCell::new);
+        }
+        self
+    }
 }
 
 /// A code word, as bits.
@@ -55,12 +92,15 @@ pub(super) struct Bits {
 }
 
 impl<'a> Sent<'a> {
-    pub fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), epoch: i64) -> Self {
+    pub fn new(
+        receiver: &'a Receiver,
+        sent: (&'a Codebook, &'a ShotLog),
+        (epoch, words): (i64, Words),
+    ) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.fired_since(log, epoch);
         let width = window(receiver.jitter_ticks);
-        let words = (0..codebook.words()).map(|_| OnceCell::new()).collect();
-        let bits = (0..codebook.words()).map(|_| OnceCell::new()).collect();
+        let words = words.of(codebook, receiver.ticks_per_chip, width);
         let in_words: Vec<u32> = (0..codebook.words())
             .map(|word| codebook.word(word as u16).marks.len() as u32)
             .collect();
@@ -68,13 +108,23 @@ impl<'a> Sent<'a> {
             codebook.lit_bits(*label).len() as u32 * in_words[usize::from(*word)]
         };
         let weights = log.label.iter().zip(&log.word).map(weight).collect();
-        Self { receiver, codebook, log, epoch, fired, weights, width, words, bits }
+        let length = i64::from(codebook.chips()) * i64::from(receiver.ticks_per_chip);
+        let (nearest, farthest) = receiver.gate_ticks;
+        let light = i64::from(receiver.light_ticks);
+        let end = light.max(i64::from(farthest) + length) + 1;
+        let reach = (i64::from(nearest) - length).max(0)..end;
+        Self { reach, receiver, codebook, log, epoch, fired, weights, width, words }
+    }
+
+    /// Ticks from each of the first marks of `shot` to the next one.
+    pub fn gaps(&self, shot: usize) -> &[u32; FIRST] {
+        &self.words.gaps[usize::from(self.log.word[shot])]
     }
 
     /// The code word of `shot`, as ticks in a row.
     pub fn word(&self, shot: usize) -> &WordTicks {
         let word = self.log.word[shot];
-        self.words[usize::from(word)].get_or_init(|| {
+        self.words.ticks[usize::from(word)].get_or_init(|| {
             WordTicks::new(&self.codebook.word(word).marks, self.receiver.ticks_per_chip)
         })
     }
@@ -82,7 +132,7 @@ impl<'a> Sent<'a> {
     /// The code word of `shot`, as bits.
     pub fn bits(&self, shot: usize) -> &Bits {
         let word = self.log.word[shot];
-        self.bits[usize::from(word)].get_or_init(|| {
+        self.words.bits[usize::from(word)].get_or_init(|| {
             let chips = self.codebook.word(word).marks.iter();
             let scale = self.receiver.ticks_per_chip;
             let marks: Vec<u32> = chips.map(|&mark| scale * u32::from(mark)).collect();
@@ -190,8 +240,7 @@ impl<'a> Sent<'a> {
     /// may come, a macropulse farther at least. What stands there has sidelobes within the gate, and
     /// lights marks of later shots; known, it is told from returns.
     pub fn reach(&self) -> Range<i64> {
-        let (gate, light) = (self.gate(), i64::from(self.receiver.light_ticks) + 1);
-        (gate.start - self.length()).max(0)..light.max(gate.end + self.length())
+        self.reach.clone()
     }
 
     /// The time in which light of `shot` can arrive.

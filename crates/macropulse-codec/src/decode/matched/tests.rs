@@ -5,8 +5,8 @@ use proptest::test_runner::RngSeed;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::sent::Sent;
-use super::{Band, cancel, decode};
+use super::sent::{Sent, Words};
+use super::{Band, Memory, cancel, decode};
 use crate::code::{Codebook, Crc, Family, Keying, Payload};
 use crate::decode::field::Source;
 use crate::decode::{Effort, Pick, Receiver, Returns};
@@ -216,8 +216,8 @@ proptest! {
         let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
         let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
         let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
-        let sent = Sent::new(&receiver, (&sensor.book, &log), 0);
-        let mut band = Band::new(&sent, &ticks.tick, nothing(12));
+        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let mut band = Band::new(&sent, (&ticks.tick, nothing(12)), Memory::default());
         band.field.cover(Band::span(&sent, 0..12));
         for shot in 4..8 {
             let lags = from..from + 2500;
@@ -265,7 +265,7 @@ proptest! {
         let receiver = sensor.receiver(if late > 0 { 0.2 } else { 0.0 });
         let receiver = Receiver { effort: Effort::Thorough, false_alarm: 1e-4, ..receiver };
         let returns = sensor.decode(&receiver, &log, &ticks);
-        let sent = Sent::new(&receiver, (&sensor.book, &log), 0);
+        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
         for (place, &shot) in returns.shot.iter().enumerate() {
             let (_, count) = exhaustive(&sent, &ticks.tick, shot as usize, sent.reach());
             // Or light of others has more of its marks, and is known not to be its own.
@@ -343,7 +343,7 @@ fn shots_in_flight_do_not_hide_each_others_maximum() {
     let weather = Weather { missed: 10, roughness: 4000, ..CLEAR };
     let (ticks, surfaces) = sensor.ticks(&log, weather, 4);
     let returns = sensor.decode(&receiver, &log, &ticks);
-    let sent = Sent::new(&receiver, (&sensor.book, &log), 0);
+    let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
     let found = returns.shot.iter().zip(returns.tof.iter().zip(&returns.peak));
     let mut wrong = 0;
     for (&shot, (&tof, &peak)) in found {
