@@ -25,7 +25,7 @@ impl Band<'_> {
     /// The lag at which `shot` is to be expected after its neighbours, in so many ways: on the lines
     /// through two of them and the plane through three, and at the lag of one, which may be `gap`
     /// shots away.
-    fn expected(&self, shot: usize, gap: usize, way: usize) -> Option<i64> {
+    pub(super) fn expected(&self, shot: usize, gap: usize, way: usize) -> Option<i64> {
         let at = |shot: Option<usize>| Some(self.found.get(shot?)?.as_ref()?.lag);
         let beside = |of: &[Option<u32>], shot: Option<usize>| {
             of.get(shot?).copied().flatten().map(|shot| shot as usize)

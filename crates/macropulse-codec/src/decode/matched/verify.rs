@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::track::BLOCK;
 use super::{Band, Detection};
 use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
@@ -15,6 +16,7 @@ impl Band<'_> {
         let mut surfaces = Vec::new();
         self.further.sort_by_key(|(shot, _)| *shot);
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
+            self.choose_of_equals(shot);
             let Some(first) = self.found[shot] else {
                 returns.reject(Reject::NoPeak);
                 continue;
@@ -56,6 +58,33 @@ impl Band<'_> {
         // Older light overlaps with nothing that is still to come.
         let oldest = self.in_flight_before(shots.end);
         self.further.retain(|(shot, _)| *shot >= oldest);
+    }
+
+    /// Takes for the lag of `shot`, of several with as many marks, the one nearest to where it is to be
+    /// expected after its neighbours, and keeps the earliest where there are none.
+    ///
+    /// The marks of a word may be a comb, as those of the first prime sequence are. Shifted by a tooth,
+    /// only the last marks in every run of lit bits have nothing to fall upon; where these are missed
+    /// as many marks are found there, and nothing in the light of the shot tells which it is.
+    fn choose_of_equals(&mut self, shot: usize) {
+        let Some(found) = self.found[shot].filter(|found| found.margin == 0) else { return };
+        let at = |ways: &[usize]| ways.iter().find_map(|way| self.expected(shot, 1, *way));
+        let expected = match (at(&[1]), at(&[4])) {
+            (Some(before), Some(behind)) => Some(before.midpoint(behind)),
+            _ => at(&[0, 5, 2, 1, 4, 3]),
+        };
+        let Some(expected) = expected else { return };
+        self.best_in_block(shot, found.lag);
+        let equal = self.counts.at_least(found.count);
+        let is_equal = |lag: i64| equal[(lag / 64) as usize] >> (lag % 64) & 1 == 1;
+        let (first, gate) = (found.lag - BLOCK / 2, self.sent.gate());
+        // Of those side by side, the first one.
+        let lags = (0..BLOCK).filter(|lag| is_equal(*lag) && (*lag == 0 || !is_equal(lag - 1)));
+        let lags = lags.map(|lag| first + lag).filter(|lag| gate.contains(lag));
+        let nearest = lags.min_by_key(|lag| lag.abs_diff(expected));
+        if let (Some(lag), Some(kept)) = (nearest, &mut self.found[shot]) {
+            kept.lag = lag;
+        }
     }
 
     /// Why a `surface` of `shot` gives no return, if it does not.
