@@ -69,11 +69,12 @@ impl Band<'_> {
     fn choose_of_equals(&mut self, shot: usize) {
         let Some(found) = self.found[shot].filter(|found| found.margin == 0) else { return };
         let at = |ways: &[usize]| ways.iter().find_map(|way| self.expected(shot, 1, *way));
-        let expected = match (at(&[1]), at(&[4])) {
-            (Some(before), Some(behind)) => Some(before.midpoint(behind)),
-            _ => at(&[0, 5, 2, 1, 4, 3]),
-        };
-        let Some(expected) = expected else { return };
+        // The middle between both sides, or a line or plane through others. The one before is settled;
+        // one behind that is as doubtful tells nothing.
+        let Some(nearest) = at(&[0, 2, 1, 3, 5, 4]) else { return };
+        let next = self.found.get(shot + 1).copied().flatten();
+        let behind = next.filter(|next| next.margin > 0).map(|next| next.lag);
+        let (before, behind) = at(&[1]).zip(behind).unwrap_or((nearest, nearest));
         self.best_in_block(shot, found.lag);
         let equal = self.counts.at_least(found.count);
         let is_equal = |lag: i64| equal[(lag / 64) as usize] >> (lag % 64) & 1 == 1;
@@ -81,7 +82,7 @@ impl Band<'_> {
         // Of those side by side, the first one.
         let lags = (0..BLOCK).filter(|lag| is_equal(*lag) && (*lag == 0 || !is_equal(lag - 1)));
         let lags = lags.map(|lag| first + lag).filter(|lag| gate.contains(lag));
-        let nearest = lags.min_by_key(|lag| lag.abs_diff(expected));
+        let nearest = lags.min_by_key(|lag| (2 * lag).abs_diff(before + behind));
         if let (Some(lag), Some(kept)) = (nearest, &mut self.found[shot]) {
             kept.lag = lag;
         }
