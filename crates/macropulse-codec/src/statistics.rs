@@ -54,6 +54,31 @@ pub fn normal_quantile(p: f64) -> f64 {
     horner(&A, r) * q / (horner(&B, r) * r + 1.0)
 }
 
+/// Mean and standard deviation of the `place`-th smallest, m, of `count` k independent standard
+/// normal variables \[DJ54\], with p = m/(k + 1), q = 1 − p, z = Φ⁻¹(p) and φ = φ(z):
+///
+/// > z + pq/(2(k + 2))·z/φ² + pq/(k + 2)²·[(q − p)/3·(1 + 2z²)/φ³ + pq/8·z(7 + 6z²)/φ⁴],
+/// > √(pq/(k + 2))/φ.
+///
+/// The mean is right to 4·10⁻⁴ where 20 or more are below it and one or more above, or the other way
+/// round, and to 0.01 everywhere. Of the standard deviation only the first term is taken: it is too
+/// small by up to 4 % where ten or more are on both sides, by up to 28 % elsewhere. `count` is held
+/// within 1 and 10¹⁵, `place` within 1 and `count`.
+pub fn normal_order(place: f64, count: f64) -> (f64, f64) {
+    let count = count.clamp(1.0, 1e15);
+    let place = place.clamp(1.0, count);
+    let all = count + 2.0;
+    let below = place / (all - 1.0);
+    let above = (all - 1.0 - place) / (all - 1.0);
+    let z = normal_quantile(below);
+    let density = exp(-z * z / 2.0) / libm::sqrt(std::f64::consts::TAU);
+    let first = libm::sqrt(below * above / all) / density;
+    let skew = (above - below) / (all * density);
+    let square = first * first;
+    let second = skew / 3.0 * (1.0 + 2.0 * z * z) + square / 8.0 * z * (7.0 + 6.0 * z * z);
+    (z + square / 2.0 * z + square * second, first)
+}
+
 /// P(X ≥ k) of X ~ Bin(n, p): the chance that `least` or more of `trials` succeed, each with
 /// probability `p`. Summed from the smaller side.
 pub fn binomial_tail(trials: usize, p: f64, least: usize) -> f64 {
@@ -202,6 +227,58 @@ mod tests {
             let bound = student_95(degrees);
             assert_relative_eq!(reference.sf(bound), 0.025, max_relative = 1e-7);
         }
+    }
+
+    /// Mean and standard deviation from the density of the order statistic, m·C(k, m)·Φ^(m−1)·
+    /// (1 − Φ)^(k−m)·φ, summed at a million places. Published \[DJ54\]: 1/√π for the larger of two,
+    /// 1.16296 for the largest of five, 1.86748 for that of twenty.
+    #[test]
+    fn the_order_of_normal_variables_is_that_of_its_density() {
+        let summed = |place: f64, count: f64| {
+            let step = |at: i32| f64::from(at) * 1.2e-5 - 6.0;
+            let weight = |t: f64| {
+                let (above, below) = (normal_tail(t), normal_tail(-t));
+                (place - 1.0) * log(below) + (count - place) * log(above) - t * t / 2.0
+            };
+            let highest = (0..1000).map(|at| weight(step(at * 1000))).fold(f64::MIN, f64::max);
+            let mut sums = [0.0; 3];
+            for at in 0..1_000_000 {
+                let (t, weight) = (step(at), exp(weight(step(at)) - highest));
+                for (power, sum) in (0..).zip(&mut sums) {
+                    *sum += weight * t.powi(power);
+                }
+            }
+            let mean = sums[1] / sums[0];
+            (mean, (sums[2] / sums[0] - mean * mean).sqrt())
+        };
+        for (place, count, published) in
+            [(2.0, 2.0, 0.564_19), (5.0, 5.0, 1.162_96), (20.0, 20.0, 1.867_48)]
+        {
+            assert_abs_diff_eq!(summed(place, count).0, published, epsilon = 1e-5);
+        }
+        for (place, count, right_to, share) in [
+            (1.0, 1.0, 1e-2, 0.28),
+            (2.0, 2.0, 1e-2, 0.28),
+            (1.0, 500.0, 1e-2, 0.28),
+            (20.0, 20.0, 1e-2, 0.28),
+            (20.0, 21.0, 4e-4, 0.28),
+            (2.0, 21.0, 4e-4, 0.28),
+            (11.0, 21.0, 4e-4, 0.04),
+            (100.0, 101.0, 4e-4, 0.28),
+            (100.0, 130.0, 4e-4, 0.04),
+            (100.0, 90_000.0, 4e-4, 0.04),
+            (400.0, 450.0, 4e-4, 0.04),
+            (400.0, 160_000.0, 4e-4, 0.04),
+        ] {
+            let (found, expected) = (normal_order(place, count), summed(place, count));
+            assert!((found.0 - expected.0).abs() < right_to, "{place}, {count}: {found:?}");
+            assert_relative_eq!(found.1, expected.1, max_relative = share);
+            // Turned round, it is the same from the other side.
+            let other = normal_order(count + 1.0 - place, count);
+            assert_abs_diff_eq!(other.0, -found.0, epsilon = 1e-6);
+        }
+        assert_eq!(normal_order(7.0, 3.0), normal_order(3.0, 3.0));
+        assert!([1e9, f64::INFINITY].iter().all(|count| normal_order(1.0, *count).0.is_finite()));
     }
 
     /// 10 Erlang offered to 10 lines: 21.46 %; 1 to 1: one half; far too many: what is not served.

@@ -1,8 +1,6 @@
 //! Single-stop timing: one event per shot, when enough photons have come \[KP16 Fig. 7\].
 
-use std::f64::consts::PI;
-
-use macropulse_codec::statistics::{normal_quantile, normal_tail};
+use macropulse_codec::statistics::{normal_order, normal_quantile, normal_tail};
 use serde::Deserialize;
 
 use super::{
@@ -11,9 +9,6 @@ use super::{
 };
 use crate::design::{Error, Light};
 use crate::units::RMS_OF_FWHM;
-
-/// The walk of a firing is calibrated up to this share of the pulse.
-const LATEST: f64 = 0.99;
 
 /// `[detector.single-stop]` as typed.
 #[derive(Debug, Deserialize)]
@@ -132,6 +127,12 @@ impl SingleStop {
 }
 
 impl SingleStopSetting {
+    /// Whether it measures the photons of a pulse: not if the first of them fires it, as a Geiger
+    /// cell.
+    pub fn measures(&self) -> bool {
+        self.needed > 1
+    }
+
     /// Probability that a detector which needs m photons fires at a mark of which n = `photons` are
     /// detected on average, with a photons rms of noise: 1 − exp(−n) for m = 1 without noise, else
     /// Q((m − n)/√(n + a²)).
@@ -192,14 +193,11 @@ impl Model for SingleStop {
         self.jitter
     }
 
-    /// Of the moment at which the m-th of n photons comes: √m/(n·φ(z)) rms lengths of a Gaussian
-    /// pulse, z = Φ⁻¹(m/n); m at most 99 % of n.
+    /// Of the moment at which the m-th of n photons comes, about its mean: that of the m-th smallest of
+    /// n normal variables ([`normal_order`]), in rms lengths of a Gaussian pulse.
     fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64 {
         let needed = f64::from(self.firing_photons);
-        let share = (needed / lit.photons).min(LATEST);
-        let z = normal_quantile(share);
-        let density = libm::exp(-z * z / 2.0) / (2.0 * PI).sqrt();
-        light.pulse * RMS_OF_FWHM * (share / needed.sqrt() / density)
+        light.pulse * RMS_OF_FWHM * normal_order(needed, lit.photons.max(needed)).1
     }
 
     fn ready_share(&self, _: f64) -> f64 {
