@@ -8,7 +8,8 @@
 //!
 //! Before that, the pictures are asked for the code word alone: of a macropulse with k marks, one of
 //! its B lit bits has k/B of them at least. This is a fraction of the marks, looked up once for all
-//! bits, and where light is bright it leaves next to nothing to be counted.
+//! bits, and where light is bright it leaves next to nothing to be counted; where chance has as many
+//! nearly everywhere it is not asked.
 
 use std::ops::Range;
 
@@ -147,17 +148,21 @@ impl Search {
     }
 
     /// Notes where `needed` marks of the code word may be, in so many `bits` of the pictures from bit
-    /// `first` on.
-    fn note_words(&mut self, first: u32, bits: u32, needed: u32) {
+    /// `first` on, and tells whether they may be anywhere.
+    fn note_words(&mut self, first: u32, bits: u32, needed: u32) -> bool {
         self.words.clear();
+        let mut any = false;
         for block in (first..first + bits).step_by(BLOCK as usize) {
             self.counts.clear();
             let marks = &self.word;
             self.counts.add(&self.pictures.words, block, &marks.places, marks.farthest);
-            self.words.extend(self.counts.at_least(needed));
+            let noted = self.counts.at_least(needed);
+            any |= !is_dark(&noted);
+            self.words.extend(noted);
         }
         // Blocks are read from anywhere.
         self.words.extend([0; WIDE + 1]);
+        any
     }
 
     /// The bits of a block, `first` bits behind the first one noted, of which any of the lit bits, so
@@ -190,6 +195,10 @@ impl Band<'_> {
             return None;
         }
         let span = fired + from.start..fired + to.end + sent.length() + i64::from(sent.width);
+        let density = match source {
+            Source::Seen => self.density_in_gate(shot, 0),
+            Source::Residual => self.leftover().density(shot, &(from.start..to.end)),
+        };
         self.lay_out(shot);
         let search = &mut self.search;
         let memory = (search.cancelled, &mut search.lit);
@@ -198,20 +207,25 @@ impl Band<'_> {
         let stride = 64 * search.pictures.stride as u32;
         search.places.set(&self.marks, stride);
         let bits = sent.lit_bits(shot).len() as u32;
+        let (lit, in_word) = (1.0 - (1.0 - density).powi(COARSE as i32), sent.in_word(shot));
+        let word_tells =
+            bits > 1 && least.div_ceil(bits) >= self.word_thresholds.least(in_word, lit);
         search.word.set(&sent.bits(shot).marks, stride);
         let bit_of = |lag: i64| (fired + lag - origin) / COARSE as i64;
         let mut best = None;
         let mut needed = least.max(1);
         for lags in lags {
             let (first, last) = (bit_of(lags.start), bit_of(lags.end - 1));
-            if bits > 1 {
+            if word_tells {
                 let behind = last + 1 - first + sent.length() / COARSE as i64 + 1;
                 let in_one = needed.div_ceil(bits);
-                self.search.note_words(first as u32, behind as u32, in_one);
+                if !self.search.note_words(first as u32, behind as u32, in_one) {
+                    continue;
+                }
             }
             for block in (first..=last).step_by(BLOCK as usize) {
                 let mut hits = below(last + 1 - block, [u64::MAX; WIDE], true);
-                if bits > 1 {
+                if word_tells {
                     let after = sent.lit_from(shot, 0);
                     let with_words = self.search.with_words((block - first) as usize, after);
                     hits = std::array::from_fn(|lane| hits[lane] & with_words[lane]);

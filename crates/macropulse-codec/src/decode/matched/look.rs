@@ -69,48 +69,38 @@ impl Band<'_> {
     fn look_where_expected(&mut self, block: Range<usize>) {
         let (mut next, mut pause) = (block.start, 1);
         for shot in block.clone() {
-            if !self.is_sought(shot) {
-                continue;
-            }
-            let tracked = self.tracked(shot, 1);
-            if let Some(bright) = tracked.filter(|found| self.is_bright(shot, *found)) {
-                self.keep(shot, bright);
+            let may_search = shot >= next;
+            let pass = may_search.then_some(Pass::First);
+            if self.is_sought(shot) && !self.track_or_acquire(shot, pass) && may_search {
+                (next, pause) = (shot + pause, (2 * pause).min(LONGEST_PAUSE));
+            } else if self.found[shot].is_some() {
                 (next, pause) = (shot + 1, 1);
-            } else if shot >= next {
-                let found = self.acquire(shot, tracked, Pass::First);
-                if let Some(found) = found {
-                    self.keep(shot, found);
-                }
-                (next, pause) = match found {
-                    Some(_) => (shot + 1, 1),
-                    None => (shot + pause, (2 * pause).min(LONGEST_PAUSE)),
-                };
             }
         }
-        for shot in block.clone().rev() {
-            if self.is_sought(shot)
-                && let Some(found) = self.tracked(shot, 1)
-                && self.is_usual(shot, found)
-            {
-                self.keep(shot, found);
-            }
+        for shot in block.clone().rev().filter(|shot| self.is_sought(*shot)).collect::<Vec<_>>() {
+            self.track_or_acquire(shot, None);
         }
         // Of those in flight together all bright ones must be known, as some that overlap would pass
         // for a faint one: now those that were passed by.
-        if !block.clone().any(|shot| self.is_sought(shot)) {
-            return;
+        let passed: Vec<usize> = block.filter(|shot| self.is_sought(*shot)).collect();
+        if !passed.is_empty() {
+            self.leftover().find_fullest();
         }
-        self.leftover().find_fullest();
-        for shot in block {
-            if !self.is_sought(shot) {
-                continue;
-            }
-            let tracked = self.tracked(shot, 1).filter(|found| self.is_bright(shot, *found));
-            let found = tracked.or_else(|| self.acquire(shot, None, Pass::Second));
-            if let Some(found) = found {
-                self.keep(shot, found);
-            }
+        for shot in passed {
+            self.track_or_acquire(shot, Some(Pass::Second));
         }
+    }
+
+    /// Keeps `shot` where it is tracked and bright, or else, in a `pass` that searches, where it is
+    /// acquired; whether it is kept.
+    fn track_or_acquire(&mut self, shot: usize, pass: Option<Pass>) -> bool {
+        let tracked = self.tracked(shot, 1);
+        let bright = tracked.filter(|found| self.is_bright(shot, *found));
+        let found = bright.or_else(|| self.acquire(shot, tracked, pass?));
+        if let Some(found) = found {
+            self.keep(shot, found);
+        }
+        found.is_some()
     }
 
     /// The most marks of `shot` that the residual leads to, if no fewer than usual or half of them and
@@ -137,7 +127,11 @@ impl Band<'_> {
         // What comes from beyond must stand out.
         let found = parts.into_iter().zip([is_even, false]).find_map(|(part, is_even)| {
             let lags = self.leftover().lags(shot, part, least, is_even);
-            let (lag, _) = self.maximum(shot, Source::Residual, &lags, least)?;
+            // As many as usual bound so much of the gate that to ask for fewer is rarely needed.
+            let usual = self.usual.least(weight);
+            let mut search = |least| self.maximum(shot, Source::Residual, &lags, least);
+            let likely = (pass == Pass::First && usual > least).then(|| search(usual)).flatten();
+            let (lag, _) = likely.or_else(|| search(least))?;
             self.climb(shot, lag, 1)
         });
         let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);

@@ -123,6 +123,8 @@ struct Band<'a> {
     bit_thresholds: Thresholds,
     /// For the first marks of a macropulse, or the last ones.
     end_thresholds: Thresholds,
+    /// For the places of a code word in the pictures that are told by one machine word.
+    word_thresholds: Thresholds,
     usual: Usual,
     /// What is left over of the ticks at hand, once it is asked for.
     leftover: Option<Leftover<'a>>,
@@ -156,10 +158,11 @@ impl<'a> Band<'a> {
         let gate = sent.gate();
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
-        let wanted = [(lags, false_alarm), (bits, false_alarm), (1.0, BY_CHANCE)]
+        let (of_lags, of_bits) = ((lags, false_alarm), (bits, false_alarm));
+        let wanted = [of_lags, of_bits, (1.0, BY_CHANCE), (2.0 * 64.0 * bits, 0.5)]
             .map(|(places, false_alarm)| Thresholds::new(places, false_alarm, sent.is_thorough()));
         let mut remembered = memory.thresholds;
-        let [thresholds, bit_thresholds, end_thresholds] =
+        let [thresholds, bit_thresholds, end_thresholds, word_thresholds] =
             wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
@@ -195,6 +198,7 @@ impl<'a> Band<'a> {
             thresholds,
             bit_thresholds,
             end_thresholds,
+            word_thresholds,
             usual: Usual::new(),
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
@@ -242,7 +246,12 @@ impl<'a> Band<'a> {
             field: self.field.into_memory(),
             search: self.search,
             photons: self.photons,
-            thresholds: vec![self.thresholds, self.bit_thresholds, self.end_thresholds],
+            thresholds: vec![
+                self.thresholds,
+                self.bit_thresholds,
+                self.end_thresholds,
+                self.word_thresholds,
+            ],
         };
         (returns, memory)
     }
