@@ -23,13 +23,6 @@ use crate::kernels::{COARSE, Counts, WIDE, coarse, in_pictures, is_dark, read};
 /// Lags that are counted at once.
 const BLOCK: i64 = 64 * WIDE as i64;
 
-/// Marks after which it is asked whether enough can still be found.
-const CHUNK: usize = 48;
-
-/// Macropulses that are cancelled before pictures of the residual are made anew: till then they show
-/// ticks that are no longer there, which costs time and nothing else.
-const STALE: usize = 32;
-
 /// Memory kept from search to search.
 #[derive(Debug, Default)]
 pub(super) struct Search {
@@ -42,8 +35,6 @@ pub(super) struct Search {
     pictures: Pictures,
     /// Where marks count as found.
     lit: Timeline,
-    /// Macropulses that were cancelled.
-    cancelled: usize,
 }
 
 /// Marks in the pictures, and the farthest of them.
@@ -70,8 +61,8 @@ struct Pictures {
     stride: usize,
     /// What they show: which ticks, and from which one on.
     shown: Option<(Source, i64)>,
-    /// Of each segment, how many macropulses had been cancelled when it was made.
-    made: Vec<Option<usize>>,
+    /// Which segments are made.
+    made: Vec<bool>,
 }
 
 /// Ticks of a segment: a fifth of the gate of a lidar that sees 100 m at 2.5 ps a tick, and one machine
@@ -79,19 +70,21 @@ struct Pictures {
 const SEGMENT: i64 = 1 << 15;
 
 impl Pictures {
-    /// Makes those of `span`, where there are none yet or `cancelled` tells that they are stale.
+    /// Makes those of `span`, where there are none yet. Those of the residual go on showing ticks that
+    /// are cancelled later, which costs time and nothing else: less than to make them anew after so
+    /// many macropulses as 8, 32, or 128.
     fn show(
         &mut self,
         (field, source): (&Field, Source),
         span: &Range<i64>,
-        (cancelled, memory): (usize, &mut Timeline),
+        memory: &mut Timeline,
     ) {
         let extent = field.extent();
         if self.shown != Some((source, extent.start)) {
             self.shown = Some((source, extent.start));
             let segments = ((extent.end - extent.start) / SEGMENT + 1) as usize;
             self.made.clear();
-            self.made.resize(segments, None);
+            self.made.resize(segments, false);
             // Blocks of lags are read beyond their end.
             self.stride = segments * (SEGMENT / PER_WORD) as usize + 4 * WIDE;
             self.words.resize(self.stride * COARSE, 0);
@@ -99,11 +92,9 @@ impl Pictures {
         let first = (span.start - extent.start).max(0) / SEGMENT;
         let segments = first..((span.end - extent.start) / SEGMENT + 1).min(self.made.len() as i64);
         for segment in segments {
-            let made = &mut self.made[segment as usize];
-            if made.is_some_and(|made| cancelled - made < STALE) {
+            if std::mem::replace(&mut self.made[segment as usize], true) {
                 continue;
             }
-            *made = Some(cancelled);
             let start = extent.start + segment * SEGMENT;
             let ticks = start..start + SEGMENT + 64;
             let words = field.lit_in(source, &ticks, memory).words(&ticks);
@@ -122,29 +113,14 @@ impl Search {
     /// Forgets the pictures.
     pub fn forget(&mut self) {
         self.pictures.shown = None;
-        self.cancelled = 0;
     }
 
-    /// Tells that a macropulse was cancelled.
-    pub fn grow_stale(&mut self) {
-        self.cancelled += 1;
-    }
-
-    /// Those of the `valid` bits from bit `first` of the pictures on that may have `needed` marks.
-    fn bounded(&mut self, first: u32, needed: u32, valid: [u64; WIDE]) -> [u64; WIDE] {
+    /// The bits from bit `first` of the pictures on that may have `needed` marks.
+    fn bounded(&mut self, first: u32, needed: u32) -> [u64; WIDE] {
         self.counts.clear();
-        let (marks, mut hits) = (&self.places, valid);
-        let mut left = marks.places.len() as u32;
-        for places in marks.places.chunks(CHUNK) {
-            if is_dark(&hits) {
-                break;
-            }
-            self.counts.add(&self.pictures.words, first, places, marks.farthest);
-            left -= places.len() as u32;
-            let enough = self.counts.at_least(needed.saturating_sub(left));
-            hits = std::array::from_fn(|lane| enough[lane] & valid[lane]);
-        }
-        hits
+        let marks = &self.places;
+        self.counts.add(&self.pictures.words, first, &marks.places, marks.farthest);
+        self.counts.at_least(needed)
     }
 
     /// Notes where `needed` marks of the code word may be, in so many `bits` of the pictures from bit
@@ -201,8 +177,7 @@ impl Band<'_> {
         };
         self.lay_out(shot);
         let search = &mut self.search;
-        let memory = (search.cancelled, &mut search.lit);
-        search.pictures.show((&self.field, source), &span, memory);
+        search.pictures.show((&self.field, source), &span, &mut search.lit);
         let origin = self.field.extent().start;
         let stride = 64 * search.pictures.stride as u32;
         search.places.set(&self.marks, stride);
@@ -230,7 +205,11 @@ impl Band<'_> {
                     let with_words = self.search.with_words((block - first) as usize, after);
                     hits = std::array::from_fn(|lane| hits[lane] & with_words[lane]);
                 }
-                hits = self.search.bounded(block as u32, needed, hits);
+                if is_dark(&hits) {
+                    continue;
+                }
+                let bounded = self.search.bounded(block as u32, needed);
+                hits = std::array::from_fn(|lane| hits[lane] & bounded[lane]);
                 // A machine word of the picture stands for one block of lags.
                 for lane in (0..WIDE).filter(|lane| hits[*lane] != 0) {
                     let first = origin + COARSE as i64 * (block + 64 * lane as i64) - fired;

@@ -6,11 +6,11 @@ use super::track::WIDEST_GAP;
 use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
 
-/// So many shots are passed by at most, where nothing was found, before the next one is searched for.
-const LONGEST_PAUSE: usize = 64;
-
-/// The same where light does not stand out among what is spread evenly.
-pub(super) const LONGEST_EVEN: usize = 256;
+/// So many shots are passed by at most, where nothing was found, before the next one is searched for:
+/// in the first pass, and of shots of which light does not stand out among what is spread evenly. With
+/// 16 and 64 as with 256 the same shots are found in all standard scenes and weathers, in up to 1.7 of
+/// the time where it is dark in dense noise; with 1024 in 0.82 to 1.08 of it.
+const LONGEST_PAUSE: usize = 256;
 
 /// Which shots of a block are acquired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +19,30 @@ enum Pass {
     First,
     /// Those that were passed by, where all that is bright is known but them.
     Second,
+}
+
+/// Shots of which one in so many is searched for, fewer and fewer as long as none is found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Paced {
+    next: usize,
+    pause: usize,
+}
+
+impl Default for Paced {
+    fn default() -> Self {
+        Self { next: 0, pause: LONGEST_PAUSE }
+    }
+}
+
+impl Paced {
+    fn is_due(&self, shot: usize) -> bool {
+        shot >= self.next
+    }
+
+    fn note(&mut self, shot: usize, is_found: bool) {
+        self.next = shot + if is_found { 1 } else { self.pause };
+        self.pause = if is_found { 1 } else { (2 * self.pause).min(LONGEST_PAUSE) };
+    }
 }
 
 /// The share of their marks that was found of the shots before: a running mean.
@@ -67,14 +91,11 @@ impl Band<'_> {
     /// Tracks the shots of a block from both sides, and acquires those that are no fainter than the
     /// others but were not expected where they are.
     fn look_where_expected(&mut self, block: Range<usize>) {
-        let (mut next, mut pause) = (block.start, 1);
         for shot in block.clone() {
-            let may_search = shot >= next;
-            let pass = may_search.then_some(Pass::First);
-            if self.is_sought(shot) && !self.track_or_acquire(shot, pass) && may_search {
-                (next, pause) = (shot + pause, (2 * pause).min(LONGEST_PAUSE));
-            } else if self.found[shot].is_some() {
-                (next, pause) = (shot + 1, 1);
+            let pass = self.searched.is_due(shot).then_some(Pass::First);
+            let is_found = !self.is_sought(shot) || self.track_or_acquire(shot, pass);
+            if is_found || pass.is_some() {
+                self.searched.note(shot, is_found);
             }
         }
         for shot in block.clone().rev().filter(|shot| self.is_sought(*shot)).collect::<Vec<_>>() {
@@ -201,10 +222,10 @@ impl Band<'_> {
         if self.leftover().is_empty_of(ticks) {
             return false;
         }
-        let may_be_even = known.is_none() && shot >= self.next_even;
+        let may_be_even = known.is_none() && self.even.is_due(shot);
         let is_even = wants_further || self.sent.is_thorough() || may_be_even;
-        if is_even {
-            (self.next_even, self.pause) = (shot + self.pause, (2 * self.pause).min(LONGEST_EVEN));
+        if may_be_even {
+            self.even.note(shot, false);
         }
         let lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
         if lags.is_empty() {
@@ -227,7 +248,7 @@ impl Band<'_> {
         self.cancel(shot, found.map_or(lag, |found| found.lag));
         if let Some(found) = found {
             if known.is_none() {
-                (self.next_even, self.pause) = (shot, 1);
+                self.even.note(shot, true);
             }
             self.add_surface(shot, found);
         }

@@ -41,7 +41,7 @@ use crate::code::Codebook;
 use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
 use acquire::{Leftover, Search};
-use look::Usual;
+use look::{Paced, Usual};
 use sent::{Sent, Words};
 use verify::Photons;
 
@@ -130,10 +130,9 @@ struct Band<'a> {
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
-    /// The next shot that is searched for where light does not stand out, and the shots to the one
-    /// behind it.
-    next_even: usize,
-    pause: usize,
+    /// Which shots are searched for that are tracked no more, and of which light does not stand out.
+    searched: Paced,
+    even: Paced,
     /// Counts of the block of lags that was looked at last.
     counts: Counts<NARROW>,
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
@@ -202,8 +201,8 @@ impl<'a> Band<'a> {
             usual: Usual::new(),
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
-            next_even: 0,
-            pause: look::LONGEST_EVEN,
+            searched: Paced::default(),
+            even: Paced::default(),
             counts: Counts::default(),
             marks: Vec::new(),
             marks_of: None,
@@ -319,7 +318,6 @@ impl<'a> Band<'a> {
     fn cancel(&mut self, shot: usize, lag: i64) {
         let start = self.sent.fired[shot] + lag - self.sent.farther();
         self.field.cancel(self.sent.lit_from(shot, start), &self.sent.bits(shot).cancelled);
-        self.search.grow_stale();
         if let Some(leftover) = &mut self.leftover {
             leftover.renew(&self.field, &self.sent.light(shot, lag));
         }

@@ -10,10 +10,6 @@ pub(super) const BLOCK: i64 = 64 * NARROW as i64;
 /// The lags to both sides of a peak that are always seen with it.
 pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - SAME;
 
-/// Blocks to each side of a peak in which a higher one is looked for: with the one of the peak they
-/// hold all sidelobes of words of up to 892 ticks.
-const SIDES: i64 = 3;
-
 /// A peak so near to where it was expected is no sidelobe of one elsewhere; one that is not is looked
 /// at again in the middle of a block.
 const SAME: i64 = 4;
@@ -112,12 +108,10 @@ impl Band<'_> {
         Some(best)
     }
 
-    /// The highest of the peaks to both sides of the block around `middle`, if more marks of `shot` are
+    /// The higher of the peaks in the blocks to both sides of that around `middle`, if more marks of `shot` are
     /// found there than at `detection`, or as many earlier.
     fn beside(&mut self, shot: usize, middle: i64, detection: Detection) -> Option<Detection> {
-        let word = self.sent.bit_length();
-        let sides = (1..=SIDES).take_while(|side| side * BLOCK - BLOCK / 2 < word);
-        let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
+        let sides = [middle - BLOCK, middle + BLOCK].into_iter();
         let of = |peak: &Detection| (peak.count, std::cmp::Reverse(peak.lag));
         let peaks = sides.filter_map(|side| self.best_in_block(shot, side));
         peaks.max_by_key(of).filter(|peak| of(peak) > of(&detection))
