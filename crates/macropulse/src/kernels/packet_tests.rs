@@ -45,7 +45,7 @@ proptest! {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let corners = soup(&mut chance, count);
         let centre = [0; 3].map(|_| chance.random_range(-5.0..5.0_f64));
-        let (triangles, _) = Triangles::new(count, |index| corners[index], centre);
+        let (triangles, _) = Triangles::new(corners.clone(), centre);
         let mut origin = [centre, [0; 3].map(|_| chance.random_range(-9.0..9.0))][seed as usize % 2];
         let mut aim = [1.0, 2.0, 3.0];
         if let Some(corner) = corners.first().filter(|_| from_corner) {
@@ -81,7 +81,7 @@ proptest! {
 fn the_soup_is_thick() {
     let mut chance = ChaCha8Rng::seed_from_u64(7);
     let corners = soup(&mut chance, 100);
-    let (triangles, _) = Triangles::new(100, |index| corners[index], [0.0; 3]);
+    let (triangles, _) = Triangles::new(corners.clone(), [0.0; 3]);
     let mut packet = Packet::from([0.0; 3]);
     for lane in 0..LANES {
         let toward = direction(&mut chance, 2, corners[lane][0], [0.0; 3]);
@@ -112,8 +112,8 @@ proptest! {
             packet.set(lane, direction(&mut chance, 2, toward, origin), f64::INFINITY);
         }
         let ones: Vec<Triangles> =
-            corners.iter().map(|one| Triangles::new(1, |_| *one, centre).0).collect();
-        let (triangles, _) = Triangles::new(count, |index| corners[index], centre);
+            corners.iter().map(|one| Triangles::new(vec![*one], centre).0).collect();
+        let (triangles, _) = Triangles::new(corners.clone(), centre);
         let nearest = |lane: usize| {
             let hits = ones.iter().filter_map(|one| {
                 one.nearest((origin, packet.along(lane)), (0.0, f64::INFINITY))

@@ -49,32 +49,27 @@ pub(crate) struct Hit {
 }
 
 impl Triangles {
-    /// Builds the hierarchy of `count` triangles with the corners that `corners_of` gives, exact
-    /// about `centre`; what that holds is dropped before. Gives it with the index that each
-    /// leaf had; triangles without area or with a coordinate that is not finite cannot be hit and
-    /// are left out.
-    pub(crate) fn new(
-        count: usize,
-        corners_of: impl Fn(usize) -> Corners,
-        centre: [f64; 3],
-    ) -> (Self, Vec<u32>) {
-        let (mut kept, mut found) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        for index in 0..count {
-            let corners = corners_of(index);
-            if is_near(&corners, centre) && has_area(&corners) {
-                kept.push(index as u32);
-                found.push(corners);
+    /// Builds the hierarchy of triangles with these `corners`, exact about `centre`. Gives it with
+    /// the index that each leaf had; triangles without area or with a coordinate that is not finite
+    /// cannot be hit and are left out.
+    pub(crate) fn new(mut corners: Vec<Corners>, centre: [f64; 3]) -> (Self, Vec<u32>) {
+        let (mut index, mut kept) = (0, Vec::with_capacity(corners.len()));
+        corners.retain(|corners| {
+            let is_kept = is_near(corners, centre) && has_area(corners);
+            if is_kept {
+                kept.push(index);
             }
-        }
-        // Of millions of triangles no copy is kept longer than it is needed.
-        drop(corners_of);
-        let bounds = found.iter().map(|corners| {
+            index += 1;
+            is_kept
+        });
+        let bounds = corners.iter().map(|corners| {
             let [a, b, c] = narrow(corners, centre).map(Vec3A::from_array);
             Bounds { low: a.min(b).min(c), high: a.max(b).max(c) }
         });
         let Built { tree, mut order, ends } = Built::over(bounds, SIDE, centre);
-        let corners: Vec<Corners> = order.iter().map(|index| found[*index as usize]).collect();
-        drop(found);
+        // What is in the old order is dropped here: of millions of triangles no list is kept longer
+        // than it is needed.
+        corners = order.iter().map(|index| corners[*index as usize]).collect();
         order.iter_mut().for_each(|index| *index = kept[*index as usize]);
         drop(kept);
         let mut first = 0;

@@ -99,8 +99,11 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     let pose = |stand: &Stand| source.pose(stand);
     let (interferers, assumed) = interferer::interferers((source, base), &file.interferers, pose)?;
     assembly.notes.extend(assumed);
-    let Assembly { materials, objects, solids, placed, moving_shapes, moving, mut notes, .. } =
+    let Assembly { materials, objects, solids, placed, moving_shapes, moving, meshes, .. } =
         assembly;
+    let mut notes = assembly.notes;
+    // The world has triangles of its own: nothing else may hold meshes while it is made.
+    drop(meshes);
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
     let mut surfaces = Digest::new();
     surfaces.all_placed(&placed);

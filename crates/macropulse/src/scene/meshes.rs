@@ -67,7 +67,8 @@ impl Known {
         }
         let (low, high) = mesh.bounds().unwrap_or_default();
         let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
-        let footing = Footing::of(&mesh);
-        Self { origin, mesh: Rc::new(mesh), footing, size }
+        let mesh = Rc::new(mesh);
+        let footing = Footing::of(Rc::clone(&mesh));
+        Self { origin, mesh, footing, size }
     }
 }

@@ -13,7 +13,7 @@ use super::mesh::Mesh;
 use super::motion::Motion;
 use super::moving::Mover;
 use super::pose::{Pose, Transform};
-use super::raycast::{Facet, Facets};
+use super::raycast::{Facet, Facets, Loose};
 use super::world::{Copy, World};
 
 /// A mesh in metres, and where it stands.
@@ -51,10 +51,9 @@ impl Placed {
 
     /// The mesh in its own frame, exact about its middle.
     fn model(&self) -> Facets {
-        let facets: Vec<Facet> = self.facets(|vertex| vertex).collect();
         let (low, high) = self.mesh.bounds().unwrap_or_default();
         let middle = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
-        Facets::new(facets, middle)
+        Facets::new(self.facets(|vertex| vertex).collect(), middle)
     }
 
     /// The distance of its farthest corner from the origin of its frame, m.
@@ -96,7 +95,7 @@ fn models(placed: &[Placed]) -> Vec<Vec<&Placed>> {
 
 /// The world of all that is placed, exact about `centre` (the sensor).
 pub(super) fn world(placed: Vec<Placed>, solids: Vec<Solid>, centre: [f64; 3]) -> World {
-    let mut facets = Vec::new();
+    let mut facets = Loose::default();
     let mut copies = Vec::new();
     let mut kept = Vec::new();
     for alike in self::models(&placed) {

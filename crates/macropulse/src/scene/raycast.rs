@@ -1,7 +1,5 @@
 //! Triangles with what they belong to, in a hierarchy that rays descend.
 
-use std::borrow::Cow;
-
 use super::hits::{CastRays, Hit, Ray};
 use crate::kernels::{Corners, Triangles};
 
@@ -11,6 +9,33 @@ pub(super) struct Facet {
     pub corners: Corners,
     pub material: u16,
     pub object: u16,
+}
+
+/// Triangles over which no hierarchy is built yet, as columns.
+#[derive(Default)]
+pub(super) struct Loose {
+    corners: Vec<Corners>,
+    material_and_object: Vec<[u16; 2]>,
+}
+
+impl Extend<Facet> for Loose {
+    fn extend<T: IntoIterator<Item = Facet>>(&mut self, facets: T) {
+        let facets = facets.into_iter();
+        self.corners.reserve(facets.size_hint().0);
+        self.material_and_object.reserve(facets.size_hint().0);
+        for Facet { corners, material, object } in facets {
+            self.corners.push(corners);
+            self.material_and_object.push([material, object]);
+        }
+    }
+}
+
+impl FromIterator<Facet> for Loose {
+    fn from_iter<T: IntoIterator<Item = Facet>>(facets: T) -> Self {
+        let mut loose = Self::default();
+        loose.extend(facets);
+        loose
+    }
 }
 
 /// Triangles that can be hit by rays.
@@ -23,13 +48,10 @@ pub(super) struct Facets {
 impl Facets {
     /// Builds the hierarchy of `facets`, exact about `centre` (the sensor). Triangles without
     /// area or with a coordinate that is not finite cannot be hit and are left out.
-    pub(super) fn new<'a>(facets: impl Into<Cow<'a, [Facet]>>, centre: [f64; 3]) -> Self {
-        let facets = facets.into();
-        let pairs: Vec<[u16; 2]> =
-            facets.iter().map(|facet| [facet.material, facet.object]).collect();
-        let corners_of = move |index: usize| facets[index].corners;
-        let (triangles, order) = Triangles::new(pairs.len(), corners_of, centre);
-        let material_and_object = order.iter().map(|index| pairs[*index as usize]).collect();
+    pub(super) fn new(facets: Loose, centre: [f64; 3]) -> Self {
+        let (triangles, order) = Triangles::new(facets.corners, centre);
+        let pair = |index: &u32| facets.material_and_object[*index as usize];
+        let material_and_object = order.iter().map(pair).collect();
         Self { triangles, material_and_object }
     }
 
@@ -81,6 +103,10 @@ mod tests {
         (0..rows).flat_map(|row| (0..2 * rows).flat_map(move |column| cell(row, column))).collect()
     }
 
+    fn built(facets: &[Facet], centre: [f64; 3]) -> Facets {
+        Facets::new(facets.iter().copied().collect(), centre)
+    }
+
     fn direction(chance: &mut ChaCha8Rng) -> DVec3 {
         loop {
             let point = DVec3::from([0; 3].map(|_| chance.random_range(-1.0..1.0)));
@@ -96,7 +122,7 @@ mod tests {
 
     #[test]
     fn no_ray_leaks_out_of_a_closed_sphere() {
-        let world = Facets::new(sphere(DVec3::ZERO, 10.0, 300), [0.0; 3]);
+        let world = built(&sphere(DVec3::ZERO, 10.0, 300), [0.0; 3]);
         let mut chance = ChaCha8Rng::seed_from_u64(1);
         let rays = (0..500_000).map(|_| {
             let origin = (direction(&mut chance) * chance.random_range(0.0..9.9)).to_array();
@@ -108,9 +134,9 @@ mod tests {
     #[test]
     fn no_ray_of_a_packet_leaks_out_of_a_closed_sphere() {
         let mut facets = sphere(DVec3::ZERO, 10.0, 300);
-        let closed = Facets::new(&facets, [0.0; 3]);
+        let closed = built(&facets, [0.0; 3]);
         facets.drain(180_000..180_020);
-        let open = Facets::new(&facets, [0.0; 3]);
+        let open = built(&facets, [0.0; 3]);
         let leaks = |world: &Facets| {
             let mut chance = ChaCha8Rng::seed_from_u64(5);
             let (mut leaks, mut waiting) = (0, Waiting::default());
@@ -133,7 +159,7 @@ mod tests {
     #[test]
     fn no_ray_leaks_that_is_aimed_at_corners_and_edges() {
         let facets = sphere(DVec3::ZERO, 10.0, 60);
-        let world = Facets::new(&facets, [0.0; 3]);
+        let world = built(&facets, [0.0; 3]);
         let mut chance = ChaCha8Rng::seed_from_u64(2);
         let rays = (0..300_000).map(|index| {
             let [a, b, _] = facets[index % facets.len()].corners.map(DVec3::from);
@@ -150,7 +176,7 @@ mod tests {
         // The control of the two tests above: they can fail.
         let mut facets = sphere(DVec3::ZERO, 10.0, 60);
         facets.swap_remove(5_000);
-        let world = Facets::new(&facets, [0.0; 3]);
+        let world = built(&facets, [0.0; 3]);
         let mut chance = ChaCha8Rng::seed_from_u64(3);
         let rays = (0..200_000)
             .map(|_| Ray { origin: [0.0; 3], direction: direction(&mut chance).to_array() });
@@ -165,7 +191,7 @@ mod tests {
             |y: f64, z: f64| (map + DVec3::new(150.0 + 0.3 * y - 0.2 * z, y, z)).to_array();
         let [a, b, c, d] =
             [corner(-60.0, -40.0), corner(60.0, -40.0), corner(60.0, 40.0), corner(-60.0, 40.0)];
-        let world = Facets::new(&[facet([a, b, c]), facet([a, c, d])], map.to_array());
+        let world = built(&[facet([a, b, c]), facet([a, c, d])], map.to_array());
         let normal = DVec3::new(1.0, -0.3, 0.2).normalize();
         let mut chance = ChaCha8Rng::seed_from_u64(4);
         for _ in 0..10_000 {
@@ -183,7 +209,7 @@ mod tests {
     #[test]
     fn a_ray_that_goes_on_behind_a_surface_meets_the_next() {
         let wall = |x: f64| facet([[x, -9.0, -9.0], [x, 9.0, -9.0], [x, 0.0, 9.0]]);
-        let world = Facets::new(&[wall(10.0), wall(10.001), wall(20.0)], [0.0; 3]);
+        let world = built(&[wall(10.0), wall(10.001), wall(20.0)], [0.0; 3]);
         let ray = Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0] };
         let mut ranges = vec![];
         let mut nearest = 0.0;
@@ -199,9 +225,9 @@ mod tests {
     fn nonsense_is_never_hit() {
         let point = facet([[10.0, 0.0, 0.0]; 3]);
         let nowhere = facet([[10.0, f64::NAN, 0.0], [10.0, 1.0, 0.0], [10.0, 0.0, 1.0]]);
-        let world = Facets::new(&[point, nowhere], [0.0; 3]);
+        let world = built(&[point, nowhere], [0.0; 3]);
         assert_eq!(world.len(), 0);
-        let world = Facets::new(sphere(DVec3::ZERO, 10.0, 8), [0.0; 3]);
+        let world = built(&sphere(DVec3::ZERO, 10.0, 8), [0.0; 3]);
         for direction in [[f64::NAN; 3], [0.0; 3], [f64::INFINITY, 0.0, 0.0]] {
             assert_eq!(world.cast(&Ray { origin: [0.0; 3], direction }, 0.0, 1e3), None);
         }

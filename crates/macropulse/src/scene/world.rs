@@ -8,15 +8,13 @@
 //! What moves is kept apart and asked after all that, ray by ray; of equally far surfaces it comes
 //! last, in the order of the scene file.
 
-use std::borrow::Cow;
-
 use glam::{DVec3, Vec3A};
 
 use super::closed_form::Solid;
 use super::hits::{CastRays, Hit, Ray};
 use super::moving::Mover;
 use super::pose::Transform;
-use super::raycast::{Facet, Facets};
+use super::raycast::{Facets, Loose};
 use crate::kernels::{
     Bounds, Built, LANES, Lanes, NONE, Packet, Tree, Waiting, cosines, normals, turned,
 };
@@ -66,8 +64,8 @@ const FINE: usize = 50_000;
 
 impl World {
     /// Puts surfaces together; exact about `centre` (the sensor).
-    pub(super) fn new<'a>(
-        facets: impl Into<Cow<'a, [Facet]>>,
+    pub(super) fn new(
+        facets: Loose,
         (models, copies): (Vec<Facets>, &[Copy]),
         solids: Vec<Solid>,
         centre: [f64; 3],

@@ -3,6 +3,7 @@
 use super::super::closed_form::Shape;
 use super::super::motion::Motion;
 use super::super::pose::Pose;
+use super::super::raycast::Facet;
 use super::*;
 use crate::kernels::Corners;
 use crate::units::FS_PER_S;
@@ -47,19 +48,19 @@ fn worlds(poses: &[Pose]) -> [World; 2] {
             solid(Shape::Sphere { radius: 2.0 }, [-15.0, 10.0, 0.0], 2),
         ]
     };
-    let model: Vec<Facet> = mesh.iter().map(|corners| facet(*corners, 0)).collect();
+    let model = mesh.iter().map(|corners| facet(*corners, 0)).collect();
     let mut copies = vec![];
-    let mut flat = vec![];
+    let mut flat = Loose::default();
     for (index, pose) in poses.iter().enumerate() {
         let (to_world, object) = (pose.world_from_sensor(), 3 + index as u16);
         copies.push(Copy { model: 0, to_world, object });
         let laid = |corners: &Corners| facet(corners.map(|corner| to_world.point(corner)), object);
         flat.extend(mesh.iter().map(laid));
     }
-    let models = vec![Facets::new(&model, [0.0; 3])];
+    let models = vec![Facets::new(model, [0.0; 3])];
     [
-        World::new(&[], (models, &copies), solids(), [0.0; 3]),
-        World::new(&flat, (vec![], &[]), solids(), [0.0; 3]),
+        World::new(Loose::default(), (models, &copies), solids(), [0.0; 3]),
+        World::new(flat, (vec![], &[]), solids(), [0.0; 3]),
     ]
 }
 
@@ -111,8 +112,8 @@ fn a_packet_meets_movers_at_the_times_of_its_rays() {
     let mut chance = ChaCha8Rng::seed_from_u64(14);
     let [still, _] = worlds(&poses(&mut chance, 30));
     let facet = |corners: &Corners| Facet { corners: *corners, material: 4, object: 0 };
-    let facets: Vec<Facet> = egg(20).iter().map(facet).collect();
-    let model = std::sync::Arc::new(Facets::new(&facets, [0.0; 3]));
+    let facets = egg(20).iter().map(facet).collect();
+    let model = std::sync::Arc::new(Facets::new(facets, [0.0; 3]));
     let poses = poses(&mut chance, 20);
     let motion = |pose: &Pose| Motion { pose: *pose, velocity: [9.0, -5.0, 2.0], turn_rate: 3.0 };
     let mover = |(object, pose): (u16, &Pose)| {
