@@ -7,10 +7,10 @@
 
 use std::ops::Range;
 
-use glam::Vec3A;
+use glam::{Vec3A, Vec4};
 
 use super::tree::{Bounds, Child, Eight, Tree};
-use super::wide::SIDE;
+use super::wide::{Any, Registers, SIDE, Task, Wide, on_level};
 
 /// Places of an axis at which a range may be cut, and one more.
 const BINS: usize = 16;
@@ -20,22 +20,67 @@ const BINS: usize = 16;
 /// half of it.
 const CUTS: u32 = 48;
 
-/// What a hierarchy is built over.
+/// A box that grows by the lesser of each lane: its low corner and, with its signs turned, its high
+/// one, in lanes 0 to 2 and 4 to 6. The others are for whoever puts something there.
 #[derive(Clone, Copy)]
-struct Item {
-    low: [f32; 3],
-    index: u32,
-    high: [f32; 3],
+#[repr(C, align(32))]
+struct Growing([f32; SIDE]);
+
+impl Growing {
+    /// No line enters it.
+    const NOWHERE: Self = Self([f32::INFINITY; SIDE]);
+
+    /// Its low corner, and the high one with its signs turned.
+    #[inline(always)]
+    fn corners(&self) -> [Vec3A; 2] {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        [Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)].map(Vec3A::from_vec4)
+    }
+
+    fn bounds(&self) -> Bounds {
+        let [low, turned] = self.corners();
+        Bounds { low, high: -turned }
+    }
+
+    /// Around both.
+    #[inline(always)]
+    fn joined<R: Registers>(&self, other: &Self) -> Self {
+        let mut least = [0.0; SIDE];
+        R::Boxes::load(&self.0).least(R::Boxes::load(&other.0)).store(&mut least);
+        Self(least)
+    }
+
+    /// Half of the surface, m².
+    #[inline(always)]
+    fn half_area(&self) -> f32 {
+        let [low, turned] = self.corners();
+        // The signs of all sides are turned, and so of no product of two.
+        let [x, y, z] = (low + turned).to_array();
+        x * y + y * z + z * x
+    }
 }
 
+/// What a hierarchy is built over: a box, with the halves of its index in the lanes left over, as
+/// numbers: as bits they would be subnormal, which is slow to compute with.
+#[derive(Clone, Copy)]
+struct Item(Growing);
+
 impl Item {
-    fn bounds(&self) -> Bounds {
-        Bounds { low: Vec3A::from_array(self.low), high: Vec3A::from_array(self.high) }
+    fn new(index: u32, Bounds { low, high }: &Bounds) -> Self {
+        let [less, more] = [index & 0xFFFF, index >> 16].map(|half| half as f32);
+        Self(Growing([low.x, low.y, low.z, less, -high.x, -high.y, -high.z, more]))
+    }
+
+    fn index(&self) -> u32 {
+        let [_, _, _, less, _, _, _, more] = self.0.0;
+        less as u32 | (more as u32) << 16
     }
 
     /// Twice the middle of its box.
+    #[inline(always)]
     fn middle(&self) -> Vec3A {
-        Vec3A::from_array(self.low) + Vec3A::from_array(self.high)
+        let [low, turned] = self.0.corners();
+        low - turned
     }
 }
 
@@ -44,6 +89,8 @@ impl Item {
 struct Part {
     items: Range<usize>,
     bounds: Bounds,
+    /// Around twice the middles of their boxes.
+    middles: Bounds,
     /// Cuts that made it.
     cuts: u32,
 }
@@ -74,19 +121,20 @@ impl Built {
         most: usize,
         centre: [f64; 3],
     ) -> Self {
-        let mut all = Bounds::NOWHERE;
+        let (mut all, mut middles) = (Bounds::NOWHERE, Bounds::NOWHERE);
         let item = |(index, bounds): (u32, Bounds)| {
-            all = all.joined(&bounds);
-            Item { low: bounds.low.to_array(), index, high: bounds.high.to_array() }
+            let item = Item::new(index, &bounds);
+            (all, middles) = (all.joined(&bounds), middles.holding(item.middle()));
+            item
         };
         let items: Vec<Item> = (0..).zip(bounds).map(item).collect();
         let mut builder = Builder { items, most, eights: Vec::new(), ends: Vec::new(), depth: 0 };
         if !builder.items.is_empty() {
             let items = 0..builder.items.len();
-            builder.node(Part { items, bounds: all, cuts: 0 }, 1);
+            builder.node(Part { items, bounds: all, middles, cuts: 0 }, 1);
         }
         let Builder { items, eights, ends, depth, .. } = builder;
-        let order = items.iter().map(|item| item.index).collect();
+        let order = items.iter().map(Item::index).collect();
         Self { tree: Tree::new(centre, all, eights, depth), order, ends }
     }
 }
@@ -125,114 +173,165 @@ impl Builder {
     /// Cuts a part of two items or more in two.
     fn cut(&mut self, part: &Part) -> (Part, Part) {
         let items = &mut self.items[part.items.clone()];
-        let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-        for item in &*items {
-            let middle = item.middle();
-            (low, high) = (low.min(middle), high.max(middle));
-        }
-        let extent = high - low;
-        let (count, [left, right]) = if extent.max_element() > 0.0 && part.cuts < CUTS {
-            Bins::of(items, low, extent).cut(items, self.most)
+        let mut halves = Halves::NONE;
+        let extent = part.middles.high - part.middles.low;
+        if extent.max_element() > 0.0 && part.cuts < CUTS {
+            let scale = BINS as f32 * (1.0 - f32::EPSILON) / extent;
+            let ruler = Ruler { low: part.middles.low, scale };
+            on_level(Cut { items, ruler, most: self.most, halves: &mut halves });
         } else {
-            halve(items, extent)
-        };
+            halve(items, extent.max_position(), &mut halves);
+        }
+        let Halves { count, bounds, middles } = halves;
         let (start, end, cuts) = (part.items.start, part.items.end, part.cuts + 1);
-        (
-            Part { items: start..start + count, bounds: left, cuts },
-            Part { items: start + count..end, bounds: right, cuts },
-        )
+        let half = |items, side: usize| Part {
+            items,
+            bounds: bounds[side].bounds(),
+            middles: middles[side],
+            cuts,
+        };
+        (half(start..start + count, 0), half(start + count..end, 1))
     }
 }
 
-/// Half of the items on either side of the longest axis.
-fn halve(items: &mut [Item], extent: Vec3A) -> (usize, [Bounds; 2]) {
-    let axis = extent.max_position();
-    let half = items.len() / 2;
-    items.select_nth_unstable_by(half, |a, b| {
+/// Items on either side of a cut, those on the near side first.
+struct Halves {
+    /// How many are on the near side.
+    count: usize,
+    /// Around those of either side.
+    bounds: [Growing; 2],
+    /// Around twice their middles.
+    middles: [Bounds; 2],
+}
+
+impl Halves {
+    /// Of no items.
+    const NONE: Self =
+        Self { count: 0, bounds: [Growing::NOWHERE; 2], middles: [Bounds::NOWHERE; 2] };
+}
+
+/// Half of the items on either side along an axis.
+fn halve(items: &mut [Item], axis: usize, halves: &mut Halves) {
+    halves.count = items.len() / 2;
+    items.select_nth_unstable_by(halves.count, |a, b| {
         let along = a.middle()[axis].total_cmp(&b.middle()[axis]);
-        along.then(a.index.cmp(&b.index))
+        along.then(a.index().cmp(&b.index()))
     });
-    let bounds = |items: &[Item]| {
-        items.iter().fold(Bounds::NOWHERE, |bounds, item| bounds.joined(&item.bounds()))
-    };
-    (half, [bounds(&items[..half]), bounds(&items[half..])])
+    let (near, far) = items.split_at(halves.count);
+    for (side, items) in [near, far].into_iter().enumerate() {
+        for item in items {
+            halves.bounds[side] = halves.bounds[side].joined::<Any>(&item.0);
+            halves.middles[side] = halves.middles[side].holding(item.middle());
+        }
+    }
+}
+
+/// Where the bins of a part lie on each axis.
+struct Ruler {
+    low: Vec3A,
+    /// Bins per length.
+    scale: Vec3A,
+}
+
+/// Cuts items where that is expected to be best.
+struct Cut<'a> {
+    items: &'a mut [Item],
+    ruler: Ruler,
+    /// Items of a leaf, at most.
+    most: usize,
+    halves: &'a mut Halves,
 }
 
 /// The items of a part by the place of their middles, on each axis.
 struct Bins {
-    low: Vec3A,
-    /// Bins per length.
-    scale: Vec3A,
-    bounds: [[Bounds; BINS]; 3],
+    bounds: [[Growing; BINS]; 3],
     counts: [[u32; BINS]; 3],
 }
 
-impl Bins {
-    fn of(items: &[Item], low: Vec3A, extent: Vec3A) -> Self {
-        let scale = BINS as f32 * (1.0 - f32::EPSILON) / extent;
-        let mut bins =
-            Self { low, scale, bounds: [[Bounds::NOWHERE; BINS]; 3], counts: [[0; BINS]; 3] };
-        for item in items {
-            let bounds = item.bounds();
-            let place = bins.place(item);
+impl Task for Cut<'_> {
+    #[inline(always)]
+    fn run<R: Registers>(&mut self) {
+        let (axis, end) = self.best::<R>(&self.bins::<R>());
+        let (low, scale) = (self.ruler.low[axis], self.ruler.scale[axis]);
+        let [mut near, mut far] = [Bounds::NOWHERE; 2];
+        let mut count = 0;
+        for index in 0..self.items.len() {
+            let middle = self.items[index].middle();
+            if bin((middle[axis] - low) * scale) < end {
+                near = near.holding(middle);
+                self.items.swap(index, count);
+                count += 1;
+            } else {
+                far = far.holding(middle);
+            }
+        }
+        (self.halves.count, self.halves.middles) = (count, [near, far]);
+    }
+}
+
+impl Cut<'_> {
+    #[inline(always)]
+    fn bins<R: Registers>(&self) -> Bins {
+        let mut bins = Bins { bounds: [[Growing::NOWHERE; BINS]; 3], counts: [[0; BINS]; 3] };
+        for item in &*self.items {
+            let place = (item.middle() - self.ruler.low) * self.ruler.scale;
             for axis in 0..3 {
-                let bin = &mut bins.bounds[axis][place[axis]];
-                *bin = bin.joined(&bounds);
-                bins.counts[axis][place[axis]] += 1;
+                let bin = bin(place[axis]);
+                let bounds = &mut bins.bounds[axis][bin];
+                *bounds = bounds.joined::<R>(&item.0);
+                bins.counts[axis][bin] += 1;
             }
         }
         bins
     }
 
-    /// The bin of an item on each axis.
+    /// The axis of the best cut, and the bin before which it lies. Notes the boxes of either side.
     #[inline(always)]
-    fn place(&self, item: &Item) -> [usize; 3] {
-        let place = (item.middle() - self.low) * self.scale;
-        // What is no number, on an axis without extent, becomes zero.
-        place.to_array().map(|place| (place as i32 as usize).min(BINS - 1))
-    }
-
-    /// Moves the items on the near side of the best cut to the front; how many they are, and the
-    /// box of either side.
-    fn cut(&self, items: &mut [Item], most: usize) -> (usize, [Bounds; 2]) {
-        let mut best = (f32::INFINITY, 0, 1, [Bounds::NOWHERE; 2]);
+    fn best<R: Registers>(&mut self, bins: &Bins) -> (usize, usize) {
+        let (mut least, mut best) = (f32::INFINITY, (0, 1));
+        let tests = |count: u32| count.div_ceil(self.most as u32) as f32;
         for axis in 0..3 {
-            let (bounds, counts) = (&self.bounds[axis], &self.counts[axis]);
-            let tests = |count: u32| count.div_ceil(most as u32) as f32;
-            let mut behind = [(Bounds::NOWHERE, 0); BINS];
-            let (mut right, mut count) = (Bounds::NOWHERE, 0);
-            for bin in (1..BINS).rev() {
-                (right, count) = (right.joined(&bounds[bin]), count + counts[bin]);
+            let (bounds, counts) = (&bins.bounds[axis], &bins.counts[axis]);
+            // A cut behind a bin without items is the one behind the bin before it.
+            let (mut used, mut bins) = (0, [0; BINS]);
+            for bin in 0..BINS {
+                bins[used] = bin;
+                used += usize::from(counts[bin] > 0);
+            }
+            let bins = &bins[..used];
+            let mut behind = [(Growing::NOWHERE, 0); BINS];
+            let (mut right, mut count) = (Growing::NOWHERE, 0);
+            for &bin in bins.iter().rev() {
+                (right, count) = (right.joined::<R>(&bounds[bin]), count + counts[bin]);
                 behind[bin] = (right, count);
             }
-            let (mut left, mut count) = (Bounds::NOWHERE, 0);
-            for bin in 1..BINS {
-                (left, count) = (left.joined(&bounds[bin - 1]), count + counts[bin - 1]);
-                let (right, rest) = behind[bin];
-                if count == 0 || rest == 0 {
-                    continue;
-                }
+            let (mut left, mut count) = (Growing::NOWHERE, 0);
+            for pair in bins.windows(2) {
+                let (bin, next) = (pair[0], pair[1]);
+                (left, count) = (left.joined::<R>(&bounds[bin]), count + counts[bin]);
+                let (right, rest) = behind[next];
                 let cost = left.half_area() * tests(count) + right.half_area() * tests(rest);
-                if cost < best.0 {
-                    best = (cost, axis, bin, [left, right]);
+                if cost < least {
+                    (least, best) = (cost, (axis, bin + 1));
+                    self.halves.bounds = [left, right];
                 }
             }
         }
-        let (_, axis, bin, bounds) = best;
-        let mut count = 0;
-        for index in 0..items.len() {
-            if self.place(&items[index])[axis] < bin {
-                items.swap(index, count);
-                count += 1;
-            }
-        }
-        (count, bounds)
+        best
     }
+}
+
+/// The bin at a place, counted in bins. What is no number, on an axis without extent, is in the
+/// first.
+#[inline(always)]
+fn bin(place: f32) -> usize {
+    usize::from(place.clamp(0.0, BINS as f32 - 1.0) as u8) % BINS
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -293,6 +392,31 @@ mod tests {
             let mut sorted = order;
             sorted.sort_unstable();
             prop_assert!(sorted.into_iter().eq(0..count as u32));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_level_builds_the_same(seed in 0..u64::MAX, count in 1..400_usize, cells in 1..40) {
+            let items = boxes(seed, count, cells);
+            let built = at_each_level(|| {
+                let built = Built::over(items.iter().copied(), SIDE, [0.0; 3]);
+                format!("{:?} {:?} {:?}", built.tree, built.order, built.ends)
+            });
+            for (level, one) in &built {
+                prop_assert_eq!(one, &built[0].1, "{:?}", level);
+            }
+        }
+    }
+
+    #[test]
+    fn an_item_keeps_its_index_and_its_box() {
+        let bounds = Bounds { low: Vec3A::new(-1.0, 0.25, 3.0), high: Vec3A::new(-0.5, 1e15, 3.0) };
+        for index in [0, 1, 0xFFFF, 0x1_0000, 0x7FFF_FFFF, u32::MAX] {
+            let item = Item::new(index, &bounds);
+            let Bounds { low, high } = item.0.bounds();
+            assert_eq!((item.index(), low, high), (index, bounds.low, bounds.high));
+            assert_eq!(item.middle(), bounds.low + bounds.high);
         }
     }
 

@@ -55,6 +55,12 @@ impl Bounds {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
+    /// Around it and `place`.
+    #[inline(always)]
+    pub(super) fn holding(&self, place: Vec3A) -> Self {
+        Self { low: self.low.min(place), high: self.high.max(place) }
+    }
+
     /// Half of the surface, m².
     #[inline(always)]
     pub(super) fn half_area(&self) -> f32 {
