@@ -239,6 +239,9 @@ impl Band<'_> {
     }
 }
 
+/// Stretches of which the highest is known.
+const PER_TOP: usize = 16;
+
 /// Where light that is left over may be looked for.
 pub(super) struct Leftover<'a> {
     sent: &'a Sent<'a>,
@@ -250,8 +253,8 @@ pub(super) struct Leftover<'a> {
     cell: i64,
     /// Cells that a macropulse takes up.
     together: usize,
-    /// The highest of the stretches when they were last asked for it.
-    fullest: u32,
+    /// The highest of every [`PER_TOP`] stretches.
+    tops: Vec<u32>,
     /// Memory for cells that are counted anew.
     counts: Vec<u32>,
 }
@@ -260,9 +263,6 @@ pub(super) struct Leftover<'a> {
 /// a nanosecond each, a microsecond.
 const SOON: i64 = 1000;
 
-/// In a gate of so many macropulses or more one of them raises the mean hardly.
-const MANY: usize = 16;
-
 impl<'a> Leftover<'a> {
     /// Of all ticks at hand.
     pub fn new(sent: &'a Sent<'a>, field: &Field) -> Self {
@@ -270,18 +270,11 @@ impl<'a> Leftover<'a> {
         let begin = field.residual_cells(&field.extent(), &mut cells);
         let together = field.stretch(sent.length() + i64::from(sent.width));
         let stretches = vec![0; cells.len()];
-        let all = 0..cells.len();
-        let cell = field.cell();
-        let mut leftover =
-            Self { sent, cells, stretches, begin, cell, together, fullest: 0, counts: vec![] };
+        let (all, tops) = (0..cells.len(), vec![0; cells.len().div_ceil(PER_TOP)]);
+        let (cell, counts) = (field.cell(), Vec::new());
+        let mut leftover = Self { sent, cells, stretches, tops, begin, cell, together, counts };
         leftover.sum(all);
-        leftover.find_fullest();
         leftover
-    }
-
-    /// Asks which of the stretches is the highest.
-    pub fn find_fullest(&mut self) {
-        self.fullest = self.stretches.iter().copied().max().unwrap_or(0);
     }
 
     /// Counts anew what is left in `light`.
@@ -298,16 +291,23 @@ impl<'a> Leftover<'a> {
     fn sum(&mut self, stretches: Range<usize>) {
         let from = |cell: usize| self.cells.get(cell..).unwrap_or_default();
         let mut sum: u32 = from(stretches.start).iter().take(self.together).sum();
-        for cell in stretches {
+        for cell in stretches.clone() {
             self.stretches[cell] = sum;
             let next = self.cells.get(cell + self.together).copied().unwrap_or(0);
             sum = sum + next - self.cells[cell];
         }
+        let tops = self.tops.iter_mut().zip(self.stretches.chunks(PER_TOP)).enumerate();
+        let first = stretches.start / PER_TOP;
+        for (_, (top, stretches)) in tops.take(stretches.end.div_ceil(PER_TOP)).skip(first) {
+            *top = stretches.iter().copied().max().unwrap_or(0);
+        }
     }
 
-    /// Whether there are nowhere so many ticks.
-    pub fn is_empty_of(&self, ticks: u32) -> bool {
-        self.fullest < ticks
+    /// Whether so many ticks may be anywhere where light of `shot` begins that comes after the `lags`.
+    pub fn may_hold(&self, shot: usize, lags: &Range<i64>, ticks: u32) -> bool {
+        let cells = self.cells(self.sent.fired[shot], lags);
+        let tops = cells.start / PER_TOP..cells.end.div_ceil(PER_TOP);
+        self.tops[tops].iter().any(|top| *top >= ticks)
     }
 
     /// The cells in which light of `shot` begins that comes after the `lags`.
@@ -338,19 +338,16 @@ impl<'a> Leftover<'a> {
         let mut places: Vec<Range<i64>> = Vec::new();
         let sent = self.sent;
         let (enough, fired) = (sent.ticks_of(shot, least), sent.fired[shot]);
-        if self.fullest < enough || lags.is_empty() {
+        if lags.is_empty() || !self.may_hold(shot, &lags, enough) {
             return places;
         }
         let cells = self.cells(fired, &lags);
         let stretches = &self.stretches[cells.clone()];
         let mean = stretches.iter().map(|&ticks| u64::from(ticks)).sum::<u64>() as f64
             / stretches.len().max(1) as f64;
-        // In a short gate it may be full everywhere of light that is sought; and what is soon searched
-        // need not stand out.
+        // What is soon searched need not stand out.
         let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
-        let is_long = stretches.len() > MANY * self.together
-            && blocks * i64::from(sent.weight(shot)) > SOON
-            && !sent.is_thorough();
+        let is_long = blocks * i64::from(sent.weight(shot)) > SOON && !sent.is_thorough();
         let fullest = stretches.iter().copied().max().map_or(0.0, f64::from);
         // What is sought adds to what chance spreads evenly.
         let may_be = mean + f64::from(enough) - 3.0 * mean.sqrt();

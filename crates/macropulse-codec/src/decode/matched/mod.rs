@@ -95,6 +95,13 @@ struct Detection {
     is_sure: bool,
 }
 
+impl Detection {
+    /// So many marks at `lag`, of which no more is known.
+    fn at(lag: i64, count: u32) -> Self {
+        Self { lag, count, margin: 0, stands_out: false, is_sure: false }
+    }
+}
+
 /// Of which shots light may be found that was not cancelled to begin with.
 #[derive(Debug)]
 enum Open {

@@ -195,6 +195,13 @@ impl<'a> Sent<'a> {
         self.lit_bits(shot).iter().map(move |&bit| start + scale * i64::from(bit))
     }
 
+    /// The sum of `found`, a number for each bit, over the lit bits of `shot`.
+    pub fn in_bits(&self, shot: usize, found: &[u32]) -> u32 {
+        let length = self.codebook.chips() / self.bits_of_payload() as u32;
+        let lit = self.lit_bits(shot).iter().map(|bit| bit / length);
+        lit.filter_map(|bit| found.get(bit as usize)).sum()
+    }
+
     /// Puts into `after` the ticks from the start of a macropulse of `shot` to each bit of it that is
     /// lit, or dark.
     pub fn bits_that_are(&self, is_lit: bool, shot: usize, after: &mut Vec<u32>) {

@@ -125,14 +125,8 @@ impl Band<'_> {
         if bits == 1 {
             return None;
         }
-        let start = sent.fired[shot] + detection.lag - bits * length;
-        let each: Vec<u32> = (0..3 * bits).map(|bit| (bit * length) as u32).collect();
-        let mut found = Vec::new();
-        self.field.lit().lit_in_each(start, &each, &sent.bits(shot).pattern, &mut found);
-        let count = |away: i64| {
-            let bits = sent.lit_from(shot, 0).map(|bit| (bits + away + bit / length) as usize);
-            bits.filter_map(|bit| found.get(bit)).sum::<u32>()
-        };
+        let words = self.words_about(shot, sent.fired[shot] + detection.lag);
+        let count = |away: i64| sent.in_bits(shot, &words[(bits + away) as usize..]);
         let reach = sent.reach();
         let lags = (-bits..=bits).map(|away| (count(away), detection.lag + away * length));
         let higher = lags.filter(|(count, lag)| *count > detection.count && reach.contains(lag));
@@ -195,7 +189,7 @@ impl Band<'_> {
         let others = std::array::from_fn(|lane| before[lane] | behind[lane]);
         let next = self.counts.highest(others).map_or(0, |(_, count)| count);
         let margin = count.saturating_sub(next);
-        Some(Detection { lag: first + at, count, margin, stands_out: false, is_sure: false })
+        Some(Detection { margin, ..Detection::at(first + at, count) })
     }
 
     /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.

@@ -235,28 +235,29 @@ impl Band<'_> {
         let first = sent.fired.partition_point(|fired| *fired < from);
         let end = sent.fired.partition_point(|fired| *fired <= start + bits * length - lags.start);
         let is_alike = |other: &usize| sent.log.word[*other] == sent.log.word[shot];
-        let pattern = &sent.bits(shot).pattern;
-        let lit = self.field.lit();
+        let mut alike = (first..end.max(first)).filter(is_alike).filter(|other| *other != shot);
+        let Some(one) = alike.next() else { return Vec::new() };
+        let words = self.words_about(shot, start);
         let mut found = Vec::new();
-        for other in (first..end.max(first)).filter(is_alike).filter(|other| *other != shot) {
-            for begins in (1 - bits..bits).map(|bit| start + bit * length) {
-                let lag = begins - sent.fired[other];
+        for other in std::iter::once(one).chain(alike) {
+            for away in 1 - bits..bits {
+                let lag = start + away * length - sent.fired[other];
                 if lags.contains(&lag) {
-                    let marks = sent.lit_from(other, begins).map(|bit| lit.lit_in(bit, pattern));
-                    found.push((
-                        other,
-                        Detection {
-                            lag,
-                            count: marks.sum(),
-                            margin: 0,
-                            stands_out: false,
-                            is_sure: false,
-                        },
-                    ));
+                    let count = sent.in_bits(other, &words[(bits + away) as usize..]);
+                    found.push((other, Detection::at(lag, count)));
                 }
             }
         }
         found
+    }
+
+    /// The marks of the word of `shot` that are found where each bit would be from as many bits before
+    /// tick `start` on as a payload has, to twice as many behind it.
+    pub(super) fn words_about(&self, shot: usize, start: i64) -> Vec<u32> {
+        let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
+        let pattern = &self.sent.bits(shot).pattern;
+        let at = |bit: i64| self.field.lit().lit_in(start + bit * length, pattern);
+        (-bits..2 * bits).map(at).collect()
     }
 
     /// The returns found so far of which light overlaps with `light`.
