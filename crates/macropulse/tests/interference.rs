@@ -120,8 +120,9 @@ fn other_words_of_the_family_are_nearly_as_good_as_silence() {
     for keys in [&[HALF][..], &[HALF, LITERAL]] {
         let (with, without) = (score("other-words", keys, 0), score("none", keys, 0));
         assert!(with.ghosts <= 5, "{keys:?} {with:?}");
-        let lost = without.count(Outcome::Right) - with.count(Outcome::Right);
-        assert!(lost < 6784 / 20, "{keys:?} {with:?}");
+        // Chance may give a few more than without.
+        let differ = without.count(Outcome::Right).abs_diff(with.count(Outcome::Right));
+        assert!(differ < 6784 / 20, "{keys:?} {with:?} {without:?}");
     }
     // With all words of the family it has our own one in half of the pixels.
     let half = score("in-phase", &[HALF], 0);
