@@ -1,7 +1,6 @@
 //! Tracking: the exact maximum about the lags at which the neighbours of a shot were found.
 
 use super::{Band, Detection};
-use crate::decode::field::Source;
 use crate::kernels::{NARROW, is_dark, places_of};
 
 /// Lags that are counted at once.
@@ -60,9 +59,6 @@ impl Band<'_> {
                 continue;
             }
             tried[way] = lag;
-            if gap > 1 && !self.is_left_about(shot, lag, least.div_ceil(2)) {
-                continue;
-            }
             let Some(peak) = self.climb(shot, lag, least) else { continue };
             let Some(peak) = self.told_from_chance(shot, peak) else { continue };
             if best.is_none_or(|best| peak.count > best.count)
@@ -132,19 +128,6 @@ impl Band<'_> {
         let higher = lags.filter(|(count, lag)| *count > detection.count && reach.contains(lag));
         let (_, lag) = higher.max_by_key(|(count, lag)| (*count, -lag))?;
         self.best_in_block(shot, lag)
-    }
-
-    /// Whether so many marks of `shot` are left anywhere in the block around `middle`.
-    fn is_left_about(&mut self, shot: usize, middle: i64, least: u32) -> bool {
-        let first = self.sent.fired[shot] + middle - BLOCK / 2;
-        self.lay_out(shot);
-        let farthest = self.marks.last().copied().unwrap_or(0);
-        let span = first..first + BLOCK + i64::from(farthest);
-        let left = self.field.lit_in(Source::Residual, &span, &mut self.residual);
-        let (words, begin) = left.at(first);
-        self.counts.clear();
-        self.counts.add(words, begin as u32, &self.marks, farthest);
-        !is_dark(&self.counts.at_least(least))
     }
 
     /// The highest peak in the [`BLOCK`] around `middle`.
