@@ -59,7 +59,7 @@ impl Usual {
         Self { share: 0.5, shots: 0.0 }
     }
 
-    /// Shots that the mean runs over.
+    /// Shots that the mean runs over: 32 lose 3 of 9099 shots of `street` as declared; 2 find as many.
     const RUNS_OVER: f64 = 8.0;
 
     pub(super) fn learn(&mut self, count: u32, weight: u32) {

@@ -6,14 +6,21 @@ use crate::kernels::{NARROW, is_dark, places_of};
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
 
+/// Blocks to each side of a peak in which a higher one is looked for: with the one of the peak they
+/// hold all sidelobes of words of up to 892 ticks. Of 190 824 shots of `car-50m` as declared 3 find 122
+/// more than 1; none at all lose one in 200 in good light, too.
+const SIDES: i64 = 3;
+
 /// The lags to both sides of a peak that are always seen with it.
 pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - SAME;
 
 /// A peak so near to where it was expected is no sidelobe of one elsewhere; one that is not is looked
-/// at again in the middle of a block.
+/// at again in the middle of a block. In the standard scenes 1 to 16 find the same shots in the same
+/// time.
 const SAME: i64 = 4;
 
-/// Where light is faint, a shot is looked for near one that was found so many shots away.
+/// Where light is faint, a shot is looked for near one that was found so many shots away: of 37 268 shots
+/// in faint light, `car-50m` as declared, 4 loses 25 that 12 finds.
 pub(super) const WIDEST_GAP: usize = 12;
 
 impl Band<'_> {
@@ -104,10 +111,12 @@ impl Band<'_> {
         Some(best)
     }
 
-    /// The higher of the peaks in the blocks to both sides of that around `middle`, if more marks of `shot` are
+    /// The highest of the peaks in the blocks to both sides of that around `middle`, if more marks of `shot` are
     /// found there than at `detection`, or as many earlier.
     fn beside(&mut self, shot: usize, middle: i64, detection: Detection) -> Option<Detection> {
-        let sides = [middle - BLOCK, middle + BLOCK].into_iter();
+        let word = self.sent.bit_length();
+        let sides = (1..=SIDES).take_while(|side| side * BLOCK - BLOCK / 2 < word);
+        let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
         let of = |peak: &Detection| (peak.count, std::cmp::Reverse(peak.lag));
         let peaks = sides.filter_map(|side| self.best_in_block(shot, side));
         peaks.max_by_key(of).filter(|peak| of(peak) > of(&detection))
