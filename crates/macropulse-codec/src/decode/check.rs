@@ -11,7 +11,7 @@ use crate::kernels::ascends;
 const LONGEST: u64 = 1 << 24;
 
 /// Ticks over which light may be looked for, with the length of a macropulse. The matched receiver
-/// keeps as many as twenty-four bits for each: 200 MB.
+/// keeps as many as thirty-two bits for each: 270 MB.
 const FARTHEST: u64 = 1 << 26;
 
 /// How far from the epoch of the ticks a shot may be fired, in ticks: as far as these are counted.

@@ -65,8 +65,8 @@ struct Pictures {
     made: Vec<bool>,
 }
 
-/// Ticks of a segment: a fifth of the gate of a lidar that sees 100 m at 2.5 ps a tick, and one machine
-/// word of a picture at least. Half and four times as many take as long.
+/// Ticks of a segment: an eighth of the gate of a lidar that sees 100 m at 2.5 ps a tick, in whole machine
+/// words of a picture. Half and four times as many take as long.
 const SEGMENT: i64 = 1 << 15;
 
 impl Pictures {
