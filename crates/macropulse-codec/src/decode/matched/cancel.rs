@@ -62,13 +62,17 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
             count => count,
         };
     }
-    let Canceller { detections, again, mut left, .. } = canceller;
-    let found_any = ticks.is_empty() || detections.iter().any(Option::is_some);
-    let residual = found_any.then(|| {
-        left.extend_from_slice(&ticks[place..]);
-        left
-    });
-    Cancelled { detections, again, residual }
+    if place < ticks.len() {
+        // The few that were found are soon found again; to tell their ticks from all others is not soon
+        // done.
+        return Cancelled {
+            detections: vec![None; sent.fired.len()],
+            again: vec![],
+            residual: None,
+        };
+    }
+    let Canceller { detections, again, left, .. } = canceller;
+    Cancelled { detections, again, residual: Some(left) }
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
