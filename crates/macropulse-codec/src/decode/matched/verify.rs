@@ -78,10 +78,10 @@ impl Band<'_> {
         self.best_in_block(shot, found.lag);
         let equal = self.counts.at_least(found.count);
         let is_equal = |lag: i64| equal[(lag / 64) as usize] >> (lag % 64) & 1 == 1;
-        let (first, gate) = (found.lag - BLOCK / 2, self.sent.gate());
+        let (first, reach) = (found.lag - BLOCK / 2, self.sent.reach());
         // Of those side by side, the first one.
         let lags = (0..BLOCK).filter(|lag| is_equal(*lag) && (*lag == 0 || !is_equal(lag - 1)));
-        let lags = lags.map(|lag| first + lag).filter(|lag| gate.contains(lag));
+        let lags = lags.map(|lag| first + lag).filter(|lag| reach.contains(lag));
         let nearest = lags.min_by_key(|lag| (2 * lag).abs_diff(before + behind));
         if let (Some(lag), Some(kept)) = (nearest, &mut self.found[shot]) {
             kept.lag = lag;
