@@ -347,7 +347,7 @@ mod avx512 {
 macro_rules! on_lanes {
     ($name:ident, $sign:tt) => {
         #[inline(always)]
-        fn $name<const W: usize>(mut a: [u64; W], b: [u64; W]) -> [u64; W] {
+        pub(crate) fn $name<const W: usize>(mut a: [u64; W], b: [u64; W]) -> [u64; W] {
             for lane in 0..W {
                 a[lane] $sign b[lane];
             }

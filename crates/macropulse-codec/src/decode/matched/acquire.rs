@@ -18,7 +18,7 @@ use super::sent::Sent;
 use super::track::below;
 use crate::decode::field::{Field, Source};
 use crate::decode::timeline::Timeline;
-use crate::kernels::{COARSE, Counts, WIDE, coarse, in_pictures, is_dark, read};
+use crate::kernels::{COARSE, Counts, WIDE, and, coarse, in_pictures, is_dark, or, read};
 
 /// Lags that are counted at once.
 const BLOCK: i64 = 64 * WIDE as i64;
@@ -147,8 +147,7 @@ impl Search {
         after.fold([0; WIDE], |mut any, after| {
             // Eight lags are, so many ticks later, met by two neighbouring bits.
             for bit in [after, after + COARSE as i64 - 1] {
-                let noted = read::<WIDE>(&self.words, first + bit as usize / COARSE);
-                any.iter_mut().zip(noted).for_each(|(any, noted)| *any |= noted);
+                any = or(any, read(&self.words, first + bit as usize / COARSE));
             }
             any
         })
@@ -203,13 +202,12 @@ impl Band<'_> {
                 if word_tells {
                     let after = sent.lit_from(shot, 0);
                     let with_words = self.search.with_words((block - first) as usize, after);
-                    hits = std::array::from_fn(|lane| hits[lane] & with_words[lane]);
+                    hits = and(hits, with_words);
                 }
                 if is_dark(&hits) {
                     continue;
                 }
-                let bounded = self.search.bounded(block as u32, needed);
-                hits = std::array::from_fn(|lane| hits[lane] & bounded[lane]);
+                hits = and(hits, self.search.bounded(block as u32, needed));
                 // A machine word of the picture stands for one block of lags.
                 for lane in (0..WIDE).filter(|lane| hits[*lane] != 0) {
                     let first = origin + COARSE as i64 * (block + 64 * lane as i64) - fired;
@@ -296,9 +294,9 @@ impl<'a> Leftover<'a> {
             let next = self.cells.get(cell + self.together).copied().unwrap_or(0);
             sum = sum + next - self.cells[cell];
         }
-        let tops = self.tops.iter_mut().zip(self.stretches.chunks(PER_TOP)).enumerate();
-        let first = stretches.start / PER_TOP;
-        for (_, (top, stretches)) in tops.take(stretches.end.div_ceil(PER_TOP)).skip(first) {
+        let tops = self.tops.iter_mut().zip(self.stretches.chunks(PER_TOP));
+        let changed = stretches.start / PER_TOP..stretches.end.div_ceil(PER_TOP);
+        for (top, stretches) in tops.take(changed.end).skip(changed.start) {
             *top = stretches.iter().copied().max().unwrap_or(0);
         }
     }

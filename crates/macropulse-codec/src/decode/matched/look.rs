@@ -99,14 +99,17 @@ impl Band<'_> {
                 self.searched.note(shot, is_found);
             }
         }
-        for shot in block.clone().rev().filter(|shot| self.is_sought(*shot)).collect::<Vec<_>>() {
-            self.track_or_acquire(shot, None);
+        for shot in block.clone().rev() {
+            if self.is_sought(shot) {
+                self.track_or_acquire(shot, None);
+            }
         }
         // Of those in flight together all bright ones must be known, as some that overlap would pass
         // for a faint one: now those that were passed by.
-        let passed: Vec<usize> = block.filter(|shot| self.is_sought(*shot)).collect();
-        for shot in passed {
-            self.track_or_acquire(shot, Some(Pass::Second));
+        for shot in block {
+            if self.is_sought(shot) {
+                self.track_or_acquire(shot, Some(Pass::Second));
+            }
         }
     }
 

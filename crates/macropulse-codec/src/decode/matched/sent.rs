@@ -23,7 +23,7 @@ pub(super) struct Sent<'a> {
     /// The lags at which light is looked for: see [`Self::reach`].
     reach: Range<i64>,
     /// Number of marks of each shot.
-    pub weights: Vec<u32>,
+    weights: Vec<u32>,
     /// Length of the stretch in which a mark may be found, in ticks.
     pub width: u32,
     pub words: Words,

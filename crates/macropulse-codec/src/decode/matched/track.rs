@@ -1,7 +1,7 @@
 //! Tracking: the exact maximum about the lags at which the neighbours of a shot were found.
 
 use super::{Band, Detection};
-use crate::kernels::{NARROW, is_dark, places_of};
+use crate::kernels::{NARROW, and, is_dark, or, places_of};
 
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
@@ -173,13 +173,11 @@ impl Band<'_> {
         self.counts.clear();
         let farthest = self.marks.last().copied().unwrap_or(0);
         self.counts.add(words, begin as u32, &self.marks, farthest);
-        let of_both = std::array::from_fn(|lane| allowed[lane] & wanted[lane]);
-        let (at, count) = self.counts.highest(of_both)?;
+        let (at, count) = self.counts.highest(and(allowed, wanted))?;
         let (at, width) = (i64::from(at), i64::from(self.sent.width));
         let before = below(at - width, allowed, true);
         let behind = below(at + width + 1, allowed, false);
-        let others = std::array::from_fn(|lane| before[lane] | behind[lane]);
-        let next = self.counts.highest(others).map_or(0, |(_, count)| count);
+        let next = self.counts.highest(or(before, behind)).map_or(0, |(_, count)| count);
         let margin = count.saturating_sub(next);
         Some(Detection { margin, ..Detection::at(first + at, count) })
     }
