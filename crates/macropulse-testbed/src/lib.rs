@@ -1,0 +1,121 @@
+//! What tests need of other people's programs: Python with packages, and a browser.
+//!
+//! Files that Macropulse writes are read in its tests by readers that others wrote, most of them
+//! Python packages. [`python`] makes an environment with the packages of a requirements file, once,
+//! in the target folder, and gives its interpreter.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Interpreter of a Python environment with the packages of `requirements`, a file as `pip` reads
+/// it. The environment is made at the first call, and anew when the file or Python changes; several
+/// tests may ask for it at once.
+///
+/// # Errors
+/// A sentence, if there is no `python3` of version 3.10 or later, or a package cannot be installed.
+pub fn python(requirements: &Path) -> Result<PathBuf, String> {
+    let wanted = fs::read(requirements)
+        .map_err(|why| format!("{} cannot be read: {why}", requirements.display()))?;
+    let system = system_python()?;
+    let mut name = blake3::Hasher::new();
+    name.update(system.version.as_bytes()).update(&wanted);
+    let folder = target()?.join("python").join(&name.finalize().to_hex()[..16]);
+    let is_made = folder.join("is-complete");
+    fs::create_dir_all(&folder)
+        .map_err(|why| format!("{} cannot be made: {why}", folder.display()))?;
+    // Whoever comes second waits for the first, also in another test program.
+    let lock = File::create(folder.join("lock")).map_err(|why| why.to_string())?;
+    lock.lock().map_err(|why| why.to_string())?;
+    let environment = folder.join("environment");
+    let interpreter = environment.join("bin").join("python");
+    if !is_made.exists() {
+        call(Command::new(&system.program).args(["-m", "venv", "--clear"]).arg(&environment))?;
+        call(
+            Command::new(&interpreter)
+                .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"])
+                .arg(requirements),
+        )?;
+        File::create(&is_made).map_err(|why| why.to_string())?;
+    }
+    Ok(interpreter)
+}
+
+/// A Chromium of this machine, if there is one: the program in `MACROPULSE_CHROMIUM`, or one of the
+/// usual name on the path.
+///
+/// # Errors
+/// A sentence, if there is none and `MACROPULSE_BROWSER` is `required`.
+pub fn chromium() -> Result<Option<PathBuf>, String> {
+    let named = std::env::var_os("MACROPULSE_CHROMIUM").map(PathBuf::from);
+    let usual = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+    let found = named.or_else(|| usual.iter().find_map(|name| on_path(name)));
+    match std::env::var("MACROPULSE_BROWSER").as_deref() {
+        Ok("required") if found.is_none() => {
+            Err("MACROPULSE_BROWSER is `required`, and there is no Chromium on the path: install \
+                 one, or name its program in MACROPULSE_CHROMIUM"
+                .to_owned())
+        }
+        _ => Ok(found),
+    }
+}
+
+/// Runs `command`, and gives what it printed.
+///
+/// # Errors
+/// What it printed, if it could not be started or failed.
+pub fn call(command: &mut Command) -> Result<String, String> {
+    let output = command.output().map_err(|why| format!("{command:?} did not start: {why}"))?;
+    let printed =
+        [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+    if output.status.success() {
+        Ok(printed.concat())
+    } else {
+        Err(format!("{command:?} failed ({}):\n{}", output.status, printed.concat()))
+    }
+}
+
+struct SystemPython {
+    program: PathBuf,
+    version: String,
+}
+
+fn system_python() -> Result<SystemPython, String> {
+    let program =
+        on_path("python3").ok_or("the tests need a `python3` of version 3.10 or later")?;
+    let version = call(Command::new(&program).args(["-c", "import sys; print(sys.version)"]))?;
+    Ok(SystemPython { program, version })
+}
+
+fn on_path(name: &str) -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file())
+}
+
+/// The target folder that the test program runs from.
+fn target() -> Result<PathBuf, String> {
+    let program = std::env::current_exe().map_err(|why| why.to_string())?;
+    let is_target = |folder: &&Path| folder.join("CACHEDIR.TAG").exists();
+    let found = program.ancestors().find(is_target);
+    found
+        .map(Path::to_path_buf)
+        .ok_or_else(|| format!("{} does not lie in a target folder of cargo", program.display()))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_that_fails_says_what_it_printed() {
+        let why = call(Command::new("sh").args(["-c", "echo broken >&2; exit 3"])).unwrap_err();
+        assert!(why.contains("broken"), "{why}");
+        assert_eq!(call(Command::new("sh").args(["-c", "echo well"])).unwrap(), "well\n");
+    }
+
+    #[test]
+    fn the_target_folder_is_found() {
+        assert!(target().unwrap().join("CACHEDIR.TAG").exists());
+    }
+}
