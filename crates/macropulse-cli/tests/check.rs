@@ -95,7 +95,10 @@ fn the_other_lidars_of_a_scene_are_listed_and_their_ghosts_counted() {
     let run = "simulate --sensor peregrine --scene a.toml --format none";
     assert!(desk.run(run).out.contains("2 other lidars, "));
     let counted = desk.json(&format!("{run} --json"));
-    assert!(counted["counts"]["ghosts"].is_u64() && counted["counts"]["interferer_shots"].is_u64(), "{counted}");
+    assert!(
+        counted["counts"]["ghosts"].is_u64() && counted["counts"]["interferer_shots"].is_u64(),
+        "{counted}"
+    );
     let alone = desk.json("simulate --sensor peregrine --scene wall --format none --json");
     assert_eq!(alone["counts"]["ghosts"], serde_json::Value::Null);
 }
