@@ -1,7 +1,7 @@
 //! What all commands have in common: how sensors and scenes are named, what JSON looks like, and the
 //! pages and completions made of it.
 
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 mod common;
 
