@@ -21,7 +21,7 @@ use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
 /// Why there is no scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The sensor cannot be simulated in the environment of the scene.
+    /// The sensor cannot be simulated in the scene.
     #[error(transparent)]
     Operating(#[from] channel::Error),
     /// The receiver cannot decode what the stages before it made: a fault of the simulator.
@@ -114,7 +114,7 @@ impl<'a> Scans<'a> {
     /// # Errors
     /// As [`scan`].
     pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Result<Self, Error> {
-        let operating = Operating::of(design, &scene.environment)?;
+        let operating = Operating::in_scene(design, scene)?;
         let detectors = Detectors::new(design, &operating, Chance::new(seed));
         let scan = Scan {
             pieces: Vec::new(),
@@ -239,8 +239,10 @@ fn measure<'a>(
     lap(&mut tally);
     let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
     let hits = traced.middle;
-    let in_gate =
-        |i: &usize| (design.scan.min_range..=design.scan.max_range).contains(&hits.range[*i]);
+    let in_gate = |i: &usize| {
+        let row = log.row[hits.shot[*i] as usize];
+        design.scan.gate(row).contains(&hits.range[*i])
+    };
     tally.shots = log.owned.len() as u64;
     let surfaces = (0..hits.shot.len()).filter(|i| owned(&hits.shot[*i]));
     tally.surfaces = surfaces.filter(in_gate).count() as u64;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use macropulse::design::{Design, Detector};
 use macropulse::emit::bands;
@@ -13,10 +14,28 @@ use macropulse::sim;
 
 const FORMATS: &str = include_str!("../../../docs/formats.md");
 
-const PATTERNS: [&str; 3] = ["raster", "spinning", "flash"];
+const PATTERNS: [&str; 5] = ["raster", "spinning", "flash", "table", "rosette"];
 
-fn pattern(name: &str) -> &'static str {
-    match name {
+/// A table of directions on a disc, once for all tests: without times, so that their rate is typed.
+fn table_file() -> &'static str {
+    static FILE: OnceLock<(tempfile::TempDir, String)> = OnceLock::new();
+    let (_, path) = FILE.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let line = |entry: i32| {
+            let (angle, out) = (f64::from(entry) * 2.4, f64::from(entry) / 8.0);
+            format!("{:.4},{:.4}\n", out * angle.cos(), out * angle.sin())
+        };
+        let lines: String = (0..32).map(line).collect();
+        let path = folder.path().join("table.csv");
+        std::fs::write(&path, format!("azimuth,elevation\n{lines}")).unwrap();
+        let path = path.display().to_string();
+        (folder, path)
+    });
+    path
+}
+
+fn pattern(name: &str) -> String {
+    let keys = match name {
         "raster" => {
             "scan.raster = { rows = 4, columns = 8, horizontal_deg = 8.0, vertical_deg = 4.0 }"
         }
@@ -27,8 +46,14 @@ fn pattern(name: &str) -> &'static str {
         "flash" => {
             "scan.flash = { rows = 4, columns = 8, horizontal_deg = 8.0, vertical_deg = 4.0 }"
         }
+        "table" => "scan.table = { file = 'TABLE', firings_per_s = 320.0 }",
+        "rosette" => {
+            "scan.rosette = { shots_per_s = 320.0, prisms = [{ deflection_deg = 2.0, turns_per_s = \
+             7.3 }, { deflection_deg = 2.0, turns_per_s = -4.7 }] }"
+        }
         other => panic!("no pattern {other}"),
-    }
+    };
+    keys.replace("TABLE", table_file())
 }
 
 /// The section of `docs/formats.md` on combinations.
@@ -172,6 +197,7 @@ fn the_forecast_holds_for_every_combination() {
             let text = file(scanned, row[0], row[1], row[2])
                 .replace("rows = 4, columns = 8", "rows = 32, columns = 64")
                 .replace("azimuth_step_deg = 45.0", "azimuth_step_deg = 5.625")
+                .replace("_per_s = 320.0", "_per_s = 20480.0")
                 .replace("lasers = 4", "lasers = 32")
                 .replace("converters = 64", "converters = 2048");
             let design = Design::from_toml(&text, "mine.toml", Path::new(""), &[]).unwrap();

@@ -28,7 +28,7 @@ use macropulse_codec::ShotLog;
 
 use crate::design::Design;
 use crate::scene::{Hits, Material, SUB_MACROPULSES, Scene, Traced};
-use crate::units::tof_fs_from_ranges;
+use crate::units::{fs_from_s, tof_from_range, tof_fs_from_ranges};
 
 /// A sensor in a scene, at work in the environment of the scene.
 #[derive(Debug, Clone, Copy)]
@@ -53,8 +53,24 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
         [] => echoes(&mut light.trains, (&operating.link, &scene.materials), log, &traced.middle),
         each => echoes_of_sub_macropulses(&mut light.trains, seen, log, each),
     }
+    start_late(&mut light.trains, design, log);
     interferers::add(&mut light, design, scene, log);
     light
+}
+
+/// Lets the light of lasers whose clock starts late arrive earlier by it: what is added to their ranges
+/// (docs/physics.md#beams-of-a-turning-head).
+fn start_late(trains: &mut PulseTrains, design: &Design, log: &ShotLog) {
+    let offsets = design.scan.model().range_offsets();
+    if offsets.is_empty() {
+        return;
+    }
+    let late_fs: Vec<i64> =
+        offsets.iter().map(|offset| fs_from_s(tof_from_range(*offset))).collect();
+    for (arrives_fs, shot) in trains.arrives_fs.iter_mut().zip(&trains.shot) {
+        let row = log.row[(shot - log.first) as usize];
+        *arrives_fs -= late_fs[usize::from(row)];
+    }
 }
 
 /// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out.

@@ -3,6 +3,7 @@
 use super::Link;
 use crate::design::Design;
 use crate::environment::Environment;
+use crate::scene::Scene;
 
 /// A sensor cannot be simulated in an environment: why, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,6 +46,29 @@ pub fn idealised(design: &Design, environment: &Environment) -> Vec<Idealised> {
 }
 
 impl Operating {
+    /// The sensor `design` in `scene`.
+    ///
+    /// # Errors
+    /// As [`Operating::of`]; and if the scene has other lidars and either they or the sensor have a
+    /// scan pattern that is no lattice: which pixel looks where is known of lattices alone.
+    pub fn in_scene(design: &Design, scene: &Scene) -> Result<Self, Error> {
+        let scattered = |design: &&Design| !design.scan.model().is_lattice();
+        let others = scene.interferers.iter().map(|other| &other.design);
+        let first = std::iter::once(design).chain(others).find(scattered);
+        if let Some(first) = first.filter(|_| !scene.interferers.is_empty()) {
+            return Err(Error {
+                sensor: design.name.clone(),
+                environment: scene.name.clone(),
+                message: format!(
+                    "other lidars are simulated for scan patterns of rows and columns alone, not \
+                     for that of {}: take [[interferers]] out of the scene, or choose another sensor",
+                    first.name
+                ),
+            });
+        }
+        Self::of(design, &scene.environment)
+    }
+
     /// The sensor `design` in `environment`.
     ///
     /// # Errors

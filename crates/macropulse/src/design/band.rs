@@ -28,9 +28,12 @@ impl Design {
         fs_from_s(tof_from_range(self.scan.max_range)) + self.macropulse_fs()
     }
 
-    /// From the firing of a shot to the last of its light that is followed, fs.
+    /// From the firing of a shot to the last of its light that is followed, fs: for the clock that
+    /// starts first.
     pub fn light_fs(&self) -> i64 {
-        fs_from_s(tof_from_range(self.scan.light_range)) + self.macropulse_fs()
+        let offsets = self.scan.model().range_offsets().iter();
+        let early = offsets.map(|offset| -offset).fold(0.0, f64::max);
+        fs_from_s(tof_from_range(self.scan.light_range + early)) + self.macropulse_fs()
     }
 
     /// For how long before the first owned shot of a band light must be known, fs: as long as

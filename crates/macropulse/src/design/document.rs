@@ -26,9 +26,14 @@ pub const WITHOUT: &str = "without";
 const PROSE: &str = "summary";
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
-/// the parent's table instead of adding to it.
-const ALTERNATIVES: [(&str, &[&str]); 3] =
-    [("scan", Pattern::NAMES), ("detector", Detector::NAMES), ("family", FAMILIES)];
+/// the parent's table instead of adding to it. So with keys of which there may be one.
+const ALTERNATIVES: [(&str, &[&str]); 5] = [
+    ("scan", Pattern::NAMES),
+    ("detector", Detector::NAMES),
+    ("family", FAMILIES),
+    ("spinning", &["blocks", "lasers", "calibration"]),
+    ("spinning", &["azimuth_step_deg", "cycle_us"]),
+];
 
 /// One TOML text with its origin.
 #[derive(Debug, Clone)]
@@ -37,6 +42,8 @@ struct Document {
     origin: String,
     text: String,
     table: Table,
+    /// Where the files lie that it names.
+    folder: PathBuf,
 }
 
 /// The documents behind a sensor, the strongest first: `--set`, the file, what it extends, and
@@ -76,7 +83,7 @@ impl Chain {
             documents.push(document_of_overrides(&overrides)?);
         }
         let mut folder = folder.to_path_buf();
-        documents.push(Document::parse(text, origin)?);
+        documents.push(Document::parse(text, origin, &folder)?);
         while let Some(parent) = documents.last().and_then(|d| d.table.get("extends")) {
             let path = "extends";
             let Some(parent) = parent.as_str().map(str::to_owned) else {
@@ -88,7 +95,7 @@ impl Chain {
             let (text, origin, next_folder) = open(&parent, &folder)
                 .map_err(|error| place(&documents, path).error(error.message))?;
             folder = next_folder;
-            documents.push(Document::parse(&text, &origin)?);
+            documents.push(Document::parse(&text, &origin, &folder)?);
         }
         let mut merged = Table::new();
         let own = documents.iter().position(|document| document.origin != SET).unwrap_or(0);
@@ -103,7 +110,7 @@ impl Chain {
             let said = format!("extends {parent}");
             merged.entry(PROSE).or_insert(said.into());
         }
-        let defaults = Document::parse(presets::DEFAULTS, "built-in defaults")?;
+        let defaults = Document::parse(presets::DEFAULTS, "built-in defaults", Path::new(""))?;
         let fitting = only_for_what_is_there(&defaults.table, &merged);
         fill_in(&mut merged, &fitting);
         merged.remove("extends");
@@ -131,6 +138,13 @@ impl Chain {
     /// An error about the value at the dotted `path`, pointing at the document that gave it.
     pub fn error(&self, path: &str, message: impl Into<String>) -> Error {
         place(&self.documents, path).error(message)
+    }
+
+    /// The file called `name` at the dotted `path`: beside the document that says so.
+    pub fn beside(&self, path: &str, name: &str) -> PathBuf {
+        let says = |document: &&Document| value_at(&document.table, path).is_some();
+        let document = self.documents.iter().find(says);
+        document.map_or_else(|| PathBuf::from(name), |document| document.folder.join(name))
     }
 
     /// Where the key at the dotted `path` was typed, if it was: with `--set`, or in the file itself.
@@ -178,7 +192,7 @@ impl Chain {
 }
 
 impl Document {
-    fn parse(text: &str, origin: &str) -> Result<Self, Error> {
+    fn parse(text: &str, origin: &str, folder: &Path) -> Result<Self, Error> {
         let table: Table = text.parse().map_err(|error: toml::de::Error| Error {
             origin: origin.to_owned(),
             line_column: error.span().map(|span| line_column(text, span.start)),
@@ -186,7 +200,8 @@ impl Document {
             message: error.message().to_owned(),
             others: Vec::new(),
         })?;
-        Ok(Self { origin: origin.to_owned(), text: text.to_owned(), table })
+        let (origin, text) = (origin.to_owned(), text.to_owned());
+        Ok(Self { origin, text, table, folder: folder.to_owned() })
     }
 }
 
@@ -224,7 +239,7 @@ fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Err
             at = next;
         }
     }
-    Ok(Document { origin: SET.to_owned(), text: String::new(), table })
+    Ok(Document { origin: SET.to_owned(), text: String::new(), table, folder: PathBuf::new() })
 }
 
 /// Adds to `strong` what only `weak` has.
@@ -236,14 +251,14 @@ fn fill_in(strong: &mut Table, weak: &Table) {
             }
             Some(toml::Value::Table(inner)) => {
                 if let toml::Value::Table(below) = value {
-                    // Of a family there is nothing but its kind, be it misspelt.
-                    let chosen =
-                        key == "family" || alternatives(key).any(|kind| inner.contains_key(kind));
                     let mut below = below.clone();
-                    if chosen {
-                        below.retain(|kind, _| {
-                            inner.contains_key(kind) || !alternatives(key).any(|k| k == kind)
-                        });
+                    for (_, kinds) in ALTERNATIVES.iter().filter(|(group, _)| group == key) {
+                        // Of a family there is nothing but its kind, be it misspelt.
+                        if key == "family" || kinds.iter().any(|kind| inner.contains_key(*kind)) {
+                            below.retain(|kind, _| {
+                                inner.contains_key(kind) || !kinds.contains(&kind)
+                            });
+                        }
                     }
                     fill_in(inner, &below);
                 }
@@ -251,11 +266,6 @@ fn fill_in(strong: &mut Table, weak: &Table) {
             Some(_) => {}
         }
     }
-}
-
-fn alternatives(group: &str) -> impl Iterator<Item = &'static str> {
-    let kinds = ALTERNATIVES.iter().find(|(name, _)| *name == group).map_or(&[][..], |(_, k)| k);
-    kinds.iter().copied()
 }
 
 /// The defaults without the tables that the sensor does not have: no code, another kind of scan.

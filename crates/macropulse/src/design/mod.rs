@@ -38,7 +38,10 @@ pub use effect::Effect;
 pub use family::family_from_toml;
 pub use light::Light;
 pub use presets::{names as preset_names, text as preset_text};
-pub use scan::{Directions, Extent, Firing, Flash, Grid, Mirror, Pattern, Raster, Scan, Spinning};
+pub use scan::{
+    Directions, Extent, Firing, Flash, Grid, Laser, Mirror, Pattern, Prism, Raster, Rosette, Scan,
+    Spinning, Table,
+};
 pub use tdc::Tdc;
 
 use crate::digest::Digest;
@@ -73,7 +76,8 @@ pub struct Design {
     pub defaults: Vec<(String, String)>,
     /// What a user should know although it is no error.
     pub warnings: Vec<String>,
-    /// The whole sensor as TOML, defaults included: the same design without the files it came from.
+    /// The whole sensor as TOML, defaults included: the same design without the files it extends. A
+    /// calibration or a table stays in its file.
     pub text: String,
     /// Made when first asked for.
     directions: OnceLock<Directions>,
@@ -139,10 +143,13 @@ impl Design {
         shots / self.shots_per_scan() as f64 * self.scan_period() / seconds
     }
 
-    /// A hash of everything the sensor file says, defaults included.
+    /// A hash of everything the sensor file says, defaults and the files it names included.
     pub fn digest(&self) -> String {
         let mut hash = Digest::new();
         hash.bytes(self.text.as_bytes());
+        if let Some(file) = self.scan.model().file_digest() {
+            hash.bytes(file.as_bytes());
+        }
         hash.text()
     }
 

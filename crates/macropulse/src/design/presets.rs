@@ -3,7 +3,7 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 9] = [
+const PRESETS: [(&str, &str); 11] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
@@ -12,6 +12,8 @@ const PRESETS: [(&str, &str); 9] = [
     ("bipolar-gold", include_str!("../../../../sensors/bipolar-gold.toml")),
     ("hdl-64e", include_str!("../../../../sensors/hdl-64e.toml")),
     ("hdl-64e-equal-spacing", include_str!("../../../../sensors/hdl-64e-equal-spacing.toml")),
+    ("vlp-16", include_str!("../../../../sensors/vlp-16.toml")),
+    ("rosette-mid-40", include_str!("../../../../sensors/rosette-mid-40.toml")),
     ("peregrine", include_str!("../../../../sensors/peregrine.toml")),
 ];
 

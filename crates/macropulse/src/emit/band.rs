@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn bands_cover_a_scan_without_gap_or_overlap() {
-        for name in ["kim-park-2016", "hdl-64e", "peregrine"] {
+        for name in ["kim-park-2016", "hdl-64e", "peregrine", "vlp-16", "rosette-mid-40"] {
             let design = Design::open(name, &[]).unwrap();
             let mut next = 0;
             for band in bands(&design, 3) {

@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn by_our_own_clock_they_are_our_own_shots() {
-        for name in ["kim-park-2016", "hdl-64e", "peregrine"] {
+        for name in ["kim-park-2016", "hdl-64e", "peregrine", "vlp-16"] {
             let design = Design::open(name, &[]).unwrap();
             let band = bands(&design, 2).next().unwrap();
             let ours = ShotLog {

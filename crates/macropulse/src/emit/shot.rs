@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn every_shot_is_found_by_its_pixel() {
         use crate::emit::bands;
-        for name in ["hdl-64e", "peregrine", "kim-park-2016"] {
+        for name in ["hdl-64e", "peregrine", "kim-park-2016", "vlp-16", "rosette-mid-40"] {
             let design = Design::open(name, &[]).unwrap();
             let log = bands(&design, 1).next().unwrap().shot_log(&design);
             for shot in 0..log.len() {

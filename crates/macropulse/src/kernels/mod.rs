@@ -39,7 +39,7 @@ pub(crate) use pack::{distinct, keep_below};
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
 pub(crate) use philox::{GROUP, philox};
 pub(crate) use ruler::{Ruler, arrivals};
-pub(crate) use shapes::{Form, meet, meet_packet, turned};
+pub(crate) use shapes::{CURVED, Form, Frustum, meet, meet_packet, turned};
 pub(crate) use spacing::all_apart;
 pub(crate) use train::append_train;
 pub(crate) use tree::{Bounds, Tree};

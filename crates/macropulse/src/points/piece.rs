@@ -72,12 +72,19 @@ impl Piece {
             column.resize(returns.len(), 0.0);
         }
         let directions = design.directions();
+        let beside = directions.have_origins();
         for (at, (&tof, &photons)) in returns.tof.iter().zip(&returns.photons).enumerate() {
-            let range = range_from_tof(tof);
-            let [x, y, z] = directions.of(points.row[at], points.column[at]);
-            points.x[at] = (x * range) as f32;
-            points.y[at] = (y * range) as f32;
-            points.z[at] = (z * range) as f32;
+            let (row, column) = (points.row[at], points.column[at]);
+            let range = range_from_tof(tof) + design.scan.range_offset(row);
+            let mut point =
+                directions.of_shot(log, returns.shot[at] as usize).map(|part| part * range);
+            if beside {
+                let begins = directions.origin(row, column);
+                point = [0, 1, 2].map(|axis| begins[axis] + point[axis]);
+            }
+            points.x[at] = point[0] as f32;
+            points.y[at] = point[1] as f32;
+            points.z[at] = point[2] as f32;
             points.range[at] = range as f32;
             let white = link.photons(1.0, range);
             let share = || (f64::from(photons) / white) as f32;

@@ -1,5 +1,7 @@
 //! From a scene file as typed to a scene that can be hit by rays.
 
+mod shapes;
+
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
@@ -249,23 +251,7 @@ impl Assembly<'_> {
         let object = self.object(name.clone(), written.target, spanned.span())?;
         if let Some(shape) = &written.shape {
             self.source.refuse_mesh_keys(written)?;
-            let material = match &written.material {
-                Some(typed) => self.material_typed(typed)?,
-                None => self.unnamed(&name),
-            };
-            for mut motion in motions {
-                let shape = self.source.shape(shape)?;
-                if written.rest_on_ground {
-                    motion.pose.position[2] += shape.depth_below(&motion.pose);
-                }
-                if motion.moves() {
-                    let solid = Solid::new(shape, Pose::default(), material, object);
-                    self.moving_shapes.push(MovingShape { solid, motion });
-                } else {
-                    self.solids.push(Solid::new(shape, motion.pose, material, object));
-                }
-            }
-            return Ok(());
+            return self.add_shape((&name, object), (written, shape), &motions);
         }
         let origin = self.mesh_origin(&name, written)?;
         let known = self.meshes.of(&origin, || read(&origin))?;

@@ -1,6 +1,6 @@
 //! Rays gathered into packets, and followed through glass.
 
-use super::pose::Transform;
+use super::pose::{Pose, Transform};
 use super::world::PacketHits;
 use super::{Hits, Scene};
 use crate::kernels::{LANES, Lanes, Packet, turned};
@@ -23,6 +23,9 @@ pub(super) struct Batch<'a> {
     sensor_moves: bool,
     /// When rays leave that are added now, fs.
     now_fs: i64,
+    /// Where in the frame of the sensor they begin, m.
+    begin: [f64; 3],
+    pose: Pose,
     world_from_sensor: Transform,
     /// In the frame of the sensor, by axis.
     aims: [Lanes<f64>; 3],
@@ -58,6 +61,8 @@ impl<'a> Batch<'a> {
             farthest,
             sensor_moves: scene.sensor.moves(),
             now_fs: 0,
+            begin: [0.0; 3],
+            pose: scene.sensor.pose,
             world_from_sensor: scene.sensor.pose.world_from_sensor(),
             aims: [[0.0; LANES]; 3],
             packet: Packet::from(scene.sensor.pose.position),
@@ -79,11 +84,25 @@ impl<'a> Batch<'a> {
             if self.count > 0 {
                 self.flush();
             }
-            let pose = self.scene.sensor.at(time_fs);
-            self.world_from_sensor = pose.world_from_sensor();
-            self.packet.origin = pose.position;
+            self.pose = self.scene.sensor.at(time_fs);
+            self.world_from_sensor = self.pose.world_from_sensor();
+            self.packet.origin = self.pose.position;
+            self.begin = [0.0; 3];
         }
         self.now_fs = time_fs;
+    }
+
+    /// The rays that are added from now on begin here, given in the frame of the sensor.
+    #[inline(always)]
+    pub(super) fn begin_at(&mut self, begin: [f64; 3]) {
+        if begin != self.begin {
+            if self.count > 0 {
+                self.flush();
+            }
+            self.begin = begin;
+            let beside = self.world_from_sensor.direction(begin);
+            self.packet.origin = [0, 1, 2].map(|axis| self.pose.position[axis] + beside[axis]);
+        }
     }
 
     /// Adds a ray, given in the frame of the sensor.

@@ -7,6 +7,7 @@ const SCENES: &[(&str, &str)] = &[
     ("car-70m", include_str!("../../../../scenes/car-70m.toml")),
     ("car-120m", include_str!("../../../../scenes/car-120m.toml")),
     ("wall", include_str!("../../../../scenes/wall.toml")),
+    ("crossing", include_str!("../../../../scenes/crossing.toml")),
     ("street", include_str!("../../../../scenes/street.toml")),
 ];
 

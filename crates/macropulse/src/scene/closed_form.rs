@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::hits::{CastRays, Hit, Ray};
 use super::pose::{Pose, Transform};
-use crate::kernels::{Form, Lanes, Packet, meet, meet_packet};
+use crate::kernels::{CURVED, Form, Frustum, Lanes, Packet, meet, meet_packet};
 
 /// A shape in its own frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +25,25 @@ pub enum Shape {
         /// Half its length, width and height, m.
         half: [f64; 3],
     },
+    /// A cylinder or a cone about the origin, along z.
+    Frustum {
+        /// Radii at its lower and at its upper end, m; 0 at the tip of a cone.
+        radii: [f64; 2],
+        /// Half its height, m.
+        half: f64,
+    },
+    /// A cylinder about the origin, along z, with a half ball at each end.
+    Capsule {
+        /// Radius, m.
+        radius: f64,
+        /// Half the height of the cylinder, m.
+        half: f64,
+    },
+    /// An ellipsoid about the origin, along the axes.
+    Ellipsoid {
+        /// Half its length, width and height, m.
+        half: [f64; 3],
+    },
 }
 
 impl Shape {
@@ -34,6 +53,9 @@ impl Shape {
             Self::Plane { .. } => f64::INFINITY,
             Self::Sphere { radius } => radius,
             Self::Box { half } => DVec3::from(half).length(),
+            Self::Frustum { radii: [low, high], half } => libm::hypot(low.max(high), half),
+            Self::Capsule { radius, half } => radius + half,
+            Self::Ellipsoid { half } => DVec3::from(half).max_element(),
         }
     }
 
@@ -48,6 +70,52 @@ impl Shape {
                 let edge = |axis: usize| turned.direction(DVec3::AXES[axis].to_array())[2].abs();
                 (0..3).map(|axis| half[axis] * edge(axis)).sum()
             }
+            Self::Frustum { radii: [low, high], half } => {
+                // How steep the axis is, and how far the rim of an end reaches below its middle.
+                let up = pose.world_from_sensor().direction([0.0, 0.0, 1.0])[2];
+                let rim = (1.0 - up * up).max(0.0).sqrt();
+                (half * up + low * rim).max(high * rim - half * up)
+            }
+            Self::Capsule { radius, half } => {
+                radius + half * pose.world_from_sensor().direction([0.0, 0.0, 1.0])[2].abs()
+            }
+            Self::Ellipsoid { half } => {
+                (pose.world_from_sensor().rotation().row(2) * DVec3::from(half)).length()
+            }
+        }
+    }
+
+    /// Whether a point in the frame of the shape lies inside. Nothing lies inside a plane.
+    pub(super) fn holds(&self, point: DVec3) -> bool {
+        let beside = libm::hypot(point.x, point.y);
+        match *self {
+            Self::Plane { .. } => false,
+            Self::Sphere { radius } => point.length() < radius,
+            Self::Box { half } => point.abs().cmplt(DVec3::from(half)).all(),
+            Self::Frustum { radii: [low, high], half } => {
+                let share = (point.z / half + 1.0) / 2.0;
+                point.z.abs() < half && beside < low + share * (high - low)
+            }
+            Self::Capsule { radius, half } => {
+                libm::hypot(beside, (point.z.abs() - half).max(0.0)) < radius
+            }
+            Self::Ellipsoid { half } => (point / DVec3::from(half)).length() < 1.0,
+        }
+    }
+
+    /// The normal, of any length, at a point of a curved face.
+    fn curved(&self, point: DVec3) -> DVec3 {
+        match *self {
+            Self::Frustum { radii: [low, high], half } => {
+                // Outward by 1, and up by as much as the side leans in.
+                let beside = libm::hypot(point.x, point.y);
+                DVec3::new(point.x, point.y, beside * (low - high) / (2.0 * half))
+            }
+            Self::Capsule { half, .. } => {
+                DVec3::new(point.x, point.y, point.z - point.z.clamp(-half, half))
+            }
+            Self::Ellipsoid { half } => point / (DVec3::from(half) * DVec3::from(half)),
+            Self::Sphere { .. } | Self::Plane { .. } | Self::Box { .. } => point,
         }
     }
 }
@@ -107,6 +175,12 @@ impl Solid {
             Shape::Plane { normal } => Form::Plane(normal),
             Shape::Sphere { radius } => Form::Sphere(radius),
             Shape::Box { half } => Form::Box(half),
+            Shape::Frustum { radii: [low, high], half } => {
+                let (middle, slope) = ((low + high) / 2.0, (high - low) / (2.0 * half));
+                Form::Frustum(Frustum { middle, slope, half })
+            }
+            Shape::Capsule { radius, half } => Form::Capsule([radius, half]),
+            Shape::Ellipsoid { half } => Form::Ellipsoid(half),
         }
     }
 
@@ -117,16 +191,43 @@ impl Solid {
             Shape::Plane { .. } => None,
             Shape::Sphere { radius } => Some(DVec3::splat(radius)),
             Shape::Box { half } => Some(self.to_world.rotation().abs() * DVec3::from(half)),
+            Shape::Frustum { radii: [low, high], half } => {
+                let across = DVec3::new(1.0, 1.0, 0.0) * low.max(high);
+                Some(self.along(half).abs() + self.reach_of(across))
+            }
+            Shape::Capsule { radius, half } => Some(self.along(half).abs() + DVec3::splat(radius)),
+            Shape::Ellipsoid { half } => Some(self.reach_of(DVec3::from(half))),
         }
+    }
+
+    /// From the middle so far along the z axis of the solid, in the world.
+    fn along(&self, distance: f64) -> DVec3 {
+        DVec3::from(self.to_world.direction([0.0, 0.0, distance]))
+    }
+
+    /// How far an ellipsoid with these half axes, in the frame of the solid, reaches along each axis
+    /// of the world.
+    fn reach_of(&self, half: DVec3) -> DVec3 {
+        let rotation = self.to_world.rotation();
+        let axis = |axis: usize| (rotation.row(axis) * half).length();
+        DVec3::new(axis(0), axis(1), axis(2))
     }
 
     /// The unit normal in the world where a ray has met `face` at `range`.
     #[inline(always)]
     fn normal(&self, ray: &Ray, (range, face): (f64, u32)) -> [f64; 3] {
-        let Shape::Sphere { radius } = self.shape else { return self.normals[face as usize] };
+        if face != CURVED {
+            return self.normals[face as usize];
+        }
         let origin = DVec3::from(self.from_world.point(ray.origin));
         let along = DVec3::from(self.from_world.direction(ray.direction));
-        self.to_world.direction(((origin + along * range) / radius).to_array())
+        let point = origin + along * range;
+        let normal = match self.shape {
+            Shape::Sphere { radius } => point / radius,
+            // The tip of a cone looks up.
+            shape => shape.curved(point).normalize_or(DVec3::Z),
+        };
+        self.to_world.direction(normal.to_array())
     }
 
     /// The hit of a ray that has met `face` at `range`.

@@ -85,6 +85,18 @@ impl Digest {
             Shape::Plane { normal } => normal.iter().for_each(|value| self.number(*value)),
             Shape::Sphere { radius } => self.number(radius),
             Shape::Box { half } => half.iter().for_each(|value| self.number(*value)),
+            Shape::Frustum { radii, half } => {
+                self.bytes(b"frustum");
+                radii.iter().chain([&half]).for_each(|value| self.number(*value));
+            }
+            Shape::Capsule { radius, half } => {
+                self.bytes(b"capsule");
+                [radius, half].iter().for_each(|value| self.number(*value));
+            }
+            Shape::Ellipsoid { half } => {
+                self.bytes(b"ellipsoid");
+                half.iter().for_each(|value| self.number(*value));
+            }
         }
         self.pose(&solid.pose());
         self.bytes(&solid.material().to_le_bytes());

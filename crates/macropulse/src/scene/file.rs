@@ -151,6 +151,21 @@ pub(super) enum ShapeTyped {
     Sphere { radius_m: f64 },
     /// About the object's position; length, width, height.
     Box { size_m: [f64; 3] },
+    /// Upright, about the object's position.
+    Cylinder { radius_m: f64, height_m: f64 },
+    /// Upright, about the object's position, the tip up.
+    Cone {
+        radius_m: f64,
+        height_m: f64,
+        #[serde(default)]
+        top_radius_m: f64,
+    },
+    /// Upright, about the object's position; its height with both half balls.
+    Capsule { radius_m: f64, height_m: f64 },
+    /// About the object's position; length, width, height.
+    Ellipsoid { size_m: [f64; 3] },
+    /// Stands on the object's position and looks along x.
+    Person { height_m: f64 },
 }
 
 /// The unit of length of a mesh.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::closed_form::{Shape, Solid};
+use super::closed_form::Solid;
 use super::hits::{CastRays, Ray};
 
 /// Directions in which an enclosing mesh must be met.
@@ -14,12 +14,7 @@ const MOST_SURFACES: usize = 1000;
 impl Solid {
     /// Whether `point`, in the world, lies inside. Nothing lies inside a plane.
     fn holds(&self, point: [f64; 3]) -> bool {
-        let local = DVec3::from(self.pose().sensor_from_world().point(point));
-        match self.shape() {
-            Shape::Plane { .. } => false,
-            Shape::Sphere { radius } => local.length() < radius,
-            Shape::Box { half } => local.abs().cmplt(DVec3::from(half)).all(),
-        }
+        self.shape().holds(DVec3::from(self.pose().sensor_from_world().point(point)))
     }
 }
 

@@ -20,6 +20,7 @@ mod mesh;
 mod meshes;
 mod motion;
 mod moving;
+mod person;
 mod placed;
 mod pose;
 mod raycast;

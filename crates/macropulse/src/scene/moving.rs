@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::closed_form::Solid;
 use super::hits::{CastRays, Hit, Ray};
 use super::motion::Motion;
+use super::pose::Pose;
 use super::raycast::Facets;
 
 /// The sphere about a mover is widened by this much, and by [`WIDER`] of its radius, m: more than
@@ -30,7 +31,7 @@ enum Body {
     Mesh { model: Arc<Facets>, object: u16 },
 }
 
-/// A shape in its own frame, and how that moves.
+/// A shape that stands upright in the frame of its object, and how that moves.
 pub(super) struct MovingShape {
     pub solid: Solid,
     pub motion: Motion,
@@ -40,7 +41,9 @@ impl MovingShape {
     /// The shape where it is when the first scan begins.
     pub(super) fn at_first(&self) -> Solid {
         let Self { solid, motion } = self;
-        Solid::new(solid.shape(), motion.pose, solid.material(), solid.object())
+        let place = motion.pose.world_from_sensor();
+        let pose = Pose { position: place.point(solid.pose().position), ..motion.pose };
+        Solid::new(solid.shape(), pose, solid.material(), solid.object())
     }
 }
 
@@ -94,7 +97,8 @@ impl Mover {
 
 impl From<MovingShape> for Mover {
     fn from(MovingShape { solid, motion }: MovingShape) -> Self {
-        let reach = solid.shape().reach() * (1.0 + WIDER) + WIDE;
+        let beside = DVec3::from(solid.pose().position).length();
+        let reach = (solid.shape().reach() + beside) * (1.0 + WIDER) + WIDE;
         Self { body: Body::Shape(Box::new(solid)), motion, reach }
     }
 }
@@ -102,7 +106,6 @@ impl From<MovingShape> for Mover {
 #[cfg(test)]
 mod tests {
     use super::super::closed_form::Shape;
-    use super::super::pose::Pose;
     use super::*;
     use crate::units::FS_PER_S;
     use rand::{RngExt, SeedableRng};

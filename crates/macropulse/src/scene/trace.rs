@@ -6,7 +6,8 @@
 //!    different directions: each has rays of its own (docs/physics.md#mirror-motion).
 //! 3. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
-//! 4. Where something moves, all rays of a shot are cast at the time at which it is fired.
+//! 4. Where beams begin beside the origin of the sensor, so do their rays.
+//! 5. Where something moves, all rays of a shot are cast at the time at which it is fired.
 
 use super::batch::Batch;
 use super::coherence;
@@ -20,7 +21,7 @@ impl Scene {
     /// of the log. Ranges are those from where the sensor is at that time.
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Traced {
         let directions = design.directions();
-        let along = |shot: usize| directions.of(log.row[shot], log.column[shot]);
+        let along = |shot: usize| directions.of_shot(log, shot);
         let middle = self.trace_along(design, log, along);
         if !design.scan.moves {
             return Traced { middle, sub_macropulses: Vec::new() };
@@ -38,8 +39,9 @@ impl Scene {
     ) -> Hits {
         let footprint = Footprint::of(design);
         // Where the sensor moves, each shot has a place of its own, and no neighbours.
+        let apart = design.directions().have_origins();
         let by_row = !self.sensor.moves()
-            && (footprint.offsets.len() > 1 || self.world.is_fine())
+            && (footprint.offsets.len() > 1 || self.world.is_fine() || apart)
             && !coherence::are_in_rows(&log.row);
         self.trace_with((design, log), &footprint, axis, by_row)
     }
@@ -55,9 +57,13 @@ impl Scene {
     ) -> Hits {
         let order = if by_row { coherence::order_of_rows(&log.row) } else { Vec::new() };
         let mut batch = Batch::new(self, design.scan.light_range);
+        let directions = design.directions();
         for place in 0..log.len() {
             let shot = order.get(place).map_or(place, |shot| *shot as usize);
             batch.leave_at(log.fired_at_fs[shot]);
+            if directions.have_origins() {
+                batch.begin_at(directions.origin(log.row[shot], log.column[shot]));
+            }
             footprint.rays(axis(shot), |aim, weight| batch.add(shot as u32, weight, aim));
         }
         let hits = batch.finish();

@@ -9,6 +9,7 @@ use super::closed_form::Shape;
 use super::error::Error;
 use super::file::{ObjectTyped, ShapeTyped, Source, Stand};
 use super::motion::{FASTEST, FASTEST_TURN_DEG, Motion};
+use super::person::{self, Part};
 use super::pose::Pose;
 
 impl Source<'_> {
@@ -58,23 +59,57 @@ impl Source<'_> {
         Ok(pose)
     }
 
-    /// A shape about the position of its object.
-    pub(super) fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Shape, Error> {
-        let fault = |message: &str| Err(self.fault(typed.span(), message));
-        match *typed.get_ref() {
+    /// The parts of a shape about the position of its object.
+    pub(super) fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Vec<Part>, Error> {
+        let fault = |message: &str| self.fault(typed.span(), message);
+        let positive = |value: f64, key: &str| match value > 0.0 && value.is_finite() {
+            true => Ok(value),
+            false => Err(fault(&format!("`{key}` must be finite and above zero"))),
+        };
+        let each = |sizes: [f64; 3]| match sizes.iter().all(|s| *s > 0.0 && s.is_finite()) {
+            true => Ok(sizes.map(|side| side / 2.0)),
+            false => Err(fault("each of `size_m` must be finite and above zero")),
+        };
+        let shape = match *typed.get_ref() {
             ShapeTyped::Plane { normal } => match DVec3::from(normal).try_normalize() {
-                Some(normal) => Ok(Shape::Plane { normal: normal.to_array() }),
-                None => fault("`normal` must be a finite direction, not zero"),
+                Some(normal) => Shape::Plane { normal: normal.to_array() },
+                None => return Err(fault("`normal` must be a finite direction, not zero")),
             },
-            ShapeTyped::Sphere { radius_m: radius } => match radius > 0.0 && radius.is_finite() {
-                true => Ok(Shape::Sphere { radius }),
-                false => fault("`radius_m` must be finite and above zero"),
+            ShapeTyped::Sphere { radius_m } => {
+                Shape::Sphere { radius: positive(radius_m, "radius_m")? }
+            }
+            ShapeTyped::Box { size_m } => Shape::Box { half: each(size_m)? },
+            ShapeTyped::Cylinder { radius_m, height_m } => Shape::Frustum {
+                radii: [positive(radius_m, "radius_m")?; 2],
+                half: positive(height_m, "height_m")? / 2.0,
             },
-            ShapeTyped::Box { size_m } => match size_m.iter().all(|s| *s > 0.0 && s.is_finite()) {
-                true => Ok(Shape::Box { half: size_m.map(|side| side / 2.0) }),
-                false => fault("each of `size_m` must be finite and above zero"),
-            },
-        }
+            ShapeTyped::Cone { radius_m, height_m, top_radius_m } => {
+                let radius = positive(radius_m, "radius_m")?;
+                if !(0.0..=radius).contains(&top_radius_m) {
+                    return Err(fault("`top_radius_m` must be from 0 to `radius_m`"));
+                }
+                let half = positive(height_m, "height_m")? / 2.0;
+                Shape::Frustum { radii: [radius, top_radius_m], half }
+            }
+            ShapeTyped::Capsule { radius_m, height_m } => {
+                let radius = positive(radius_m, "radius_m")?;
+                let half = positive(height_m, "height_m")? / 2.0 - radius;
+                if half < 0.0 {
+                    let message = "`height_m` of a capsule must be twice its `radius_m` at least";
+                    return Err(fault(message));
+                }
+                Shape::Capsule { radius, half }
+            }
+            ShapeTyped::Ellipsoid { size_m } => Shape::Ellipsoid { half: each(size_m)? },
+            ShapeTyped::Person { height_m } => {
+                if !person::HEIGHTS.contains(&height_m) {
+                    let (least, most) = (person::HEIGHTS.start(), person::HEIGHTS.end());
+                    return Err(fault(&format!("`height_m` must be from {least} to {most}")));
+                }
+                return Ok(person::parts(height_m));
+            }
+        };
+        Ok(vec![Part { shape, at: [0.0; 3], material: None }])
     }
 
     /// Keys that mean something only for the mesh of a file.

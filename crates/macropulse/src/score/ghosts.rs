@@ -27,7 +27,9 @@ pub fn ghosts(piece: &Piece, design: &Design, log: &ShotLog, light: &Light) -> u
         if !matches!(outcome, Outcome::Wrong | Outcome::False) {
             return false;
         }
-        let tof_fs = fs_from_s(tof_from_range(f64::from(points.range[at])));
+        // As the clock of the laser has it.
+        let measured = f64::from(points.range[at]) - design.scan.range_offset(log.row[shot]);
+        let tof_fs = fs_from_s(tof_from_range(measured));
         let begins_fs = log.fired_at_fs[shot] + tof_fs;
         let own = design.coding.codebook.marks(log.label[shot], log.word[shot]);
         let own = own.iter().map(|mark| begins_fs + i64::from(*mark) * design.coding.chip_fs);

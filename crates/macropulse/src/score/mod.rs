@@ -83,7 +83,6 @@ pub fn judge(
     hits: &Hits,
 ) -> Score {
     let mut score = Score::default();
-    let gate = design.scan.min_range..=design.scan.max_range;
     let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
     let mut at = 0;
     piece.points.truth.pixels.blank(log.owned.len());
@@ -93,6 +92,7 @@ pub fn judge(
         while next < hits.shot.len() && hits.shot[next] as usize == shot {
             next += 1;
         }
+        let gate = design.scan.gate(log.row[shot]);
         let met = (first..next).filter(|&i| gate.contains(&hits.range[i]));
         let surface = |i: Option<usize>, outcome: Outcome| match i {
             None => Surface { outcome, ..Surface::NONE },

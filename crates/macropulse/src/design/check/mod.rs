@@ -67,6 +67,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         parts;
     // What has no effect belongs neither to the sensor nor to its digest.
     let said = chain.clone().without(&idle);
+    let warnings = scan.model().notes().to_vec();
     let mut design = Design {
         name: file.name,
         summary: file.summary,
@@ -80,7 +81,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         right_within,
         idealised,
         defaults: said.defaults_used(),
-        warnings: Vec::new(),
+        warnings,
         text: said.text(),
         directions: OnceLock::new(),
     };

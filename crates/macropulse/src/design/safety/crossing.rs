@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_4;
 use super::beams::{LineBeams, Lines};
 use super::class1::{Class1, Opening};
 use super::exposure::{Crossing, Crossings, Exposure};
+use super::scattered::Scattered;
 use super::share::Share;
 use crate::design::budget::solid_angle;
 use crate::design::{Coding, Light, Scan};
@@ -16,6 +17,8 @@ pub(crate) enum Beams {
     Lines(Lines),
     /// All pixels at once: light spread evenly over a field of this width and height, rad.
     Flood([f64; 2]),
+    /// One beam after the other in these directions, unit vectors, in no lines.
+    Scattered(Vec<[f64; 3]>),
 }
 
 /// Who sends, and from how far away.
@@ -44,6 +47,17 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
             let flash = places.first().and_then(|place| place.shots.first());
             let (passed, brightest) = flash.map_or((0.0, 0.0), |flash| (flash.share, flash.energy));
             (places, passed, brightest)
+        }
+        Beams::Scattered(beams) => {
+            let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
+            let scattered = Scattered { scan, beams: &beams, energies: &energies };
+            let at = |(opening, share): (&Opening, &Share)| Crossings {
+                durations: opening.durations,
+                shots: scattered.crossing(share, sender.distance),
+            };
+            let places = openings.iter().zip(&shares).map(at).collect();
+            let passed = shares.first().map_or(1.0, |share| share.at(0.0));
+            (places, passed, passed * energies.most())
         }
         Beams::Lines(lines) => {
             let beams = LineBeams::new(scan, lines, &energies, sender.distance);

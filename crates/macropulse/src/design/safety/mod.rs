@@ -9,6 +9,7 @@ mod beams;
 mod class1;
 mod crossing;
 mod exposure;
+mod scattered;
 mod share;
 
 pub(crate) use beams::{Line, Lines};

@@ -1,13 +1,82 @@
-//! Where each pixel lies, looked up instead of computed for every shot.
+//! Where each shot is sent, looked up instead of computed for every one.
 
-/// Unit vectors in the sensor frame (x forward, y left, z up) at which the pixels of a scan lie.
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use macropulse_codec::ShotLog;
+
+use super::rosette::Prism;
+
+/// Where the shots of a scan are sent: unit vectors in the sensor frame (x forward, y left, z up),
+/// and the places in it at which the beams begin.
 ///
-/// Column 0 is at the left, row 0 at the top. A spinning sensor begins to the rear, turns
-/// clockwise seen from above, and goes on turning while its lasers fire one after another.
+/// Column 0 of a lattice is at the left, row 0 at the top. A spinning sensor begins to the rear,
+/// turns clockwise seen from above, and goes on turning while its lasers fire one after another.
+/// Where a pattern is no lattice the row is a laser and the column counts its shots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Directions {
-    elevations: Table,
-    azimuths: Table,
+    course: Course,
+    /// Where the beam of each row begins, m, in a frame that has turned with its azimuth; empty where
+    /// all begin at the origin of the sensor.
+    origins: Vec<[f64; 3]>,
+}
+
+/// How directions follow from pixels and scans.
+#[derive(Debug, Clone, PartialEq)]
+enum Course {
+    /// Every scan as the one before.
+    Lattice { elevations: Table, azimuths: Table },
+    /// Each scan goes on where the one before it ended.
+    Path(Path),
+}
+
+/// Directions one after the other, scan after scan.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Path {
+    /// Shots of a scan.
+    pub per_scan: u64,
+    /// Rows, which take turns.
+    pub rows: u64,
+    pub way: Way,
+}
+
+/// What a path is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Way {
+    /// A list that begins anew at its end.
+    List(Arc<[[f64; 3]]>),
+    /// Prisms that turn, and the time between shots, s.
+    Prisms([Prism; 2], f64),
+}
+
+impl Path {
+    /// The direction of shot `number`, counted from the first one of the first scan.
+    #[inline]
+    fn at(&self, number: u64) -> [f64; 3] {
+        match &self.way {
+            Way::List(list) => list[(number % list.len().max(1) as u64) as usize],
+            Way::Prisms(prisms, step) => deflected(prisms, number as f64 * step),
+        }
+    }
+}
+
+/// The direction of a beam along x that thin prisms have deflected at time `t`, s: what each of them
+/// adds across the beam adds up,
+///
+/// θ_y + i·θ_z = Σ δ·exp(i·(2π·f·t + φ))
+///
+/// and θ is the angle from x, in this direction across it \[Mar99\].
+fn deflected(prisms: &[Prism; 2], t: f64) -> [f64; 3] {
+    let (mut across, mut up) = (0.0, 0.0);
+    for Prism { deflection, turns_per_s, phase } in prisms {
+        let turns = turns_per_s * t;
+        let angle = TAU * (turns - turns.floor()) + phase;
+        across += deflection * libm::cos(angle);
+        up += deflection * libm::sin(angle);
+    }
+    let angle = libm::hypot(across, up);
+    let share = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };
+    [libm::cos(angle), share * across, share * up]
 }
 
 /// An angle of each pixel, rad: that of `row` and `column` is number
@@ -53,18 +122,58 @@ impl Table {
 }
 
 impl Directions {
-    /// The directions at these elevations and azimuths.
-    pub(super) fn new(elevations: &Angles, azimuths: &Angles) -> Self {
-        Self { elevations: Table::of(elevations), azimuths: Table::of(azimuths) }
+    /// The directions at these elevations and azimuths, the beam of each row beginning at one of
+    /// `origins`, or at the origin where there are none.
+    pub(super) fn new(elevations: &Angles, azimuths: &Angles, origins: Vec<[f64; 3]>) -> Self {
+        let (elevations, azimuths) = (Table::of(elevations), Table::of(azimuths));
+        Self { course: Course::Lattice { elevations, azimuths }, origins }
     }
 
-    /// The unit vector at which the middle of a pixel of the image lies.
+    /// The directions along a path.
+    pub(super) fn along(path: Path) -> Self {
+        Self { course: Course::Path(path), origins: Vec::new() }
+    }
+
+    /// The unit vector at which the middle of a pixel lies; where each scan goes on where the one
+    /// before it ended, that of the first scan.
     #[inline]
     pub fn of(&self, row: u16, column: u16) -> [f64; 3] {
         let (row, column) = (usize::from(row), usize::from(column));
-        let [sin_e, cos_e] = self.elevations.at(row, column);
-        let [sin_a, cos_a] = self.azimuths.at(row, column);
-        [cos_e * cos_a, cos_e * sin_a, sin_e]
+        match &self.course {
+            Course::Lattice { elevations, azimuths } => {
+                let [sin_e, cos_e] = elevations.at(row, column);
+                let [sin_a, cos_a] = azimuths.at(row, column);
+                [cos_e * cos_a, cos_e * sin_a, sin_e]
+            }
+            Course::Path(path) => path.at(column as u64 * path.rows + row as u64),
+        }
+    }
+
+    /// The unit vector along which a shot of `log` is sent.
+    #[inline]
+    pub fn of_shot(&self, log: &ShotLog, shot: usize) -> [f64; 3] {
+        let (row, column) = (log.row[shot], log.column[shot]);
+        let Course::Path(path) = &self.course else { return self.of(row, column) };
+        let scan = (log.first + shot as u64) / path.per_scan;
+        path.at(scan * path.per_scan + u64::from(column) * path.rows + u64::from(row))
+    }
+
+    /// Whether beams begin elsewhere than at the origin of the sensor.
+    pub fn have_origins(&self) -> bool {
+        !self.origins.is_empty()
+    }
+
+    /// Where in the sensor frame the beam to a pixel begins, m.
+    #[inline]
+    pub fn origin(&self, row: u16, column: u16) -> [f64; 3] {
+        let (row, column) = (usize::from(row), usize::from(column));
+        match (&self.course, self.origins.get(row)) {
+            (Course::Lattice { azimuths, .. }, Some([x, y, z])) => {
+                let [sin_a, cos_a] = azimuths.at(row, column);
+                [x * cos_a - y * sin_a, x * sin_a + y * cos_a, *z]
+            }
+            _ => [0.0; 3],
+        }
     }
 }
 

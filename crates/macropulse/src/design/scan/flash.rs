@@ -30,7 +30,7 @@ pub(super) struct File {
 }
 
 impl Typed for File {
-    fn check(&self, check: &Check) -> Result<Pattern, Error> {
+    fn check(&self, check: &Check, _period: f64) -> Result<Pattern, Error> {
         let &Self { rows, columns, horizontal_deg, vertical_deg } = self;
         let grid = grid::Typed { rows, columns, horizontal_deg, vertical_deg };
         let grid = grid.check(check, "flash")?;

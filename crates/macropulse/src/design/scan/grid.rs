@@ -46,7 +46,7 @@ impl Grid {
     /// Where the middles of its cells lie.
     pub(super) fn directions(&self) -> Directions {
         let azimuths = Angles::by_column(middles(self.horizontal, self.columns));
-        Directions::new(&Angles::by_row(self.elevations()), &azimuths)
+        Directions::new(&Angles::by_row(self.elevations()), &azimuths, Vec::new())
     }
 
     /// Elevations of its rows, rad.

@@ -4,22 +4,31 @@
 //! workbench asks of every pattern (`Model`). A new one is such a file and an entry in the list of
 //! this page. Nothing else knows which there are.
 
+mod calibration;
 mod directions;
 mod flash;
 mod grid;
+mod laser;
 mod model;
 mod raster;
+mod rosette;
 mod spinning;
+mod table;
+
+use std::ops::RangeInclusive;
 
 use serde::Deserialize;
 
 pub use directions::Directions;
 pub use flash::Flash;
 pub use grid::Grid;
+pub use laser::Laser;
 pub use model::Extent;
 pub(crate) use model::Model;
 pub use raster::{Mirror, Raster};
+pub use rosette::{Prism, Rosette};
 pub use spinning::{Firing, Spinning};
+pub use table::Table;
 
 use super::Error;
 use super::limits::Check;
@@ -75,15 +84,19 @@ patterns! {
     Spinning, spinning, "spinning";
     /// Every direction at once.
     Flash, flash, "flash";
+    /// A list of directions, scan after scan.
+    Table, table, "table";
+    /// One beam through two prisms that turn.
+    Rosette, rosette, "rosette";
 }
 
 /// The table of a pattern in a sensor file.
 trait Typed {
-    /// The pattern in SI units.
+    /// The pattern in SI units, of a scan that lasts `period` seconds.
     ///
     /// # Errors
     /// If a value lies outside its limits.
-    fn check(&self, check: &Check) -> Result<Pattern, Error>;
+    fn check(&self, check: &Check, period: f64) -> Result<Pattern, Error>;
 }
 
 /// Where and when the sensor looks.
@@ -149,10 +162,23 @@ impl Scan {
     }
 
     /// The pixel, row and column, in whose cell the unit vector `direction` of the sensor frame
-    /// lies; `None` outside the field of view. A cell reaches half of the way to its neighbours.
+    /// lies; `None` outside the field of view, and where the pattern is no lattice. A cell reaches half
+    /// of the way to its neighbours.
     pub fn pixel_at(&self, direction: [f64; 3]) -> Option<(u16, u16)> {
         let [x, y, z] = direction;
         self.model().pixel_at(libm::atan2(y, x), libm::asin(z.clamp(-1.0, 1.0)))
+    }
+
+    /// How much is added to what a shot to `row` measures, m.
+    pub fn range_offset(&self, row: u16) -> f64 {
+        self.model().range_offsets().get(usize::from(row)).copied().unwrap_or(0.0)
+    }
+
+    /// The ranges at which a surface is within the gate of a shot to `row`, m: the gate is one of
+    /// its clock, which starts too late for a laser with a range offset.
+    pub fn gate(&self, row: u16) -> RangeInclusive<f64> {
+        let offset = self.range_offset(row);
+        self.min_range + offset..=self.max_range + offset
     }
 
     /// Everything it looks at.
@@ -193,7 +219,8 @@ impl Check<'_> {
                 Pattern::NAMES.iter().map(|name| format!("[scan.{name}]")).collect();
             return self.refuse("scan", format!("needs exactly one of {}", all.join(", ")));
         };
-        let pattern = pattern.check(self)?;
+        let rate_millihertz = (rate * 1e3).round() as u64;
+        let pattern = pattern.check(self, 1000.0 / rate_millihertz as f64)?;
         if moves && pattern.model().moves_by().is_none() {
             return self.refuse(
                 "idealised",
@@ -206,7 +233,6 @@ impl Check<'_> {
             let message = format!("{rows} x {columns} pixels are more than {MOST_PIXELS}");
             return self.refuse("scan", message);
         }
-        let rate_millihertz = (rate * 1e3).round() as u64;
         Ok(Scan {
             rows,
             columns,

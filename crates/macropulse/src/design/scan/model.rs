@@ -69,6 +69,27 @@ pub(crate) trait Model {
 
     /// What it sends, as eye safety counts it.
     fn beams(&self) -> Beams;
+
+    /// How much is added to what each row measures, m, because its clock starts too late
+    /// (docs/physics.md#beams-of-a-turning-head); empty where nothing is.
+    fn range_offsets(&self) -> &[f64] {
+        &[]
+    }
+
+    /// Whether pixels are cells of an image that is the same in every scan.
+    fn is_lattice(&self) -> bool {
+        true
+    }
+
+    /// The digest of the file that the directions were read from, if they were.
+    fn file_digest(&self) -> Option<&str> {
+        None
+    }
+
+    /// What a user should know about it although it is no error.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
 }
 
 /// When a shot is fired, from the beginning of its scan: exact, and a rest that is not.

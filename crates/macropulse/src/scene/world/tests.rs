@@ -36,16 +36,24 @@ fn poses(chance: &mut ChaCha8Rng, count: usize) -> Vec<Pose> {
     (0..count).map(pose).collect()
 }
 
-/// The same eggs, kept once or laid out; with a plane, a box and a ball.
+/// The same eggs, kept once or laid out; with a shape of each kind.
 fn worlds(poses: &[Pose]) -> [World; 2] {
     let mesh = egg(20);
     let facet = |corners: Corners, object| Facet { corners, material: 1, object };
     let solids = || {
         let solid = |shape, at, object| Solid::new(shape, Pose::at(at), 0, object);
+        let turned = |shape, at| {
+            let pose = Pose { position: at, yaw: 0.7, pitch: -0.5, roll: 1.9 };
+            Solid::new(shape, pose, 0, 2)
+        };
         vec![
             solid(Shape::Plane { normal: [0.0, 0.0, 1.0] }, [0.0, 0.0, -50.0], 0),
             solid(Shape::Box { half: [3.0, 2.0, 1.0] }, [20.0, 0.0, 0.0], 1),
             solid(Shape::Sphere { radius: 2.0 }, [-15.0, 10.0, 0.0], 2),
+            turned(Shape::Frustum { radii: [2.0, 0.5], half: 1.5 }, [9.0, 12.0, -3.0]),
+            turned(Shape::Frustum { radii: [1.5, 1.5], half: 2.0 }, [-12.0, -9.0, 3.0]),
+            turned(Shape::Capsule { radius: 1.0, half: 2.5 }, [3.0, -13.0, 4.0]),
+            turned(Shape::Ellipsoid { half: [3.0, 1.0, 2.0] }, [-4.0, 2.0, 14.0]),
         ]
     };
     let model = mesh.iter().map(|corners| facet(*corners, 0)).collect();

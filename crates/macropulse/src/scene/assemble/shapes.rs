@@ -1,0 +1,53 @@
+//! Objects that are shapes: of one part, or of several, as a person.
+
+use toml::Spanned;
+
+use super::super::closed_form::Solid;
+use super::super::error::Error;
+use super::super::file::{ObjectTyped, ShapeTyped};
+use super::super::motion::Motion;
+use super::super::moving::MovingShape;
+use super::super::person::Part;
+use super::super::pose::Pose;
+use super::Assembly;
+
+impl Assembly<'_> {
+    /// Adds the `shape` of an object at all places at which it stands or from which it moves.
+    pub(super) fn add_shape(
+        &mut self,
+        (name, object): (&str, u16),
+        (written, shape): (&ObjectTyped, &Spanned<ShapeTyped>),
+        motions: &[Motion],
+    ) -> Result<(), Error> {
+        let parts = self.source.shape(shape)?;
+        let typed = written.material.as_ref();
+        let typed = typed.map(|typed| self.material_typed(typed)).transpose()?;
+        let mut materials = Vec::with_capacity(parts.len());
+        for part in &parts {
+            let own = part.material.and_then(|own| self.known(own));
+            materials.push(match (typed, own) {
+                (Some(typed), _) => typed,
+                (None, Some(own)) => self.enlist(own),
+                (None, None) => self.unnamed(name),
+            });
+        }
+        for motion in motions {
+            let mut motion = *motion;
+            if written.rest_on_ground {
+                let depth = |part: &Part| part.depth_below(&motion.pose);
+                let deepest = parts.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
+                motion.pose.position[2] += deepest;
+            }
+            for (part, &material) in parts.iter().zip(&materials) {
+                let solid = |pose| Solid::new(part.shape, pose, material, object);
+                if motion.moves() {
+                    let solid = solid(Pose::at(part.at));
+                    self.moving_shapes.push(MovingShape { solid, motion });
+                } else {
+                    self.solids.push(solid(part.pose(&motion.pose)));
+                }
+            }
+        }
+        Ok(())
+    }
+}
