@@ -4,8 +4,10 @@ mod budget;
 mod check;
 mod codes;
 mod completions;
+mod decode;
 mod encode;
 mod environments;
+mod explain;
 mod fault;
 mod folder;
 mod interrupt;
@@ -53,6 +55,7 @@ enum Command {
     Budget(budget::Budget),
     Codes(codes::Codes),
     Encode(encode::Encode),
+    Decode(decode::Decode),
     Speed(speed::Speed),
     Completions(completions::Completions),
 }
@@ -85,6 +88,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
+        Command::Decode(decode) => decode::run(decode, common),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions, Options::command()),
     }

@@ -161,6 +161,11 @@ impl<'a> Scans<'a> {
         self.part_kept(&bands, watch, keep)
     }
 
+    /// Whether ticks come with amplitudes.
+    pub fn measure(&self) -> bool {
+        self.detectors.measure()
+    }
+
     /// What the receiver is given of a band.
     pub fn record(&self, band: &Band) -> (ShotLog, Ticks) {
         let Self { design, scene, operating, detectors, .. } = self;

@@ -53,7 +53,12 @@ impl Run<'_> {
         if !self.folder.is_empty() {
             columns.push("written", self.written());
         }
-        format!("{}\n\n{}", self.headline(), columns.text())
+        let mut text = format!("{}\n\n{}", self.headline(), columns.text());
+        for (explained, _) in &self.explained {
+            text.push('\n');
+            text.push_str(explained);
+        }
+        text
     }
 
     fn headline(&self) -> String {
@@ -195,6 +200,9 @@ impl Run<'_> {
                 .map(|o| (o.name().to_owned(), self.score.count_further(o).into()))
                 .collect::<Map<String, Value>>()
                 .into();
+        }
+        if !self.explained.is_empty() {
+            json["explained"] = self.explained.iter().map(|(_, json)| json.clone()).collect();
         }
         if !self.scene.interferers.is_empty() {
             json["interferer_shots"] = tally.interferer_shots.into();

@@ -15,7 +15,8 @@ const RECORD: usize = 18;
 /// Shots are counted up to here: more than any sensor fires in its time.
 const MOST_SHOTS: u64 = 1 << 60;
 
-const KEYS: [&str; 6] = ["first", "owned_from", "owned_until", "digest", "position_m", "turn"];
+const KEYS: [&str; 7] =
+    ["first", "count", "owned_from", "owned_until", "digest", "position_m", "turn"];
 
 const COLUMNS: [&str; 8] =
     ["shot", "fired_fs", "fired_ps", "row", "column", "label", "word", "channel"];
@@ -140,9 +141,7 @@ impl<R: Read> ShotReader<R> {
     /// If it cannot be read, is fired before the one before it, is none of the sensor's, or if the
     /// file ends too early.
     pub fn next_shot(&mut self) -> Result<Option<Shot>, Error> {
-        let is_last = self.header.count == Some(self.read);
         let shot = match self.source.form {
-            _ if is_last => None,
             Form::Text => self.text()?,
             Form::Binary => self.binary()?,
         };
@@ -155,6 +154,9 @@ impl<R: Read> ShotReader<R> {
                 _ => Ok(None),
             };
         };
+        if let Some(count) = self.header.count.filter(|count| self.read >= *count) {
+            return self.refuse(format!("the header says that there are {count} shots only"));
+        }
         if shot.fired_fs.unsigned_abs() > LONGEST_FS.unsigned_abs() {
             return self.refuse("is fired more than 9000 s from the beginning of the first scan");
         }
@@ -235,7 +237,7 @@ fn read_text<R: Read>(source: &mut Source<R>) -> Result<(ShotHeader, Columns), E
         digest: keys.digest(source)?,
         position: keys.reals(source, "position_m")?.unwrap_or_default(),
         turn: keys.reals(source, "turn")?.unwrap_or(ShotHeader::default().turn),
-        count: None,
+        count: keys.number(source, "count")?,
     };
     let columns = Columns::read(source, &COLUMNS, &["row", "column"])?;
     match (columns.has(1), columns.has(2)) {
@@ -314,6 +316,9 @@ impl<W: Write> ShotWriter<W> {
 
 fn write_text(out: &mut impl Write, header: &ShotHeader) -> io::Result<()> {
     write!(out, "# macropulse shots {VERSION}, first={}", header.first)?;
+    if let Some(count) = header.count {
+        write!(out, ", count={count}")?;
+    }
     if let Some(owned) = &header.owned {
         write!(out, ", owned_from={}, owned_until={}", owned.start, owned.end)?;
     }

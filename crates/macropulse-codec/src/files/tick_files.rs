@@ -13,7 +13,7 @@ const MAGIC: &[u8; 8] = b"MPTICKS\0";
 const SEVERAL: u32 = 1;
 const MEASURED: u32 = 2;
 
-const KEYS: [&str; 2] = ["tick_fs", "digest"];
+const KEYS: [&str; 3] = ["tick_fs", "count", "digest"];
 
 const COLUMNS: [&str; 3] = ["tick", "channel", "amplitude"];
 
@@ -80,9 +80,7 @@ impl<R: Read> TickReader<R> {
     /// If it cannot be read, does not come after the one before it, has a channel that the sensor
     /// has not, or if the file ends too early.
     pub fn next_tick(&mut self) -> Result<Option<Tick>, Error> {
-        let is_last = self.header.count == Some(self.read);
         let tick = match self.source.form {
-            _ if is_last => None,
             Form::Text => self.text()?,
             Form::Binary => self.binary()?,
         };
@@ -95,6 +93,9 @@ impl<R: Read> TickReader<R> {
                 _ => Ok(None),
             };
         };
+        if let Some(count) = self.header.count.filter(|count| self.read >= *count) {
+            return self.refuse(format!("the header says that there are {count} ticks only"));
+        }
         if tick.tick.unsigned_abs() > (LONGEST_FS / self.header.tick_fs).unsigned_abs() {
             let at = tick.tick;
             return self.refuse(format!("tick {at} is more than 9000 s from the first scan"));
@@ -190,7 +191,8 @@ fn read_text<R: Read>(
     let digest = keys.digest(source)?;
     let columns = Columns::read(source, &COLUMNS, &["tick"])?;
     let (several, measured) = (columns.has(1), columns.has(2));
-    Ok((TickHeader { tick_fs: typed, several, measured, digest, count: None }, columns))
+    let count = keys.number(source, "count")?;
+    Ok((TickHeader { tick_fs: typed, several, measured, digest, count }, columns))
 }
 
 fn read_binary<R: Read>(source: &mut Source<R>) -> Result<TickHeader, Error> {
@@ -235,7 +237,8 @@ impl<W: Write> TickWriter<W> {
         Ok(Self::behind(out, form, header))
     }
 
-    /// A writer of ticks behind a header that is written already.
+    /// A writer of ticks behind a header that is written already. A header is as long whatever its
+    /// count, so that it may be written again when that is known.
     pub fn behind(out: W, form: Form, header: &TickHeader) -> Self {
         Self { out, form, several: header.several, measured: header.measured }
     }
@@ -273,6 +276,10 @@ impl<W: Write> TickWriter<W> {
 
 fn write_text(out: &mut impl Write, header: &TickHeader) -> io::Result<()> {
     write!(out, "# macropulse ticks {VERSION}, tick_fs={}", header.tick_fs)?;
+    // As wide as any, so that it may be written before it is known.
+    if let Some(count) = header.count {
+        write!(out, ", count={count:020}")?;
+    }
     if let Some(digest) = header.digest {
         write!(out, ", digest={digest}")?;
     }

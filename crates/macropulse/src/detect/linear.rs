@@ -50,6 +50,10 @@ impl Thresholding {
 }
 
 impl Kind for Thresholding {
+    fn measures(&self) -> bool {
+        self.measures
+    }
+
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         let mut events: Vec<(u32, f32)> = Vec::new();
         let span = channel.whole_span();

@@ -14,6 +14,9 @@ use macropulse_codec::ShotLog;
 /// coded sensor to stay in the cache, enough for the guard shots to be a small part of it.
 const SHOTS: u64 = 1700;
 
+/// Shots of a log that are worked out together.
+const PART: u64 = 4096;
+
 /// One band: consecutive shots of one scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Band {
@@ -58,6 +61,19 @@ fn shots_of_band(design: &Design) -> u64 {
 }
 
 impl Band {
+    /// The band that owns `shot`, counted from the first shot of the first scan.
+    pub fn of_shot(design: &Design, shot: u64) -> Self {
+        let total = design.shots_per_scan();
+        let step = shots_of_band(design);
+        let first = shot % total / step * step;
+        Self { scan: shot / total, first, shots: step.min(total - first) }
+    }
+
+    /// The shot behind its last one, counted from the first shot of the first scan.
+    pub fn end(&self, design: &Design) -> u64 {
+        self.scan * design.shots_per_scan() + self.first + self.shots
+    }
+
     /// The band behind it, in its scan or in the next one.
     pub fn next(&self, design: &Design) -> Self {
         let first = self.first + self.shots;
@@ -86,6 +102,22 @@ impl Band {
         let owned = (owned_first - shots.start) as usize;
         ShotLog { owned: owned..owned + self.shots as usize, ..log_of(design, shots) }
     }
+}
+
+/// The shots of scan number `scan` and the guard shots around it, counted from the first shot of the
+/// first scan: all that its returns can be decoded with.
+pub fn shots_of_scan(design: &Design, scan: u64) -> Range<u64> {
+    let first = scan * design.shots_per_scan();
+    with_guard(design, first..first + design.shots_per_scan())
+}
+
+/// The log of `shots`, in parts of some thousand, all of them owned.
+pub fn logs(design: &Design, shots: Range<u64>) -> impl Iterator<Item = ShotLog> {
+    let ends = shots.end;
+    shots.step_by(PART as usize).map(move |from| {
+        let log = log_of(design, from..ends.min(from + PART));
+        ShotLog { owned: 0..log.len(), ..log }
+    })
 }
 
 /// The shots `owned`, those before them whose light is still under way when their ticks begin, and
@@ -206,6 +238,9 @@ mod tests {
             let all: Vec<Band> = (0..2).flat_map(|scan| bands(&design, scan)).collect();
             for pair in all.windows(2) {
                 assert_eq!(pair[0].next(&design), pair[1], "{name}");
+                let end = pair[0].end(&design);
+                assert_eq!(Band::of_shot(&design, end - 1), pair[0], "{name}");
+                assert_eq!(Band::of_shot(&design, end), pair[1], "{name}");
                 let ((seen, own), (_, next)) = (pair[0].ticks(&design), pair[1].ticks(&design));
                 assert_eq!((own.start, own.end), (seen.start, next.start), "{name}");
             }
