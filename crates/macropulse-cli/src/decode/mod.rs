@@ -52,7 +52,11 @@ pub struct Decode {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 
-    #[arg(long, value_name = "LIST", help = "Formats to write, as of `simulate` [default: pcd,png]")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        help = "Formats to write, as of `simulate` [default: pcd,png]"
+    )]
     format: Option<Formats>,
 
     /// Say why the shot to this pixel was decided as it was; repeatable

@@ -144,12 +144,7 @@ impl<'a> Run<'a> {
     }
 
     /// Counts a band and keeps its points.
-    fn take(
-        &mut self,
-        band: Decoded,
-        sink: &mut Sink,
-        interrupt: &Interrupt,
-    ) -> Result<(), Fault> {
+    fn take(&mut self, band: Decoded, sink: &mut Sink, interrupt: &Interrupt) -> Result<(), Fault> {
         let scan = band.piece.points.scan;
         if scan != self.number {
             self.end_scan(sink, interrupt)?;
@@ -202,10 +197,8 @@ impl<'a> Run<'a> {
         if pieces.is_empty() {
             return Ok(());
         }
-        let frame = PointCloud {
-            viewpoint: self.viewpoint,
-            ..PointCloud::empty(self.design, self.number)
-        };
+        let frame =
+            PointCloud { viewpoint: self.viewpoint, ..PointCloud::empty(self.design, self.number) };
         let cloud = PointCloud::joined(&frame, &pieces);
         let names = Names::default();
         let files = interrupt.undisturbed(|| {
@@ -224,7 +217,9 @@ impl<'a> Run<'a> {
     fn find_warnings(&mut self) {
         if self.returns == 0 && self.shots > 0 {
             let reason = match self.ticks {
-                0 => "no tick lies in the time in which light of the shots may come: are both of one recording?",
+                0 => {
+                    "no tick lies in the time in which light of the shots may come: are both of one recording?"
+                }
                 _ => "the receiver found none of the macropulses; --explain ROW,COLUMN says why",
             };
             self.warnings.push(format!("not a single point: {reason}"));

@@ -161,7 +161,10 @@ impl Explained<'_> {
         let mut order: Vec<_> = self.explanation.others.iter().zip(&self.others).collect();
         order.sort_by_key(|(other, _)| std::cmp::Reverse((other.shared, other.marks)));
         let more = order.len().saturating_sub(MOST_OTHERS);
-        let say = |(other, (row, column)): &(&macropulse::codec::decode::OtherLight, &super::Pixel)| {
+        let say = |(other, (row, column)): &(
+            &macropulse::codec::decode::OtherLight,
+            &super::Pixel,
+        )| {
             format!(
                 "row {row}, column {column}: {} here, {} of them where this shot has one at its peak",
                 counted(other.marks.into(), "mark"),

@@ -61,7 +61,16 @@ impl Scenario {
         let (designs, scene) = (designs?, Scene::open_changed(scene, &changes.of_scene)?);
         check_operating(&designs, &scene)?;
         let Formats(formats, ticks) = Formats::default();
-        Ok(Self { designs, scene, scans: 1, seed: 1, formats, ticks, truth: false, explain: Vec::new() })
+        Ok(Self {
+            designs,
+            scene,
+            scans: 1,
+            seed: 1,
+            formats,
+            ticks,
+            truth: false,
+            explain: Vec::new(),
+        })
     }
 
     /// The scenario in the file at `path`; names of files count from its folder.

@@ -5,9 +5,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use macropulse::codec::files::{
-    Form, Shot, ShotHeader, ShotWriter, TickHeader, TickWriter,
-};
+use macropulse::codec::files::{Form, Shot, ShotHeader, ShotWriter, TickHeader, TickWriter};
 use macropulse::design::Design;
 use macropulse::emit::{logs, scan_begins_fs, shots_of_scan};
 use macropulse::formats::{self, WholeFile};

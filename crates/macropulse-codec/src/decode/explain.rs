@@ -195,14 +195,23 @@ impl<'a> Bench<'a> {
         let width = if is_direct { 1 } else { window(receiver.jitter_ticks) };
         let length = marks.last().map_or(0, |last| i64::from(*last)) + i64::from(width);
         let until = gate.end + length;
-        let of_channel = |at: &usize| {
-            ticks.channel.get(*at).is_none_or(|channel| *channel == log.channel[shot])
-        };
+        let of_channel =
+            |at: &usize| ticks.channel.get(*at).is_none_or(|channel| *channel == log.channel[shot]);
         let after = |at: usize| ticks.epoch + i64::from(ticks.tick[at]) - fired;
         let seen = (0..ticks.len()).filter(of_channel).map(after);
         let seen: Vec<i64> = seen.filter(|tick| (gate.start..until).contains(tick)).collect();
         let mut bench = Self {
-            receiver, codebook, log, shot, fired, marks, gate, step, width, seen, lit: Vec::new(),
+            receiver,
+            codebook,
+            log,
+            shot,
+            fired,
+            marks,
+            gate,
+            step,
+            width,
+            seen,
+            lit: Vec::new(),
         };
         bench.lit = bench.lit_by(|_| true);
         bench

@@ -79,7 +79,9 @@ impl Keys {
         let Some(value) = self.value(key) else { return Ok(None) };
         let numbers: Option<Vec<f64>> = value.split_whitespace().map(finite).collect();
         match numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok()) {
-            None => source.refuse(format!("{key}: `{value}` is not {N} numbers with blanks between")),
+            None => {
+                source.refuse(format!("{key}: `{value}` is not {N} numbers with blanks between"))
+            }
             numbers => Ok(numbers),
         }
     }
@@ -123,7 +125,8 @@ impl Columns {
         required: &[&str],
     ) -> Result<Self, Error> {
         let Some(line) = source.line()?.map(str::to_owned) else {
-            return source.refuse("behind its first line the file ends: the names of columns are missing");
+            return source
+                .refuse("behind its first line the file ends: the names of columns are missing");
         };
         let names: Vec<&str> = line.split(',').map(str::trim).collect();
         if let Some(wrong) = names.iter().find(|name| !known.contains(name)) {
@@ -153,7 +156,8 @@ impl Columns {
             Some(line) => line.split(',').count(),
         };
         if count != self.wide {
-            return source.refuse(format!("{count} numbers, where there are {} columns", self.wide));
+            return source
+                .refuse(format!("{count} numbers, where there are {} columns", self.wide));
         }
         Ok(true)
     }

@@ -129,7 +129,9 @@ fn first_byte(bytes: &mut impl BufRead) -> std::io::Result<Option<u8>> {
 macro_rules! number {
     ($record:expr, $at:expr, $kind:ty) => {{
         let bytes = $record.get($at..$at + size_of::<$kind>());
-        bytes.and_then(|bytes| bytes.try_into().ok()).map_or_else(Default::default, <$kind>::from_le_bytes)
+        bytes
+            .and_then(|bytes| bytes.try_into().ok())
+            .map_or_else(Default::default, <$kind>::from_le_bytes)
     }};
 }
 pub(super) use number;

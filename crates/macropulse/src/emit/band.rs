@@ -130,8 +130,7 @@ fn with_guard(design: &Design, owned: Range<u64>) -> Range<u64> {
     let (opens, closes) = fired_fs.into_inner();
     // As many as are fired in that time on average, and then one by one: a resonant mirror is
     // faster in the middle of a line, and slower at its ends.
-    let mean =
-        (cut.history_fs as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
+    let mean = (cut.history_fs as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
     let (mut first, mut end) = (owned.start.saturating_sub(mean), owned.end + mean);
     while first > 0 && fired(first - 1) >= opens {
         first -= 1;

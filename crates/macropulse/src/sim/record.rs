@@ -67,7 +67,8 @@ fn first_of(log: &ShotLog, shots: usize) -> ShotLog {
 
 /// Adds ticks that come `later`, whatever they are counted from.
 fn append(ticks: &mut Ticks, later: &Ticks) {
-    let kinds = [ticks, later].map(|ticks| (!ticks.channel.is_empty(), !ticks.amplitude.is_empty()));
+    let kinds =
+        [ticks, later].map(|ticks| (!ticks.channel.is_empty(), !ticks.amplitude.is_empty()));
     let stream: Vec<Tick> = [ticks.stream(), later.stream()].concat();
     let kind = (kinds[0].0 || kinds[1].0, kinds[0].1 || kinds[1].1);
     *ticks = Ticks::of(&stream, ticks.epoch, kind);
