@@ -34,6 +34,11 @@ impl Folder {
         fs::create_dir_all(&self.path).map_err(|error| self.not_writable(&error))
     }
 
+    /// Makes the folder, if that was not done before.
+    pub fn make_once(&mut self) -> Result<(), Fault> {
+        if self.kept || self.made.is_some() { Ok(()) } else { self.make() }
+    }
+
     /// From now on the folder stays, whatever happens.
     pub fn keep(&mut self) {
         self.kept = true;

@@ -4,8 +4,10 @@ mod budget;
 mod check;
 mod codes;
 mod completions;
+mod decode;
 mod encode;
 mod environments;
+mod explain;
 mod fault;
 mod folder;
 mod input;
@@ -56,6 +58,7 @@ enum Command {
     Budget(budget::Budget),
     Codes(codes::Codes),
     Encode(encode::Encode),
+    Decode(decode::Decode),
     Speed(speed::Speed),
     Completions(completions::Completions),
     Man(man::Man),
@@ -91,6 +94,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
+        Command::Decode(decode) => decode::run(decode, common),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),
         Command::Man(man) => man::run(man, Options::command()),

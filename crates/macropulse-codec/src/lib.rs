@@ -6,7 +6,9 @@
 //! light, a file system or a thread pool.
 //!
 //! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
-//! * [`ShotLog`] and [`Ticks`]: what a receiver is given, as columns.
+//! * [`ShotLog`] and [`Ticks`]: what a receiver is given, as columns; [`Cut`]: how they are cut out
+//!   of a stream.
+//! * [`files`]: shot logs and ticks as text and as bytes.
 //! * [`decode`]: the receivers, from ticks to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
 //! * [`level`]: which instructions the wide loops use.
@@ -15,13 +17,16 @@
 
 pub mod code;
 pub mod decode;
+pub mod files;
 pub mod statistics;
 pub mod time;
 
+mod cut;
 mod kernels;
 mod shot_log;
 mod ticks;
 
+pub use cut::Cut;
 pub use kernels::level;
 pub use shot_log::ShotLog;
-pub use ticks::Ticks;
+pub use ticks::{Tick, Ticks};

@@ -45,10 +45,23 @@ pub fn write_scan(
     let objects: Vec<String> = scene.objects.iter().map(|object| object.name.clone()).collect();
     let materials: Vec<String> = scene.materials.iter().map(|m| m.name.clone()).collect();
     let names = Names { objects: &objects, materials: &materials };
+    write_decoded(folder, formats, cloud, (design, &names))
+}
+
+/// As [`write_scan`], of a cloud whose objects and materials, if it knows any, have these names.
+///
+/// # Errors
+/// As [`write_scan`].
+pub fn write_decoded(
+    folder: &Path,
+    formats: &[Format],
+    cloud: &PointCloud,
+    (design, names): (&Design, &Names),
+) -> Result<Vec<String>, Error> {
     let mut files = Vec::new();
     for &format in formats {
         let file = format.file_name(cloud.scan);
-        write_cloud(format, cloud, &names, &folder.join(&file))?;
+        write_cloud(format, cloud, names, &folder.join(&file))?;
         files.push(file);
         if format == Format::Png {
             // Some grids are too large for a picture in colour; the 16-bit one is there.

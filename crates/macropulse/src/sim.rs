@@ -1,5 +1,7 @@
 //! The whole chain from shots to points, as function calls.
 
+mod record;
+
 use std::sync::Mutex;
 
 use rayon::prelude::*;
@@ -15,8 +17,8 @@ use crate::scene::{Hits, Pose, Scene};
 use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
-use macropulse_codec::ShotLog;
 use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
+use macropulse_codec::{ShotLog, Ticks};
 
 /// Why there is no scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -141,6 +143,46 @@ impl<'a> Scans<'a> {
     /// # Errors
     /// As [`Scans::scan`].
     pub fn part(&mut self, bands: &[Band], watch: &Watch) -> Result<Option<&Scan>, Error> {
+        self.part_kept(bands, watch, &|_| {})
+    }
+
+    /// As [`Scans::scan`], and what the receiver was given of each band goes to `keep`, from many
+    /// threads, nearly in the order of the bands.
+    ///
+    /// # Errors
+    /// As [`Scans::scan`].
+    pub fn scan_kept(
+        &mut self,
+        number: u64,
+        watch: &Watch,
+        keep: &(dyn Fn(&Record) + Sync),
+    ) -> Result<Option<&Scan>, Error> {
+        let bands: Vec<Band> = bands(self.design, number).collect();
+        self.part_kept(&bands, watch, keep)
+    }
+
+    /// Whether ticks come with amplitudes.
+    pub fn measure(&self) -> bool {
+        self.detectors.measure()
+    }
+
+    /// What the receiver is given of a band.
+    pub fn record(&self, band: &Band) -> (ShotLog, Ticks) {
+        let Self { design, scene, operating, detectors, .. } = self;
+        let setup = Setup { seen: Seen { design, scene, operating }, detectors };
+        let log = band.shot_log(design);
+        let mut memory = Memory::default();
+        let mut converted = record::converted(&setup, &mut memory, &log);
+        record::cut(&setup, &mut memory, (band, &log), &mut converted);
+        (log, converted.ticks)
+    }
+
+    fn part_kept(
+        &mut self,
+        bands: &[Band],
+        watch: &Watch,
+        keep: &(dyn Fn(&Record) + Sync),
+    ) -> Result<Option<&Scan>, Error> {
         let Self { design, scene, operating, detectors, memories, scan } = self;
         let setup = Setup { seen: Seen { design, scene, operating }, detectors };
         let number = bands.first().map_or(0, |band| band.scan);
@@ -157,8 +199,10 @@ impl<'a> Scans<'a> {
                 && let Some((band, piece)) = next()
             {
                 let known = counted.1.peak_busy;
-                let (score, tally) =
-                    measure(&setup, memory, (band, known))?.judged(&setup.seen, piece);
+                let measured = measure(&setup, memory, (band, known))?;
+                keep(&Record { band, log: &measured.log, ticks: &measured.ticks });
+                let (score, tally, ticks) = measured.judged(&setup.seen, piece);
+                memory.take_back(ticks.tick);
                 counted.0.add(&score);
                 counted.1.add(&tally);
                 (watch.done)(band.shots);
@@ -181,25 +225,37 @@ fn viewpoint(pose: &Pose) -> Viewpoint {
     Viewpoint { position: pose.position, turn: pose.quaternion() }
 }
 
+/// What the receiver was given of a band.
+#[derive(Debug, Clone, Copy)]
+pub struct Record<'a> {
+    /// The band.
+    pub band: &'a Band,
+    /// Its shots, guard shots included.
+    pub log: &'a ShotLog,
+    /// All ticks that belong to it ([`Band::ticks`]).
+    pub ticks: &'a Ticks,
+}
+
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
 struct Measured<'a> {
     log: ShotLog,
     hits: Hits,
     light: Light<'a>,
+    ticks: Ticks,
     returns: Returns,
     tally: Tally,
 }
 
 impl Measured<'_> {
-    /// Makes the returns of a band the points of `piece`, and counts.
-    fn judged(mut self, seen: &Seen, piece: &mut Piece) -> (Score, Tally) {
+    /// Makes the returns of a band the points of `piece`, and counts; and the ticks back.
+    fn judged(mut self, seen: &Seen, piece: &mut Piece) -> (Score, Tally, Ticks) {
         let Seen { design, scene, operating } = *seen;
         let began = thread_seconds();
         piece.fill(design, &operating.link, &self.log, &self.returns);
         let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
         score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
         self.tally.seconds[POINTS] += thread_seconds() - began;
-        (score, self.tally)
+        (score, self.tally, self.ticks)
     }
 }
 
@@ -233,8 +289,11 @@ fn measure<'a>(
     lap(&mut tally);
     let response = detectors.response(&log, &light, memory);
     lap(&mut tally);
-    let Converted { ticks, peak_busy, lost, merged } = tdc::ticks(design, response, known);
+    let mut converted = tdc::ticks(design, response, known);
+    tally.ticks = converted.ticks.tick.len() as u64;
+    record::cut(setup, memory, (band, &log), &mut converted);
     lap(&mut tally);
+    let Converted { ticks, peak_busy, lost, merged } = converted;
     let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
     lap(&mut tally);
     let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
@@ -253,7 +312,6 @@ fn measure<'a>(
             _ => tally.interferer_shots += 1,
         }
     }
-    tally.ticks = ticks.tick.len() as u64;
     tally.detections = tally.ticks + merged + lost;
     tally.merged = merged;
     tally.lost = lost;
@@ -263,8 +321,7 @@ fn measure<'a>(
         tally.by_number[usize::from(number - 1)] += 1;
     }
     tally.rejects = returns.rejects;
-    memory.take_back(ticks.tick);
-    Ok(Measured { log, hits, light, returns, tally })
+    Ok(Measured { log, hits, light, ticks, returns, tally })
 }
 
 /// The last stage, after those of a band: its points and their score.

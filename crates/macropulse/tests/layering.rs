@@ -37,6 +37,12 @@ const CODEC: Layers = Layers {
         },
         Rule { module: "shot_log", may_name: &[], because: "the log is columns" },
         Rule { module: "ticks", may_name: &[], because: "ticks are columns" },
+        Rule { module: "cut", may_name: &[], because: "a stream is cut by times alone" },
+        Rule {
+            module: "files",
+            may_name: &["cut", "shot_log", "ticks"],
+            because: "files hold shots and ticks, whoever made them and whatever decodes them",
+        },
         Rule {
             module: "decode",
             may_name: &["code", "kernels", "shot_log", "statistics", "ticks", "time"],
@@ -313,7 +319,8 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
     // Types that a crate shows at its root stand for the module they are from.
     let home = |name: &str| match name {
         "ShotLog" => "shot_log".to_owned(),
-        "Ticks" => "ticks".to_owned(),
+        "Tick" | "Ticks" => "ticks".to_owned(),
+        "Cut" => "cut".to_owned(),
         _ => name.to_owned(),
     };
     all.map(home).collect()

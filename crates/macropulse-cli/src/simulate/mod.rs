@@ -1,9 +1,10 @@
 //! `macropulse simulate`: sensors in a scene, scan by scan.
 
-mod formats;
+pub mod formats;
 mod run;
 pub mod scenario;
 mod summary;
+pub mod ticks;
 
 use std::path::{Path, PathBuf};
 
@@ -12,6 +13,7 @@ use clap_complete::engine::ArgValueCompleter;
 use macropulse::scene::Changes;
 
 use crate::completions;
+use crate::explain;
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
@@ -92,6 +94,10 @@ pub struct Simulate {
     #[arg(long)]
     truth: bool,
 
+    /// Say why the shot to this pixel was decided as it was, in the first scan; repeatable
+    #[arg(long = "explain", value_name = "ROW,COLUMN", value_parser = explain::pixel)]
+    explain: Vec<explain::Pixel>,
+
     /// Print what was counted as JSON: an object, or an array of them for several sensors
     #[arg(long)]
     json: bool,
@@ -127,19 +133,22 @@ impl Simulate {
         };
         if let Some(formats) = &self.format {
             scenario.formats.clone_from(&formats.0);
+            scenario.ticks = formats.1;
         }
         scenario.scans = self.scans.unwrap_or(scenario.scans);
         scenario::check_scans(scenario.scans, &scenario.designs)
             .map_err(|sentence| Fault::Wrong(format!("--scans: {sentence}")))?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         scenario.truth |= self.truth;
+        scenario.explain.clone_from(&self.explain);
+        scenario.designs.iter().try_for_each(|design| explain::check(design, &self.explain))?;
         Ok(scenario)
     }
 
     /// A folder for each sensor, proven to be writable; none where nothing is to be written.
     fn folders(&self, scenario: &Scenario) -> Result<Vec<Option<Folder>>, Fault> {
         let Some(output) = &self.output else {
-            if scenario.formats.is_empty() {
+            if scenario.formats.is_empty() && scenario.ticks.is_none() {
                 return Ok(scenario.designs.iter().map(|_| None).collect());
             }
             let remedy = "say where the results go with -o DIR, or write none with --format none";

@@ -3,14 +3,18 @@
 use std::time::Instant;
 
 use macropulse::design::Design;
+use macropulse::emit::{Band, bands};
 use macropulse::formats::{Format, Manifest};
 use macropulse::points::Truth;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
-use macropulse::sim::{Scans, Tally, Watch};
+use macropulse::sim::{Record, Scans, Tally, Watch};
 use macropulse_study::record::{self, COLOUR};
+use serde_json::Value;
 
 use super::scenario::Scenario;
+use super::ticks::{Recorded, TickFiles};
+use crate::explain::{self, Explained, Pixel};
 use crate::fault::{Fault, warn};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
@@ -33,6 +37,8 @@ pub struct Run<'a> {
     /// Where the files are, and their names; empty where none were wanted.
     pub folder: String,
     pub files: Vec<String>,
+    /// What was explained, for people and for programs.
+    pub explained: Vec<(String, Value)>,
     /// What its user should know.
     pub warnings: Vec<String>,
 }
@@ -53,7 +59,20 @@ impl<'a> Run<'a> {
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
-            let Some(scan) = scans.scan(run.scans, &watch)? else { break };
+            let ticks = match (&mut folder, scenario.ticks) {
+                (Some(folder), Some(form)) => {
+                    if run.scans == 0 {
+                        folder.make()?;
+                    }
+                    let recorded = Recorded { design, number: run.scans, form };
+                    Some(TickFiles::begin(folder.path(), recorded, (&scans, &scenario.scene))?)
+                }
+                _ => None,
+            };
+            let keep = |record: &Record| {
+                ticks.iter().for_each(|ticks| ticks.take(record));
+            };
+            let Some(scan) = scans.scan_kept(run.scans, &watch, &keep)? else { break };
             run.score.add(&scan.score);
             run.tally.add(&scan.tally);
             if let Some(folder) = &mut folder {
@@ -63,21 +82,26 @@ impl<'a> Run<'a> {
                     cloud.truth = Truth::default();
                 }
                 let files = interrupt.undisturbed(|| {
-                    if run.scans == 0 {
+                    if run.scans == 0 && scenario.ticks.is_none() {
                         folder.make()?;
                     }
+                    let ticks = ticks.map(TickFiles::finish).transpose()?.unwrap_or_default();
                     let stage = (design, &scenario.scene);
                     let files =
                         record::write_scan(folder.path(), &scenario.formats, &cloud, stage)?;
                     folder.keep();
-                    Ok::<_, Fault>(files)
+                    Ok::<_, Fault>((files, ticks))
                 })?;
-                run.files.extend(files);
+                run.files.extend(files.0);
+                run.files.extend(files.1);
                 run.writing += writing.elapsed().as_secs_f64();
             }
             run.scans += 1;
         }
         run.elapsed = began.elapsed().as_secs_f64();
+        if run.scans > 0 {
+            run.explain(&scans, &scenario.explain, folder.as_ref())?;
+        }
         progress.finish();
         run.find_warnings(scenario, folder.as_ref());
         if let (Some(folder), 1..) = (&folder, run.scans) {
@@ -85,6 +109,31 @@ impl<'a> Run<'a> {
             interrupt.undisturbed(|| run.manifest().write(folder.path()))?;
         }
         Ok(run)
+    }
+
+    /// Explains the shots of the first scan to `pixels`.
+    fn explain(
+        &mut self,
+        scans: &Scans,
+        pixels: &[Pixel],
+        folder: Option<&Folder>,
+    ) -> Result<(), Fault> {
+        for pixel in pixels {
+            let is_there = |band: &Band| {
+                explain::shot_of(&band.shot_log(self.design), *pixel).map(|shot| (*band, shot))
+            };
+            let Some((band, shot)) = bands(self.design, 0).find_map(|band| is_there(&band)) else {
+                self.warnings.push("a pixel of --explain has no shot".to_owned());
+                continue;
+            };
+            let (log, ticks) = scans.record(&band);
+            let explained = Explained::of(self.design, (&log, &ticks), shot)?;
+            self.explained.push((explained.text(), explained.json()));
+            if let Some(folder) = folder {
+                self.files.extend(explained.write(folder.path())?);
+            }
+        }
+        Ok(())
     }
 
     fn new(design: &'a Design, scenario: &'a Scenario) -> Self {
@@ -99,6 +148,7 @@ impl<'a> Run<'a> {
             writing: 0.0,
             folder: String::new(),
             files: Vec::new(),
+            explained: Vec::new(),
             warnings: design.warnings.clone(),
         }
     }

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use macropulse::channel::Operating;
+use macropulse::codec::files::Form;
 use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
@@ -12,7 +13,8 @@ use macropulse::scene::{Changes, Scene};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::formats::Formats;
+use super::formats::{Formats, form};
+use crate::explain::Pixel;
 use crate::fault::Fault;
 use crate::input::{self, STDIN};
 use crate::kind::Kind;
@@ -30,7 +32,11 @@ pub struct Scenario {
     pub scans: u64,
     pub seed: u64,
     pub formats: Vec<Format>,
+    /// In which form shots and ticks are written, if they are.
+    pub ticks: Option<Form>,
     pub truth: bool,
+    /// Pixels to be explained.
+    pub explain: Vec<Pixel>,
 }
 
 /// A scenario file as typed.
@@ -72,7 +78,17 @@ impl Scenario {
             sensors.iter().map(|sensor| input::design(sensor, &changes.of_sensor)).collect();
         let (designs, scene) = (designs?, input::scene(scene, &changes.of_scene)?);
         check_operating(&designs, &scene)?;
-        Ok(Self { designs, scene, scans: 1, seed: 1, formats: Formats::default().0, truth: false })
+        let Formats(formats, ticks) = Formats::default();
+        Ok(Self {
+            designs,
+            scene,
+            scans: 1,
+            seed: 1,
+            formats,
+            ticks,
+            truth: false,
+            explain: Vec::new(),
+        })
     }
 
     /// The scenario in the file called `name`; names of files count from its folder.
@@ -108,16 +124,16 @@ impl Scenario {
         let scene = Scene::open_changed(&place, &changes.of_scene)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
         check_operating(&designs, &scene)?;
-        let formats = match file.formats {
+        let Formats(formats, ticks) = match file.formats {
             Some(names) => formats(&source, &names)?,
-            None => Formats::default().0,
+            None => Formats::default(),
         };
         let scans = file.scans.as_ref().map_or(1, |scans| *scans.get_ref());
         if let (Some(typed), Err(sentence)) = (&file.scans, check_scans(scans, &designs)) {
             return Err(source.fault(typed.span(), &format!("scans: {sentence}")));
         }
         let (seed, truth) = (file.seed.unwrap_or(1), file.truth);
-        Ok(Self { designs, scene, scans, seed, formats, truth })
+        Ok(Self { designs, scene, scans, seed, formats, ticks, truth, explain: Vec::new() })
     }
 }
 
@@ -153,16 +169,20 @@ pub fn check_scans(scans: u64, designs: &[Design]) -> Result<(), String> {
     Ok(())
 }
 
-fn formats(source: &Source, names: &[Spanned<String>]) -> Result<Vec<Format>, Fault> {
-    let mut formats = Vec::new();
+fn formats(source: &Source, names: &[Spanned<String>]) -> Result<Formats, Fault> {
+    let (mut formats, mut ticks) = (Vec::new(), None);
     for name in names {
+        if let Some(form) = form(name.get_ref()) {
+            ticks = Some(form);
+            continue;
+        }
         match Format::parse(name.get_ref()) {
             Ok(format) if formats.contains(&format) => {}
             Ok(format) => formats.push(format),
             Err(error) => return Err(source.fault(name.span(), &error.to_string())),
         }
     }
-    Ok(formats)
+    Ok(Formats(formats, ticks))
 }
 
 fn looks_like_a_path(name: &str) -> bool {

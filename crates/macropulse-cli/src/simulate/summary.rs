@@ -53,7 +53,12 @@ impl Run<'_> {
         if !self.folder.is_empty() {
             columns.push("written", self.written());
         }
-        format!("{}\n\n{}", self.headline(), columns.text())
+        let mut text = format!("{}\n\n{}", self.headline(), columns.text());
+        for (explained, _) in &self.explained {
+            text.push('\n');
+            text.push_str(explained);
+        }
+        text
     }
 
     fn headline(&self) -> String {
@@ -137,6 +142,9 @@ impl Run<'_> {
         let mut json = serde_json::to_value(self.manifest()).unwrap_or_default();
         json["speed"] = self.speed().into();
         json["folder"] = (!self.folder.is_empty()).then_some(self.folder.as_str()).into();
+        if !self.explained.is_empty() {
+            json["explained"] = self.explained.iter().map(|(_, json)| json.clone()).collect();
+        }
         json
     }
 }

@@ -6,6 +6,7 @@ mod bitwise;
 mod check;
 mod direct;
 mod error;
+mod explain;
 mod field;
 mod matched;
 mod pick;
@@ -15,6 +16,7 @@ mod timeline;
 mod timing;
 
 pub use error::Error;
+pub use explain::{Accepted, Explanation, OtherLight, Verdict};
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 

@@ -4,6 +4,8 @@
 //! its guard shots, and their echoes.
 
 use super::Design;
+use macropulse_codec::Cut;
+
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
 /// Parts of a tick in which detection events are timed. Jitter is rounded to one, by 6 µm for 2.5 ps.
@@ -36,11 +38,21 @@ impl Design {
         fs_from_s(tof_from_range(self.scan.light_range + early)) + self.macropulse_fs()
     }
 
-    /// For how long before the first owned shot of a band light must be known, fs: as long as
-    /// light of earlier shots is under way, and for the detector to forget the state it is started
-    /// in.
-    pub fn history_fs(&self) -> i64 {
-        self.light_fs().max(self.detector.model().memory_fs())
+    /// How a band is cut out of a stream of shots and ticks. Before its first owned shot light must be
+    /// known for as long as that of earlier shots is under way when its ticks begin, and for the
+    /// detector to forget the state it is started in.
+    pub fn cut(&self) -> Cut {
+        let jitter_fs = self.most_jitter_fs();
+        let lead_fs = self.macropulse_fs() + jitter_fs;
+        let under_way_fs = self.light_fs() + jitter_fs;
+        Cut {
+            tick_fs: self.tdc.tick_fs,
+            clock_fs: self.tdc.clock_fs,
+            jitter_fs,
+            listening_fs: self.listening_fs(),
+            lead_fs,
+            history_fs: lead_fs + under_way_fs.max(self.detector.model().memory_fs()),
+        }
     }
 
     /// How far jitter, and the length of a micropulse, can displace a detection event, fs.
@@ -53,8 +65,9 @@ impl Design {
     /// where not even one shot has room.
     pub fn longest_band_fs(&self) -> i64 {
         let counted = i64::from(u32::MAX / PARTS_OF_TICK).saturating_mul(self.tdc.tick_fs);
+        let cut = self.cut();
         // Guard shots on both sides, and the light of the last one.
-        let around = self.history_fs() + self.listening_fs() + self.light_fs();
+        let around = cut.history_fs + cut.listening_fs + cut.lead_fs + self.light_fs();
         // The clock starts at one of its own periods, and jitter goes both ways.
         counted - around - 2 * self.most_jitter_fs() - 2 * self.tdc.clock_fs
     }

@@ -21,6 +21,7 @@ mod light;
 mod limits;
 mod presets;
 mod receiver;
+mod recorded;
 pub mod safety;
 mod scan;
 mod tdc;

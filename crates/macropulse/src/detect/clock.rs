@@ -17,9 +17,8 @@ impl Clock {
     /// The clock of a band whose first shot is fired at `first_fs`. It starts early enough for an
     /// event that jitter puts before that.
     pub fn new(design: &Design, first_fs: i64) -> Self {
-        let (tick_fs, clock_fs) = (design.tdc.tick_fs, design.tdc.clock_fs);
-        let epoch_fs = (first_fs - design.most_jitter_fs()).div_euclid(clock_fs) * clock_fs;
-        Self { epoch: epoch_fs / tick_fs, epoch_fs, ruler: Ruler::new(PARTS_OF_TICK, tick_fs) }
+        let (tick_fs, epoch) = (design.tdc.tick_fs, design.cut().epoch(first_fs));
+        Self { epoch, epoch_fs: epoch * tick_fs, ruler: Ruler::new(PARTS_OF_TICK, tick_fs) }
     }
 
     /// Whole parts of a tick in `fs`, rounded down.

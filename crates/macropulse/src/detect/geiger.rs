@@ -9,8 +9,8 @@
 //! 4. When the detector begins to look, a cell is blind with the probability ρ = r·τ/(1 + r·τ) that
 //!    the steady rate r of counts per cell leaves, τ the dead time, and for a time that is even
 //!    between 0 and τ: the stationary state of a cell in steady light. It begins several dead
-//!    times before the first owned shot ([`history_fs`](crate::design::Design::history_fs)), so that by then the state is
-//!    what the light has made of it.
+//!    times before the ticks of a band ([`Design::cut`](crate::design::Design::cut)), so that by then the state is what the
+//!    light has made of it.
 //!
 //! A single cell with a dead time as long as the range gate is the detector that fires once per
 //! arm time.

@@ -50,6 +50,10 @@ impl Thresholding {
 }
 
 impl Kind for Thresholding {
+    fn measures(&self) -> bool {
+        self.measures
+    }
+
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         let mut events: Vec<(u32, f32)> = Vec::new();
         let span = channel.whole_span();
@@ -69,7 +73,8 @@ impl Kind for Thresholding {
         counts(self.linear.false_rate, channel, chance, &mut memory.noise);
         let noise = memory.noise.iter();
         events.extend(noise.map(|time| (*time, self.linear.threshold as f32)));
-        events.sort_unstable_by_key(|event| event.0);
+        // Of several at once the order must not depend on what else is looked at.
+        events.sort_unstable_by(|one, other| one.0.cmp(&other.0).then(other.1.total_cmp(&one.1)));
         found.time.extend(events.iter().map(|event| event.0));
         if self.measures {
             found.amplitude.extend(events.iter().map(|event| event.1));

@@ -69,9 +69,19 @@ trait Kind: fmt::Debug + Send + Sync {
     fn marks(&self, _order: &[u64], _light: &Light) -> Option<(&ExactWords, Vec<Macropulse>)> {
         None
     }
+
+    /// Whether it measures the energy of each pulse.
+    fn measures(&self) -> bool {
+        false
+    }
 }
 
 impl<'a> Detectors<'a> {
+    /// Whether its events have amplitudes.
+    pub fn measure(&self) -> bool {
+        self.kind.measures()
+    }
+
     /// The detectors of `design` where it is `operating`, with the random numbers of `chance`.
     pub fn new(design: &'a Design, operating: &Operating, chance: Chance) -> Self {
         let sunlight = operating.background;

@@ -59,6 +59,10 @@ struct Fired {
 }
 
 impl Kind for SingleStopSetting {
+    fn measures(&self) -> bool {
+        SingleStopSetting::measures(self)
+    }
+
     /// For each shot, while its gate is open, the earliest firing.
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, _: &mut Memory) {
         let &Channel { clock, design, log, .. } = channel;

@@ -14,6 +14,9 @@ use macropulse_codec::ShotLog;
 /// coded sensor to stay in the cache, enough for the guard shots to be a small part of it.
 const SHOTS: u64 = 1700;
 
+/// Shots of a log that are worked out together.
+const PART: u64 = 4096;
+
 /// One band: consecutive shots of one scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Band {
@@ -58,8 +61,40 @@ fn shots_of_band(design: &Design) -> u64 {
 }
 
 impl Band {
-    /// The shots of the band and its guard shots: all whose light can arrive while the receiver
-    /// listens to the band's own shots, be it from beyond the range gate.
+    /// The band that owns `shot`, counted from the first shot of the first scan.
+    pub fn of_shot(design: &Design, shot: u64) -> Self {
+        let total = design.shots_per_scan();
+        let step = shots_of_band(design);
+        let first = shot % total / step * step;
+        Self { scan: shot / total, first, shots: step.min(total - first) }
+    }
+
+    /// The shot behind its last one, counted from the first shot of the first scan.
+    pub fn end(&self, design: &Design) -> u64 {
+        self.scan * design.shots_per_scan() + self.first + self.shots
+    }
+
+    /// The band behind it, in its scan or in the next one.
+    pub fn next(&self, design: &Design) -> Self {
+        let first = self.first + self.shots;
+        let total = design.shots_per_scan();
+        let (scan, first) = if first < total { (self.scan, first) } else { (self.scan + 1, 0) };
+        Self { scan, first, shots: shots_of_band(design).min(total - first) }
+    }
+
+    /// The ticks that the receiver is given of the band, absolute; and those of them that are the
+    /// band's own: up to where those of the next band begin.
+    pub fn ticks(&self, design: &Design) -> (Range<i64>, Range<i64>) {
+        let fired = |shot: u64| fired_at_fs(design, self.scan, self.first + shot);
+        let cut = design.cut();
+        let seen = cut.ticks(fired(0), fired(self.shots - 1));
+        let next = self.next(design);
+        let own = seen.start..cut.opens(fired_at_fs(design, next.scan, next.first));
+        (seen, own)
+    }
+
+    /// The shots of the band and its guard shots: all whose light can arrive in the ticks of the band,
+    /// be it from beyond the range gate ([`Design::cut`]).
     pub fn shot_log(&self, design: &Design) -> ShotLog {
         let owned_first = self.scan * design.shots_per_scan() + self.first;
         let owned_last = owned_first + self.shots;
@@ -69,17 +104,33 @@ impl Band {
     }
 }
 
-/// The shots `owned`, those before them whose light is still under way, and those after them that
-/// are fired while the receiver still listens to the last of them.
+/// The shots of scan number `scan` and the guard shots around it, counted from the first shot of the
+/// first scan: all that its returns can be decoded with.
+pub fn shots_of_scan(design: &Design, scan: u64) -> Range<u64> {
+    let first = scan * design.shots_per_scan();
+    with_guard(design, first..first + design.shots_per_scan())
+}
+
+/// The log of `shots`, in parts of some thousand, all of them owned.
+pub fn logs(design: &Design, shots: Range<u64>) -> impl Iterator<Item = ShotLog> {
+    let ends = shots.end;
+    shots.step_by(PART as usize).map(move |from| {
+        let log = log_of(design, from..ends.min(from + PART));
+        ShotLog { owned: 0..log.len(), ..log }
+    })
+}
+
+/// The shots `owned`, those before them whose light is still under way when their ticks begin, and
+/// those after them that are fired before their ticks end.
 fn with_guard(design: &Design, owned: Range<u64>) -> Range<u64> {
     let per_scan = design.shots_per_scan();
     let fired = |shot: u64| fired_at_fs(design, shot / per_scan, shot % per_scan);
-    let (opens, closes) =
-        (fired(owned.start) - design.history_fs(), fired(owned.end - 1) + design.listening_fs());
+    let cut = design.cut();
+    let fired_fs = cut.shots(fired(owned.start), fired(owned.end - 1));
+    let (opens, closes) = fired_fs.into_inner();
     // As many as are fired in that time on average, and then one by one: a resonant mirror is
     // faster in the middle of a line, and slower at its ends.
-    let mean =
-        (design.history_fs() as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
+    let mean = (cut.history_fs as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
     let (mut first, mut end) = (owned.start.saturating_sub(mean), owned.end + mean);
     while first > 0 && fired(first - 1) >= opens {
         first -= 1;
@@ -176,6 +227,22 @@ mod tests {
                 next += band.shots;
             }
             assert_eq!(next, design.shots_per_scan());
+        }
+    }
+
+    #[test]
+    fn the_band_behind_the_last_one_is_the_first_of_the_next_scan() {
+        for name in ["kim-park-2016", "hdl-64e", "peregrine"] {
+            let design = Design::open(name, &[]).unwrap();
+            let all: Vec<Band> = (0..2).flat_map(|scan| bands(&design, scan)).collect();
+            for pair in all.windows(2) {
+                assert_eq!(pair[0].next(&design), pair[1], "{name}");
+                let end = pair[0].end(&design);
+                assert_eq!(Band::of_shot(&design, end - 1), pair[0], "{name}");
+                assert_eq!(Band::of_shot(&design, end), pair[1], "{name}");
+                let ((seen, own), (_, next)) = (pair[0].ticks(&design), pair[1].ticks(&design));
+                assert_eq!((own.start, own.end), (seen.start, next.start), "{name}");
+            }
         }
     }
 

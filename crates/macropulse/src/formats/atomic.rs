@@ -1,8 +1,64 @@
 //! Whole files or none.
 
 use super::Error;
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// A file that is not there before it is kept, for one that is written bit by bit; see
+/// [`write_atomically`].
+#[derive(Debug)]
+pub struct WholeFile {
+    path: PathBuf,
+    out: BufWriter<NamedTempFile>,
+}
+
+impl WholeFile {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if its folder cannot be written to.
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        // A bare file name has an empty parent, which is the current folder.
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let temporary = builder().tempfile_in(folder.unwrap_or(Path::new(".")));
+        let temporary = temporary.map_err(|cause| Error::write(path, cause))?;
+        Ok(Self { path: path.to_owned(), out: BufWriter::with_capacity(1 << 16, temporary) })
+    }
+
+    /// Gives the file, which is whole now, its name.
+    ///
+    /// # Errors
+    /// [`Error::Write`] with its path and the cause; the temporary file is gone then.
+    pub fn keep(self) -> Result<(), Error> {
+        let Self { path, out } = self;
+        let temporary = out.into_inner().map_err(io::IntoInnerError::into_error);
+        let kept = temporary.and_then(|temporary| temporary.persist(&path).map_err(|e| e.error));
+        kept.map(|_| ()).map_err(|cause| Error::write(&path, cause))
+    }
+
+    /// What went wrong while it was written, with its path.
+    pub fn failed(&self, cause: io::Error) -> Error {
+        Error::write(&self.path, cause)
+    }
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.out.seek(to)
+    }
+}
 
 /// Writes a file under a temporary name in the same folder and renames it when it is whole. Who
 /// looks at `path` sees the old file or the new one, never half of it, also after Ctrl-C.
@@ -13,17 +69,9 @@ pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
-    let attempt = || -> io::Result<()> {
-        // A bare file name has an empty parent, which is the current folder.
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let temporary = builder().tempfile_in(folder.unwrap_or(Path::new(".")))?;
-        let mut out = BufWriter::with_capacity(1 << 16, temporary);
-        write(&mut out)?;
-        let temporary = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-        temporary.persist(path).map_err(|failed| failed.error)?;
-        Ok(())
-    };
-    attempt().map_err(|cause| Error::write(path, cause))
+    let mut file = WholeFile::create(path)?;
+    write(&mut file.out).map_err(|cause| file.failed(cause))?;
+    file.keep()
 }
 
 /// Temporary files are private by default; ours become results to be kept, so they take the

@@ -13,7 +13,7 @@ mod pcd_reader;
 mod ply;
 mod png16;
 
-pub use atomic::write_atomically;
+pub use atomic::{WholeFile, write_atomically};
 pub use csv::quoted;
 pub use error::Error;
 pub use manifest::{Begun, Entries, Manifest, Named, SCHEMA_VERSION, Surroundings, versioned};
@@ -112,6 +112,22 @@ pub fn write_cloud(
         Format::Csv => write_atomically(path, |out| csv::write(cloud, names, out)),
         Format::Png => write_atomically(path, |out| png16::write(cloud, out)),
     }
+}
+
+/// Writes the returns of `cloud` as lines of [`Format::Csv`], for a stream of parts of which only the
+/// first has the line of names before it.
+///
+/// # Errors
+/// If `out` cannot be written to.
+pub fn write_csv_lines(
+    cloud: &PointCloud,
+    is_first: bool,
+    out: &mut dyn std::io::Write,
+) -> std::io::Result<()> {
+    let mut lines = Vec::new();
+    csv::write(cloud, &Names::default(), &mut lines)?;
+    let behind = lines.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    out.write_all(if is_first { &lines } else { &lines[behind..] })
 }
 
 /// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.

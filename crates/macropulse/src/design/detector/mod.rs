@@ -165,6 +165,12 @@ pub trait Model {
     /// For how long, fs, its state depends on the light that it has seen; 0 without memory.
     fn memory_fs(&self) -> i64;
 
+    /// Whether an event may depend on other light than that which makes it: on what came before, or
+    /// on what else comes while a gate is open.
+    fn has_state(&self) -> bool {
+        self.memory_fs() > 0
+    }
+
     /// Why it cannot be simulated in so much sunlight, and what to do, if it cannot.
     fn refusal(&self, background: f64) -> Option<String>;
 

@@ -172,6 +172,11 @@ impl Model for SingleStop {
         0
     }
 
+    /// What fires it in a gate decides what else could have.
+    fn has_state(&self) -> bool {
+        true
+    }
+
     fn refusal(&self, _: f64) -> Option<String> {
         None
     }

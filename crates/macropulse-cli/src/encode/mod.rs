@@ -1,20 +1,33 @@
-//! `macropulse encode`: what is sent to a pixel, chip by chip.
+//! `macropulse encode`: what is sent to a pixel, chip by chip; and the shot log of a whole scan, with
+//! the ticks of an ideal echo.
+
+mod scan;
+
+use std::path::PathBuf;
 
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::codec::files::Form;
 use macropulse::design::Design;
 use macropulse::emit::{Shot, most_scans, shot_of_pixel};
 use serde_json::{Value, json};
 
 use crate::fault::Fault;
 use crate::options::Changes;
+use crate::simulate::ticks::Recorded;
 use crate::text::{Columns, grouped, print, print_json};
 use crate::{completions, input};
 
-/// Print the macropulse that is sent to a pixel, mark by mark
+/// Print the macropulse that is sent to a pixel, mark by mark, or write the shot log of a scan
+///
+/// Without --pixel the shot log of the scan is written, as `decode` reads it; with --wall-m also the
+/// ticks that an ideal detector and unlimited converters would give of a white wall at that range
+/// from every pixel: a test vector for a decoder in hardware.
 #[derive(Args)]
-#[command(after_help = "Example:
-  macropulse encode kim-park-2016 --pixel 0,1")]
+#[command(after_help = "Examples:
+  macropulse encode kim-park-2016 --pixel 0,1
+  macropulse encode kim-park-2016 --scan 3 -o out
+  macropulse encode kim-park-2016-fixed --wall-m 30 --format ticks-csv -o out")]
 pub struct Encode {
     /// Ready sensor or TOML file, - for standard input
     #[arg(value_name = "SENSOR", conflicts_with = "named", required_unless_present = "named")]
@@ -29,12 +42,25 @@ pub struct Encode {
     changes: Changes,
 
     /// Pixel, both counted from 0, row 0 at the top and column 0 at the left; repeatable
-    #[arg(long = "pixel", value_name = "ROW,COLUMN", required = true, value_parser = pixel)]
+    #[arg(long = "pixel", value_name = "ROW,COLUMN", value_parser = pixel)]
     pixels: Vec<(u32, u32)>,
 
     /// Number of the scan, from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     scan: u64,
+
+    /// Folder for the shot log of the scan, made if need be
+    #[arg(short, long, value_name = "DIR", conflicts_with = "pixels")]
+    #[arg(required_unless_present = "pixels")]
+    output: Option<PathBuf>,
+
+    /// Form of the shot log: ticks for binary, ticks-csv for text [default: ticks]
+    #[arg(long, value_name = "FORM", requires = "output", value_parser = scan::form)]
+    format: Option<Form>,
+
+    /// Write also the ticks of an echo of every shot from this range, m, as of an ideal detector
+    #[arg(long, value_name = "M", requires = "output")]
+    wall_m: Option<f64>,
 
     /// Print as JSON: an object, or an array of them for several pixels
     #[arg(long)]
@@ -51,6 +77,11 @@ fn pixel(typed: &str) -> Result<(u32, u32), String> {
 pub fn run(options: &Encode) -> Result<(), Fault> {
     let sensor = options.sensor.as_ref().or(options.named.as_ref()).map_or("", String::as_str);
     let design = input::design(sensor, &options.changes.of_sensor()?)?;
+    if let Some(output) = &options.output {
+        let form = options.format.unwrap_or(Form::Binary);
+        let recorded = Recorded { design: &design, number: options.scan, form };
+        return scan::write(recorded, output, (options.wall_m, options.json));
+    }
     let macropulses: Vec<Macropulse> = options
         .pixels
         .iter()

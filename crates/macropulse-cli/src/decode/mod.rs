@@ -1,0 +1,113 @@
+//! `macropulse decode`: points out of recorded shots and ticks, without a scene.
+
+mod input;
+mod run;
+mod summary;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap_complete::engine::ArgValueCompleter;
+use macropulse::channel::Operating;
+
+use crate::completions;
+use crate::explain::{self, Pixel};
+use crate::fault::Fault;
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
+use crate::options::{self, Common, Surroundings};
+use crate::simulate::formats::Formats;
+use crate::text::{print, print_json};
+use run::{Run, Sink};
+
+/// Decode recorded shots and ticks into points
+///
+/// Both come from `simulate --format ticks`, from `encode`, or from hardware: docs/formats.md says how
+/// they are written. The points are those that `simulate` gives, to the byte.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  macropulse simulate kim-park-2016-fixed car-30m --format ticks,pcd -o out
+  macropulse decode --sensor kim-park-2016-fixed out/shots-000000.mps out/ticks-000000.mpt -o again
+  macropulse decode --sensor mine.toml shots.csv - --format none -o - < ticks.csv
+  macropulse decode --sensor mine.toml shots.csv ticks.csv --explain 240,424")]
+pub struct Decode {
+    /// The shot log, or `-` for stdin
+    #[arg(value_name = "SHOTS")]
+    shots: PathBuf,
+
+    /// The ticks, or `-` for stdin: points leave as soon as they are decided
+    #[arg(value_name = "TICKS")]
+    ticks: PathBuf,
+
+    /// Ready sensor or TOML file, as the shots were fired by
+    #[arg(long, value_name = "NAME-or-FILE", add = ArgValueCompleter::new(completions::sensors))]
+    sensor: String,
+
+    #[command(flatten)]
+    surroundings: Surroundings,
+
+    #[command(flatten)]
+    changes: options::Changes,
+
+    /// Folder for the results, made if need be; `-` writes the points to stdout as lines of CSV
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    #[arg(
+        long,
+        value_name = "LIST",
+        help = "Formats to write, as of `simulate` [default: pcd,png]"
+    )]
+    format: Option<Formats>,
+
+    /// Say why the shot to this pixel was decided as it was; repeatable
+    #[arg(long = "explain", value_name = "ROW,COLUMN", value_parser = explain::pixel)]
+    explain: Vec<Pixel>,
+
+    /// Print what was counted as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
+    let changes = options.changes.apart(&options.surroundings)?;
+    let design = crate::input::design(&options.sensor, &changes.of_sensor)?;
+    let environment = Surroundings::alone(&changes)?;
+    let operating = Operating::of(&design, &environment)?;
+    explain::check(&design, &options.explain)?;
+    let formats = options.formats()?;
+    let sink = match options.output.as_deref() {
+        None => Sink::Nothing,
+        Some(path) if path == Path::new("-") => Sink::Lines,
+        Some(path) => Sink::Folder(Folder::claim(path)?, formats),
+    };
+    if matches!(sink, Sink::Lines) && (options.json || !options.explain.is_empty()) {
+        return Err(Fault::Wrong(
+            "-o - writes the points to stdout: --json and --explain have no place there; write to \
+             a folder with -o DIR"
+                .to_owned(),
+        ));
+    }
+    let stream = input::open(&options.shots, &options.ticks, &design)?;
+    let interrupt = Interrupt::listen()?;
+    let run = Run::new(&design, &operating, options.explain.clone());
+    let run = run.through(stream, sink, (common, &interrupt))?;
+    if options.json {
+        print_json(vec![run.json(&environment)])?;
+    } else if !common.quiet && !run.is_streamed {
+        print(&run.text(&environment))?;
+    }
+    if interrupt.is_raised() { Err(Fault::Interrupted) } else { Ok(()) }
+}
+
+impl Decode {
+    fn formats(&self) -> Result<Formats, Fault> {
+        let formats = self.format.clone().unwrap_or_default();
+        match formats.1 {
+            None => Ok(formats),
+            Some(_) => Err(Fault::Wrong(
+                "--format: ticks are what `decode` reads; ask for formats of points".to_owned(),
+            )),
+        }
+    }
+}

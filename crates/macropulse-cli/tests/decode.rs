@@ -1,0 +1,285 @@
+//! Decoding recorded shots and ticks: the points of the simulation again, from files alone.
+
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Command, Stdio};
+
+use common::Desk;
+
+/// Simulates with ticks, decodes them, and compares every file of points byte by byte; gives the JSON
+/// of both.
+fn again(
+    desk: &Desk,
+    sensor: &str,
+    rest: &str,
+    scans: usize,
+) -> (serde_json::Value, serde_json::Value) {
+    let formats = "--format pcd,csv,png";
+    let line = format!("simulate {sensor} {rest} {formats},ticks -o out --json -j 1");
+    let simulated = desk.json(&format!("{line} --scans {scans}"));
+    assert!(simulated["counts"]["returns"].as_u64().unwrap() > 0, "{line}");
+    let environment = simulated["environment"].as_str().unwrap();
+    let mut returns = 0;
+    let mut decoded = serde_json::Value::Null;
+    for scan in 0..scans {
+        let files = format!("out/shots-{scan:06}.mps out/ticks-{scan:06}.mpt");
+        let line = format!("decode {sensor} {files} --environment {environment} {formats} -j 3");
+        decoded = desk.json(&format!("{line} -o again --json"));
+        returns += decoded["counts"]["returns"].as_u64().unwrap();
+        for ending in ["pcd", "csv", "png"] {
+            let kind = if ending == "png" { "range" } else { "scan" };
+            let name = format!("{kind}-{scan:06}.{ending}");
+            let [was, is] = ["out", "again"]
+                .map(|folder| fs::read(desk.path().join(folder).join(&name)).unwrap());
+            assert!(was == is, "{sensor} {rest}: {name} differs");
+        }
+    }
+    assert_eq!(simulated["counts"]["returns"], returns, "{sensor}");
+    assert_eq!(
+        simulated["counts"]["shots"].as_u64().unwrap(),
+        decoded["counts"]["shots"].as_u64().unwrap() * scans as u64
+    );
+    (simulated, decoded)
+}
+
+const ROWS: &str = "--set scan.raster.rows";
+
+#[test]
+fn the_coded_receivers_find_the_same_points_in_files() {
+    for (sensor, rows) in [
+        ("kim-park-2016-fixed", 24),
+        ("kim-park-2016", 12),
+        ("bipolar-gold", 6),
+        ("coded-practical", 10),
+    ] {
+        let desk = Desk::new();
+        let sensor = format!("--sensor {sensor} {ROWS}={rows}");
+        let (_, decoded) = again(&desk, &sensor, "--scene street", 1);
+        assert_eq!(decoded["counts"]["scans"], 1);
+    }
+}
+
+#[test]
+fn the_direct_receivers_find_the_same_points_in_files() {
+    for sensor in ["hdl-64e", "peregrine"] {
+        again(&Desk::new(), &format!("--sensor {sensor}"), "--scene car-30m", 1);
+    }
+}
+
+#[test]
+fn several_returns_and_several_scans_of_a_moving_scene_come_out_the_same() {
+    let desk = Desk::new();
+    let scene = "version = 1\nground = { material = \"asphalt\" }\nenvironment = \"overcast\"\n\
+                 [sensor]\nposition_m = [0, 0, 2]\npitch_deg = 10\nvelocity_m_s = [20, 0, 0]\n";
+    desk.put("drive.toml", scene);
+    let sensor = format!("--sensor kim-park-2016-fixed {ROWS}=8 --set receiver.returns=3");
+    let (simulated, _) = again(&desk, &sensor, "--scene drive.toml", 3);
+    assert_eq!(simulated["counts"]["scans"], 3);
+}
+
+/// Detectors and converters that remember: what they saw before a band decides what they see in it.
+#[test]
+fn cells_that_are_blind_and_converters_that_are_busy_change_nothing() {
+    let desk = Desk::new();
+    desk.put(
+        "cells.toml",
+        "version = 1\nname = \"cells\"\nextends = \"kim-park-2016\"\n[scan.raster]\nrows = 6\n\
+         [detector.geiger]\nsensitivity = { range_m = 150.0, reflectance = 1.0, pd = 0.99 }\n\
+         cells = 20\ndead_time_ns = 20\ndark_counts_hz = 1e8\n",
+    );
+    again(&desk, "--sensor cells.toml", "--scene car-30m", 1);
+    let desk = Desk::new();
+    let sensor = format!("--sensor kim-park-2016-fixed {ROWS}=12 --set tdc.converters=10");
+    let (simulated, _) = again(&desk, &sensor, "--scene car-30m", 1);
+    assert!(simulated["detections_lost"].as_u64().unwrap() > 1000, "{simulated}");
+}
+
+const SMALL: &str = "--sensor kim-park-2016-fixed --set scan.raster.rows=6";
+
+/// The sun and air of the scene.
+const DARK: &str = "--environment vacuum-dark";
+
+/// A desk with the record of a small scan in both forms.
+fn recorded() -> Desk {
+    let desk = Desk::new();
+    for form in ["ticks", "ticks-csv"] {
+        desk.json(&format!("simulate {SMALL} --scene car-30m --format csv,{form} -o out --json"));
+    }
+    desk
+}
+
+#[test]
+fn text_says_what_binary_says() {
+    let desk = recorded();
+    let points = |shots: &str, ticks: &str| {
+        let line =
+            format!("decode {SMALL} {DARK} out/{shots} out/{ticks} --format csv -o a --json");
+        desk.json(&line);
+        fs::read(desk.path().join("a/scan-000000.csv")).unwrap()
+    };
+    let was = fs::read(desk.path().join("out/scan-000000.csv")).unwrap();
+    assert!(was == points("shots-000000.csv", "ticks-000000.csv"));
+    assert!(was == points("shots-000000.mps", "ticks-000000.csv"));
+    assert!(was == points("shots-000000.csv", "ticks-000000.mpt"));
+}
+
+/// Points leave before the ticks have ended, and are those of the files.
+#[test]
+fn ticks_on_stdin_become_lines_on_stdout_as_they_come() {
+    let desk = recorded();
+    let was = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    let ticks = fs::read(desk.path().join("out/ticks-000000.mpt")).unwrap();
+    let line = format!("decode {SMALL} {DARK} out/shots-000000.mps - -o -");
+    let mut program = desk
+        .command(&line)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = program.stdin.take().unwrap();
+    let mut out = BufReader::new(program.stdout.take().unwrap());
+    stdin.write_all(&ticks[..ticks.len() * 9 / 10]).unwrap();
+    stdin.flush().unwrap();
+    let mut first = String::new();
+    for _ in 0..100 {
+        out.read_line(&mut first).unwrap();
+    }
+    assert!(was.starts_with(&first) && first.lines().count() == 100);
+    stdin.write_all(&ticks[ticks.len() * 9 / 10..]).unwrap();
+    drop(stdin);
+    let mut rest = String::new();
+    out.read_to_string(&mut rest).unwrap();
+    assert!(program.wait().unwrap().success());
+    assert!(was == format!("{first}{rest}"));
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_one_sentence_with_its_place() {
+    let desk = recorded();
+    let path = |name: &str| desk.path().join("out").join(name);
+    let read = |name: &str| fs::read(path(name)).unwrap();
+    let (shots, ticks) = (read("shots-000000.mps"), read("ticks-000000.mpt"));
+    let text = String::from_utf8(read("ticks-000000.csv")).unwrap();
+    let put = |name: &str, bytes: &[u8]| fs::write(path(name), bytes).unwrap();
+    put("short.mpt", &ticks[..ticks.len() - 3]);
+    put("few.mpt", &ticks[..128 + 8 * 1000]);
+    put("empty", b"");
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.swap(500, 501);
+    put("order.csv", lines.join("\n").as_bytes());
+    put("version.csv", text.replacen("ticks 1", "ticks 7", 1).as_bytes());
+    put("length.csv", text.replacen("tick_fs=2500", "tick_fs=5000", 1).as_bytes());
+    let mut far = shots.clone();
+    far[128 + 10..128 + 12].copy_from_slice(&848_u16.to_le_bytes());
+    put("far.mps", &far);
+    let start = format!("decode {SMALL}");
+    let good = ("out/shots-000000.mps", "out/ticks-000000.mpt");
+    for (shots, ticks, words) in [
+        (good.0, "out/short.mpt", &["short.mpt: byte ", "truncated"][..]),
+        (good.0, "out/few.mpt", &["few.mpt: ", "1000 of", "truncated"]),
+        (good.0, "out/empty", &["out/empty: ", "is empty"]),
+        ("out/empty", good.1, &["out/empty: ", "is empty"]),
+        (good.0, "out/order.csv", &["order.csv: line 502: ", "sort them"]),
+        (good.0, "out/version.csv", &["version.csv: line 1: version `7`", "reads 1"]),
+        (good.0, "out/length.csv", &["line 1: ticks of 5000 fs", "2500 fs"]),
+        ("out/far.mps", good.1, &["far.mps: byte 128: shot 0: column 848 is not among the 848"]),
+        (good.1, good.0, &["these are ticks, where shots are wanted"]),
+        (good.0, "out/nothing", &["out/nothing: cannot be read: there is no such file"]),
+        ("-", "-", &["only one of SHOTS and TICKS can come from stdin"]),
+    ] {
+        desk.refused(&format!("{start} {shots} {ticks} -o a"), words);
+    }
+    let other = format!("decode --sensor kim-park-2016-fixed {} {} -o a", good.0, good.1);
+    desk.refused(&other, &["shots-000000.mps: is of another sensor", "name the sensor"]);
+}
+
+/// A file without ticks is read, and it is said that nothing came of it.
+#[test]
+fn no_points_are_never_silent() {
+    let desk = recorded();
+    desk.put("none.csv", "# macropulse ticks 1, tick_fs=2500\ntick\n");
+    let ran = desk.run(&format!("decode {SMALL} out/shots-000000.mps none.csv -o a --format csv"));
+    assert_eq!(ran.code, Some(0));
+    assert!(ran.err.contains("not a single point: no tick lies in the time"), "{}", ran.err);
+    desk.put("no-shots.csv", "# macropulse shots 1\nshot,fired_fs,row,column,label,word\n");
+    let line = format!("decode {SMALL} no-shots.csv out/ticks-000000.mpt -o b");
+    desk.refused(&line, &["there is not a single shot"]);
+}
+
+/// The shot log of `encode`, with the ticks of a wall at a known range.
+#[test]
+fn an_encoded_scan_is_decoded_to_the_wall_it_is_of() {
+    let desk = Desk::new();
+    for form in ["ticks", "ticks-csv"] {
+        let line = format!("encode {SMALL} --scan 2 --wall-m 37.5 --format {form} -o in --json");
+        let encoded = desk.json(&line);
+        assert!(encoded["ticks"].as_u64().unwrap() > 100_000);
+        let [shots, ticks] = [0, 1].map(|at| encoded["files"][at].as_str().unwrap().to_owned());
+        let line = format!("decode {SMALL} in/{shots} in/{ticks} --format csv -o {form} --json");
+        let decoded = desk.json(&line);
+        // Column 0 is dark.
+        assert_eq!(decoded["counts"]["returns"], 6 * 848);
+        let points = fs::read_to_string(desk.path().join(form).join("scan-000002.csv")).unwrap();
+        let range = |line: &str| line.split(',').nth(4).unwrap().parse::<f64>().unwrap();
+        assert!(points.lines().skip(1).all(|line| (range(line) - 37.5).abs() < 4e-4));
+    }
+}
+
+/// Ticks of hardware that we did not simulate, written by a program in another language.
+#[test]
+fn made_up_hardware_in_python_is_decoded_to_its_wall() {
+    let desk = Desk::new();
+    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/examples");
+    let written = Command::new("python3")
+        .arg(format!("{examples}/ticks.py"))
+        .arg(desk.path())
+        .status()
+        .expect("python3 is needed for this test");
+    assert!(written.success());
+    let line = format!("decode --sensor {examples}/hardware.toml shots.csv ticks.csv");
+    let decoded = desk.json(&format!("{line} --format csv -o out --json"));
+    assert_eq!(decoded["counts"]["returns"], 256);
+    let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    let range = |line: &str| line.split(',').nth(4).unwrap().parse::<f64>().unwrap();
+    assert!(points.lines().skip(1).all(|line| (range(line) - 42.0).abs() < 4e-4), "{points}");
+}
+
+/// What is explained agrees with what is decoded, accepted or not, in words, JSON and pictures.
+#[test]
+fn an_explanation_says_what_was_decided() {
+    let desk = Desk::new();
+    let sensor = "--sensor kim-park-2016 --set scan.raster.rows=6";
+    let pixels = "--explain 2,0 --explain 2,300 --explain 3,424";
+    let line =
+        format!("simulate {sensor} --scene car-30m --format csv,ticks -o out --json {pixels}");
+    let simulated = desk.json(&line);
+    let files = "out/shots-000000.mps out/ticks-000000.mpt";
+    let environment = simulated["environment"].as_str().unwrap();
+    let line =
+        format!("decode {sensor} {files} --environment {environment} -o again --json {pixels}");
+    let decoded = desk.json(&line);
+    assert_eq!(simulated["explained"], decoded["explained"]);
+    let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    for told in decoded["explained"].as_array().unwrap() {
+        let pixel = format!(",{},{},", told["row"], told["column"]);
+        let line = points.lines().find(|line| line.contains(&pixel));
+        assert_eq!(line.is_some(), told["decided"] == "accepted", "{told}");
+        if let Some(line) = line {
+            let range: f64 = line.split(',').nth(4).unwrap().parse().unwrap();
+            assert!((told["returns"][0]["range_m"].as_f64().unwrap() - range).abs() < 1e-4);
+        }
+    }
+    assert_eq!(decoded["explained"][0]["decided"], "no_peak");
+    assert!(decoded["explained"][0]["why"].as_str().unwrap().contains("has no mark"));
+    for ending in ["txt", "json", "svg", "png"] {
+        let path = desk.path().join(format!("again/explain-000000-2-300.{ending}"));
+        assert!(path.is_file(), "{}", path.display());
+    }
+    let line = format!("decode {sensor} {files} --explain 6,0");
+    desk.refused(&line, &["--explain 6,0: kim-park-2016 has rows 0 to 5 and columns 0 to 847"]);
+}

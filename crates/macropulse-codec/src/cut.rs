@@ -1,0 +1,86 @@
+//! How a run of shots is cut out of a stream, so that it can be decoded by itself.
+
+use std::ops::{Range, RangeInclusive};
+
+/// What must be known around a run of **owned** shots to decode them as if the whole stream were at
+/// hand. All times are fs.
+///
+/// Who simulates a band and who decodes a recorded stream cut by the same rule, and so the receiver
+/// is given the same shots and the same ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cut {
+    /// Length of a tick.
+    pub tick_fs: i64,
+    /// Period of the converters' clock, a whole number of ticks.
+    pub clock_fs: i64,
+    /// How far jitter can displace a tick.
+    pub jitter_fs: i64,
+    /// How long the receiver listens to a shot, from its firing on.
+    pub listening_fs: i64,
+    /// How long before the first owned shot the ticks begin, and how long after the last gate is
+    /// closed they end: as long as a macropulse, so that all that overlap with light of an owned
+    /// shot are there as a whole.
+    pub lead_fs: i64,
+    /// How long before the first owned shot others must be known: their light may still be under way
+    /// when the ticks begin.
+    pub history_fs: i64,
+}
+
+impl Cut {
+    /// When shots are fired that belong to the log of owned ones, the first of which is fired at
+    /// `first` and the last at `last`.
+    pub fn shots(&self, first: i64, last: i64) -> RangeInclusive<i64> {
+        first.saturating_sub(self.history_fs)..=self.closes(last)
+    }
+
+    /// The absolute ticks that belong to owned shots fired from `first` to `last`.
+    pub fn ticks(&self, first: i64, last: i64) -> Range<i64> {
+        self.opens(first)..self.closes(last).div_euclid(self.tick_fs) + 1
+    }
+
+    /// The first absolute tick that belongs to owned shots of which the first is fired at `first`.
+    pub fn opens(&self, first: i64) -> i64 {
+        first.saturating_sub(self.lead_fs).div_euclid(self.tick_fs)
+    }
+
+    /// The absolute tick that ticks are counted from in a log whose first shot, owned or not, is
+    /// fired at `first`: early enough for what jitter puts before that.
+    pub fn epoch(&self, first: i64) -> i64 {
+        let clocks = first.saturating_sub(self.jitter_fs).div_euclid(self.clock_fs);
+        clocks * (self.clock_fs / self.tick_fs)
+    }
+
+    fn closes(&self, last: i64) -> i64 {
+        last.saturating_add(self.listening_fs).saturating_add(self.lead_fs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CUT: Cut = Cut {
+        tick_fs: 10,
+        clock_fs: 80,
+        jitter_fs: 5,
+        listening_fs: 1000,
+        lead_fs: 100,
+        history_fs: 2100,
+    };
+
+    #[test]
+    fn shots_and_ticks_reach_beyond_the_owned_shots() {
+        assert_eq!(CUT.shots(5000, 7000), 2900..=8100);
+        assert_eq!(CUT.ticks(5000, 7000), 490..811);
+        assert_eq!(CUT.opens(5000), 490);
+        // Light of the last shots may be beyond what is counted.
+        assert_eq!(*CUT.shots(0, i64::MAX).end(), i64::MAX);
+    }
+
+    #[test]
+    fn ticks_are_counted_from_a_period_of_the_clock_on() {
+        assert_eq!(CUT.epoch(2900), 2880 / 10);
+        // A little before the first shot of all.
+        assert_eq!(CUT.epoch(0), -8);
+    }
+}

@@ -1,0 +1,308 @@
+//! Why a shot was decided as it was.
+//!
+//! The verdict is the receiver's: the band is decoded again, by the same code, with that shot as the
+//! only one that is owned. What is shown beside it, how many marks are found at every lag and which
+//! light other shots account for, is counted from the ticks in the plainest way, mark by mark.
+
+use std::ops::Range;
+
+use super::threshold::least_marks;
+use super::{Error, Receiver, ReceiverKind, Reject, window};
+use crate::code::Codebook;
+use crate::shot_log::ShotLog;
+use crate::ticks::Ticks;
+use crate::time;
+
+/// Lags of a gate that are counted at most; of longer ones every second, third, … is counted.
+const MOST_LAGS: u64 = 1 << 20;
+
+/// One shot of a band and what became of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explanation {
+    /// Index of the shot in the band's log.
+    pub shot: usize,
+    /// Absolute tick in which it was fired.
+    pub fired_tick: i64,
+    /// When the marks of its macropulse leave, in ticks after that; ascending.
+    pub marks: Vec<u32>,
+    /// Lags of the gate, ticks.
+    pub gate: Range<i64>,
+    /// Lag of each entry of `found`: this many ticks apart, the first one where the gate begins.
+    pub step: i64,
+    /// For how many ticks from its place on a mark is looked for.
+    pub width: u32,
+    /// Marks found at each lag; of a receiver of single marks 1 where there is a tick.
+    pub found: Vec<u16>,
+    /// The same without ticks that other shots account for.
+    pub left: Vec<u16>,
+    /// Ticks of its channel from the opening of the gate to the end of the last macropulse in it, in
+    /// ticks after firing; and whether another shot accounts for it.
+    pub ticks: Vec<(i64, bool)>,
+    /// Share of places in that time at which a mark would be found by chance.
+    pub density: f64,
+    /// The fewest marks that chance does not reach at that density, where the receiver has a threshold.
+    pub threshold: Option<u32>,
+    /// The lag with most marks, and how many.
+    pub peak: Option<(i64, u16)>,
+    /// The best lag that is not at the peak, more than the width of a mark away from it.
+    pub sidelobe: Option<(i64, u16)>,
+    /// What the receiver decided.
+    pub verdict: Verdict,
+    /// Other shots whose light is in this shot's time.
+    pub others: Vec<OtherLight>,
+}
+
+/// What the receiver decided of a shot.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Verdict {
+    /// Its returns, the nearest first.
+    pub returns: Vec<Accepted>,
+    /// What was refused, and how often.
+    pub rejects: Vec<(Reject, u64)>,
+}
+
+/// A return that was accepted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accepted {
+    /// Two-way time of flight, s.
+    pub tof: f64,
+    /// Marks found.
+    pub peak: u16,
+    /// Marks of the macropulse.
+    pub marks: u16,
+    /// Peak minus the best other lag that the receiver looked at.
+    pub margin: u16,
+    /// Detected photons per mark, as far as the receiver can tell.
+    pub photons: f32,
+}
+
+/// Light of another shot that overlaps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OtherLight {
+    /// Index of the shot in the band's log.
+    pub shot: usize,
+    /// When its macropulse begins to arrive, in ticks after the explained shot was fired.
+    pub begins: i64,
+    /// Marks of it that are found, all of them in the time of the explained shot.
+    pub marks: u32,
+    /// Of these, marks at places where the explained shot has one at its peak.
+    pub shared: u32,
+}
+
+impl Receiver {
+    /// Why `shot` of `log` was decided as it was, out of all `ticks` of its band.
+    ///
+    /// # Errors
+    /// As [`Receiver::decode`].
+    pub fn explain(
+        &self,
+        codebook: &Codebook,
+        (log, ticks): (&ShotLog, &Ticks),
+        shot: usize,
+    ) -> Result<Explanation, Error> {
+        let alone = ShotLog { owned: shot..shot + 1, ..log.clone() };
+        let decided = self.decode(codebook, &alone, ticks)?;
+        let everyone = ShotLog { owned: 0..log.len(), ..log.clone() };
+        let all = self.decode(codebook, &everyone, ticks)?;
+        let bench = Bench::new(self, (codebook, log), ticks, shot);
+        let found = bench.counts(&bench.lit);
+        let mut claimed = vec![false; bench.seen.len()];
+        let width = i64::from(bench.width);
+        let peak = best(&found, |_| true).map(|(at, count)| (bench.lag(at), count));
+        let mut others = Vec::new();
+        for at in (0..all.len()).filter(|at| all.shot[*at] as usize != shot) {
+            let other = all.shot[at] as usize;
+            others.extend(bench.claims(other, all.tof[at], peak, &mut claimed));
+        }
+        let free = |at: usize| !claimed[at];
+        let left = bench.counts(&bench.lit_by(free));
+        let is_beside = |at: usize| {
+            peak.is_some_and(|(lag, _)| (bench.lag(at) - lag).abs() > width.max(bench.step))
+        };
+        let sidelobe = best(&found, is_beside).map(|(at, count)| (bench.lag(at), count));
+        Ok(Explanation {
+            shot,
+            fired_tick: bench.fired,
+            gate: bench.gate.clone(),
+            step: bench.step,
+            width: bench.width,
+            ticks: bench.seen.iter().copied().zip(claimed).collect(),
+            density: bench.density(),
+            threshold: bench.threshold(),
+            sidelobe,
+            peak,
+            found,
+            left,
+            verdict: Verdict::of(&decided),
+            others,
+            marks: bench.marks,
+        })
+    }
+}
+
+impl Verdict {
+    fn of(decided: &super::Returns) -> Self {
+        let accepted = |at: usize| Accepted {
+            tof: decided.tof[at],
+            peak: decided.peak[at],
+            marks: decided.marks[at],
+            margin: decided.margin[at],
+            photons: decided.photons[at],
+        };
+        let rejects = Reject::ALL.into_iter().zip(decided.rejects);
+        Self {
+            returns: (0..decided.len()).map(accepted).collect(),
+            rejects: rejects.filter(|(_, count)| *count > 0).collect(),
+        }
+    }
+}
+
+/// The time of one shot, tick by tick.
+struct Bench<'a> {
+    receiver: &'a Receiver,
+    codebook: &'a Codebook,
+    log: &'a ShotLog,
+    shot: usize,
+    fired: i64,
+    marks: Vec<u32>,
+    gate: Range<i64>,
+    step: i64,
+    width: u32,
+    /// Ticks of the channel in this time, after firing.
+    seen: Vec<i64>,
+    /// Whether a mark is found at each place from the opening of the gate on.
+    lit: Vec<bool>,
+}
+
+impl<'a> Bench<'a> {
+    fn new(
+        receiver: &'a Receiver,
+        (codebook, log): (&'a Codebook, &'a ShotLog),
+        ticks: &Ticks,
+        shot: usize,
+    ) -> Self {
+        let is_direct = receiver.kind == ReceiverKind::Direct;
+        let fired = receiver.fired(log, shot);
+        let chip = receiver.ticks_per_chip;
+        let of_shot = |chips: &[u16]| chips.iter().map(|mark| u32::from(*mark) * chip).collect();
+        let marks: Vec<u32> = match is_direct {
+            true => vec![0],
+            false => of_shot(codebook.marks(log.label[shot], log.word[shot])),
+        };
+        let (nearest, farthest) = receiver.gate_ticks;
+        let gate = i64::from(nearest)..i64::from(farthest) + 1;
+        let step = ((gate.end - gate.start) as u64).div_ceil(MOST_LAGS) as i64;
+        let width = if is_direct { 1 } else { window(receiver.jitter_ticks) };
+        let length = marks.last().map_or(0, |last| i64::from(*last)) + i64::from(width);
+        let until = gate.end + length;
+        let of_channel =
+            |at: &usize| ticks.channel.get(*at).is_none_or(|channel| *channel == log.channel[shot]);
+        let after = |at: usize| ticks.epoch + i64::from(ticks.tick[at]) - fired;
+        let seen = (0..ticks.len()).filter(of_channel).map(after);
+        let seen: Vec<i64> = seen.filter(|tick| (gate.start..until).contains(tick)).collect();
+        let mut bench = Self {
+            receiver,
+            codebook,
+            log,
+            shot,
+            fired,
+            marks,
+            gate,
+            step,
+            width,
+            seen,
+            lit: Vec::new(),
+        };
+        bench.lit = bench.lit_by(|_| true);
+        bench
+    }
+
+    /// The lag of place `at` of a list of counts.
+    fn lag(&self, at: usize) -> i64 {
+        self.gate.start + at as i64 * self.step
+    }
+
+    /// Where marks are found by those of the ticks seen that are `wanted`.
+    fn lit_by(&self, wanted: impl Fn(usize) -> bool) -> Vec<bool> {
+        let length = self.marks.last().map_or(0, |last| *last as usize) + self.width as usize;
+        let mut lit = vec![false; (self.gate.end - self.gate.start) as usize + length];
+        let (early, late) = self.window();
+        for (_, tick) in self.seen.iter().enumerate().filter(|(at, _)| wanted(*at)) {
+            let place = tick - self.gate.start;
+            for place in (place - late).max(0)..=(place + early).min(lit.len() as i64 - 1) {
+                lit[place as usize] = true;
+            }
+        }
+        lit
+    }
+
+    /// How many ticks early, and late, a mark may come.
+    fn window(&self) -> (i64, i64) {
+        let width = i64::from(self.width);
+        ((width - 1) / 2, width - 1 - (width - 1) / 2)
+    }
+
+    /// Marks found at each lag.
+    fn counts(&self, lit: &[bool]) -> Vec<u16> {
+        let lags = ((self.gate.end - self.gate.start) / self.step.max(1)) as usize;
+        let count = |at: usize| {
+            let from = (at as i64 * self.step) as usize;
+            let found = |mark: &&u32| lit.get(from + **mark as usize).is_some_and(|lit| *lit);
+            self.marks.iter().filter(found).count() as u16
+        };
+        (0..lags).map(count).collect()
+    }
+
+    /// Marks the ticks that `other`, found after `tof` seconds, accounts for; `None` where its light is
+    /// not in this time.
+    fn claims(
+        &self,
+        other: usize,
+        tof: f64,
+        peak: Option<(i64, u16)>,
+        claimed: &mut [bool],
+    ) -> Option<OtherLight> {
+        let is_coded = self.receiver.kind != ReceiverKind::Direct;
+        if !is_coded || self.log.channel[other] != self.log.channel[self.shot] {
+            return None;
+        }
+        let arrives_fs = self.log.fired_at_fs[other] + time::fs_from_s(tof);
+        let begins = arrives_fs.div_euclid(self.receiver.tick_fs) - self.fired;
+        let (early, late) = self.window();
+        let own: Vec<i64> = peak
+            .map(|(lag, _)| self.marks.iter().map(|mark| lag + i64::from(*mark)).collect())
+            .unwrap_or_default();
+        let mut light = OtherLight { shot: other, begins, marks: 0, shared: 0 };
+        for mark in self.codebook.marks(self.log.label[other], self.log.word[other]) {
+            let place = begins + i64::from(u32::from(*mark) * self.receiver.ticks_per_chip);
+            let first = self.seen.partition_point(|tick| *tick < place - early);
+            let near = self.seen[first..].iter().take_while(|tick| **tick <= place + late).count();
+            claimed[first..first + near].fill(true);
+            light.marks += u32::from(near > 0);
+            let is_shared = own.iter().any(|own| (own - place).abs() <= early.max(late));
+            light.shared += u32::from(near > 0 && is_shared);
+        }
+        (light.marks > 0).then_some(light)
+    }
+
+    /// Share of the places that are lit.
+    fn density(&self) -> f64 {
+        let lit = self.lit.iter().filter(|lit| **lit).count();
+        lit as f64 / self.lit.len().max(1) as f64
+    }
+
+    /// The marks that chance does not reach, of a receiver that derives them.
+    fn threshold(&self) -> Option<u32> {
+        let Receiver { kind, false_alarm, .. } = *self.receiver;
+        let marks = self.marks.len() as u32;
+        let lags = (self.gate.end - self.gate.start) as f64;
+        (kind == ReceiverKind::Matched && marks > 0)
+            .then(|| least_marks(lags, marks, self.density(), false_alarm))
+    }
+}
+
+/// The place with most, the first of several, of those that are `wanted`; `None` where nothing is.
+fn best(counts: &[u16], wanted: impl Fn(usize) -> bool) -> Option<(usize, u16)> {
+    let wanted = counts.iter().copied().enumerate().filter(|(at, count)| *count > 0 && wanted(*at));
+    wanted.max_by_key(|(at, count)| (*count, std::cmp::Reverse(*at)))
+}

@@ -1,0 +1,134 @@
+//! Shot logs and ticks as files and streams: the seam at which recorded hardware takes the place of
+//! a simulation.
+//!
+//! Both have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
+//! line that says what they are, and **binary**, little-endian records under a header. A reader
+//! tells them apart by their first byte. `docs/formats.md` has them byte by byte.
+//!
+//! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
+//! record, and keep none. [`Stream`] reads both at once and cuts them into bands to be decoded.
+//! What is wrong is told with the line or the byte where it stands.
+
+mod head;
+mod shots;
+mod source;
+mod stream;
+mod tick_files;
+
+use std::fmt;
+use std::io;
+
+pub use shots::{Limits, Shot, ShotHeader, ShotReader, ShotWriter};
+pub use stream::Stream;
+pub use tick_files::{TickHeader, TickReader, TickWriter};
+
+/// The version of both files that is written, and the only one that is read.
+pub const VERSION: u32 = 1;
+
+/// No shot and no tick is later, or earlier, than so many fs from the beginning of the first scan.
+pub const LONGEST_FS: i64 = 9_000_000_000_000_000_000;
+
+/// Stands in a binary header for a number that is not known.
+const UNKNOWN: u64 = u64::MAX;
+
+/// How a file holds its numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Little-endian records.
+    Binary,
+    /// Lines of comma-separated numbers.
+    Text,
+}
+
+/// What a shot log and ticks are of: a hash of all that is sent and how it is timed. Logs of sensors
+/// that differ in it are not decoded by each other's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Digest(pub [u8; 16]);
+
+impl Digest {
+    /// The digest of 32 hexadecimal digits.
+    pub fn parse(text: &str) -> Option<Self> {
+        let is_hex = text.len() == 32 && text.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let number = is_hex.then(|| u128::from_str_radix(text, 16).ok())??;
+        Some(Self(number.to_be_bytes()))
+    }
+}
+
+impl fmt::Display for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:032x}", u128::from_be_bytes(self.0))
+    }
+}
+
+/// Where something stands in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// A line, from 1.
+    Line(u64),
+    /// A byte, from 0.
+    Byte(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// Which of the two files an error is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum What {
+    /// The shot log.
+    Shots,
+    /// The ticks.
+    Ticks,
+}
+
+/// Why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The system did not give it.
+    #[error("cannot be read: {cause}")]
+    Read {
+        /// Which file.
+        what: What,
+        /// Why.
+        cause: io::Error,
+    },
+    /// It says something that cannot be.
+    #[error("{place}: {message}")]
+    Content {
+        /// Which file.
+        what: What,
+        /// Where.
+        place: Place,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+}
+
+impl Error {
+    /// Which of the two files it is about.
+    pub fn what(&self) -> What {
+        match self {
+            Self::Read { what, .. } | Self::Content { what, .. } => *what,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_digest_is_32_digits() {
+        let text = "00112233445566778899aabbccddeeff";
+        assert_eq!(Digest::parse(text).unwrap().to_string(), text);
+        assert_eq!(Digest::parse(text).unwrap().0[..3], [0x00, 0x11, 0x22]);
+        assert_eq!(Digest::parse(&text[1..]), None);
+        assert_eq!(Digest::parse("+0112233445566778899aabbccddeeff"), None);
+    }
+}

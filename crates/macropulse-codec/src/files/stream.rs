@@ -1,0 +1,167 @@
+//! Shots and ticks read side by side, and cut into bands that can each be decoded by itself.
+
+use std::io::Read;
+use std::ops::Range;
+
+use super::{Error, Shot, ShotReader, TickReader};
+use crate::cut::Cut;
+use crate::shot_log::ShotLog;
+use crate::ticks::{Tick, Ticks};
+
+/// Shots of a band at most, guard shots included.
+const MOST_SHOTS: usize = 1 << 20;
+
+/// Ticks of a band at most: 400 MB of them.
+const MOST_TICKS: usize = 1 << 24;
+
+/// A shot log and ticks under way; of both no more is kept than belongs to one band.
+#[derive(Debug)]
+pub struct Stream<S, T> {
+    cut: Cut,
+    shots: ShotReader<S>,
+    ticks: TickReader<T>,
+    /// Whether the receiver is given the channel of each tick.
+    several: bool,
+    /// The shots at hand, and the id of the first one.
+    at_hand: Vec<Shot>,
+    first: u64,
+    shots_end: bool,
+    /// The ticks at hand.
+    seen: Vec<Tick>,
+    ticks_end: bool,
+    /// The shots that are still to be owned.
+    left: Range<u64>,
+}
+
+impl<S: Read, T: Read> Stream<S, T> {
+    /// The bands of `shots` and `ticks`, which are of a sensor that is `cut` so; with the channel of
+    /// each tick if it has `several`.
+    pub fn new(cut: Cut, shots: ShotReader<S>, ticks: TickReader<T>, several: bool) -> Self {
+        let first = shots.header().first;
+        let left = shots.header().owned.clone().unwrap_or(first..u64::MAX);
+        Self {
+            cut,
+            shots,
+            ticks,
+            several,
+            at_hand: Vec::new(),
+            first,
+            shots_end: false,
+            seen: Vec::new(),
+            ticks_end: false,
+            left: left.start.max(first)..left.end,
+        }
+    }
+
+    /// The next band, whose owned shots end before the shot that `until` says of their first one; its
+    /// shots and its ticks. `None` behind the last one.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or its shots are fired so far apart, or have so many ticks, that they
+    /// cannot be decoded together.
+    pub fn next_band(
+        &mut self,
+        until: impl Fn(u64) -> u64,
+    ) -> Result<Option<(ShotLog, Ticks)>, Error> {
+        let first = self.left.start;
+        let wanted = first..until(first).clamp(first, self.left.end);
+        while self.end_at_hand() < wanted.end && self.read_shot()? {}
+        let owned = wanted.start..wanted.end.min(self.end_at_hand());
+        if owned.is_empty() {
+            return self.drain();
+        }
+        self.left.start = owned.end;
+        let [begins, ends] = [owned.start, owned.end - 1].map(|shot| self.shot(shot).fired_fs);
+        let fired_fs = self.cut.shots(begins, ends);
+        while self.at_hand.last().is_none_or(|shot| shot.fired_fs <= *fired_fs.end())
+            && self.read_shot()?
+        {}
+        let is_before = |shot: &Shot| shot.fired_fs < *fired_fs.start();
+        let past = self.at_hand.partition_point(is_before);
+        self.at_hand.drain(..past);
+        self.first += past as u64;
+        let is_guard = |shot: &Shot| shot.fired_fs <= *fired_fs.end();
+        let log = self.log(self.at_hand.partition_point(is_guard), owned);
+        let span = self.cut.ticks(begins, ends);
+        let epoch = self.cut.epoch(log.fired_at_fs[0]);
+        if span.end - epoch > i64::from(u32::MAX) {
+            return self.shots.refuse(format!(
+                "shots {} to {} are fired too far apart to be decoded together",
+                first,
+                self.left.start - 1
+            ));
+        }
+        Ok(Some((log, self.ticks_of(&span, epoch)?)))
+    }
+
+    /// The id behind the last shot at hand.
+    fn end_at_hand(&self) -> u64 {
+        self.first + self.at_hand.len() as u64
+    }
+
+    fn shot(&self, id: u64) -> &Shot {
+        &self.at_hand[(id - self.first) as usize]
+    }
+
+    /// Reads one more shot; `false` at the end.
+    fn read_shot(&mut self) -> Result<bool, Error> {
+        if self.shots_end {
+            return Ok(false);
+        }
+        if self.at_hand.len() >= MOST_SHOTS {
+            return self.shots.refuse(format!(
+                "more than {MOST_SHOTS} shots are fired while light of one of them is under way"
+            ));
+        }
+        match self.shots.next_shot()? {
+            Some(shot) => self.at_hand.push(shot),
+            None => self.shots_end = true,
+        }
+        Ok(!self.shots_end)
+    }
+
+    /// The first `shots` at hand as a log.
+    fn log(&self, shots: usize, owned: Range<u64>) -> ShotLog {
+        let shots = &self.at_hand[..shots];
+        let column = |number: fn(&Shot) -> u16| shots.iter().map(number).collect();
+        let place = |id: u64| (id - self.first) as usize;
+        ShotLog {
+            first: self.first,
+            fired_at_fs: shots.iter().map(|shot| shot.fired_fs).collect(),
+            row: column(|shot| shot.row),
+            column: column(|shot| shot.column),
+            label: column(|shot| shot.label),
+            word: column(|shot| shot.word),
+            channel: column(|shot| shot.channel),
+            owned: place(owned.start)..place(owned.end),
+        }
+    }
+
+    /// The ticks of `span`, counted from `epoch` on.
+    fn ticks_of(&mut self, span: &Range<i64>, epoch: i64) -> Result<Ticks, Error> {
+        let past = self.seen.partition_point(|one| one.tick < span.start);
+        self.seen.drain(..past);
+        while !self.ticks_end && self.seen.last().is_none_or(|last| last.tick < span.end) {
+            match self.ticks.next_tick()? {
+                Some(one) if one.tick < span.start => {}
+                Some(one) => self.seen.push(one),
+                None => self.ticks_end = true,
+            }
+            if self.seen.len() > MOST_TICKS {
+                return self.ticks.refuse(format!(
+                    "more than {MOST_TICKS} ticks belong to shots that are decoded together"
+                ));
+            }
+        }
+        let within = self.seen.partition_point(|one| one.tick < span.end);
+        let kind = (self.several, self.ticks.header().measured);
+        Ok(Ticks::of(&self.seen[..within], epoch, kind))
+    }
+
+    /// Reads both files to their ends, so that what is wrong there is not passed over.
+    fn drain(&mut self) -> Result<Option<(ShotLog, Ticks)>, Error> {
+        while self.shots.next_shot()?.is_some() {}
+        while self.ticks.next_tick()?.is_some() {}
+        Ok(None)
+    }
+}

@@ -1,0 +1,75 @@
+//! What the receiver is given of a band: the part of one continuous stream of ticks that belongs to
+//! it, so that who has the stream alone, from a file or from hardware, can cut the same out of it.
+//!
+//! A band owns the ticks from where its own begin to where those of the next band do. Behind them it
+//! is given those of the next band, as far as light of its shots may arrive. These come out of the
+//! band's own simulation as they do of the next one's where an event depends on nothing but the
+//! light that makes it, for all of that is in both. Where it may depend on more, cells that were
+//! blind or converters that were busy, the beginning of the next band is simulated as it will be.
+
+use macropulse_codec::{ShotLog, Tick, Ticks};
+
+use super::Setup;
+use crate::channel::{self, Seen};
+use crate::detect::Memory;
+use crate::emit::Band;
+use crate::tdc::{self, Converted};
+
+/// What the converters make of the light of the shots of `log`.
+pub(super) fn converted(setup: &Setup, memory: &mut Memory, log: &ShotLog) -> Converted {
+    let Setup { seen, detectors } = setup;
+    let Seen { design, scene, .. } = seen;
+    let traced = scene.trace(design, log);
+    let light = channel::light(seen, log, &traced);
+    let response = detectors.response(log, &light, memory);
+    tdc::ticks(design, response, 0)
+}
+
+/// Leaves of what was `converted` of a band, with its guard shots, the ticks that belong to it.
+pub(super) fn cut(
+    setup: &Setup,
+    memory: &mut Memory,
+    (band, log): (&Band, &ShotLog),
+    converted: &mut Converted,
+) {
+    let design = setup.seen.design;
+    let (seen, own) = band.ticks(design);
+    let is_the_same = !design.detector.model().has_state() && converted.lost == 0;
+    if is_the_same || own.end >= seen.end {
+        converted.ticks.keep(&seen);
+        return;
+    }
+    let next = band.next(design).shot_log(design);
+    // What is fired while gates are open of shots whose light is looked at.
+    let closes_fs = seen.end * design.tdc.tick_fs + design.cut().listening_fs;
+    let shots = next.fired_at_fs.partition_point(|fired| *fired <= closes_fs);
+    let mut later = self::converted(setup, memory, &first_of(&next, shots)).ticks;
+    later.keep(&(own.end..seen.end));
+    converted.ticks.keep(&own);
+    append(&mut converted.ticks, &later);
+    debug_assert_eq!(converted.ticks.epoch, design.cut().epoch(log.fired_at_fs[0]));
+}
+
+/// The first `shots` of a log.
+fn first_of(log: &ShotLog, shots: usize) -> ShotLog {
+    let column = |column: &[u16]| column[..shots].to_vec();
+    ShotLog {
+        first: log.first,
+        fired_at_fs: log.fired_at_fs[..shots].to_vec(),
+        row: column(&log.row),
+        column: column(&log.column),
+        label: column(&log.label),
+        word: column(&log.word),
+        channel: column(&log.channel),
+        owned: log.owned.start.min(shots)..log.owned.end.min(shots),
+    }
+}
+
+/// Adds ticks that come `later`, whatever they are counted from.
+fn append(ticks: &mut Ticks, later: &Ticks) {
+    let kinds =
+        [ticks, later].map(|ticks| (!ticks.channel.is_empty(), !ticks.amplitude.is_empty()));
+    let stream: Vec<Tick> = [ticks.stream(), later.stream()].concat();
+    let kind = (kinds[0].0 || kinds[1].0, kinds[0].1 || kinds[1].1);
+    *ticks = Ticks::of(&stream, ticks.epoch, kind);
+}
