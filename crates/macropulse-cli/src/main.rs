@@ -19,6 +19,7 @@ mod simulate;
 mod speed;
 mod sweep;
 mod text;
+mod view;
 
 use std::process::ExitCode;
 
@@ -53,6 +54,7 @@ enum Command {
     Budget(budget::Budget),
     Codes(codes::Codes),
     Encode(encode::Encode),
+    View(view::View),
     Speed(speed::Speed),
     Completions(completions::Completions),
 }
@@ -85,6 +87,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
+        Command::View(view) => view::run(view, common),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions, Options::command()),
     }

@@ -16,6 +16,7 @@ use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
+use crate::view::{PAGE, Page};
 
 /// A run that is over, with all that was counted.
 pub struct Run<'a> {
@@ -49,6 +50,7 @@ impl<'a> Run<'a> {
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
+        let mut page = Page::of(&run);
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
@@ -59,6 +61,7 @@ impl<'a> Run<'a> {
             if let Some(folder) = &mut folder {
                 let writing = Instant::now();
                 let mut cloud = scan.cloud();
+                page.add(&cloud);
                 if !scenario.truth {
                     cloud.truth = Truth::default();
                 }
@@ -82,7 +85,12 @@ impl<'a> Run<'a> {
         run.find_warnings(scenario);
         if let (Some(folder), 1..) = (&folder, run.scans) {
             run.folder = folder.path().display().to_string();
-            interrupt.undisturbed(|| run.manifest().write(folder.path()))?;
+            run.files.push(PAGE.to_owned());
+            interrupt.undisturbed(|| {
+                let manifest = run.manifest();
+                page.write(folder.path(), &manifest)?;
+                manifest.write(folder.path())
+            })?;
         }
         Ok(run)
     }

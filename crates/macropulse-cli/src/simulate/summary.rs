@@ -1,5 +1,7 @@
 //! What is printed of a run.
 
+use std::path::Path;
+
 use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
@@ -7,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::run::Run;
 use crate::text::{Columns, NO_BREAK, counted, grouped, lasted, short};
+use crate::view::PAGE;
 
 impl Run<'_> {
     /// A report for people.
@@ -126,10 +129,8 @@ impl Run<'_> {
 
     fn written(&self) -> String {
         let files = counted(self.files.len() as u64, "file");
-        match self.files.is_empty() {
-            true => format!("manifest.json to {}", self.folder),
-            false => format!("{files} and manifest.json to {}", self.folder),
-        }
+        let page = Path::new(&self.folder).join(PAGE);
+        format!("{files} and manifest.json to {}; open {}", self.folder, page.display())
     }
 
     /// The same for programs; keys carry their units.
