@@ -2,7 +2,7 @@
 
 use std::io::{ErrorKind, Write};
 
-pub use macropulse_study::text::{Columns, NO_BREAK, section, short};
+pub use macropulse_study::text::{Columns, NO_BREAK, grouped, section, short};
 
 use crate::fault::Fault;
 
@@ -21,19 +21,6 @@ pub fn print(text: &str) -> Result<(), Fault> {
 pub fn print_json(mut values: Vec<serde_json::Value>) -> Result<(), Fault> {
     let value = if values.len() == 1 { values.remove(0) } else { values.into() };
     print(&format!("{value:#}\n"))
-}
-
-/// 1234567 as `1 234 567`, with blanks that keep it on its line.
-pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(NO_BREAK);
-        }
-        text.push(digit);
-    }
-    text
 }
 
 /// A duration in the unit that suits it.

@@ -4,14 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{self, Format, Manifest, Names, write_atomically};
+use macropulse::formats::{self, Format, Names, write_atomically};
 use macropulse::points::PointCloud;
+use macropulse_study::record::{PAGE, describe};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
 
 use crate::fault::Fault;
 use crate::options::Common;
-use crate::simulate::Run;
 use crate::text::{grouped, print};
 
 /// Make a page to explore a point cloud: one HTML file that any browser opens, offline
@@ -30,44 +30,6 @@ pub struct View {
     /// The page [default: index.html in the folder, or the name of the file with .html]
     #[arg(short, long, value_name = "PAGE.html")]
     output: Option<PathBuf>,
-}
-
-/// Name of the page that a run leaves.
-pub const PAGE: &str = "index.html";
-
-/// The page of a run in the making.
-pub struct Page {
-    explorer: Explorer,
-    objects: Vec<String>,
-    materials: Vec<String>,
-}
-
-impl Page {
-    /// The page of a run of which nothing is known yet but its sensor and scene.
-    pub fn of(run: &Run) -> Self {
-        let scene = run.scene;
-        Self {
-            explorer: Explorer::new(&format!("{} in {}", run.design.name, scene.name)),
-            objects: scene.objects.iter().map(|object| object.name.clone()).collect(),
-            materials: scene.materials.iter().map(|material| material.name.clone()).collect(),
-        }
-    }
-
-    /// Adds a scan, with the truth if the cloud has it.
-    pub fn add(&mut self, cloud: &PointCloud) {
-        let names = Names { objects: &self.objects, materials: &self.materials };
-        self.explorer.cloud(&format!("scan {}", cloud.scan), cloud, &names);
-    }
-
-    /// Writes the page of a run that is over into its `folder`.
-    pub fn write(mut self, folder: &Path, manifest: &Manifest) -> Result<(), formats::Error> {
-        // Names are strings and numbers finite: there is nothing JSON could refuse.
-        describe(&mut self.explorer, &serde_json::to_value(manifest).unwrap_or_default());
-        self.explorer.file("manifest.json");
-        let files = manifest.files.iter().filter(|file| *file != PAGE);
-        files.for_each(|file| self.explorer.file(file));
-        write_atomically(&folder.join(PAGE), |out| out.write_all(self.explorer.html().as_bytes()))
-    }
 }
 
 /// The formats that can be read, the one that keeps most first.
@@ -173,29 +135,6 @@ fn manifest(folder: &Path) -> Result<Option<Value>, Fault> {
         Fault::Wrong(format!("{name}: is not the manifest of a run: {error}; name a cloud instead"))
     })?;
     Ok(Some(manifest))
-}
-
-/// Tells of a run what its manifest does.
-fn describe(page: &mut Explorer, manifest: &Value) {
-    let text = |value: &Value| match (value.as_str(), value.as_u64()) {
-        (Some(text), _) => text.to_owned(),
-        (None, Some(count)) => grouped(count),
-        (None, None) => value.to_string(),
-    };
-    let facts = [
-        ("sensor", &manifest["sensor"]["name"]),
-        ("scene", &manifest["scene"]["name"]),
-        ("environment", &manifest["environment"]),
-        ("seed", &manifest["seed"]),
-    ];
-    for (what, value) in facts.into_iter().filter(|(_, value)| !value.is_null()) {
-        page.fact(what, &text(value));
-    }
-    for (counts, prefix) in [("counts", ""), ("outcomes", "pixels ")] {
-        for (what, count) in manifest[counts].as_object().into_iter().flatten() {
-            page.fact(&format!("{prefix}{}", what.replace('_', " ")), &text(count));
-        }
-    }
 }
 
 fn named(list: &Value) -> Vec<String> {

@@ -17,7 +17,7 @@ use crate::kind::Kind;
 use crate::options::{self, Common, Surroundings};
 use crate::text::{print, print_json};
 use formats::Formats;
-pub use run::Run;
+use run::Run;
 use scenario::Scenario;
 
 /// Scan a scene and write point clouds, range images and a manifest

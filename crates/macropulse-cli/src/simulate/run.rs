@@ -8,7 +8,7 @@ use macropulse::points::Truth;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::{Scans, Tally, Watch};
-use macropulse_study::record::{self, COLOUR};
+use macropulse_study::record::{self, COLOUR, PAGE, Page};
 
 use super::scenario::Scenario;
 use crate::fault::{Fault, complain};
@@ -16,7 +16,6 @@ use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::view::{PAGE, Page};
 
 /// A run that is over, with all that was counted.
 pub struct Run<'a> {
@@ -50,7 +49,7 @@ impl<'a> Run<'a> {
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
-        let mut page = Page::of(&run);
+        let mut page = Page::new(design, &scenario.scene);
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =

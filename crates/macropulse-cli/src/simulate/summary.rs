@@ -5,11 +5,11 @@ use std::path::Path;
 use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
+use macropulse_study::record::PAGE;
 use serde_json::{Map, Value, json};
 
 use super::run::Run;
 use crate::text::{Columns, NO_BREAK, counted, grouped, lasted, short};
-use crate::view::PAGE;
 
 impl Run<'_> {
     /// A report for people.

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::chart::{Axis, Chart};
 use super::plot::Plane;
+use crate::text::short;
 
 /// Titles of the axes, the area between them, and the points of every series in it, with the places
 /// where they are drawn: as `theme/hover.js` describes them.
@@ -46,20 +47,8 @@ fn text(axis: &Axis, value: f64) -> String {
 }
 
 fn number(value: f64) -> String {
-    let size = value.abs();
-    if value.fract() == 0.0 && size < 1e9 {
-        return format!("{value:.0}");
-    }
-    if !(1e-4..1e6).contains(&size) {
-        return format!("{value:.3e}");
-    }
-    let digits = (4 - size.log10().floor() as i32).max(0) as usize;
-    let text = format!("{value:.digits$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
+    let is_plain = value == 0.0 || (1e-4..1e9).contains(&value.abs());
+    if is_plain { short(value) } else { format!("{value:.3e}") }
 }
 
 #[cfg(test)]
@@ -69,8 +58,8 @@ mod tests {
 
     #[test]
     fn numbers_have_five_digits_at_most() {
-        let told = [30.0, 0.1 + 0.2, 123.456_789, 2.5e-7, 123_456.7, -0.05].map(number);
-        assert_eq!(told, ["30", "0.3", "123.46", "2.500e-7", "123457", "-0.05"]);
+        let told = [30.0, 0.1 + 0.2, 123.456_789, 2.5e-7, 123_456.7, -0.05, 0.0].map(number);
+        assert_eq!(told, ["30", "0.3", "123.46", "2.500e-7", "123457", "-0.05", "0"]);
     }
 
     #[test]
