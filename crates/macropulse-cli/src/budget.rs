@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use macropulse::design::Design;
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::formats::write_atomically;
 use macropulse::predict::verdict::Wanted;
 use macropulse_study::budget::{Figures, USUAL_FALSE_POINTS, USUAL_PD, USUAL_REFLECTANCE, usual};
@@ -12,6 +12,7 @@ use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::options::{Changes, Common, Surroundings};
 use crate::text::{print, print_json};
+use crate::{completions, input};
 
 /// Work out the link budget of a sensor: photons, Pd, false points, precision, eye safety
 ///
@@ -23,8 +24,8 @@ use crate::text::{print, print_json};
   macropulse budget kim-park-2016-physical -o out
   macropulse budget coded-practical --environment overcast --set environment.visibility_km=2")]
 pub struct Budget {
-    /// A ready sensor, or a TOML file
-    #[arg(value_name = "NAME-or-FILE")]
+    /// Ready sensor or TOML file, - for standard input
+    #[arg(value_name = "SENSOR", add = ArgValueCompleter::new(completions::sensors))]
     sensor: String,
 
     #[command(flatten)]
@@ -74,7 +75,7 @@ fn share(typed: &str) -> Result<f64, String> {
 
 pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
     let changes = options.changes.apart(&options.surroundings)?;
-    let design = Design::open(&options.sensor, &changes.of_sensor)?;
+    let design = input::design(&options.sensor, &changes.of_sensor)?;
     let environment = Surroundings::alone(&changes)?;
     let wanted = Wanted {
         reflectance: options.reflectance,

@@ -65,7 +65,9 @@ pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
         folder.keep();
     }
     if options.json {
-        return print_json(vec![compared.iter().map(json).collect()]);
+        return print_json(vec![
+            json!({ "families": compared.iter().map(json).collect::<Vec<_>>() }),
+        ]);
     }
     if !common.quiet {
         print(&table(&compared))?;

@@ -1,6 +1,7 @@
 //! `macropulse encode`: what is sent to a pixel, chip by chip.
 
 use clap::Args;
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::design::Design;
 use macropulse::emit::{Shot, most_scans, shot_of_pixel};
 use serde_json::{Value, json};
@@ -8,15 +9,21 @@ use serde_json::{Value, json};
 use crate::fault::Fault;
 use crate::options::Changes;
 use crate::text::{Columns, grouped, print, print_json};
+use crate::{completions, input};
 
 /// Print the macropulse that is sent to a pixel, mark by mark
 #[derive(Args)]
 #[command(after_help = "Example:
-  macropulse encode --sensor kim-park-2016 --pixel 0,1")]
+  macropulse encode kim-park-2016 --pixel 0,1")]
 pub struct Encode {
-    /// Ready sensor or TOML file
-    #[arg(long, value_name = "NAME-or-FILE")]
-    sensor: String,
+    /// Ready sensor or TOML file, - for standard input
+    #[arg(value_name = "SENSOR", conflicts_with = "named", required_unless_present = "named")]
+    #[arg(add = ArgValueCompleter::new(completions::sensors))]
+    sensor: Option<String>,
+
+    /// Another way to name the sensor
+    #[arg(long = "sensor", value_name = "NAME-or-FILE")]
+    named: Option<String>,
 
     #[command(flatten)]
     changes: Changes,
@@ -42,7 +49,8 @@ fn pixel(typed: &str) -> Result<(u32, u32), String> {
 }
 
 pub fn run(options: &Encode) -> Result<(), Fault> {
-    let design = Design::open(&options.sensor, &options.changes.of_sensor()?)?;
+    let sensor = options.sensor.as_ref().or(options.named.as_ref()).map_or("", String::as_str);
+    let design = input::design(sensor, &options.changes.of_sensor()?)?;
     let macropulses: Vec<Macropulse> = options
         .pixels
         .iter()

@@ -1,12 +1,14 @@
 //! `macropulse environments`: sun and air that come with the program.
 
 use clap::Args;
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::environment::{self, Environment};
 use serde_json::json;
 
+use crate::completions;
 use crate::fault::Fault;
 use crate::scenes::summary;
-use crate::text::{Columns, print};
+use crate::text::{Columns, print, print_json};
 
 /// List the ready environments, sun and air of a scene, or print one as TOML to start from
 #[derive(Args)]
@@ -21,7 +23,7 @@ Example:
   macropulse environments fog-50m")]
 pub struct Environments {
     /// Environment to print
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", add = ArgValueCompleter::new(completions::environments))]
     name: Option<String>,
 
     /// Print as JSON
@@ -46,7 +48,7 @@ fn one(name: &str, as_json: bool) -> Result<(), Fault> {
             "conditions": environment.conditions(),
             "toml": toml,
         });
-        return print(&format!("{environment:#}\n"));
+        return print_json(vec![environment]);
     }
     print(toml)
 }
@@ -61,7 +63,7 @@ fn all(as_json: bool) -> Result<(), Fault> {
         columns.push(name, format!("{summary}: {conditions}"));
     }
     if as_json {
-        return print(&format!("{:#}\n", serde_json::Value::from(list)));
+        return print_json(vec![json!({ "environments": list })]);
     }
     print(&columns.text())
 }

@@ -3,8 +3,10 @@
 use std::io;
 use std::process::ExitCode;
 
+use anstyle::AnsiColor;
 use clap::error::ErrorKind;
 use macropulse::{channel, design, environment, formats, scene, sim};
+use macropulse_study::text::broken;
 use macropulse_study::{paper, record, sweep};
 
 /// Why a command did not do what was asked.
@@ -50,9 +52,28 @@ impl Fault {
     }
 }
 
-/// One line on stderr, with the name of the program before it.
-pub fn complain(sentence: &str) {
-    eprintln!("macropulse: {}", one_line(sentence));
+/// What went wrong, as a sentence on stderr.
+fn complain(sentence: &str) {
+    tell(sentence, AnsiColor::Red);
+}
+
+/// What a user should know although nothing went wrong, as a sentence on stderr.
+pub fn warn(sentence: &str) {
+    tell(sentence, AnsiColor::Yellow);
+}
+
+/// A sentence on stderr, with the name of the program before it: on a terminal in colour and broken
+/// at its width, elsewhere one line.
+fn tell(sentence: &str, colour: AnsiColor) {
+    let text = format!("macropulse: {}", one_line(sentence));
+    let text = match terminal_size::terminal_size_of(io::stderr()) {
+        Some((terminal_size::Width(width), _)) => broken(&text, usize::from(width)).join("\n  "),
+        None => text,
+    };
+    let rest = text.strip_prefix("macropulse:").unwrap_or(&text);
+    let name = colour.on_default().bold();
+    // Without colour where stderr is no terminal, or NO_COLOR is set.
+    anstream::eprintln!("{name}macropulse:{name:#}{rest}");
 }
 
 fn one_line(text: &str) -> String {

@@ -43,6 +43,17 @@ impl Folder {
         &self.path
     }
 
+    /// Names of what lies in the folder from an older run: files named like those of scans and not
+    /// among `files`.
+    pub fn older(&self, files: &[String]) -> Vec<String> {
+        let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut older: Vec<String> =
+            names.filter(|name| is_of_scan(name) && !files.contains(name)).collect();
+        older.sort();
+        older
+    }
+
     fn clear(&mut self) {
         if let Some(made) = self.made.take() {
             // It was not there before us. If it cannot go, it stays.
@@ -64,6 +75,12 @@ impl Drop for Folder {
             self.clear();
         }
     }
+}
+
+/// Whether a file is named as that of a scan: a word, a hyphen, a number of at least six digits.
+fn is_of_scan(name: &str) -> bool {
+    let word = ["scan-", "range-", "shots-", "ticks-"].iter().find_map(|w| name.strip_prefix(w));
+    word.is_some_and(|rest| rest.bytes().take_while(u8::is_ascii_digit).count() >= 6)
 }
 
 fn reason(error: &io::Error) -> String {
@@ -95,6 +112,18 @@ mod tests {
         folder.keep();
         drop(folder);
         assert!(wanted.is_dir());
+    }
+
+    #[test]
+    fn scans_of_an_older_run_are_told_from_what_belongs_to_others() {
+        let there = tempfile::tempdir().unwrap();
+        let names = ["scan-000000.pcd", "scan-000007.pcd", "range-000007-colour.png", "scan-1.pcd"];
+        for name in names.iter().chain(&["notes.txt", "scan.pcd"]) {
+            fs::write(there.path().join(name), "").unwrap();
+        }
+        let folder = Folder::claim(there.path()).unwrap();
+        let older = folder.older(&["scan-000000.pcd".to_owned()]);
+        assert_eq!(older, ["range-000007-colour.png", "scan-000007.pcd"]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::fault::{Fault, complain};
+use crate::fault::{Fault, warn};
 
 /// What a shell expects of a program ended by Ctrl-C.
 pub const EXIT_CODE: u8 = 130;
@@ -26,7 +26,7 @@ impl Interrupt {
                 let _whole = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
                 std::process::exit(i32::from(EXIT_CODE));
             }
-            complain("stopping; Ctrl-C again stops at once");
+            warn("stopping; Ctrl-C again stops at once");
         })
         .map_err(|error| Fault::Ours(format!("cannot listen for Ctrl-C: {error}")))?;
         Ok(seen)

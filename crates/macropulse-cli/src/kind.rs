@@ -8,6 +8,7 @@ use macropulse::scene::Scene;
 use toml::{Table, Value};
 
 use crate::fault::Fault;
+use crate::input::{self, STDIN};
 
 /// What can be checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,11 +38,14 @@ impl Kind {
             return Ok(Self::Scene);
         }
         let path = Path::new(name);
-        if !path.exists() && path.extension().is_none() && path.components().count() == 1 {
+        if name != STDIN
+            && !path.exists()
+            && path.extension().is_none()
+            && path.components().count() == 1
+        {
             return Err(Fault::Wrong(unknown(name)));
         }
-        let text =
-            std::fs::read_to_string(path).map_err(|error| Fault::unreadable(name, &error))?;
+        let (text, name) = input::text(name)?;
         match text.parse::<Table>() {
             Ok(table) => Self::of_table(&table).ok_or_else(|| {
                 Fault::Wrong(format!(
@@ -50,7 +54,7 @@ impl Kind {
                      `macropulse sensors NAME` or `macropulse scenes NAME`"
                 ))
             }),
-            Err(error) => Err(Fault::Wrong(not_toml(name, &text, &error))),
+            Err(error) => Err(Fault::Wrong(not_toml(&name, &text, &error))),
         }
     }
 

@@ -8,8 +8,10 @@ mod encode;
 mod environments;
 mod fault;
 mod folder;
+mod input;
 mod interrupt;
 mod kind;
+mod man;
 mod options;
 mod paper;
 mod progress;
@@ -24,6 +26,7 @@ mod view;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::CompleteEnv;
 
 use fault::Fault;
 use options::Common;
@@ -33,7 +36,7 @@ use options::Common;
 #[derive(Parser)]
 #[command(name = "macropulse", version, max_term_width = 100)]
 #[command(after_help = "Example:
-  macropulse simulate --sensor kim-park-2016-fixed --scene car-30m -o out")]
+  macropulse simulate kim-park-2016-fixed car-30m -o out")]
 struct Options {
     #[command(flatten)]
     common: Common,
@@ -57,9 +60,12 @@ enum Command {
     View(view::View),
     Speed(speed::Speed),
     Completions(completions::Completions),
+    Man(man::Man),
 }
 
 fn main() -> ExitCode {
+    // A shell that completes a line calls the program once more, with this in its environment.
+    CompleteEnv::with_factory(Options::command).var(completions::VARIABLE).complete();
     let done = match Options::try_parse() {
         Ok(options) => {
             kernels().and_then(|()| options.common.use_threads()).and_then(|()| run(&options))
@@ -89,7 +95,8 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Encode(encode) => encode::run(encode),
         Command::View(view) => view::run(view, common),
         Command::Speed(speed) => speed::run(speed, common),
-        Command::Completions(completions) => completions::run(completions, Options::command()),
+        Command::Completions(completions) => completions::run(completions),
+        Command::Man(man) => man::run(man, Options::command()),
     }
 }
 

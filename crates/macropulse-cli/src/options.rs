@@ -1,11 +1,13 @@
 //! What every command understands.
 
 use clap::{Args, ValueEnum};
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::design::{self, WITH, WITHOUT};
 use macropulse::environment::{self, Environment};
 use macropulse::names::nearest;
 use macropulse::scene;
 
+use crate::completions;
 use crate::fault::Fault;
 
 /// Options of every command.
@@ -116,6 +118,7 @@ pub struct Surroundings {
     /// Sun and air: a ready environment, in place of that of the scene; `macropulse environments`
     /// lists them
     #[arg(long = "environment", value_name = "NAME")]
+    #[arg(add = ArgValueCompleter::new(completions::environments))]
     name: Option<String>,
 }
 

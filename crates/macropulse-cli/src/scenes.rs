@@ -1,12 +1,14 @@
 //! `macropulse scenes`: the scenes that come with the program.
 
 use clap::Args;
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::names::nearest;
 use macropulse::scene::Scene;
 use serde_json::json;
 
+use crate::completions;
 use crate::fault::Fault;
-use crate::text::{Columns, first_sentence, print};
+use crate::text::{Columns, first_sentence, print, print_json};
 
 /// List the ready scenes, or print one as TOML to start from
 #[derive(Args)]
@@ -14,7 +16,7 @@ use crate::text::{Columns, first_sentence, print};
   macropulse scenes street > mine.toml")]
 pub struct Scenes {
     /// Scene to print
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", add = ArgValueCompleter::new(completions::scenes))]
     name: Option<String>,
 
     /// Print as JSON
@@ -42,7 +44,7 @@ fn one(name: &str, as_json: bool) -> Result<(), Fault> {
     };
     if as_json {
         let scene = json!({ "name": name, "summary": summary(toml), "toml": toml });
-        return print(&format!("{scene:#}\n"));
+        return print_json(vec![scene]);
     }
     print(toml)
 }
@@ -54,7 +56,7 @@ fn all(as_json: bool) -> Result<(), Fault> {
     if as_json {
         let list: Vec<_> =
             scenes().map(|(name, summary)| json!({ "name": name, "summary": summary })).collect();
-        return print(&format!("{:#}\n", serde_json::Value::from(list)));
+        return print_json(vec![json!({ "scenes": list })]);
     }
     let mut columns = Columns::default();
     scenes().for_each(|(name, summary)| columns.push(name, summary));

@@ -1,11 +1,13 @@
 //! `macropulse sensors`: the sensors that come with the program.
 
 use clap::Args;
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::design::{Design, preset_names, preset_text};
 use serde_json::json;
 
+use crate::completions;
 use crate::fault::Fault;
-use crate::text::{Columns, print};
+use crate::text::{Columns, print, print_json};
 
 /// List the ready sensors, or print one as TOML to start from
 #[derive(Args)]
@@ -13,7 +15,7 @@ use crate::text::{Columns, print};
   macropulse sensors kim-park-2016 > mine.toml")]
 pub struct Sensors {
     /// Sensor to print; of a file, everything it leaves unsaid is printed too
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", add = ArgValueCompleter::new(completions::sensors))]
     name: Option<String>,
 
     /// Print as JSON
@@ -33,7 +35,7 @@ fn one(name: &str, as_json: bool) -> Result<(), Fault> {
     let toml = preset_text(name).unwrap_or(&design.text);
     if as_json {
         let sensor = json!({ "name": design.name, "summary": design.summary, "toml": toml });
-        return print(&format!("{sensor:#}\n"));
+        return print_json(vec![sensor]);
     }
     print(toml)
 }
@@ -47,7 +49,7 @@ fn all(as_json: bool) -> Result<(), Fault> {
         columns.push(name, summary);
     }
     if as_json {
-        return print(&format!("{:#}\n", serde_json::Value::from(list)));
+        return print_json(vec![json!({ "sensors": list })]);
     }
     print(&columns.text())
 }

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use crate::fault::Fault;
 use crate::options::{Common, Surroundings};
-use crate::text::{Columns, print, short};
+use crate::text::{Columns, print, print_json, short};
 
 /// Measure how fast this machine simulates the sensor of the paper
 ///
@@ -63,7 +63,7 @@ struct Figures {
 pub fn run(options: &Speed, common: &Common) -> Result<(), Fault> {
     let figures = measure(&options.surroundings, &USUAL)?;
     if options.json {
-        return print(&format!("{:#}\n", figures.json()));
+        return print_json(vec![figures.json()]);
     }
     if common.quiet { Ok(()) } else { print(&figures.text()) }
 }

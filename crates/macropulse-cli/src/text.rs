@@ -2,6 +2,7 @@
 
 use std::io::{ErrorKind, Write};
 
+use macropulse::formats::versioned;
 pub use macropulse_study::text::{Columns, NO_BREAK, grouped, section, short};
 
 use crate::fault::Fault;
@@ -17,8 +18,10 @@ pub fn print(text: &str) -> Result<(), Fault> {
     }
 }
 
-/// Writes JSON to stdout: the only value as itself, several as an array.
-pub fn print_json(mut values: Vec<serde_json::Value>) -> Result<(), Fault> {
+/// Writes JSON to stdout, each object with the version of its keys: the only one as itself, several
+/// as an array.
+pub fn print_json(values: Vec<serde_json::Value>) -> Result<(), Fault> {
+    let mut values: Vec<_> = values.into_iter().map(versioned).collect();
     let value = if values.len() == 1 { values.remove(0) } else { values.into() };
     print(&format!("{value:#}\n"))
 }

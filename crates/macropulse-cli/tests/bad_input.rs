@@ -140,7 +140,7 @@ fn an_unknown_format() {
 fn options_that_are_wrong() {
     let desk = Desk::new();
     desk.refused("simulate --sensor peregrine", &["--scene"]);
-    desk.refused("simulate", &["SCENARIO.toml", "simulate --help"]);
+    desk.refused("simulate", &["<SENSOR>", "simulate --help"]);
     desk.refused("simulate --sead 3", &["--sead", "'--seed'"]);
     desk.refused("check peregrine --set scan.max_range_m", &["--set", "key=value"]);
     desk.refused("check peregrine --set scan.max_rnage_m=3", &["--set", "did you mean"]);
@@ -170,7 +170,7 @@ fn a_scenario_that_is_wrong() {
         "simulate gone.toml -o out",
         &["gone.toml: cannot be read: there is no such file"],
     );
-    let words = ["hdl-64e: is a sensor", "--sensor hdl-64e and --scene"];
+    let words = ["hdl-64e: is a sensor", "`macropulse simulate hdl-64e street`"];
     desk.refused("simulate hdl-64e -o out", &words);
     desk.refused("simulate s.toml --sensor hdl-64e --scene wall -o out", &["cannot be used with"]);
 }

@@ -34,7 +34,7 @@ fn refused(mesh: &str, bytes: &str) {
 fn a_good_mesh_is_hit() {
     let desk = desk_with("good.obj", TRIANGLE);
     let line = "simulate --sensor peregrine --scene s.toml -o out --json";
-    assert!(desk.json(line)["returns"].as_u64().unwrap() > 0);
+    assert!(desk.json(line)["counts"]["returns"].as_u64().unwrap() > 0);
     assert_eq!(desk.json("check s.toml --json")["triangles"], 1);
 }
 

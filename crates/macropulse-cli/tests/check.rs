@@ -23,8 +23,8 @@ fn the_numbers_of_the_paper() {
     close("tick_mm", 0.374_74, 1e-5);
     assert_eq!(report["macropulse_chips"], 10_933);
     assert_eq!((&report["marks_min"], &report["marks_max"]), (&58.into(), &319.into()));
-    assert_eq!(report["idealised"]["footprint"], "the beam is a line without width");
-    assert_eq!(report["defaults"]["scan.min_range_m"], "0.5");
+    assert_eq!(report["assumptions"]["footprint"], "the beam is a line without width");
+    assert_eq!(report["defaults"]["scan.min_range_m"], 0.5);
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn what_is_changed_counts() {
 fn every_ready_sensor_and_scene_is_right() {
     let desk = Desk::new();
     for list in ["sensors", "scenes"] {
-        for entry in desk.json(&format!("{list} --json")).as_array().unwrap() {
+        for entry in desk.json(&format!("{list} --json"))[list].as_array().unwrap() {
             let name = entry["name"].as_str().unwrap();
             assert_ne!(entry["summary"], "", "{name}");
             assert_eq!(desk.run(&format!("check {name}")).code, Some(0), "{name}");
@@ -64,11 +64,11 @@ fn all_files_are_checked_though_one_is_wrong() {
 }
 
 #[test]
-fn completions_know_the_commands() {
+fn there_are_completions_for_the_usual_shells() {
     for shell in ["bash", "zsh", "fish"] {
         let ran = Desk::new().run(&format!("completions {shell}"));
         assert_eq!(ran.code, Some(0));
-        assert!(ran.out.contains("simulate"), "{shell}");
+        assert!(ran.out.contains("macropulse"), "{shell}");
     }
 }
 
@@ -95,9 +95,12 @@ fn the_other_lidars_of_a_scene_are_listed_and_their_ghosts_counted() {
     let run = "simulate --sensor peregrine --scene a.toml --format none";
     assert!(desk.run(run).out.contains("2 other lidars, "));
     let counted = desk.json(&format!("{run} --json"));
-    assert!(counted["ghosts"].is_u64() && counted["interferer_shots"].is_u64(), "{counted}");
+    assert!(
+        counted["counts"]["ghosts"].is_u64() && counted["counts"]["interferer_shots"].is_u64(),
+        "{counted}"
+    );
     let alone = desk.json("simulate --sensor peregrine --scene wall --format none --json");
-    assert_eq!(alone["ghosts"], serde_json::Value::Null);
+    assert_eq!(alone["counts"]["ghosts"], serde_json::Value::Null);
 }
 
 #[test]

@@ -9,7 +9,8 @@ use serde_json::json;
 
 #[test]
 fn the_paper_and_a_dense_family_in_figures() {
-    let families = Desk::new().json("codes prime=29 gold=5 --json");
+    let told = Desk::new().json("codes prime=29 gold=5 --json");
+    let families = &told["families"];
     let paper = &families[0];
     assert_eq!(paper["family"], "prime 29");
     assert_eq!((&paper["length_chips"], &paper["words"]), (&json!(841), &json!(29)));

@@ -18,6 +18,7 @@ fn the_second_pixel_of_the_paper() {
     assert_eq!(
         shot,
         json!({
+            "schema_version": 1,
             "row": 0,
             "column": 1,
             "label": 1,

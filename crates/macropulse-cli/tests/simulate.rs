@@ -101,7 +101,7 @@ fn nothing_is_written_when_nothing_is_wanted() {
     let desk = Desk::new();
     let run = desk.json(&format!("{START} --format none --json"));
     assert_eq!(desk.files(), [""; 0]);
-    assert_eq!(run["shots"], 4096);
+    assert_eq!(run["counts"]["shots"], 4096);
     assert_eq!(run["folder"], serde_json::Value::Null);
 }
 
@@ -114,8 +114,8 @@ fn a_scenario_with_several_sensors_gives_each_a_folder() {
                 scans = 2\nseed = 5\nformats = [\"ply\"]\n";
     desk.put("in/s.toml", text);
     let runs = desk.json("simulate in/s.toml -o out --scans 1 --json");
-    assert_eq!((&runs[0]["scans"], &runs[1]["seed"]), (&1.into(), &5.into()));
-    assert_eq!(runs[1]["sensor"], "mine");
+    assert_eq!((&runs[0]["counts"]["scans"], &runs[1]["seed"]), (&1.into(), &5.into()));
+    assert_eq!(runs[1]["sensor"]["name"], "mine");
     for file in ["out/mine/scan-000000.ply", "out/peregrine/manifest.json"] {
         assert!(desk.path().join(file).is_file(), "{file}");
     }

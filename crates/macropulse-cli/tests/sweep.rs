@@ -74,7 +74,7 @@ fn a_sweep_leaves_a_table_a_picture_and_a_manifest() {
     let manifest: Value = serde_json::from_str(&read(&desk, "out/manifest.json")).unwrap();
     assert_eq!(manifest["points"].as_array().unwrap().len(), 3);
     assert_eq!(manifest["seeds"], 3);
-    assert!(manifest["idealisations"].as_array().unwrap().contains(&"footprint".into()));
+    assert!(manifest["idealised"].as_array().unwrap().contains(&"footprint".into()));
     assert!(read(&desk, "out/sweep.svg").matches("<g transform").count() == 3);
 }
 

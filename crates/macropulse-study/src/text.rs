@@ -1,7 +1,10 @@
 //! Text for people: names with values beside them in columns, numbers one can read.
 
-/// Columns at which long values are broken.
+/// Columns at which long values are broken where they are not shown on a terminal, and at most there.
 const WIDTH: usize = 96;
+
+/// Fewer than these are not worth breaking for.
+const NARROWEST: usize = 40;
 
 /// A blank at which [`Columns`] breaks no line.
 pub const NO_BREAK: char = '\u{a0}';
@@ -23,13 +26,21 @@ impl Columns {
         }
     }
 
-    /// All lines, indented by two, with plain blanks.
+    /// All lines, indented by two, with plain blanks, as wide as the terminal that standard output
+    /// is.
     pub fn text(&self) -> String {
+        let terminal = terminal_size::terminal_size_of(std::io::stdout());
+        self.within(terminal.map_or(WIDTH, |(width, _)| usize::from(width.0)))
+    }
+
+    /// All lines, none longer than `columns` unless a word is.
+    fn within(&self, columns: usize) -> String {
+        let columns = columns.clamp(NARROWEST, WIDTH);
         let width = self.0.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0) + 2;
         let mut text = String::new();
         for (name, value) in &self.0 {
             let mut name = name.as_str();
-            for line in broken(value, WIDTH - 2 - width) {
+            for line in broken(value, columns.saturating_sub(2 + width)) {
                 text += format!("  {name:<width$}{line}").trim_end();
                 text.push('\n');
                 name = "";
@@ -46,7 +57,7 @@ pub fn section(heading: &str, columns: &Columns) -> String {
 }
 
 /// `text` as lines of at most `width` characters where its blanks allow.
-fn broken(text: &str, width: usize) -> Vec<String> {
+pub fn broken(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.len() - 1;
@@ -114,5 +125,8 @@ mod tests {
         assert_eq!(lines[0], "  a          1");
         assert_eq!(lines.len(), 3);
         assert!(lines[2].starts_with("             x x"));
+        let narrow = columns.within(50);
+        assert!(narrow.lines().all(|line| line.chars().count() <= 50), "{narrow}");
+        assert_eq!(narrow.lines().count(), 1 + 4);
     }
 }

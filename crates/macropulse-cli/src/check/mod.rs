@@ -3,14 +3,16 @@
 mod scene;
 mod sensor;
 
-use std::path::Path;
-
 use clap::Args;
-use macropulse::design::Design;
-use macropulse::scene::{self as scenes, Scene};
+use clap_complete::engine::ArgValueCompleter;
+use macropulse::formats::versioned;
+use macropulse::scene as scenes;
+use macropulse_study::record::surroundings;
 use serde_json::{Value, json};
 
+use crate::completions;
 use crate::fault::Fault;
+use crate::input;
 use crate::kind::Kind;
 use crate::options::{Changes, Common, Surroundings};
 use crate::simulate::scenario::Scenario;
@@ -24,8 +26,9 @@ use crate::text::{Columns, counted, print, print_json};
 #[command(after_help = "Example:
   macropulse check kim-park-2016 mine.toml")]
 pub struct Check {
-    /// Ready sensors or scenes, or TOML files
+    /// Ready sensors or scenes, or TOML files, - for standard input
     #[arg(required = true, value_name = "NAME-or-FILE")]
+    #[arg(add = ArgValueCompleter::new(completions::both))]
     files: Vec<String>,
 
     #[command(flatten)]
@@ -53,12 +56,12 @@ pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
         }
     }
     if options.json {
-        // A file that is wrong is missing from the array, but an array it stays.
-        let values = reports.into_iter().map(|report| report.json).collect::<Vec<Value>>();
+        // A file that is wrong is missing from the list, but a list it stays.
+        let mut values = reports.into_iter().map(|report| report.json).collect::<Vec<Value>>();
         if options.files.len() > 1 {
-            print(&format!("{:#}\n", Value::from(values)))?;
-        } else if !values.is_empty() {
-            print_json(values)?;
+            print_json(vec![values.into_iter().map(versioned).collect()])?;
+        } else if let Some(value) = values.pop() {
+            print_json(vec![value])?;
         }
     } else if !common.quiet && !reports.is_empty() {
         let texts: Vec<String> = reports.into_iter().map(|report| report.text).collect();
@@ -78,10 +81,10 @@ impl Report {
         match Kind::of(name)? {
             Kind::Sensor => {
                 let environment = Surroundings::alone(changes)?;
-                sensor::report(&Design::open(name, &changes.of_sensor)?, &environment)
+                sensor::report(&input::design(name, &changes.of_sensor)?, &environment)
             }
-            Kind::Scene => Ok(scene::report(&Scene::open_changed(name, &changes.of_scene)?)),
-            Kind::Scenario => Ok(scenario(name, &Scenario::open(Path::new(name), changes)?)),
+            Kind::Scene => Ok(scene::report(&input::scene(name, &changes.of_scene)?)),
+            Kind::Scenario => Ok(scenario(name, &Scenario::open(name, changes)?)),
         }
     }
 }
@@ -115,8 +118,7 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
             "name": name,
             "sensors": sensors,
             "scene": scenario.scene.name,
-            "environment": environment.name,
-            "conditions": conditions,
+            "environment": surroundings(environment),
             "scans": scenario.scans,
             "seed": scenario.seed,
             "formats": formats,

@@ -1,6 +1,7 @@
 //! The report on a scene.
 
 use macropulse::scene::{Interferer, Moving, Pose, Scene};
+use macropulse_study::record::surroundings;
 use serde_json::{Map, Value, json};
 
 use super::Report;
@@ -47,9 +48,9 @@ pub fn report(scene: &Scene) -> Report {
             "sensor_pitch_deg": scene.sensor.pose.pitch.to_degrees(),
             "sensor_roll_deg": scene.sensor.pose.roll.to_degrees(),
             "moving": scene.moving.iter().map(moves).collect::<Vec<_>>(),
-            "environment": environment.name,
-            "conditions": conditions,
-            "idealised": environment
+            "environment": surroundings(environment),
+            "idealised": environment.idealised.iter().map(|e| e.name()).collect::<Vec<_>>(),
+            "assumptions": environment
                 .idealised
                 .iter()
                 .map(|e| (e.name().to_owned(), e.assumption().into()))

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use macropulse::channel::Operating;
 use macropulse::design::{Derived, Design};
 use macropulse::environment::Environment;
+use macropulse_study::record::{defaults, surroundings};
 use serde_json::{Map, Value, json};
 
 use super::Report;
@@ -36,8 +37,7 @@ pub fn report(design: &Design, environment: &Environment) -> Result<Report, Faul
     warnings.push_list("!", design.warnings.iter().cloned());
     text += &section("Warnings", &warnings);
     let mut json = json(design, &derived);
-    json["environment"] = environment.name.clone().into();
-    json["conditions"] = environment.conditions().into();
+    json["environment"] = json!(surroundings(environment));
     json["sunlight_hz"] = operating.background.into();
     json["false_rate_hz"] = operating.false_rate.into();
     json["transmission"] = operating.link.transmission(design.scan.rated_range).into();
@@ -157,12 +157,15 @@ fn light(design: &Design, derived: &Derived) -> Columns {
 
 fn json(design: &Design, derived: &Derived) -> Value {
     let (fewest, mean, most) = derived.marks;
-    let named = |pairs: &mut dyn Iterator<Item = (&str, &str)>| -> Map<String, Value> {
-        pairs.map(|(key, value)| (key.to_owned(), value.into())).collect()
-    };
+    let assumptions: Map<String, Value> = design
+        .idealised
+        .iter()
+        .map(|effect| (effect.name().to_owned(), effect.assumption().into()))
+        .collect();
     json!({
         "kind": "sensor",
         "name": design.name,
+        "digest": design.digest(),
         "summary": design.summary,
         "rows": design.scan.rows,
         "columns": design.scan.columns,
@@ -188,8 +191,9 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "marks_per_scan": derived.marks_per_scan,
         "mean_overlap": derived.mean_overlap,
         "reference_photons": derived.reference_photons,
-        "idealised": named(&mut design.idealised.iter().map(|e| (e.name(), e.assumption()))),
-        "defaults": named(&mut design.defaults.iter().map(|(k, v)| (k.as_str(), v.as_str()))),
+        "idealised": design.idealised.iter().map(|effect| effect.name()).collect::<Vec<_>>(),
+        "assumptions": assumptions,
+        "defaults": defaults(design),
         "warnings": design.warnings,
     })
 }

@@ -8,8 +8,10 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::scene::Changes;
 
+use crate::completions;
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
@@ -26,9 +28,10 @@ use scenario::Scenario;
 /// win over the file.
 #[derive(Args)]
 #[command(after_help = "Examples:
-  macropulse simulate --sensor kim-park-2016-fixed --scene car-30m -o out
-  macropulse simulate --sensor hdl-64e --scene street --scans 5 --format ply,csv --truth -o out
-  macropulse simulate --sensor hdl-64e --scene street --environment fog-50m -o out
+  macropulse simulate kim-park-2016-fixed car-30m -o out
+  macropulse simulate hdl-64e street --scans 5 --format ply,csv --truth -o out
+  macropulse simulate hdl-64e street --environment fog-50m -o out
+  macropulse simulate --sensor hdl-64e --sensor peregrine --scene street -o out
   macropulse simulate crossing.toml -o out
 
 A scenario file:
@@ -40,18 +43,25 @@ A scenario file:
   formats = [\"pcd\", \"png\"]
   truth = true")]
 pub struct Simulate {
-    /// Scenario file
-    #[arg(value_name = "SCENARIO.toml", conflicts_with_all = ["sensors", "scene"])]
-    #[arg(required_unless_present_any = ["sensors", "scene"])]
-    scenario: Option<PathBuf>,
+    /// Ready sensor or TOML file, - for standard input; or, alone, a scenario file
+    #[arg(value_name = "SENSOR", conflicts_with = "sensors", required_unless_present = "sensors")]
+    #[arg(add = ArgValueCompleter::new(completions::sensors))]
+    sensor: Option<String>,
 
-    /// Ready sensor or TOML file; repeatable, each gets a folder of its own
-    #[arg(long = "sensor", value_name = "NAME-or-FILE", requires = "scene")]
+    /// Ready scene or TOML file, - for standard input
+    #[arg(value_name = "SCENE", conflicts_with_all = ["named_scene", "sensors"])]
+    #[arg(add = ArgValueCompleter::new(completions::scenes))]
+    scene: Option<String>,
+
+    /// Another way to name a sensor; repeatable, each of several gets a folder of its own
+    #[arg(long = "sensor", value_name = "NAME-or-FILE", requires = "named_scene")]
+    #[arg(add = ArgValueCompleter::new(completions::sensors))]
     sensors: Vec<String>,
 
-    /// Ready scene or TOML file
-    #[arg(long, value_name = "NAME-or-FILE", requires = "sensors")]
-    scene: Option<String>,
+    /// Another way to name the scene
+    #[arg(long = "scene", value_name = "NAME-or-FILE", id = "named_scene")]
+    #[arg(add = ArgValueCompleter::new(completions::scenes))]
+    named_scene: Option<String>,
 
     #[command(flatten)]
     surroundings: Surroundings,
@@ -107,9 +117,13 @@ impl Simulate {
         if let Some(kind) = self.receiver.and_then(|receiver| receiver.to_possible_value()) {
             changes.of_sensor.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
         }
-        let mut scenario = match (&self.scenario, &self.scene) {
-            (Some(path), _) => open(path, &changes)?,
-            (None, scene) => Scenario::of(&self.sensors, scene.as_deref().unwrap_or(""), &changes)?,
+        let scene = self.scene.as_ref().or(self.named_scene.as_ref());
+        let mut scenario = match (&self.sensor, scene) {
+            (Some(alone), None) => open(alone, &changes)?,
+            (sensor, scene) => {
+                let sensors: Vec<String> = sensor.iter().chain(&self.sensors).cloned().collect();
+                Scenario::of(&sensors, scene.map_or("", String::as_str), &changes)?
+            }
         };
         if let Some(formats) = &self.format {
             scenario.formats.clone_from(&formats.0);
@@ -159,17 +173,17 @@ pub fn run(options: &Simulate, common: &Common) -> Result<(), Fault> {
     if interrupt.is_raised() { Err(Fault::Interrupted) } else { Ok(()) }
 }
 
-/// The scenario in the file at `path`; a sensor or a scene in its place is a slip worth a hint.
-fn open(path: &Path, changes: &Changes) -> Result<Scenario, Fault> {
-    let (what, option, other) = match Kind::of(&path.display().to_string()) {
-        Ok(Kind::Sensor) => ("sensor", "--sensor", "--scene"),
-        Ok(Kind::Scene) => ("scene", "--scene", "--sensor"),
-        _ => return Scenario::open(path, changes),
-    };
-    let path = path.display();
-    Err(Fault::Wrong(format!(
-        "{path}: is a {what}, not a scenario; use {option} {path} and {other}"
-    )))
+/// The scenario called `name`; a sensor or a scene in its place is a slip worth a hint.
+fn open(name: &str, changes: &Changes) -> Result<Scenario, Fault> {
+    match Kind::of(name)? {
+        Kind::Scenario => Scenario::open(name, changes),
+        Kind::Sensor => Err(Fault::Wrong(format!(
+            "{name}: is a sensor; name a scene behind it, as in `macropulse simulate {name} street`"
+        ))),
+        Kind::Scene => Err(Fault::Wrong(format!(
+            "{name}: is a scene; name a sensor before it, as in `macropulse simulate hdl-64e {name}`"
+        ))),
+    }
 }
 
 /// A folder below `output` for each name; characters that mean something in a path are replaced,

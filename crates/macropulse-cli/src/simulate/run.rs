@@ -11,7 +11,7 @@ use macropulse::sim::{Scans, Tally, Watch};
 use macropulse_study::record::{self, COLOUR, PAGE, Page};
 
 use super::scenario::Scenario;
-use crate::fault::{Fault, complain};
+use crate::fault::{Fault, warn};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
@@ -81,7 +81,7 @@ impl<'a> Run<'a> {
         }
         run.elapsed = began.elapsed().as_secs_f64();
         progress.finish();
-        run.find_warnings(scenario);
+        run.find_warnings(scenario, folder.as_ref());
         if let (Some(folder), 1..) = (&folder, run.scans) {
             run.folder = folder.path().display().to_string();
             run.files.push(PAGE.to_owned());
@@ -111,7 +111,7 @@ impl<'a> Run<'a> {
     }
 
     /// Adds what came to light during the run, and says it at once: it must not go under.
-    fn find_warnings(&mut self, scenario: &Scenario) {
+    fn find_warnings(&mut self, scenario: &Scenario, folder: Option<&Folder>) {
         let wanted = scenario.scans;
         let mut found = Vec::new();
         if self.scans < wanted {
@@ -128,11 +128,21 @@ impl<'a> Run<'a> {
                 "too many pixels for a picture in colour; there is the 16-bit one".to_owned(),
             );
         }
-        found.iter().for_each(|warning| complain(&format!("{}: {warning}", self.design.name)));
+        let older = folder.map_or_else(Vec::new, |folder| folder.older(&self.files));
+        if let (Some(folder), [first, ..]) = (folder, older.as_slice()) {
+            let (folder, count) = (folder.path().display(), older.len());
+            let others = if count == 1 { "is" } else { "and others like it are" };
+            found.push(format!(
+                "{folder}/{first} {others} of an older run ({count} in all), and not in the \
+                 manifest: remove what is older, or write into a folder of its own"
+            ));
+        }
+        found.iter().for_each(|warning| warn(&format!("{}: {warning}", self.design.name)));
         self.warnings.extend(found);
     }
 
-    fn manifest(&self) -> Manifest {
+    /// What is needed to repeat the run and to judge it.
+    pub fn manifest(&self) -> Manifest {
         record::manifest(&record::Run {
             design: self.design,
             scene: self.scene,

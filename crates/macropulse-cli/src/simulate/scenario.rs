@@ -14,6 +14,8 @@ use toml::Spanned;
 
 use super::formats::Formats;
 use crate::fault::Fault;
+use crate::input::{self, STDIN};
+use crate::kind::Kind;
 
 /// The format this program reads.
 const VERSION: i64 = 1;
@@ -50,18 +52,32 @@ struct ScenarioFile {
 impl Scenario {
     /// One scan of the sensors in the scene, each a ready one or a file.
     pub fn of(sensors: &[String], scene: &str, changes: &Changes) -> Result<Self, Fault> {
+        if sensors.iter().map(String::as_str).chain([scene]).filter(|name| *name == STDIN).count()
+            > 1
+        {
+            return Err(Fault::Wrong(
+                "- is named twice, but standard input is one text: write the other into a file"
+                    .to_owned(),
+            ));
+        }
+        if let ([sensor], Ok(Kind::Sensor)) = (sensors, Kind::of(scene))
+            && Kind::of(sensor).is_ok_and(|kind| kind == Kind::Scene)
+        {
+            return Err(Fault::Wrong(format!(
+                "{sensor}: is a scene, and {scene} a sensor; the sensor comes first, as in \
+                 `macropulse simulate {scene} {sensor}`"
+            )));
+        }
         let designs: Result<Vec<_>, _> =
-            sensors.iter().map(|sensor| Design::open(sensor, &changes.of_sensor)).collect();
-        let (designs, scene) = (designs?, Scene::open_changed(scene, &changes.of_scene)?);
+            sensors.iter().map(|sensor| input::design(sensor, &changes.of_sensor)).collect();
+        let (designs, scene) = (designs?, input::scene(scene, &changes.of_scene)?);
         check_operating(&designs, &scene)?;
         Ok(Self { designs, scene, scans: 1, seed: 1, formats: Formats::default().0, truth: false })
     }
 
-    /// The scenario in the file at `path`; names of files count from its folder.
-    pub fn open(path: &Path, changes: &Changes) -> Result<Self, Fault> {
-        let origin = path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).map_err(|error| Fault::unreadable(&origin, &error))?;
+    /// The scenario in the file called `name`; names of files count from its folder.
+    pub fn open(name: &str, changes: &Changes) -> Result<Self, Fault> {
+        let (text, origin) = input::text(name)?;
         let source = Source { text: &text, origin: &origin };
         let file: ScenarioFile =
             toml::from_str(&text).map_err(|error| source.typed_wrongly(&error))?;
@@ -72,7 +88,7 @@ impl Scenario {
             );
             return Err(source.fault(file.version.span(), &message));
         }
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = Path::new(name).parent().unwrap_or(Path::new(""));
         let named: Vec<&Spanned<String>> = file.sensor.iter().chain(&file.sensors).collect();
         if named.is_empty() {
             return Err(source.fault(0..0, "names no sensor: add sensor = \"…\" or sensors = […]"));
@@ -201,7 +217,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
-        match Scenario::open(&path, &Changes::default()) {
+        match Scenario::open(&path.display().to_string(), &Changes::default()) {
             Err(Fault::Wrong(sentence)) => sentence.rsplit_once("s.toml").unwrap().1.to_owned(),
             _ => "accepted".to_owned(),
         }

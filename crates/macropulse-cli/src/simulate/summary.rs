@@ -6,7 +6,7 @@ use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
 use macropulse_study::record::PAGE;
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 
 use super::run::Run;
 use crate::text::{Columns, NO_BREAK, counted, grouped, lasted, short};
@@ -133,74 +133,11 @@ impl Run<'_> {
         format!("{files} and manifest.json to {}; open {}", self.folder, page.display())
     }
 
-    /// The same for programs; keys carry their units.
+    /// The same for programs: the manifest, and what depends on this machine.
     pub fn json(&self) -> Value {
-        let tally = &self.tally;
-        let outcomes: Map<String, Value> = Outcome::ALL
-            .into_iter()
-            .map(|outcome| (outcome.name().to_owned(), self.score.count(outcome).into()))
-            .collect();
-        let rejects: Map<String, Value> = Reject::ALL
-            .into_iter()
-            .zip(tally.rejects)
-            .map(|(kind, count)| (kind.name().to_owned(), count.into()))
-            .collect();
-        let stages: Map<String, Value> =
-            self.stages().map(|(stage, seconds)| (stage.to_owned(), seconds.into())).collect();
-        let environment = &self.scene.environment;
-        let idealised: Vec<&str> =
-            idealised(self.design, environment).iter().map(|effect| effect.name).collect();
-        let defaults: Map<String, Value> = self
-            .design
-            .defaults
-            .iter()
-            .map(|(key, value)| (key.clone(), value.as_str().into()))
-            .collect();
-        let mut json = json!({
-            "sensor": self.design.name,
-            "scene": self.scene.name,
-            "environment": environment.name,
-            "conditions": environment.conditions(),
-            "seed": self.seed,
-            "scans": self.scans,
-            "shots": tally.shots,
-            "surfaces": tally.surfaces,
-            "echoes": tally.echoes,
-            "detections": tally.detections,
-            "ticks": tally.ticks,
-            "returns": tally.returns,
-            "outcomes": outcomes,
-            "right_fraction": self.score.right_fraction(),
-            "right_within_m": self.design.right_within,
-            "samples_on_target": self.score.samples_on_target,
-            "points_on_target": self.score.points_on_target,
-            "rejects": rejects,
-            "converters_peak_busy": tally.peak_busy,
-            "detections_lost": tally.lost,
-            "detections_merged": tally.merged,
-            "elapsed_s": self.elapsed,
-            "speed": self.speed(),
-            "stages_s": stages,
-            "idealised": idealised,
-            "defaults": defaults,
-            "assumed": self.scene.notes,
-            "warnings": self.warnings,
-            "folder": (!self.folder.is_empty()).then_some(&self.folder),
-            "files": self.files,
-        });
-        if self.design.receiver.returns > 1 {
-            let most = usize::from(self.design.receiver.returns);
-            json["returns_by_number"] = tally.by_number[..most].into();
-            json["further_outcomes"] = Outcome::ALL
-                .into_iter()
-                .map(|o| (o.name().to_owned(), self.score.count_further(o).into()))
-                .collect::<Map<String, Value>>()
-                .into();
-        }
-        if !self.scene.interferers.is_empty() {
-            json["interferer_shots"] = tally.interferer_shots.into();
-            json["ghosts"] = self.score.ghosts.into();
-        }
+        let mut json = serde_json::to_value(self.manifest()).unwrap_or_default();
+        json["speed"] = self.speed().into();
+        json["folder"] = (!self.folder.is_empty()).then_some(self.folder.as_str()).into();
         json
     }
 }

@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use clap_complete::engine::ArgValueCompleter;
 use macropulse::sim::Watch;
 use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
-use crate::fault::{Fault, complain};
+use crate::completions;
+use crate::fault::{Fault, warn};
+use crate::input::STDIN;
 use crate::interrupt::Interrupt;
 use crate::options::{Changes, Common, Surroundings};
 use crate::progress::Progress;
@@ -26,15 +29,23 @@ use crate::text::{NO_BREAK, counted, print};
 pub struct Sweep {
     /// Ready sensor or TOML file
     #[arg(value_name = "SENSOR", conflicts_with = "sensors", required_unless_present = "sensors")]
+    #[arg(add = ArgValueCompleter::new(completions::sensors))]
     sensor: Option<String>,
+
+    /// Ready scene or TOML file
+    #[arg(value_name = "SCENE", conflicts_with_all = ["named_scene", "sensors"])]
+    #[arg(required_unless_present = "named_scene")]
+    #[arg(add = ArgValueCompleter::new(completions::scenes))]
+    scene: Option<String>,
 
     /// Several sensors, with commas between them; along x, or a curve each if a key is varied too
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     sensors: Vec<String>,
 
-    /// Ready scene or TOML file
-    #[arg(long, value_name = "NAME-or-FILE")]
-    scene: String,
+    /// Another way to name the scene
+    #[arg(long = "scene", value_name = "NAME-or-FILE", id = "named_scene")]
+    #[arg(add = ArgValueCompleter::new(completions::scenes))]
+    named_scene: Option<String>,
 
     /// Key and values: 0,0.1,0.2 a list, 50..200:7 seven in equal steps, 1e6..1e10:log9 nine in
     /// equal ratios; given twice, the second key makes a curve for each of its values
@@ -99,21 +110,30 @@ A key of the scene stands behind scene:, an object by its name, as scene:object.
 sun and air are environment.visibility_km and the like.
 
 Examples:
-  macropulse sweep kim-park-2016-fixed --scene wall --shots 20000 -o out \\
+  macropulse sweep kim-park-2016-fixed wall --shots 20000 -o out \\
     --vary detector.photon-counting.missed_marks=0,0.1,0.2,0.4 --score pd,wrong,precision
-  macropulse sweep peregrine --scene wall --vary scene:object.wall.position_m.x=10..70:13 -o far
-  macropulse sweep hdl-64e --scene street --vary environment.visibility_km=0.05..5:log7 -o fog
+  macropulse sweep peregrine wall --vary scene:object.wall.position_m.x=10..70:13 -o far
+  macropulse sweep hdl-64e street --vary environment.visibility_km=0.05..5:log7 -o fog
   macropulse sweep --sensors kim-park-2016,kim-park-2016-fixed,hdl-64e --scene car-50m -o cars
-  macropulse sweep mine.toml --scene street --vary tdc.converters=8..512:log7 --shard 1/2 -o tdc",
+  macropulse sweep mine.toml street --vary tdc.converters=8..512:log7 --shard 1/2 -o tdc",
         scores.concat()
     )
 }
 
 impl Sweep {
     fn request(&self) -> Result<Request, Fault> {
+        let sensors: Vec<String> = self.sensor.iter().chain(&self.sensors).cloned().collect();
+        let scene = self.scene.as_ref().or(self.named_scene.as_ref()).cloned().unwrap_or_default();
+        if sensors.iter().chain([&scene]).any(|name| name == STDIN) {
+            return Err(Fault::Wrong(
+                "- is no name for a sweep, which goes on later with the same command: write the \
+                 sensor or scene into a file"
+                    .to_owned(),
+            ));
+        }
         Ok(Request {
-            sensors: self.sensor.iter().chain(&self.sensors).cloned().collect(),
-            scene: self.scene.clone(),
+            sensors,
+            scene,
             set: self.changes.all(&self.surroundings)?,
             vary: self.vary.clone(),
             seeds: self.seed..self.seed + self.seeds,
@@ -134,14 +154,14 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     if !done {
         let (left, all) = (missing.len(), counted(plan.count() as u64, "scan"));
         let told = format!("{left} of {all} are missing; the same command goes on from here");
-        complain(&told.replace(NO_BREAK, " "));
+        warn(&told.replace(NO_BREAK, " "));
         return Err(Fault::Interrupted);
     }
     let told = match missing.as_slice() {
         [] => {
             let scores = &options.score.0;
             let table = interrupt.undisturbed(|| plan.finish(folder, scores))?;
-            table.empty().iter().for_each(|sentence| complain(sentence));
+            table.empty().iter().for_each(|sentence| warn(sentence));
             match options.json {
                 true => summary::json(&plan, &table),
                 false => summary::text(&plan, &table, folder),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use macropulse::formats::versioned;
 use macropulse_study::sweep::{Plan, Point, Shard, Table};
 use serde_json::{Value, json};
 
@@ -45,7 +46,7 @@ pub fn text_of_missing(plan: &Plan, missing: &[usize], shard: Shard) -> String {
 pub fn json(plan: &Plan, table: &Table) -> String {
     let mut value = header(plan);
     value["rows"] = table.json();
-    format!("{value:#}\n")
+    format!("{:#}\n", versioned(value))
 }
 
 /// What is left to do, for programs.
@@ -53,7 +54,7 @@ pub fn json_of_missing(plan: &Plan, missing: &[usize], shard: Shard) -> String {
     let mut value = header(plan);
     value["missing"] = missing.len().into();
     value["missing_shards"] = shard.with_any(missing).into();
-    format!("{value:#}\n")
+    format!("{:#}\n", versioned(value))
 }
 
 fn header(plan: &Plan) -> Value {

@@ -6,6 +6,7 @@ use macropulse::predict::verdict::Check;
 use serde_json::{Value, json};
 
 use super::{Farthest, Figures};
+use crate::record::{named, surroundings};
 
 impl Figures<'_> {
     /// All of it as one JSON object; the names of its keys end in their units.
@@ -20,9 +21,8 @@ impl Figures<'_> {
             .zip(class)
             .map(|(limit, class)| class.single_exposure(limit.duration) * 1e9);
         json!({
-            "sensor": self.design.name,
-            "environment": self.environment.name,
-            "conditions": self.environment.conditions(),
+            "sensor": named(self.design),
+            "environment": surroundings(&self.environment),
             "range_m": self.wanted.range,
             "reflectance": self.wanted.reflectance,
             "energy_per_macropulse_nj": budget.map(|budget| budget.energy * 1e9),

@@ -9,9 +9,12 @@ use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::emit::scan_begins_fs;
+use macropulse::environment::Environment;
 use macropulse::formats::{
-    self, Begun, Entries, Format, Manifest, Named, Names, write_atomically, write_cloud,
+    self, Begun, Entries, Format, Manifest, Named, Names, Surroundings, write_atomically,
+    write_cloud,
 };
+use macropulse::names::toml_value;
 use macropulse::points::{Outcome, PointCloud};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
@@ -107,19 +110,22 @@ pub struct Run<'a> {
 
 /// The manifest of a run.
 pub fn manifest(run: &Run) -> Manifest {
-    let Run { design, scene, tally, .. } = *run;
+    let Run { design, scene, tally, score, .. } = *run;
     let mut manifest = Manifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: run.seed,
-        sensor: Named { name: design.name.clone(), digest: design.digest() },
+        sensor: named(design),
         scene: Named { name: scene.name.clone(), digest: scene.digest() },
-        defaults: Entries(design.defaults.clone()),
-        environment: format!("{}: {}", scene.environment.name, scene.environment.conditions()),
-        idealisations: idealised(design, &scene.environment)
+        environment: surroundings(&scene.environment),
+        defaults: defaults(design),
+        idealised: idealised(design, &scene.environment)
             .iter()
             .map(|effect| effect.name.to_owned())
             .collect(),
-        notes: scene.notes.iter().chain(run.warnings).cloned().collect(),
+        assumed: scene.notes.clone(),
+        warnings: run.warnings.to_vec(),
+        right_fraction: Some(score.right_fraction()).filter(|fraction| fraction.is_finite()),
+        right_within_m: design.right_within,
         scans: (0..run.scans).map(|scan| begun(design, scene, scan)).collect(),
         files: run.files.to_vec(),
         ..Manifest::default()
@@ -135,29 +141,53 @@ pub fn manifest(run: &Run) -> Manifest {
     ] {
         manifest.counts.push(name, count);
     }
-    for number in 2..=design.receiver.returns {
+    for number in 1..=design.receiver.returns {
         let count = tally.by_number[usize::from(number) - 1];
-        manifest.counts.push(format!("returns_{number}"), count);
+        if design.receiver.returns > 1 {
+            manifest.counts.push(format!("returns_{number}"), count);
+        }
     }
+    manifest.counts.push("samples_on_target", score.samples_on_target);
+    manifest.counts.push("points_on_target", score.points_on_target);
     if !scene.interferers.is_empty() {
         manifest.counts.push("interferer_shots", tally.interferer_shots);
-        manifest.counts.push("ghosts", run.score.ghosts);
+        manifest.counts.push("ghosts", score.ghosts);
     }
     for (kind, count) in Reject::ALL.into_iter().zip(tally.rejects) {
         manifest.rejects.push(kind.name(), count);
     }
-    manifest.tdc.push("peak_busy", u64::from(tally.peak_busy));
-    manifest.tdc.push("lost", tally.lost);
-    manifest.tdc.push("merged", tally.merged);
+    manifest.converters.push("peak_busy", u64::from(tally.peak_busy));
+    manifest.converters.push("lost", tally.lost);
+    manifest.converters.push("merged", tally.merged);
     for outcome in Outcome::ALL {
-        manifest.outcomes.push(outcome.name(), run.score.count(outcome));
+        manifest.outcomes.push(outcome.name(), score.count(outcome));
+        if design.receiver.returns > 1 {
+            manifest.further_outcomes.push(outcome.name(), score.count_further(outcome));
+        }
     }
     for (stage, seconds) in Tally::STAGES.into_iter().zip(tally.seconds) {
-        manifest.stage_times_s.push(stage, seconds);
+        manifest.times_s.push(stage, seconds);
     }
-    manifest.stage_times_s.push("write", run.writing);
-    manifest.stage_times_s.push("elapsed", run.elapsed);
+    manifest.times_s.push("write", run.writing);
+    manifest.times_s.push("elapsed", run.elapsed);
     manifest
+}
+
+/// A sensor as manifests have it.
+pub fn named(design: &Design) -> Named {
+    Named { name: design.name.clone(), digest: design.digest() }
+}
+
+/// Sun and air as manifests have them.
+pub fn surroundings(environment: &Environment) -> Surroundings {
+    Surroundings { name: environment.name.clone(), conditions: environment.conditions() }
+}
+
+/// What the file of a sensor leaves open, by key.
+pub fn defaults(design: &Design) -> Entries<serde_json::Value> {
+    let value = |typed: &str| serde_json::to_value(toml_value(typed)).unwrap_or_default();
+    let defaults = design.defaults.iter();
+    Entries(defaults.map(|(key, typed)| (key.clone(), value(typed))).collect())
 }
 
 fn begun(design: &Design, scene: &Scene, scan: u64) -> Begun {

@@ -63,15 +63,52 @@ pub fn describe(page: &mut Explorer, manifest: &Value) {
     let facts = [
         ("sensor", &manifest["sensor"]["name"]),
         ("scene", &manifest["scene"]["name"]),
-        ("environment", &manifest["environment"]),
+        ("environment", &manifest["environment"]["name"]),
+        ("conditions", &manifest["environment"]["conditions"]),
         ("seed", &manifest["seed"]),
     ];
     for (what, value) in facts.into_iter().filter(|(_, value)| !value.is_null()) {
         page.fact(what, &text(value));
     }
+    for warning in manifest["warnings"].as_array().into_iter().flatten() {
+        page.fact("warning", &text(warning));
+    }
     for (counts, prefix) in [("counts", ""), ("outcomes", "pixels ")] {
         for (what, count) in manifest[counts].as_object().into_iter().flatten() {
             page.fact(&format!("{prefix}{}", what.replace('_', " ")), &text(count));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_page_tells_what_the_manifest_does_but_for_times() {
+        let manifest = json!({
+            "sensor": { "name": "mine" },
+            "environment": { "name": "clear-day", "conditions": "visibility 23 km" },
+            "counts": { "shots": 407_040, "interferer_shots": 7 },
+            "outcomes": { "missed": 3 },
+            "warnings": ["not a single point"],
+            "times_s": { "elapsed": 77.5 },
+        });
+        let mut page = Explorer::new("t");
+        describe(&mut page, &manifest);
+        let html = page.html().replace('\u{202f}', " ").replace('\u{a0}', " ");
+        for (what, value) in [
+            ("sensor", "mine"),
+            ("conditions", "visibility 23 km"),
+            ("shots", "407 040"),
+            ("interferer shots", "7"),
+            ("pixels missed", "3"),
+            ("warning", "not a single point"),
+        ] {
+            let line = format!("<dt>{what}</dt><dd>{value}</dd>");
+            assert!(html.contains(&line), "{line}");
+        }
+        assert!(!html.contains("<dt>scene</dt>") && !html.contains("77.5"));
     }
 }

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Axis, Error, Job};
+use crate::record::{defaults, named, surroundings};
 use macropulse::channel::{Operating, idealised};
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
-use macropulse::formats::Named;
+use macropulse::formats::{Entries, Named, Surroundings};
 use macropulse::scene::{Changes, Scene, apart};
 
 /// More jobs than this are taken for a slip.
@@ -62,14 +63,16 @@ pub struct Point {
     pub shots: u64,
     /// Pixels of a whole scan.
     pub shots_per_scan: u64,
-    /// Sun and air: the name of the environment, and what it is like.
-    pub environment: String,
+    /// Sun and air.
+    pub environment: Surroundings,
     /// Effects that are left out.
-    pub idealisations: Vec<String>,
-    /// Values that the file leaves open: dotted key and value.
-    pub defaults: Vec<(String, String)>,
-    /// Assumptions of the scene and warnings of the sensor.
-    pub notes: Vec<String>,
+    pub idealised: Vec<String>,
+    /// Values that the file leaves open, by key.
+    pub defaults: Entries<Value>,
+    /// What was assumed in reading the scene.
+    pub assumed: Vec<String>,
+    /// Warnings of the sensor.
+    pub warnings: Vec<String>,
     /// The whole sensor as TOML.
     pub(super) text: String,
     /// What is measured of a scan.
@@ -141,15 +144,14 @@ impl Plan {
 
     /// What makes the sweep another one if it changes, scores apart; part of the manifest.
     pub(super) fn description(&self) -> Value {
-        let named = |named: &Named| json!({ "name": named.name, "digest": named.digest });
         let points: Vec<Value> = self
             .points
             .iter()
             .map(|point| {
                 json!({
                     "values": point.values,
-                    "sensor": named(&point.sensor),
-                    "scene": named(&point.scene),
+                    "sensor": point.sensor,
+                    "scene": point.scene,
                     "pixels": point.shots,
                     "pixels_per_scan": point.shots_per_scan,
                 })
@@ -194,17 +196,18 @@ impl Point {
         let bands = spread(&design, request.shots);
         Ok(Self {
             values: values.to_vec(),
-            sensor: Named { name: design.name.clone(), digest: design.digest() },
+            sensor: named(&design),
             scene: Named { name: scene.name.clone(), digest: scene.digest() },
             shots: bands.iter().map(|band| band.shots).sum(),
             shots_per_scan: design.shots_per_scan(),
-            environment: format!("{}: {}", scene.environment.name, scene.environment.conditions()),
-            idealisations: idealised(&design, &scene.environment)
+            environment: surroundings(&scene.environment),
+            idealised: idealised(&design, &scene.environment)
                 .iter()
                 .map(|effect| effect.name.to_owned())
                 .collect(),
-            notes: scene.notes.iter().chain(&design.warnings).cloned().collect(),
-            defaults: design.defaults,
+            assumed: scene.notes.clone(),
+            warnings: design.warnings.clone(),
+            defaults: defaults(&design),
             text: design.text,
             bands,
             scene_index,

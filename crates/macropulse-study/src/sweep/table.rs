@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::{Axis, Counted, Error, Metric, Plan, picture};
+use super::{Axis, Counted, Error, Metric, Plan, Point, picture};
 use crate::text::short;
-use macropulse::formats::{quoted, write_atomically};
+use macropulse::formats::{Surroundings, quoted, versioned, write_atomically};
 use macropulse::score::Estimate;
 
 /// Files written beside the manifest.
@@ -107,26 +107,28 @@ impl Plan {
         let all = |of: fn(&super::Point) -> &[String]| {
             each_once(self.points.iter().flat_map(of).map(String::as_str))
         };
-        let defaults: Map<String, Value> = self
-            .points
-            .iter()
-            .flat_map(|point| &point.defaults)
-            .map(|(key, value)| (key.clone(), value.as_str().into()))
-            .collect();
+        let defaults = self.points.iter().flat_map(|point| &point.defaults.0);
+        let defaults: Map<String, Value> = defaults.cloned().collect();
         let scores: Map<String, Value> =
             table.metrics.iter().map(|metric| (metric.column(), metric.meaning().into())).collect();
-        let mut notes: Vec<String> =
-            all(|point| &point.notes).into_iter().map(str::to_owned).collect();
-        notes.extend(table.empty());
-        let environments = self.points.iter().map(|point| point.environment.as_str());
-        manifest["environments"] = each_once(environments).into();
+        let mut warnings: Vec<String> =
+            all(|point| &point.warnings).into_iter().map(str::to_owned).collect();
+        warnings.extend(table.empty());
+        let mut environments: Vec<&Surroundings> = Vec::new();
+        for Point { environment, .. } in &self.points {
+            if !environments.contains(&environment) {
+                environments.push(environment);
+            }
+        }
+        manifest["environments"] = json!(environments);
         manifest["defaults"] = defaults.into();
-        manifest["idealisations"] = all(|point| &point.idealisations).into();
-        manifest["notes"] = notes.into();
+        manifest["idealised"] = all(|point| &point.idealised).into();
+        manifest["assumed"] = all(|point| &point.assumed).into();
+        manifest["warnings"] = warnings.into();
         manifest["scores"] = scores.into();
         manifest["confidence"] = 0.95.into();
         manifest["files"] = FILES.as_slice().into();
-        format!("{manifest:#}\n")
+        format!("{:#}\n", versioned(manifest))
     }
 }
 

@@ -27,6 +27,18 @@ impl<T: Serialize> Serialize for Entries<T> {
     }
 }
 
+/// Version of the keys of `manifest.json` and of what `--json` prints. It is raised when a key goes or
+/// changes its meaning; new keys may come without.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// `object` with [`SCHEMA_VERSION`] before its keys; anything but an object stays as it is.
+pub fn versioned(object: serde_json::Value) -> serde_json::Value {
+    let serde_json::Value::Object(object) = object else { return object };
+    let version = [("schema_version".to_owned(), SCHEMA_VERSION.into())];
+    let others = object.into_iter().filter(|(key, _)| key != "schema_version");
+    version.into_iter().chain(others).collect::<serde_json::Map<_, _>>().into()
+}
+
 /// A sensor or scene file by name and by the digest of its text.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Named {
@@ -34,6 +46,15 @@ pub struct Named {
     pub name: String,
     /// Digest of the text that was read.
     pub digest: String,
+}
+
+/// Sun and air of a run.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+pub struct Surroundings {
+    /// Name of the environment.
+    pub name: String,
+    /// What it is like, in words.
+    pub conditions: String,
 }
 
 /// When a scan began, and where the sensor was then.
@@ -54,8 +75,10 @@ pub struct Begun {
 }
 
 /// What is needed to repeat a run and to judge it. The fields are written in this order.
-#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Manifest {
+    /// Version of these keys, [`SCHEMA_VERSION`].
+    pub schema_version: u32,
     /// Version of macropulse.
     pub version: String,
     /// Seed of the random numbers.
@@ -64,29 +87,65 @@ pub struct Manifest {
     pub sensor: Named,
     /// The scene.
     pub scene: Named,
-    /// Sun and air: the name of the environment, and what it is like.
-    pub environment: String,
-    /// Values the files left open, by key, as text with unit.
-    pub defaults: Entries<String>,
-    /// What was idealised.
-    pub idealisations: Vec<String>,
-    /// Anything else a reader should know.
-    pub notes: Vec<String>,
+    /// Sun and air.
+    pub environment: Surroundings,
+    /// Values the files left open, by key; the keys carry their units.
+    pub defaults: Entries<serde_json::Value>,
+    /// Effects that are left out.
+    pub idealised: Vec<String>,
+    /// What was assumed in reading the scene.
+    pub assumed: Vec<String>,
+    /// What a reader should be warned of.
+    pub warnings: Vec<String>,
     /// Counts from stage to stage: shots, echoes, detection events, ticks, returns.
     pub counts: Entries<u64>,
     /// Rejected shots or macropulses by reason.
     pub rejects: Entries<u64>,
-    /// Converters: most busy at once, detection events lost.
-    pub tdc: Entries<u64>,
-    /// Pixels by outcome; empty without truth.
+    /// Converters: most busy at once, detection events lost and merged.
+    pub converters: Entries<u64>,
+    /// Pixels by outcome.
     pub outcomes: Entries<u64>,
+    /// Further returns of their shots by outcome; empty where shots have one return.
+    pub further_outcomes: Entries<u64>,
+    /// Share of the pixels with an echo whose range is right; `None` where there is no echo.
+    pub right_fraction: Option<f64>,
+    /// Error up to which a range counts as right, m.
+    pub right_within_m: f64,
     /// Scan by scan, when it began and where the sensor was.
     pub scans: Vec<Begun>,
     /// Files written beside the manifest, relative to it.
     pub files: Vec<String>,
-    /// Wall-clock time per stage, s. Last, because it is the only part that differs between two
-    /// equal runs.
-    pub stage_times_s: Entries<f64>,
+    /// Processor time per stage, and wall-clock time of writing and of the whole, s. Last, because
+    /// it is the only part that differs between two equal runs.
+    pub times_s: Entries<f64>,
+}
+
+impl Default for Manifest {
+    /// Nothing but the version of the keys.
+    fn default() -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            version: String::new(),
+            seed: 0,
+            sensor: Named::default(),
+            scene: Named::default(),
+            environment: Surroundings::default(),
+            defaults: Entries::default(),
+            idealised: Vec::new(),
+            assumed: Vec::new(),
+            warnings: Vec::new(),
+            counts: Entries::default(),
+            rejects: Entries::default(),
+            converters: Entries::default(),
+            outcomes: Entries::default(),
+            further_outcomes: Entries::default(),
+            right_fraction: None,
+            right_within_m: 0.0,
+            scans: Vec::new(),
+            files: Vec::new(),
+            times_s: Entries::default(),
+        }
+    }
 }
 
 impl Manifest {
@@ -114,7 +173,7 @@ mod tests {
         let mut manifest = Manifest { version: "0.1.0".into(), seed: 7, ..Manifest::default() };
         manifest.counts.push("shots", 407_040);
         manifest.counts.push("echoes", 3658);
-        manifest.stage_times_s.push("decode", 0.25);
+        manifest.times_s.push("decode", 0.25);
         manifest
     }
 
@@ -131,11 +190,11 @@ mod tests {
         let json = sample().json();
         let slower = {
             let mut slower = sample();
-            slower.stage_times_s = Entries::default();
-            slower.stage_times_s.push("decode", 99.0);
+            slower.times_s = Entries::default();
+            slower.times_s.push("decode", 99.0);
             slower.json()
         };
-        let before = |json: &str| json.split("\"stage_times_s\"").next().unwrap().to_owned();
+        let before = |json: &str| json.split("\"times_s\"").next().unwrap().to_owned();
         assert_ne!(json, slower);
         assert_eq!(before(&json), before(&slower));
     }
@@ -143,8 +202,18 @@ mod tests {
     #[test]
     fn a_time_that_is_no_number_is_null() {
         let mut manifest = sample();
-        manifest.stage_times_s.push("view", f64::NAN);
+        manifest.times_s.push("view", f64::NAN);
         assert!(manifest.json().contains("\"view\": null"));
+    }
+
+    #[test]
+    fn the_version_of_the_keys_comes_first_and_once() {
+        let object = versioned(serde_json::json!({ "b": 1, "schema_version": 7 }));
+        assert_eq!(object.to_string(), r#"{"schema_version":1,"b":1}"#);
+        assert_eq!(versioned(object.clone()), object);
+        assert_eq!(versioned(3.into()), 3);
+        let first = sample().json().lines().nth(1).map(str::to_owned);
+        assert_eq!(first.as_deref(), Some("  \"schema_version\": 1,"));
     }
 
     #[test]

@@ -16,7 +16,7 @@ mod png16;
 pub use atomic::write_atomically;
 pub use csv::quoted;
 pub use error::Error;
-pub use manifest::{Begun, Entries, Manifest, Named};
+pub use manifest::{Begun, Entries, Manifest, Named, SCHEMA_VERSION, Surroundings, versioned};
 pub use pcd_reader::read_pcd;
 pub use png16::{RangeImage, read_range_png};
 

@@ -20,10 +20,12 @@ impl Scene {
     /// # Errors
     /// As [`Scene::open`]; and if a key leads nowhere, or the scene refuses the value.
     pub fn open_changed(name_or_file: &str, changes: &[(String, String)]) -> Result<Self, Error> {
-        // What is wrong without the changes is said with its place in the file.
-        let scene = Self::open(name_or_file)?;
         if changes.is_empty() {
-            return Ok(scene);
+            return Self::open(name_or_file);
+        }
+        // What is no scene at all is said as it is without changes.
+        if Self::builtin(name_or_file).is_none() && !Path::new(name_or_file).is_file() {
+            return Self::open(name_or_file);
         }
         let path = Path::new(name_or_file);
         let (text, base) = match Self::builtin(name_or_file) {
@@ -34,6 +36,24 @@ impl Scene {
                 (text, path.parent().unwrap_or(Path::new("")))
             }
         };
+        Self::from_toml_changed(&text, name_or_file, base, changes)
+    }
+
+    /// As [`Scene::from_toml`], with `changes` of single values as [`Scene::open_changed`] takes them.
+    ///
+    /// # Errors
+    /// As [`Scene::open_changed`].
+    pub fn from_toml_changed(
+        text: &str,
+        origin: &str,
+        base: &Path,
+        changes: &[(String, String)],
+    ) -> Result<Self, Error> {
+        // What is wrong without the changes is said with its place in the file.
+        let scene = Self::from_toml(text, origin, base)?;
+        if changes.is_empty() {
+            return Ok(scene);
+        }
         let keys = || changes.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>().join(", ");
         let refused = |message: String| {
             let told = |key: &str| message.strip_prefix(key)?.strip_prefix(": ");
@@ -52,7 +72,7 @@ impl Scene {
             })?;
         }
         let text = toml::to_string(&table).map_err(|error| refused(error.to_string()))?;
-        Self::from_toml(&text, name_or_file, base).map_err(|error| match error {
+        Self::from_toml(&text, origin, base).map_err(|error| match error {
             // Its place would be in a text that is not that of the file.
             Error::Typed { message, .. } => refused(message),
             error => error,

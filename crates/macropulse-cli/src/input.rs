@@ -1,0 +1,70 @@
+//! Sensors and scenes by their names: ready ones, files, and `-` for what stands on standard input.
+
+use std::io::Read;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use macropulse::design::Design;
+use macropulse::scene::Scene;
+
+use crate::fault::Fault;
+
+/// What standard input is called on the command line.
+pub const STDIN: &str = "-";
+
+/// What it is called in messages.
+const ORIGIN: &str = "standard input";
+
+/// Longer texts are no sensor and no scene, bytes.
+const LONGEST: u64 = 16 << 20;
+
+/// The sensor called `name`, with single values changed.
+///
+/// # Errors
+/// What is wrong with the name, the text or a change.
+pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault> {
+    match name {
+        STDIN => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
+        name => Ok(Design::open(name, changes)?),
+    }
+}
+
+/// The scene called `name`, with single values changed.
+///
+/// # Errors
+/// What is wrong with the name, the text or a change.
+pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
+    match name {
+        STDIN => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
+        name => Ok(Scene::open_changed(name, changes)?),
+    }
+}
+
+/// The text called `name`, and what it is called in messages.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn text(name: &str) -> Result<(String, String), Fault> {
+    match name {
+        STDIN => Ok((stdin()?.to_owned(), ORIGIN.to_owned())),
+        name => match std::fs::read_to_string(name) {
+            Ok(text) => Ok((text, name.to_owned())),
+            Err(error) => Err(Fault::unreadable(name, &error)),
+        },
+    }
+}
+
+/// What stands on standard input: read once, for all that ask for it.
+fn stdin() -> Result<&'static str, Fault> {
+    static TEXT: OnceLock<Result<String, String>> = OnceLock::new();
+    let read = TEXT.get_or_init(|| {
+        let mut bytes = Vec::new();
+        let mut input = std::io::stdin().lock().take(LONGEST + 1);
+        input.read_to_end(&mut bytes).map_err(|error| format!("cannot be read: {error}"))?;
+        if bytes.len() as u64 > LONGEST {
+            return Err(format!("is longer than the {} MiB of a text", LONGEST >> 20));
+        }
+        String::from_utf8(bytes).map_err(|_| "is not text".to_owned())
+    });
+    read.as_deref().map_err(|why| Fault::Wrong(format!("{ORIGIN}: {why}")))
+}
