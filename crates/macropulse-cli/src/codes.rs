@@ -61,7 +61,7 @@ pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
     let compared: Vec<Comparison> = families.into_iter().map(Comparison::of).collect();
     if let Some(folder) = &mut folder {
         folder.make()?;
-        pictures::write(&compared, folder.path())?;
+        pictures::write(&compared, &table(&compared), folder.path())?;
         folder.keep();
     }
     if options.json {
@@ -72,7 +72,7 @@ pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
     if !common.quiet {
         print(&table(&compared))?;
         if let Some(folder) = &folder {
-            print(&format!("\npictures in {}\n", folder.path().display()))?;
+            print(&format!("\nopen {}\n", folder.path().join("index.html").display()))?;
         }
     }
     Ok(())

@@ -23,6 +23,7 @@ mod simulate;
 mod speed;
 mod sweep;
 mod text;
+mod view;
 
 use std::process::ExitCode;
 
@@ -59,6 +60,7 @@ enum Command {
     Codes(codes::Codes),
     Encode(encode::Encode),
     Decode(decode::Decode),
+    View(view::View),
     Speed(speed::Speed),
     Completions(completions::Completions),
     Man(man::Man),
@@ -95,6 +97,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
         Command::Decode(decode) => decode::run(decode, common),
+        Command::View(view) => view::run(view, common),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),
         Command::Man(man) => man::run(man, Options::command()),

@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Write};
 
 use macropulse::formats::versioned;
-pub use macropulse_study::text::{Columns, NO_BREAK, section, short};
+pub use macropulse_study::text::{Columns, NO_BREAK, grouped, section, short};
 
 use crate::fault::Fault;
 
@@ -24,19 +24,6 @@ pub fn print_json(values: Vec<serde_json::Value>) -> Result<(), Fault> {
     let mut values: Vec<_> = values.into_iter().map(versioned).collect();
     let value = if values.len() == 1 { values.remove(0) } else { values.into() };
     print(&format!("{value:#}\n"))
-}
-
-/// 1234567 as `1 234 567`, with blanks that keep it on its line.
-pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(NO_BREAK);
-        }
-        text.push(digit);
-    }
-    text
 }
 
 /// A duration in the unit that suits it.

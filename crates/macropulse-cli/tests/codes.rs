@@ -45,7 +45,8 @@ fn the_same_pictures_every_time() {
         assert_eq!((ran.code, ran.out.as_str()), (Some(0), ""), "{}", ran.err);
     }
     let files = one.files();
-    for name in ["quadratic-congruence-7.png", "m-sequence-5.png", "errors-soft.svg"] {
+    for name in ["index.html", "quadratic-congruence-7.png", "m-sequence-5.png", "errors-soft.svg"]
+    {
         assert!(files.contains(&format!("out/codes/{name}")), "{files:?}");
     }
     for name in files.iter().filter(|name| name.contains('.')) {

@@ -19,6 +19,7 @@ fn a_run_leaves_its_scans_and_a_manifest() {
     let wanted = [
         "a",
         "a/b",
+        "a/b/index.html",
         "a/b/manifest.json",
         "a/b/range-000000-colour.png",
         "a/b/range-000000.png",
@@ -31,7 +32,7 @@ fn a_run_leaves_its_scans_and_a_manifest() {
     let manifest: serde_json::Value =
         serde_json::from_slice(&fs::read(desk.path().join("a/b/manifest.json")).unwrap()).unwrap();
     assert_eq!(manifest["counts"]["shots"], 2 * 32 * 128);
-    assert_eq!(manifest["files"].as_array().unwrap().len(), 6);
+    assert_eq!(manifest["files"].as_array().unwrap().len(), 7);
 }
 
 /// Where a moving sensor was stands beside its scans, and with the points.
@@ -74,10 +75,11 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let points = |line: &str| {
         let line = format!("simulate --sensor hdl-64e --scene car-30m --format csv --truth {line}");
         assert_eq!(desk.run(&line).code, Some(0));
-        fs::read(desk.path().join("out/scan-000000.csv")).unwrap()
+        ["scan-000000.csv", "index.html"]
+            .map(|file| fs::read(desk.path().join("out").join(file)).unwrap())
     };
     let one = points("--seed 7 -j 1 -o out");
-    assert!(one.len() > 100_000);
+    assert!(one[0].len() > 100_000);
     assert!(one == points("--seed 7 -j 3 -o out"), "threads change the points");
     assert!(one != points("--seed 8 -j 3 -o out"), "the seed does not change the points");
 }
@@ -140,7 +142,10 @@ fn a_range_image_too_large_for_a_picture_is_written_all_the_same() {
     let ran = desk.run(&format!("{START} {long} --format png -o out"));
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     assert!(ran.err.contains("too many pixels for a picture in colour"), "{}", ran.err);
-    assert_eq!(desk.files(), ["out", "out/manifest.json", "out/range-000000.png"]);
+    assert_eq!(
+        desk.files(),
+        ["out", "out/index.html", "out/manifest.json", "out/range-000000.png"]
+    );
 }
 
 #[test]
@@ -176,6 +181,6 @@ fn ctrl_c_ends_after_the_scan_with_whole_files() {
     let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
     let scans = manifest["counts"]["scans"].as_u64().unwrap() as usize;
     assert!((1..100_000).contains(&scans));
-    // The folder, the manifest, and one file for each scan: nothing half done.
-    assert_eq!(desk.files().len(), 2 + scans);
+    // The folder, the manifest, the page, and one file for each scan: nothing half done.
+    assert_eq!(desk.files().len(), 3 + scans);
 }

@@ -17,7 +17,7 @@ const TINY: &str = "sweep kim-park-2016-fixed --scene wall --set scan.raster.row
 const MARKS: &str = "--vary detector.photon-counting.missed_marks=0,0.5,0.9";
 
 /// The files that are the same however a sweep came about.
-const RESULTS: [&str; 4] = ["sweep.json", "sweep.csv", "sweep.svg", "manifest.json"];
+const RESULTS: [&str; 5] = ["index.html", "sweep.json", "sweep.csv", "sweep.svg", "manifest.json"];
 
 /// Runs what must succeed without a word on stderr, and gives what it said.
 fn good(desk: &Desk, line: &str) -> String {

@@ -89,6 +89,19 @@ pub fn short(number: f64) -> String {
     }
 }
 
+/// 1234567 as `1 234 567`, with blanks that keep it on its line.
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(NO_BREAK);
+        }
+        text.push(digit);
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

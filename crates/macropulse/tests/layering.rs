@@ -154,16 +154,20 @@ const STUDY: Layers = Layers {
     may_name: &["macropulse"],
     modules: &[
         Rule { module: "text", may_name: &[], because: "lines of text ask not what they say" },
-        Rule { module: "view", may_name: &[], because: "pictures show columns, no physics" },
+        Rule { module: "view", may_name: &["text"], because: "pictures show columns, no physics" },
         Rule {
             module: "budget",
             may_name: &["text", "view"],
             because: "a budget is a forecast: it needs no run and leaves no file",
         },
-        Rule { module: "record", may_name: &["view"], because: "a run leaves files and pictures" },
+        Rule {
+            module: "record",
+            may_name: &["text", "view"],
+            because: "a run leaves files and pictures",
+        },
         Rule {
             module: "sweep",
-            may_name: &["view"],
+            may_name: &["text", "view"],
             because: "a sweep repeats whole scans and counts; how one is made is no affair of its",
         },
         Rule {

@@ -5,7 +5,9 @@ use std::path::Path;
 use macropulse::formats::write_atomically;
 use macropulse::predict::comparison::Comparison;
 use macropulse::predict::multiple_access::{MultipleAccess, bit_error_hard, bit_error_soft};
-use macropulse_study::view::{Axis, Chart, MatrixPicture, Style, standalone};
+use macropulse_study::view::{
+    Axis, Block, Chart, Figure, MatrixPicture, Page, Section, Style, standalone,
+};
 
 use crate::fault::Fault;
 
@@ -15,29 +17,40 @@ const MOST_USERS: u32 = 64;
 /// Errors below are not drawn: the lifetime of the sensor has not so many bits.
 const LEAST_ERROR: f64 = 1e-20;
 
-/// Writes the correlation matrix of each family, and the errors of all of them.
-pub fn write(compared: &[Comparison], folder: &Path) -> Result<(), Fault> {
+/// Writes the correlation matrix of each family, the errors of all of them, and a page of both with
+/// the `listing` that is printed.
+pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<(), Fault> {
+    let mut files = Vec::new();
+    let mut matrices = Vec::new();
     for of in compared {
         let name = of.family.to_string();
-        let picture = MatrixPicture {
-            title: format!("{name}: marks two words share at most"),
-            side: of.compared,
-            values: &of.matrix,
-        };
+        let title = format!("{name}: marks two words share at most");
+        let picture = MatrixPicture { title, side: of.compared, values: &of.matrix };
         let png = picture.png().map_err(|error| Fault::Ours(error.to_string()))?;
-        write_atomically(&folder.join(format!("{}.png", file_name(&name))), |out| {
-            out.write_all(&png)
-        })?;
+        let file = format!("{}.png", file_name(&name));
+        write_atomically(&folder.join(&file), |out| out.write_all(&png))?;
+        matrices.push(Figure::png(png, &picture.title, &name));
+        files.push(file);
     }
-    let limited = |error: fn(&MultipleAccess) -> f64, how: &str| {
-        let title = format!("Bit error against users, {how}");
-        standalone(&errors(compared, error, &title).svg())
-    };
-    let soft = limited(bit_error_soft, "every mark counted");
-    let hard = limited(bit_error_hard, "one mark per chip");
-    for (file, svg) in [("errors-soft.svg", soft), ("errors-hard.svg", hard)] {
-        write_atomically(&folder.join(file), |out| out.write_all(svg.as_bytes()))?;
+    let limits: [(_, fn(&MultipleAccess) -> f64, _); 2] = [
+        ("errors-soft.svg", bit_error_soft, "every mark counted"),
+        ("errors-hard.svg", bit_error_hard, "one mark per chip"),
+    ];
+    let mut curves = Section::new("Errors");
+    for (file, error, how) in limits {
+        let svg = errors(compared, error, &format!("Bit error against users, {how}")).svg();
+        write_atomically(&folder.join(file), |out| out.write_all(standalone(&svg).as_bytes()))?;
+        curves = curves.figure(Figure::svg(&svg, ""));
+        files.push(file.to_owned());
     }
+    let lead = "How much the words of each family share with each other, and what that costs.";
+    let page = Page::new("Code families compared", lead)
+        .kicker("Macropulse")
+        .section(curves)
+        .section(Section::new("Numbers").block(Block::Listing(listing.to_owned())))
+        .section(Section::new("Correlations").block(Block::Gallery(2, matrices)))
+        .files(&files);
+    write_atomically(&folder.join("index.html"), |out| out.write_all(page.html().as_bytes()))?;
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use macropulse::points::Truth;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::{Record, Scans, Tally, Watch};
-use macropulse_study::record::{self, COLOUR};
+use macropulse_study::record::{self, COLOUR, PAGE, Page};
 use serde_json::Value;
 
 use super::scenario::Scenario;
@@ -55,6 +55,7 @@ impl<'a> Run<'a> {
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
+        let mut page = Page::new(design, &scenario.scene);
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
@@ -78,6 +79,7 @@ impl<'a> Run<'a> {
             if let Some(folder) = &mut folder {
                 let writing = Instant::now();
                 let mut cloud = scan.cloud();
+                page.add(&cloud);
                 if !scenario.truth {
                     cloud.truth = Truth::default();
                 }
@@ -106,7 +108,12 @@ impl<'a> Run<'a> {
         run.find_warnings(scenario, folder.as_ref());
         if let (Some(folder), 1..) = (&folder, run.scans) {
             run.folder = folder.path().display().to_string();
-            interrupt.undisturbed(|| run.manifest().write(folder.path()))?;
+            run.files.push(PAGE.to_owned());
+            interrupt.undisturbed(|| {
+                let manifest = run.manifest();
+                page.write(folder.path(), &manifest)?;
+                manifest.write(folder.path())
+            })?;
         }
         Ok(run)
     }

@@ -1,8 +1,11 @@
 //! What is printed of a run.
 
+use std::path::Path;
+
 use macropulse::channel::idealised;
 use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
+use macropulse_study::record::PAGE;
 use serde_json::Value;
 
 use super::run::Run;
@@ -131,10 +134,8 @@ impl Run<'_> {
 
     fn written(&self) -> String {
         let files = counted(self.files.len() as u64, "file");
-        match self.files.is_empty() {
-            true => format!("manifest.json to {}", self.folder),
-            false => format!("{files} and manifest.json to {}", self.folder),
-        }
+        let page = Path::new(&self.folder).join(PAGE);
+        format!("{files} and manifest.json to {}; open {}", self.folder, page.display())
     }
 
     /// The same for programs: the manifest, and what depends on this machine.

@@ -22,7 +22,8 @@ use crate::text::{NO_BREAK, counted, print};
 ///
 /// Every value is measured with several seeds; each of these scans leaves a small file in
 /// DIR/jobs. What is there is not measured again, so the same command goes on where it was stopped.
-/// When nothing is missing, sweep.csv, sweep.svg, sweep.png and manifest.json are written.
+/// When nothing is missing, a page, index.html, and sweep.csv, sweep.svg, sweep.png and manifest.json
+/// are written.
 #[derive(Args)]
 #[command(after_help = after_help())]
 pub struct Sweep {

@@ -3,25 +3,22 @@
 use std::path::Path;
 
 use macropulse::formats::versioned;
-use macropulse::score::Estimate;
 use macropulse_study::sweep::{Plan, Point, Shard, Table};
 use serde_json::{Value, json};
 
-use crate::text::{NO_BREAK, counted, grouped, short};
+use crate::text::{NO_BREAK, counted, grouped};
 
 /// The table for people.
 pub fn text(plan: &Plan, table: &Table, folder: &Path) -> String {
     let mut lines = vec![table.axes.iter().map(|axis| axis.key.clone()).collect::<Vec<_>>()];
     lines[0].extend(table.metrics.iter().map(|metric| metric.column()));
     for row in &table.rows {
-        let mut line = row.values.clone();
-        line.extend(row.scores.iter().map(estimate));
-        lines.push(line);
+        lines.push(row.cells());
     }
     let folder = folder.display();
     let text = format!(
-        "{}\n\n{}\n  sweep.csv, sweep.svg, sweep.png and manifest.json written to {folder}; in \
-         brackets the 95 % intervals\n",
+        "{}\n\n{}\n  index.html, sweep.csv, sweep.svg, sweep.png and manifest.json written to {folder}; \
+         in brackets the 95 % intervals\n",
         headline(plan),
         aligned(&lines)
     );
@@ -92,15 +89,6 @@ fn headline(plan: &Plan) -> String {
         pixels(|point| point.shots),
         pixels(|point| point.shots_per_scan),
     )
-}
-
-fn estimate(estimate: &Estimate) -> String {
-    let Estimate { value, low, high } = *estimate;
-    match (value.is_nan(), low.is_nan()) {
-        (true, _) => "-".to_owned(),
-        (_, true) => short(value),
-        _ => format!("{} [{}, {}]", short(value), short(low), short(high)),
-    }
 }
 
 /// Lines of cells as columns, indented by two.

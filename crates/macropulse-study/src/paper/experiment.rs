@@ -60,12 +60,15 @@ pub(super) fn trial(
     let scan = sim::scan_watched(design, &scene, seed, 0, watch)?.ok_or(Error::Stopped)?;
     let cloud = scan.cloud();
     let elapsed = began.elapsed().as_secs_f64();
-    let folder = folder.join(format!("{sensor}-{distance}m"));
+    let folder = folder.join(self::folder(sensor, distance));
     std::fs::create_dir_all(&folder)
         .map_err(|source| Error::Folder { path: folder.clone(), source })?;
     let formats = [Format::Pcd, Format::Png];
     let writing = Instant::now();
-    let files = record::write_scan(&folder, &formats, &cloud, (design, &scene))?;
+    let mut files = record::write_scan(&folder, &formats, &cloud, (design, &scene))?;
+    let mut page = record::Page::new(design, &scene);
+    page.add(&cloud);
+    files.push(record::PAGE.to_owned());
     let writing = writing.elapsed().as_secs_f64();
     let warnings: Vec<String> =
         scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
@@ -81,7 +84,9 @@ pub(super) fn trial(
         writing,
         elapsed,
     };
-    record::manifest(&run).write(&folder)?;
+    let manifest = record::manifest(&run);
+    page.write(&folder, &manifest)?;
+    manifest.write(&folder)?;
     let samples = samples_on_car(design, &scene);
     let image = cloud.image(cloud.pick);
     let found = |sample: &Sample| {
@@ -103,6 +108,11 @@ pub(super) fn trial(
         tally: scan.tally,
         cloud,
     })
+}
+
+/// Name of the folder of a trial.
+pub(super) fn folder(sensor: &str, distance: u32) -> String {
+    format!("{sensor}-{distance}m")
 }
 
 /// A ray that meets the car first.

@@ -1,7 +1,8 @@
 //! The report: one page with every table and figure of \[KP16\], made again from data.
 
 use super::claim::Verdict;
-use super::{Error, Findings, conclusion, pictures, tables};
+use super::{Error, Findings, conclusion, experiment, pictures, tables};
+use crate::record;
 use crate::view::{Block, Page, Section, Tone};
 use macropulse::points::Outcome;
 
@@ -27,12 +28,22 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     .section(claims(findings))
     .section(conclusion(findings)?)
     .section(idealisations(findings))
+    .files(&files(findings))
     .footer(&format!(
         "macropulse {}, seed {seed}. Every picture and number on this page was computed by the \
          run that wrote it; clouds, range images and manifests lie in the folders beside it.",
         env!("CARGO_PKG_VERSION")
     ));
     Ok(page)
+}
+
+/// What lies beside the page: the tables, and of each trial a page to explore its cloud.
+fn files(findings: &Findings) -> Vec<String> {
+    let tables = ["points.csv", "claims.json"].map(str::to_owned);
+    let pages = findings.trials.iter().map(|trial| {
+        format!("{}/{}", experiment::folder(trial.sensor, trial.distance), record::PAGE)
+    });
+    tables.into_iter().chain(pages).collect()
 }
 
 fn summary(findings: &Findings) -> Section {

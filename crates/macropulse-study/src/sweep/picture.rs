@@ -1,12 +1,31 @@
 //! Curves with their intervals, a chart for each score.
 
 use super::{Axis, Spread, Table};
-use crate::view::{self, Chart, Hue, Stack, Style};
+use crate::view::{self, Align, Cell, Chart, Figure, Hue, Page, Section, Stack, Style};
 
 /// A chart for each score, one below the other.
 pub(super) fn stack(table: &Table, title: &str) -> Stack {
     let charts = (0..table.metrics.len()).map(|metric| chart(table, metric, title)).collect();
     Stack { title: title.to_owned(), charts }
+}
+
+/// The same charts, the table, and links to the files at these paths, as a page.
+pub(super) fn page(table: &Table, stack: &Stack, files: &[String]) -> Page {
+    let mut charts = Section::new("Curves");
+    for chart in &stack.charts {
+        charts = charts.figure(Figure::svg(&chart.svg(), ""));
+    }
+    let keys = table.axes.iter().map(|axis| (axis.key.clone(), Align::Right));
+    let scores = table.metrics.iter().map(|metric| (metric.column(), Align::Right));
+    let mut rows = view::Table::new("In brackets the 95 % intervals", &[]);
+    rows.header = keys.chain(scores).collect();
+    rows.rows = table.rows.iter().map(|row| row.cells().iter().map(Cell::from).collect()).collect();
+    let varied: Vec<String> = table.axes.iter().map(|axis| axis.key.clone()).collect();
+    Page::new(&format!("Sweep over {}", varied.join(" and ")), &stack.title)
+        .kicker("Macropulse")
+        .section(charts)
+        .section(Section::new("Numbers").table(rows))
+        .files(files)
 }
 
 /// The score of number `at`: along x the first key, a curve for each value of the second.

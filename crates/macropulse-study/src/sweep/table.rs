@@ -5,11 +5,12 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::{Axis, Counted, Error, Metric, Plan, Point, picture};
+use crate::text::short;
 use macropulse::formats::{Surroundings, quoted, versioned, write_atomically};
 use macropulse::score::Estimate;
 
 /// Files written beside the manifest.
-const FILES: [&str; 3] = ["sweep.csv", "sweep.svg", "sweep.png"];
+const FILES: [&str; 4] = ["index.html", "sweep.csv", "sweep.svg", "sweep.png"];
 
 /// Scores of every point, with intervals.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,9 +38,23 @@ pub struct Row {
     pub empty: Option<String>,
 }
 
+impl Row {
+    /// The values, then the scores with their intervals in brackets, as text.
+    pub fn cells(&self) -> Vec<String> {
+        let scores = self.scores.iter().map(|&Estimate { value, low, high }| {
+            match (value.is_nan(), low.is_nan()) {
+                (true, _) => "-".to_owned(),
+                (_, true) => short(value),
+                _ => format!("{} [{}, {}]", short(value), short(low), short(high)),
+            }
+        });
+        self.values.iter().cloned().chain(scores).collect()
+    }
+}
+
 impl Plan {
     /// Makes the table of `metrics` from the jobs in `folder` and writes `sweep.csv`, `sweep.svg`,
-    /// `sweep.png` and `manifest.json` beside them.
+    /// `sweep.png`, `manifest.json` and the page `index.html` beside them.
     ///
     /// # Errors
     /// If a job is missing or its file is damaged, or a file cannot be written.
@@ -53,7 +68,10 @@ impl Plan {
             self.scene
         );
         let picture = picture::stack(&table, &title);
-        let contents = [table.csv().into_bytes(), picture.svg().into_bytes(), picture.png()?];
+        let beside: Vec<String> =
+            FILES[1..].iter().chain(&["manifest.json"]).map(|&file| file.to_owned()).collect();
+        let page = picture::page(&table, &picture, &beside).html();
+        let contents = [page.into(), table.csv().into(), picture.svg().into(), picture.png()?];
         for (file, bytes) in FILES.iter().zip(contents) {
             write_atomically(&folder.join(file), |out| out.write_all(&bytes))?;
         }

@@ -3,6 +3,7 @@
 use super::curves::{
     band_path, curve_class, draw_curve, draw_dots, draw_line, draw_note, draw_whiskers,
 };
+use super::hover::told;
 use super::plot::{Plane, Ruler, room_for_ticks};
 use super::svg::{Anchor, Hue, Svg, text_width};
 use super::ticks::label;
@@ -201,6 +202,7 @@ impl Chart {
         for note in &self.notes {
             draw_note(&mut svg, note, &plane);
         }
+        svg.told(&told(self, &plane));
         svg
     }
 

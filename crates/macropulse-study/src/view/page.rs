@@ -1,8 +1,8 @@
 //! The report: one HTML file that needs nothing beside it.
 
-use super::page_style::STYLE;
-use super::svg::{self, escape};
+use super::svg::escape;
 use super::table::Table;
+use super::theme;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
@@ -174,6 +174,7 @@ pub struct Page {
     kicker: String,
     lead: String,
     sections: Vec<Section>,
+    files: Vec<String>,
     footer: String,
 }
 
@@ -185,6 +186,7 @@ impl Page {
             kicker: String::new(),
             lead: lead.to_owned(),
             sections: Vec::new(),
+            files: Vec::new(),
             footer: String::new(),
         }
     }
@@ -207,17 +209,22 @@ impl Page {
         self
     }
 
+    /// Sets the files that the page links to, by their paths from it.
+    pub fn files(mut self, paths: &[String]) -> Self {
+        paths.clone_into(&mut self.files);
+        self
+    }
+
     /// The page as HTML.
     pub fn html(&self) -> String {
         let mut html = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>{}</title>\n<style>\n{STYLE}{}\n</style>\n</head>\n<body>\n",
+             <title>{}</title>\n<style>\n{}\n</style>\n</head>\n<body>\n",
             escape(&self.title),
-            svg::style()
+            theme::style()
         );
-        html += "<header>\n";
+        html += "<header>\n<button type=\"button\" class=\"switch\" data-theme-switch hidden></button>\n";
         if !self.kicker.is_empty() {
             html += &format!("<p class=\"kicker\">{}</p>\n", inline(&self.kicker));
         }
@@ -226,7 +233,7 @@ impl Page {
             inline(&self.title),
             inline(&self.lead)
         );
-        let ids = self.ids();
+        let ids = ids(&self.sections);
         if self.sections.len() > 1 {
             html += "<nav aria-label=\"Contents\"><ol>\n";
             for (id, section) in ids.iter().zip(&self.sections) {
@@ -234,37 +241,45 @@ impl Page {
             }
             html += "</ol></nav>\n";
         }
-        html += "<main>\n";
-        for (id, section) in ids.iter().zip(&self.sections) {
-            html += &format!("<section id=\"{id}\">\n<h2>{}</h2>\n", inline(&section.title));
-            html.extend(section.blocks.iter().map(Block::html));
-            html += "</section>\n";
+        html += &format!("<main>\n{}</main>\n", sections(&self.sections));
+        if !self.files.is_empty() {
+            html += &format!("<h2 class=\"plain\">Files</h2>\n{}", theme::links(&self.files));
         }
-        html += "</main>\n";
         if !self.footer.is_empty() {
             html += &format!("<footer><p>{}</p></footer>\n", inline(&self.footer));
         }
-        html + "</body>\n</html>\n"
+        html + &theme::script() + "</body>\n</html>\n"
     }
+}
 
-    /// Names of the sections in links: unique, made of their titles.
-    fn ids(&self) -> Vec<String> {
-        let mut ids: Vec<String> = Vec::new();
-        for section in &self.sections {
-            let letters = section.title.to_lowercase();
-            let words = letters.split(|letter: char| !letter.is_ascii_alphanumeric());
-            let slug = words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-");
-            let slug = if slug.is_empty() { "section".to_owned() } else { slug };
-            let mut id = slug.clone();
-            let mut count = 1;
-            while ids.contains(&id) {
-                count += 1;
-                id = format!("{slug}-{count}");
-            }
-            ids.push(id);
-        }
-        ids
+/// Sections as HTML, each with its name in links.
+pub(super) fn sections(sections: &[Section]) -> String {
+    let mut html = String::new();
+    for (id, section) in ids(sections).iter().zip(sections) {
+        html += &format!("<section id=\"{id}\">\n<h2>{}</h2>\n", inline(&section.title));
+        html.extend(section.blocks.iter().map(Block::html));
+        html += "</section>\n";
     }
+    html
+}
+
+/// Names of sections in links: unique, made of their titles.
+fn ids(sections: &[Section]) -> Vec<String> {
+    let mut ids: Vec<String> = Vec::new();
+    for section in sections {
+        let letters = section.title.to_lowercase();
+        let words = letters.split(|letter: char| !letter.is_ascii_alphanumeric());
+        let slug = words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-");
+        let slug = if slug.is_empty() { "section".to_owned() } else { slug };
+        let mut id = slug.clone();
+        let mut count = 1;
+        while ids.contains(&id) {
+            count += 1;
+            id = format!("{slug}-{count}");
+        }
+        ids.push(id);
+    }
+    ids
 }
 
 /// Width and height for the browser, so that nothing moves while it decodes the picture. One that
@@ -320,7 +335,7 @@ mod tests {
         let body = body(&Page::new("<T>", "l").section(section));
         assert!(body.contains("<h2>a &lt; b</h2>"));
         assert!(body.contains("<p>&lt;script&gt;alert(1)&lt;/script&gt; &amp; more</p>"));
-        assert!(!body.contains("<script"));
+        assert!(!body.contains("<script>alert"));
     }
 
     #[test]
@@ -343,7 +358,7 @@ mod tests {
     fn sections_with_one_title_have_two_names() {
         let page =
             Page::new("t", "l").section(Section::new("At 30 m")).section(Section::new("At 30 m"));
-        assert_eq!(page.ids(), ["at-30-m", "at-30-m-2"]);
+        assert_eq!(ids(&page.sections), ["at-30-m", "at-30-m-2"]);
         assert!(body(&page).contains("href=\"#at-30-m-2\""));
     }
 
@@ -361,15 +376,19 @@ mod tests {
             .block(Block::Heading("h".into()))
             .block(Block::Numbers(vec![("3658".into(), "points".into())]));
         let html = Page::new("t", "l")
+            .files(&["a.pcd".to_owned()])
             .kicker("k")
             .footer("f")
             .section(section.clone())
             .section(section)
             .html();
-        assert!(is_balanced(&html));
+        let (markup, script) = html.split_once("<script>").unwrap();
+        let (_, end) = script.split_once("</script>").unwrap();
+        assert!(is_balanced(&format!("{markup}{end}")));
         assert!(html.contains("src=\"data:image/png;base64,AQID\""));
-        let outside = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
-        for resource in ["http", "url(", "@import", "<link", "<script"] {
+        // The one address is the name of a format, which nobody fetches.
+        let outside = html.replace("\"http://www.w3.org/2000/svg\"", "");
+        for resource in ["http", "url(", "@import", "<link", "<script src", "fetch("] {
             assert!(!outside.contains(resource), "{resource}");
         }
     }

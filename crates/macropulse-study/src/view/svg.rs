@@ -1,5 +1,7 @@
 //! The few SVG elements charts are made of, and the one style they share.
 
+use super::theme;
+
 /// Colours of series and bars. What each looks like depends on the reader's light or dark page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Hue {
@@ -79,16 +81,21 @@ font-variant-numeric:tabular-nums}\
 .mp .dot{fill:currentColor;stroke:var(--paper);stroke-width:1}.mp text.hued{fill:currentColor}\
 .mp text.on{fill:var(--paper);font-weight:600}";
 
-/// Style of every chart, for pages that may be light or dark. The page carries it once;
-/// [`standalone`] puts it into a single chart.
-pub(super) fn style() -> String {
-    let [light, dark] = [Ground::Light, Ground::Dark].map(|ground| {
-        let each = |(name, colour)| format!("--{name}:{colour};");
-        colours(ground).map(each).collect::<String>()
-    });
+/// Style of the charts of a page, which carries it once.
+pub(super) fn style_of_pages() -> String {
+    theme::ground("svg.mp", &declared(Ground::Light), &declared(Ground::Dark)) + RULES
+}
+
+/// Style of a chart that is a file of its own: as light or dark as the reader's system.
+fn style() -> String {
+    let [light, dark] = [Ground::Light, Ground::Dark].map(declared);
     format!(
         "svg.mp{{{light}}}@media screen and (prefers-color-scheme:dark){{svg.mp{{{dark}}}}}{RULES}"
     )
+}
+
+fn declared(ground: Ground) -> String {
+    colours(ground).map(|(name, colour)| format!("--{name}:{colour};")).collect()
 }
 
 /// The same where the ground is known: plain colours, no variables.
@@ -173,6 +180,11 @@ impl Svg {
             "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
             escape(text)
         ));
+    }
+
+    /// JSON that is not drawn, for the script that shows values at the pointer.
+    pub fn told(&mut self, json: &serde_json::Value) {
+        self.push(&format!("<metadata>{}</metadata>", escape(&json.to_string())));
     }
 
     /// What is drawn until [`Svg::close_window`] is cut off at this rectangle.

@@ -1,5 +1,7 @@
 //! What a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
 
+mod page;
+
 use std::path::Path;
 
 use crate::view::{Layout, RangePicture};
@@ -17,6 +19,8 @@ use macropulse::points::{Outcome, PointCloud};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::Tally;
+
+pub use page::{PAGE, Page, describe};
 
 /// How the names of range images in colour end.
 pub const COLOUR: &str = "-colour.png";

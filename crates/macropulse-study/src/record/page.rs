@@ -1,0 +1,114 @@
+//! The page by which a run is looked at.
+
+use std::path::Path;
+
+use macropulse::design::Design;
+use macropulse::formats::{self, Manifest, Names, write_atomically};
+use macropulse::points::PointCloud;
+use macropulse::scene::Scene;
+use serde_json::Value;
+
+use crate::text::grouped;
+use crate::view::Explorer;
+
+/// Name of the page that a run leaves.
+pub const PAGE: &str = "index.html";
+
+/// The page of a run in the making: its clouds, scan after scan, and what its manifest tells.
+#[derive(Debug, Clone)]
+pub struct Page {
+    explorer: Explorer,
+    objects: Vec<String>,
+    materials: Vec<String>,
+}
+
+impl Page {
+    /// The page of a run that has no scan yet.
+    pub fn new(design: &Design, scene: &Scene) -> Self {
+        Self {
+            explorer: Explorer::new(&format!("{} in {}", design.name, scene.name)),
+            objects: scene.objects.iter().map(|object| object.name.clone()).collect(),
+            materials: scene.materials.iter().map(|material| material.name.clone()).collect(),
+        }
+    }
+
+    /// Adds a scan, with the truth if the cloud has it. The page says how many have no room in it.
+    pub fn add(&mut self, cloud: &PointCloud) {
+        let names = Names { objects: &self.objects, materials: &self.materials };
+        self.explorer.cloud(&format!("scan {}", cloud.scan), cloud, &names);
+    }
+
+    /// Writes the page of a run that is over into its `folder`. It is the same for equal runs, however
+    /// long they took.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(mut self, folder: &Path, manifest: &Manifest) -> Result<(), formats::Error> {
+        // Names are strings and numbers finite or null: there is nothing JSON could refuse.
+        describe(&mut self.explorer, &serde_json::to_value(manifest).unwrap_or_default());
+        self.explorer.file("manifest.json");
+        let files = manifest.files.iter().filter(|file| *file != PAGE);
+        files.for_each(|file| self.explorer.file(file));
+        write_atomically(&folder.join(PAGE), |out| out.write_all(self.explorer.html().as_bytes()))
+    }
+}
+
+/// Tells on a page what the `manifest` of a run does: what was simulated, and what was counted.
+pub fn describe(page: &mut Explorer, manifest: &Value) {
+    let text = |value: &Value| match (value.as_str(), value.as_u64()) {
+        (Some(text), _) => text.to_owned(),
+        (None, Some(count)) => grouped(count),
+        (None, None) => value.to_string(),
+    };
+    let facts = [
+        ("sensor", &manifest["sensor"]["name"]),
+        ("scene", &manifest["scene"]["name"]),
+        ("environment", &manifest["environment"]["name"]),
+        ("conditions", &manifest["environment"]["conditions"]),
+        ("seed", &manifest["seed"]),
+    ];
+    for (what, value) in facts.into_iter().filter(|(_, value)| !value.is_null()) {
+        page.fact(what, &text(value));
+    }
+    for warning in manifest["warnings"].as_array().into_iter().flatten() {
+        page.fact("warning", &text(warning));
+    }
+    for (counts, prefix) in [("counts", ""), ("outcomes", "pixels ")] {
+        for (what, count) in manifest[counts].as_object().into_iter().flatten() {
+            page.fact(&format!("{prefix}{}", what.replace('_', " ")), &text(count));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_page_tells_what_the_manifest_does_but_for_times() {
+        let manifest = json!({
+            "sensor": { "name": "mine" },
+            "environment": { "name": "clear-day", "conditions": "visibility 23 km" },
+            "counts": { "shots": 407_040, "interferer_shots": 7 },
+            "outcomes": { "missed": 3 },
+            "warnings": ["not a single point"],
+            "times_s": { "elapsed": 77.5 },
+        });
+        let mut page = Explorer::new("t");
+        describe(&mut page, &manifest);
+        let html = page.html().replace('\u{202f}', " ").replace('\u{a0}', " ");
+        for (what, value) in [
+            ("sensor", "mine"),
+            ("conditions", "visibility 23 km"),
+            ("shots", "407 040"),
+            ("interferer shots", "7"),
+            ("pixels missed", "3"),
+            ("warning", "not a single point"),
+        ] {
+            let line = format!("<dt>{what}</dt><dd>{value}</dd>");
+            assert!(html.contains(&line), "{line}");
+        }
+        assert!(!html.contains("<dt>scene</dt>") && !html.contains("77.5"));
+    }
+}
