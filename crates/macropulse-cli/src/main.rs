@@ -4,6 +4,7 @@ mod budget;
 mod check;
 mod codes;
 mod completions;
+mod convert;
 mod encode;
 mod environments;
 mod fault;
@@ -53,6 +54,7 @@ enum Command {
     Budget(budget::Budget),
     Codes(codes::Codes),
     Encode(encode::Encode),
+    Convert(convert::Convert),
     Speed(speed::Speed),
     Completions(completions::Completions),
 }
@@ -85,6 +87,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode),
+        Command::Convert(convert) => convert::run(convert, common),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions, Options::command()),
     }

@@ -19,7 +19,7 @@ impl Formats {
     pub fn help() -> String {
         let names =
             |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();
-        let (known, default) = (names(&Format::ALL), names(&Self::default().0));
+        let (known, default) = (names(Format::ALL), names(&Self::default().0));
         format!(
             "Formats to write: {}, with commas between them, or none [default: {}]",
             known.join(", "),

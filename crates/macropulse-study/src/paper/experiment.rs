@@ -65,7 +65,9 @@ pub(super) fn trial(
         .map_err(|source| Error::Folder { path: folder.clone(), source })?;
     let formats = [Format::Pcd, Format::Png];
     let writing = Instant::now();
-    let files = record::write_scan(&folder, &formats, &cloud, (design, &scene))?;
+    let mut recorded = record::Files::new(&folder, &formats, (design, &scene));
+    let files = recorded.add(&cloud)?;
+    recorded.finish()?;
     let writing = writing.elapsed().as_secs_f64();
     let warnings: Vec<String> =
         scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
