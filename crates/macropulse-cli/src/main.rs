@@ -4,6 +4,7 @@ mod budget;
 mod check;
 mod codes;
 mod completions;
+mod convert;
 mod decode;
 mod encode;
 mod environments;
@@ -61,6 +62,7 @@ enum Command {
     Encode(encode::Encode),
     Decode(decode::Decode),
     View(view::View),
+    Convert(convert::Convert),
     Speed(speed::Speed),
     Completions(completions::Completions),
     Man(man::Man),
@@ -98,6 +100,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Encode(encode) => encode::run(encode),
         Command::Decode(decode) => decode::run(decode, common),
         Command::View(view) => view::run(view, common),
+        Command::Convert(convert) => convert::run(convert, common),
         Command::Speed(speed) => speed::run(speed, common),
         Command::Completions(completions) => completions::run(completions),
         Command::Man(man) => man::run(man, Options::command()),

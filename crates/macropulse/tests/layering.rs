@@ -127,8 +127,9 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "formats",
-            may_name: &["names", "points"],
-            because: "files hold columns, no physics",
+            may_name: &["names", "points", "units"],
+            because: "files hold columns, no physics; of units they know the speed of light, by \
+                      which some have a time in place of a range",
         },
         Rule {
             module: "sim",

@@ -3,12 +3,12 @@
 use std::io::{ErrorKind, Write};
 use std::time::Instant;
 
-use macropulse::channel::Operating;
+use macropulse::channel::{Link, Operating};
 use macropulse::codec::decode::{Reject, Returns};
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::Band;
-use macropulse::formats::{Names, write_csv_lines};
+use macropulse::formats::write_csv_lines;
 use macropulse::points::{Piece, PointCloud, Viewpoint};
 use macropulse_study::record;
 use rayon::prelude::*;
@@ -56,6 +56,8 @@ pub struct Run<'a> {
     /// The scan under way, and its points so far.
     number: u64,
     pieces: Vec<Piece>,
+    /// Its files, from the first one on.
+    recorded: Option<record::Files<'a>>,
     has_header: bool,
 }
 
@@ -65,6 +67,18 @@ struct Decoded {
     ticks: Ticks,
     returns: Returns,
     piece: Piece,
+}
+
+impl Decoded {
+    fn of(
+        (log, ticks): (ShotLog, Ticks),
+        (design, link): (&Design, &Link),
+    ) -> Result<Self, String> {
+        let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
+        let returns = returns.map_err(|error| error.to_string())?;
+        let piece = Piece::of(design, link, &log, &returns);
+        Ok(Self { log, ticks, returns, piece })
+    }
 }
 
 impl<'a> Run<'a> {
@@ -87,6 +101,7 @@ impl<'a> Run<'a> {
             viewpoint: Viewpoint::default(),
             number: 0,
             pieces: Vec::new(),
+            recorded: None,
             has_header: false,
         }
     }
@@ -115,8 +130,9 @@ impl<'a> Run<'a> {
                     None => is_over = true,
                 }
             }
+            let link = &self.operating.link;
             let decoded: Vec<Result<Decoded, _>> =
-                bands.into_par_iter().map(|band| self.decoded(band)).collect();
+                bands.into_par_iter().map(|band| Decoded::of(band, (design, link))).collect();
             for band in decoded {
                 let band = band.map_err(|error| input.wrong(&error))?;
                 progress.add(band.log.owned.len() as u64);
@@ -126,6 +142,9 @@ impl<'a> Run<'a> {
         if !interrupt.is_raised() {
             self.end_scan(&mut sink, interrupt)?;
         }
+        if let Some(recorded) = self.recorded.take() {
+            interrupt.undisturbed(|| recorded.finish())?;
+        }
         progress.finish();
         self.elapsed = began.elapsed().as_secs_f64();
         if self.shots == 0 && !interrupt.is_raised() {
@@ -133,14 +152,6 @@ impl<'a> Run<'a> {
         }
         self.find_warnings();
         Ok(self)
-    }
-
-    fn decoded(&self, (log, ticks): (ShotLog, Ticks)) -> Result<Decoded, String> {
-        let design = self.design;
-        let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
-        let returns = returns.map_err(|error| error.to_string())?;
-        let piece = Piece::of(design, &self.operating.link, &log, &returns);
-        Ok(Decoded { log, ticks, returns, piece })
     }
 
     /// Counts a band and keeps its points.
@@ -200,11 +211,12 @@ impl<'a> Run<'a> {
         let frame =
             PointCloud { viewpoint: self.viewpoint, ..PointCloud::empty(self.design, self.number) };
         let cloud = PointCloud::joined(&frame, &pieces);
-        let names = Names::default();
+        let stage = (self.design, None);
+        let recorded = || record::Files::new(folder.path(), &formats.0, stage);
+        let recorded = self.recorded.get_or_insert_with(recorded);
         let files = interrupt.undisturbed(|| {
             folder.make_once()?;
-            let stage = (self.design, &names);
-            let files = record::write_decoded(folder.path(), &formats.0, &cloud, stage)?;
+            let files = recorded.add(&cloud)?;
             folder.keep();
             Ok::<_, Fault>(files)
         })?;

@@ -29,7 +29,7 @@ impl Formats {
     pub fn help() -> String {
         let names =
             |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();
-        let (known, default) = (names(&Format::ALL), names(&Self::default().0));
+        let (known, default) = (names(Format::ALL), names(&Self::default().0));
         format!(
             "Formats to write: {}, ticks, ticks-csv (shots and ticks, for `decode`), with commas \
              between them, or none [default: {}]",

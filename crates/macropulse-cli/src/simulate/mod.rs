@@ -20,7 +20,7 @@ use crate::interrupt::Interrupt;
 use crate::kind::Kind;
 use crate::options::{self, Common, Surroundings};
 use crate::text::{print, print_json};
-use formats::Formats;
+pub use formats::Formats;
 use run::Run;
 use scenario::Scenario;
 

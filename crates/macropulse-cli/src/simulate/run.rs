@@ -57,6 +57,10 @@ impl<'a> Run<'a> {
         let began = Instant::now();
         let mut page = Page::new(design, &scenario.scene);
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
+        let stage = (design, Some(&scenario.scene));
+        let mut recorded = folder
+            .as_ref()
+            .map(|folder| record::Files::new(folder.path(), &scenario.formats, stage));
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
@@ -76,7 +80,7 @@ impl<'a> Run<'a> {
             let Some(scan) = scans.scan_kept(run.scans, &watch, &keep)? else { break };
             run.score.add(&scan.score);
             run.tally.add(&scan.tally);
-            if let Some(folder) = &mut folder {
+            if let (Some(folder), Some(recorded)) = (&mut folder, &mut recorded) {
                 let writing = Instant::now();
                 let mut cloud = scan.cloud();
                 page.add(&cloud);
@@ -88,9 +92,7 @@ impl<'a> Run<'a> {
                         folder.make()?;
                     }
                     let ticks = ticks.map(TickFiles::finish).transpose()?.unwrap_or_default();
-                    let stage = (design, &scenario.scene);
-                    let files =
-                        record::write_scan(folder.path(), &scenario.formats, &cloud, stage)?;
+                    let files = recorded.add(&cloud)?;
                     folder.keep();
                     Ok::<_, Fault>((files, ticks))
                 })?;
@@ -99,6 +101,9 @@ impl<'a> Run<'a> {
                 run.writing += writing.elapsed().as_secs_f64();
             }
             run.scans += 1;
+        }
+        if let Some(recorded) = recorded {
+            interrupt.undisturbed(|| recorded.finish())?;
         }
         run.elapsed = began.elapsed().as_secs_f64();
         if run.scans > 0 {
@@ -171,6 +176,13 @@ impl<'a> Run<'a> {
             && let Some(reason) = self.tally.where_all_was_lost()
         {
             found.push(format!("not a single point: {reason}"));
+        }
+        for format in scenario.formats.iter().filter(|_| scenario.truth) {
+            let left_out = format.leaves_out_of_truth();
+            if !left_out.is_empty() {
+                let (name, left_out) = (format.name(), left_out.join(", "));
+                found.push(format!("{name} cannot hold {left_out}: left out in spite of --truth"));
+            }
         }
         let painted = self.files.iter().any(|file| file.ends_with(COLOUR));
         if scenario.formats.contains(&Format::Png) && !self.files.is_empty() && !painted {

@@ -65,7 +65,9 @@ pub(super) fn trial(
         .map_err(|source| Error::Folder { path: folder.clone(), source })?;
     let formats = [Format::Pcd, Format::Png];
     let writing = Instant::now();
-    let mut files = record::write_scan(&folder, &formats, &cloud, (design, &scene))?;
+    let mut recorded = record::Files::new(&folder, &formats, (design, Some(&scene)));
+    let mut files = recorded.add(&cloud)?;
+    recorded.finish()?;
     let mut page = record::Page::new(design, &scene);
     page.add(&cloud);
     files.push(record::PAGE.to_owned());

@@ -2,7 +2,7 @@
 
 mod page;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::view::{Layout, RangePicture};
 use macropulse::channel::idealised;
@@ -11,8 +11,7 @@ use macropulse::design::Design;
 use macropulse::emit::scan_begins_fs;
 use macropulse::environment::Environment;
 use macropulse::formats::{
-    self, Begun, Entries, Format, Manifest, Named, Names, Surroundings, write_atomically,
-    write_cloud,
+    self, Begun, Entries, Format, Manifest, Named, Names, Recording, Surroundings, write_atomically,
 };
 use macropulse::names::toml_value;
 use macropulse::points::{Outcome, PointCloud};
@@ -36,49 +35,63 @@ pub enum Error {
     View(#[from] crate::view::Error),
 }
 
-/// Writes the files of scan number `cloud.scan` into `folder` and gives their names.
-///
-/// # Errors
-/// If a file cannot be written; files written before it stay.
-pub fn write_scan(
-    folder: &Path,
-    formats: &[Format],
-    cloud: &PointCloud,
-    (design, scene): (&Design, &Scene),
-) -> Result<Vec<String>, Error> {
-    let objects: Vec<String> = scene.objects.iter().map(|object| object.name.clone()).collect();
-    let materials: Vec<String> = scene.materials.iter().map(|m| m.name.clone()).collect();
-    let names = Names { objects: &objects, materials: &materials };
-    write_decoded(folder, formats, cloud, (design, &names))
+/// The files of a run of one sensor, written scan by scan.
+pub struct Files<'a> {
+    folder: PathBuf,
+    recording: Recording,
+    design: &'a Design,
+    objects: Vec<String>,
+    materials: Vec<String>,
 }
 
-/// As [`write_scan`], of a cloud whose objects and materials, if it knows any, have these names.
-///
-/// # Errors
-/// As [`write_scan`].
-pub fn write_decoded(
-    folder: &Path,
-    formats: &[Format],
-    cloud: &PointCloud,
-    (design, names): (&Design, &Names),
-) -> Result<Vec<String>, Error> {
-    let mut files = Vec::new();
-    for &format in formats {
-        let file = format.file_name(cloud.scan);
-        write_cloud(format, cloud, names, &folder.join(&file))?;
-        files.push(file);
-        if format == Format::Png {
-            // Some grids are too large for a picture in colour; the 16-bit one is there.
-            let picture = match colour_picture(cloud, design) {
-                Err(crate::view::Error::Size { .. }) => continue,
-                picture => picture?,
-            };
-            let file = format!("range-{:06}{COLOUR}", cloud.scan);
-            write_atomically(&folder.join(&file), |out| out.write_all(&picture))?;
-            files.push(file);
+impl<'a> Files<'a> {
+    /// The files that go to `folder` in `formats`, of a sensor in a scene, if one is known. Nothing is
+    /// written yet.
+    pub fn new(
+        folder: &Path,
+        formats: &[Format],
+        (design, scene): (&'a Design, Option<&Scene>),
+    ) -> Files<'a> {
+        let names = |of: fn(&Scene) -> Vec<String>| scene.map(of).unwrap_or_default();
+        Self {
+            folder: folder.to_owned(),
+            recording: Recording::new(folder, formats),
+            design,
+            objects: names(|scene| scene.objects.iter().map(|one| one.name.clone()).collect()),
+            materials: names(|scene| scene.materials.iter().map(|one| one.name.clone()).collect()),
         }
     }
-    Ok(files)
+
+    /// Writes the files of scan number `cloud.scan` and gives the names of those that are new.
+    ///
+    /// # Errors
+    /// If a file cannot be written; files written before it stay.
+    pub fn add(&mut self, cloud: &PointCloud) -> Result<Vec<String>, Error> {
+        let names = Names { objects: &self.objects, materials: &self.materials };
+        let mut files = Vec::new();
+        for (format, file) in self.recording.add(cloud, &names)? {
+            files.push(file);
+            if format == Format::Png {
+                // Some grids are too large for a picture in colour; the 16-bit one is there.
+                let picture = match colour_picture(cloud, self.design) {
+                    Err(crate::view::Error::Size { .. }) => continue,
+                    picture => picture?,
+                };
+                let file = format!("range-{:06}{COLOUR}", cloud.scan);
+                write_atomically(&self.folder.join(&file), |out| out.write_all(&picture))?;
+                files.push(file);
+            }
+        }
+        Ok(files)
+    }
+
+    /// Finishes the files that hold all scans.
+    ///
+    /// # Errors
+    /// If one cannot be written to.
+    pub fn finish(self) -> Result<(), Error> {
+        Ok(self.recording.finish()?)
+    }
 }
 
 /// The range image for people, large enough to see something in.

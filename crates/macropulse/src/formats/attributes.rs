@@ -1,6 +1,7 @@
 //! What is written of each point: one table for all point formats.
 
 use super::Error;
+use super::number::Kind;
 use crate::points::{Outcome, PointCloud, Surface};
 
 /// Rows or columns that 16 bits can number.
@@ -47,42 +48,53 @@ pub(super) enum Value {
     F8(f64),
     U1(u8),
     U2(u16),
+    U4(u32),
 }
 
-const MEASURED: [Attribute; 15] = [
-    Attribute::X,
-    Attribute::Y,
-    Attribute::Z,
-    Attribute::Intensity,
-    Attribute::Range,
-    Attribute::TimeNs,
-    Attribute::Row,
-    Attribute::Column,
-    Attribute::Ring,
-    Attribute::Peak,
-    Attribute::Marks,
-    Attribute::Margin,
-    Attribute::ReturnNumber,
-    Attribute::NumberOfReturns,
-    Attribute::Flags,
-];
-
-const TRUE: [Attribute; 5] = [
-    Attribute::TrueRange,
-    Attribute::Object,
-    Attribute::Material,
-    Attribute::Incidence,
-    Attribute::Outcome,
-];
+/// Attributes of the measurement; the others are truth.
+const MEASURED: usize = 15;
 
 impl Attribute {
+    /// All attributes, the truth at the end.
+    pub const ALL: [Self; 20] = [
+        Self::X,
+        Self::Y,
+        Self::Z,
+        Self::Intensity,
+        Self::Range,
+        Self::TimeNs,
+        Self::Row,
+        Self::Column,
+        Self::Ring,
+        Self::Peak,
+        Self::Marks,
+        Self::Margin,
+        Self::ReturnNumber,
+        Self::NumberOfReturns,
+        Self::Flags,
+        Self::TrueRange,
+        Self::Object,
+        Self::Material,
+        Self::Incidence,
+        Self::Outcome,
+    ];
+
     /// What is written of `cloud`: the measurement and, if it is there, the truth.
-    pub fn of(cloud: &PointCloud) -> Vec<Self> {
-        let mut attributes = MEASURED.to_vec();
-        if has_truth(cloud) {
-            attributes.extend(TRUE);
-        }
-        attributes
+    pub fn of(cloud: &PointCloud) -> &'static [Self] {
+        let all: &'static [Self] = &Self::ALL;
+        if has_truth(cloud) { all } else { &all[..MEASURED] }
+    }
+
+    /// Whether it is known from the scene alone.
+    pub fn is_true(self) -> bool {
+        !Self::ALL[..MEASURED].contains(&self)
+    }
+
+    /// The attribute of this name in binary or text files.
+    pub fn named(name: &str) -> Option<Self> {
+        let is_named =
+            |known: &Self| known.name() == name || known.name_with_unit().as_str() == name;
+        Self::ALL.into_iter().find(is_named)
     }
 
     /// Name in binary files.
@@ -193,13 +205,25 @@ impl Attribute {
 }
 
 impl Value {
-    /// Bytes in binary files.
-    pub fn size(self) -> usize {
+    /// What it is stored as.
+    pub fn kind(self) -> Kind {
         match self {
-            Self::U1(_) => 1,
-            Self::U2(_) => 2,
-            Self::F4(_) => 4,
-            Self::F8(_) => 8,
+            Self::U1(_) => Kind::U1,
+            Self::U2(_) => Kind::U2,
+            Self::U4(_) => Kind::U4,
+            Self::F4(_) => Kind::F4,
+            Self::F8(_) => Kind::F8,
+        }
+    }
+
+    /// The same as a number.
+    pub fn number(self) -> f64 {
+        match self {
+            Self::U1(value) => f64::from(value),
+            Self::U2(value) => f64::from(value),
+            Self::U4(value) => f64::from(value),
+            Self::F4(value) => f64::from(value),
+            Self::F8(value) => value,
         }
     }
 
@@ -208,6 +232,7 @@ impl Value {
         match self {
             Self::U1(value) => bytes.push(value),
             Self::U2(value) => bytes.extend(value.to_le_bytes()),
+            Self::U4(value) => bytes.extend(value.to_le_bytes()),
             Self::F4(value) => bytes.extend(value.to_le_bytes()),
             Self::F8(value) => bytes.extend(value.to_le_bytes()),
         }
@@ -235,12 +260,6 @@ pub(super) fn pixels(cloud: &PointCloud) -> Vec<Point> {
 /// The outcome with the number `code` in binary files.
 pub(super) fn outcome_from_code(code: u8) -> Option<Outcome> {
     Outcome::ALL.get(usize::from(code)).copied()
-}
-
-/// One comment line per name, for the headers of files that hold numbers only.
-pub(super) fn comment_lines(what: &str, names: &[String]) -> Vec<String> {
-    let clean = |name: &str| name.replace(char::is_control, " ");
-    names.iter().enumerate().map(|(at, name)| format!("{what} {at} {}", clean(name))).collect()
 }
 
 /// Refuses a cloud whose columns have not one entry per return or pixel each, or too many pixels to
@@ -302,12 +321,23 @@ mod tests {
     #[test]
     fn blank_has_the_type_of_every_value() {
         let cloud = sample_cloud();
-        for attribute in Attribute::of(&cloud) {
+        for &attribute in Attribute::of(&cloud) {
             for point in [Point::Return(0), Point::Unanswered(2)] {
                 let [blank, value] = [attribute.blank(), attribute.value(&cloud, point)];
                 assert_eq!(std::mem::discriminant(&blank), std::mem::discriminant(&value));
             }
         }
+    }
+
+    #[test]
+    fn an_attribute_is_found_by_its_name_with_or_without_a_unit() {
+        for attribute in Attribute::ALL {
+            assert_eq!(Attribute::named(attribute.name()), Some(attribute));
+            assert_eq!(Attribute::named(&attribute.name_with_unit()), Some(attribute));
+        }
+        assert_eq!(Attribute::named("nir"), None);
+        let truth = Attribute::ALL.into_iter().filter(|attribute| attribute.is_true());
+        assert_eq!(truth.count(), 5);
     }
 
     #[test]

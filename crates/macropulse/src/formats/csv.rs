@@ -4,7 +4,6 @@ use super::Names;
 use super::attributes::{Attribute, Value, outcome_from_code, returns};
 use crate::points::{NO_OBJECT, PointCloud};
 use std::borrow::Cow;
-use std::fmt::{Display, Write as _};
 use std::io::{self, Write};
 
 /// Writes the returns of a cloud whose columns are even. Numbers have as many digits as it takes
@@ -37,24 +36,34 @@ fn add_cell(line: &mut String, attribute: Attribute, value: Value, names: &Names
         (Attribute::Outcome, Value::U1(code)) => {
             line.push_str(outcome_from_code(code).map_or("", |outcome| outcome.name()));
         }
-        (_, Value::F4(value)) if value.is_nan() => {}
-        (_, Value::U1(value)) => add(line, value),
-        (_, Value::U2(value)) => add(line, value),
-        (_, Value::F4(value)) => add(line, value),
-        (_, Value::F8(value)) => add(line, value),
+        (_, Value::F4(value)) => add_real(line, value),
+        (_, Value::F8(value)) => add_real(line, value),
+        (_, Value::U1(value)) => add_whole(line, value.into()),
+        (_, Value::U2(value)) => add_whole(line, value.into()),
+        (_, Value::U4(value)) => add_whole(line, value),
     }
 }
 
-fn add(line: &mut String, value: impl Display) {
-    // Text in memory takes all that is written to it.
-    let _ = write!(line, "{value}");
+fn add_real<T: zmij::Float + Into<f64> + Copy>(line: &mut String, value: T) {
+    let wide: f64 = value.into();
+    if wide.is_finite() {
+        let mut buffer = zmij::Buffer::new();
+        let text = buffer.format_finite(value);
+        line.push_str(text.strip_suffix(".0").unwrap_or(text));
+    } else if wide.is_infinite() {
+        line.push_str(if wide > 0.0 { "inf" } else { "-inf" });
+    }
+}
+
+fn add_whole(line: &mut String, value: u32) {
+    line.push_str(itoa::Buffer::new().format(value));
 }
 
 fn add_name(line: &mut String, names: &[String], at: u16) {
     match names.get(usize::from(at)) {
         _ if at == NO_OBJECT => {}
         Some(name) => line.push_str(&quoted(name)),
-        None => add(line, at),
+        None => add_whole(line, at.into()),
     }
 }
 

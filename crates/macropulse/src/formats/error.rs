@@ -58,8 +58,17 @@ pub enum Error {
         /// Columns of the cloud.
         columns: usize,
     },
+    /// Clouds are not read from such files.
+    #[error(
+        "{}: no point cloud is read from such a file; read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .bin (KITTI) and .mcap (ROS 2)",
+        path.display()
+    )]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+    },
     /// No format is called so.
-    #[error("unknown format `{name}`;{suggestion} known: {}", Format::ALL.map(Format::name).join(", "))]
+    #[error("unknown format `{name}`;{suggestion} known: {}", known().join(", "))]
     UnknownFormat {
         /// The name as given.
         name: String,
@@ -81,12 +90,20 @@ impl Error {
         Self::Invalid { path: path.to_owned(), format: format.name(), fault: fault.into() }
     }
 
+    pub(super) fn unreadable(path: &Path) -> Self {
+        Self::Unreadable { path: path.to_owned() }
+    }
+
     pub(super) fn unknown_format(name: &str, lower: &str) -> Self {
-        let nearest = crate::names::nearest(lower, Format::ALL.map(Format::name));
+        let nearest = crate::names::nearest(lower, known());
         let suggestion =
             nearest.map(|known| format!(" did you mean `{known}`?")).unwrap_or_default();
         Self::UnknownFormat { name: name.to_owned(), suggestion }
     }
+}
+
+fn known() -> Vec<&'static str> {
+    Format::ALL.iter().map(|format| format.name()).collect()
 }
 
 /// The cause in words that also say what to do, where we know.

@@ -1,88 +1,47 @@
-//! Writers, and readers to check them by: point clouds, range images, the manifest of a run.
+//! Writers and readers of files: point clouds, range images, the manifest of a run.
 //!
-//! Every file is written under a temporary name and renamed when it is whole. Nothing here knows
-//! how a point came about.
+//! A file is written under a temporary name and renamed when it is whole; but one with all scans of a
+//! run fills up under its own. Nothing here knows how a point came about.
 
+mod about;
 mod atomic;
 mod attributes;
+mod clouds;
 mod csv;
+mod csv_reader;
+mod e57;
 mod error;
+mod format;
+mod holding;
+mod kitti;
+mod las;
+mod las_reader;
 mod manifest;
+mod mcap;
+mod npy;
+mod number;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pcd;
 mod pcd_reader;
 mod ply;
+mod ply_reader;
 mod png16;
+mod recording;
+mod table;
 
 pub use atomic::{WholeFile, write_atomically};
+pub use clouds::{Clouds, read_cloud, read_pcd};
 pub use csv::quoted;
 pub use error::Error;
+pub use format::Format;
 pub use manifest::{Begun, Entries, Manifest, Named, SCHEMA_VERSION, Surroundings, versioned};
-pub use pcd_reader::read_pcd;
+pub use mcap::{Message, Profile};
 pub use png16::{RangeImage, read_range_png};
+pub use recording::Recording;
 
 use crate::points::PointCloud;
 use std::path::Path;
-
-/// The formats a point cloud can be written in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Format {
-    /// Point Cloud Data 0.7, binary. Organised, every pixel, NaN where nothing returned; where a shot
-    /// may have several returns, a list of them.
-    Pcd,
-    /// Polygon file format, binary little endian; returns only.
-    Ply,
-    /// Comma-separated text with units in the header; returns only.
-    Csv,
-    /// Range image, 16-bit grey, metres = value / 256, 0 = no return; of each pixel the return picked.
-    Png,
-}
-
-impl Format {
-    /// All formats, in the order in which they are listed to people.
-    pub const ALL: [Self; 4] = [Self::Pcd, Self::Ply, Self::Csv, Self::Png];
-
-    /// Name on the command line and in scenario files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pcd => "pcd",
-            Self::Ply => "ply",
-            Self::Csv => "csv",
-            Self::Png => "png",
-        }
-    }
-
-    /// What the names of its files end in, after the dot: the program that opens a file goes by it,
-    /// so formats may share one.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Pcd => "pcd",
-            Self::Ply => "ply",
-            Self::Csv => "csv",
-            Self::Png => "png",
-        }
-    }
-
-    /// Name of the file of scan number `scan`, another one for every format.
-    pub fn file_name(self, scan: u64) -> String {
-        let kind = match self {
-            Self::Png => "range",
-            Self::Pcd | Self::Ply | Self::Csv => "scan",
-        };
-        format!("{kind}-{scan:06}.{}", self.extension())
-    }
-
-    /// The format called `name`, in either case.
-    ///
-    /// # Errors
-    /// [`Error::UnknownFormat`], which names the nearest known format.
-    pub fn parse(name: &str) -> Result<Self, Error> {
-        let lower = name.trim().to_lowercase();
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == lower)
-            .ok_or_else(|| Error::unknown_format(name, &lower))
-    }
-}
 
 /// What the object and material numbers of a scene are called. Numbers without a name are written
 /// as numbers.
@@ -94,7 +53,8 @@ pub struct Names<'a> {
     pub materials: &'a [String],
 }
 
-/// Writes `cloud` to `path`. Truth is written when the cloud has it.
+/// Writes `cloud` to `path`. Truth is written when the cloud has it and the format can hold it. A
+/// format with all scans of a run in one file has this one alone; see [`Recording`].
 ///
 /// # Errors
 /// [`Error::Uneven`] if a column of the cloud has not one entry per return or pixel, [`Error::TooLarge`] if it
@@ -106,12 +66,22 @@ pub fn write_cloud(
     path: &Path,
 ) -> Result<(), Error> {
     attributes::check_even(cloud)?;
-    match format {
-        Format::Pcd => write_atomically(path, |out| pcd::write(cloud, names, out)),
-        Format::Ply => write_atomically(path, |out| ply::write(cloud, names, out)),
-        Format::Csv => write_atomically(path, |out| csv::write(cloud, names, out)),
-        Format::Png => write_atomically(path, |out| png16::write(cloud, out)),
-    }
+    let both = (cloud, names);
+    write_atomically(path, |out| match format {
+        Format::Pcd => pcd::write(cloud, names, out),
+        Format::Ply => ply::write(cloud, names, out),
+        Format::Las => las::write(both, false, out),
+        Format::Laz => las::write(both, true, out),
+        Format::E57 => e57::write(cloud, names, out),
+        Format::Npy => npy::write(cloud, out),
+        Format::Csv => csv::write(cloud, names, out),
+        Format::Kitti => kitti::write(cloud, out),
+        #[cfg(feature = "parquet")]
+        Format::Parquet => parquet::write(cloud, names, out),
+        Format::Mcap(message) => mcap::write(message, both, out),
+        Format::Png => png16::write(cloud, out),
+        Format::RangeNpy => npy::write_range(cloud, out),
+    })
 }
 
 /// Writes the returns of `cloud` as lines of [`Format::Csv`], for a stream of parts of which only the
@@ -193,38 +163,6 @@ fn sample_cloud() -> PointCloud {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_format_is_found_by_name_in_either_case() {
-        for format in Format::ALL {
-            assert_eq!(Format::parse(format.name()).unwrap(), format);
-        }
-        assert_eq!(Format::parse(" PCD ").unwrap(), Format::Pcd);
-    }
-
-    #[test]
-    fn formats_share_neither_a_name_nor_the_name_of_a_file() {
-        for (at, one) in Format::ALL.into_iter().enumerate() {
-            for other in &Format::ALL[at + 1..] {
-                assert_ne!(one.name(), other.name());
-                assert_ne!(one.file_name(7), other.file_name(7));
-            }
-        }
-        assert_eq!(Format::Pcd.file_name(7), "scan-000007.pcd");
-        assert_eq!(Format::Png.file_name(1_234_567), "range-1234567.png");
-    }
-
-    #[test]
-    fn a_misspelt_format_names_its_neighbour() {
-        assert_eq!(
-            Format::parse("pdc").unwrap_err().to_string(),
-            "unknown format `pdc`; did you mean `pcd`? known: pcd, ply, csv, png"
-        );
-        assert_eq!(
-            Format::parse("holograms").unwrap_err().to_string(),
-            "unknown format `holograms`; known: pcd, ply, csv, png"
-        );
-    }
 
     #[test]
     fn a_cloud_with_a_short_column_is_refused() {

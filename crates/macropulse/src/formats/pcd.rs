@@ -1,27 +1,22 @@
 //! PCD 0.7, binary: organised, every pixel, where a shot has one return at most; else a list.
 
 use super::Names;
-use super::attributes::{Attribute, Value, comment_lines, pixels, returns};
-use crate::points::{PointCloud, Viewpoint};
+use super::about::{list_line, name_lines, scan_line, viewpoint_text};
+use super::attributes::{Attribute, pixels, returns};
+use crate::points::PointCloud;
 use std::io::{self, Write};
-
-/// Comment that carries the number of the scan through the file.
-pub(super) const SCAN_COMMENT: &str = "# macropulse scan ";
-
-/// Comment that carries rows, columns, most returns of a shot and the return picked through a list.
-pub(super) const LIST_COMMENT: &str = "# macropulse list ";
 
 /// Writes a cloud whose columns are even. Where a shot has one return at most, every pixel: `WIDTH`
 /// are the columns, `HEIGHT` the rows; a pixel without a return is NaN, never 0. Where it may have
 /// several, and where there are no pixels, the returns as a list: `HEIGHT` is 1.
 pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
-    write_header(cloud, &attributes, names, out)?;
+    write_header(cloud, attributes, names, out)?;
     let mut bytes = Vec::new();
     let points = if is_list(cloud) { returns(cloud).collect() } else { pixels(cloud) };
     for point in points {
         bytes.clear();
-        for attribute in &attributes {
+        for attribute in attributes {
             attribute.value(cloud, point).append_to(&mut bytes);
         }
         out.write_all(&bytes)?;
@@ -29,7 +24,8 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
     Ok(())
 }
 
-fn is_list(cloud: &PointCloud) -> bool {
+/// Whether the points are a list and no image.
+pub(super) fn is_list(cloud: &PointCloud) -> bool {
     cloud.returns_per_shot > 1 || cloud.rows * cloud.columns == 0
 }
 
@@ -43,35 +39,24 @@ fn write_header(
         attributes.iter().map(each).collect::<Vec<_>>().join(" ")
     };
     writeln!(out, "# .PCD v0.7 - Point Cloud Data file format")?;
-    writeln!(out, "{SCAN_COMMENT}{}", cloud.scan)?;
+    writeln!(out, "# {}", scan_line(cloud))?;
     let (mut columns, mut rows) = (cloud.columns, cloud.rows);
     if is_list(cloud) {
-        let (most, pick) = (cloud.returns_per_shot, cloud.pick.name());
-        writeln!(out, "{LIST_COMMENT}{rows} {columns} {most} {pick}")?;
+        writeln!(out, "# {}", list_line(cloud))?;
         (columns, rows) = (cloud.returns(), 1);
     }
-    for (what, list) in [("object", names.objects), ("material", names.materials)] {
-        for line in comment_lines(what, list) {
-            writeln!(out, "# {line}")?;
-        }
+    for line in name_lines(names) {
+        writeln!(out, "# {line}")?;
     }
     writeln!(out, "VERSION 0.7")?;
     writeln!(out, "FIELDS {}", row(&|attribute| attribute.name().to_owned()))?;
-    writeln!(out, "SIZE {}", row(&|attribute| attribute.blank().size().to_string()))?;
-    writeln!(out, "TYPE {}", row(&|attribute| type_letter(attribute.blank()).to_owned()))?;
+    writeln!(out, "SIZE {}", row(&|attribute| attribute.blank().kind().size().to_string()))?;
+    writeln!(out, "TYPE {}", row(&|attribute| attribute.blank().kind().letter().to_owned()))?;
     writeln!(out, "COUNT {}", row(&|_| "1".to_owned()))?;
     writeln!(out, "WIDTH {columns}\nHEIGHT {rows}")?;
-    let Viewpoint { position: [x, y, z], turn: [w, i, j, k] } = cloud.viewpoint;
-    writeln!(out, "VIEWPOINT {x} {y} {z} {w} {i} {j} {k}")?;
+    writeln!(out, "VIEWPOINT {}", viewpoint_text(&cloud.viewpoint))?;
     writeln!(out, "POINTS {}", columns * rows)?;
     writeln!(out, "DATA binary")
-}
-
-pub(super) fn type_letter(value: Value) -> &'static str {
-    match value {
-        Value::U1(_) | Value::U2(_) => "U",
-        Value::F4(_) | Value::F8(_) => "F",
-    }
 }
 
 #[cfg(test)]
@@ -82,7 +67,7 @@ mod tests {
 
     fn header(cloud: &PointCloud, names: &Names) -> String {
         let mut bytes = Vec::new();
-        write_header(cloud, &Attribute::of(cloud), names, &mut bytes).unwrap();
+        write_header(cloud, Attribute::of(cloud), names, &mut bytes).unwrap();
         String::from_utf8(bytes).unwrap()
     }
 

@@ -1,26 +1,26 @@
 //! PLY, binary little endian: the returns as vertices.
 
 use super::Names;
-use super::attributes::{Attribute, Value, comment_lines, returns};
+use super::about::all_lines;
+use super::attributes::{Attribute, Value, returns};
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
 /// Writes the returns of a cloud whose columns are even.
+///
+/// Numbers of two bytes become `int`: readers that many use drop a `ushort`.
 pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
     writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    writeln!(out, "comment macropulse scan {}", cloud.scan)?;
     writeln!(out, "comment metres, radians; x forward, y left, z up")?;
-    for (what, list) in [("object", names.objects), ("material", names.materials)] {
-        for line in comment_lines(what, list) {
-            writeln!(out, "comment {line}")?;
-        }
+    for line in all_lines(cloud, names) {
+        writeln!(out, "comment {line}")?;
     }
     writeln!(out, "element vertex {}", cloud.returns())?;
-    for attribute in &attributes {
+    for attribute in attributes {
         let kind = match attribute.blank() {
             Value::U1(_) => "uchar",
-            Value::U2(_) => "ushort",
+            Value::U2(_) | Value::U4(_) => "int",
             Value::F4(_) => "float",
             Value::F8(_) => "double",
         };
@@ -30,8 +30,11 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
     let mut bytes = Vec::new();
     for point in returns(cloud) {
         bytes.clear();
-        for attribute in &attributes {
-            attribute.value(cloud, point).append_to(&mut bytes);
+        for attribute in attributes {
+            match attribute.value(cloud, point) {
+                Value::U2(value) => bytes.extend(i32::from(value).to_le_bytes()),
+                value => value.append_to(&mut bytes),
+            }
         }
         out.write_all(&bytes)?;
     }
@@ -56,7 +59,7 @@ mod tests {
     fn only_returns_are_vertices() {
         let (header, body) = written(&sample_cloud(), &Names::default());
         assert!(header.contains("element vertex 5\n"));
-        assert_eq!(body.len(), 5 * (5 * 4 + 8 + 6 * 2 + 3 + 4 + 2 + 2 + 4 + 1));
+        assert_eq!(body.len(), 5 * (5 * 4 + 8 + 6 * 4 + 3 + 4 + 4 + 4 + 4 + 1));
         assert_eq!(body[..4], 30f32.to_le_bytes());
     }
 

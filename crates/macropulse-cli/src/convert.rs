@@ -1,0 +1,236 @@
+//! `macropulse convert`: point clouds from one format to another.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use macropulse::formats::{Clouds, Format, Recording};
+use macropulse::points::PointCloud;
+
+use crate::fault::{Fault, warn};
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
+use crate::options::Common;
+use crate::simulate::Formats;
+use crate::text::{grouped, print};
+
+/// Convert point clouds to another format
+///
+/// Read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .bin (KITTI) and .mcap (clouds
+/// of ROS 2, one after the other). What an output cannot hold is said.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  macropulse convert out/scan-000000.pcd -o car.laz
+  macropulse convert out/scan-*.pcd -o drive.mcap
+  macropulse convert out/scans.mcap --format ply,csv -o clouds")]
+pub struct Convert {
+    /// Files with point clouds
+    #[arg(value_name = "IN", required = true)]
+    inputs: Vec<PathBuf>,
+
+    /// File, whose ending says its format, or with --format also a folder
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+
+    #[arg(
+        long,
+        value_name = "LIST",
+        help = "Formats to write, as of simulate; OUT is a folder \
+                                             unless it ends as the files of the only one do"
+    )]
+    format: Option<Formats>,
+}
+
+/// Where the clouds go.
+struct Target {
+    formats: Vec<Format>,
+    folder: PathBuf,
+    /// The name of the one file; without it each input has files of its own name.
+    file: Option<String>,
+}
+
+impl Convert {
+    fn target(&self) -> Result<Target, Fault> {
+        let output = &self.output;
+        let ending = output.extension().and_then(OsStr::to_str);
+        let by_ending = ending.and_then(Format::of_extension);
+        let formats = match (&self.format, by_ending) {
+            (Some(formats), _) if formats.0.is_empty() => {
+                let remedy = "--format: nothing is to be written; name a format, as `ply`";
+                return Err(Fault::Wrong(remedy.to_owned()));
+            }
+            (Some(formats), _) => formats.0.clone(),
+            (None, Some(format)) => vec![format],
+            (None, None) => {
+                let output = output.display();
+                return Err(Fault::Wrong(format!(
+                    "{output}: says no format; give it an ending, as {output}.ply, or say \
+                     --format ply to write into a folder of this name"
+                )));
+            }
+        };
+        let is_file = match formats.as_slice() {
+            [format] => ending == Some(format.extension()) && !output.is_dir(),
+            _ => false,
+        };
+        let name = output.file_name().filter(|_| is_file);
+        let file = name.map(|name| name.to_string_lossy().into_owned());
+        let parent = output.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let folder = if is_file { parent.unwrap_or(Path::new(".")) } else { output };
+        Ok(Target { formats, folder: folder.to_owned(), file })
+    }
+}
+
+impl Target {
+    /// Refuses inputs whose files would take each other's place, or that of an input.
+    fn check(&self, inputs: &[PathBuf]) -> Result<(), Fault> {
+        let Some(file) = &self.file else {
+            for (at, input) in inputs.iter().enumerate() {
+                let is_same = |other: &&PathBuf| other.file_stem() == input.file_stem();
+                if let Some(other) = inputs[..at].iter().find(is_same) {
+                    let (one, other) = (other.display(), input.display());
+                    return Err(Fault::Wrong(format!(
+                        "{one} and {other} would be written under one name; convert them to \
+                         folders of their own"
+                    )));
+                }
+            }
+            return Ok(());
+        };
+        let output = std::fs::canonicalize(self.folder.join(file)).ok();
+        let is_output = |input: &&PathBuf| output.is_some() && input.canonicalize().ok() == output;
+        match inputs.iter().find(is_output) {
+            Some(input) => {
+                let input = input.display();
+                let sentence = format!("{input}: is to be read and written; choose another name");
+                Err(Fault::Wrong(sentence))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Whether it takes several scans.
+    fn takes_several(&self) -> bool {
+        self.file.is_none() || self.formats.iter().all(|format| format.is_of_run())
+    }
+
+    /// The name of a file.
+    fn name(&self, format: Format, input: &Path, scan: Option<u64>) -> String {
+        if let Some(file) = &self.file {
+            return file.clone();
+        }
+        if format.is_of_run() {
+            return format.file_name(0);
+        }
+        let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+        let scan = scan.map(|scan| format!("-{scan:06}")).unwrap_or_default();
+        let kind = if format == Format::RangeNpy { "-range" } else { "" };
+        format!("{stem}{scan}{kind}.{}", format.extension())
+    }
+}
+
+/// A conversion under way.
+struct Conversion<'a> {
+    target: &'a Target,
+    folder: Folder,
+    recording: Recording,
+    /// Number of the scan that comes next at least, where they go into one file.
+    next: u64,
+    scans: u64,
+    points: u64,
+    files: u64,
+}
+
+pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
+    let target = options.target()?;
+    target.check(&options.inputs)?;
+    let interrupt = Interrupt::listen()?;
+    let mut conversion = Conversion {
+        target: &target,
+        folder: Folder::claim(&target.folder)?,
+        recording: Recording::new(&target.folder, &target.formats),
+        next: 0,
+        scans: 0,
+        points: 0,
+        files: 0,
+    };
+    let mut converted = Ok(());
+    for input in &options.inputs {
+        converted = conversion.convert(input, options.inputs.len(), &interrupt);
+        if converted.is_err() || interrupt.is_raised() {
+            break;
+        }
+    }
+    let Conversion { recording, scans, points, files, .. } = conversion;
+    interrupt.undisturbed(|| recording.finish())?;
+    converted?;
+    if points == 0 {
+        warn("not a single point: there is none in what was read");
+    }
+    if !common.quiet {
+        let (scans, points, files) = (grouped(scans), grouped(points), grouped(files));
+        let output = options.output.display();
+        print(&format!("{scans} scans, {points} points, {files} files: {output}\n"))?;
+    }
+    if interrupt.is_raised() { Err(Fault::Interrupted) } else { Ok(()) }
+}
+
+impl Conversion<'_> {
+    fn convert(&mut self, input: &Path, inputs: usize, interrupt: &Interrupt) -> Result<(), Fault> {
+        let mut clouds = Clouds::open(input)?;
+        let has_several = input.extension().is_some_and(|ending| ending == "mcap");
+        let mut next = clouds.next();
+        while let Some(cloud) = next.take() {
+            if interrupt.is_raised() {
+                return Ok(());
+            }
+            let cloud = cloud?;
+            if !self.target.takes_several() {
+                next = clouds.next();
+                if inputs > 1 || matches!(next, Some(Ok(_))) {
+                    return Err(self.several());
+                }
+            }
+            interrupt.undisturbed(|| self.write(cloud, (input, has_several), &clouds))?;
+            next = next.or_else(|| clouds.next());
+        }
+        Ok(())
+    }
+
+    fn several(&self) -> Fault {
+        let format = self.target.formats.first().map_or("", |format| format.name());
+        Fault::Wrong(format!(
+            "several scans do not fit into one {format} file; say --format {format} and give a \
+             folder with -o"
+        ))
+    }
+
+    fn write(
+        &mut self,
+        mut cloud: PointCloud,
+        (input, has_several): (&Path, bool),
+        clouds: &Clouds,
+    ) -> Result<(), Fault> {
+        let names = clouds.names();
+        if self.scans == 0 {
+            self.folder.make()?;
+            for format in &self.target.formats {
+                let left_out = format.leaves_out(&cloud, &names);
+                if !left_out.is_empty() {
+                    let (name, left_out) = (format.name(), left_out.join(", "));
+                    warn(&format!("{name} cannot hold {left_out}: left out"));
+                }
+            }
+        }
+        let scan = cloud.scan;
+        cloud.scan = scan.max(self.next);
+        self.next = cloud.scan + 1;
+        let scan = has_several.then_some(scan);
+        let name = |format| self.target.name(format, input, scan);
+        self.files += self.recording.add_as(&cloud, &names, name)?.len() as u64;
+        self.folder.keep();
+        self.scans += 1;
+        self.points += cloud.returns() as u64;
+        Ok(())
+    }
+}

@@ -1,0 +1,89 @@
+//! Clouds from files, whatever their format.
+
+use super::about::About;
+use super::mcap::Messages;
+use super::{
+    Error, Format, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader, ply_reader,
+};
+use crate::points::PointCloud;
+use std::path::Path;
+
+/// The clouds of a file, one after the other: many of an MCAP file, one of any other.
+pub struct Clouds(Source);
+
+enum Source {
+    One { cloud: Option<Box<PointCloud>>, about: About },
+    Many(Box<Messages>),
+}
+
+impl Clouds {
+    /// Opens the file at `path`, whose ending says what it is: `pcd`, `ply`, `las`, `laz`, `e57`,
+    /// `npy`, `csv`, `bin` (KITTI) or `mcap` (`PointCloud2` of ROS 2).
+    ///
+    /// Attributes that the file lacks are NaN or 0, except that the range is then the length of
+    /// (x, y, z), and a point the first return of one. Truth is read if the file has the outcome. A
+    /// file that does not tell its rows and columns has those of its highest ones, or no image.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is not what its ending
+    /// says, [`Error::Unreadable`] if no cloud is read from files of that ending.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        let format = Format::of_extension(ending).ok_or_else(|| Error::unreadable(path))?;
+        if let Format::Mcap(_) = format {
+            return Ok(Self(Source::Many(Box::new(Messages::open(path)?))));
+        }
+        let read = || std::fs::read(path).map_err(|cause| Error::read(path, cause));
+        let parsed = match format {
+            Format::Pcd => pcd_reader::parse(&read()?),
+            Format::Ply => ply_reader::parse(&read()?),
+            Format::Las | Format::Laz => las_reader::parse(read()?),
+            Format::E57 => e57::parse(read()?),
+            Format::Npy => npy::parse(&read()?),
+            Format::Csv => csv_reader::parse(&read()?),
+            Format::Kitti => kitti::parse(&read()?),
+            _ => return Err(Error::unreadable(path)),
+        };
+        let (cloud, about) = parsed.map_err(|fault| Error::invalid(path, format, fault))?;
+        Ok(Self(Source::One { cloud: Some(Box::new(cloud)), about }))
+    }
+
+    /// The names of objects and materials, as far as the file was read and tells them.
+    pub fn names(&self) -> Names<'_> {
+        let about = match &self.0 {
+            Source::One { about, .. } => about,
+            Source::Many(messages) => messages.about(),
+        };
+        Names { objects: &about.objects, materials: &about.materials }
+    }
+}
+
+impl Iterator for Clouds {
+    type Item = Result<PointCloud, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match &mut self.0 {
+            Source::One { cloud, .. } => cloud.take().map(|cloud| Ok(*cloud)),
+            Source::Many(messages) => messages.next(),
+        }
+    }
+}
+
+/// The cloud in the file at `path`, as [`Clouds::open`] reads it; of several the first.
+///
+/// # Errors
+/// As [`Clouds::open`].
+pub fn read_cloud(path: &Path) -> Result<PointCloud, Error> {
+    let no_cloud = || Error::unreadable(path);
+    Clouds::open(path)?.next().ok_or_else(no_cloud)?
+}
+
+/// The cloud in the binary PCD file at `path`, whatever its ending.
+///
+/// # Errors
+/// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is no such PCD file.
+pub fn read_pcd(path: &Path) -> Result<PointCloud, Error> {
+    let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
+    let parsed = pcd_reader::parse(&bytes);
+    parsed.map(|(cloud, _)| cloud).map_err(|fault| Error::invalid(path, Format::Pcd, fault))
+}

@@ -1,0 +1,190 @@
+//! LAS 1.4 and LAZ, point format 6: the returns, with extra bytes for what LAS has no field for.
+
+use super::Names;
+use super::about::all_lines;
+use super::attributes::{Attribute, Value, returns};
+use super::number::Kind;
+use crate::points::PointCloud;
+use las::{Builder, Point, Transform, Vector, Version, Vlr, Writer};
+use std::io::{self, Cursor, Write};
+
+/// Length of the smallest step of a coordinate, m, unless the cloud is too large for it. A float of
+/// 32 bits, which a coordinate is before, has steps of 1 to 8 µm between 8 and 128 m.
+const STEP: f64 = 1e-6;
+
+/// What an apparent reflectance of 1 is as an intensity: the 16 bits end at 6.5535.
+pub(super) const WHITE: f64 = 10_000.0;
+
+/// Whose records are the descriptions of extra bytes, and their number.
+pub(super) const EXTRA_BYTES: (&str, u16) = ("LASF_Spec", 4);
+
+/// Whose record is our text, and its number.
+pub(super) const TEXT: (&str, u16) = ("macropulse", 1);
+
+/// Bytes that describe a dimension of the extra bytes.
+pub(super) const DESCRIPTION: usize = 192;
+
+/// Number of each kind in the description of extra bytes.
+pub(super) const KINDS: [Kind; 10] = [
+    Kind::U1,
+    Kind::I1,
+    Kind::U2,
+    Kind::I2,
+    Kind::U4,
+    Kind::I4,
+    Kind::U8,
+    Kind::I8,
+    Kind::F4,
+    Kind::F8,
+];
+
+/// The name of an attribute among the extra bytes, if LAS has no field that holds it whole.
+pub(super) fn extra_name(attribute: Attribute) -> Option<&'static str> {
+    match attribute {
+        Attribute::X | Attribute::Y | Attribute::Z | Attribute::TimeNs => None,
+        Attribute::ReturnNumber | Attribute::NumberOfReturns => None,
+        // `intensity` is a field of LAS, with 16 bits.
+        Attribute::Intensity => Some("reflectance"),
+        other => Some(other.name()),
+    }
+}
+
+/// Writes the returns of a cloud whose columns are even.
+pub(super) fn write(
+    (cloud, names): (&PointCloud, &Names),
+    compress: bool,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let extra: Vec<Attribute> = Attribute::of(cloud)
+        .iter()
+        .copied()
+        .filter(|attribute| extra_name(*attribute).is_some())
+        .collect();
+    let header = builder((cloud, names), &extra, compress)?.into_header();
+    let mut writer = Writer::new(Cursor::new(Vec::new()), header.map_err(io::Error::other)?)
+        .map_err(io::Error::other)?;
+    for (at, point) in returns(cloud).enumerate() {
+        let mut bytes = Vec::new();
+        extra.iter().for_each(|attribute| attribute.value(cloud, point).append_to(&mut bytes));
+        writer.write_point(point_of(cloud, at, bytes)).map_err(io::Error::other)?;
+    }
+    out.write_all(writer.into_inner().map_err(io::Error::other)?.get_ref())
+}
+
+fn builder(
+    (cloud, names): (&PointCloud, &Names),
+    extra: &[Attribute],
+    compress: bool,
+) -> io::Result<Builder> {
+    let mut builder = Builder::from(Version::new(1, 4));
+    builder.generating_software = concat!("macropulse ", env!("CARGO_PKG_VERSION")).to_owned();
+    builder.system_identifier = "SIMULATION".to_owned();
+    builder.point_format = las::point::Format::new(6).map_err(io::Error::other)?;
+    builder.point_format.is_compressed = compress;
+    let size = extra.iter().map(|attribute| attribute.blank().kind().size()).sum::<usize>();
+    builder.point_format.extra_bytes = size as u16;
+    let transform = Transform { scale: step(cloud), offset: 0.0 };
+    builder.transforms = Vector { x: transform, y: transform, z: transform };
+    let described = extra.iter().flat_map(|attribute| description(*attribute)).collect();
+    let lines: Vec<String> = all_lines(cloud, names).collect();
+    builder.vlrs.push(record(EXTRA_BYTES, "extra bytes", described));
+    let text = record(TEXT, "scan, image, pose, names", lines.join("\n").into_bytes());
+    // Only the extended records have room for more than 65 535 bytes.
+    if text.has_large_data() { &mut builder.evlrs } else { &mut builder.vlrs }.push(text);
+    Ok(builder)
+}
+
+fn record((user, number): (&str, u16), description: &str, data: Vec<u8>) -> Vlr {
+    Vlr { user_id: user.to_owned(), record_id: number, description: description.to_owned(), data }
+}
+
+/// The description of a dimension of the extra bytes.
+fn description(attribute: Attribute) -> [u8; DESCRIPTION] {
+    let mut bytes = [0; DESCRIPTION];
+    let mut put = |at: usize, text: &str| {
+        let text = &text.as_bytes()[..text.len().min(31)];
+        bytes[at..at + text.len()].copy_from_slice(text);
+    };
+    put(4, extra_name(attribute).unwrap_or_default());
+    put(160, attribute.unit());
+    let kind = attribute.blank().kind();
+    bytes[2] = KINDS.iter().position(|known| *known == kind).map_or(0, |at| at as u8 + 1);
+    bytes
+}
+
+/// The smallest step of coordinates, m: a power of ten by which the farthest of them has 31 bits.
+fn step(cloud: &PointCloud) -> f64 {
+    let all = cloud.x.iter().chain(&cloud.y).chain(&cloud.z);
+    let farthest = all.fold(0.0_f32, |most, place| most.max(place.abs()));
+    let mut step = STEP;
+    while f64::from(farthest) > step * f64::from(i32::MAX - 1) && step < 1e30 {
+        step *= 10.0;
+    }
+    step
+}
+
+fn point_of(cloud: &PointCloud, at: usize, extra_bytes: Vec<u8>) -> Point {
+    let grey = (f64::from(cloud.intensity[at]) * WHITE).round().clamp(0.0, 65_535.0);
+    Point {
+        x: f64::from(cloud.x[at]),
+        y: f64::from(cloud.y[at]),
+        z: f64::from(cloud.z[at]),
+        intensity: grey as u16,
+        return_number: cloud.return_number[at].min(15),
+        number_of_returns: cloud.number_of_returns[at].min(15),
+        user_data: u8::try_from(cloud.row[at]).unwrap_or(0),
+        gps_time: Some(cloud.time_ns[at] * 1e-9),
+        extra_bytes,
+        ..Point::default()
+    }
+}
+
+impl Attribute {
+    /// Its unit, for the descriptions of fields; nothing where it has none.
+    fn unit(self) -> &'static str {
+        match (self, self.blank()) {
+            (Self::TimeNs, _) => "ns",
+            (Self::Incidence, _) => "rad",
+            (Self::Intensity, _) => "1 = white Lambertian",
+            (_, Value::F4(_)) => "m",
+            _ => "",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample_cloud;
+    use super::*;
+
+    #[test]
+    fn a_step_is_a_micrometre_until_the_cloud_is_too_large() {
+        let cloud = sample_cloud();
+        assert_eq!(step(&cloud), 1e-6);
+        let far = PointCloud { x: vec![3000.0], ..PointCloud::default() };
+        assert!((step(&far) - 1e-5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_description_of_extra_bytes_is_laid_out_as_las_has_it() {
+        let bytes = description(Attribute::Row);
+        assert_eq!(bytes[2], 3, "unsigned short");
+        assert_eq!(&bytes[4..8], b"row\0");
+        let bytes = description(Attribute::Intensity);
+        assert_eq!((bytes[2], &bytes[4..15]), (9, &b"reflectance"[..]));
+    }
+
+    #[test]
+    fn las_files_begin_with_their_magic_and_laz_is_smaller() {
+        let cloud = PointCloud { returns_per_shot: 1, ..sample_cloud() };
+        let written = |compress| {
+            let mut bytes = Vec::new();
+            write((&cloud, &Names::default()), compress, &mut bytes).unwrap();
+            assert_eq!(&bytes[..4], b"LASF");
+            bytes
+        };
+        let [las, laz] = [false, true].map(written);
+        assert_eq!((las[24], las[25], las[104] & 63), (1, 4, 6));
+        assert_eq!(laz[104] & 128, 128);
+    }
+}

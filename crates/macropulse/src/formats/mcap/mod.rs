@@ -1,0 +1,221 @@
+//! MCAP: all scans of a run in one file of messages, which fill up scan by scan.
+//!
+//! A scan is flushed as a chunk of its own when it is done, and the summary follows at the end. So
+//! the file cannot appear as a whole, as our others do: it grows under its own name, and a run that
+//! is broken off leaves the finished scans in it. Readers that go through a file from its beginning
+//! read those, and `mcap recover` adds the summary.
+
+mod cdr;
+mod foxglove;
+mod osi;
+mod point_cloud2;
+mod profile;
+mod protobuf;
+mod reader;
+mod ros2;
+
+pub(super) use profile::holding as profile_holding;
+pub(super) use reader::Messages;
+
+use super::about::{list_line, name_lines};
+use super::{Error, Names};
+use crate::points::PointCloud;
+use ::mcap::records::{MessageHeader, Metadata};
+use ::mcap::{Compression, McapError, WriteOptions, Writer};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Cursor, Seek, Write};
+use std::path::{Path, PathBuf};
+
+/// Time that stands for the beginning of the first scan, ns. ROS takes a time of 0 for none at all.
+pub(super) const EPOCH_NS: u64 = 1_000_000_000;
+
+/// Name of the metadata that is ours, and its one key.
+const METADATA: &str = "macropulse";
+const ABOUT: &str = "about";
+
+/// What the messages of a file are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Message {
+    /// ROS 2: `sensor_msgs/msg/PointCloud2`, `/tf` and `/tf_static`.
+    Ros2(Profile),
+    /// `foxglove.PointCloud` and `foxglove.FrameTransforms`.
+    Foxglove,
+    /// ASAM OSI: `osi3.SensorData` with lidar detections and, with the truth, `osi3.SensorView` with
+    /// reflections.
+    Osi,
+}
+
+/// Which fields a `PointCloud2` has: those that programs for these sensors expect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Profile {
+    /// All attributes under their own names.
+    Extended,
+    /// `XYZIRT` as the ROS 2 driver of Velodyne has it.
+    Velodyne,
+    /// As the driver of Ouster has it.
+    Ouster,
+    /// As the driver of Livox has it.
+    Livox,
+    /// `XYZIRCAEDT` of Autoware, 32 bytes.
+    Autoware,
+}
+
+/// A stream of messages of one kind.
+struct Topic {
+    name: &'static str,
+    schema: &'static str,
+    schema_encoding: &'static str,
+    schema_text: Vec<u8>,
+    encoding: &'static str,
+    metadata: BTreeMap<String, String>,
+}
+
+/// A message for the topic of this number.
+type Payload = (usize, Vec<u8>);
+
+impl Message {
+    fn topics(self) -> Vec<Topic> {
+        match self {
+            Self::Ros2(_) => ros2::topics(),
+            Self::Foxglove => foxglove::topics(),
+            Self::Osi => osi::topics(),
+        }
+    }
+
+    fn file_metadata(self) -> Option<Metadata> {
+        (self == Self::Osi).then(osi::file_metadata)
+    }
+
+    /// What a scan becomes; the first one also brings what is said once.
+    fn payloads(self, cloud: &PointCloud, is_first: bool) -> io::Result<Vec<Payload>> {
+        match self {
+            Self::Ros2(profile) => ros2::payloads(profile, cloud, is_first),
+            Self::Foxglove => foxglove::payloads(cloud),
+            Self::Osi => osi::payloads(cloud),
+        }
+    }
+
+    fn profile_name(self) -> &'static str {
+        match self {
+            Self::Ros2(_) => "ros2",
+            Self::Foxglove | Self::Osi => "",
+        }
+    }
+}
+
+/// A file of messages that is being written.
+pub(super) struct Recorder<W: Write + Seek> {
+    writer: Writer<W>,
+    message: Message,
+    channels: Vec<u16>,
+    scans: u64,
+}
+
+impl<W: Write + Seek> Recorder<W> {
+    fn begin(message: Message, out: W) -> Result<Self, McapError> {
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Lz4))
+            .chunk_size(None)
+            // A chunk is written when it is whole.
+            .disable_seeking(true)
+            .profile(message.profile_name())
+            .library(concat!("macropulse ", env!("CARGO_PKG_VERSION")));
+        let mut writer = options.create(out)?;
+        let mut channels = Vec::new();
+        for topic in message.topics() {
+            let Topic { schema, schema_encoding, ref schema_text, .. } = topic;
+            let schema = writer.add_schema(schema, schema_encoding, schema_text)?;
+            let Topic { name, encoding, ref metadata, .. } = topic;
+            channels.push(writer.add_channel(schema, name, encoding, metadata)?);
+        }
+        if let Some(metadata) = message.file_metadata() {
+            writer.write_metadata(&metadata)?;
+        }
+        Ok(Self { writer, message, channels, scans: 0 })
+    }
+
+    /// Adds a scan, whose columns are even, as a chunk that is flushed.
+    fn add(&mut self, cloud: &PointCloud, names: &Names) -> Result<(), McapError> {
+        let is_first = self.scans == 0;
+        if is_first {
+            let lines = [list_line(cloud)].into_iter().chain(name_lines(names));
+            let about = lines.collect::<Vec<_>>().join("\n");
+            let metadata = BTreeMap::from([(ABOUT.to_owned(), about)]);
+            self.writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
+        }
+        let time = stamp_ns(cloud);
+        for (topic, payload) in self.message.payloads(cloud, is_first)? {
+            let Some(&channel_id) = self.channels.get(topic) else { continue };
+            let sequence = cloud.scan as u32;
+            let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
+            self.writer.write_to_known_channel(&header, &payload)?;
+        }
+        self.scans += 1;
+        self.writer.flush()
+    }
+}
+
+/// A file of messages on the disk.
+pub(super) struct Recording {
+    recorder: Recorder<BufWriter<File>>,
+    path: PathBuf,
+}
+
+impl Recording {
+    /// Begins the file at `path`, in place of an older one.
+    pub fn begin(message: Message, path: &Path) -> Result<Self, Error> {
+        let file = File::create(path).map_err(|cause| Error::write(path, cause))?;
+        let recorder = Recorder::begin(message, BufWriter::with_capacity(1 << 16, file))
+            .map_err(|error| Error::write(path, cause(error)))?;
+        Ok(Self { recorder, path: path.to_owned() })
+    }
+
+    /// Adds a scan, whose columns are even. When this returns, it is readable.
+    pub fn add(&mut self, cloud: &PointCloud, names: &Names) -> Result<(), Error> {
+        let added = self.recorder.add(cloud, names);
+        added.map_err(|error| Error::write(&self.path, cause(error)))
+    }
+
+    /// Writes the summary.
+    pub fn finish(mut self) -> Result<(), Error> {
+        let finished = self.recorder.writer.finish();
+        finished.map(|_| ()).map_err(|error| Error::write(&self.path, cause(error)))
+    }
+}
+
+/// A file with one scan alone, whose columns are even.
+pub(super) fn write(
+    message: Message,
+    (cloud, names): (&PointCloud, &Names),
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let mut file = Cursor::new(Vec::new());
+    let written = (|| {
+        let mut recorder = Recorder::begin(message, &mut file)?;
+        recorder.add(cloud, names)?;
+        recorder.writer.finish()
+    })();
+    written.map_err(cause)?;
+    out.write_all(file.get_ref())
+}
+
+fn cause(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(cause) => cause,
+        other => io::Error::other(other),
+    }
+}
+
+/// When the first shot of a scan was fired, ns from the beginning of the first scan: that of a pixel
+/// where there are any, or else that of a return.
+fn begins_ns(cloud: &PointCloud) -> f64 {
+    let times = if cloud.fired_ns.is_empty() { &cloud.time_ns } else { &cloud.fired_ns };
+    let first = times.iter().copied().filter(|time| !time.is_nan()).fold(f64::INFINITY, f64::min);
+    if first.is_finite() { first } else { 0.0 }
+}
+
+/// The time of a scan, whole ns from the epoch of the file.
+fn stamp_ns(cloud: &PointCloud) -> u64 {
+    EPOCH_NS.saturating_add(begins_ns(cloud).max(0.0) as u64)
+}

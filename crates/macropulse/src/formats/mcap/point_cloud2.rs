@@ -1,0 +1,187 @@
+//! `sensor_msgs/msg/PointCloud2`, written and read.
+
+use super::super::about::About;
+use super::super::attributes::{Attribute, pixels, returns};
+use super::super::number::Kind;
+use super::super::pcd::is_list;
+use super::super::table::{self, Layout};
+use super::cdr::{Decoder, Encoder};
+use super::profile::{Source, fields};
+use super::{EPOCH_NS, Profile, stamp_ns};
+use crate::points::PointCloud;
+use std::io;
+
+/// The frame that points are in.
+pub(super) const SENSOR_FRAME: &str = "lidar";
+
+/// A scan as a message: organised, with NaN where there is no return, where each shot has one return
+/// at most and the driver of the profile does the same; else a list.
+pub(super) fn encode(profile: Profile, cloud: &PointCloud) -> io::Result<Vec<u8>> {
+    let stamp = stamp_ns(cloud);
+    let source = Source::new(cloud, stamp as f64 - EPOCH_NS as f64);
+    let is_list = is_list(cloud) || !profile.is_organised();
+    let [height, width] = if is_list { [1, cloud.returns()] } else { [cloud.rows, cloud.columns] };
+    let points = if is_list { returns(cloud).collect() } else { pixels(cloud) };
+    let (step, fields) = fields(profile, cloud);
+    let size = points.len().checked_mul(step).filter(|size| u32::try_from(*size).is_ok());
+    let size = size.ok_or_else(|| io::Error::other("a message holds 4 GiB of points at most"))?;
+    let mut body = Vec::with_capacity(size);
+    for point in points {
+        let begin = body.len();
+        for field in &fields {
+            body.resize(begin + field.offset, 0);
+            source.value(field.quantity, point).append_to(&mut body);
+        }
+        body.resize(begin + step, 0);
+    }
+    let mut message = Encoder::new();
+    write_stamp(&mut message, stamp, SENSOR_FRAME);
+    message.u4(height as u32);
+    message.u4(width as u32);
+    message.u4(fields.len() as u32);
+    for field in &fields {
+        message.text(field.name);
+        message.u4(field.offset as u32);
+        message.u1(field.quantity.kind().ros().unwrap_or(0));
+        message.u4(1);
+    }
+    message.u1(0);
+    message.u4(step as u32);
+    message.u4((step * width) as u32);
+    message.bytes(&body);
+    message.u1(u8::from(is_list || cloud.returns() == cloud.rows * cloud.columns));
+    Ok(message.done())
+}
+
+/// A `std_msgs/Header`.
+pub(super) fn write_stamp(message: &mut Encoder, stamp_ns: u64, frame: &str) {
+    message.u4((stamp_ns / 1_000_000_000) as u32);
+    message.u4((stamp_ns % 1_000_000_000) as u32);
+    message.text(frame);
+}
+
+/// A field as a message has it.
+struct Stored<'a> {
+    name: &'a str,
+    offset: usize,
+    kind: Kind,
+}
+
+/// The cloud of a message: of ours, or of a driver whose fields we know.
+pub(super) fn decode(message: &[u8], about: &About) -> Result<PointCloud, String> {
+    let mut message = Decoder::new(message)?;
+    let seconds = message.u4()?;
+    let stamp_ns = f64::from(seconds) * 1e9 + f64::from(message.u4()?);
+    message.text()?;
+    let (height, width) = (message.u4()? as usize, message.u4()? as usize);
+    let mut fields = Vec::new();
+    for _ in 0..message.u4()? {
+        let (name, offset) = (message.text()?, message.u4()? as usize);
+        let (kind, count) = (message.u1()?, message.u4()?);
+        let kind = Kind::from_ros(kind).filter(|_| count <= 1);
+        fields.extend(kind.map(|kind| Stored { name, offset, kind }));
+    }
+    if message.u1()? != 0 {
+        return Err("its points are big endian; little-endian ones are read".to_owned());
+    }
+    let stride = message.u4()? as usize;
+    if stride == 0 {
+        return Err("its points have no bytes".to_owned());
+    }
+    message.u4()?;
+    let body = message.bytes()?;
+    let (layout, time_from_ns) = layout((&fields, stride), stamp_ns);
+    let mut cloud = if height == 1 {
+        // What is known of the image is of use with rows and columns alone.
+        let list = about.list.filter(|_| layout.has(Attribute::Column));
+        let (scan, viewpoint) = (about.scan, about.viewpoint);
+        let about = About { scan, viewpoint, list, ..About::default() };
+        table::list(&about, &layout, (body, width))?
+    } else {
+        let cloud = table::image(about, &layout, (body, [height, width]))?;
+        PointCloud { pick: about.list.map_or(cloud.pick, |list| list.pick), ..cloud }
+    };
+    if time_from_ns != 0.0 {
+        let times = cloud.time_ns.iter_mut().chain(&mut cloud.fired_ns);
+        times.for_each(|time| *time += time_from_ns);
+    }
+    Ok(cloud)
+}
+
+/// Where our attributes are, and what is to be added to their times, ns.
+fn layout((fields, stride): (&[Stored], usize), stamp_ns: f64) -> (Layout, f64) {
+    let has = |name: &str| fields.iter().any(|field| field.name == name);
+    let white = match () {
+        () if has("time_ns") => 1.0,
+        () if has("tag") => 150.0,
+        () => 100.0,
+    };
+    let epoch_ns = EPOCH_NS as f64;
+    let mut layout = Layout::default();
+    layout.stride = stride;
+    let mut time_from_ns = 0.0;
+    for &Stored { name, offset, kind } in fields {
+        let known = match (name, kind) {
+            ("intensity", _) => Some((Attribute::Intensity, 1.0 / white)),
+            ("range", Kind::U4) => Some((Attribute::Range, 1e-3)),
+            ("distance", Kind::F4) => Some((Attribute::Range, 1.0)),
+            ("line", Kind::U1) | ("channel", Kind::U2) => Some((Attribute::Ring, 1.0)),
+            ("time", Kind::F4) => Some((Attribute::TimeNs, 1e9)),
+            ("t" | "time_stamp", Kind::U4) => Some((Attribute::TimeNs, 1.0)),
+            ("timestamp", Kind::F8) if has("tag") => Some((Attribute::TimeNs, 1.0)),
+            _ => Attribute::named(name).map(|attribute| (attribute, 1.0)),
+        };
+        match name {
+            "time" | "t" | "time_stamp" => time_from_ns = stamp_ns - epoch_ns,
+            "timestamp" if has("tag") => time_from_ns = -epoch_ns,
+            _ => {}
+        }
+        layout.place(known, kind, offset);
+    }
+    (layout, time_from_ns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::sample_cloud;
+    use super::*;
+    use crate::points::Truth;
+
+    fn read(profile: Profile, cloud: &PointCloud) -> PointCloud {
+        decode(&encode(profile, cloud).unwrap(), &About::default()).unwrap()
+    }
+
+    #[test]
+    fn the_extended_profile_keeps_every_pixel() {
+        let cloud = sample_cloud();
+        let read = read(Profile::Extended, &cloud);
+        assert_eq!((read.rows, read.columns), (2, 3));
+        assert_eq!((&read.range, &read.time_ns), (&cloud.range, &cloud.time_ns));
+        assert_eq!((&read.intensity, &read.fired_ns), (&cloud.intensity, &cloud.fired_ns));
+        assert_eq!(read.truth.pixels.outcome, cloud.truth.pixels.outcome);
+    }
+
+    #[test]
+    fn a_driver_s_fields_come_back_in_our_units() {
+        let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
+        for profile in [Profile::Velodyne, Profile::Ouster, Profile::Livox, Profile::Autoware] {
+            let read = read(profile, &cloud);
+            assert_eq!((&read.x, &read.row), (&cloud.x, &cloud.row), "{profile:?}");
+            for at in 0..5 {
+                let off = |read: f32, written: f32| (read - written).abs();
+                assert!(off(read.intensity[at], cloud.intensity[at]) <= 0.005, "{profile:?}");
+                assert!(off(read.range[at], cloud.range[at]) <= 0.1, "{profile:?}");
+                assert!((read.time_ns[at] - cloud.time_ns[at]).abs() <= 0.5, "{profile:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_message_that_lies_is_refused() {
+        let whole = encode(Profile::Extended, &sample_cloud()).unwrap();
+        // The last byte says only whether there is a return everywhere.
+        for length in 0..whole.len() - 1 {
+            assert!(decode(&whole[..length], &About::default()).is_err(), "{length}");
+        }
+    }
+}

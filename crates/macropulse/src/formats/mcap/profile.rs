@@ -1,0 +1,329 @@
+//! The fields of `PointCloud2` that programs for known sensors expect.
+
+use super::super::attributes::{Attribute, Point, Value};
+use super::super::holding::Holding;
+use super::super::number::Kind;
+use super::Profile;
+use crate::points::{Image, Pick, PointCloud};
+
+/// A field of a point.
+pub(super) struct Field {
+    pub name: &'static str,
+    pub offset: usize,
+    pub quantity: Quantity,
+}
+
+/// What a field holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quantity {
+    /// An attribute as it is.
+    Of(Attribute),
+    /// Apparent reflectance in percent, as a float.
+    Percent,
+    /// The same, whole, 255 at most, in one byte or two.
+    PercentU1,
+    PercentU2,
+    /// Apparent reflectance, white 150.
+    Livox150,
+    /// Time since the stamp, s.
+    SecondsF4,
+    /// Time since the stamp, whole ns.
+    NanosU4,
+    /// Time since the epoch of the file, ns.
+    NanosF8,
+    /// Range, whole mm.
+    MillimetresU4,
+    /// The row, 255 at most.
+    LineU1,
+    /// Bits 5 and 4 are the number of the return, from 0.
+    LivoxTag,
+    /// Autoware's number for the kind of return.
+    ReturnType,
+    /// atan2(y, x), rad.
+    Azimuth,
+    /// Angle above the x-y plane, rad.
+    Elevation,
+    /// Nothing that is simulated: 0.
+    ZeroU2,
+}
+
+/// Name, offset and content of a field.
+type Row = (&'static str, usize, Quantity);
+
+const X: Row = ("x", 0, Quantity::Of(Attribute::X));
+const Y: Row = ("y", 4, Quantity::Of(Attribute::Y));
+const Z: Row = ("z", 8, Quantity::Of(Attribute::Z));
+
+const VELODYNE: &[Row] = &[
+    X,
+    Y,
+    Z,
+    ("intensity", 12, Quantity::Percent),
+    ("ring", 16, Quantity::Of(Attribute::Ring)),
+    ("time", 18, Quantity::SecondsF4),
+];
+
+const OUSTER: &[Row] = &[
+    X,
+    Y,
+    Z,
+    ("intensity", 16, Quantity::Percent),
+    ("t", 20, Quantity::NanosU4),
+    ("reflectivity", 24, Quantity::PercentU2),
+    ("ring", 26, Quantity::Of(Attribute::Ring)),
+    ("ambient", 28, Quantity::ZeroU2),
+    ("range", 32, Quantity::MillimetresU4),
+];
+
+const LIVOX: &[Row] = &[
+    X,
+    Y,
+    Z,
+    ("intensity", 12, Quantity::Livox150),
+    ("tag", 16, Quantity::LivoxTag),
+    ("line", 17, Quantity::LineU1),
+    ("timestamp", 18, Quantity::NanosF8),
+];
+
+const AUTOWARE: &[Row] = &[
+    X,
+    Y,
+    Z,
+    ("intensity", 12, Quantity::PercentU1),
+    ("return_type", 13, Quantity::ReturnType),
+    ("channel", 14, Quantity::Of(Attribute::Ring)),
+    ("azimuth", 16, Quantity::Azimuth),
+    ("elevation", 20, Quantity::Elevation),
+    ("distance", 24, Quantity::Of(Attribute::Range)),
+    ("time_stamp", 28, Quantity::NanosU4),
+];
+
+/// Bytes of a point, and its fields; of the extended profile those that the cloud has.
+pub(super) fn fields(profile: Profile, cloud: &PointCloud) -> (usize, Vec<Field>) {
+    let (step, rows) = match profile {
+        Profile::Velodyne => (22, VELODYNE),
+        Profile::Ouster => (48, OUSTER),
+        Profile::Livox => (26, LIVOX),
+        Profile::Autoware => (32, AUTOWARE),
+        Profile::Extended => {
+            let mut step = 0;
+            let place = |attribute: &Attribute| {
+                let offset = step;
+                step += attribute.blank().kind().size();
+                Field { name: attribute.name(), offset, quantity: Quantity::Of(*attribute) }
+            };
+            let fields = Attribute::of(cloud).iter().map(place).collect();
+            return (step, fields);
+        }
+    };
+    let field = |&(name, offset, quantity): &Row| Field { name, offset, quantity };
+    (step, rows.iter().map(field).collect())
+}
+
+/// How a profile holds an attribute: as it is, in words how else, or not at all.
+pub(in super::super) fn holding(profile: Profile, attribute: Attribute) -> Holding {
+    let rows = match profile {
+        Profile::Extended => return Holding::Whole,
+        Profile::Velodyne => VELODYNE,
+        Profile::Ouster => OUSTER,
+        Profile::Livox => LIVOX,
+        Profile::Autoware => AUTOWARE,
+    };
+    // The ring is the row.
+    let asked = if attribute == Attribute::Row { Attribute::Ring } else { attribute };
+    let found = rows.iter().find_map(|(_, _, quantity)| {
+        let (held, how) = quantity.holds()?;
+        (held == asked).then_some(how)
+    });
+    found.unwrap_or(Holding::Not)
+}
+
+impl Profile {
+    /// Whether its driver gives images, with a point for each pixel.
+    pub(in super::super) fn is_organised(self) -> bool {
+        !matches!(self, Self::Livox | Self::Autoware)
+    }
+}
+
+impl Quantity {
+    /// The kind of its numbers.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Of(attribute) => attribute.blank().kind(),
+            Self::PercentU1 | Self::LineU1 | Self::LivoxTag | Self::ReturnType => Kind::U1,
+            Self::PercentU2 | Self::ZeroU2 => Kind::U2,
+            Self::NanosU4 | Self::MillimetresU4 => Kind::U4,
+            Self::Percent | Self::Livox150 | Self::SecondsF4 => Kind::F4,
+            Self::Azimuth | Self::Elevation => Kind::F4,
+            Self::NanosF8 => Kind::F8,
+        }
+    }
+
+    /// The attribute it tells, and how.
+    fn holds(self) -> Option<(Attribute, Holding)> {
+        use Holding::{Partly, Whole};
+        Some(match self {
+            Self::Of(attribute) => (attribute, Whole),
+            Self::Percent => (Attribute::Intensity, Partly("in percent")),
+            Self::PercentU1 => (Attribute::Intensity, Partly("whole percent, 255 at most")),
+            Self::Livox150 => (Attribute::Intensity, Partly("white is 150, 255 at most")),
+            Self::SecondsF4 => (Attribute::TimeNs, Partly("s from the stamp, float")),
+            Self::NanosU4 => (Attribute::TimeNs, Partly("whole ns from the stamp")),
+            Self::NanosF8 => (Attribute::TimeNs, Partly("ns from the epoch")),
+            Self::MillimetresU4 => (Attribute::Range, Partly("whole mm")),
+            Self::LineU1 => (Attribute::Ring, Partly("255 at most")),
+            Self::LivoxTag => (Attribute::ReturnNumber, Partly("up to 4")),
+            Self::PercentU2 | Self::ReturnType => return None,
+            Self::Azimuth | Self::Elevation | Self::ZeroU2 => return None,
+        })
+    }
+}
+
+/// The numbers of a scan's points as a profile has them.
+pub(super) struct Source<'a> {
+    cloud: &'a PointCloud,
+    stamp_ns: f64,
+    /// The strongest return of each pixel, where a shot may have several.
+    strongest: Option<Image>,
+}
+
+impl<'a> Source<'a> {
+    /// The points of a scan whose time is `stamp_ns` from the beginning of the first one.
+    pub fn new(cloud: &'a PointCloud, stamp_ns: f64) -> Self {
+        let several = cloud.returns_per_shot > 1;
+        Self { cloud, stamp_ns, strongest: several.then(|| cloud.image(Pick::Strongest)) }
+    }
+
+    /// A quantity of a point; coordinates, intensity and range of one without a return are NaN.
+    pub fn value(&self, quantity: Quantity, point: Point) -> Value {
+        let number = |attribute: Attribute| attribute.value(self.cloud, point).number();
+        let whole = |value: f64, most: f64| value.round().clamp(0.0, most);
+        let percent = || number(Attribute::Intensity) * 100.0;
+        let since = || (number(Attribute::TimeNs) - self.stamp_ns).max(0.0);
+        match quantity {
+            Quantity::Of(attribute) => attribute.value(self.cloud, point),
+            Quantity::Percent => Value::F4(percent() as f32),
+            Quantity::PercentU1 => Value::U1(whole(percent(), 255.0) as u8),
+            Quantity::PercentU2 => Value::U2(whole(percent(), 255.0) as u16),
+            Quantity::Livox150 => {
+                Value::F4((number(Attribute::Intensity) * 150.0).clamp(0.0, 255.0) as f32)
+            }
+            Quantity::SecondsF4 => Value::F4((since() * 1e-9) as f32),
+            Quantity::NanosU4 => Value::U4(whole(since(), f64::from(u32::MAX)) as u32),
+            Quantity::NanosF8 => Value::F8(number(Attribute::TimeNs) + super::EPOCH_NS as f64),
+            Quantity::MillimetresU4 => {
+                let millimetres = number(Attribute::Range) * 1e3;
+                Value::U4(whole(millimetres, f64::from(u32::MAX)) as u32)
+            }
+            Quantity::LineU1 => Value::U1(whole(number(Attribute::Ring), 255.0) as u8),
+            Quantity::LivoxTag => {
+                let before = (number(Attribute::ReturnNumber) - 1.0).clamp(0.0, 3.0);
+                Value::U1((before as u8) << 4)
+            }
+            Quantity::ReturnType => Value::U1(self.return_type(point)),
+            Quantity::Azimuth => {
+                Value::F4(libm::atan2(number(Attribute::Y), number(Attribute::X)) as f32)
+            }
+            Quantity::Elevation => {
+                let level = libm::hypot(number(Attribute::X), number(Attribute::Y));
+                Value::F4(libm::atan2(number(Attribute::Z), level) as f32)
+            }
+            Quantity::ZeroU2 => Value::U2(0),
+        }
+    }
+
+    /// Autoware's number: 0 invalid, 1 single, 3 to 6 first or last of several and the strongest of
+    /// them or not, 7 the only one of a shot that might have had several.
+    fn return_type(&self, point: Point) -> u8 {
+        let Point::Return(at) = point else { return 0 };
+        let Some(strongest) = &self.strongest else { return 1 };
+        let cloud = self.cloud;
+        let pixel = usize::from(cloud.row[at]) * cloud.columns + usize::from(cloud.column[at]);
+        let is_strongest = strongest.get(pixel) == Some(at);
+        match (cloud.number_of_returns[at], cloud.return_number[at], is_strongest) {
+            (0 | 1, _, _) => 7,
+            (_, 1, true) => 3,
+            (_, 1, false) => 5,
+            (_, _, true) => 4,
+            (_, _, false) => 6,
+        }
+    }
+}
+
+impl Kind {
+    /// Its number in a `PointField` of ROS.
+    pub(super) fn ros(self) -> Option<u8> {
+        let all = [Self::I1, Self::U1, Self::I2, Self::U2, Self::I4, Self::U4, Self::F4, Self::F8];
+        all.iter().position(|kind| *kind == self).map(|at| at as u8 + 1)
+    }
+
+    /// The kind with this number in a `PointField` of ROS.
+    pub(super) fn from_ros(number: u8) -> Option<Self> {
+        let all = [Self::I1, Self::U1, Self::I2, Self::U2, Self::I4, Self::U4, Self::F4, Self::F8];
+        all.get(usize::from(number).checked_sub(1)?).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::sample_cloud;
+    use super::*;
+
+    #[test]
+    fn fields_neither_overlap_nor_reach_beyond_the_point() {
+        let cloud = sample_cloud();
+        let source = Source::new(&cloud, 0.0);
+        for profile in [
+            Profile::Extended,
+            Profile::Velodyne,
+            Profile::Ouster,
+            Profile::Livox,
+            Profile::Autoware,
+        ] {
+            let (step, fields) = fields(profile, &cloud);
+            let mut end = 0;
+            for field in fields {
+                assert!(field.offset >= end, "{profile:?} {}", field.name);
+                let kind = field.quantity.kind();
+                assert_eq!(source.value(field.quantity, Point::Return(0)).kind(), kind);
+                end = field.offset + kind.size();
+            }
+            assert!(end <= step, "{profile:?}");
+        }
+    }
+
+    #[test]
+    fn quantities_are_in_the_units_that_are_expected() {
+        let cloud = sample_cloud();
+        let source = Source::new(&cloud, 40.0);
+        let value = |quantity| source.value(quantity, Point::Return(1));
+        assert_eq!(value(Quantity::PercentU1), Value::U1(10));
+        assert_eq!(value(Quantity::MillimetresU4), Value::U4(30_500));
+        assert_eq!(value(Quantity::NanosU4), Value::U4(1));
+        assert_eq!(value(Quantity::NanosF8), Value::F8(1_000_000_040.946_5));
+        assert_eq!(value(Quantity::ReturnType), Value::U1(1));
+        let Value::F4(elevation) = value(Quantity::Elevation) else { panic!() };
+        assert!((elevation - (0.5_f32 / 30.5).atan()).abs() < 1e-7);
+        assert_eq!(source.value(Quantity::PercentU1, Point::Unanswered(2)), Value::U1(0));
+    }
+
+    #[test]
+    fn returns_of_a_shot_are_told_apart() {
+        let mut cloud = sample_cloud();
+        cloud.returns_per_shot = 2;
+        (cloud.row[1], cloud.column[1]) = (0, 0);
+        (cloud.number_of_returns[0], cloud.number_of_returns[1]) = (2, 2);
+        cloud.return_number[1] = 2;
+        let source = Source::new(&cloud, 0.0);
+        let value = |quantity, at| source.value(quantity, Point::Return(at));
+        let kinds = [0, 1, 2].map(|at| value(Quantity::ReturnType, at));
+        assert_eq!(kinds, [Value::U1(3), Value::U1(6), Value::U1(7)]);
+        assert_eq!(value(Quantity::LivoxTag, 1), Value::U1(0x10));
+    }
+
+    #[test]
+    fn kinds_have_the_numbers_of_ros() {
+        assert_eq!((Kind::U2.ros(), Kind::F4.ros(), Kind::U8.ros()), (Some(4), Some(7), None));
+        assert_eq!((Kind::from_ros(8), Kind::from_ros(0)), (Some(Kind::F8), None));
+    }
+}

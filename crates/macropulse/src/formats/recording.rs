@@ -1,0 +1,73 @@
+//! The files of a run, written scan by scan.
+
+use super::mcap::Recording as Messages;
+use super::{Error, Format, Names, attributes, write_cloud};
+use crate::points::PointCloud;
+use std::path::{Path, PathBuf};
+
+/// The files of a run in one folder: those with a scan each, which appear as a whole, and those with
+/// all scans, which fill up.
+pub struct Recording {
+    folder: PathBuf,
+    formats: Vec<Format>,
+    open: Vec<(Format, Messages)>,
+}
+
+impl Recording {
+    /// A run that is to be written to `folder` in `formats`. Nothing is written yet.
+    pub fn new(folder: &Path, formats: &[Format]) -> Self {
+        Self { folder: folder.to_owned(), formats: formats.to_vec(), open: Vec::new() }
+    }
+
+    /// Writes a scan in all formats, and gives the formats and names of the files that are new.
+    ///
+    /// # Errors
+    /// As [`write_cloud`]; files written before stay.
+    pub fn add(
+        &mut self,
+        cloud: &PointCloud,
+        names: &Names,
+    ) -> Result<Vec<(Format, String)>, Error> {
+        self.add_as(cloud, names, |format| format.file_name(cloud.scan))
+    }
+
+    /// As [`Recording::add`], with another name for the file of a format. Where all scans of a run go
+    /// into one file, the first name counts.
+    ///
+    /// # Errors
+    /// As [`write_cloud`]; files written before stay.
+    pub fn add_as(
+        &mut self,
+        cloud: &PointCloud,
+        names: &Names,
+        name: impl Fn(Format) -> String,
+    ) -> Result<Vec<(Format, String)>, Error> {
+        attributes::check_even(cloud)?;
+        let mut files = Vec::new();
+        for &format in &self.formats {
+            let file = name(format);
+            let path = self.folder.join(&file);
+            let Format::Mcap(message) = format else {
+                write_cloud(format, cloud, names, &path)?;
+                files.push((format, file));
+                continue;
+            };
+            let at = self.open.iter().position(|(open, _)| *open == format);
+            let at = at.unwrap_or(self.open.len());
+            if at == self.open.len() {
+                self.open.push((format, Messages::begin(message, &path)?));
+                files.push((format, file));
+            }
+            self.open[at].1.add(cloud, names)?;
+        }
+        Ok(files)
+    }
+
+    /// Finishes the files that hold all scans.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; the scans are readable then, too.
+    pub fn finish(self) -> Result<(), Error> {
+        self.open.into_iter().try_for_each(|(_, messages)| messages.finish())
+    }
+}
