@@ -10,7 +10,7 @@ use macropulse::emit::scan_begins_fs;
 use macropulse::formats::{
     self, Begun, Entries, Format, Manifest, Named, Names, write_atomically, write_cloud,
 };
-use macropulse::points::{Outcome, PointCloud};
+use macropulse::points::{Outcome, PointCloud, Truth};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::Tally;
@@ -41,7 +41,11 @@ pub fn write_scan(
 ) -> Result<Vec<String>, Error> {
     let objects: Vec<String> = scene.objects.iter().map(|object| object.name.clone()).collect();
     let materials: Vec<String> = scene.materials.iter().map(|m| m.name.clone()).collect();
-    let names = Names { objects: &objects, materials: &materials };
+    // Names of what the files do not tell say nothing.
+    let names = match cloud.truth == Truth::default() {
+        true => Names::default(),
+        false => Names { objects: &objects, materials: &materials },
+    };
     write_decoded(folder, formats, cloud, (design, &names))
 }
 

@@ -9,7 +9,7 @@ use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::Band;
 use macropulse::formats::{Names, write_csv_lines};
-use macropulse::points::{Piece, PointCloud, Viewpoint};
+use macropulse::points::{Piece, PointCloud, Truth, Viewpoint};
 use macropulse_study::record;
 use rayon::prelude::*;
 use serde_json::Value;
@@ -199,7 +199,9 @@ impl<'a> Run<'a> {
         }
         let frame =
             PointCloud { viewpoint: self.viewpoint, ..PointCloud::empty(self.design, self.number) };
-        let cloud = PointCloud::joined(&frame, &pieces);
+        let mut cloud = PointCloud::joined(&frame, &pieces);
+        // Nothing is known of a scene.
+        cloud.truth = Truth::default();
         let names = Names::default();
         let files = interrupt.undisturbed(|| {
             folder.make_once()?;
