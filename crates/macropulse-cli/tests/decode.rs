@@ -143,17 +143,25 @@ fn ticks_on_stdin_become_lines_on_stdout_as_they_come() {
         .unwrap();
     let mut stdin = program.stdin.take().unwrap();
     let mut out = BufReader::new(program.stdout.take().unwrap());
-    stdin.write_all(&ticks[..ticks.len() * 9 / 10]).unwrap();
-    stdin.flush().unwrap();
+    let (begun, rest_of_ticks) = ticks.split_at(ticks.len() * 9 / 10);
+    let (begun, rest_of_ticks) = (begun.to_vec(), rest_of_ticks.to_vec());
+    let (go_on, is_told) = std::sync::mpsc::channel();
+    // Whoever writes waits for the program, which waits for whoever reads.
+    let writer = std::thread::spawn(move || {
+        stdin.write_all(&begun).unwrap();
+        stdin.flush().unwrap();
+        is_told.recv().unwrap();
+        stdin.write_all(&rest_of_ticks).unwrap();
+    });
     let mut first = String::new();
     for _ in 0..100 {
         out.read_line(&mut first).unwrap();
     }
     assert!(was.starts_with(&first) && first.lines().count() == 100);
-    stdin.write_all(&ticks[ticks.len() * 9 / 10..]).unwrap();
-    drop(stdin);
+    go_on.send(()).unwrap();
     let mut rest = String::new();
     out.read_to_string(&mut rest).unwrap();
+    writer.join().unwrap();
     assert!(program.wait().unwrap().success());
     assert!(was == format!("{first}{rest}"));
 }
@@ -186,7 +194,7 @@ fn what_is_wrong_with_a_file_is_one_sentence_with_its_place() {
         ("out/empty", good.1, &["out/empty: ", "is empty"]),
         (good.0, "out/order.csv", &["order.csv: line 502: ", "sort them"]),
         (good.0, "out/version.csv", &["version.csv: line 1: version `7`", "reads 1"]),
-        (good.0, "out/length.csv", &["line 1: ticks of 5000 fs", "2500 fs"]),
+        (good.0, "out/length.csv", &["length.csv: line ", "ticks of 5000 fs", "2500 fs"]),
         ("out/far.mps", good.1, &["far.mps: byte 128: shot 0: column 848 is not among the 848"]),
         (good.1, good.0, &["these are ticks, where shots are wanted"]),
         (good.0, "out/nothing", &["out/nothing: cannot be read: there is no such file"]),

@@ -250,7 +250,7 @@ fn receiver(kind: ReceiverKind) -> Receiver {
 /// Echoes of `shots` after 700 ticks and a bit more from shot to shot, and some noise.
 fn echoes(shots: &[Shot], noise: u32) -> Vec<Tick> {
     let book = codebook();
-    let mut ticks: Vec<i64> = (0..i64::from(noise)).map(|n| n * n * 7919 % 60_000).collect();
+    let mut ticks: Vec<i64> = (0..i64::from(noise)).map(|n| n * 7919 % 60_000).collect();
     for (at, shot) in shots.iter().enumerate() {
         let begins = shot.fired_fs.div_euclid(TICK_FS) + 700 + at as i64 % 9;
         ticks.extend(book.marks(shot.label, shot.word).iter().map(|m| begins + i64::from(*m)));

@@ -9,7 +9,7 @@ use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::Band;
 use macropulse::formats::write_csv_lines;
-use macropulse::points::{Piece, PointCloud, Viewpoint};
+use macropulse::points::{Piece, PointCloud, Truth, Viewpoint};
 use macropulse_study::record;
 use rayon::prelude::*;
 use serde_json::Value;
@@ -210,7 +210,9 @@ impl<'a> Run<'a> {
         }
         let frame =
             PointCloud { viewpoint: self.viewpoint, ..PointCloud::empty(self.design, self.number) };
-        let cloud = PointCloud::joined(&frame, &pieces);
+        let mut cloud = PointCloud::joined(&frame, &pieces);
+        // Nothing is known of a scene.
+        cloud.truth = Truth::default();
         let stage = (self.design, None);
         let recorded = || record::Files::new(folder.path(), &formats.0, stage);
         let recorded = self.recorded.get_or_insert_with(recorded);

@@ -152,7 +152,7 @@ impl Explained<'_> {
             });
             columns.push(name, text);
         }
-        columns.push_list("others", self.listed_others().into_iter());
+        columns.push_list("others", self.listed_others());
         let (row, column) = self.pixel;
         format!("row {row}, column {column}, shot {}\n\n{}", self.id, columns.text())
     }

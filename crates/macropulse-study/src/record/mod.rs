@@ -14,7 +14,7 @@ use macropulse::formats::{
     self, Begun, Entries, Format, Manifest, Named, Names, Recording, Surroundings, write_atomically,
 };
 use macropulse::names::toml_value;
-use macropulse::points::{Outcome, PointCloud};
+use macropulse::points::{Outcome, PointCloud, Truth};
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::Tally;
@@ -67,7 +67,11 @@ impl<'a> Files<'a> {
     /// # Errors
     /// If a file cannot be written; files written before it stay.
     pub fn add(&mut self, cloud: &PointCloud) -> Result<Vec<String>, Error> {
-        let names = Names { objects: &self.objects, materials: &self.materials };
+        // Names of what the files do not tell say nothing.
+        let names = match cloud.truth == Truth::default() {
+            true => Names::default(),
+            false => Names { objects: &self.objects, materials: &self.materials },
+        };
         let mut files = Vec::new();
         for (format, file) in self.recording.add(cloud, &names)? {
             files.push(file);
