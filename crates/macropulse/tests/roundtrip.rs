@@ -170,6 +170,22 @@ fn as_list(cloud: &PointCloud) -> PointCloud {
     PointCloud { fired_ns: image.iter().map(fired).collect(), ..cloud.clone() }
 }
 
+/// Gives objects and materials the numbers they were written with: a CSV has names, which are numbered
+/// in the order in which they come.
+fn renumber(cloud: &mut PointCloud, found: Names) {
+    let [objects, materials] = names();
+    let truth = &mut cloud.truth.returns;
+    for (numbers, found, written) in [
+        (&mut truth.object, found.objects, objects),
+        (&mut truth.material, found.materials, materials),
+    ] {
+        for number in numbers {
+            let name = &found[usize::from(*number)];
+            *number = written.iter().position(|written| written == name).unwrap() as u16;
+        }
+    }
+}
+
 #[test]
 fn formats_that_hold_every_attribute_give_every_attribute_back() {
     for name in ["pcd", "ply", "e57", "npy", "csv", "mcap"] {
@@ -177,7 +193,11 @@ fn formats_that_hold_every_attribute_give_every_attribute_back() {
         for (most, with_truth) in [(1, true), (1, false), (3, true), (3, false)] {
             let written = cloud_of(most, with_truth);
             let (_folder, path) = write(format, &written);
-            let mut read = read_cloud(&path).unwrap();
+            let mut clouds = Clouds::open(&path).unwrap();
+            let mut read = clouds.next().unwrap().unwrap();
+            if name == "csv" {
+                renumber(&mut read, clouds.names());
+            }
             // E57 has seconds, of which a billionth is not always the same number.
             for (read, written) in read.time_ns.iter_mut().zip(&written.time_ns) {
                 assert!((*read - written).abs() <= 1e-12 * written.abs(), "{name}");

@@ -59,8 +59,12 @@ impl Format {
         attributes.map(|attribute| attribute.name()).chain(further.map(Further::name)).collect()
     }
 
-    /// Which attributes of the truth cannot be written in this format.
+    /// Which attributes of the truth cannot be written in this format of clouds; of an image of ranges
+    /// none is expected.
     pub fn leaves_out_of_truth(self) -> Vec<&'static str> {
+        if matches!(self, Self::Png | Self::RangeNpy) {
+            return Vec::new();
+        }
         let truth = Attribute::ALL.into_iter().filter(|attribute| attribute.is_true());
         let left_out = truth.filter(|attribute| self.holds(*attribute) == Holding::Not);
         left_out.map(Attribute::name).collect()
@@ -224,5 +228,6 @@ mod tests {
         assert!(!left_out(Format::Kitti, &cloud).contains(&"outcome"));
         assert!(left_out(Format::Pcd, &cloud).is_empty());
         assert!(Format::Pcd.leaves_out_of_truth().is_empty());
+        assert!(Format::Png.leaves_out_of_truth().is_empty());
     }
 }

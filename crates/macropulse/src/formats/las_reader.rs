@@ -23,6 +23,8 @@ struct Extra {
 /// The cloud of a LAS or LAZ file, and what it says beside it.
 pub(super) fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
     check_sizes(&bytes)?;
+    let header = Header::new(Cursor::new(&bytes)).map_err(|error| error.to_string())?;
+    check_layers(&bytes, &header)?;
     let mut reader = Reader::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let about = about(reader.header())?;
     let extra = extra(reader.header());
@@ -69,6 +71,52 @@ fn check_sizes(bytes: &[u8]) -> Result<(), String> {
     }
     if is_large {
         check_extended(bytes)?;
+    }
+    Ok(())
+}
+
+/// Refuses layers of compressed points that reach beyond the file: the library takes memory for each
+/// before it reads it.
+fn check_layers(bytes: &[u8], header: &Header) -> Result<(), String> {
+    let fault = || "its compressed points are damaged".to_owned();
+    let number = |at: u64, kind: Kind| {
+        let at = usize::try_from(at).ok()?;
+        bytes.get(at..).filter(|rest| rest.len() >= kind.size()).map(|rest| kind.read(rest) as u64)
+    };
+    let Ok(vlr) = header.laz_vlr() else { return Ok(()) };
+    let begin = number(96, Kind::U4).ok_or_else(fault)?;
+    let table = number(begin, Kind::U8).ok_or_else(fault)?;
+    // Where the file was written as a stream, the place of the table is at the end.
+    let end = bytes.len() as u64;
+    let table = if table > begin && table < end {
+        table
+    } else {
+        number(end.saturating_sub(8), Kind::U8).ok_or_else(fault)?
+    };
+    let chunks = number(table.saturating_add(4), Kind::U4).ok_or_else(fault)?;
+    if table <= begin || chunks > end {
+        return Err(fault());
+    }
+    let format = header.point_format();
+    if !format.is_extended {
+        return Ok(());
+    }
+    let colours = u64::from(format.has_color) + u64::from(format.has_nir);
+    let layers = 9 + colours + u64::from(format.extra_bytes) + u64::from(format.has_waveform);
+    let mut source = Cursor::new(bytes);
+    source.set_position(begin);
+    let table =
+        laz::laszip::ChunkTable::read_from(&mut source, &vlr).map_err(|why| why.to_string())?;
+    let mut at = begin + 8;
+    for chunk in 0..table.len() {
+        // The first point as it is, then how many there are, then the sizes of the layers.
+        let sizes = at + u64::from(format.len()) + 4;
+        let layers = (0..layers).map(|layer| number(sizes + 4 * layer, Kind::U4));
+        let size: u64 = layers.map(Option::unwrap_or_default).sum();
+        if size > end {
+            return Err(fault());
+        }
+        at = at.checked_add(table[chunk].byte_count).filter(|at| *at <= end).ok_or_else(fault)?;
     }
     Ok(())
 }

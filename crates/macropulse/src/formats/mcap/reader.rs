@@ -5,9 +5,9 @@ use super::super::about::About;
 use super::super::{Error, Format};
 use super::{ABOUT, METADATA, Message, Profile, point_cloud2, ros2};
 use crate::points::PointCloud;
-use ::mcap::records::Record;
+use ::mcap::McapError;
+use ::mcap::records::op;
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use ::mcap::{McapError, parse_record};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
@@ -21,6 +21,9 @@ const MOST_COMPRESSED: u64 = 256;
 
 /// Bytes of the longest message that is read.
 const LONGEST: u64 = 1 << 32;
+
+/// Bytes that are read at a time.
+const AT_A_TIME: usize = 1 << 20;
 
 /// The clouds of a file, in its order.
 pub(in super::super) struct Messages {
@@ -85,16 +88,14 @@ impl Messages {
             };
             match event {
                 LinearReadEvent::ReadRequest(need) => {
-                    let read = self.file.read(self.reader.insert(need));
+                    // A length in the file is not believed at once.
+                    let read = self.file.read(self.reader.insert(need.min(AT_A_TIME)));
                     let read = read.map_err(|cause| Error::read(&self.path, cause))?;
                     self.reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {
-                    let taken = parse_record(opcode, data)
-                        .map_err(|error| error.to_string())
-                        .and_then(|record| {
-                            take(&record, &mut self.schemas, &mut self.channels, &mut self.about)
-                        });
+                    let (schemas, channels) = (&mut self.schemas, &mut self.channels);
+                    let taken = take((opcode, data), schemas, channels, &mut self.about);
                     match taken {
                         Ok(None) => {}
                         Ok(Some(cloud)) => {
@@ -123,45 +124,89 @@ fn told(error: &McapError) -> String {
 
 /// Takes in a record; the cloud of a message that is one.
 fn take(
-    record: &Record,
+    (opcode, data): (u8, &[u8]),
     schemas: &mut BTreeMap<u16, String>,
     channels: &mut BTreeMap<u16, Content>,
     about: &mut About,
 ) -> Result<Option<PointCloud>, String> {
-    match record {
-        Record::Schema { header, .. } => {
-            schemas.insert(header.id, header.name.clone());
+    let mut fields = Fields(data);
+    match opcode {
+        op::SCHEMA => {
+            let number = fields.u2()?;
+            schemas.insert(number, fields.text()?.to_owned());
         }
-        Record::Channel(channel) => {
-            let schema = schemas.get(&channel.schema_id).map(String::as_str);
-            let is_cdr = channel.message_encoding == "cdr";
-            match (schema, channel.topic.as_str()) {
-                (Some(ros2::POINT_CLOUD2), _) if is_cdr => {
-                    channels.insert(channel.id, Content::Clouds);
+        op::CHANNEL => {
+            let number = fields.u2()?;
+            let schema = schemas.get(&fields.u2()?).map(String::as_str);
+            let (topic, encoding) = (fields.text()?, fields.text()?);
+            let content = match (schema, topic) {
+                (Some(ros2::POINT_CLOUD2), _) => Some(Content::Clouds),
+                (_, ros2::TF) => Some(Content::Transforms),
+                _ => None,
+            };
+            channels.extend(content.filter(|_| encoding == "cdr").map(|content| (number, content)));
+        }
+        op::METADATA if fields.text()? == METADATA => {
+            let mut entries = Fields(fields.bytes()?);
+            while !entries.0.is_empty() {
+                let (key, text) = (entries.text()?, entries.text()?);
+                let lines = text.lines().filter(|_| key == ABOUT);
+                lines.map(|line| about.take(line)).collect::<Result<(), _>>()?;
+            }
+        }
+        op::MESSAGE => {
+            let channel = fields.u2()?;
+            let sequence = fields.u4()?;
+            // When it was recorded, and when it was published.
+            fields.take(16)?;
+            match channels.get(&channel) {
+                Some(Content::Transforms) => {
+                    about.viewpoint = ros2::viewpoint(fields.0)?.unwrap_or(about.viewpoint);
                 }
-                (_, ros2::TF) if is_cdr => {
-                    channels.insert(channel.id, Content::Transforms);
+                Some(Content::Clouds) => {
+                    about.scan = sequence.into();
+                    return point_cloud2::decode(fields.0, about).map(Some);
                 }
-                _ => {}
+                None => {}
             }
         }
-        Record::Metadata(metadata) if metadata.name == METADATA => {
-            let text = metadata.metadata.get(ABOUT).map_or("", String::as_str);
-            text.lines().try_for_each(|line| about.take(line))?;
-        }
-        Record::Message { header, data } => match channels.get(&header.channel_id) {
-            Some(Content::Transforms) => {
-                about.viewpoint = ros2::viewpoint(data)?.unwrap_or(about.viewpoint);
-            }
-            Some(Content::Clouds) => {
-                about.scan = header.sequence.into();
-                return point_cloud2::decode(data, about).map(Some);
-            }
-            None => {}
-        },
         _ => {}
     }
     Ok(None)
+}
+
+/// What is left of a record. The parser of the library takes the memory that a length asks for before
+/// it looks whether the record is as long.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, size: usize) -> Result<&'a [u8], String> {
+        let split = self.0.split_at_checked(size);
+        let (taken, rest) = split.ok_or("a record ends within a field")?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        self.take(N)?.try_into().map_err(|_| "a record ends within a field".to_owned())
+    }
+
+    fn u2(&mut self) -> Result<u16, String> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    fn u4(&mut self) -> Result<u32, String> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn bytes(&mut self) -> Result<&'a [u8], String> {
+        let size = self.u4()? as usize;
+        self.take(size)
+    }
+
+    fn text(&mut self) -> Result<&'a str, String> {
+        std::str::from_utf8(self.bytes()?).map_err(|_| "a name in a record is not text".to_owned())
+    }
 }
 
 impl Iterator for Messages {
