@@ -111,7 +111,7 @@ mod tests {
         });
         let mut page = Explorer::new("t");
         describe(&mut page, &manifest);
-        let html = page.html().replace('\u{202f}', " ").replace('\u{a0}', " ");
+        let html = page.html().replace(['\u{202f}', '\u{a0}'], " ");
         for (what, value) in [
             ("sensor", "mine"),
             ("conditions", "visibility 23 km"),

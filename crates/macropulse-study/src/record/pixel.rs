@@ -34,8 +34,8 @@ fn of(told: &Value) -> Option<Section> {
     if let Some(chart) = arrivals(told) {
         section = section.figure(Figure::svg(
             &chart.svg(),
-            "The marks of the macropulse where the correlation is highest, and the ticks there; \
-             light is told by them alone, since nothing else reaches a receiver.",
+            "The marks of the macropulse where the correlation is highest, and the ticks there: of \
+             the light a receiver has nothing else.",
         ));
     }
     let counts = Counts::of(told)?;
