@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use macropulse::formats::{self, Format, Names, write_atomically};
 use macropulse::points::PointCloud;
-use macropulse_study::record::{PAGE, describe};
+use macropulse_study::record::{PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
 
@@ -106,6 +106,7 @@ fn of_folder(folder: &Path, output: &Path) -> Result<Explorer, Fault> {
     let files_of_the_page = files.iter().filter(|file| folder.join(file) != output);
     for file in files_of_the_page {
         page.file(&beside(output, &folder.join(file)));
+        explain(&mut page, &folder.join(file));
     }
     for file in clouds {
         page.cloud(file, &read(&folder.join(file))?, &Names::default());

@@ -17,6 +17,9 @@ const MOST_USERS: u32 = 64;
 /// Errors below are not drawn: the lifetime of the sensor has not so many bits.
 const LEAST_ERROR: f64 = 1e-20;
 
+/// Probability of a wrong bit among so many users.
+type Errors = fn(&MultipleAccess) -> f64;
+
 /// Writes the correlation matrix of each family, the errors of all of them, and a page of both with
 /// the `listing` that is printed.
 pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<(), Fault> {
@@ -32,7 +35,7 @@ pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<()
         matrices.push(Figure::png(png, &picture.title, &name));
         files.push(file);
     }
-    let limits: [(_, fn(&MultipleAccess) -> f64, _); 2] = [
+    let limits: [(&str, Errors, &str); 2] = [
         ("errors-soft.svg", bit_error_soft, "every mark counted"),
         ("errors-hard.svg", bit_error_hard, "one mark per chip"),
     ];
@@ -54,7 +57,7 @@ pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<()
     Ok(())
 }
 
-fn errors(compared: &[Comparison], error: fn(&MultipleAccess) -> f64, title: &str) -> Chart {
+fn errors(compared: &[Comparison], error: Errors, title: &str) -> Chart {
     let users = Axis::linear("users at once").limits(2.0, MOST_USERS.into());
     let mut chart = Chart::new(title, users, Axis::log(title).limits(LEAST_ERROR, 1.0));
     chart.size = [904.0, 460.0];

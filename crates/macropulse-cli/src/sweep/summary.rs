@@ -114,13 +114,4 @@ mod tests {
         let lines = [["key", "pd"], ["0.25", "1"]].map(|line| line.map(str::to_owned).to_vec());
         assert_eq!(aligned(&lines), "  key   pd\n  0.25  1\n");
     }
-
-    #[test]
-    fn what_is_not_known_is_not_made_up() {
-        let nan = f64::NAN;
-        let told = |value, low, high| estimate(&Estimate { value, low, high });
-        assert_eq!(told(0.5, 0.25, 0.75), "0.5 [0.25, 0.75]");
-        assert_eq!(told(0.5, nan, nan), "0.5");
-        assert_eq!(told(nan, nan, nan), "-");
-    }
 }

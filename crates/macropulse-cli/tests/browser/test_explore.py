@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import shutil
 import urllib.parse
 
 import numpy as np
@@ -302,6 +303,40 @@ def test_the_cloud_of_another_program_has_a_page(visit, tmp_path):
     place = np.array([number(told(page)[axis]) for axis in "xyz"])
     nearest = np.abs(points.astype("<f4").astype(float) - place).max(axis=1).min()
     assert nearest < 6e-5
+
+
+def test_a_pixel_that_is_explained_leads_to_its_ticks(visit, coarse, tmp_path):
+    folder = shutil.copytree(coarse, tmp_path / "explained")
+    told = {
+        "row": 13,
+        "column": 30,
+        "shot": 654,
+        "decided": "accepted",
+        "why": "Four of four marks.",
+        "marks_ticks": [0, 5, 9, 20],
+        "window_ticks": 1,
+        "ticks": [141, 146, 150, 161],
+        "is_of_others": [False] * 4,
+        "peak": {"lag_ticks": 141, "range_m": 47.9, "marks": 4},
+        "correlation": {"first_lag_ticks": 140, "step_ticks": 1, "marks": [0, 4, 1], "marks_without_others": [0, 4, 1]},
+    }
+    (folder / "explain-000000-13-30.json").write_text(json.dumps(told))
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["files"].append("explain-000000-13-30.json")
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    macropulse("view", folder)
+    page = opened(visit(folder / "index.html"))
+    click_pixel(page, (13, 29), (24, 48))
+    assert page.locator("#to-pixel").is_hidden()
+    click_pixel(page, (13, 30), (24, 48))
+    page.locator("#to-pixel").click()
+    section = page.locator("#pixel-13-30")
+    assert "Four of four marks." in section.inner_text()
+    section.locator("svg.mp").nth(1).focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    lines = page.locator(".at-pointer p").all_inner_texts()
+    assert lines == ["Lag, ticks: 141", "all ticks: 4", "without those of other shots: 4"]
 
 
 def test_an_empty_cloud_says_so(visit, tmp_path):

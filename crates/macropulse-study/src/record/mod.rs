@@ -1,6 +1,7 @@
 //! What a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
 
 mod page;
+mod pixel;
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::Tally;
 
-pub use page::{PAGE, Page, describe};
+pub use page::{PAGE, Page, describe, explain};
 
 /// How the names of range images in colour end.
 pub const COLOUR: &str = "-colour.png";

@@ -8,6 +8,7 @@ use macropulse::points::PointCloud;
 use macropulse::scene::Scene;
 use serde_json::Value;
 
+use super::pixel;
 use crate::text::grouped;
 use crate::view::Explorer;
 
@@ -48,8 +49,21 @@ impl Page {
         describe(&mut self.explorer, &serde_json::to_value(manifest).unwrap_or_default());
         self.explorer.file("manifest.json");
         let files = manifest.files.iter().filter(|file| *file != PAGE);
-        files.for_each(|file| self.explorer.file(file));
+        for file in files {
+            self.explorer.file(file);
+            explain(&mut self.explorer, &folder.join(file));
+        }
         write_atomically(&folder.join(PAGE), |out| out.write_all(self.explorer.html().as_bytes()))
+    }
+}
+
+/// Adds what was sent and received of a pixel, if the file at `path` explains one.
+pub fn explain(page: &mut Explorer, path: &Path) {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if pixel::is_explanation(&name)
+        && let Some(section) = pixel::section(path)
+    {
+        page.section(section);
     }
 }
 
@@ -97,7 +111,7 @@ mod tests {
         });
         let mut page = Explorer::new("t");
         describe(&mut page, &manifest);
-        let html = page.html().replace('\u{202f}', " ").replace('\u{a0}', " ");
+        let html = page.html().replace(['\u{202f}', '\u{a0}'], " ");
         for (what, value) in [
             ("sensor", "mine"),
             ("conditions", "visibility 23 km"),

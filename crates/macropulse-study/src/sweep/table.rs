@@ -215,6 +215,15 @@ mod tests {
     use super::*;
     use std::str::FromStr;
 
+    #[test]
+    fn what_is_not_known_is_not_made_up() {
+        let nan = f64::NAN;
+        let ends = [[0.5, 0.25, 0.75], [0.5, nan, nan], [nan; 3]];
+        let scores = ends.map(|[value, low, high]| Estimate { value, low, high }).to_vec();
+        let row = Row { values: vec!["7".into()], seeds: 1, pixels: 1, scores, empty: None };
+        assert_eq!(row.cells(), ["7", "0.5 [0.25, 0.75]", "0.5", "-"]);
+    }
+
     fn table() -> Table {
         let axes = ["detector.x=1e-3,2", "receiver.kind=matched,\"a,b\""];
         let score = |value: f64| Estimate { value, low: f64::NAN, high: 0.5 };

@@ -103,7 +103,7 @@ mod tests {
     fn every_colour_has_a_dark_side_by_system_and_by_choice() {
         let style = style();
         for (name, light, dark) in COLOURS {
-            assert_eq!(style.matches(&format!("--{name}:{light};")).count() >= 1, true, "{name}");
+            assert!(style.contains(&format!("--{name}:{light};")), "{name}");
             assert!(style.matches(&format!("--{name}:{dark};")).count() >= 2, "{name}");
         }
     }

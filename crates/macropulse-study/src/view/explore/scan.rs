@@ -37,8 +37,7 @@ impl Scan {
         let has_image = matches!(cloud.rows.checked_mul(cloud.columns), Some(1..=MOST_PIXELS));
         let attributes = attributes(cloud, has_image);
         let packed = attributes.into_par_iter().filter_map(|(kept, value)| {
-            let values: Vec<f64> =
-                (0..cloud.returns()).step_by(every).map(|at| value(at)).collect();
+            let values: Vec<f64> = (0..cloud.returns()).step_by(every).map(value).collect();
             Column::of(kept, &values)
         });
         let outcomes = &cloud.truth.pixels.outcome;
