@@ -157,19 +157,19 @@ const STUDY: Layers = Layers {
         Rule { module: "text", may_name: &[], because: "lines of text ask not what they say" },
         Rule { module: "view", may_name: &["text"], because: "pictures show columns, no physics" },
         Rule {
-            module: "budget",
-            may_name: &["text", "view"],
-            because: "a budget is a forecast: it needs no run and leaves no file",
-        },
-        Rule {
             module: "record",
             may_name: &["text", "view"],
             because: "a run leaves files and pictures",
         },
         Rule {
+            module: "budget",
+            may_name: &["record", "text", "view"],
+            because: "a budget is a forecast; it names sensor and environment as records do",
+        },
+        Rule {
             module: "sweep",
-            may_name: &["text", "view"],
-            because: "a sweep repeats whole scans and counts; how one is made is no affair of its",
+            may_name: &["record", "text", "view"],
+            because: "a sweep repeats whole scans, counts, and names them as records do",
         },
         Rule {
             module: "paper",
