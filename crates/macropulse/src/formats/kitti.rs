@@ -30,12 +30,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
         layout.push(attribute.name(), Kind::F4, 1)?;
     }
     let points = bytes.len() / layout.stride;
-    if bytes.len() % layout.stride != 0 {
+    if !bytes.len().is_multiple_of(layout.stride) {
         let length = bytes.len();
         return Err(format!("it has {length} bytes, and 16 to a point; the file was cut short"));
     }
     let about = About::default();
-    let cloud = table::list(&about, &layout, (bytes, points))?;
+    let cloud = table::list(&about, &layout, bytes, points)?;
     Ok((cloud, about))
 }
 

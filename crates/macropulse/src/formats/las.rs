@@ -51,7 +51,8 @@ pub(super) fn extra_name(attribute: Attribute) -> Option<&'static str> {
 
 /// Writes the returns of a cloud whose columns are even.
 pub(super) fn write(
-    (cloud, names): (&PointCloud, &Names),
+    cloud: &PointCloud,
+    names: &Names,
     compress: bool,
     out: &mut dyn Write,
 ) -> io::Result<()> {
@@ -60,7 +61,7 @@ pub(super) fn write(
         .copied()
         .filter(|attribute| extra_name(*attribute).is_some())
         .collect();
-    let header = builder((cloud, names), &extra, compress)?.into_header();
+    let header = builder(cloud, names, &extra, compress)?.into_header();
     let mut writer = Writer::new(Cursor::new(Vec::new()), header.map_err(io::Error::other)?)
         .map_err(io::Error::other)?;
     for (at, point) in returns(cloud).enumerate() {
@@ -72,7 +73,8 @@ pub(super) fn write(
 }
 
 fn builder(
-    (cloud, names): (&PointCloud, &Names),
+    cloud: &PointCloud,
+    names: &Names,
     extra: &[Attribute],
     compress: bool,
 ) -> io::Result<Builder> {
@@ -179,7 +181,7 @@ mod tests {
         let cloud = PointCloud { returns_per_shot: 1, ..sample_cloud() };
         let written = |compress| {
             let mut bytes = Vec::new();
-            write((&cloud, &Names::default()), compress, &mut bytes).unwrap();
+            write(&cloud, &Names::default(), compress, &mut bytes).unwrap();
             assert_eq!(&bytes[..4], b"LASF");
             bytes
         };

@@ -205,7 +205,7 @@ mod tests {
 
     fn written(compress: bool) -> Vec<u8> {
         let mut bytes = Vec::new();
-        las::write((&sample_cloud(), &Names::default()), compress, &mut bytes).unwrap();
+        las::write(&sample_cloud(), &Names::default(), compress, &mut bytes).unwrap();
         bytes
     }
 

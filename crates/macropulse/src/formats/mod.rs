@@ -66,19 +66,18 @@ pub fn write_cloud(
     path: &Path,
 ) -> Result<(), Error> {
     attributes::check_even(cloud)?;
-    let both = (cloud, names);
     write_atomically(path, |out| match format {
         Format::Pcd => pcd::write(cloud, names, out),
         Format::Ply => ply::write(cloud, names, out),
-        Format::Las => las::write(both, false, out),
-        Format::Laz => las::write(both, true, out),
+        Format::Las => las::write(cloud, names, false, out),
+        Format::Laz => las::write(cloud, names, true, out),
         Format::E57 => e57::write(cloud, names, out),
         Format::Npy => npy::write(cloud, out),
         Format::Csv => csv::write(cloud, names, out),
         Format::Kitti => kitti::write(cloud, out),
         #[cfg(feature = "parquet")]
         Format::Parquet => parquet::write(cloud, names, out),
-        Format::Mcap(message) => mcap::write(message, both, out),
+        Format::Mcap(message) => mcap::write(message, cloud, names, out),
         Format::Png => png16::write(cloud, out),
         Format::RangeNpy => npy::write_range(cloud, out),
     })

@@ -75,7 +75,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let header = std::str::from_utf8(header).map_err(|_| "its header is not text")?;
     let points = shape(header).ok_or("its shape is not that of one list of points")?;
     let about = About::default();
-    let cloud = table::list(&about, &layout(header)?, (body, points))?;
+    let cloud = table::list(&about, &layout(header)?, body, points)?;
     Ok((cloud, about))
 }
 

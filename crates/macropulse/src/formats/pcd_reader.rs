@@ -38,8 +38,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let layout = layout(&header)?;
     let is_list = header.about.list.is_some() || rows == 1 && !layout.has(Attribute::Column);
     let cloud = match is_list {
-        true => table::list(&header.about, &layout, (body, points)),
-        false => table::image(&header.about, &layout, (body, [rows, columns])),
+        true => table::list(&header.about, &layout, body, points),
+        false => table::image(&header.about, &layout, body, [rows, columns]),
     };
     Ok((cloud?, header.about))
 }

@@ -31,7 +31,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let (header, body) = parse_header(bytes)?;
     let points = header.points.ok_or("it has no element `vertex`")?;
     let cloud = match header.stored {
-        Some(Stored::Binary) => table::list(&header.about, &header.layout, (body, points)),
+        Some(Stored::Binary) => table::list(&header.about, &header.layout, body, points),
         Some(Stored::Text) => text(&header, body, points),
         None => Err("its header has no line `format`".to_owned()),
     };

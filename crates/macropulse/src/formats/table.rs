@@ -96,9 +96,10 @@ pub(super) fn check_coordinates(attributes: &[Attribute]) -> Result<(), String> 
 pub(super) fn list(
     about: &About,
     layout: &Layout,
-    (body, points): (&[u8], usize),
+    body: &[u8],
+    points: usize,
 ) -> Result<PointCloud, String> {
-    let body = records(layout, (body, points))?;
+    let body = records(layout, body, points)?;
     let mut gathered = Gathered::new(about, &layout.attributes())?;
     for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
         gathered.add(layout.record(bytes, at)?);
@@ -114,10 +115,11 @@ pub(super) fn list(
 pub(super) fn image(
     about: &About,
     layout: &Layout,
-    (body, [rows, columns]): (&[u8], [usize; 2]),
+    body: &[u8],
+    [rows, columns]: [usize; 2],
 ) -> Result<PointCloud, String> {
     let points = rows.checked_mul(columns).ok_or("WIDTH × HEIGHT is beyond all bounds")?;
-    let body = records(layout, (body, points))?;
+    let body = records(layout, body, points)?;
     if rows.max(columns) > MOST_ROWS {
         return Err(format!("it has {rows} × {columns} pixels; 65536 rows and columns are read"));
     }
@@ -138,7 +140,7 @@ pub(super) fn image(
 }
 
 /// The bytes of `points` whole records.
-fn records<'a>(layout: &Layout, (body, points): (&'a [u8], usize)) -> Result<&'a [u8], String> {
+fn records<'a>(layout: &Layout, body: &'a [u8], points: usize) -> Result<&'a [u8], String> {
     layout.check()?;
     let needed = points.checked_mul(layout.stride).ok_or("the points are beyond all bounds")?;
     body.get(..needed).ok_or_else(|| {

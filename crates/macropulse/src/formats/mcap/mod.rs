@@ -187,7 +187,8 @@ impl Recording {
 /// A file with one scan alone, whose columns are even.
 pub(super) fn write(
     message: Message,
-    (cloud, names): (&PointCloud, &Names),
+    cloud: &PointCloud,
+    names: &Names,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let mut file = Cursor::new(Vec::new());

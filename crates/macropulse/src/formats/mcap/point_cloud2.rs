@@ -90,15 +90,15 @@ pub(super) fn decode(message: &[u8], about: &About) -> Result<PointCloud, String
     }
     message.u4()?;
     let body = message.bytes()?;
-    let (layout, time_from_ns) = layout((&fields, stride), stamp_ns);
+    let (layout, time_from_ns) = layout(&fields, stride, stamp_ns);
     let mut cloud = if height == 1 {
         // What is known of the image is of use with rows and columns alone.
         let list = about.list.filter(|_| layout.has(Attribute::Column));
         let (scan, viewpoint) = (about.scan, about.viewpoint);
         let about = About { scan, viewpoint, list, ..About::default() };
-        table::list(&about, &layout, (body, width))?
+        table::list(&about, &layout, body, width)?
     } else {
-        let cloud = table::image(about, &layout, (body, [height, width]))?;
+        let cloud = table::image(about, &layout, body, [height, width])?;
         PointCloud { pick: about.list.map_or(cloud.pick, |list| list.pick), ..cloud }
     };
     if time_from_ns != 0.0 {
@@ -109,7 +109,7 @@ pub(super) fn decode(message: &[u8], about: &About) -> Result<PointCloud, String
 }
 
 /// Where our attributes are, and what is to be added to their times, ns.
-fn layout((fields, stride): (&[Stored], usize), stamp_ns: f64) -> (Layout, f64) {
+fn layout(fields: &[Stored], stride: usize, stamp_ns: f64) -> (Layout, f64) {
     let has = |name: &str| fields.iter().any(|field| field.name == name);
     let white = match () {
         () if has("time_ns") => 1.0,

@@ -95,7 +95,7 @@ impl Messages {
                 }
                 LinearReadEvent::Record { data, opcode } => {
                     let (schemas, channels) = (&mut self.schemas, &mut self.channels);
-                    let taken = take((opcode, data), schemas, channels, &mut self.about);
+                    let taken = take(opcode, data, schemas, channels, &mut self.about);
                     match taken {
                         Ok(None) => {}
                         Ok(Some(cloud)) => {
@@ -124,7 +124,8 @@ fn told(error: &McapError) -> String {
 
 /// Takes in a record; the cloud of a message that is one.
 fn take(
-    (opcode, data): (u8, &[u8]),
+    opcode: u8,
+    data: &[u8],
     schemas: &mut BTreeMap<u16, String>,
     channels: &mut BTreeMap<u16, Content>,
     about: &mut About,
@@ -150,8 +151,8 @@ fn take(
             let mut entries = Fields(fields.bytes()?);
             while !entries.0.is_empty() {
                 let (key, text) = (entries.text()?, entries.text()?);
-                let lines = text.lines().filter(|_| key == ABOUT);
-                lines.map(|line| about.take(line)).collect::<Result<(), _>>()?;
+                let mut lines = text.lines().filter(|_| key == ABOUT);
+                lines.try_for_each(|line| about.take(line))?;
             }
         }
         op::MESSAGE => {
