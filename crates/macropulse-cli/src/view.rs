@@ -4,15 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{self, Format, Names, write_atomically};
-use macropulse::points::PointCloud;
+use macropulse::formats::{Clouds, write_atomically};
 use macropulse_study::record::{PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
 
 use crate::fault::Fault;
 use crate::options::Common;
-use crate::text::{grouped, print};
+use crate::text::print;
 
 /// Make a page to explore a point cloud: one HTML file that any browser opens, offline
 ///
@@ -23,7 +22,7 @@ use crate::text::{grouped, print};
   macropulse view out/street
   macropulse view scan-000000.pcd -o cloud.html")]
 pub struct View {
-    /// Point cloud (PCD), or folder of a run
+    /// Point cloud in any format that can be read, or folder of a run
     #[arg(value_name = "FILE-or-DIR")]
     path: PathBuf,
 
@@ -32,29 +31,32 @@ pub struct View {
     output: Option<PathBuf>,
 }
 
-/// The formats that can be read, the one that keeps most first.
-const READABLE: [Format; 1] = [Format::Pcd];
+/// Endings of the files in a folder that hold clouds, the one that keeps most first. What ends as one
+/// of the last may be many things: there the name must begin as that of a scan.
+const ENDINGS: [&str; 9] = ["pcd", "ply", "las", "laz", "e57", "mcap", "npy", "csv", "bin"];
 
-/// Reads a cloud by the name of its file.
-fn read(path: &Path) -> Result<PointCloud, Fault> {
-    match readable(path) {
-        Some(_) => Ok(formats::read_pcd(path)?),
-        None => {
-            let known: Vec<String> =
-                READABLE.iter().map(|format| format!(".{}", format.extension())).collect();
-            let (path, known) = (path.display(), known.join(", "));
-            Err(Fault::Wrong(format!(
-                "{path}: is no point cloud that can be read; name a file that ends in {known}, or \
-                 the folder of a run"
-            )))
-        }
-    }
+/// How many of the endings are of clouds alone.
+const OF_CLOUDS: usize = 6;
+
+/// The place of a file of a folder among [`ENDINGS`], if it may hold a cloud.
+fn rank(name: &str) -> Option<usize> {
+    let ending = Path::new(name).extension()?.to_str()?.to_lowercase();
+    let rank = ENDINGS.iter().position(|known| *known == ending)?;
+    (rank < OF_CLOUDS || name.starts_with("scan-")).then_some(rank)
 }
 
-/// The place of the format of `path` in [`READABLE`], by its ending.
-fn readable(path: &Path) -> Option<usize> {
-    let ending = path.extension()?.to_str()?.to_lowercase();
-    READABLE.iter().position(|format| format.extension() == ending)
+/// Adds the clouds of the file at `path`.
+fn add(page: &mut Explorer, name: &str, path: &Path) -> Result<(), Fault> {
+    let mut clouds = Clouds::open(path)?;
+    let mut at = 0;
+    while let Some(cloud) = clouds.next() {
+        let cloud = cloud?;
+        let of_several = || format!("{name}, scan {}", cloud.scan);
+        let name = if at == 0 && !name.ends_with(".mcap") { name.to_owned() } else { of_several() };
+        page.cloud(&name, &cloud, &clouds.names());
+        at += 1;
+    }
+    Ok(())
 }
 
 pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
@@ -74,12 +76,10 @@ pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
 }
 
 fn of_file(path: &Path, output: &Path) -> Result<Explorer, Fault> {
-    let cloud = read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut page = Explorer::new(&name);
-    page.fact("points", &grouped(cloud.returns() as u64));
     page.file(&beside(output, path));
-    page.cloud(&name, &cloud, &Names::default());
+    add(&mut page, &name, path)?;
     Ok(page)
 }
 
@@ -92,10 +92,9 @@ fn of_folder(folder: &Path, output: &Path) -> Result<Explorer, Fault> {
     let clouds = clouds(&files);
     if clouds.is_empty() {
         let folder = folder.display();
-        let known = READABLE.map(Format::name).join(", ");
         return Err(Fault::Wrong(format!(
             "{folder}: holds no point cloud that can be read; write one with \
-             `macropulse simulate … --format {known} -o {folder}`"
+             `macropulse simulate … --format pcd -o {folder}`"
         )));
     }
     let mut page = Explorer::new(&title(folder, manifest.as_ref()));
@@ -109,7 +108,7 @@ fn of_folder(folder: &Path, output: &Path) -> Result<Explorer, Fault> {
         explain(&mut page, &folder.join(file));
     }
     for file in clouds {
-        page.cloud(file, &read(&folder.join(file))?, &Names::default());
+        add(&mut page, file, &folder.join(file))?;
     }
     Ok(page)
 }
@@ -149,7 +148,7 @@ fn listed(folder: &Path) -> Result<Vec<String>, Fault> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(unreadable)? {
         let name = entry.map_err(unreadable)?.file_name().to_string_lossy().into_owned();
-        if readable(Path::new(&name)).is_some() {
+        if rank(&name).is_some() {
             names.push(name);
         }
     }
@@ -157,11 +156,12 @@ fn listed(folder: &Path) -> Result<Vec<String>, Fault> {
     Ok(names)
 }
 
-/// Of several files of one cloud, which differ in their endings, the one that keeps most.
+/// Of several files of one cloud, which differ in their endings, the one that keeps most; files with
+/// all scans of a run only where no others hold them.
 fn clouds(files: &[String]) -> Vec<&String> {
     let mut chosen: Vec<(usize, &String)> = Vec::new();
     for file in files {
-        let Some(rank) = readable(Path::new(file)) else { continue };
+        let Some(rank) = rank(file) else { continue };
         let stem = Path::new(file).with_extension("");
         match chosen.iter_mut().find(|(_, other)| Path::new(other).with_extension("") == stem) {
             Some(other) if rank < other.0 => *other = (rank, file),
@@ -169,6 +169,11 @@ fn clouds(files: &[String]) -> Vec<&String> {
             None => chosen.push((rank, file)),
         }
     }
+    let is_of_run = |file: &String| file.to_lowercase().ends_with(".mcap");
+    let has_others = chosen.iter().any(|(_, file)| !is_of_run(file));
+    chosen.retain(|(_, file)| !has_others || !is_of_run(file));
+    // Of one run in several kinds of messages, the first: they sort with what we read before the rest.
+    chosen.dedup_by(|(_, one), (_, other)| is_of_run(one) && is_of_run(other));
     chosen.into_iter().map(|(_, file)| file).collect()
 }
 
@@ -202,5 +207,8 @@ mod tests {
     fn each_cloud_is_taken_once() {
         let files = ["scan-0.pcd", "range-0.png", "scan-1.PCD", "scan-0.csv"].map(str::to_owned);
         assert_eq!(clouds(&files), ["scan-0.pcd", "scan-1.PCD"]);
+        let files = ["range-0.npy", "scan-0.npy", "scans.mcap", "shots-0.csv"].map(str::to_owned);
+        assert_eq!(clouds(&files), ["scan-0.npy"]);
+        assert_eq!(clouds(&files[2..]), ["scans.mcap"]);
     }
 }
