@@ -60,7 +60,7 @@ fn put<T: DataType>(
 }
 
 fn field(attribute: Attribute) -> Result<TypePtr> {
-    let unsigned = |bit_width| Some(LogicalType::Integer { bit_width, is_signed: false });
+    let unsigned = |bit_width| Some(LogicalType::integer(bit_width, false));
     let (physical, logical) = match attribute.blank().kind() {
         Kind::F4 => (Physical::FLOAT, None),
         Kind::F8 => (Physical::DOUBLE, None),
@@ -72,4 +72,26 @@ fn field(attribute: Attribute) -> Result<TypePtr> {
         .with_logical_type(logical)
         .build()
         .map(Arc::new)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample_cloud;
+    use super::*;
+    use ::parquet::file::reader::{FileReader, SerializedFileReader};
+
+    #[test]
+    fn every_attribute_is_a_column() {
+        let cloud = sample_cloud();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.parquet");
+        std::fs::write(&path, encode(&cloud, &Names::default()).unwrap()).unwrap();
+        let file = SerializedFileReader::new(std::fs::File::open(path).unwrap()).unwrap();
+        let rows: Vec<_> = file.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+        assert_eq!(rows.len(), cloud.returns());
+        let names: Vec<String> = rows[0].get_column_iter().map(|(name, _)| name.clone()).collect();
+        let expected: Vec<&str> = Attribute::of(&cloud).iter().map(|known| known.name()).collect();
+        assert_eq!(names, expected);
+        assert_eq!(rows[2].get_column_iter().next().unwrap().1.to_string(), "29.0");
+    }
 }
