@@ -220,7 +220,7 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
     if said.starts_with("unknown field") || said.starts_with("unknown variant") {
         let (wrong, known) = (quoted[0], &quoted[1..]);
         let hint = crate::names::nearest(wrong, known.iter().copied())
-            .map(|near| format!("did you mean `{near}`? "))
+            .map(|near| format!("; did you mean `{near}`?"))
             .unwrap_or_else(|| format!("; known are {}", known.join(", ")));
         let what = if said.starts_with("unknown field") { "key" } else { "value" };
         let place = match (what, path.as_str()) {
@@ -257,10 +257,10 @@ impl Check<'_> {
                 None => {
                     let known: Vec<&str> = Effect::ALL.iter().map(|e| e.name()).collect();
                     let hint = crate::names::nearest(name, known.iter().copied())
-                        .map(|near| format!("did you mean `{near}`? "))
+                        .map(|near| format!("; did you mean `{near}`?"))
                         .unwrap_or_default();
                     let message =
-                        format!("`{name}` is no effect; {hint}known are {}", known.join(", "));
+                        format!("`{name}` is no effect{hint} known are {}", known.join(", "));
                     return self.refuse("idealised", message);
                 }
             }
