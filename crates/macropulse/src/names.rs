@@ -1,6 +1,6 @@
 //! Help with misspelt names, places in texts, and values typed on a command line.
 
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 /// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
 /// apart, or the beginning of it, as `yaw_deg` is of `yaw_degrees`.
@@ -40,6 +40,52 @@ pub(crate) fn offset_of_key(text: &str, path: &str) -> Option<usize> {
     None
 }
 
+/// The key, or the element of a list, that stands around the byte at `offset` of a TOML `text`, as
+/// `object[1].position_m`; `None` if none does.
+pub(crate) fn key_at(text: &str, offset: usize) -> Option<String> {
+    let root = DeTable::parse(text).ok()?;
+    let mut path = String::new();
+    within_table(root.get_ref(), offset, &mut path);
+    (!path.is_empty()).then_some(path)
+}
+
+fn within_table(table: &DeTable, offset: usize, path: &mut String) {
+    // A table with a header spans no more than that: what lies in it is asked for first.
+    for (name, value) in table.iter() {
+        let before = path.len();
+        path.push_str(if path.is_empty() { "" } else { "." });
+        path.push_str(name.get_ref());
+        let inside = path.len();
+        within(value.get_ref(), offset, path);
+        let is_here = |span: std::ops::Range<usize>| (span.start..=span.end).contains(&offset);
+        if path.len() > inside || is_here(name.span()) || is_here(value.span()) {
+            return;
+        }
+        path.truncate(before);
+    }
+}
+
+fn within(value: &DeValue, offset: usize, path: &mut String) {
+    match value {
+        DeValue::Table(inner) => within_table(inner, offset, path),
+        DeValue::Array(list) => {
+            for (at, element) in list.iter().enumerate() {
+                let before = path.len();
+                path.push_str(&format!("[{at}]"));
+                let inside = path.len();
+                within(element.get_ref(), offset, path);
+                let is_table = element.get_ref().is_table();
+                let span = element.span();
+                if path.len() > inside || (is_table && (span.start..=span.end).contains(&offset)) {
+                    return;
+                }
+                path.truncate(before);
+            }
+        }
+        _ => {}
+    }
+}
+
 /// The value that `typed` is as TOML; what is not TOML is taken as text.
 pub fn toml_value(typed: &str) -> toml::Value {
     let parsed = format!("v = {typed}").parse::<toml::Table>().ok();
@@ -49,13 +95,32 @@ pub fn toml_value(typed: &str) -> toml::Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{line_column, nearest};
+    use super::{key_at, line_column, nearest};
 
     #[test]
     fn lines_and_columns_count_from_one() {
         assert_eq!(line_column("a\nbcd", 0), (1, 1));
         assert_eq!(line_column("a\nbcd", 4), (2, 3));
         assert_eq!(line_column("a\n", 99), (2, 1));
+    }
+
+    #[test]
+    fn a_place_is_named_by_its_key() {
+        let text = "version = 1\n[sensor]\nyaw_deg = 3\n[[object]]\nname = \"a\"\n[[object]]\n\
+                    position_m = [1.0, 2.0]\nshape = { box = { size_m = [1, 1, 1] } }\n";
+        let key = |found: &str| key_at(text, text.find(found).unwrap());
+        for (found, wanted) in [
+            ("version", "version"),
+            ("3", "sensor.yaw_deg"),
+            ("name", "object[0].name"),
+            ("1.0", "object[1].position_m"),
+            ("position_m", "object[1].position_m"),
+            ("size_m", "object[1].shape.box.size_m"),
+            ("[[object]]", "object[0]"),
+        ] {
+            assert_eq!(key(found).as_deref(), Some(wanted));
+        }
+        assert_eq!((key_at("", 0), key_at("a = ", 0)), (None, None));
     }
 
     #[test]

@@ -75,6 +75,22 @@ impl Chain {
         folder: &Path,
         overrides: &[(String, String)],
     ) -> Result<Self, Error> {
+        Self::of(Document::parse(text, origin, folder)?, folder, overrides)
+    }
+
+    /// As [`Chain::read`], of a `table` that was not typed as text: its values have no line.
+    pub fn of_table(
+        table: &Table,
+        origin: &str,
+        folder: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Error> {
+        let (origin, table) = (origin.to_owned(), table.clone());
+        let first = Document { origin, text: String::new(), table, folder: folder.to_owned() };
+        Self::of(first, folder, overrides)
+    }
+
+    fn of(first: Document, folder: &Path, overrides: &[(String, String)]) -> Result<Self, Error> {
         let mut documents = Vec::new();
         let switches = |key: &str| [WITH, WITHOUT].contains(&key);
         let (switched, overrides): (Vec<_>, Vec<_>) =
@@ -83,7 +99,7 @@ impl Chain {
             documents.push(document_of_overrides(&overrides)?);
         }
         let mut folder = folder.to_path_buf();
-        documents.push(Document::parse(text, origin, &folder)?);
+        documents.push(first);
         while let Some(parent) = documents.last().and_then(|d| d.table.get("extends")) {
             let path = "extends";
             let Some(parent) = parent.as_str().map(str::to_owned) else {

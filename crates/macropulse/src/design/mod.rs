@@ -108,6 +108,20 @@ impl Design {
         check::design(&document::Chain::read(text, origin, folder, overrides)?)
     }
 
+    /// The sensor that `table` describes, as a sensor file does. `origin` stands in error messages
+    /// before the key, `folder` is where files named in `extends` are looked for.
+    ///
+    /// # Errors
+    /// As [`Design::open`], with the key as the place.
+    pub fn from_table(
+        table: &toml::Table,
+        origin: &str,
+        folder: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Error> {
+        check::design(&document::Chain::of_table(table, origin, folder, overrides)?)
+    }
+
     /// Whether shots carry a code.
     pub fn is_coded(&self) -> bool {
         self.coding.label.is_some()
@@ -217,6 +231,28 @@ impl Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_is_the_sensor_that_its_text_is() {
+        let text = "extends = \"peregrine\"\nname = \"mine\"\nscan.max_range_m = 40\n";
+        let table: toml::Table = text.parse().unwrap();
+        let made = Design::from_table(&table, "a dictionary", Path::new(""), &[]).unwrap();
+        let read = Design::from_toml(text, "mine.toml", Path::new(""), &[]).unwrap();
+        assert_eq!((made.digest(), made.scan.rated_range), (read.digest(), 40.0));
+        let set = [("scan.max_range_m".to_owned(), "30".to_owned())];
+        let set = Design::from_table(&table, "a dictionary", Path::new(""), &set).unwrap();
+        assert_eq!(set.scan.rated_range, 30.0);
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_table_is_named_by_its_key() {
+        let text = "extends = \"peregrine\"\nscan.max_rnage_m = 40\n";
+        let told = Design::from_table(&text.parse().unwrap(), "a dictionary", Path::new(""), &[]);
+        assert_eq!(
+            told.unwrap_err().to_string(),
+            "a dictionary: scan.max_rnage_m: unknown key `max_rnage_m`; did you mean `max_range_m`?"
+        );
+    }
 
     #[test]
     fn speed_is_the_time_of_the_sensor_over_ours() {

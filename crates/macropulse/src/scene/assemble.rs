@@ -2,7 +2,7 @@
 
 mod shapes;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::path::Path;
 use std::rc::Rc;
@@ -33,6 +33,8 @@ use crate::names::line_column;
 struct Assembly<'a> {
     source: Source<'a>,
     base: &'a Path,
+    /// Meshes in memory, by name; they go before files.
+    given: &'a BTreeMap<String, Mesh>,
     /// Materials the file defines; they go before the library.
     defined: Vec<Material>,
     materials: Vec<Material>,
@@ -45,8 +47,13 @@ struct Assembly<'a> {
     meshes: Meshes,
 }
 
-/// Makes the scene that `source` describes; meshes are looked for in `base`.
-pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
+/// Makes the scene that `source` describes; meshes are looked for among those `given`, and then in
+/// `base`.
+pub(super) fn scene(
+    source: Source<'_>,
+    base: &Path,
+    given: &BTreeMap<String, Mesh>,
+) -> Result<Scene, Error> {
     let file = source.parse()?;
     if *file.version.get_ref() != 1 {
         let message = format!("version {} is not known; write version = 1", file.version.get_ref());
@@ -55,6 +62,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     let mut assembly = Assembly {
         source,
         base,
+        given,
         defined: vec![],
         materials: vec![],
         objects: vec![],
@@ -128,6 +136,7 @@ pub(super) fn scene(source: Source<'_>, base: &Path) -> Result<Scene, Error> {
     }));
     Ok(Scene {
         name,
+        text: source.text.to_owned(),
         materials,
         objects,
         sensor,
@@ -254,9 +263,10 @@ impl Assembly<'_> {
             return self.add_shape((&name, object), (written, shape), &motions);
         }
         let origin = self.mesh_origin(&name, written)?;
-        let known = self.meshes.of(&origin, || read(&origin))?;
+        let given = self.given;
+        let known = self.meshes.of(&origin, || read(&origin, given))?;
         let mesh = Rc::clone(&known.mesh);
-        if matches!(origin, Origin::File { .. }) {
+        if origin != Origin::Car {
             let ([x, y, z], count) = (known.size, mesh.triangles.len());
             self.notes.push(format!(
                 "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
@@ -288,9 +298,15 @@ impl Assembly<'_> {
             Some(_) => WithoutMaterials::Fine,
             None => WithoutMaterials::Refused,
         };
-        let path = self.base.join(path.get_ref());
+        let called = path.get_ref();
+        let is_given = self.given.contains_key(called);
+        let path = self.base.join(called);
         let metres = self.metres_per_unit(name, written)?;
-        let (up, forward) = self.axes(name, written, readers::is_gltf(&path))?;
+        let is_gltf = !is_given && readers::is_gltf(&path);
+        let (up, forward) = self.axes(name, written, is_gltf)?;
+        if is_given {
+            return Ok(Origin::Given { name: called.clone(), metres, up, forward });
+        }
         Ok(Origin::File { path, without, metres, up, forward })
     }
 
@@ -446,10 +462,13 @@ impl Assembly<'_> {
     }
 }
 
-/// The mesh of this origin, as its file has it.
-fn read(origin: &Origin) -> Result<Mesh, Error> {
+/// The mesh of this origin, as its file has it, or as it is `given`.
+fn read(origin: &Origin, given: &BTreeMap<String, Mesh>) -> Result<Mesh, Error> {
     match origin {
         Origin::Car => car::mesh(),
+        Origin::Given { name, .. } => {
+            given.get(name).cloned().unwrap_or_default().checked(Path::new(name))
+        }
         Origin::File { path, without, .. } => readers::read(path, *without),
     }
 }

@@ -35,6 +35,16 @@ pub enum Error {
         /// What is wrong and what to do.
         message: String,
     },
+    /// A scene that a program describes says something that cannot be.
+    #[error("{origin}: {key}{}{message}", if key.is_empty() { "" } else { ": " })]
+    Keyed {
+        /// What the program calls its description.
+        origin: String,
+        /// The key, as `object[1].position_m`; empty for the scene as a whole.
+        key: String,
+        /// What is wrong and what to do.
+        message: String,
+    },
     /// A value was changed to what cannot be.
     #[error("{key}: {message}")]
     Changed {

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use toml::{Spanned, Table};
 
 use super::error::Error;
-use crate::names::{line_column, nearest, offset_of_key};
+use crate::names::{key_at, line_column, nearest, offset_of_key};
 
 /// A whole scene file.
 #[derive(Debug, Deserialize)]
@@ -251,14 +251,29 @@ pub(super) fn object_names(typed: &[Option<&str>]) -> Vec<String> {
     typed.iter().enumerate().map(name).collect()
 }
 
-/// The text of a scene file and its name: finds line and column of what is wrong.
+/// The text of a scene and its name: finds the place of what is wrong.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub text: &'a str,
     pub origin: &'a str,
+    pub place: Place,
 }
 
-impl Source<'_> {
+/// What is told as the place of what is wrong.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Place {
+    /// Line and column, of a text that people have typed.
+    Line,
+    /// The key, where a program has made the text of a table.
+    Key,
+}
+
+impl<'a> Source<'a> {
+    /// A text as it was typed.
+    pub(super) fn typed(text: &'a str, origin: &'a str) -> Self {
+        Self { text, origin, place: Place::Line }
+    }
+
     /// Reads the file.
     pub(super) fn parse(&self) -> Result<SceneFile, Error> {
         toml::from_str(self.text)
@@ -278,8 +293,15 @@ impl Source<'_> {
 
     /// An error at a place in the text.
     pub(super) fn fault(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        let (origin, message) = (self.origin.to_owned(), message.into());
+        if self.place == Place::Key {
+            // What is missing has the whole text as its place, or none.
+            let is_whole = span == (0..0) || span == (0..self.text.len());
+            let key = key_at(self.text, span.start).filter(|_| !is_whole).unwrap_or_default();
+            return Error::Keyed { origin, key, message };
+        }
         let (line, column) = line_column(self.text, span.start);
-        Error::Typed { origin: self.origin.to_owned(), line, column, message: message.into() }
+        Error::Typed { origin, line, column, message }
     }
 }
 
@@ -299,13 +321,13 @@ mod tests {
     use super::*;
 
     fn told(text: &str) -> String {
-        Source { text, origin: "a.toml" }.parse().unwrap_err().to_string()
+        Source::typed(text, "a.toml").parse().unwrap_err().to_string()
     }
 
     #[test]
     fn a_small_scene_is_read() {
         let text = "version = 1\n[[object]]\nshape.sphere.radius_m = 2\nposition_m = [10, 0, 0]\n";
-        let scene = Source { text, origin: "a.toml" }.parse().unwrap();
+        let scene = Source::typed(text, "a.toml").parse().unwrap();
         assert_eq!(scene.objects[0].get_ref().position_m.as_ref().unwrap().get_ref()[0], 10.0);
     }
 

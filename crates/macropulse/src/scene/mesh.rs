@@ -21,6 +21,17 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// A mesh of one material without a name.
+    pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            material_of_triangle: vec![0; triangles.len()],
+            vertices,
+            triangles,
+            material_names: vec![String::new()],
+            diffuse_guesses: vec![None],
+        }
+    }
+
     /// The index of the material called `name`, which is added if it is new.
     pub(super) fn material(&mut self, name: &str) -> u16 {
         let index =
@@ -72,6 +83,23 @@ impl Mesh {
                 ));
             }
         }
+        let (given, needed) = (self.material_of_triangle.len(), self.triangles.len());
+        let names = self.material_names.len();
+        let unnamed = self.material_of_triangle.iter().find(|own| usize::from(**own) >= names);
+        if given != needed || self.diffuse_guesses.len() != names {
+            return Err(Error::mesh(
+                path,
+                format!("{given} of its {needed} triangles have a material"),
+                "give each of them one",
+            ));
+        }
+        if let Some(material) = unnamed {
+            return Err(Error::mesh(
+                path,
+                format!("a triangle is of material {material}, but {names} are named"),
+                "count them from 0, and name them all",
+            ));
+        }
         let broken = self.vertices.iter().position(|v| v.iter().any(|value| !value.is_finite()));
         if let Some(index) = broken {
             return Err(Error::mesh(
@@ -119,8 +147,14 @@ mod tests {
         let told = |mesh: Mesh| mesh.checked(path).unwrap_err().to_string();
         assert!(told(Mesh::default()).contains("no triangles"));
         let mut mesh = square();
-        mesh.triangles.push([0, 1, 4]);
-        assert!(told(mesh).contains("triangle 2 names vertex 4, but there are only 4"));
+        mesh.triangles[1] = [0, 1, 4];
+        assert!(told(mesh).contains("triangle 1 names vertex 4, but there are only 4"));
+        let mut mesh = square();
+        mesh.material_of_triangle.pop();
+        assert!(told(mesh).contains("1 of its 2 triangles"));
+        let mut mesh = square();
+        mesh.material_of_triangle[1] = 1;
+        assert!(told(mesh).contains("of material 1, but 1 are named"));
         let mut mesh = square();
         mesh.vertices[3][1] = f64::NAN;
         assert!(told(mesh).contains("vertex 3"));

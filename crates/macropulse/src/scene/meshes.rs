@@ -22,6 +22,25 @@ pub(super) enum Origin {
         up: DVec3,
         forward: DVec3,
     },
+    /// A mesh in memory, by its name, in the same.
+    Given {
+        name: String,
+        metres: f64,
+        up: DVec3,
+        forward: DVec3,
+    },
+}
+
+impl Origin {
+    /// The unit in metres, and up and forward in its own axes, of what is not ours.
+    fn frame(&self) -> Option<(f64, DVec3, DVec3)> {
+        match *self {
+            Self::Car => None,
+            Self::File { metres, up, forward, .. } | Self::Given { metres, up, forward, .. } => {
+                Some((metres, up, forward))
+            }
+        }
+    }
 }
 
 /// A mesh in metres, x forward, z up.
@@ -58,7 +77,7 @@ impl Meshes {
 impl Known {
     /// A `mesh` as its file has it.
     fn new(origin: Origin, mut mesh: Mesh) -> Self {
-        if let Origin::File { metres, up, forward, .. } = origin {
+        if let Some((metres, up, forward)) = origin.frame() {
             let left = up.cross(forward);
             for vertex in &mut mesh.vertices {
                 let place = DVec3::from(*vertex) * metres;

@@ -29,6 +29,7 @@ mod trace;
 mod typed;
 mod world;
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
@@ -49,7 +50,7 @@ pub use trace::{SUB_MACROPULSES, Traced};
 use crate::digest::Digest;
 use crate::environment::Environment;
 use crate::kernels::{LANES, Packet};
-use file::Source;
+use file::{Place, Source};
 use world::{PacketHits, World};
 
 /// So many rays at most are put in order together.
@@ -61,6 +62,8 @@ const ORDERED: usize = 1 << 20;
 pub struct Scene {
     /// Name, for reports.
     pub name: String,
+    /// The TOML text that describes it, with the changes made to it.
+    pub text: String,
     /// What surfaces are made of; [`Hit::material`] counts in this list.
     pub materials: Vec<Material>,
     /// What surfaces belong to; [`Hit::object`] counts in this list.
@@ -127,7 +130,28 @@ impl Scene {
     /// # Errors
     /// If the text or one of the meshes is wrong.
     pub fn from_toml(text: &str, origin: &str, base: &Path) -> Result<Self, Error> {
-        assemble::scene(Source { text, origin }, base)
+        assemble::scene(Source::typed(text, origin), base, &BTreeMap::new())
+    }
+
+    /// The scene that `table` describes, as a scene file does. `origin` is its name in messages,
+    /// before the key; meshes are looked for by their names among `meshes`, and then as files in
+    /// `base`.
+    ///
+    /// # Errors
+    /// As [`Scene::from_toml`], with the key as the place.
+    pub fn from_table(
+        table: &toml::Table,
+        origin: &str,
+        base: &Path,
+        meshes: &BTreeMap<String, Mesh>,
+    ) -> Result<Self, Error> {
+        let text = toml::to_string(table).map_err(|fault| Error::Keyed {
+            origin: origin.to_owned(),
+            key: String::new(),
+            message: fault.to_string(),
+        })?;
+        let source = Source { text: &text, origin, place: Place::Key };
+        assemble::scene(source, base, meshes)
     }
 
     /// The TOML text of a built-in scene.

@@ -156,7 +156,7 @@ mod tests {
 
     fn motion(keys: &str) -> Result<Motion, String> {
         let text = format!("version = 1\n[sensor]\n{keys}");
-        let source = Source { text: &text, origin: "a.toml" };
+        let source = Source::typed(&text, "a.toml");
         let file = source.parse().unwrap();
         source.motion(&file.sensor).map_err(|error| error.to_string())
     }

@@ -1,0 +1,184 @@
+//! Codes: the marks of a shot, families of words, and how alike these are.
+
+use std::sync::Arc;
+
+use macropulse::codec::code::correlation::periodic;
+use macropulse::design::family_from_toml;
+use macropulse::emit::shot_of_pixel;
+use macropulse::predict::comparison::Comparison;
+use macropulse::predict::multiple_access::{bit_error_hard, bit_error_soft};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use serde_json::{Value, json};
+
+use crate::error::{OrRaise, check_scan, wrong};
+use crate::sensor::Sensor;
+use crate::values::from_json;
+use crate::work;
+
+/// The macropulse that is sent to a pixel, mark by mark.
+///
+/// Args:
+///     sensor: A `Sensor`, the name of a ready one, or a TOML file.
+///     row: Row of the pixel, 0 at the top.
+///     column: Column of the pixel, 0 at the left.
+///     scan: Number of the scan, from 0.
+///
+/// Returns:
+///     A dictionary with the keys of `macropulse encode --json`; `marks`, the lit chips counted from
+///     0, is an array.
+///
+/// Raises:
+///     Error: If the sensor has no such pixel or scan.
+#[pyfunction]
+#[pyo3(signature = (sensor, row, column, *, scan = 0))]
+pub fn encode<'py>(
+    sensor: &Bound<'py, PyAny>,
+    row: u32,
+    column: u32,
+    scan: u64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let py = sensor.py();
+    let design = Arc::clone(&Sensor::of(sensor)?.get().design);
+    check_scan(&design, scan)?;
+    let Some(shot) = shot_of_pixel(&design, scan, row, column) else {
+        let (rows, columns) = (design.scan.rows - 1, design.scan.columns - 1);
+        return Err(wrong(format!(
+            "pixel {row}, {column}: {} has rows 0 to {rows} and columns 0 to {columns}",
+            design.name
+        )));
+    };
+    let codebook = &design.coding.codebook;
+    let told = PyDict::new(py);
+    told.set_item("row", row)?;
+    told.set_item("column", column)?;
+    told.set_item("label", shot.label)?;
+    told.set_item("payload", codebook.payload().map(|payload| payload.text(shot.label)))?;
+    told.set_item("code_word", shot.word)?;
+    told.set_item("marks", PyArray1::from_slice(py, codebook.marks(shot.label, shot.word)))?;
+    told.set_item("chips", codebook.chips())?;
+    told.set_item("fired_at_fs", shot.fired_at_fs)?;
+    Ok(told)
+}
+
+/// Numbers of users whose bit errors are told.
+const USERS: [u32; 3] = [10, 16, 25];
+
+/// Compares code families: how alike their words are, and what that costs when many send at once.
+///
+/// Args:
+///     families: As behind `code.family` in a sensor file: `"prime=29"`, `"gold=7"`,
+///         `"sparse={length=841, weight=29, words=64, seed=1}"`.
+///
+/// Returns:
+///     A dictionary for each, with the keys of `families` in `macropulse codes --json`, and `matrix`, shape (n, n)
+///     of the words compared: the highest periodic cross-correlation of each with each other one,
+///     and on the diagonal the highest sidelobe.
+///
+/// Raises:
+///     Error: If there is no such family.
+#[pyfunction]
+#[pyo3(signature = (*families))]
+pub fn codes<'py>(py: Python<'py>, families: Vec<String>) -> PyResult<Bound<'py, PyList>> {
+    if families.is_empty() {
+        return Err(wrong("no family is named; name one at least, as \"prime=29\" or \"gold=7\""));
+    }
+    let compared = work::done(py, 0, move |_| {
+        // All of them are read before the first is compared.
+        let families = families.iter().map(|text| family_from_toml(text));
+        let families = families.collect::<Result<Vec<_>, _>>()?;
+        Ok::<_, macropulse::design::Error>(families.into_iter().map(Comparison::of).collect())
+    })?;
+    let compared: Vec<Comparison> = compared.or_raise()?;
+    let told = compared.iter().map(|of| {
+        let told = from_json(py, &told_of(of))?;
+        let matrix = PyArray1::from_slice(py, &of.matrix).reshape([of.compared, of.compared])?;
+        told.set_item("matrix", matrix)?;
+        Ok(told)
+    });
+    PyList::new(py, told.collect::<PyResult<Vec<_>>>()?)
+}
+
+fn told_of(of: &Comparison) -> Value {
+    let errors = USERS.into_iter().filter_map(|users| {
+        let access = of.users(users)?;
+        let (soft, hard) = (bit_error_soft(&access), bit_error_hard(&access));
+        Some(json!({ "users": users, "soft": soft, "hard": hard }))
+    });
+    json!({
+        "family": of.family.to_string(),
+        "length_chips": of.family.length(),
+        "marks_min": of.marks.0,
+        "marks_max": of.marks.1,
+        "words": of.family.count(),
+        "words_compared": of.compared,
+        "sidelobe_periodic": of.sidelobes.0,
+        "sidelobe_aperiodic": of.sidelobes.1,
+        "cross_max_periodic": of.crosses.0,
+        "cross_max_aperiodic": of.crosses.1,
+        "cross_mean": of.spread.0,
+        "cross_variance": of.spread.1,
+        "harmless_interferers": of.harmless_interferers(),
+        "bit_errors": errors.collect::<Vec<_>>(),
+    })
+}
+
+/// Most chips of all words together that are written out.
+const MOST_CHIPS: usize = 1 << 28;
+
+/// The words of a code family, chip by chip.
+///
+/// Args:
+///     family: As behind `code.family` in a sensor file, `"prime=29"` say.
+///
+/// Returns:
+///     An array of shape (words, chips), 1 where a chip is lit and 0 where it is dark.
+///
+/// Raises:
+///     Error: If there is no such family, or its words are too many to be written out.
+#[pyfunction]
+pub fn code_words<'py>(py: Python<'py>, family: &str) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let family = family_from_toml(family).or_raise()?;
+    let (words, chips) = (family.count(), family.length() as usize);
+    if words.saturating_mul(chips) > MOST_CHIPS {
+        return Err(wrong(format!(
+            "{family} has {words} words of {chips} chips; {MOST_CHIPS} chips together are written \
+             out at most"
+        )));
+    }
+    let mut lit = vec![0; words * chips];
+    for (word, lit) in family.words().iter().zip(lit.chunks_mut(chips)) {
+        word.marks.iter().for_each(|mark| lit[*mark as usize] = 1);
+    }
+    PyArray1::from_vec(py, lit).reshape([words, chips])
+}
+
+/// The periodic correlation of two words of a code family against lag.
+///
+/// Args:
+///     family: As behind `code.family` in a sensor file, `"prime=29"` say.
+///     word: Number of a word, from 0.
+///     other: Number of another word, or of the same for its autocorrelation.
+///
+/// Returns:
+///     An array with an entry for each lag: how many marks coincide.
+///
+/// Raises:
+///     Error: If there is no such family or word.
+#[pyfunction]
+pub fn correlation<'py>(
+    py: Python<'py>,
+    family: &str,
+    word: usize,
+    other: usize,
+) -> PyResult<Bound<'py, PyArray1<u16>>> {
+    let family = family_from_toml(family).or_raise()?;
+    let words = family.words();
+    let known = |number: usize| {
+        words.get(number).ok_or_else(|| {
+            wrong(format!("word {number}: the words of {family} are 0 to {}", words.len() - 1))
+        })
+    };
+    Ok(PyArray1::from_vec(py, periodic(known(word)?, known(other)?)))
+}

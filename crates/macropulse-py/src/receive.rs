@@ -1,0 +1,274 @@
+//! The receiver's side alone: what it is given of a scan, and what it makes of that.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use macropulse::channel::{self, Operating, Seen};
+use macropulse::codec::{ShotLog, Ticks};
+use macropulse::design::Design;
+use macropulse::detect::{Detectors, Memory};
+use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
+use macropulse::environment::Environment;
+use macropulse::points::{Piece, PointCloud, Truth};
+use macropulse::random::Chance;
+use macropulse::scene::Scene as Simulated;
+use macropulse::tdc;
+use numpy::{Element, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::{OrRaise, check_scan, wrong};
+use crate::scan::{About, Scan};
+use crate::scene::Scene;
+use crate::sensor::Sensor;
+use crate::values::Reader;
+use crate::work;
+
+/// Shots are numbered up to here: more than any sensor fires in its time.
+const MOST_SHOTS: u64 = 1 << 60;
+
+/// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`.
+#[pyclass(frozen, module = "macropulse")]
+pub struct Records {
+    design: Arc<Design>,
+    scene: Arc<Simulated>,
+    seed: u64,
+    /// The bands that are left, the next one last.
+    left: Mutex<Vec<Band>>,
+}
+
+impl Records {
+    fn left(&self) -> MutexGuard<'_, Vec<Band>> {
+        self.left.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+type Pair<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>);
+
+#[pymethods]
+impl Records {
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Pair<'py>>> {
+        let next = self.left().pop();
+        let Some(band) = next else { return Ok(None) };
+        let (design, scene) = (Arc::clone(&self.design), Arc::clone(&self.scene));
+        let seed = self.seed;
+        let made = work::done(py, 0, move |_| {
+            let operating = Operating::of(&design, &scene.environment)?;
+            let detectors = Detectors::new(&design, &operating, Chance::new(seed));
+            let seen = Seen { design: &design, scene: &scene, operating: &operating };
+            let log = band.shot_log(&design);
+            let traced = scene.trace(&design, &log);
+            let light = channel::light(&seen, &log, &traced);
+            let mut memory = Memory::default();
+            let response = detectors.response(&log, &light, &mut memory);
+            let ticks = tdc::ticks(&design, response, 0).ticks;
+            Ok::<_, channel::Error>((log, ticks))
+        })?;
+        let (log, ticks) = made.or_raise()?;
+        Ok(Some((told_of_shots(py, log)?, told_of_ticks(py, ticks)?)))
+    }
+
+    /// How many bands are left.
+    fn __len__(&self) -> usize {
+        self.left().len()
+    }
+
+    fn __repr__(&self) -> String {
+        let (design, scene) = (&self.design.name, &self.scene.name);
+        format!("<macropulse.Records of {design} in {scene}: {} bands left>", self.__len__())
+    }
+}
+
+/// What the receiver of a sensor is given of one scan: the log of its shots, and the ticks of its
+/// converters; nothing of the scene.
+///
+/// A scan comes in bands of about 1700 shots. Each has guard shots at both ends, whose light overlaps
+/// with that of its `owned` ones: they are decoded as well, and their returns dropped.
+///
+/// Args:
+///     sensor: A `Sensor`, the name of a ready one, or a TOML file.
+///     scene: A `Scene`, the name of a ready one, or a TOML file.
+///     seed: Seed of the random numbers.
+///     scan: Number of the scan, from 0.
+///
+/// Returns:
+///     An iterator of pairs as `decode` takes them. Of the shots `first` (number of the first one, from
+///     the beginning of the first scan), `owned` (from, until: indices), and the arrays `fired_at_fs`,
+///     `row`, `column`, `label`, `word` and `channel`; of the ticks `epoch` (absolute time of tick 0,
+///     in ticks), and the arrays `tick`, `channel` (empty for a single detector) and `amplitude`
+///     (empty where not measured).
+///
+/// Raises:
+///     Error: As `simulate`.
+#[pyfunction]
+#[pyo3(signature = (sensor, scene, *, seed = 1, scan = 0))]
+pub fn record(
+    sensor: &Bound<'_, PyAny>,
+    scene: &Bound<'_, PyAny>,
+    seed: u64,
+    scan: u64,
+) -> PyResult<Records> {
+    let design = Arc::clone(&Sensor::of(sensor)?.get().design);
+    let scene = Arc::clone(&Scene::of(scene)?.get().scene);
+    Operating::of(&design, &scene.environment).or_raise()?;
+    check_scan(&design, scan)?;
+    let mut left: Vec<Band> = bands(&design, scan).collect();
+    left.reverse();
+    Ok(Records { design, scene, seed, left: Mutex::new(left) })
+}
+
+fn told_of_shots(py: Python<'_>, log: ShotLog) -> PyResult<Bound<'_, PyDict>> {
+    let told = PyDict::new(py);
+    told.set_item("first", log.first)?;
+    told.set_item("owned", (log.owned.start, log.owned.end))?;
+    told.set_item("fired_at_fs", PyArray1::from_vec(py, log.fired_at_fs))?;
+    told.set_item("row", PyArray1::from_vec(py, log.row))?;
+    told.set_item("column", PyArray1::from_vec(py, log.column))?;
+    told.set_item("label", PyArray1::from_vec(py, log.label))?;
+    told.set_item("word", PyArray1::from_vec(py, log.word))?;
+    told.set_item("channel", PyArray1::from_vec(py, log.channel))?;
+    Ok(told)
+}
+
+fn told_of_ticks(py: Python<'_>, ticks: Ticks) -> PyResult<Bound<'_, PyDict>> {
+    let told = PyDict::new(py);
+    told.set_item("epoch", ticks.epoch)?;
+    told.set_item("tick", PyArray1::from_vec(py, ticks.tick))?;
+    told.set_item("channel", PyArray1::from_vec(py, ticks.channel))?;
+    told.set_item("amplitude", PyArray1::from_vec(py, ticks.amplitude))?;
+    Ok(told)
+}
+
+/// Decodes ticks, from a simulation or from hardware, with no scene.
+///
+/// Args:
+///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
+///     shots: The log of its shots, as `record` gives it, at least `fired_at_fs`, `row` and `column`.
+///         Where `label` and `word` are left out they are those that the sensor would send; without
+///         `owned` the returns of all shots are wanted; `first` and `channel` are 0.
+///     ticks: As `record` gives them, at least `tick`, ascending; without `epoch` it is 0. Those of
+///         several detectors are sorted by `channel` first.
+///     environment: Sun and air, for the `intensity` of the points.
+///
+/// Returns:
+///     The points of the owned shots, without any truth.
+///
+/// Raises:
+///     Error: If columns are missing, out of order, of unequal length, or of another sensor.
+#[pyfunction]
+#[pyo3(signature = (sensor, shots, ticks, *, environment = None))]
+pub fn decode(
+    sensor: &Bound<'_, PyAny>,
+    shots: &Bound<'_, PyDict>,
+    ticks: &Bound<'_, PyDict>,
+    environment: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Scan> {
+    let py = sensor.py();
+    let design = Arc::clone(&Sensor::of(sensor)?.get().design);
+    let environment = match environment {
+        None => Environment::default(),
+        Some(given) => {
+            let value = Reader::default().value(given, "environment", 0)?;
+            Environment::read(&value).or_raise()?
+        }
+    };
+    let operating = Operating::of(&design, &environment).or_raise()?;
+    let log = shot_log(&design, shots)?;
+    let ticks = Ticks {
+        epoch: entry(ticks, "ticks", "epoch", || 0)?,
+        tick: column(ticks, ("ticks", "tick"), None)?,
+        channel: column(ticks, ("ticks", "channel"), Some(Vec::new()))?,
+        amplitude: column(ticks, ("ticks", "amplitude"), Some(Vec::new()))?,
+    };
+    let receiver = Arc::clone(&design);
+    let cloud = work::done(py, 0, move |_| {
+        let design = &*receiver;
+        let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
+        let piece = Piece::of(design, &operating.link, &log, &returns);
+        let frame = PointCloud::empty(design, piece.points.scan);
+        let cloud = PointCloud::joined(&frame, &[piece]);
+        // There is no truth to stand beside it.
+        Ok::<_, macropulse::codec::decode::Error>(PointCloud { truth: Truth::default(), ..cloud })
+    })?;
+    Ok(Scan::new(cloud.or_raise()?, About { sensor: Some(design), ..About::default() }))
+}
+
+/// The log that a dictionary holds, all of whose pixels are the sensor's.
+fn shot_log(design: &Design, shots: &Bound<'_, PyDict>) -> PyResult<ShotLog> {
+    let row: Vec<u16> = column(shots, ("shots", "row"), None)?;
+    let columns: Vec<u16> = column(shots, ("shots", "column"), None)?;
+    for (name, entries, end) in
+        [("row", &row, design.scan.rows), ("column", &columns, design.scan.columns)]
+    {
+        if let Some(beyond) = entries.iter().find(|entry| u32::from(**entry) >= end) {
+            let last = end - 1;
+            return Err(wrong(format!(
+                "shots: {name} has {beyond}, and {} has 0 to {last}; is it the sensor that they were \
+                 recorded with?",
+                design.name
+            )));
+        }
+    }
+    let sent = row
+        .iter()
+        .zip(&columns)
+        .map(|(row, column)| shot_of_pixel(design, 0, u32::from(*row), u32::from(*column)));
+    let sent: Vec<Shot> = sent.flatten().collect();
+    let first: u64 = entry(shots, "shots", "first", || 0)?;
+    if first > MOST_SHOTS {
+        return Err(wrong(format!("shots: first is {first}; it must be {MOST_SHOTS} at most")));
+    }
+    let owned: (usize, usize) = entry(shots, "shots", "owned", || (0, row.len()))?;
+    Ok(ShotLog {
+        first,
+        fired_at_fs: column(shots, ("shots", "fired_at_fs"), None)?,
+        label: column(shots, ("shots", "label"), Some(sent.iter().map(|s| s.label).collect()))?,
+        word: column(shots, ("shots", "word"), Some(sent.iter().map(|s| s.word).collect()))?,
+        channel: column(shots, ("shots", "channel"), Some(vec![0; row.len()]))?,
+        owned: owned.0..owned.1,
+        row,
+        column: columns,
+    })
+}
+
+/// A single value of a dictionary.
+fn entry<'py, T: for<'a> FromPyObject<'a, 'py>>(
+    given: &Bound<'py, PyDict>,
+    what: &str,
+    key: &str,
+    otherwise: impl FnOnce() -> T,
+) -> PyResult<T> {
+    match given.get_item(key)? {
+        None => Ok(otherwise()),
+        Some(value) => value
+            .extract()
+            .map_err(|_| wrong(format!("{what}: {key} is {value}, which it cannot be"))),
+    }
+}
+
+/// A column of a dictionary, copied; whole numbers that do not fit are refused, not cut.
+fn column<T: Element + Copy>(
+    given: &Bound<'_, PyDict>,
+    (what, key): (&str, &str),
+    otherwise: Option<Vec<T>>,
+) -> PyResult<Vec<T>> {
+    let py = given.py();
+    let Some(value) = given.get_item(key)? else {
+        return otherwise.ok_or_else(|| wrong(format!("{what}: there is no column `{key}`")));
+    };
+    let numpy = py.import("numpy")?;
+    let typed = numpy.call_method1("asarray", (&value,))?;
+    let wanted = numpy::dtype::<T>(py);
+    let fits = typed.call_method1("astype", (&wanted,))?;
+    let is_same = numpy.call_method1("array_equal", (&typed, &fits))?.is_truthy()?;
+    let array: Option<PyReadonlyArray1<'_, T>> = fits.extract().ok();
+    match array.filter(|_| is_same || typed.len().is_ok_and(|length| length == 0)) {
+        Some(array) => Ok(array.as_array().to_vec()),
+        None => Err(wrong(format!(
+            "{what}: the column `{key}` must be numbers of type {wanted}, one after the other"
+        ))),
+    }
+}

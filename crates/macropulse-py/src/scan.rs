@@ -1,0 +1,443 @@
+//! Scans: columns, images, files.
+
+use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
+
+use macropulse::design::Design;
+use macropulse::names::nearest;
+use macropulse::points::{Outcome, PointCloud};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyImportError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::Value;
+
+use crate::columns::{Column, Computed, MEASURED, TRUE, lent};
+use crate::error::wrong;
+use crate::sensor::Sensor;
+use crate::values::from_json;
+use crate::{files, images, show};
+
+/// The points of one scan, as columns: NumPy arrays with an entry for each return, in the order in
+/// which the shots were fired, those of one shot nearest first.
+///
+/// The arrays lend the memory of the scan: nothing is copied, none can be written to, and each keeps
+/// the scan alive. Coordinates are in the frame of the sensor: x forward, y left, z up, metres; where
+/// the sensor was then is in `position_m` and `rotation`.
+#[pyclass(frozen, module = "macropulse")]
+pub struct Scan {
+    /// The points.
+    pub cloud: PointCloud,
+    computed: OnceLock<Computed>,
+    /// What has measured it.
+    sensor: Option<Arc<Design>>,
+    /// Names of the scene's objects.
+    pub objects: Vec<String>,
+    /// Names of the scene's materials.
+    pub materials: Vec<String>,
+    manifest: Value,
+}
+
+/// What is known of a scan beside its points.
+#[derive(Default)]
+pub struct About {
+    /// What has measured it.
+    pub sensor: Option<Arc<Design>>,
+    /// Names of the scene's objects.
+    pub objects: Vec<String>,
+    /// Names of the scene's materials.
+    pub materials: Vec<String>,
+    /// What is needed to repeat and to judge it; null where it was not simulated here.
+    pub manifest: Value,
+}
+
+impl Scan {
+    /// The scan of these points.
+    pub fn new(cloud: PointCloud, about: About) -> Self {
+        let About { sensor, objects, materials, manifest } = about;
+        Self { cloud, computed: OnceLock::new(), sensor, objects, materials, manifest }
+    }
+
+    /// What follows from the columns.
+    pub fn computed(&self) -> &Computed {
+        self.computed.get_or_init(|| Computed::of(&self.cloud))
+    }
+
+    /// Whether the truth stands beside the points.
+    pub fn has_truth(&self) -> bool {
+        let truth = &self.cloud.truth;
+        !(truth.pixels.outcome.is_empty() && truth.returns.outcome.is_empty())
+    }
+
+    /// Names of all its columns.
+    fn names(&self) -> impl Iterator<Item = &'static str> {
+        let truth = if self.has_truth() { &TRUE[..] } else { &[] };
+        MEASURED.iter().chain(truth).copied()
+    }
+
+    /// The column called `name`.
+    ///
+    /// # Errors
+    /// If there is none; the message names the nearest.
+    pub fn known(&self, name: &str) -> PyResult<Column<'_>> {
+        self.column(name).ok_or_else(|| {
+            if TRUE.contains(&name) {
+                return wrong(format!(
+                    "there is no {name}: the scan has no truth beside its points, as one that was \
+                     decoded or read from a file without it"
+                ));
+            }
+            let hint = nearest(name, self.names())
+                .map(|near| format!("did you mean `{near}`? "))
+                .unwrap_or_default();
+            let known: Vec<&str> = self.names().collect();
+            wrong(format!("there is no column `{name}`; {hint}known are {}", known.join(", ")))
+        })
+    }
+}
+
+/// The documentation of each column stands at its getter.
+macro_rules! column {
+    ($slf:expr, $name:literal) => {
+        lent($slf, &$slf.get().known($name)?)
+    };
+}
+
+type Array<'py> = PyResult<Bound<'py, PyAny>>;
+
+#[pymethods]
+impl Scan {
+    /// Forward, m.
+    #[getter]
+    fn x<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "x")
+    }
+
+    /// Left, m.
+    #[getter]
+    fn y<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "y")
+    }
+
+    /// Up, m.
+    #[getter]
+    fn z<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "z")
+    }
+
+    /// Apparent reflectance: 1 is a white surface that faces the sensor.
+    #[getter]
+    fn intensity<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "intensity")
+    }
+
+    /// One-way range, m.
+    #[getter]
+    fn range<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "range")
+    }
+
+    /// Time at which the shot was fired, ns from the beginning of the first scan.
+    #[getter]
+    fn time_ns<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "time_ns")
+    }
+
+    /// Row of the pixel, 0 at the top.
+    #[getter]
+    fn row<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "row")
+    }
+
+    /// Column of the pixel, 0 at the left.
+    #[getter(column)]
+    fn column_of_pixel<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "column")
+    }
+
+    /// The row, as drivers of lidars call it.
+    #[getter]
+    fn ring<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "ring")
+    }
+
+    /// Marks found at their place.
+    #[getter]
+    fn peak<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "peak")
+    }
+
+    /// Marks that the macropulse has.
+    #[getter]
+    fn marks<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "marks")
+    }
+
+    /// Peak minus the best other lag that the receiver looked at.
+    #[getter]
+    fn margin<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "margin")
+    }
+
+    /// Number among the returns of the shot, from 1, the nearest first.
+    #[getter]
+    fn return_number<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "return_number")
+    }
+
+    /// Returns of the shot.
+    #[getter]
+    fn number_of_returns<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "number_of_returns")
+    }
+
+    /// Bits: 1 for a return with fewer than half of its marks, 2 for one for which another lag had
+    /// as many.
+    #[getter]
+    fn flags<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "flags")
+    }
+
+    /// Energy as the receiver can tell it, in detected photons per mark; NaN in a scan that was read
+    /// from a file.
+    #[getter]
+    fn photons<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "photons")
+    }
+
+    /// Truth: range of the surface that the return came from, or else of the first one along the
+    /// beam, m; NaN where there is none.
+    #[getter]
+    fn true_range<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "true_range")
+    }
+
+    /// Truth: index of the object in `objects`; 65535 where there is none.
+    #[getter]
+    fn object<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "object")
+    }
+
+    /// Truth: index of the material in `materials`; 65535 where there is none.
+    #[getter]
+    fn material<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "material")
+    }
+
+    /// Truth: angle of incidence, rad; NaN where there is no surface.
+    #[getter]
+    fn incidence<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "incidence")
+    }
+
+    /// Truth: how the return came out, an index into `macropulse.OUTCOMES`: 1 right, 2 near, 3
+    /// wrong, 5 false.
+    #[getter]
+    fn outcome<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        column!(slf, "outcome")
+    }
+
+    /// All columns by name, those of the truth where it is there.
+    ///
+    /// Returns:
+    ///     A dictionary of arrays, as `pandas.DataFrame` and `numpy.savez` take it.
+    fn columns<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(slf.py());
+        for name in slf.get().names() {
+            columns.set_item(name, lent(slf, &slf.get().known(name)?)?)?;
+        }
+        Ok(columns)
+    }
+
+    /// The points, shape (n, 3), float32, m: a copy.
+    fn xyz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let cloud = &self.cloud;
+        let points = cloud.x.iter().zip(&cloud.y).zip(&cloud.z);
+        let flat: Vec<f32> = points.flat_map(|((x, y), z)| [*x, *y, *z]).collect();
+        PyArray1::from_vec(py, flat).reshape([cloud.returns(), 3])
+    }
+
+    /// A column as an image, one return of each pixel.
+    ///
+    /// Args:
+    ///     name: Name of a column.
+    ///     pick: Which return of a pixel is shown: "first", "strongest" or "last"; as the sensor
+    ///         file has it if left out.
+    ///
+    /// Returns:
+    ///     A new array of shape (rows, columns), row 0 at the top. A pixel without a return is NaN in
+    ///     real numbers and 0 in whole ones; of the truth it has that of the first surface along its
+    ///     beam, and `outcome` says there which pixels are empty (0) and which missed (4).
+    #[pyo3(signature = (name = "range", pick = None))]
+    fn image<'py>(
+        &self,
+        name: &str,
+        pick: Option<&str>,
+        py: Python<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        images::image(py, self, name, pick)
+    }
+
+    /// Number of the scan, from 0.
+    #[getter]
+    fn number(&self) -> u64 {
+        self.cloud.scan
+    }
+
+    /// Rows and columns of pixels; (0, 0) for a list without an image.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        (self.cloud.rows, self.cloud.columns)
+    }
+
+    /// Where the sensor was in the world when the scan began, m.
+    #[getter]
+    fn position_m(&self) -> [f64; 3] {
+        self.cloud.viewpoint.position
+    }
+
+    /// The turn that carries directions of the sensor into the world: a unit quaternion w, x, y, z.
+    #[getter]
+    fn rotation(&self) -> [f64; 4] {
+        self.cloud.viewpoint.turn
+    }
+
+    /// The sensor that has measured it; None for a scan that was read from a file.
+    #[getter]
+    fn sensor(&self) -> Option<Sensor> {
+        self.sensor.as_ref().map(|design| Sensor { design: Arc::clone(design) })
+    }
+
+    /// Names of the scene's objects, where they are known.
+    #[getter]
+    fn objects(&self) -> Vec<String> {
+        self.objects.clone()
+    }
+
+    /// Names of the scene's materials, where they are known.
+    #[getter]
+    fn materials(&self) -> Vec<String> {
+        self.materials.clone()
+    }
+
+    /// What is needed to repeat the scan and to judge it, with the keys of `macropulse simulate
+    /// --json`: seed, sensor, scene, environment, defaults, what is left out and was assumed, and what
+    /// was counted; None for a scan that was not simulated here.
+    #[getter]
+    fn manifest<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        from_json(py, &self.manifest)
+    }
+
+    /// Of the manifest, how the pixels came out: `outcomes`, `right_fraction` and the like; None for a
+    /// scan that was not simulated here.
+    #[getter]
+    fn score<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let own = ["outcomes", "further_outcomes", "right_fraction", "right_within_m"];
+        let counts = &self.manifest["counts"];
+        let of_target = ["samples_on_target", "points_on_target", "ghosts"];
+        let named = own.map(|key| (key, &self.manifest[key])).into_iter();
+        from_json(py, &some_of(named.chain(of_target.map(|key| (key, &counts[key])))))
+    }
+
+    /// Of the manifest, what was counted on the way from shots to returns, the `rejects`, the
+    /// `converters`, and the seconds of processor time of each stage in `times_s`; None for a scan that
+    /// was not simulated here.
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let counts = self.manifest["counts"].as_object();
+        let counts = counts.into_iter().flatten().map(|(key, value)| (key.as_str(), value));
+        let others = ["rejects", "converters", "times_s"].map(|key| (key, &self.manifest[key]));
+        from_json(py, &some_of(counts.chain(others)))
+    }
+
+    /// The scan as a table of pandas, a row for each return.
+    fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let pandas = package(slf.py(), "pandas", "to_pandas")?;
+        pandas.call_method1("DataFrame", (Self::columns(slf)?,))
+    }
+
+    /// The scan as a cloud of Open3D: `open3d.t.geometry.PointCloud` with the attributes
+    /// `positions`, `intensity`, `range` and `ring`.
+    fn to_open3d<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let open3d = package(py, "open3d", "to_open3d")?;
+        let cloud = open3d.getattr("t")?.getattr("geometry")?.call_method0("PointCloud")?;
+        let tensor = open3d.getattr("core")?.getattr("Tensor")?;
+        let point = cloud.getattr("point")?;
+        point.set_item("positions", tensor.call1((slf.get().xyz(py)?,))?)?;
+        let columns =
+            [("intensity", "float32"), ("range", "float32"), ("ring", "int32")].into_iter();
+        for (name, kind) in columns {
+            let column = lent(slf, &slf.get().known(name)?)?;
+            let column = column.call_method1("astype", (kind,))?;
+            let column = column.call_method1("reshape", (-1, 1))?;
+            point.set_item(name, tensor.call1((column,))?)?;
+        }
+        Ok(cloud)
+    }
+
+    /// Writes the scan to a file, whole or not at all.
+    ///
+    /// Args:
+    ///     path: The file; its ending says the format.
+    ///     format: Name of the format, as the program has it behind `--format`, if the ending does
+    ///         not say it.
+    ///     truth: Whether the truth is written beside the points.
+    #[pyo3(signature = (path, *, format = None, truth = true))]
+    fn save(
+        slf: &Bound<'_, Self>,
+        path: PathBuf,
+        format: Option<&str>,
+        truth: bool,
+    ) -> PyResult<()> {
+        files::save(slf, path, (format, truth))
+    }
+
+    fn __len__(&self) -> usize {
+        self.cloud.returns()
+    }
+
+    fn __repr__(&self) -> String {
+        let cloud = &self.cloud;
+        let sensor = self.sensor.as_ref().map_or(String::new(), |one| format!(" of {}", one.name));
+        let image = match cloud.rows * cloud.columns {
+            0 => String::new(),
+            _ => format!(", {} x {} pixels", cloud.rows, cloud.columns),
+        };
+        let fold = |(low, high): (f32, f32), range: &f32| (low.min(*range), high.max(*range));
+        let ranges = cloud.range.iter().fold((f32::INFINITY, f32::NEG_INFINITY), fold);
+        let ranges = match cloud.range.is_empty() {
+            true => String::new(),
+            false => format!(", {:.2} to {:.2} m", ranges.0, ranges.1),
+        };
+        format!(
+            "<macropulse.Scan {}{sensor}: {} points{image}{ranges}>",
+            cloud.scan,
+            cloud.returns()
+        )
+    }
+
+    fn _repr_html_(&self) -> String {
+        show::html(&self.cloud, &self.__repr__(), &self.manifest)
+    }
+}
+
+/// The entries that there are, as an object; null if there is none.
+fn some_of<'a>(entries: impl Iterator<Item = (&'a str, &'a Value)>) -> Value {
+    let known = entries.filter(|(_, value)| !value.is_null());
+    let known: serde_json::Map<String, Value> =
+        known.map(|(key, value)| (key.to_owned(), value.clone())).collect();
+    if known.is_empty() { Value::Null } else { Value::Object(known) }
+}
+
+/// A package that not everybody has.
+fn package<'py>(py: Python<'py>, name: &str, why: &str) -> PyResult<Bound<'py, PyModule>> {
+    py.import(name).map_err(|_| {
+        PyImportError::new_err(format!("{why} needs the package {name}: pip install {name}"))
+    })
+}
+
+/// What the numbers of `Scan.outcome` mean.
+pub fn outcomes() -> Vec<&'static str> {
+    Outcome::ALL.iter().map(|outcome| outcome.name()).collect()
+}

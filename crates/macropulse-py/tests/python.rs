@@ -1,0 +1,90 @@
+//! The tests of the Python package, run by pytest on a package that `pip install .` has made.
+#![allow(clippy::unwrap_used)]
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use macropulse_testbed::{call, python};
+
+fn here() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder that cargo builds into: the package and the program are not compiled anew where they
+/// have been.
+fn target() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    test.ancestors().find(|folder| folder.join("CACHEDIR.TAG").exists()).unwrap().to_path_buf()
+}
+
+/// The program of this source, which is to give the same bytes.
+fn program() -> PathBuf {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let build = ["build", "--quiet", "--package", "macropulse-cli", "--target-dir"];
+    call(Command::new(cargo).current_dir(here()).args(build).arg(target())).unwrap();
+    target().join("debug").join("macropulse")
+}
+
+/// A folder with the package, installed from the root of the repository as a newcomer does it, but
+/// with the profile of the tests and by `interpreter`.
+fn installed(interpreter: &Path) -> &'static Path {
+    static SITE: OnceLock<PathBuf> = OnceLock::new();
+    SITE.get_or_init(|| {
+        let site = target().join("python").join("site");
+        // What an older source has left.
+        let _ = std::fs::remove_dir_all(&site);
+        let options = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+        // The builder is one of the requirements: nothing is fetched.
+        let offline = ["--no-build-isolation", "--no-deps", "--no-index", "--target"];
+        let mut pip = Command::new(interpreter);
+        pip.args(options).args(offline).arg(&site).arg(here().join("../.."));
+        pip.env("CARGO_TARGET_DIR", target()).env("MATURIN_PEP517_ARGS", "--profile dev");
+        // The builder stands beside the interpreter.
+        let beside = interpreter.parent().unwrap().display().to_string();
+        pip.env("PATH", format!("{beside}:{}", std::env::var("PATH").unwrap_or_default()));
+        call(&mut pip).unwrap();
+        site
+    })
+}
+
+/// What pytest says of `tests`, all of which pass.
+fn passed(interpreter: &Path, site: &Path, tests: &[&str]) -> String {
+    let printed = call(
+        Command::new(interpreter)
+            .current_dir(here())
+            .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider"])
+            .args(tests)
+            .env("PYTHONPATH", site)
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .env("MACROPULSE_PROGRAM", program()),
+    )
+    .unwrap();
+    assert!(printed.contains(" passed"), "{printed}");
+    printed
+}
+
+#[test]
+fn the_package_passes_its_tests() {
+    let interpreter = python(&here().join("tests/requirements.txt")).unwrap();
+    let site = installed(&interpreter);
+    println!("{}", passed(&interpreter, site, &["tests", "--ignore", "tests/cluster"]));
+}
+
+/// Ray is large, and not made for every Python: where it cannot be installed this says so, loudly, and
+/// fails only if `MACROPULSE_RAY` is `required`.
+#[test]
+fn a_cluster_gives_what_one_machine_does() {
+    let requirements = here().join("tests/requirements.txt");
+    let site = installed(&python(&requirements).unwrap());
+    match python(&here().join("tests/requirements-ray.txt")) {
+        Ok(interpreter) => println!("{}", passed(&interpreter, site, &["tests/cluster"])),
+        Err(why) => {
+            assert_ne!(std::env::var("MACROPULSE_RAY").as_deref(), Ok("required"), "{why}");
+            let told = format!("\nNOT TESTED: macropulse.cluster, for want of Ray: {why}\n");
+            // Past what the test program keeps to itself.
+            std::io::stderr().write_all(told.as_bytes()).unwrap();
+        }
+    }
+}

@@ -1,0 +1,50 @@
+"""The examples run as they stand, each in a folder of its own."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).resolve().parent.parent / "examples").glob("*.py"))
+
+# What an example needs beside the package.
+NEEDS = {"open3d_view.py": "open3d", "rerun_log.py": "rerun"}
+
+# What it says at its end, and what it leaves.
+LEAVES = {
+    "quick_start.py": ("points", []),
+    "own_mesh.py": ("on the pyramid", ["pyramid.pcd"]),
+    "compare_receivers.py": ("matched", []),
+    "labelled_set.py": ("labelled", ["scan-000000.npz", "scan-000003.npz"]),
+    "code_length.py": ("clear-day", ["code-length.csv"]),
+}
+
+
+def test_every_example_is_known():
+    assert {path.name for path in EXAMPLES} == set(NEEDS) | set(LEAVES)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+def test_an_example_runs(path, tmp_path):
+    package = NEEDS.get(path.name)
+    if package and importlib.util.find_spec(package) is None:
+        pytest.skip(f"{path.name} needs {package}, which is not installed")
+    done = subprocess.run([sys.executable, path], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    said, files = LEAVES.get(path.name, ("", []))
+    assert said in done.stdout, done.stdout
+    for file in files:
+        assert (tmp_path / file).stat().st_size > 0, file
+
+
+def test_the_guide_prints_what_it_says(tmp_path):
+    guide = Path(__file__).resolve().parents[3] / "docs" / "guide" / "python.md"
+    source, printed = re.search(
+        r"```python\n(.*?)```.*?```text\n(.*?)```", guide.read_text(), re.DOTALL
+    ).groups()
+    done = subprocess.run([sys.executable, "-c", source], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, printed), done.stderr
+    assert (tmp_path / "car.pcd").exists()

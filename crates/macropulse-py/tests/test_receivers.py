@@ -1,0 +1,72 @@
+"""The receiver's side alone: ticks to points."""
+
+import macropulse as mp
+import numpy as np
+import pytest
+
+SENSORS = {
+    "literal": ("kim-park-2016", {"receiver.kind": "literal", "scan.raster.rows": 6}),
+    "blind": ("kim-park-2016", {"receiver.kind": "blind", "scan.raster.rows": 6}),
+    "matched": ("kim-park-2016-fixed", {"scan.raster.rows": 6}),
+    "direct": ("hdl-64e", {}),
+}
+
+
+@pytest.mark.parametrize("kind", SENSORS)
+def test_ticks_decode_to_the_points_of_the_simulation(kind):
+    name, changes = SENSORS[kind]
+    sensor, scene = mp.Sensor(name, changes), mp.Scene("car-30m")
+    whole = mp.simulate(sensor, scene, seed=5)
+    bands = mp.record(sensor, scene, seed=5)
+    count = len(bands)
+    assert count > 1 and iter(bands) is bands
+    decoded = [mp.decode(sensor, shots, ticks, environment="vacuum-dark") for shots, ticks in bands]
+    assert len(decoded) == count and sum(map(len, decoded)) == len(whole) > 500
+    for column in ("x", "y", "z", "range", "intensity", "row", "column", "time_ns", "peak", "margin",
+                   "return_number", "number_of_returns"):
+        joined = np.concatenate([getattr(band, column) for band in decoded])
+        np.testing.assert_array_equal(joined, getattr(whole, column), err_msg=column)
+    assert decoded[0].score is None and "outcome" not in decoded[0].columns()
+
+
+def test_ticks_that_were_made_by_hand():
+    """A single echo, laid out mark by mark here: its range is known."""
+    sensor = mp.Sensor("kim-park-2016-fixed")
+    shot = mp.encode(sensor, 240, 424)
+    text = sensor.to_toml()
+    chip_fs = 2_500 if "chip_ps = 2.5" in text else None
+    assert chip_fs and sensor.tick_fs <= chip_fs
+    metres = 42.0
+    away = round(2 * metres / 299_792_458 * 1e15)
+    light = shot["fired_at_fs"] + away + shot["marks"].astype(np.int64) * chip_fs
+    epoch = shot["fired_at_fs"] // sensor.tick_fs - 10
+    ticks = np.unique(light // sensor.tick_fs) - epoch
+    shots = {"fired_at_fs": [shot["fired_at_fs"]], "row": [240], "column": [424],
+             "label": [shot["label"]], "word": [shot["code_word"]]}
+    scan = mp.decode(sensor, shots, {"epoch": epoch, "tick": ticks})
+    assert len(scan) == 1 and abs(scan.range[0] - metres) < 0.001
+    assert (scan.row[0], scan.column[0]) == (240, 424) and scan.peak[0] == scan.marks[0]
+    # Labels and words are those that the sensor would send.
+    less = {key: shots[key] for key in ("fired_at_fs", "row", "column")}
+    assert mp.decode(sensor, less, {"epoch": epoch, "tick": ticks}).range[0] == scan.range[0]
+
+
+def test_what_cannot_be_decoded_is_refused():
+    sensor = mp.Sensor("kim-park-2016-fixed", {"scan.raster.rows": 6})
+    *_, (shots, ticks) = mp.record(sensor, "car-30m")
+    assert len(ticks["tick"]) > 1000
+
+    def told(shots=shots, ticks=ticks, **changed):
+        with pytest.raises(mp.Error) as raised:
+            mp.decode(sensor, {**shots, **changed}, ticks)
+        return str(raised.value)
+
+    assert "sort the ticks" in told(ticks={**ticks, "tick": ticks["tick"][::-1]})
+    assert told(ticks={}) == "ticks: there is no column `tick`"
+    assert "must be numbers of type uint32" in told(ticks={**ticks, "tick": ticks["tick"] - 0.5})
+    assert "must be numbers of type uint32" in told(ticks={**ticks, "tick": [-1, 2]})
+    assert "row has 6, and kim-park-2016-fixed has 0 to 5" in told(row=shots["row"] + 6)
+    assert "label" in told(label=shots["label"][:-1])
+    assert "first is" in told(first=2**61)
+    assert "owned" in told(owned=(3, 2)) and "owned is (1,)" in told(owned=(1,))
+    assert told(word=np.full_like(shots["word"], 60000))
