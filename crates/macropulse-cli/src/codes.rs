@@ -8,7 +8,8 @@ use clap::Args;
 use macropulse::design::family_from_toml;
 use macropulse::predict::comparison::Comparison;
 use macropulse::predict::multiple_access::{bit_error_hard, bit_error_soft};
-use serde_json::{Value, json};
+use macropulse_study::codes::{USERS, told};
+use serde_json::json;
 
 use crate::fault::Fault;
 use crate::folder::Folder;
@@ -46,9 +47,6 @@ const DEFAULTS: [&str; 8] = [
     "gold=7",
 ];
 
-/// Numbers of users whose bit errors are printed; the paper has 25 shots in flight.
-const USERS: [u32; 3] = [10, 16, 25];
-
 pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
     let texts: Vec<&str> = match options.families.is_empty() {
         true => DEFAULTS.to_vec(),
@@ -66,7 +64,7 @@ pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
     }
     if options.json {
         return print_json(vec![
-            json!({ "families": compared.iter().map(json).collect::<Vec<_>>() }),
+            json!({ "families": compared.iter().map(told).collect::<Vec<_>>() }),
         ]);
     }
     if !common.quiet {
@@ -76,31 +74,6 @@ pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
         }
     }
     Ok(())
-}
-
-fn json(of: &Comparison) -> Value {
-    let number = |value: f64| if value.is_finite() { value.into() } else { Value::Null };
-    let errors = USERS.into_iter().filter_map(|users| {
-        let access = of.users(users)?;
-        let (soft, hard) = (bit_error_soft(&access), bit_error_hard(&access));
-        Some(json!({ "users": users, "soft": soft, "hard": hard }))
-    });
-    json!({
-        "family": of.family.to_string(),
-        "length_chips": of.family.length(),
-        "marks_min": of.marks.0,
-        "marks_max": of.marks.1,
-        "words": of.family.count(),
-        "words_compared": of.compared,
-        "sidelobe_periodic": of.sidelobes.0,
-        "sidelobe_aperiodic": of.sidelobes.1,
-        "cross_max_periodic": of.crosses.0,
-        "cross_max_aperiodic": of.crosses.1,
-        "cross_mean": number(of.spread.0),
-        "cross_variance": number(of.spread.1),
-        "harmless_interferers": of.harmless_interferers(),
-        "bit_errors": errors.collect::<Vec<_>>(),
-    })
 }
 
 fn table(compared: &[Comparison]) -> String {

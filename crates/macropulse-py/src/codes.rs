@@ -6,11 +6,10 @@ use macropulse::codec::code::correlation::periodic;
 use macropulse::design::family_from_toml;
 use macropulse::emit::shot_of_pixel;
 use macropulse::predict::comparison::Comparison;
-use macropulse::predict::multiple_access::{bit_error_hard, bit_error_soft};
+use macropulse_study::codes::told;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use serde_json::{Value, json};
 
 use crate::error::{OrRaise, check_scan, wrong};
 use crate::sensor::Sensor;
@@ -62,9 +61,6 @@ pub fn encode<'py>(
     Ok(told)
 }
 
-/// Numbers of users whose bit errors are told.
-const USERS: [u32; 3] = [10, 16, 25];
-
 /// Compares code families: how alike their words are, and what that costs when many send at once.
 ///
 /// Args:
@@ -92,36 +88,12 @@ pub fn codes<'py>(py: Python<'py>, families: Vec<String>) -> PyResult<Bound<'py,
     })?;
     let compared: Vec<Comparison> = compared.or_raise()?;
     let told = compared.iter().map(|of| {
-        let told = from_json(py, &told_of(of))?;
+        let told = from_json(py, &told(of))?;
         let matrix = PyArray1::from_slice(py, &of.matrix).reshape([of.compared, of.compared])?;
         told.set_item("matrix", matrix)?;
         Ok(told)
     });
     PyList::new(py, told.collect::<PyResult<Vec<_>>>()?)
-}
-
-fn told_of(of: &Comparison) -> Value {
-    let errors = USERS.into_iter().filter_map(|users| {
-        let access = of.users(users)?;
-        let (soft, hard) = (bit_error_soft(&access), bit_error_hard(&access));
-        Some(json!({ "users": users, "soft": soft, "hard": hard }))
-    });
-    json!({
-        "family": of.family.to_string(),
-        "length_chips": of.family.length(),
-        "marks_min": of.marks.0,
-        "marks_max": of.marks.1,
-        "words": of.family.count(),
-        "words_compared": of.compared,
-        "sidelobe_periodic": of.sidelobes.0,
-        "sidelobe_aperiodic": of.sidelobes.1,
-        "cross_max_periodic": of.crosses.0,
-        "cross_max_aperiodic": of.crosses.1,
-        "cross_mean": of.spread.0,
-        "cross_variance": of.spread.1,
-        "harmless_interferers": of.harmless_interferers(),
-        "bit_errors": errors.collect::<Vec<_>>(),
-    })
 }
 
 /// Most chips of all words together that are written out.

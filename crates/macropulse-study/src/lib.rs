@@ -4,6 +4,7 @@
 #![cfg_attr(test, allow(missing_docs))]
 
 pub mod budget;
+pub mod codes;
 pub mod paper;
 pub mod record;
 pub mod sweep;

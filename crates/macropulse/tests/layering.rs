@@ -156,6 +156,7 @@ const STUDY: Layers = Layers {
     modules: &[
         Rule { module: "text", may_name: &[], because: "lines of text ask not what they say" },
         Rule { module: "view", may_name: &["text"], because: "pictures show columns, no physics" },
+        Rule { module: "codes", may_name: &[], because: "families are compared without a scan" },
         Rule {
             module: "record",
             may_name: &["text", "view"],
