@@ -182,14 +182,17 @@ impl Band<'_> {
 
     /// Looks for what is left over where all light is known that overlaps with that of `shots`: faint
     /// shots, and further surfaces.
-    pub(super) fn look_for_leftovers(&mut self, shots: Range<usize>) {
+    pub(super) fn look_for_leftovers(&mut self, shots: Range<usize>, at_hand: usize) {
         if shots.is_empty() {
             return;
         }
         for shot in shots.clone() {
             if self.is_open(shot) {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
-                (0..=SURFACES).find(|_| !self.look_for_leftover(shot));
+                for _ in 0..=SURFACES {
+                    let Some(lag) = self.look_for_leftover(shot) else { break };
+                    self.follow(shot + 1..at_hand, lag);
+                }
             }
         }
         for shot in shots.rev() {
@@ -199,17 +202,16 @@ impl Band<'_> {
         }
     }
 
-    /// Looks for light of `shot` that is left over; whether there is some.
-    fn look_for_leftover(&mut self, shot: usize) -> bool {
+    /// Looks for light of `shot` that is left over, and tells after which lag there is some.
+    fn look_for_leftover(&mut self, shot: usize) -> Option<i64> {
         if self.found[shot].is_none() && self.track_leftover(shot) {
-            return true;
+            return self.found[shot].map(|found| found.lag);
         }
         let (known, gate, weight) = (self.found[shot], self.sent.gate(), self.sent.weight(shot));
-        let wants_further = self.sent.wants_further();
         // Half of the marks may lie under ticks that are cancelled already, or a quarter of those that
         // must replace another return.
         let (least, visible) = match known {
-            Some(known) if !wants_further && gate.contains(&known.lag) => {
+            Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
                 (known.count, known.count - known.count / 4)
             }
             // Of light from beyond the gate no more is wanted.
@@ -220,39 +222,59 @@ impl Band<'_> {
         };
         let ticks = self.sent.ticks_of(shot, visible);
         if !self.leftover().may_hold(shot, &gate, ticks) {
-            return false;
+            return None;
         }
         let may_be_even = known.is_none() && self.even.is_due(shot);
-        let is_even = wants_further || self.sent.is_thorough() || may_be_even;
+        let is_even = self.sent.wants_further() || self.sent.is_thorough() || may_be_even;
         if may_be_even {
             self.even.note(shot, false);
         }
         let lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
         if lags.is_empty() {
-            return false;
+            return None;
         }
         let reach = self.sent.reach();
         let left = self.leftover().density(shot, &reach);
         let visible = self.thresholds.least(weight, left).max(visible);
-        let most = self.maximum(shot, Source::Residual, &lags, visible);
-        let Some((lag, _)) = most else { return false };
+        let (lag, _) = self.maximum(shot, Source::Residual, &lags, visible)?;
         // What was found already may be higher, and near enough to be climbed to.
         let found = match known {
-            None => self.climb(shot, lag, least),
+            None => self.climb(shot, lag, least).filter(|found| self.stands_alone(shot, *found)),
             Some(_) => self.found_at(shot, lag),
         };
-        let is_new = |found: &Detection| !self.is_known(shot, found.lag);
-        let found = found.filter(is_new);
-        let found = found.filter(|found| known.is_some() || self.stands_alone(shot, *found));
-        let found = found.and_then(|found| self.believed(shot, found));
-        self.cancel(shot, found.map_or(lag, |found| found.lag));
-        if let Some(found) = found {
-            if known.is_none() {
-                self.even.note(shot, true);
-            }
-            self.add_surface(shot, found);
+        let taken = self.take_surface(shot, found);
+        if taken.is_none() {
+            // It is not looked at again.
+            self.cancel(shot, lag);
         }
-        true
+        Some(taken.unwrap_or(lag))
+    }
+
+    /// Takes what was `found` of `shot` for one of its surfaces, if it is new and to be believed, cancels
+    /// it, and tells at which lag.
+    fn take_surface(&mut self, shot: usize, found: Option<Detection>) -> Option<i64> {
+        let found = found.filter(|found| !self.is_known(shot, found.lag));
+        let found = found.and_then(|found| self.believed(shot, found))?;
+        self.cancel(shot, found.lag);
+        if self.found[shot].is_none() {
+            self.even.note(shot, true);
+        }
+        self.add_surface(shot, found);
+        Some(found.lag)
+    }
+
+    /// Follows a surface that stands beside others, as behind a pane of glass, along the `shots`, the
+    /// first of which is expected to have it at `lag`: to search for each of them alone takes long.
+    fn follow(&mut self, shots: Range<usize>, mut lag: i64) {
+        for shot in shots {
+            if self.found[shot].is_none() || !self.is_open(shot) {
+                return;
+            }
+            let usual = self.usual.least(self.sent.weight(shot));
+            let found = self.climb(shot, lag, usual);
+            let Some(taken) = self.take_surface(shot, found) else { return };
+            lag = taken;
+        }
     }
 
     /// Adds a surface of `shot`: the one with most marks, the nearest of several, stands for it.

@@ -243,7 +243,7 @@ impl<'a> Band<'a> {
                 self.leftover = None;
                 self.cancel_found(block.clone());
                 self.look_for(block);
-                self.look_for_leftovers(closed.clone());
+                self.look_for_leftovers(closed.clone(), first);
             }
             self.settle(closed, &mut returns);
         }
