@@ -346,11 +346,11 @@ impl<'a> Leftover<'a> {
         // What is soon searched need not stand out.
         let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
         let is_long = blocks * i64::from(sent.weight(shot)) > SOON && !sent.is_thorough();
-        let fullest = stretches.iter().copied().max().map_or(0.0, f64::from);
-        // What is sought adds to what chance spreads evenly.
-        let may_be = mean + f64::from(enough) - 3.0 * mean.sqrt();
-        let stands_out = fullest > mean + 5.0 * mean.sqrt();
-        if is_long && !stands_out && !(is_even && fullest >= may_be) {
+        let fullest = stretches.iter().copied().max().unwrap_or(0);
+        let stands_out = f64::from(fullest) > mean + 5.0 * mean.sqrt();
+        // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one.
+        let enough = enough + stretches.iter().copied().min().unwrap_or(0);
+        if is_long && !stands_out && !(is_even && fullest >= enough) {
             return places;
         }
         let at = |cell: usize| self.begin + self.cell * (cells.start + cell) as i64 - fired;

@@ -212,6 +212,9 @@ impl Band<'_> {
         // must replace another return.
         let (least, visible) = match known {
             Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
+                if !known.stands_out {
+                    return None;
+                }
                 (known.count, known.count - known.count / 4)
             }
             // Of light from beyond the gate no more is wanted.
