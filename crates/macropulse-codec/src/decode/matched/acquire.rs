@@ -262,10 +262,10 @@ pub(super) struct Leftover<'a> {
 const SOON: i64 = 1000;
 
 impl<'a> Leftover<'a> {
-    /// Of all ticks at hand.
-    pub fn new(sent: &'a Sent<'a>, field: &Field) -> Self {
+    /// Of the ticks at hand from tick `first` on.
+    pub fn new(sent: &'a Sent<'a>, field: &Field, first: i64) -> Self {
         let mut cells = Vec::new();
-        let begin = field.residual_cells(&field.extent(), &mut cells);
+        let begin = field.residual_cells(&(first..field.extent().end), &mut cells);
         let together = field.stretch(sent.length() + i64::from(sent.width));
         let stretches = vec![0; cells.len()];
         let (all, tops) = (0..cells.len(), vec![0; cells.len().div_ceil(PER_TOP)]);

@@ -133,7 +133,9 @@ struct Band<'a> {
     /// For the places of a code word in the pictures that are told by one machine word.
     word_thresholds: Thresholds,
     usual: Usual,
-    /// What is left over of the ticks at hand, once it is asked for.
+    /// The time of which all light is at hand.
+    at_hand: Range<i64>,
+    /// What is left over of it, once that is asked for.
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
@@ -206,6 +208,7 @@ impl<'a> Band<'a> {
             end_thresholds,
             word_thresholds,
             usual: Usual::new(),
+            at_hand: 0..0,
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
             searched: Paced::default(),
@@ -238,7 +241,8 @@ impl<'a> Band<'a> {
             let closed = settled..end.max(settled);
             settled = closed.end;
             if block.clone().chain(closed.clone()).any(|shot| self.is_open(shot)) {
-                self.field.cover(Self::span(self.sent, block.clone()));
+                self.at_hand = Self::span(self.sent, block.clone());
+                self.field.cover(self.at_hand.clone());
                 self.search.forget();
                 self.leftover = None;
                 self.cancel_found(block.clone());
@@ -332,7 +336,8 @@ impl<'a> Band<'a> {
 
     /// What is left over of the ticks at hand.
     fn leftover(&mut self) -> &mut Leftover<'a> {
-        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &self.field))
+        let first = self.at_hand.start;
+        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &self.field, first))
     }
 
     /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of
