@@ -6,12 +6,10 @@ use super::track::WIDEST_GAP;
 use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
 
-/// So many shots are passed by at most, where nothing was found, before the next one is searched for:
-/// in the first pass, and of shots of which light does not stand out among what is spread evenly. Of
-/// 37 268 shots in faint light, `car-50m` as declared, 64 finds 31 more than 256, and 16 finds 62 more
-/// than 64; in the dark and 10¹⁰ dark counts a second 256 takes half as long as 64, and 16 three times as
-/// long.
-const LONGEST_PAUSE: usize = 64;
+/// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
+/// searched for; fewer after a smaller part. Of 37 268 shots in faint light, `car-50m` as declared, 64
+/// finds TODO more than 256; in the dark and 10¹⁰ dark counts a second 256 takes half as long as 64.
+const LONGEST_PAUSE: f64 = 256.0;
 
 /// Which shots of a block are acquired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +24,7 @@ enum Pass {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Paced {
     next: usize,
-    pause: usize,
+    pause: f64,
 }
 
 impl Default for Paced {
@@ -40,9 +38,10 @@ impl Paced {
         shot >= self.next
     }
 
-    fn note(&mut self, shot: usize, is_found: bool) {
-        self.next = shot + if is_found { 1 } else { self.pause };
-        self.pause = if is_found { 1 } else { (2 * self.pause).min(LONGEST_PAUSE) };
+    /// `shot` was found, or else searched for in such a `share` of its gate.
+    fn note(&mut self, shot: usize, is_found: bool, share: f64) {
+        self.next = shot + 1 + if is_found { 0 } else { (self.pause * share) as usize };
+        self.pause = if is_found { 1.0 } else { (2.0 * self.pause).min(LONGEST_PAUSE) };
     }
 }
 
@@ -96,7 +95,8 @@ impl Band<'_> {
             let pass = self.searched.is_due(shot).then_some(Pass::First);
             let is_found = !self.is_sought(shot) || self.track_or_acquire(shot, pass);
             if is_found || pass.is_some() {
-                self.searched.note(shot, is_found);
+                // Only what stands out is searched then: a tenth to a quarter of a gate.
+                self.searched.note(shot, is_found, 0.25);
             }
         }
         for shot in block.clone().rev() {
@@ -229,10 +229,11 @@ impl Band<'_> {
         }
         let may_be_even = known.is_none() && self.even.is_due(shot);
         let is_even = self.sent.wants_further() || self.sent.is_thorough() || may_be_even;
-        if may_be_even {
-            self.even.note(shot, false);
-        }
         let lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
+        if may_be_even {
+            let searched = lags.iter().map(|lags| lags.end - lags.start).sum::<i64>() as f64;
+            self.even.note(shot, false, searched / (gate.end - gate.start) as f64);
+        }
         if lags.is_empty() {
             return None;
         }
@@ -260,7 +261,7 @@ impl Band<'_> {
         let found = found.and_then(|found| self.believed(shot, found))?;
         self.cancel(shot, found.lag);
         if self.found[shot].is_none() {
-            self.even.note(shot, true);
+            self.even.note(shot, true, 0.0);
         }
         self.add_surface(shot, found);
         Some(found.lag)
