@@ -350,7 +350,7 @@ impl<'a> Leftover<'a> {
         let stands_out = f64::from(fullest) > mean + 5.0 * mean.sqrt();
         // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one.
         let enough = enough + stretches.iter().copied().min().unwrap_or(0);
-        if is_long && !stands_out && !(is_even && fullest >= enough) {
+        if is_long && !stands_out && !is_even {
             return places;
         }
         let at = |cell: usize| self.begin + self.cell * (cells.start + cell) as i64 - fired;
