@@ -41,6 +41,7 @@ use crate::code::Codebook;
 use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
 use acquire::{Leftover, Search};
+use cancel::Cancelled;
 use look::{Paced, Usual};
 use sent::{Sent, Words};
 use verify::Photons;
@@ -159,10 +160,9 @@ struct Band<'a> {
 impl<'a> Band<'a> {
     fn new(
         sent: &'a Sent<'a>,
-        (ticks, cancelled): (&'a [u32], cancel::Cancelled),
+        (ticks, cancelled): (&'a [u32], Option<Cancelled>),
         mut memory: Memory,
     ) -> Self {
-        let cancel::Cancelled { detections: found, again: further, residual } = cancelled;
         let gate = sent.gate();
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
@@ -175,12 +175,13 @@ impl<'a> Band<'a> {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
-        let open = match &residual {
-            Some(residual) if residual.is_empty() => Open::None,
-            Some(residual) => Open::Left(in_gates(sent, residual)),
-            None if sent.fired.is_empty() => Open::None,
+        let open = match &cancelled {
+            Some(cancelled) if cancelled.residual.is_empty() => Open::None,
+            Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
             None => Open::All,
         };
+        let Cancelled { detections: mut found, again: further, .. } = cancelled.unwrap_or_default();
+        found.resize(sent.fired.len(), None);
         let reach = sent.reach();
         let light = reach.end - reach.start + sent.length() + i64::from(sent.width);
         let begin = sent.fired.first().map_or(0, |first| first + reach.start);
