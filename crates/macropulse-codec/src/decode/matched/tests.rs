@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::sent::{Sent, Words};
-use super::{Band, Memory, cancel, decode};
+use super::{Band, Memory, decode};
 use crate::code::{Codebook, Crc, Family, Keying, Payload};
 use crate::decode::field::Source;
 use crate::decode::{Effort, Pick, Receiver, Returns};
