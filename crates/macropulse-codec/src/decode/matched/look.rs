@@ -213,7 +213,7 @@ impl Band<'_> {
         // must replace another return.
         let (least, visible) = match known {
             Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
-                if !known.stands_out {
+                if !known.stands_out && !self.again.is_due(shot) {
                     return None;
                 }
                 (known.count, known.count - known.count / 4)
@@ -231,9 +231,14 @@ impl Band<'_> {
         let may_be_even = known.is_none() && self.even.is_due(shot);
         let is_even = self.sent.wants_further() || self.sent.is_thorough() || may_be_even;
         let lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
-        if may_be_even {
-            let searched = lags.iter().map(|lags| lags.end - lags.start).sum::<i64>() as f64;
-            self.even.note(shot, false, searched / (gate.end - gate.start) as f64);
+        let searched = lags.iter().map(|lags| lags.end - lags.start).sum::<i64>() as f64;
+        let share = searched / (gate.end - gate.start) as f64;
+        match known {
+            // Faint ones are looked at again now and then. If none is, 28 of 74 519 shots of `street` as
+            // declared are found at a fainter surface; a sixteenth of the pause finds what an eighth does.
+            Some(known) if !known.stands_out => self.again.note(shot, false, share / 8.0),
+            None if may_be_even => self.even.note(shot, false, share),
+            _ => {}
         }
         if lags.is_empty() {
             return None;
@@ -261,8 +266,9 @@ impl Band<'_> {
         let found = found.filter(|found| !self.is_known(shot, found.lag));
         let found = found.and_then(|found| self.believed(shot, found))?;
         self.cancel(shot, found.lag);
-        if self.found[shot].is_none() {
-            self.even.note(shot, true, 0.0);
+        match self.found[shot] {
+            Some(_) => self.again.note(shot, true, 0.0),
+            None => self.even.note(shot, true, 0.0),
         }
         self.add_surface(shot, found);
         Some(found.lag)

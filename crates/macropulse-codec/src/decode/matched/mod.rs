@@ -140,9 +140,11 @@ struct Band<'a> {
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
-    /// Which shots are searched for that are tracked no more, and of which light does not stand out.
+    /// Which shots are searched for that are tracked no more, of which light does not stand out, and
+    /// that are found but faint.
     searched: Paced,
     even: Paced,
+    again: Paced,
     /// Counts of the block of lags that was looked at last.
     counts: Counts<NARROW>,
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
@@ -214,6 +216,7 @@ impl<'a> Band<'a> {
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
             searched: Paced::default(),
             even: Paced::default(),
+            again: Paced::default(),
             counts: Counts::default(),
             marks: Vec::new(),
             marks_of: None,
