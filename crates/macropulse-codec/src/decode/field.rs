@@ -132,8 +132,7 @@ impl<'a> Field<'a> {
     fn widen(&mut self, span: Range<i64>) {
         let span = span.start - 64 * (i64::from(self.width) / 64 + 1)..span.end;
         let (seen, lit) = (self.seen.words(&span), self.lit.words_mut(&span));
-        lit.copy_from_slice(seen);
-        look_ahead(lit, self.width as usize - 1);
+        look_ahead(seen, lit, self.width as usize - 1);
     }
 
     /// Where marks count as found.
@@ -170,8 +169,8 @@ impl<'a> Field<'a> {
                 let words =
                     self.residual.words(&(span.start..span.end + i64::from(self.width) + 64));
                 let start = span.start.div_euclid(64) * 64;
-                memory.copy(start.max(self.residual.origin()), words);
-                look_ahead(memory.all_words_mut(), self.width as usize - 1);
+                let reach = self.width as usize - 1;
+                memory.look_ahead(start.max(self.residual.origin()), words, reach);
                 memory
             }
         }

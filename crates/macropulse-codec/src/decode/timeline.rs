@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use crate::kernels::{Pattern, lay, light_up, lit_in, lit_in_all, lit_in_each, put_out};
+use crate::kernels::{
+    Pattern, lay, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, put_out,
+};
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
 #[derive(Debug, Clone, Default)]
@@ -36,16 +38,11 @@ impl Timeline {
         self.words.resize((length.max(0) / 64 + 1) as usize, 0);
     }
 
-    /// Makes it the `words` that begin at `origin`.
-    pub fn copy(&mut self, origin: i64, words: &[u64]) {
+    /// Makes it the `words` that begin at `origin`, with the `reach` ticks before each lit one.
+    pub fn look_ahead(&mut self, origin: i64, words: &[u64], reach: usize) {
         self.origin = origin;
-        self.words.clear();
-        self.words.extend_from_slice(words);
-    }
-
-    /// All of its machine words, to be changed.
-    pub fn all_words_mut(&mut self) -> &mut [u64] {
-        &mut self.words
+        self.words.resize(words.len(), 0);
+        look_ahead(words, &mut self.words, reach);
     }
 
     /// Lets it begin at `origin`, whole machine words later; what is behind where it ended so far is

@@ -189,6 +189,10 @@ fn expect(expected: &mut [(f64, f64)], begins: f64, known: &Known) {
     let (table, per_tick) = (normal_table(), known.sigma.recip());
     for (distance, share) in of_mark.chain(known.neighbours.iter().copied()) {
         let from = begins - distance as f64;
+        let end = from + expected.len() as f64;
+        if from * per_tick > FARTHEST || end * per_tick < -FARTHEST {
+            continue;
+        }
         let mut edge = normal(table, from * per_tick);
         for (place, expected) in (1..).zip(&mut *expected) {
             let next = normal(table, (from + f64::from(place)) * per_tick);

@@ -42,16 +42,17 @@ on_every_level! {
     /// Makes `places` the marks of `word`, begun at `scale` · bit for each of `bits`.
     pub(crate) fn places_of(word: &WordTicks, bits: &[u32], scale: u32, places: &mut Vec<u32>) {
         // The filling of a word is written over by the next one.
-        places.resize(bits.len() * word.marks + LANES, 0);
-        for (index, &bit) in bits.iter().enumerate() {
-            let rest = &mut places[index * word.marks..];
+        let all = bits.len() * word.marks;
+        places.resize(all + word.ticks.len() * LANES, 0);
+        let mut rest = &mut places[..];
+        for &bit in bits {
+            let begin = scale * bit;
             for (block, marks) in rest.as_chunks_mut::<LANES>().0.iter_mut().zip(&word.ticks) {
-                for lane in 0..LANES {
-                    block[lane] = scale * bit + marks[lane];
-                }
+                *block = marks.map(|mark| begin + mark);
             }
+            rest = &mut rest[word.marks..];
         }
-        places.truncate(bits.len() * word.marks);
+        places.truncate(all);
     }
 }
 

@@ -129,10 +129,18 @@ fn under(words: &mut [u64], first: usize, pattern: &Pattern, to_word: impl Fn(&m
 }
 
 on_every_level! {
-    /// Lights the `reach` bits before each one that is lit.
-    pub(crate) fn look_ahead(words: &mut [u64], reach: usize) {
+    /// Makes `ahead` what `words`, as many, are, with the `reach` bits before each one that is lit.
+    pub(crate) fn look_ahead(words: &[u64], ahead: &mut [u64], reach: usize) {
+        let Some((last, before)) = ahead.split_last_mut().filter(|_| reach > 0) else {
+            ahead.copy_from_slice(words);
+            return;
+        };
+        for (ahead, pair) in before.iter_mut().zip(words.windows(2)) {
+            *ahead = pair[0] | pair[0] >> 1 | pair[1] << 63;
+        }
+        *last = words.last().map_or(0, |word| word | word >> 1);
         // Each round looks as far ahead again as all rounds before it.
-        let mut reached = 0;
+        let (words, mut reached) = (ahead, 1);
         while reached < reach {
             let step = (reached + 1).min(reach - reached);
             let (skip, shift) = (step / 64, step % 64);
@@ -181,9 +189,9 @@ mod tests {
             let before = |bit: &usize| bit.saturating_sub(reach)..=*bit;
             let expected = lit_at(&mut lit.iter().flat_map(before));
             let seen = at_each_level(|| {
-                let mut words = lit_at(&mut lit.iter().copied());
-                look_ahead(&mut words, reach);
-                words
+                let mut ahead = vec![7; 10];
+                look_ahead(&lit_at(&mut lit.iter().copied()), &mut ahead, reach);
+                ahead
             });
             for (level, words) in seen {
                 prop_assert_eq!(&words, &expected, "{:?}", level);

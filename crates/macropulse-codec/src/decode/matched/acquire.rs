@@ -262,10 +262,10 @@ pub(super) struct Leftover<'a> {
 const SOON: i64 = 1000;
 
 impl<'a> Leftover<'a> {
-    /// Of all ticks at hand.
-    pub fn new(sent: &'a Sent<'a>, field: &Field) -> Self {
+    /// Of the ticks at hand from tick `first` on.
+    pub fn new(sent: &'a Sent<'a>, field: &Field, first: i64) -> Self {
         let mut cells = Vec::new();
-        let begin = field.residual_cells(&field.extent(), &mut cells);
+        let begin = field.residual_cells(&(first..field.extent().end), &mut cells);
         let together = field.stretch(sent.length() + i64::from(sent.width));
         let stretches = vec![0; cells.len()];
         let (all, tops) = (0..cells.len(), vec![0; cells.len().div_ceil(PER_TOP)]);
@@ -346,11 +346,11 @@ impl<'a> Leftover<'a> {
         // What is soon searched need not stand out.
         let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
         let is_long = blocks * i64::from(sent.weight(shot)) > SOON && !sent.is_thorough();
-        let fullest = stretches.iter().copied().max().map_or(0.0, f64::from);
-        // What is sought adds to what chance spreads evenly.
-        let may_be = mean + f64::from(enough) - 3.0 * mean.sqrt();
-        let stands_out = fullest > mean + 5.0 * mean.sqrt();
-        if is_long && !stands_out && !(is_even && fullest >= may_be) {
+        let fullest = stretches.iter().copied().max().unwrap_or(0);
+        let stands_out = f64::from(fullest) > mean + 5.0 * mean.sqrt();
+        // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one.
+        let enough = enough + stretches.iter().copied().min().unwrap_or(0);
+        if is_long && !stands_out && !is_even {
             return places;
         }
         let at = |cell: usize| self.begin + self.cell * (cells.start + cell) as i64 - fired;

@@ -28,18 +28,19 @@ use crate::kernels::begin_with;
 const PATIENCE: (usize, usize) = (16, 2);
 
 /// What was found without a gap, and the residual.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Cancelled {
     /// The lag of each shot that was found.
     pub detections: Vec<Option<Detection>>,
     /// Shots that were found once more, behind their first lag, and where.
     pub again: Vec<(usize, Detection)>,
-    /// Ticks that are not cancelled, in order; `None` where that is all of them.
-    pub residual: Option<Vec<u32>>,
+    /// Ticks that are not cancelled, in order.
+    pub residual: Vec<u32>,
 }
 
-/// Cancels the complete macropulses of the shots `sent` in the sorted `ticks`.
-pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
+/// Cancels the complete macropulses of the shots `sent` in the sorted `ticks`; `None` where that was given
+/// up.
+pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Option<Cancelled> {
     let mut canceller = Canceller {
         sent,
         ticks,
@@ -65,14 +66,10 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Cancelled {
     if place < ticks.len() {
         // The few that were found are soon found again; to tell their ticks from all others is not soon
         // done.
-        return Cancelled {
-            detections: vec![None; sent.fired.len()],
-            again: vec![],
-            residual: None,
-        };
+        return None;
     }
     let Canceller { detections, again, left, .. } = canceller;
-    Cancelled { detections, again, residual: Some(left) }
+    Some(Cancelled { detections, again, residual: left })
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N

@@ -41,6 +41,7 @@ use crate::code::Codebook;
 use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
 use acquire::{Leftover, Search};
+use cancel::Cancelled;
 use look::{Paced, Usual};
 use sent::{Sent, Words};
 use verify::Photons;
@@ -133,13 +134,17 @@ struct Band<'a> {
     /// For the places of a code word in the pictures that are told by one machine word.
     word_thresholds: Thresholds,
     usual: Usual,
-    /// What is left over of the ticks at hand, once it is asked for.
+    /// The time of which all light is at hand.
+    at_hand: Range<i64>,
+    /// What is left over of it, once that is asked for.
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
-    /// Which shots are searched for that are tracked no more, and of which light does not stand out.
+    /// Which shots are searched for that are tracked no more, of which light does not stand out, and
+    /// that are found but faint.
     searched: Paced,
     even: Paced,
+    again: Paced,
     /// Counts of the block of lags that was looked at last.
     counts: Counts<NARROW>,
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
@@ -157,10 +162,9 @@ struct Band<'a> {
 impl<'a> Band<'a> {
     fn new(
         sent: &'a Sent<'a>,
-        (ticks, cancelled): (&'a [u32], cancel::Cancelled),
+        (ticks, cancelled): (&'a [u32], Option<Cancelled>),
         mut memory: Memory,
     ) -> Self {
-        let cancel::Cancelled { detections: found, again: further, residual } = cancelled;
         let gate = sent.gate();
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
@@ -173,12 +177,13 @@ impl<'a> Band<'a> {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
-        let open = match &residual {
-            Some(residual) if residual.is_empty() => Open::None,
-            Some(residual) => Open::Left(in_gates(sent, residual)),
-            None if sent.fired.is_empty() => Open::None,
+        let open = match &cancelled {
+            Some(cancelled) if cancelled.residual.is_empty() => Open::None,
+            Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
             None => Open::All,
         };
+        let Cancelled { detections: mut found, again: further, .. } = cancelled.unwrap_or_default();
+        found.resize(sent.fired.len(), None);
         let reach = sent.reach();
         let light = reach.end - reach.start + sent.length() + i64::from(sent.width);
         let begin = sent.fired.first().map_or(0, |first| first + reach.start);
@@ -206,10 +211,12 @@ impl<'a> Band<'a> {
             end_thresholds,
             word_thresholds,
             usual: Usual::new(),
+            at_hand: 0..0,
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
             searched: Paced::default(),
             even: Paced::default(),
+            again: Paced::default(),
             counts: Counts::default(),
             marks: Vec::new(),
             marks_of: None,
@@ -238,12 +245,13 @@ impl<'a> Band<'a> {
             let closed = settled..end.max(settled);
             settled = closed.end;
             if block.clone().chain(closed.clone()).any(|shot| self.is_open(shot)) {
-                self.field.cover(Self::span(self.sent, block.clone()));
+                self.at_hand = Self::span(self.sent, block.clone());
+                self.field.cover(self.at_hand.clone());
                 self.search.forget();
                 self.leftover = None;
                 self.cancel_found(block.clone());
                 self.look_for(block);
-                self.look_for_leftovers(closed.clone());
+                self.look_for_leftovers(closed.clone(), first);
             }
             self.settle(closed, &mut returns);
         }
@@ -332,7 +340,8 @@ impl<'a> Band<'a> {
 
     /// What is left over of the ticks at hand.
     fn leftover(&mut self) -> &mut Leftover<'a> {
-        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &self.field))
+        let first = self.at_hand.start;
+        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &self.field, first))
     }
 
     /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::sent::{Sent, Words};
-use super::{Band, Memory, cancel, decode};
+use super::{Band, Memory, decode};
 use crate::code::{Codebook, Crc, Family, Keying, Payload};
 use crate::decode::field::Source;
 use crate::decode::{Effort, Pick, Receiver, Returns};
@@ -191,10 +191,6 @@ fn exhaustive(sent: &Sent, ticks: &[u32], shot: usize, lags: std::ops::Range<i64
     (best, count(best))
 }
 
-fn nothing(shots: usize) -> cancel::Cancelled {
-    cancel::Cancelled { detections: vec![None; shots], again: vec![], residual: None }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(60) })]
 
@@ -217,7 +213,7 @@ proptest! {
         let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
         let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
         let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
-        let mut band = Band::new(&sent, (&ticks.tick, nothing(12)), Memory::default());
+        let mut band = Band::new(&sent, (&ticks.tick, None), Memory::default());
         band.field.cover(Band::span(&sent, 0..12));
         for shot in 4..8 {
             let lags = from..from + 2500;
