@@ -12,7 +12,7 @@ use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::simulate::Formats;
-use crate::text::{grouped, print};
+use crate::text::{counted, print};
 
 /// Convert point clouds to another format
 ///
@@ -168,9 +168,10 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         warn("not a single point: there is none in what was read");
     }
     if !common.quiet {
-        let (scans, points, files) = (grouped(scans), grouped(points), grouped(files));
+        let (scans, points) = (counted(scans, "scan"), counted(points, "point"));
+        let files = counted(files, "file");
         let output = options.output.display();
-        print(&format!("{scans} scans, {points} points, {files} files: {output}\n"))?;
+        print(&format!("{scans}, {points}, {files}: {output}\n"))?;
     }
     if interrupt.is_raised() { Err(Fault::Interrupted) } else { Ok(()) }
 }

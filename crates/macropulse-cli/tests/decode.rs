@@ -22,7 +22,7 @@ fn again(
     let line = format!("simulate {sensor} {rest} {formats},ticks -o out --json -j 1");
     let simulated = desk.json(&format!("{line} --scans {scans}"));
     assert!(simulated["counts"]["returns"].as_u64().unwrap() > 0, "{line}");
-    let environment = simulated["environment"].as_str().unwrap();
+    let environment = simulated["environment"]["name"].as_str().unwrap();
     let mut returns = 0;
     let mut decoded = serde_json::Value::Null;
     for scan in 0..scans {
@@ -267,7 +267,7 @@ fn an_explanation_says_what_was_decided() {
         format!("simulate {sensor} --scene car-30m --format csv,ticks -o out --json {pixels}");
     let simulated = desk.json(&line);
     let files = "out/shots-000000.mps out/ticks-000000.mpt";
-    let environment = simulated["environment"].as_str().unwrap();
+    let environment = simulated["environment"]["name"].as_str().unwrap();
     let line =
         format!("decode {sensor} {files} --environment {environment} -o again --json {pixels}");
     let decoded = desk.json(&line);

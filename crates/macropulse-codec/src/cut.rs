@@ -2,6 +2,8 @@
 
 use std::ops::{Range, RangeInclusive};
 
+use crate::shot_log::ShotLog;
+
 /// What must be known around a run of **owned** shots to decode them as if the whole stream were at
 /// hand. All times are fs.
 ///
@@ -18,8 +20,8 @@ pub struct Cut {
     /// How long the receiver listens to a shot, from its firing on.
     pub listening_fs: i64,
     /// How long before the first owned shot the ticks begin, and how long after the last gate is
-    /// closed they end: as long as a macropulse, so that all that overlap with light of an owned
-    /// shot are there as a whole.
+    /// closed they end: long enough for all that overlaps with light of an owned shot to be there as a
+    /// whole, and to be told whose it is.
     pub lead_fs: i64,
     /// How long before the first owned shot others must be known: their light may still be under way
     /// when the ticks begin.
@@ -50,6 +52,15 @@ impl Cut {
         clocks * (self.clock_fs / self.tick_fs)
     }
 
+    /// The part of the log of a band that its receiver is given: without the shots that were fired before
+    /// the ticks begin. Of their light only some is there; a receiver that knew of them would take that
+    /// of others for theirs.
+    pub fn known(&self, log: &ShotLog) -> ShotLog {
+        let Some(first) = log.fired_at_fs.get(log.owned.start) else { return log.clone() };
+        let opens_fs = self.opens(*first).saturating_mul(self.tick_fs);
+        log.from(log.fired_at_fs.partition_point(|fired| *fired < opens_fs))
+    }
+
     fn closes(&self, last: i64) -> i64 {
         last.saturating_add(self.listening_fs).saturating_add(self.lead_fs)
     }
@@ -75,6 +86,16 @@ mod tests {
         assert_eq!(CUT.opens(5000), 490);
         // Light of the last shots may be beyond what is counted.
         assert_eq!(*CUT.shots(0, i64::MAX).end(), i64::MAX);
+    }
+
+    #[test]
+    fn a_receiver_is_given_the_shots_all_of_whose_light_is_in_the_ticks() {
+        let fired = [4000, 4880, 4900, 5000, 5100];
+        let log = ShotLog { owned: 3..5, ..ShotLog::of_one_channel(&fired, &[4, 3, 2, 1, 0]) };
+        let known = CUT.known(&log);
+        assert_eq!((known.first, known.owned.clone()), (2, 1..3));
+        assert_eq!((known.fired_at_fs, known.word), (vec![4900, 5000, 5100], vec![2, 1, 0]));
+        assert_eq!(CUT.known(&ShotLog::default()), ShotLog::default());
     }
 
     #[test]

@@ -49,6 +49,21 @@ impl ShotLog {
         self.fired_at_fs.len()
     }
 
+    /// The log without its shots before shot `from`, none of which is owned.
+    pub(crate) fn from(&self, from: usize) -> Self {
+        let column = |column: &[u16]| column[from..].to_vec();
+        Self {
+            first: self.first + from as u64,
+            fired_at_fs: self.fired_at_fs[from..].to_vec(),
+            row: column(&self.row),
+            column: column(&self.column),
+            label: column(&self.label),
+            word: column(&self.word),
+            channel: column(&self.channel),
+            owned: self.owned.start.saturating_sub(from)..self.owned.end.saturating_sub(from),
+        }
+    }
+
     /// The log of each channel by itself, and which of the shots here are in it, ascending.
     pub fn each_channel(&self) -> Vec<(Vec<usize>, Self)> {
         let mut shots: Vec<usize> = (0..self.len()).collect();

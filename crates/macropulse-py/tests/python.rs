@@ -6,25 +6,18 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use macropulse_testbed::{call, python};
+use macropulse_testbed::{call, python, target};
 
 fn here() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// The folder that cargo builds into: the package and the program are not compiled anew where they
-/// have been.
-fn target() -> PathBuf {
-    let test = std::env::current_exe().unwrap();
-    test.ancestors().find(|folder| folder.join("CACHEDIR.TAG").exists()).unwrap().to_path_buf()
 }
 
 /// The program of this source, which is to give the same bytes.
 fn program() -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let build = ["build", "--quiet", "--package", "macropulse-cli", "--target-dir"];
-    call(Command::new(cargo).current_dir(here()).args(build).arg(target())).unwrap();
-    target().join("debug").join("macropulse")
+    call(Command::new(cargo).current_dir(here()).args(build).arg(target().unwrap())).unwrap();
+    target().unwrap().join("debug").join("macropulse")
 }
 
 /// A folder with the package, installed from the root of the repository as a newcomer does it, but
@@ -32,7 +25,7 @@ fn program() -> PathBuf {
 fn installed(interpreter: &Path) -> &'static Path {
     static SITE: OnceLock<PathBuf> = OnceLock::new();
     SITE.get_or_init(|| {
-        let site = target().join("python").join("site");
+        let site = target().unwrap().join("python").join("site");
         // What an older source has left.
         let _ = std::fs::remove_dir_all(&site);
         let options = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
@@ -40,7 +33,7 @@ fn installed(interpreter: &Path) -> &'static Path {
         let offline = ["--no-build-isolation", "--no-deps", "--no-index", "--target"];
         let mut pip = Command::new(interpreter);
         pip.args(options).args(offline).arg(&site).arg(here().join("../.."));
-        pip.env("CARGO_TARGET_DIR", target()).env("MATURIN_PEP517_ARGS", "--profile dev");
+        pip.env("CARGO_TARGET_DIR", target().unwrap()).env("MATURIN_PEP517_ARGS", "--profile dev");
         // The builder stands beside the interpreter.
         let beside = interpreter.parent().unwrap().display().to_string();
         pip.env("PATH", format!("{beside}:{}", std::env::var("PATH").unwrap_or_default()));

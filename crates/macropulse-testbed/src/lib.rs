@@ -92,14 +92,18 @@ fn on_path(name: &str) -> Option<PathBuf> {
     std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file())
 }
 
-/// The target folder that the test program runs from.
-fn target() -> Result<PathBuf, String> {
+/// The folder that cargo builds into, of which the calling test program is one: it lies in
+/// `<target>/<profile>/deps`.
+///
+/// # Errors
+/// A sentence, if the program lies elsewhere.
+pub fn target() -> Result<PathBuf, String> {
     let program = std::env::current_exe().map_err(|why| why.to_string())?;
-    let is_target = |folder: &&Path| folder.join("CACHEDIR.TAG").exists();
-    let found = program.ancestors().find(is_target);
-    found
+    let deps = program.ancestors().find(|folder| folder.ends_with("deps"));
+    let target = deps.and_then(Path::parent).and_then(Path::parent);
+    target
         .map(Path::to_path_buf)
-        .ok_or_else(|| format!("{} does not lie in a target folder of cargo", program.display()))
+        .ok_or_else(|| format!("{} does not lie where cargo puts test programs", program.display()))
 }
 
 #[cfg(test)]
@@ -116,6 +120,6 @@ mod tests {
 
     #[test]
     fn the_target_folder_is_found() {
-        assert!(target().unwrap().join("CACHEDIR.TAG").exists());
+        assert!(std::env::current_exe().unwrap().starts_with(target().unwrap()));
     }
 }

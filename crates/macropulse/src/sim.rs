@@ -174,7 +174,7 @@ impl<'a> Scans<'a> {
         let mut memory = Memory::default();
         let mut converted = record::converted(&setup, &mut memory, &log);
         record::cut(&setup, &mut memory, (band, &log), &mut converted);
-        (log, converted.ticks)
+        (design.cut().known(&log), converted.ticks)
     }
 
     fn part_kept(
@@ -294,7 +294,10 @@ fn measure<'a>(
     record::cut(setup, memory, (band, &log), &mut converted);
     lap(&mut tally);
     let Converted { ticks, peak_busy, lost, merged } = converted;
-    let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
+    let known = design.cut().known(&log);
+    let mut returns = design.receiver.decode(&design.coding.codebook, &known, &ticks)?;
+    let unknown = (known.first - log.first) as u32;
+    returns.shot.iter_mut().for_each(|shot| *shot += unknown);
     lap(&mut tally);
     let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
     let hits = traced.middle;

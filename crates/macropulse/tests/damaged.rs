@@ -9,14 +9,16 @@ use macropulse::scene::Scene;
 use macropulse::sim;
 use proptest::prelude::*;
 use std::fs;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 const READABLE: [&str; 9] = ["pcd", "ply", "las", "laz", "e57", "npy", "csv", "kitti", "mcap"];
 
-/// More address space than sound readers take for files of some ten kilobytes, kB: the image of a
-/// list may have as many pixels as a sensor, 2²⁵ of them, with 25 bytes each and the truth, for each
-/// of three threads.
-const MOST_MEMORY: usize = 4 << 20;
+/// More address space than sound readers take for a file of some ten kilobytes, kB: the image of a
+/// list may have as many pixels as a sensor, 2²⁵ of them, with 25 bytes each and the truth.
+const MOST_MEMORY: usize = 3 << 20;
+
+/// One file is read at a time: the address space is that of the process.
+static READING: Mutex<()> = Mutex::new(());
 
 /// The most address space that this process had, kB; 0 where it is not known.
 fn most_memory() -> usize {
@@ -49,6 +51,7 @@ fn read(name: &str, bytes: &[u8]) {
     let path = folder.path().join("damaged");
     let path = path.with_extension(Format::parse(name).unwrap().extension());
     fs::write(&path, bytes).unwrap();
+    let _alone = READING.lock().unwrap_or_else(PoisonError::into_inner);
     if let Ok(clouds) = Clouds::open(&path) {
         for cloud in clouds {
             match cloud {

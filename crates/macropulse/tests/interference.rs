@@ -124,9 +124,10 @@ fn other_words_of_the_family_are_nearly_as_good_as_silence() {
         let differ = without.count(Outcome::Right).abs_diff(with.count(Outcome::Right));
         assert!(differ < 6784 / 20, "{keys:?} {with:?} {without:?}");
     }
-    // With all words of the family it has our own one in half of the pixels.
+    // With all words of the family it has our own one in half of the pixels: those of the sky, 1284 in
+    // all, and where its light comes before ours.
     let half = score("in-phase", &[HALF], 0);
-    assert!(half.ghosts > 1500, "{half:?}");
+    assert!(half.ghosts > 1000, "{half:?}");
 }
 
 /// Out of step the other still sends one of the words of the shots in flight, with another label. The

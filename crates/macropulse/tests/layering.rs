@@ -37,7 +37,11 @@ const CODEC: Layers = Layers {
         },
         Rule { module: "shot_log", may_name: &[], because: "the log is columns" },
         Rule { module: "ticks", may_name: &[], because: "ticks are columns" },
-        Rule { module: "cut", may_name: &[], because: "a stream is cut by times alone" },
+        Rule {
+            module: "cut",
+            may_name: &["shot_log"],
+            because: "shots and ticks are cut by times alone",
+        },
         Rule {
             module: "files",
             may_name: &["cut", "shot_log", "ticks"],

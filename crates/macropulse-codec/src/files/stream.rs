@@ -91,7 +91,7 @@ impl<S: Read, T: Read> Stream<S, T> {
                 self.left.start - 1
             ));
         }
-        Ok(Some((log, self.ticks_of(&span, epoch)?)))
+        Ok(Some((self.cut.known(&log), self.ticks_of(&span, epoch)?)))
     }
 
     /// The id behind the last shot at hand.

@@ -43,9 +43,8 @@ impl Design {
     /// detector to forget the state it is started in.
     pub fn cut(&self) -> Cut {
         let jitter_fs = self.most_jitter_fs();
-        // What arrives in the gate of the shots before, too: they are decoded first, and their light
-        // cancelled.
-        let lead_fs = self.listening_fs() + jitter_fs;
+        // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows.
+        let lead_fs = 2 * self.listening_fs() + jitter_fs;
         let under_way_fs = self.light_fs() + jitter_fs;
         Cut {
             tick_fs: self.tdc.tick_fs,

@@ -75,7 +75,7 @@ mod tests {
         let paper = digest("kim-park-2016", &[]);
         let others = [
             digest("hdl-64e", &[]),
-            digest("kim-park-2016", &[("code.word_modulus", "28")]),
+            digest("kim-park-2016", &[("code.word.modulus", "28")]),
             digest("kim-park-2016", &[("tdc.resolution_ps", "1.25")]),
             digest("kim-park-2016", &[("scan.scans_per_s", "59.0")]),
         ];

@@ -7,10 +7,9 @@ use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
 
 /// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
-/// searched for, and fewer after a part of it. Of 37 268 shots in faint light, `car-50m` as declared, as
-/// many are found as with 64 after any search, which takes 1.8 times as long in the dark with 10¹⁰ dark
-/// counts a second.
-const LONGEST_PAUSE: f64 = 256.0;
+/// searched for, and fewer after a part of it. With 256 a whole scan of `kim-park-2016-fixed` in `car-50m`
+/// has 400 of 190 000 points less; it takes half as long in the dark with 10¹⁰ dark counts a second.
+const LONGEST_PAUSE: f64 = 64.0;
 
 /// Which shots of a block are acquired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,8 +95,7 @@ impl Band<'_> {
             let pass = self.searched.is_due(shot).then_some(Pass::First);
             let is_found = !self.is_sought(shot) || self.track_or_acquire(shot, pass);
             if is_found || pass.is_some() {
-                // Only what stands out is searched then: a tenth to a quarter of a gate.
-                self.searched.note(shot, is_found, 0.25);
+                self.searched.note(shot, is_found, 1.0);
             }
         }
         for shot in block.clone().rev() {
@@ -235,8 +233,8 @@ impl Band<'_> {
         let share = searched / (gate.end - gate.start) as f64;
         match known {
             // Faint ones are looked at again now and then. If none is, 28 of 74 519 shots of `street` as
-            // declared are found at a fainter surface; a sixteenth of the pause finds what an eighth does.
-            Some(known) if !known.stands_out => self.again.note(shot, false, share / 8.0),
+            // declared are found at a fainter surface; a quarter of the pause finds what a half does.
+            Some(known) if !known.stands_out => self.again.note(shot, false, share / 2.0),
             None if may_be_even => self.even.note(shot, false, share),
             _ => {}
         }
