@@ -95,7 +95,7 @@ fn cells_that_are_blind_and_converters_that_are_busy_change_nothing() {
     let desk = Desk::new();
     let sensor = format!("--sensor kim-park-2016-fixed {ROWS}=12 --set tdc.converters=10");
     let (simulated, _) = again(&desk, &sensor, "--scene car-30m", 1);
-    assert!(simulated["detections_lost"].as_u64().unwrap() > 1000, "{simulated}");
+    assert!(simulated["converters"]["lost"].as_u64().unwrap() > 1000, "{simulated}");
 }
 
 const SMALL: &str = "--sensor kim-park-2016-fixed --set scan.raster.rows=6";

@@ -131,14 +131,15 @@ impl<'a> Run<'a> {
         folder: Option<&Folder>,
     ) -> Result<(), Fault> {
         for pixel in pixels {
-            let is_there = |band: &Band| {
-                explain::shot_of(&band.shot_log(self.design), *pixel).map(|shot| (*band, shot))
-            };
-            let Some((band, shot)) = bands(self.design, 0).find_map(|band| is_there(&band)) else {
+            let is_there =
+                |band: &Band| explain::shot_of(&band.shot_log(self.design), *pixel).is_some();
+            let band = bands(self.design, 0).find(is_there);
+            let record = band.map(|band| scans.record(&band));
+            let shot = record.as_ref().and_then(|(log, _)| explain::shot_of(log, *pixel));
+            let (Some((log, ticks)), Some(shot)) = (record, shot) else {
                 self.warnings.push("a pixel of --explain has no shot".to_owned());
                 continue;
             };
-            let (log, ticks) = scans.record(&band);
             let explained = Explained::of(self.design, (&log, &ticks), shot)?;
             self.explained.push((explained.text(), explained.json()));
             if let Some(folder) = folder {

@@ -348,8 +348,11 @@ impl<'a> Leftover<'a> {
         let is_long = blocks * i64::from(sent.weight(shot)) > SOON && !sent.is_thorough();
         let fullest = stretches.iter().copied().max().unwrap_or(0);
         let stands_out = f64::from(fullest) > mean + 5.0 * mean.sqrt();
-        // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one.
-        let enough = enough + stretches.iter().copied().min().unwrap_or(0);
+        // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one where
+        // not all of them overlap with what is sought.
+        let emptiest =
+            stretches.iter().copied().min().filter(|_| stretches.len() > 2 * self.together);
+        let enough = enough + emptiest.unwrap_or(0);
         if is_long && !stands_out && !is_even {
             return places;
         }
