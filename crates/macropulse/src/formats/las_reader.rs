@@ -10,8 +10,9 @@ use las::{Header, Point, Reader};
 use std::io::Cursor;
 use std::ops::Range;
 
-/// Points read at a time: what the header says of their number is not believed.
-const AT_A_TIME: u64 = 1 << 16;
+/// Bytes of points read at a time: what the header says of their number is not believed, and each may
+/// have 65 535 bytes.
+const AT_A_TIME: u64 = 1 << 22;
 
 /// A dimension of the extra bytes that is one of our attributes.
 struct Extra {
@@ -31,10 +32,11 @@ pub(super) fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
     let mut gathered = Gathered::new(&about, &attributes(&extra))?;
     let points = reader.header().number_of_points();
     let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
+    let together = (AT_A_TIME / u64::from(header.point_format().len()).max(1)).max(1);
     let mut at = 0_usize;
     loop {
         let found = reader
-            .fill_points(AT_A_TIME, &mut batch)
+            .fill_points(together, &mut batch)
             .map_err(|why| format!("it ends after {at} of {points} points or is damaged: {why}"))?;
         if found == 0 {
             break;
