@@ -30,7 +30,8 @@ pub fn save(
                 return write_cloud(format, &this.cloud, &names, &path);
             }
             let cloud = PointCloud { truth: Truth::default(), ..this.cloud.clone() };
-            write_cloud(format, &cloud, &names, &path)
+            // Names of what the file does not tell say nothing.
+            write_cloud(format, &cloud, &Names::default(), &path)
         })
         .or_raise()
 }

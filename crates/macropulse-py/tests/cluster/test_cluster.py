@@ -38,7 +38,7 @@ def test_a_sweep_is_that_of_one_machine(two_workers, tmp_path):
     together = cluster.sweep("peregrine", "wall", VARY, folder=tmp_path / "ray", tasks=5, **ASKED)
     assert together == alone
     assert files(tmp_path / "ray") == files(tmp_path / "alone")
-    assert len(files(tmp_path / "ray")) == 12 + 5
+    assert len(files(tmp_path / "ray")) == 12 + 6
 
 
 def at_work():
