@@ -58,7 +58,7 @@ impl Cut {
     pub fn known(&self, log: &ShotLog) -> ShotLog {
         let Some(first) = log.fired_at_fs.get(log.owned.start) else { return log.clone() };
         let opens_fs = self.opens(*first).saturating_mul(self.tick_fs);
-        log.from(log.fired_at_fs.partition_point(|fired| *fired < opens_fs))
+        log.part(log.fired_at_fs.partition_point(|fired| *fired < opens_fs)..log.len())
     }
 
     fn closes(&self, last: i64) -> i64 {

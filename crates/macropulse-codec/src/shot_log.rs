@@ -49,18 +49,22 @@ impl ShotLog {
         self.fired_at_fs.len()
     }
 
-    /// The log without its shots before shot `from`, none of which is owned.
-    pub(crate) fn from(&self, from: usize) -> Self {
-        let column = |column: &[u16]| column[from..].to_vec();
+    /// The `shots` of the log, counted in it, as a log of their own; as far as they are there. Owned are
+    /// those of them that were.
+    pub fn part(&self, shots: Range<usize>) -> Self {
+        let end = shots.end.min(self.len());
+        let shots = shots.start.min(end)..end;
+        let column = |column: &[u16]| column[shots.clone()].to_vec();
+        let place = |shot: usize| shot.clamp(shots.start, shots.end) - shots.start;
         Self {
-            first: self.first + from as u64,
-            fired_at_fs: self.fired_at_fs[from..].to_vec(),
+            first: self.first + shots.start as u64,
+            fired_at_fs: self.fired_at_fs[shots.clone()].to_vec(),
             row: column(&self.row),
             column: column(&self.column),
             label: column(&self.label),
             word: column(&self.word),
             channel: column(&self.channel),
-            owned: self.owned.start.saturating_sub(from)..self.owned.end.saturating_sub(from),
+            owned: place(self.owned.start)..place(self.owned.end),
         }
     }
 

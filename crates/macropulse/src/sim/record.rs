@@ -43,26 +43,11 @@ pub(super) fn cut(
     // What is fired while gates are open of shots whose light is looked at.
     let closes_fs = seen.end * design.tdc.tick_fs + design.cut().listening_fs;
     let shots = next.fired_at_fs.partition_point(|fired| *fired <= closes_fs);
-    let mut later = self::converted(setup, memory, &first_of(&next, shots)).ticks;
+    let mut later = self::converted(setup, memory, &next.part(0..shots)).ticks;
     later.keep(&(own.end..seen.end));
     converted.ticks.keep(&own);
     append(&mut converted.ticks, &later);
     debug_assert_eq!(converted.ticks.epoch, design.cut().epoch(log.fired_at_fs[0]));
-}
-
-/// The first `shots` of a log.
-fn first_of(log: &ShotLog, shots: usize) -> ShotLog {
-    let column = |column: &[u16]| column[..shots].to_vec();
-    ShotLog {
-        first: log.first,
-        fired_at_fs: log.fired_at_fs[..shots].to_vec(),
-        row: column(&log.row),
-        column: column(&log.column),
-        label: column(&log.label),
-        word: column(&log.word),
-        channel: column(&log.channel),
-        owned: log.owned.start.min(shots)..log.owned.end.min(shots),
-    }
 }
 
 /// Adds ticks that come `later`, whatever they are counted from.
