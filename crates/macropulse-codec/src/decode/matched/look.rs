@@ -9,7 +9,7 @@ use crate::decode::field::Source;
 /// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
 /// searched for, and fewer after a part of it. With 256 a whole scan of `kim-park-2016-fixed` in `car-50m`
 /// has 400 of 190 000 points less; it takes half as long in the dark with 10¹⁰ dark counts a second.
-const LONGEST_PAUSE: f64 = 64.0;
+pub(super) const LONGEST_PAUSE: f64 = 64.0;
 
 /// So many times as many are passed by where light is so dense that lag after lag of half of the gate
 /// must be counted: a search takes 290 µs then instead of 6. Of 37 268 shots of `car-50m` and 74 519 of `street`
