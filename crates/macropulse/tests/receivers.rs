@@ -11,7 +11,7 @@ mod street;
 
 use macropulse::codec::code::Codebook;
 use macropulse::codec::decode::ReceiverKind::{Blind, Literal, Matched};
-use macropulse::codec::decode::Reject;
+use macropulse::codec::decode::{Effort, Reject};
 use street::{CLEAR, Scene, Score, Sensor, Weather, car, random, sky, slope};
 
 const SCENES: [(&str, Scene); 3] = [("car", car), ("slope", slope), ("random", random)];
@@ -221,5 +221,29 @@ fn a_log_without_shots_and_ticks_without_ticks_give_nothing() {
         let nothing =
             sensor.receiver.decode(&Codebook::single(), &Default::default(), &ticks).unwrap();
         assert!(nothing.is_empty());
+    }
+}
+
+/// A wall at 105 m.
+fn wall(_: u32, _: u32) -> Option<i64> {
+    Some(280_000)
+}
+
+/// H0: where all light is faint, the quick receiver finds most of what the thorough one does. N = 2544
+/// shots of a wall of which one mark in twenty is seen, so that about half of them can be told from
+/// chance, and of one of which one in thirty is. A receiver that looks twelve shots around those it has
+/// found loses nine in ten of the second wall.
+#[test]
+fn faint_walls_are_found_without_looking_everywhere() {
+    for (seen, share) in [(0.05, 0.9), (0.033, 0.4)] {
+        let weather = Weather { seen, ..CLEAR };
+        let found = [Effort::Quick, Effort::Thorough].map(|effort| {
+            let mut sensor = Sensor::printed(Matched);
+            sensor.receiver.effort = effort;
+            sensor.score(rows("random"), wall, weather)
+        });
+        let [quick, thorough] = found.map(|score| score.percent_right());
+        assert!((5.0..80.0).contains(&thorough), "{seen}: {thorough:.2} %");
+        assert!(quick > share * thorough, "{seen}: {quick:.2} % of {thorough:.2} %");
     }
 }

@@ -178,9 +178,10 @@ impl Band<'_> {
     /// Whether the marks found are spread over the code word. Light of another word meets the same one
     /// or two of its marks in every bit, and makes many marks of few.
     ///
-    /// Where a share q is found in each of B bits, a mark of the word is found in one bit at least with
-    /// probability p = 1 − (1 − q)ᴮ; of its W marks no fewer than W·p − 3·√(W·p·(1 − p)) may be.
-    fn is_spread(&self, shot: usize, detection: Detection) -> bool {
+    /// Where a share q is found in each of B bits, a mark of the word is found in none of them with
+    /// probability (1 − q)ᴮ. It is not spread if chance would leave out as many of the W marks with a
+    /// probability of α over the bits of a payload at most.
+    fn is_spread(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let bits = sent.lit_bits(shot).len();
         if bits < 2 {
@@ -190,10 +191,10 @@ impl Band<'_> {
         let lit = self.field.lit();
         let is_found =
             |mark: &&u32| sent.lit_from(shot, start).any(|bit| lit.has(bit + i64::from(**mark)));
-        let found = sent.bits(shot).marks.iter().filter(is_found).count() as f64;
+        let found = sent.bits(shot).marks.iter().filter(is_found).count() as u32;
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
-        let (word, any) = (f64::from(sent.in_word(shot)), 1.0 - (1.0 - share).powi(bits as i32));
-        found >= word * any - 3.0 * (word * any * (1.0 - any)).sqrt()
+        let (word, left_out) = (sent.in_word(shot), (1.0 - share).powi(bits as i32));
+        word - found < self.bit_thresholds.least(word, left_out)
     }
 
     /// What earlier shots in the word of `shot`, found with `count` marks, would be found with if their
