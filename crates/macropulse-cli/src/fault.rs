@@ -7,7 +7,7 @@ use anstyle::AnsiColor;
 use clap::error::ErrorKind;
 use macropulse::{channel, design, environment, formats, scene, sim};
 use macropulse_study::text::broken;
-use macropulse_study::{paper, record, sweep};
+use macropulse_study::{paper, record, sweep, validate};
 
 /// Why a command did not do what was asked.
 #[derive(Debug)]
@@ -159,6 +159,16 @@ impl From<record::Error> for Fault {
         match error {
             record::Error::Formats(error) => error.into(),
             record::Error::View(error) => Self::Ours(error.to_string()),
+        }
+    }
+}
+
+impl From<validate::Error> for Fault {
+    fn from(error: validate::Error) -> Self {
+        match error {
+            validate::Error::Stopped => Self::Interrupted,
+            validate::Error::Formats(error) => error.into(),
+            other => Self::Ours(other.to_string()),
         }
     }
 }

@@ -24,6 +24,7 @@ mod simulate;
 mod speed;
 mod sweep;
 mod text;
+mod validate;
 mod view;
 
 use std::process::ExitCode;
@@ -53,6 +54,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Sweep(sweep::Sweep),
     Paper(paper::Paper),
+    Validate(validate::Validate),
     Sensors(sensors::Sensors),
     Scenes(scenes::Scenes),
     Environments(environments::Environments),
@@ -91,6 +93,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Simulate(simulate) => simulate::run(simulate, common),
         Command::Sweep(sweep) => sweep::run(sweep, common),
         Command::Paper(paper) => paper::run(paper, common),
+        Command::Validate(validate) => validate::run(validate, common),
         Command::Sensors(sensors) => sensors::run(sensors),
         Command::Scenes(scenes) => scenes::run(scenes),
         Command::Environments(environments) => environments::run(environments),

@@ -9,4 +9,5 @@ pub mod paper;
 pub mod record;
 pub mod sweep;
 pub mod text;
+pub mod validate;
 pub mod view;

@@ -14,7 +14,7 @@
 //! and 13 % too much for p = 5, because real hits do not fall on random marks.
 
 use crate::units::{range_from_tof, tof_from_range};
-use macropulse_codec::code::correlation::periodic;
+use macropulse_codec::code::correlation::{aperiodic, periodic};
 use macropulse_codec::code::{CodeWord, Error, Family};
 use macropulse_codec::statistics::normal_tail;
 
@@ -125,6 +125,35 @@ impl Hits {
             }
         }
         Self::of_counts(&counts)
+    }
+
+    /// As `words` meet each other where an interferer begins at any chip of the bit that is received:
+    /// the end of one of its bits and the beginning of the next are seen, either lit half of the time.
+    /// With b₀, b₁ the bits and C the aperiodic correlation, b₀·C(τ − L) + b₁·C(τ) marks are met, all
+    /// pairs of different words and all τ from 0 to L − 1 alike.
+    pub fn of_unaligned_words(words: &[CodeWord]) -> Self {
+        let mut counts: Vec<u64> = Vec::new();
+        let ordered = words.iter().enumerate().flat_map(|(i, own)| {
+            words
+                .iter()
+                .enumerate()
+                .filter(move |(j, _)| *j != i)
+                .map(move |(_, other)| (own, other))
+        });
+        for (own, other) in ordered {
+            let met = aperiodic(own, other);
+            let length = own.length.max(other.length) as i32;
+            for delay in 0..length {
+                let [end, begin] = [met.at(delay - length), met.at(delay)].map(usize::from);
+                for marks in [0, end, begin, end + begin] {
+                    counts.resize(counts.len().max(marks + 1), 0);
+                    counts[marks] += 1;
+                }
+            }
+        }
+        let all = counts.iter().sum::<u64>().max(1) as f64;
+        let chances: Vec<f64> = counts.iter().map(|&count| count as f64 / all).collect();
+        Self::new(if chances.is_empty() { vec![1.0] } else { chances })
     }
 
     /// As words that share 0, 1 … λ marks at so many lags each.

@@ -1,0 +1,212 @@
+//! Published figures of light, eyes, detectors, converters and scanners.
+
+use std::collections::HashSet;
+
+use macropulse::codec::statistics::erlang_b;
+use macropulse::design::Design;
+use macropulse::design::detector::Amplifier;
+use macropulse::design::safety::Class1;
+use macropulse::emit::bands;
+use macropulse::environment::Environment;
+use macropulse::predict::link::diffraction;
+
+use super::Error;
+use super::published::{Figure, Figures, Within};
+
+/// Sun, air and the limits of class 1.
+///
+/// # Errors
+/// None of the ready environments is refused, unless the program is broken.
+pub(super) fn light() -> Result<Vec<Figure>, Error> {
+    let mut all = sun_and_air()?;
+    all.extend(eyes());
+    let mut figures = Figures::of("light", "KP16");
+    let spread = diffraction(905e-9, 1e-3) * 1e3;
+    figures.add(
+        "divergence of a beam of 1 mm at 905 nm, mrad",
+        1.15,
+        spread,
+        Within::Absolute(5e-3),
+    );
+    all.extend(figures.done());
+    Ok(all)
+}
+
+fn sun_and_air() -> Result<Vec<Figure>, Error> {
+    let mut sun = Figures::of("light", "G173");
+    let day = Environment::named("clear-day")?;
+    let published =
+        [(850.0, 0.894), (905.0, 0.817), (940.0, 0.472), (1064.0, 0.632), (1550.0, 0.270)];
+    for (nm, published) in published {
+        let found = day.irradiance(nm * 1e-9).unwrap_or(f64::NAN) * 1e-9;
+        // Between entries 5 nm apart it is interpolated.
+        let what = format!("sunlight at {nm} nm, W/m\u{b2}/nm");
+        sun.add(what, published, found, Within::Absolute(6e-3));
+    }
+    let mut all = sun.done();
+    let mut air = Figures::of("light", "Kim01");
+    for (nm, published) in [(550.0, 0.1701), (905.0, 0.0890)] {
+        let clear = Environment::named("clear-day")?;
+        let found = clear.extinction(nm * 1e-9) * 1e3;
+        let what = format!("extinction at {nm} nm and 23 km of visibility, 1/km");
+        air.add(what, published, found, Within::Share(2e-3));
+    }
+    all.extend(air.done());
+    Ok(all)
+}
+
+/// The limits of class 1, by wavelength, nm.
+fn eyes() -> Vec<Figure> {
+    let mut figures = Figures::of("eye safety", "IEC60825");
+    let mut add = |nm: f64, what: &str, published: f64, ours: &dyn Fn(&Class1) -> f64| {
+        if let Some(class) = Class1::at(nm * 1e-9) {
+            figures.add(format!("{nm} nm: {what}"), published, ours(&class), Within::Share(1e-3));
+        }
+    };
+    for (nm, pulse, power) in [(850.0, 153.6, 0.778), (905.0, 197.9, 1.002), (940.0, 232.5, 1.178)]
+    {
+        add(nm, "a pulse of 1 ns, nJ", pulse, &|class| class.single_exposure(1e-9) * 1e9);
+        add(nm, "without end, mW", power, &|class| class.continuous() * 1e3);
+    }
+    add(1450.0, "a pulse of 1 \u{b5}s, J", 8e-4, &|class| class.single_exposure(1e-6));
+    add(1450.0, "0.1 s, J", 4.4e-3 * 0.1_f64.powf(0.25), &|class| class.single_exposure(0.1));
+    add(1450.0, "1 s, J", 1e-2, &|class| class.single_exposure(1.0));
+    add(1450.0, "pulses so close count as one, s", 1e-3, &Class1::counted_as_one);
+    add(1550.0, "a pulse of 0.1 ns, W", 8e6, &|class| class.single_exposure(1e-10) / 1e-10);
+    add(1550.0, "a pulse of 1 \u{b5}s, J", 8e-3, &|class| class.single_exposure(1e-6));
+    add(1550.0, "4 s, J", 1.8e-2 * 4_f64.powf(0.75), &|class| class.single_exposure(4.0));
+    add(1550.0, "without end, W", 1e-2, &Class1::continuous);
+    add(1550.0, "pulses so close count as one, s", 10.0, &Class1::counted_as_one);
+    add(1550.0, "aperture for 0.1 s, mm", 1.0, &|class| class.aperture(0.1) * 1e3);
+    add(1550.0, "aperture for 4 s, mm", 1.5 * 4_f64.powf(0.375), &|class| {
+        class.aperture(4.0) * 1e3
+    });
+    add(1550.0, "aperture for 10 s, mm", 3.5, &|class| class.aperture(10.0) * 1e3);
+    figures.done()
+}
+
+/// Detectors and converters.
+pub(super) fn detectors() -> Vec<Figure> {
+    let mut rice = Figures::of("detectors", "Rice44");
+    // ln 2 false alarms a microsecond are one in half of the gates of a microsecond.
+    let pulse = Amplifier {
+        gain: 1.0,
+        ionisation: 0.0,
+        bandwidth: 1e15,
+        current_noise: 0.0,
+        dark_current: 0.0,
+        pulse: 5e-9,
+    };
+    let ratio = pulse.threshold_for(std::f64::consts::LN_2 * 1e6).unwrap_or(f64::NAN);
+    let what =
+        "threshold to noise, dB, of a false alarm in half of all gates of 1 \u{b5}s, 5 ns pulses";
+    rice.add(what, 9.776, 20.0 * ratio.log10(), Within::Absolute(2e-3));
+    let mut all = rice.done();
+    let mut excess = Figures::of("detectors", "McI66");
+    for (ionisation, gain, published) in [(0.02, 100.0, 3.95), (0.2, 20.0, 5.56), (1.0, 50.0, 50.0)]
+    {
+        let photodiode = Amplifier { gain, ionisation, ..pulse };
+        let what = format!("excess noise at a gain of {gain} and a ratio of {ionisation}");
+        excess.add(what, published, photodiode.excess(), Within::Share(2e-3));
+    }
+    all.extend(excess.done());
+    let mut erlang = Figures::of("converters", "Erl17");
+    // Tables of telephone traffic: lines, offered load, share lost.
+    for (lines, offered, published) in [(10, 5.0, 0.0184), (20, 12.0, 0.0098), (5, 2.2185, 0.05)] {
+        let what = format!("lost of {offered} erlang by {lines} lines");
+        erlang.add(what, published, erlang_b(offered, lines), Within::Share(5e-3));
+    }
+    all.extend(erlang.done());
+    all
+}
+
+/// Scanners.
+///
+/// # Errors
+/// None of the ready sensors is refused, unless the program is broken.
+pub(super) fn scanners() -> Result<Vec<Figure>, Error> {
+    let mut all = paper()?;
+    all.extend(vlp_16()?);
+    let mut rosette = Figures::of("scanners", "Mid40");
+    let design = Design::open("rosette-mid-40", &[])?;
+    for (seconds, published) in [(0.1, 0.144), (0.2, 0.269), (0.5, 0.562), (1.0, 0.839)] {
+        let found = covered(&design, (seconds * 10.0_f64).round() as u64);
+        let what = format!("share of 0.2\u{b0} cells that rosette-mid-40 meets in {seconds} s");
+        rosette.add(what, published, found, Within::Absolute(0.012));
+    }
+    all.extend(rosette.done());
+    Ok(all)
+}
+
+fn paper() -> Result<Vec<Figure>, Error> {
+    let mut figures = Figures::of("scanners", "KP16");
+    let design = Design::open("kim-park-2016", &[])?;
+    let derived = design.derived();
+    figures.add(
+        "kim-park-2016: time to a pixel, ns",
+        40.95,
+        derived.pixel_period * 1e9,
+        Within::Absolute(5e-3),
+    );
+    figures.add("gate of 150 m, \u{b5}s", 1.0, derived.gate * 1e6, Within::Absolute(5e-3));
+    figures.add(
+        "shots in flight, rounded up",
+        25.0,
+        derived.shots_in_flight.ceil(),
+        Within::Exactly,
+    );
+    figures.add("chips of 13 bits", 10_933.0, derived.chips.into(), Within::Exactly);
+    figures.add("converters", 1150.0, design.tdc.converters.into(), Within::Exactly);
+    Ok(figures.done())
+}
+
+fn vlp_16() -> Result<Vec<Figure>, Error> {
+    let mut figures = Figures::of("scanners", "VLP16");
+    let design = Design::open("vlp-16", &[])?;
+    let Some(band) = bands(&design, 0).next() else { return Ok(Vec::new()) };
+    let log = band.shot_log(&design);
+    let first = log.owned.start;
+    let after = |shot: usize| {
+        log.fired_at_fs
+            .get(first + shot)
+            .map_or(f64::NAN, |fired| (fired - log.fired_at_fs[first]) as f64 * 1e-9)
+    };
+    // Shots wait for the chip clock, 13 ps.
+    for (shot, published) in [(1, 2.304), (15, 34.56), (16, 55.296), (16 * 5 + 3, 283.392)] {
+        let what = format!("vlp-16: shot {shot} after the first one, \u{b5}s");
+        figures.add(what, published, after(shot), Within::Absolute(2e-5));
+    }
+    let corrections =
+        [(15.0, -11.2), (9.0, -6.6), (1.0, -0.7), (-1.0, 0.7), (-7.0, 5.1), (-15.0, 11.2)];
+    for (elevation, published) in corrections {
+        let row = ((15.0_f64 - elevation) / 2.0) as u16;
+        let found = design.directions().origin(row, 0)[2] * 1e3;
+        let what = format!("vertical correction of the laser at {elevation}\u{b0}, mm");
+        figures.add(what, published, found, Within::Absolute(1e-9));
+    }
+    let per_second = design.shots_per_scan() as f64 / design.scan_period();
+    figures.add("shots a second, some 300 000", 3e5, per_second, Within::Share(0.05));
+    Ok(figures.done())
+}
+
+/// The share of a disc of 19.2°, in cells of 0.2°, that `design` meets in the first `scans`.
+fn covered(design: &Design, scans: u64) -> f64 {
+    const CELL: f64 = 0.2;
+    const RADIUS: f64 = 19.2;
+    let cells = (RADIUS / CELL).ceil() as i32;
+    let mut met = HashSet::new();
+    for scan in 0..scans {
+        for band in bands(design, scan) {
+            let log = band.shot_log(design);
+            for shot in log.owned.clone() {
+                let [x, y, z] = design.directions().of_shot(&log, shot);
+                let off = x.acos().to_degrees() / y.hypot(z).max(1e-12);
+                met.insert([y, z].map(|part| (part * off / CELL).floor() as i32));
+            }
+        }
+    }
+    let middle = |cell: i32| (f64::from(cell) + 0.5) * CELL;
+    let all =
+        (-cells..cells).flat_map(|y| (-cells..cells).map(move |z| middle(y).hypot(middle(z))));
+    met.len() as f64 / all.filter(|off| *off <= RADIUS).count() as f64
+}

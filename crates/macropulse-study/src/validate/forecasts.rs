@@ -1,0 +1,164 @@
+//! Forecasts beside what is simulated: walls all around a ready sensor, of such a reflectance that one
+//! shot in ten, half of them, and nearly all are to be seen.
+
+use macropulse::design::Design;
+use macropulse::emit::{Band, bands};
+use macropulse::environment::Environment;
+use macropulse::points::{Outcome, PointCloud};
+use macropulse::predict::Forecaster;
+use macropulse::scene::Scene;
+use macropulse::sim::{Scans, Watch};
+
+use super::Error;
+
+/// Shots that are looked at of each place, or a few more: a share is known to 0.0035 then, one
+/// standard deviation.
+pub const SHOTS: u64 = 20_000;
+
+/// The sensors that are tried.
+pub const SENSORS: [&str; 8] = [
+    "kim-park-2016",
+    "kim-park-2016-fixed",
+    "coded-practical",
+    "coded-360",
+    "bipolar-gold",
+    "hdl-64e",
+    "vlp-16",
+    "peregrine",
+];
+
+/// The ready environment around them.
+const ENVIRONMENT: &str = "night";
+
+/// The walls stand at this part of the range of the sensor.
+const PART: f64 = 0.7;
+
+/// Probabilities of detection at which a forecast is tried.
+const WANTED: [f64; 3] = [0.1, 0.5, 0.95];
+
+/// A probability may be off by so much, or by so many standard deviations of what was found.
+const PD_WITHIN: (f64, f64) = (0.02, 3.0);
+
+/// A precision may be off by such a share of what was found.
+const PRECISION_WITHIN: f64 = 0.2;
+
+/// Standard deviations of fewer points are not compared: of 1000 they are known to 2 %.
+const FEWEST_POINTS: u64 = 1000;
+
+/// A forecast, and what came of it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Place {
+    /// The ready sensor.
+    pub sensor: String,
+    /// Reflectance of a wall square on.
+    pub reflectance: f64,
+    /// How far away it stands, m.
+    pub range_m: f64,
+    /// Shots with light.
+    pub shots: u64,
+    /// Probability of detection, forecast and found.
+    pub pd: [f64; 2],
+    /// Standard deviation of the range, forecast and found, m; not found of few points.
+    pub precision_m: (f64, Option<f64>),
+    /// False and wrong points per shot, forecast and found.
+    pub false_per_shot: [f64; 2],
+}
+
+impl Place {
+    /// Whether the probability is as forecast.
+    pub fn pd_holds(&self) -> bool {
+        let [forecast, found] = self.pd;
+        let deviation = (forecast * (1.0 - forecast) / self.shots.max(1) as f64).sqrt();
+        (forecast - found).abs() <= PD_WITHIN.0.max(PD_WITHIN.1 * deviation)
+    }
+
+    /// Whether all that was found is as forecast.
+    pub fn holds(&self) -> bool {
+        self.pd_holds() && self.precision_holds() != Some(false)
+    }
+
+    /// Whether the precision is as forecast; `None` where it was not found.
+    pub fn precision_holds(&self) -> Option<bool> {
+        let (forecast, found) = self.precision_m;
+        found.map(|found| (forecast - found).abs() <= PRECISION_WITHIN * found)
+    }
+}
+
+/// Tries the forecasts of the ready `sensor` by night at [`PART`] of its range.
+///
+/// # Errors
+/// Where the sensor cannot be simulated there.
+pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Error> {
+    let design = Design::open(sensor, &[])?;
+    let around = Environment::named(ENVIRONMENT)?;
+    let forecaster = Forecaster::new(&design, &around)?;
+    let range = PART * design.scan.max_range;
+    let mut places = Vec::new();
+    for wanted in WANTED {
+        let Some(reflectance) = reflectance(&forecaster, wanted, range) else { continue };
+        let forecast = forecaster.forecast(reflectance, range);
+        let scene = room(reflectance, range)?;
+        let mut shots = 0;
+        let few = |band: &Band| {
+            let is_enough = shots >= SHOTS;
+            shots += band.shots;
+            !is_enough
+        };
+        let part: Vec<Band> = bands(&design, 0).take_while(few).collect();
+        let mut scans = Scans::new(&design, &scene, seed)?;
+        let scan = scans.part(&part, watch)?.ok_or(Error::Stopped)?;
+        let of = |outcome| scan.score.count(outcome);
+        let lit = scan.score.with_echo();
+        let share = |count: u64| count as f64 / lit.max(1) as f64;
+        places.push(Place {
+            sensor: sensor.to_owned(),
+            reflectance,
+            range_m: range,
+            shots: lit,
+            pd: [forecast.pd, share(of(Outcome::Right) + of(Outcome::Near))],
+            precision_m: (forecast.precision, deviation(&scan.cloud())),
+            false_per_shot: [
+                forecast.false_per_shot,
+                share(of(Outcome::Wrong) + of(Outcome::False)),
+            ],
+        });
+    }
+    Ok(places)
+}
+
+/// The least reflectance, up to white, that is seen with probability `wanted` at `range`.
+fn reflectance(forecaster: &Forecaster, wanted: f64, range: f64) -> Option<f64> {
+    let pd = |reflectance: f64| forecaster.forecast(reflectance, range).pd;
+    let (mut low, mut high) = (1e-4, 1.0);
+    if pd(high) < wanted {
+        return None;
+    }
+    for _ in 0..40 {
+        let middle = f64::sqrt(low * high);
+        if pd(middle) < wanted { low = middle } else { high = middle }
+    }
+    Some(high)
+}
+
+/// A hollow sphere about the sensor, so that every shot meets it square on.
+fn room(reflectance: f64, range: f64) -> Result<Scene, Error> {
+    let text = format!(
+        "version = 1\nenvironment = \"{ENVIRONMENT}\"\n[[material]]\nname = \"paint\"\n\
+         diffuse = {reflectance}\n[[object]]\nshape.sphere.radius_m = {range}\n\
+         material = \"paint\"\n"
+    );
+    Ok(Scene::from_toml(&text, "room", std::path::Path::new(""))?)
+}
+
+/// Standard deviation of the range errors of right and near points, m.
+fn deviation(cloud: &PointCloud) -> Option<f64> {
+    let truth = &cloud.truth.returns;
+    let answers = (0..cloud.range.len())
+        .filter(|&at| matches!(truth.outcome[at], Outcome::Right | Outcome::Near));
+    let errors: Vec<f64> =
+        answers.map(|at| f64::from(cloud.range[at]) - f64::from(truth.range[at])).collect();
+    let count = errors.len() as f64;
+    let mean = errors.iter().sum::<f64>() / count;
+    let squares: f64 = errors.iter().map(|error| (error - mean).powi(2)).sum();
+    (errors.len() as u64 >= FEWEST_POINTS).then(|| (squares / (count - 1.0)).sqrt())
+}

@@ -1,0 +1,171 @@
+//! The report: figures beside each other, as Markdown and as a page.
+
+use super::published::Within;
+use super::{Figure, Findings, Place, SHOTS};
+use crate::view::{Align, Cell, Page, Section, Table, Verdict};
+
+const LEAD: &str = "What others have published beside what Macropulse says, and what it forecasts \
+                    beside what it simulates. Sources are those of the references.";
+
+/// What stands above the forecasts.
+fn of_forecasts(findings: &Findings) -> String {
+    format!(
+        "A wall stands all around a ready sensor by night, square on, at 70 % of its range, of such \
+         a reflectance that one shot in ten, half of them, and nearly all should be seen. N is {SHOTS} \
+         shots or a few more, as many as a scan has where that is less; seed {}. Seen are returns \
+         within 0.35 m. A forecast holds if the share is right within 0.02 or three standard \
+         deviations, and the standard deviation of the range, sidelobes and all, within 20 %.",
+        findings.seed
+    )
+}
+
+/// A number with as many digits as tell it from the published one.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    match () {
+        () if value == 0.0 => "0".to_owned(),
+        () if !(1e-3..1e6).contains(&size) => format!("{value:.3e}"),
+        () if value.fract() == 0.0 => format!("{value}"),
+        () if size >= 100.0 => format!("{value:.3}"),
+        () => format!("{value:.4}"),
+    }
+}
+
+fn within(figure: &Figure) -> String {
+    match figure.within {
+        Within::Exactly => "exact".to_owned(),
+        Within::Share(share) if share < 1e-6 => "rounding".to_owned(),
+        Within::Share(share) => format!("{} %", number(100.0 * share)),
+        Within::Absolute(most) if most < 1e-6 => "rounding".to_owned(),
+        Within::Absolute(most) => number(most),
+    }
+}
+
+fn said(holds: bool) -> &'static str {
+    if holds { "holds" } else { "fails" }
+}
+
+/// The cells of a figure, its verdict last.
+fn cells(figure: &Figure) -> [String; 6] {
+    [
+        figure.what.clone(),
+        format!("[{}]", figure.source),
+        number(figure.published),
+        number(figure.ours),
+        within(figure),
+        said(figure.holds()).to_owned(),
+    ]
+}
+
+const OF_FIGURES: [&str; 6] = ["figure", "source", "published", "ours", "may differ by", "verdict"];
+
+fn place_cells(place: &Place) -> [String; 9] {
+    let millimetres = |metres: f64| format!("{:.2}", metres * 1e3);
+    let share = |share: f64| format!("{share:.3}");
+    let (precision, found) = place.precision_m;
+    [
+        place.sensor.clone(),
+        format!("{:.2} % at {:.1} m", 100.0 * place.reflectance, place.range_m),
+        place.shots.to_string(),
+        share(place.pd[0]),
+        share(place.pd[1]),
+        said(place.pd_holds()).to_owned(),
+        millimetres(precision),
+        found.map_or_else(|| "few".to_owned(), millimetres),
+        place.precision_holds().map_or("", said).to_owned(),
+    ]
+}
+
+const OF_PLACES: [&str; 9] = [
+    "sensor",
+    "wall",
+    "N",
+    "seen, forecast",
+    "found",
+    "verdict",
+    "\u{3c3} of range, mm, forecast",
+    "found",
+    "verdict",
+];
+
+fn topics(findings: &Findings) -> Vec<&'static str> {
+    let mut topics: Vec<&str> = findings.published.iter().map(|figure| figure.topic).collect();
+    topics.dedup();
+    topics
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// How many hold.
+fn summary(findings: &Findings) -> String {
+    let (figures, forecasts) = (findings.published.len(), findings.forecasts.len());
+    format!(
+        "Of {figures} published figures {} are met; of {forecasts} forecasts {} hold.",
+        figures - findings.figures_that_fail(),
+        forecasts - findings.forecasts_that_fail()
+    )
+}
+
+pub(super) fn markdown(findings: &Findings) -> String {
+    let row = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let head = |titles: &[&str]| {
+        let titles: Vec<String> = titles.iter().map(|title| (*title).to_owned()).collect();
+        row(&titles) + &format!("|{}\n", "---|".repeat(titles.len()))
+    };
+    let mut text = format!(
+        "# Validation\n\n{LEAD} This page is written by\n\n```sh\nmacropulse validate -o validation\n```\n\n\
+         and compared with it by a test. {}\n",
+        summary(findings)
+    );
+    for topic in topics(findings) {
+        text += &format!("\n## {}\n\n{}", capitalised(topic), head(&OF_FIGURES));
+        let of_topic = findings.published.iter().filter(|figure| figure.topic == topic);
+        text.extend(of_topic.map(|figure| row(&cells(figure))));
+    }
+    text += &format!("\n## Forecasts\n\n{}\n\n{}", of_forecasts(findings), head(&OF_PLACES));
+    text.extend(findings.forecasts.iter().map(|place| row(&place_cells(place))));
+    text
+}
+
+pub(super) fn html(findings: &Findings) -> String {
+    let cell = |text: &String| match text.as_str() {
+        "holds" => Cell::verdict(Verdict::Holds, "holds"),
+        "fails" => Cell::verdict(Verdict::Fails, "fails"),
+        text => text.into(),
+    };
+    let columns = |titles: &[&'static str]| -> Vec<(&'static str, Align)> {
+        titles
+            .iter()
+            .enumerate()
+            .map(|(at, title)| (*title, if at < 2 { Align::Left } else { Align::Right }))
+            .collect()
+    };
+    let mut page = Page::new("Validation", LEAD).kicker("Macropulse");
+    let mut short = Section::new("In short").paragraph(&summary(findings));
+    if findings.forecasts_that_fail() > 0 {
+        short = short.paragraph(
+            "A forecast that fails is a fault of the forecast: what is simulated goes through the \
+             receiver, shot by shot.",
+        );
+    }
+    page = page.section(short);
+    for topic in topics(findings) {
+        let of_topic = findings.published.iter().filter(|figure| figure.topic == topic);
+        let table = of_topic.fold(Table::new("", &columns(&OF_FIGURES)), |table, figure| {
+            table.row(cells(figure).iter().map(cell).collect())
+        });
+        page = page.section(Section::new(&capitalised(topic)).table(table));
+    }
+    let table =
+        findings.forecasts.iter().fold(Table::new("", &columns(&OF_PLACES)), |table, place| {
+            table.row(place_cells(place).iter().map(cell).collect())
+        });
+    let forecasts = Section::new("Forecasts").paragraph(&of_forecasts(findings)).table(table);
+    page.section(forecasts)
+        .files(&["validation.md", "validation.json"].map(str::to_owned))
+        .footer(&format!("macropulse {}, seed {}.", env!("CARGO_PKG_VERSION"), findings.seed))
+        .html()
+}
