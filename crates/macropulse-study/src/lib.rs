@@ -5,6 +5,7 @@
 
 pub mod budget;
 pub mod codes;
+pub mod decoding;
 pub mod paper;
 pub mod record;
 pub mod sweep;

@@ -162,6 +162,11 @@ const STUDY: Layers = Layers {
         Rule { module: "view", may_name: &["text"], because: "pictures show columns, no physics" },
         Rule { module: "codes", may_name: &[], because: "families are compared without a scan" },
         Rule {
+            module: "decoding",
+            may_name: &[],
+            because: "ticks from outside become points by the simulator's own stages alone",
+        },
+        Rule {
             module: "record",
             may_name: &["text", "view"],
             because: "a run leaves files and pictures",
