@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use macropulse::{channel, codec, design, emit, environment, formats, scene, sim};
-use macropulse_study::{decoding, record, sweep, view};
+use macropulse_study::{decoding, record, sent, sweep, view};
 use pyo3::exceptions::{PyIsADirectoryError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -154,6 +154,12 @@ impl Raise for decoding::Error {
             Self::Unreadable { name, cause } => of_file(Path::new(name), cause),
             _ => wrong(self.to_string()),
         }
+    }
+}
+
+impl Raise for sent::Error {
+    fn raise(self) -> PyErr {
+        wrong(self.to_string())
     }
 }
 

@@ -8,6 +8,7 @@ pub mod codes;
 pub mod decoding;
 pub mod paper;
 pub mod record;
+pub mod sent;
 pub mod sweep;
 pub mod text;
 pub mod view;
