@@ -25,6 +25,7 @@ use macropulse::sim::Tally;
 pub use decoded::Decoded;
 pub use folder::{CloudsAt, Left};
 pub use page::{PAGE, Page, describe, explain, title};
+pub use pixel::picture as pixel_picture;
 
 /// How the names of range images in colour end.
 pub const COLOUR: &str = "-colour.png";
