@@ -296,7 +296,7 @@ fn an_explanation_says_what_was_decided() {
         assert!(path.is_file(), "{}", path.display());
     }
     let text = |folder: &str| {
-        fs::read_to_string(desk.path().join(folder).join("explain-000000-2-300.txt")).unwrap()
+        fs::read_to_string(desk.path().join(folder).join("explain-000000-3-424.txt")).unwrap()
     };
     assert!(text("out").contains("marks of this shot from "), "{}", text("out"));
     assert!(text("again").contains("not known: what is decoded is ticks alone"));
