@@ -45,8 +45,8 @@ impl Left {
         let mut chosen: Vec<(usize, &String)> = Vec::new();
         for file in &self.files {
             let Some(rank) = rank(file) else { continue };
-            let stem = Path::new(file).with_extension("");
-            match chosen.iter_mut().find(|(_, other)| Path::new(other).with_extension("") == stem) {
+            let cloud = cloud_of(file);
+            match chosen.iter_mut().find(|(_, other)| cloud_of(other) == cloud) {
                 Some(other) if rank < other.0 => *other = (rank, file),
                 Some(_) => {}
                 None => chosen.push((rank, file)),
@@ -60,6 +60,14 @@ impl Left {
         chosen.dedup_by(|(_, one), (_, other)| is_of_run(one) && is_of_run(other));
         chosen.into_iter().map(|(_, file)| file).collect()
     }
+}
+
+/// What the files of one cloud have in common: their name without an ending, and without what tells
+/// two of the same ending apart.
+fn cloud_of(file: &str) -> String {
+    let stem = Path::new(file).with_extension("");
+    let stem = stem.to_string_lossy();
+    stem.strip_suffix("-cloudcompare").unwrap_or(&stem).to_owned()
 }
 
 /// The place of a file of a folder among [`ENDINGS`], if it may hold a cloud.
@@ -160,6 +168,8 @@ mod tests {
         let files = ["range-0.npy", "scan-0.npy", "scans.mcap", "shots-0.csv"];
         assert_eq!(clouds(&files), ["scan-0.npy"]);
         assert_eq!(clouds(&files[2..]), ["scans.mcap"]);
+        let files = ["scan-0.ply", "scan-0-cloudcompare.ply", "scan-1-cloudcompare.ply"];
+        assert_eq!(clouds(&files), ["scan-0.ply", "scan-1-cloudcompare.ply"]);
     }
 
     #[test]
