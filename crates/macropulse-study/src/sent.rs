@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_macropulse_has_its_marks_and_a_pixel_that_is_not_there_none() {
-        let design = Design::preset("kim-park-2016").unwrap();
+        let design = Design::open("kim-park-2016", &[]).unwrap();
         let sent = Macropulse::to(&design, 2, (0, 1)).unwrap();
         let told = sent.json();
         assert_eq!(told["marks"].as_array().unwrap().len(), sent.marks.len());

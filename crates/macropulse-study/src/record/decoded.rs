@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn a_manifest_of_decoding_knows_no_scene() {
-        let design = Design::preset("peregrine").unwrap();
+        let design = Design::open("peregrine", &[]).unwrap();
         let environment = Environment::default();
         let decoded = Decoded {
             design: &design,
