@@ -7,7 +7,7 @@ use anstyle::AnsiColor;
 use clap::error::ErrorKind;
 use macropulse::{channel, design, environment, formats, scene, sim};
 use macropulse_study::text::broken;
-use macropulse_study::{paper, record, sweep, validate};
+use macropulse_study::{decoding, paper, record, sweep, validate};
 
 /// Why a command did not do what was asked.
 #[derive(Debug)]
@@ -159,6 +159,19 @@ impl From<record::Error> for Fault {
         match error {
             record::Error::Formats(error) => error.into(),
             record::Error::View(error) => Self::Ours(error.to_string()),
+            record::Error::Unreadable { path, cause } => {
+                Self::unreadable(&path.display().to_string(), &cause)
+            }
+            wrong => Self::Wrong(wrong.to_string()),
+        }
+    }
+}
+
+impl From<decoding::Error> for Fault {
+    fn from(error: decoding::Error) -> Self {
+        match error {
+            decoding::Error::Unreadable { name, cause } => Self::unreadable(&name, &cause),
+            wrong => Self::Wrong(wrong.to_string()),
         }
     }
 }

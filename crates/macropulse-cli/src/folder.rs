@@ -50,13 +50,26 @@ impl Folder {
 
     /// Names of what lies in the folder from an older run: files named like those of scans and not
     /// among `files`.
-    pub fn older(&self, files: &[String]) -> Vec<String> {
+    fn older(&self, files: &[String]) -> Vec<String> {
         let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
         let mut older: Vec<String> =
             names.filter(|name| is_of_scan(name) && !files.contains(name)).collect();
         older.sort();
         older
+    }
+
+    /// What is to be said of an older run in the folder, if there is one, by the `files` of this one.
+    pub fn warning_of_older(&self, files: &[String]) -> Option<String> {
+        let older = self.older(files);
+        let (folder, count) = (self.path.display(), older.len());
+        let others = if count == 1 { "is" } else { "and others like it are" };
+        older.first().map(|first| {
+            format!(
+                "{folder}/{first} {others} of an older run ({count} in all), and not in the \
+                 manifest: remove what is older, or write into a folder of its own"
+            )
+        })
     }
 
     fn clear(&mut self) {

@@ -4,6 +4,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Command, Stdio};
@@ -271,7 +272,13 @@ fn an_explanation_says_what_was_decided() {
     let line =
         format!("decode {sensor} {files} --environment {environment} -o again --json {pixels}");
     let decoded = desk.json(&line);
-    assert_eq!(simulated["explained"], decoded["explained"]);
+    let mut receiver_s = simulated["explained"].clone();
+    for told in receiver_s.as_array_mut().unwrap() {
+        // What came to the detector only a simulation knows.
+        assert!(told["light"]["detections"].as_u64().unwrap() > 0, "{told}");
+        told["light"] = serde_json::Value::Null;
+    }
+    assert_eq!(receiver_s, decoded["explained"]);
     let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
     for told in decoded["explained"].as_array().unwrap() {
         let pixel = format!(",{},{},", told["row"], told["column"]);
@@ -288,6 +295,71 @@ fn an_explanation_says_what_was_decided() {
         let path = desk.path().join(format!("again/explain-000000-2-300.{ending}"));
         assert!(path.is_file(), "{}", path.display());
     }
+    let text = |folder: &str| {
+        fs::read_to_string(desk.path().join(folder).join("explain-000000-3-424.txt")).unwrap()
+    };
+    assert!(text("out").contains("marks of this shot from "), "{}", text("out"));
+    assert!(text("again").contains("not known: what is decoded is ticks alone"));
     let line = format!("decode {sensor} {files} --explain 6,0");
     desk.refused(&line, &["--explain 6,0: kim-park-2016 has rows 0 to 5 and columns 0 to 847"]);
+}
+
+/// What stands above the ticks is what they were made of.
+#[test]
+fn light_that_is_explained_is_that_of_the_ticks() {
+    let desk = Desk::new();
+    let line = format!("simulate {SMALL} --scene wall --format none -o out --json --explain 3,500");
+    let told = desk.json(&line);
+    let text = fs::read(desk.path().join("out/explain-000000-3-500.json")).unwrap();
+    let whole: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    let light = &whole["light"];
+    let list = |value: &serde_json::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()
+    };
+    let ours = &light["of_this_shot"][0];
+    let range = |value: &serde_json::Value| value.as_f64().unwrap();
+    assert!((range(&ours["range_m"]) - range(&whole["peak"]["range_m"])).abs() < 1e-3, "{ours}");
+    assert!(range(&ours["marks"]) >= range(&whole["peak"]["marks"]));
+    let trains = light["trains"].as_array().unwrap();
+    assert_eq!(trains.len() as u64, 1 + light["trains_of_others"].as_u64().unwrap());
+    let events = list(&light["detections_ticks"]);
+    assert_eq!(events.len() as u64, light["detections"].as_u64().unwrap());
+    // Every tick is an event of the detector, and nearly every event is of a mark that arrived.
+    let fired: BTreeSet<i64> = events.iter().map(|event| event.floor() as i64).collect();
+    let ticks = list(&whole["ticks"]);
+    assert!(ticks.len() > 100);
+    assert!(ticks.iter().all(|tick| fired.contains(&(*tick as i64))), "a tick without an event");
+    let arrived: BTreeSet<i64> =
+        trains.iter().flat_map(|train| list(&train["marks_ticks"])).map(|at| at as i64).collect();
+    let is_lit = |event: &&i64| (**event - 2..=**event + 2).any(|tick| arrived.contains(&tick));
+    assert!(fired.iter().filter(is_lit).count() * 100 > fired.len() * 99);
+    assert!(told["explained"][0]["light"]["trains"].is_null(), "the whole is in the file alone");
+}
+
+/// A folder has a page and a manifest, as that of a simulation, but what no receiver knows.
+#[test]
+fn a_folder_of_points_has_a_page_and_a_manifest() {
+    let desk = recorded();
+    let files = "out/shots-000000.mps out/ticks-000000.mpt";
+    let line = format!("decode {SMALL} {DARK} {files} --explain 3,424 -o again --json");
+    let decoded = desk.json(&line);
+    let read = |name: &str| fs::read_to_string(desk.path().join("again").join(name)).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&read("manifest.json")).unwrap();
+    for (key, value) in manifest.as_object().unwrap() {
+        assert_eq!(decoded[key], *value, "{key}");
+    }
+    assert_eq!(manifest["recorded"]["ticks"], "out/ticks-000000.mpt");
+    let names: Vec<&str> =
+        manifest["files"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+    for name in ["scan-000000.pcd", "range-000000.png", "explain-000000-3-424.json", "index.html"] {
+        assert!(names.contains(&name), "{name} is not among {names:?}");
+    }
+    let page = read("index.html");
+    assert!(page.contains("<title>kim-park-2016-fixed, decoded"), "{}", &page[..400]);
+    assert!(page.contains("What light there was is not known"));
+    assert!(page.contains("href=\"./manifest.json\"") && !page.contains("<dt>scene</dt>"));
+    // What is older in the folder is named.
+    let ran = desk.run(&format!("decode {SMALL} {files} --format csv -o again"));
+    assert!(ran.err.contains("of an older run"), "{}", ran.err);
+    assert!(ran.out.contains("manifest.json to again; open again/index.html"), "{}", ran.out);
 }

@@ -9,7 +9,7 @@ use std::process::Command;
 
 use common::Desk;
 
-const FORMATS: &str = "pcd,ply,las,laz,e57,npy,csv,kitti,mcap,mcap-velodyne,mcap-ouster,\
+const FORMATS: &str = "pcd,ply,ply-cloudcompare,las,laz,e57,npy,csv,kitti,mcap,mcap-velodyne,mcap-ouster,\
                        mcap-livox,mcap-autoware,mcap-foxglove,mcap-osi,range-npy";
 
 /// A sensor that turns and moves in a street, by 2 m in a second, so that its poses differ.

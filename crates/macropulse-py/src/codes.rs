@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use macropulse::codec::code::correlation::periodic;
 use macropulse::design::family_from_toml;
-use macropulse::emit::shot_of_pixel;
 use macropulse::predict::comparison::Comparison;
 use macropulse_study::codes::told;
+use macropulse_study::sent::Macropulse;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyList;
 
-use crate::error::{OrRaise, check_scan, wrong};
+use crate::error::{OrRaise, wrong};
 use crate::sensor::Sensor;
 use crate::values::from_json;
 use crate::work;
@@ -37,27 +37,12 @@ pub fn encode<'py>(
     row: u32,
     column: u32,
     scan: u64,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Bound<'py, PyAny>> {
     let py = sensor.py();
     let design = Arc::clone(&Sensor::of(sensor)?.get().design);
-    check_scan(&design, scan)?;
-    let Some(shot) = shot_of_pixel(&design, scan, row, column) else {
-        let (rows, columns) = (design.scan.rows - 1, design.scan.columns - 1);
-        return Err(wrong(format!(
-            "pixel {row}, {column}: {} has rows 0 to {rows} and columns 0 to {columns}",
-            design.name
-        )));
-    };
-    let codebook = &design.coding.codebook;
-    let told = PyDict::new(py);
-    told.set_item("row", row)?;
-    told.set_item("column", column)?;
-    told.set_item("label", shot.label)?;
-    told.set_item("payload", codebook.payload().map(|payload| payload.text(shot.label)))?;
-    told.set_item("code_word", shot.word)?;
-    told.set_item("marks", PyArray1::from_slice(py, codebook.marks(shot.label, shot.word)))?;
-    told.set_item("chips", codebook.chips())?;
-    told.set_item("fired_at_fs", shot.fired_at_fs)?;
+    let sent = Macropulse::to(&design, scan, (row, column)).or_raise()?;
+    let told = from_json(py, &sent.json())?;
+    told.set_item("marks", PyArray1::from_slice(py, sent.marks))?;
     Ok(told)
 }
 

@@ -5,8 +5,8 @@ use std::io;
 use std::path::Path;
 
 use macropulse::{channel, codec, design, emit, environment, formats, scene, sim};
-use macropulse_study::{sweep, view};
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use macropulse_study::{decoding, record, sent, sweep, view};
+use pyo3::exceptions::{PyIsADirectoryError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(
@@ -65,6 +65,9 @@ pub fn of_file(path: &Path, why: &io::Error) -> PyErr {
             let said = why.to_string();
             let said = said.split(" (os error").next().unwrap_or(&said).to_owned();
             PyOSError::new_err((number, said, path))
+        }
+        None if why.kind() == io::ErrorKind::IsADirectory => {
+            PyIsADirectoryError::new_err(format!("{path}: is a folder, where a file is wanted"))
         }
         None => PyOSError::new_err(format!("{path}: {why}")),
     }
@@ -131,6 +134,32 @@ impl Raise for formats::Error {
 impl Raise for view::Error {
     fn raise(self) -> PyErr {
         fault(&self)
+    }
+}
+
+impl Raise for record::Error {
+    fn raise(self) -> PyErr {
+        match self {
+            Self::Formats(error) => error.raise(),
+            Self::View(error) => error.raise(),
+            Self::Unreadable { path, cause } => of_file(&path, &cause),
+            Self::Manifest { .. } | Self::NoCloud { .. } => wrong(self.to_string()),
+        }
+    }
+}
+
+impl Raise for decoding::Error {
+    fn raise(self) -> PyErr {
+        match &self {
+            Self::Unreadable { name, cause } => of_file(Path::new(name), cause),
+            _ => wrong(self.to_string()),
+        }
+    }
+}
+
+impl Raise for sent::Error {
+    fn raise(self) -> PyErr {
+        wrong(self.to_string())
     }
 }
 

@@ -1,14 +1,19 @@
-//! Scans to files, and back.
+//! Scans to files, and back; and scan after scan, out of files of points or of shots and ticks.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use macropulse::formats::{Format, Names, read_cloud, write_cloud};
+use macropulse::channel::Operating;
+use macropulse::design::Design;
+use macropulse::formats::{Format, Names, write_cloud};
 use macropulse::points::{PointCloud, Truth};
+use macropulse_study::decoding::{self, Decoding};
+use macropulse_study::record::{self, CloudsAt};
 use pyo3::prelude::*;
 
-use crate::error::{OrRaise, wrong};
+use crate::error::{OrRaise, Raise, wrong};
 use crate::scan::{About, Scan};
-use crate::work;
+use crate::work::{self, Stop};
 
 /// Writes `scan` in the format that is named, or that its ending says, with the truth if wanted.
 ///
@@ -51,17 +56,177 @@ fn format_of(path: &Path, named: Option<&str>) -> PyResult<Format> {
     Format::of_extension(&ending).map_or_else(|| Format::parse(&ending).or_raise(), Ok)
 }
 
+/// What files are read by.
+enum Source {
+    /// Points.
+    Clouds(CloudsAt),
+    /// Shots and ticks, which the receiver of a sensor decodes.
+    Ticks(Box<Decoding>, Arc<Design>, Box<Operating>),
+}
+
+/// What can go wrong with a [`Source`].
+enum Failed {
+    Record(record::Error),
+    Decoding(decoding::Error),
+}
+
+impl From<record::Error> for Failed {
+    fn from(error: record::Error) -> Self {
+        Self::Record(error)
+    }
+}
+
+impl From<decoding::Error> for Failed {
+    fn from(error: decoding::Error) -> Self {
+        Self::Decoding(error)
+    }
+}
+
+impl Raise for Failed {
+    fn raise(self) -> PyErr {
+        match self {
+            Self::Record(error) => error.raise(),
+            Self::Decoding(error) => error.raise(),
+        }
+    }
+}
+
+impl Source {
+    /// The next scan; `None` behind the last one, or once it is told to stop.
+    fn next(&mut self, stop: &Stop) -> Result<Option<Scan>, Failed> {
+        match self {
+            Self::Clouds(clouds) => {
+                let next = clouds.next_cloud()?;
+                Ok(next.map(|(cloud, names)| {
+                    let (objects, materials) = (names.objects.to_vec(), names.materials.to_vec());
+                    Scan::new(cloud, About { objects, materials, ..About::default() })
+                }))
+            }
+            Self::Ticks(decoding, design, operating) => {
+                let stage = (&**design, &operating.link);
+                let next = decoding.next_scan(stage, |_| Ok::<_, decoding::Error>(stop.flow()))?;
+                let about = || About { sensor: Some(Arc::clone(design)), ..About::default() };
+                Ok(next.map(|cloud| Scan::new(cloud, about())))
+            }
+        }
+    }
+}
+
+/// Scans out of files, each read, or decoded, when it is asked for: `for scan in load_scans(...)`.
+#[pyclass(frozen, module = "macropulse")]
+pub struct StoredScans {
+    /// Gone behind the last scan, and after anything that went wrong.
+    source: Arc<Mutex<Option<Source>>>,
+    /// What is read.
+    name: String,
+}
+
+impl StoredScans {
+    fn new(source: Source, name: String) -> Self {
+        Self { source: Arc::new(Mutex::new(Some(source))), name }
+    }
+
+    /// The scan that is the only one.
+    ///
+    /// # Errors
+    /// If there is none or several; then `several` says what to call instead.
+    pub fn only(&self, py: Python<'_>, several: &str) -> PyResult<Scan> {
+        let name = &self.name;
+        let Some(scan) = self.__next__(py)? else {
+            return Err(wrong(format!("{name}: holds no scan")));
+        };
+        match self.__next__(py)? {
+            None => Ok(scan),
+            Some(_) => Err(wrong(format!("{name}: holds several scans; {several}"))),
+        }
+    }
+}
+
+#[pymethods]
+impl StoredScans {
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Scan>> {
+        let source = Arc::clone(&self.source);
+        let next = work::done(py, 0, move |stop| {
+            let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(mut open) = source.take() else { return Ok(None) };
+            let next = open.next(stop)?;
+            if next.is_some() {
+                *source = Some(open);
+            }
+            Ok::<_, Failed>(next)
+        })?;
+        next.or_raise()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<macropulse.StoredScans of {}>", self.name)
+    }
+}
+
+fn clouds_at(py: Python<'_>, path: PathBuf) -> PyResult<StoredScans> {
+    let name = path.display().to_string();
+    let clouds = work::done(py, 0, move |_| CloudsAt::open(&path))?.or_raise()?;
+    Ok(StoredScans::new(Source::Clouds(clouds), name))
+}
+
 /// Reads a scan from a file.
 ///
 /// Args:
-///     path: A file that `Scan.save` or the program has written; its ending says the format. Of a
-///         file with several scans the first is read.
+///     path: A file that `Scan.save` or the program has written, its ending says the format; or the
+///         folder of a run. It holds a single scan; of several, `load_scans` gives one after the other.
 ///
 /// Raises:
-///     Error: If the file is none of a format that can be read.
+///     Error: If the file is none of a format that can be read, or holds several scans.
 ///     OSError: If it cannot be read.
+///
+/// Example:
+///     >>> scan = macropulse.load("out/scan-000000.pcd")
 #[pyfunction]
 pub fn load(py: Python<'_>, path: PathBuf) -> PyResult<Scan> {
-    let cloud = work::done(py, 0, move |_| read_cloud(&path))?;
-    Ok(Scan::new(cloud.or_raise()?, About::default()))
+    clouds_at(py, path)?.only(py, "iterate over them: `for scan in macropulse.load_scans(path)`")
+}
+
+/// Reads scan after scan, in the memory of one.
+///
+/// Args:
+///     path: A file with several scans, as `scans.mcap`; or a folder with files of one scan each, as
+///         the program leaves it behind `-o`, of which each scan is read once, from the file that
+///         keeps most.
+///
+/// Returns:
+///     An iterator of `Scan`.
+///
+/// Raises:
+///     Error: If a file is none of a format that can be read, or a folder holds none.
+///     OSError: If one cannot be read.
+///
+/// Example:
+///     >>> for scan in macropulse.load_scans("out"):
+///     ...     print(scan.number, len(scan))
+#[pyfunction]
+pub fn load_scans(py: Python<'_>, path: PathBuf) -> PyResult<StoredScans> {
+    clouds_at(py, path)
+}
+
+/// The decoding of the files at these paths.
+///
+/// # Errors
+/// If they cannot be read, are none, or are of another sensor.
+pub fn ticks_at(
+    py: Python<'_>,
+    (design, operating): (Arc<Design>, Operating),
+    [shots, ticks]: [PathBuf; 2],
+) -> PyResult<StoredScans> {
+    let name = format!("{} and {}", shots.display(), ticks.display());
+    let receiver = Arc::clone(&design);
+    let decoding = work::done(py, 0, move |_| {
+        let (shots, ticks) = (decoding::Input::open(&shots)?, decoding::Input::open(&ticks)?);
+        Decoding::open(&receiver, shots, ticks)
+    })?;
+    let source = Source::Ticks(Box::new(decoding.or_raise()?), design, Box::new(operating));
+    Ok(StoredScans::new(source, name))
 }

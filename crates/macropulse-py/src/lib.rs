@@ -32,11 +32,11 @@ mod _native {
     #[pymodule_export]
     use super::error::{Error, Fault};
     #[pymodule_export]
-    use super::files::load;
+    use super::files::{StoredScans, load, load_scans};
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]
-    use super::receive::{Records, decode, record};
+    use super::receive::{Records, decode, decode_scans, record};
     #[pymodule_export]
     use super::scan::Scan;
     #[pymodule_export]

@@ -1,5 +1,6 @@
 //! The receiver's side alone: what it is given of a scan, and what it makes of that.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use macropulse::channel::{self, Operating, Seen};
@@ -7,7 +8,6 @@ use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
-use macropulse::environment::Environment;
 use macropulse::points::{Piece, PointCloud, Truth};
 use macropulse::random::Chance;
 use macropulse::scene::Scene as Simulated;
@@ -17,11 +17,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::{OrRaise, check_scan, wrong};
+use crate::files::{StoredScans, ticks_at};
 use crate::scan::{About, Scan};
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::values::Reader;
-use crate::work;
+use crate::{values, work};
 
 /// Shots are numbered up to here: more than any sensor fires in its time.
 const MOST_SHOTS: u64 = 1 << 60;
@@ -142,40 +142,46 @@ fn told_of_ticks(py: Python<'_>, ticks: Ticks) -> PyResult<Bound<'_, PyDict>> {
     Ok(told)
 }
 
-/// Decodes ticks, from a simulation or from hardware, with no scene.
+/// Decodes ticks, from a simulation or from hardware, with no scene: out of arrays, or out of files as
+/// `macropulse decode` does.
 ///
 /// Args:
 ///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
-///     shots: The log of its shots, as `record` gives it, at least `fired_at_fs`, `row` and `column`.
-///         Where `label` and `word` are left out they are those that the sensor would send; without
-///         `owned` the returns of all shots are wanted; `first` and `channel` are 0.
-///     ticks: As `record` gives them, at least `tick`, ascending; without `epoch` it is 0. Those of
-///         several detectors are sorted by `channel` first.
+///     shots: The log of its shots. As a dictionary, as `record` gives it, at least `fired_at_fs`,
+///         `row` and `column`: where `label` and `word` are left out they are those that the sensor
+///         would send; without `owned` the returns of all shots are wanted; `first` and `channel` are
+///         0. Or the path of a shot log, text or binary, as `simulate --format ticks` writes it.
+///     ticks: As a dictionary, as `record` gives them, at least `tick`, ascending; without `epoch` it
+///         is 0; those of several detectors are sorted by `channel` first. A path if `shots` is one.
 ///     environment: Sun and air, for the `intensity` of the points.
 ///
 /// Returns:
-///     The points of the owned shots, without any truth.
+///     The points of the owned shots, without any truth. Files hold a single scan; of several,
+///     `decode_scans` gives one after the other.
 ///
 /// Raises:
-///     Error: If columns are missing, out of order, of unequal length, or of another sensor.
+///     Error: If columns are missing, out of order, of unequal length, or of another sensor; of a
+///         file with the line or the byte.
+///     OSError: If a file cannot be read.
+///
+/// Example:
+///     >>> for shots, ticks in macropulse.record("peregrine", "wall"):
+///     ...     band = macropulse.decode("peregrine", shots, ticks)
+///     >>> scan = macropulse.decode("peregrine", "out/shots-000000.mps", "out/ticks-000000.mpt")
 #[pyfunction]
 #[pyo3(signature = (sensor, shots, ticks, *, environment = None))]
 pub fn decode(
     sensor: &Bound<'_, PyAny>,
-    shots: &Bound<'_, PyDict>,
-    ticks: &Bound<'_, PyDict>,
+    shots: &Bound<'_, PyAny>,
+    ticks: &Bound<'_, PyAny>,
     environment: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Scan> {
     let py = sensor.py();
-    let design = Arc::clone(&Sensor::of(sensor)?.get().design);
-    let environment = match environment {
-        None => Environment::default(),
-        Some(given) => {
-            let value = Reader::default().value(given, "environment", 0)?;
-            Environment::read(&value).or_raise()?
-        }
+    let (design, operating) = receiver(sensor, environment)?;
+    let (Ok(shots), Ok(ticks)) = (shots.cast::<PyDict>(), ticks.cast::<PyDict>()) else {
+        let several = "iterate over them: `for scan in macropulse.decode_scans(...)`";
+        return ticks_at(py, (design, operating), paths(shots, ticks)?)?.only(py, several);
     };
-    let operating = Operating::of(&design, &environment).or_raise()?;
     let log = shot_log(&design, shots)?;
     let ticks = Ticks {
         epoch: entry(ticks, "ticks", "epoch", || 0)?,
@@ -194,6 +200,51 @@ pub fn decode(
         Ok::<_, macropulse::codec::decode::Error>(PointCloud { truth: Truth::default(), ..cloud })
     })?;
     Ok(Scan::new(cloud.or_raise()?, About { sensor: Some(design), ..About::default() }))
+}
+
+/// Decodes scan after scan out of files, in the memory of one, as `macropulse decode` does.
+///
+/// Args:
+///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
+///     shots: Path of a shot log, text or binary.
+///     ticks: Path of the ticks, text or binary.
+///     environment: Sun and air, for the `intensity` of the points.
+///
+/// Returns:
+///     An iterator of `Scan`, without any truth.
+///
+/// Raises:
+///     Error: If a file is of another sensor, or something in it cannot be: with the line or the
+///         byte. What stands behind a scan is found wrong when that comes up.
+///     OSError: If a file cannot be read.
+#[pyfunction]
+#[pyo3(signature = (sensor, shots, ticks, *, environment = None))]
+pub fn decode_scans(
+    sensor: &Bound<'_, PyAny>,
+    shots: PathBuf,
+    ticks: PathBuf,
+    environment: Option<&Bound<'_, PyAny>>,
+) -> PyResult<StoredScans> {
+    ticks_at(sensor.py(), receiver(sensor, environment)?, [shots, ticks])
+}
+
+/// The sensor that an argument names, in sun and air.
+fn receiver(
+    sensor: &Bound<'_, PyAny>,
+    environment: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Arc<Design>, Operating)> {
+    let design = Arc::clone(&Sensor::of(sensor)?.get().design);
+    let operating = Operating::of(&design, &values::environment(environment)?).or_raise()?;
+    Ok((design, operating))
+}
+
+fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBuf; 2]> {
+    match (shots.extract(), ticks.extract()) {
+        (Ok(shots), Ok(ticks)) => Ok([shots, ticks]),
+        _ => Err(wrong(
+            "shots and ticks: give two dictionaries of columns, or the paths of two files",
+        )),
+    }
 }
 
 /// The log that a dictionary holds, all of whose pixels are the sensor's.

@@ -125,7 +125,9 @@ impl Scan {
         column!(slf, "z")
     }
 
-    /// Apparent reflectance: 1 is a white surface that faces the sensor.
+    /// Apparent reflectance: 1 is a white surface that faces the sensor. A detector that counts marks
+    /// and measures no amplitude cannot tell bright from brighter: where `peak` equals `marks` this is
+    /// a lower bound, and of near surfaces far too low. All are 1 if it never misses a mark.
     #[getter]
     fn intensity<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         column!(slf, "intensity")

@@ -83,7 +83,7 @@ impl Stage {
             writing: 0.0,
             elapsed: 0.0,
         };
-        let mut manifest = serde_json::to_value(manifest(&run)).unwrap_or_default();
+        let mut manifest = manifest(&run).value();
         // What is of a run and its files alone.
         if let Some(entries) = manifest.as_object_mut() {
             entries.retain(|key, _| !["scans", "files"].contains(&key.as_str()));

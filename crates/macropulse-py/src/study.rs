@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use macropulse::environment::Environment;
 use macropulse::formats::write_atomically;
 use macropulse::points::Outcome;
 use macropulse::predict::verdict::Wanted;
@@ -19,7 +18,7 @@ use crate::error::{OrRaise, wrong};
 use crate::scan::Scan;
 use crate::scene::Scene;
 use crate::sensor::{Sensor, named};
-use crate::values::{Reader, changes, from_json};
+use crate::values::{self, Reader, changes, from_json};
 use crate::work;
 
 /// The link budget of a sensor: will it work, how far, and what fails first?
@@ -53,13 +52,7 @@ pub fn budget<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = sensor.py();
     let design = Arc::clone(&Sensor::of(sensor)?.get().design);
-    let environment = match environment {
-        None => Environment::default(),
-        Some(given) => {
-            let value = Reader::default().value(given, "environment", 0)?;
-            Environment::read(&value).or_raise()?
-        }
-    };
+    let environment = values::environment(environment)?;
     let usual = usual(&design);
     let limited = |given: Option<f64>, usual: f64, (name, low, high): (&str, f64, f64)| {
         let value = given.unwrap_or(usual);
@@ -168,21 +161,10 @@ pub fn sweep<'py>(
         let watch = Watch { done: &|_| {}, stop: &|| stop.is_raised() };
         plan.work(&folder, &todo, &watch)?;
         let missing: Vec<usize> = plan.missing(&folder).iter().map(|(job, _)| *job).collect();
-        let mut told = json!({
-            "sensors": plan.sensors(),
-            "scene": plan.scene,
-            "vary": plan.axes.iter().map(|axis| &axis.key).collect::<Vec<_>>(),
-            "seeds": plan.seeds.end - plan.seeds.start,
-            "scans": plan.count(),
-        });
-        match missing.is_empty() {
-            true => told["rows"] = plan.finish(&folder, &metrics)?.json(),
-            false => {
-                told["missing"] = missing.len().into();
-                told["missing_shards"] = shard.with_any(&missing).into();
-            }
-        }
-        Ok::<Value, macropulse_study::sweep::Error>(told)
+        Ok::<Value, macropulse_study::sweep::Error>(match missing.is_empty() {
+            true => plan.json(&plan.finish(&folder, &metrics)?),
+            false => plan.json_of_missing(&missing, shard),
+        })
     })?;
     from_json(py, &told.or_raise()?)
 }

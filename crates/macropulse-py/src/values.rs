@@ -1,12 +1,13 @@
 //! What is written in Python, as values of sensor and scene files, and back.
 
 use macropulse::design::{WITH, WITHOUT};
+use macropulse::environment::Environment;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString};
 use toml::{Table, Value};
 
-use crate::error::wrong;
+use crate::error::{OrRaise, wrong};
 use crate::mesh::Mesh;
 
 /// Values within values, at most: a dictionary may hold itself.
@@ -91,6 +92,17 @@ impl Reader {
         let remedy = "give a number, a text, a list or a dictionary, or leave the key out";
         Err(wrong(format!("{path}: a value cannot be of type {kind}; {remedy}")))
     }
+}
+
+/// The sun and air that an argument names, the usual ones where it is left out: the name of a ready
+/// environment, or a dictionary of keys over it.
+///
+/// # Errors
+/// If there is none of this name, or a key or a value is wrong.
+pub fn environment(given: Option<&Bound<'_, PyAny>>) -> PyResult<Environment> {
+    let Some(given) = given else { return Ok(Environment::default()) };
+    let value = Reader::default().value(given, "environment", 0)?;
+    Environment::read(&value).or_raise()
 }
 
 /// Changes of a sensor or scene: dotted keys and values, as the program takes them behind `--set`,

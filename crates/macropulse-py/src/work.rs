@@ -1,5 +1,6 @@
 //! Long work: off the lock of the interpreter, on threads of our own, and stopped by Ctrl-C.
 
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -29,6 +30,11 @@ impl Stop {
     /// Whether it was said.
     pub fn is_raised(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// The same for what goes on until it is broken off.
+    pub fn flow(&self) -> ControlFlow<()> {
+        if self.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 

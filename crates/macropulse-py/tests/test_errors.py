@@ -62,7 +62,7 @@ MISTAKES = [
     (lambda: mp.codes(), "no family is named", ""),
     (lambda: mp.code_words("sparse={length=60000, weight=3, words=60000, seed=1}"), "", ""),
     (lambda: mp.correlation("prime=5", 0, 5), "word 5: the words of ", "are 0 to 4"),
-    (lambda: mp.encode("peregrine", 0, 4000), "pixel 0, 4000: peregrine has rows 0 to", ""),
+    (lambda: mp.encode("peregrine", 0, 4000), "pixel 0,4000: peregrine has rows 0 to", ""),
     (lambda: mp.budget("coded-practical", "fogg"), "environment: ", ""),
     (lambda: mp.budget("coded-practical", pd=2), "pd is 2; it must be from", ""),
     (lambda: mp.scans("peregrine", "wall", 10**9), "1000000000 scans from number 0 on last longer", ""),

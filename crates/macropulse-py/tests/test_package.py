@@ -62,6 +62,9 @@ def test_the_stub_says_what_the_module_does():
 @pytest.mark.parametrize("source, wrong", [
     ("mp.simulate('peregrine', mp.Scene.car(30.0), seed=1).x.mean()", None),
     ("for scan in mp.scans('a', 'b', 3): print(scan.image('range').shape)", None),
+    ("for scan in mp.load_scans('out'): print(mp.score(scan))", None),
+    ("mp.decode('a', 'shots.mps', 'ticks.mpt').x", None),
+    ("mp.decode('a', 'shots.mps', {'tick': [1]})", "No overload variant"),
     ("mp.simulate('peregrine')", "Missing positional argument"),
     ("mp.simulate('peregrine', 'wall', sed=1)", "Unexpected keyword argument"),
     ("mp.load('a.pcd').rnage", '"Scan" has no attribute "rnage"'),

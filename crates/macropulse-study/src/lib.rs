@@ -5,8 +5,10 @@
 
 pub mod budget;
 pub mod codes;
+pub mod decoding;
 pub mod paper;
 pub mod record;
+pub mod sent;
 pub mod sweep;
 pub mod text;
 pub mod validate;

@@ -1,5 +1,6 @@
 //! The whole chain from shots to points, as function calls.
 
+mod arrivals;
 mod record;
 
 use std::sync::Mutex;
@@ -19,6 +20,8 @@ use crate::tdc::Converted;
 use crate::{channel, tdc};
 use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
 use macropulse_codec::{ShotLog, Ticks};
+
+pub use arrivals::{Arrival, Arrivals, Stretch};
 
 /// Why there is no scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -175,6 +178,14 @@ impl<'a> Scans<'a> {
         let mut converted = record::converted(&setup, &mut memory, &log);
         record::cut(&setup, &mut memory, (band, &log), &mut converted);
         (design.cut().known(&log), converted.ticks)
+    }
+
+    /// What comes to the detector in a stretch of the time of a band: truth, for people who ask why;
+    /// the receiver is not given it.
+    pub fn arrivals(&self, band: &Band, stretch: &Stretch) -> Arrivals {
+        let Self { design, scene, operating, detectors, .. } = self;
+        let setup = Setup { seen: Seen { design, scene, operating }, detectors };
+        arrivals::arrivals(&setup, band, stretch)
     }
 
     fn part_kept(

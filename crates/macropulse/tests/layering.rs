@@ -161,6 +161,12 @@ const STUDY: Layers = Layers {
         Rule { module: "text", may_name: &[], because: "lines of text ask not what they say" },
         Rule { module: "view", may_name: &["text"], because: "pictures show columns, no physics" },
         Rule { module: "codes", may_name: &[], because: "families are compared without a scan" },
+        Rule { module: "sent", may_name: &[], because: "what is sent asks not what it meets" },
+        Rule {
+            module: "decoding",
+            may_name: &[],
+            because: "ticks from outside become points by the simulator's own stages alone",
+        },
         Rule {
             module: "record",
             may_name: &["text", "view"],

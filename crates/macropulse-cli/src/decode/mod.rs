@@ -18,12 +18,13 @@ use crate::interrupt::Interrupt;
 use crate::options::{self, Common, Surroundings};
 use crate::simulate::formats::Formats;
 use crate::text::{print, print_json};
-use run::{Run, Sink};
+use run::{Run, Setting, Sink};
 
 /// Decode recorded shots and ticks into points
 ///
 /// Both come from `simulate --format ticks`, from `encode`, or from hardware: docs/formats.md says how
-/// they are written. The points are those that `simulate` gives, to the byte.
+/// they are written. The points are those that `simulate` gives, to the byte. A folder gets manifest.json
+/// and a page to look at them, index.html, as well.
 #[derive(Args)]
 #[command(after_help = "Examples:
   macropulse simulate kim-park-2016-fixed car-30m --format ticks,pcd -o out
@@ -88,14 +89,15 @@ pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
                 .to_owned(),
         ));
     }
-    let stream = input::open(&options.shots, &options.ticks, &design)?;
+    let (decoding, names) = input::open(&options.shots, &options.ticks, &design)?;
     let interrupt = Interrupt::listen()?;
-    let run = Run::new(&design, &operating, options.explain.clone());
-    let run = run.through(stream, sink, (common, &interrupt))?;
+    let setting = Setting { design: &design, environment: &environment, operating: &operating };
+    let run = Run::new(setting, names, options.explain.clone());
+    let run = run.through(decoding, sink, (common, &interrupt))?;
     if options.json {
-        print_json(vec![run.json(&environment)])?;
+        print_json(vec![run.json()])?;
     } else if !common.quiet && !run.is_streamed {
-        print(&run.text(&environment))?;
+        print(&run.text())?;
     }
     if interrupt.is_raised() { Err(Fault::Interrupted) } else { Ok(()) }
 }

@@ -1,20 +1,19 @@
 //! Band after band, from ticks to files.
 
 use std::io::{ErrorKind, Write};
+use std::ops::ControlFlow;
 use std::time::Instant;
 
-use macropulse::channel::{Link, Operating};
-use macropulse::codec::decode::{Reject, Returns};
-use macropulse::codec::{ShotLog, Ticks};
+use macropulse::channel::Operating;
+use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
-use macropulse::emit::Band;
-use macropulse::formats::write_csv_lines;
-use macropulse::points::{Piece, PointCloud, Truth, Viewpoint};
-use macropulse_study::record;
-use rayon::prelude::*;
+use macropulse::environment::Environment;
+use macropulse::formats::{write_csv_lines, write_manifest};
+use macropulse::points::PointCloud;
+use macropulse_study::decoding::{Band, Decoding};
+use macropulse_study::record::{self, Decoded, PAGE, Page};
 use serde_json::Value;
 
-use super::input::Input;
 use crate::explain::{self, Pixel};
 use crate::fault::{Fault, warn};
 use crate::folder::Folder;
@@ -33,10 +32,18 @@ pub enum Sink {
     Folder(Folder, Formats),
 }
 
+/// What decodes.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    pub design: &'a Design,
+    pub environment: &'a Environment,
+    pub operating: &'a Operating,
+}
+
 /// A run that decodes, with all that is counted.
 pub struct Run<'a> {
-    pub design: &'a Design,
-    operating: &'a Operating,
+    pub setting: Setting<'a>,
+    pub inputs: [String; 2],
     pub scans: u64,
     pub shots: u64,
     pub ticks: u64,
@@ -52,40 +59,14 @@ pub struct Run<'a> {
     asked: Vec<Pixel>,
     /// What was explained, for people and for programs.
     pub explained: Vec<(String, Value)>,
-    viewpoint: Viewpoint,
-    /// The scan under way, and its points so far.
-    number: u64,
-    pieces: Vec<Piece>,
-    /// Its files, from the first one on.
-    recorded: Option<record::Files<'a>>,
     has_header: bool,
 }
 
-/// A band that is decoded.
-struct Decoded {
-    log: ShotLog,
-    ticks: Ticks,
-    returns: Returns,
-    piece: Piece,
-}
-
-impl Decoded {
-    fn of(
-        (log, ticks): (ShotLog, Ticks),
-        (design, link): (&Design, &Link),
-    ) -> Result<Self, String> {
-        let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks);
-        let returns = returns.map_err(|error| error.to_string())?;
-        let piece = Piece::of(design, link, &log, &returns);
-        Ok(Self { log, ticks, returns, piece })
-    }
-}
-
 impl<'a> Run<'a> {
-    pub fn new(design: &'a Design, operating: &'a Operating, asked: Vec<Pixel>) -> Self {
+    pub fn new(setting: Setting<'a>, inputs: [String; 2], asked: Vec<Pixel>) -> Self {
         Self {
-            design,
-            operating,
+            setting,
+            inputs,
             scans: 0,
             shots: 0,
             ticks: 0,
@@ -98,10 +79,6 @@ impl<'a> Run<'a> {
             is_streamed: false,
             asked,
             explained: Vec::new(),
-            viewpoint: Viewpoint::default(),
-            number: 0,
-            pieces: Vec::new(),
-            recorded: None,
             has_header: false,
         }
     }
@@ -109,58 +86,60 @@ impl<'a> Run<'a> {
     /// Decodes all that comes, and puts it where it belongs.
     pub fn through(
         mut self,
-        mut input: Input,
+        mut decoding: Decoding,
         mut sink: Sink,
         (common, interrupt): (&Common, &Interrupt),
     ) -> Result<Self, Fault> {
         let began = Instant::now();
-        let design = self.design;
-        (self.viewpoint.position, self.viewpoint.turn) = input.pose;
+        let Setting { design, operating, .. } = self.setting;
         self.is_streamed = matches!(sink, Sink::Lines);
         let progress = Progress::of(common, &design.name, design.shots_per_scan());
-        // What comes as it is made is decoded as it comes.
-        let together = if input.is_live { 1 } else { 2 * rayon::current_num_threads() };
-        let mut is_over = false;
-        while !is_over && !interrupt.is_raised() {
-            let mut bands = Vec::new();
-            while bands.len() < together && !is_over {
-                let until = |shot: u64| Band::of_shot(design, shot).end(design);
-                match input.stream.next_band(until).map_err(|error| input.fault(&error))? {
-                    Some(band) => bands.push(band),
-                    None => is_over = true,
-                }
+        let mut recorded = match &sink {
+            Sink::Folder(folder, formats) => {
+                Some(record::Files::new(folder.path(), &formats.0, (design, None)))
             }
-            let link = &self.operating.link;
-            let decoded: Vec<Result<Decoded, _>> =
-                bands.into_par_iter().map(|band| Decoded::of(band, (design, link))).collect();
-            for band in decoded {
-                let band = band.map_err(|error| input.wrong(&error))?;
-                progress.add(band.log.owned.len() as u64);
-                self.take(band, &mut sink, interrupt)?;
+            _ => None,
+        };
+        let mut page = Page::new(design, None);
+        while let Some(cloud) = decoding.next_scan((design, &operating.link), |band| {
+            progress.add(band.log.owned.len() as u64);
+            self.take(band, &mut sink)?;
+            Ok::<_, Fault>(match interrupt.is_raised() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            })
+        })? {
+            self.scans += 1;
+            if let (Sink::Folder(folder, _), Some(recorded)) = (&mut sink, &mut recorded) {
+                page.add(&cloud);
+                self.files.extend(interrupt.undisturbed(|| {
+                    folder.make_once()?;
+                    let files = recorded.add(&cloud)?;
+                    folder.keep();
+                    Ok::<_, Fault>(files)
+                })?);
             }
         }
-        if !interrupt.is_raised() {
-            self.end_scan(&mut sink, interrupt)?;
-        }
-        if let Some(recorded) = self.recorded.take() {
+        if let Some(recorded) = recorded {
             interrupt.undisturbed(|| recorded.finish())?;
         }
         progress.finish();
         self.elapsed = began.elapsed().as_secs_f64();
-        if self.shots == 0 && !interrupt.is_raised() {
-            return Err(input.wrong("there is not a single shot whose returns are wanted"));
+        self.find_warnings(&sink);
+        if let (Sink::Folder(folder, _), 1..) = (&sink, self.scans) {
+            self.folder = folder.path().display().to_string();
+            self.files.push(PAGE.to_owned());
+            interrupt.undisturbed(|| {
+                let manifest = self.manifest();
+                page.write(folder.path(), &manifest)?;
+                write_manifest(&format!("{manifest:#}\n"), folder.path())
+            })?;
         }
-        self.find_warnings();
         Ok(self)
     }
 
-    /// Counts a band and keeps its points.
-    fn take(&mut self, band: Decoded, sink: &mut Sink, interrupt: &Interrupt) -> Result<(), Fault> {
-        let scan = band.piece.points.scan;
-        if scan != self.number {
-            self.end_scan(sink, interrupt)?;
-            self.number = scan;
-        }
+    /// Counts a band, explains what is asked for of it, and prints its points where they are to be.
+    fn take(&mut self, band: &Band, sink: &mut Sink) -> Result<(), Fault> {
         self.shots += band.log.owned.len() as u64;
         self.ticks += band.ticks.len() as u64;
         self.returns += band.returns.len() as u64;
@@ -169,7 +148,8 @@ impl<'a> Run<'a> {
         for pixel in &self.asked {
             let shot = explain::shot_of(&band.log, *pixel);
             let Some(shot) = shot else { continue };
-            let explained = explain::Explained::of(self.design, (&band.log, &band.ticks), shot)?;
+            let given = (&band.log, &band.ticks);
+            let explained = explain::Explained::of(self.setting.design, given, shot)?;
             self.explained.push((explained.text(), explained.json()));
             if let Sink::Folder(folder, _) = sink {
                 folder.make_once()?;
@@ -178,11 +158,9 @@ impl<'a> Run<'a> {
             }
         }
         match sink {
-            Sink::Nothing => {}
-            Sink::Lines => self.print(&band.piece.points)?,
-            Sink::Folder(..) => self.pieces.push(band.piece),
+            Sink::Lines => self.print(&band.piece.points),
+            Sink::Nothing | Sink::Folder(..) => Ok(()),
         }
-        Ok(())
     }
 
     /// Writes the points of a band to stdout.
@@ -198,37 +176,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Writes the files of the scan under way.
-    fn end_scan(&mut self, sink: &mut Sink, interrupt: &Interrupt) -> Result<(), Fault> {
-        if self.shots > 0 {
-            self.scans += 1;
-        }
-        let pieces = std::mem::take(&mut self.pieces);
-        let Sink::Folder(folder, formats) = sink else { return Ok(()) };
-        if pieces.is_empty() {
-            return Ok(());
-        }
-        let frame =
-            PointCloud { viewpoint: self.viewpoint, ..PointCloud::empty(self.design, self.number) };
-        let mut cloud = PointCloud::joined(&frame, &pieces);
-        // Nothing is known of a scene.
-        cloud.truth = Truth::default();
-        let stage = (self.design, None);
-        let recorded = || record::Files::new(folder.path(), &formats.0, stage);
-        let recorded = self.recorded.get_or_insert_with(recorded);
-        let files = interrupt.undisturbed(|| {
-            folder.make_once()?;
-            let files = recorded.add(&cloud)?;
-            folder.keep();
-            Ok::<_, Fault>(files)
-        })?;
-        self.folder = folder.path().display().to_string();
-        self.files.extend(files);
-        Ok(())
-    }
-
     /// What its user should know, said at once.
-    fn find_warnings(&mut self) {
+    fn find_warnings(&mut self, sink: &Sink) {
         if self.returns == 0 && self.shots > 0 {
             let reason = match self.ticks {
                 0 => {
@@ -242,6 +191,28 @@ impl<'a> Run<'a> {
         if self.asked.len() > found {
             self.warnings.push("a pixel of --explain has no shot in the log".to_owned());
         }
+        if let Sink::Folder(folder, _) = sink {
+            self.warnings.extend(folder.warning_of_older(&self.files));
+        }
         self.warnings.iter().for_each(|warning| warn(warning));
+    }
+
+    /// What is needed to repeat the run, and what was counted.
+    pub fn manifest(&self) -> Value {
+        let [shots, ticks] = &self.inputs;
+        let decoded = Decoded {
+            design: self.setting.design,
+            environment: self.setting.environment,
+            inputs: [shots, ticks],
+            scans: self.scans,
+            shots: self.shots,
+            ticks: self.ticks,
+            returns: self.returns,
+            rejects: self.rejects,
+            warnings: &self.warnings,
+            files: &self.files,
+            elapsed: self.elapsed,
+        };
+        decoded.manifest()
     }
 }

@@ -1,16 +1,18 @@
 //! What is printed of a run that decodes.
 
+use std::path::Path;
+
 use macropulse::codec::decode::Reject;
-use macropulse::environment::Environment;
-use macropulse_study::record::{named, surroundings};
-use serde_json::{Map, Value, json};
+use macropulse_study::record::PAGE;
+use serde_json::Value;
 
 use super::run::Run;
 use crate::text::{Columns, counted, grouped};
 
 impl Run<'_> {
     /// A report for people.
-    pub fn text(&self, environment: &Environment) -> String {
+    pub fn text(&self) -> String {
+        let environment = self.setting.environment;
         let mut columns = Columns::default();
         columns.push("shots", grouped(self.shots));
         columns.push("ticks", grouped(self.ticks));
@@ -26,9 +28,12 @@ impl Run<'_> {
         columns.push_list("warnings", self.warnings.iter().cloned());
         if !self.folder.is_empty() {
             let files = counted(self.files.len() as u64, "file");
-            columns.push("written", format!("{files} to {}", self.folder));
+            let page = Path::new(&self.folder).join(PAGE);
+            let text =
+                format!("{files} and manifest.json to {}; open {}", self.folder, page.display());
+            columns.push("written", text);
         }
-        let (name, scans) = (&self.design.name, counted(self.scans, "scan"));
+        let (name, scans) = (&self.setting.design.name, counted(self.scans, "scan"));
         let mut text = format!("{name}: {scans} decoded, {:.2} s\n\n", self.elapsed);
         text.push_str(&columns.text());
         for (explained, _) in &self.explained {
@@ -38,29 +43,11 @@ impl Run<'_> {
         text
     }
 
-    /// The same for programs; keys carry their units.
-    pub fn json(&self, environment: &Environment) -> Value {
-        let rejects: Map<String, Value> = Reject::ALL
-            .into_iter()
-            .zip(self.rejects)
-            .map(|(kind, count)| (kind.name().to_owned(), count.into()))
-            .collect();
-        let explained: Vec<&Value> = self.explained.iter().map(|(_, json)| json).collect();
-        json!({
-            "sensor": named(self.design),
-            "environment": surroundings(environment),
-            "counts": {
-                "scans": self.scans,
-                "shots": self.shots,
-                "ticks": self.ticks,
-                "returns": self.returns,
-            },
-            "rejects": rejects,
-            "times_s": { "elapsed": self.elapsed },
-            "warnings": self.warnings,
-            "folder": (!self.folder.is_empty()).then_some(&self.folder),
-            "files": self.files,
-            "explained": explained,
-        })
+    /// The same for programs: the manifest, and what is printed alone.
+    pub fn json(&self) -> Value {
+        let mut json = self.manifest();
+        json["folder"] = (!self.folder.is_empty()).then_some(self.folder.as_str()).into();
+        json["explained"] = self.explained.iter().map(|(_, json)| json.clone()).collect();
+        json
     }
 }

@@ -9,8 +9,7 @@ use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::codec::files::Form;
 use macropulse::design::Design;
-use macropulse::emit::{Shot, most_scans, shot_of_pixel};
-use serde_json::{Value, json};
+use macropulse_study::sent::Macropulse;
 
 use crate::fault::Fault;
 use crate::options::Changes;
@@ -86,87 +85,35 @@ pub fn run(options: &Encode) -> Result<(), Fault> {
         .pixels
         .iter()
         .map(|&pixel| Macropulse::to(&design, options.scan, pixel))
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, _>>()
+        // The error begins with the name of what was typed: that of its option.
+        .map_err(|error| Fault::Wrong(format!("--{error}")))?;
     if options.json {
         return print_json(macropulses.iter().map(Macropulse::json).collect());
     }
-    let texts: Vec<String> = macropulses.iter().map(Macropulse::text).collect();
+    let texts: Vec<String> = macropulses.iter().map(|one| text(one, &design)).collect();
     print(&texts.join("\n"))
 }
 
-/// One shot with its pixel, written out.
-struct Macropulse<'a> {
-    row: u32,
-    column: u32,
-    shot: Shot,
-    /// Bits in the order in which they are sent; `None` where a shot carries no label.
-    payload: Option<String>,
-    marks: &'a [u16],
-    chips: u32,
-    design: &'a Design,
-}
-
-impl<'a> Macropulse<'a> {
-    fn to(design: &'a Design, scan: u64, (row, column): (u32, u32)) -> Result<Self, Fault> {
-        let Some(shot) = shot_of_pixel(design, scan, row, column) else {
-            let (rows, columns) = (design.scan.rows, design.scan.columns);
-            return Err(Fault::Wrong(if row < rows && column < columns {
-                let last = most_scans(design).saturating_sub(1);
-                format!("--scan {scan}: scans of {} are numbered 0 to {last}", design.name)
-            } else {
-                format!(
-                    "--pixel {row},{column}: {} has rows 0 to {} and columns 0 to {}",
-                    design.name,
-                    rows - 1,
-                    columns - 1
-                )
-            }));
-        };
-        let codebook = &design.coding.codebook;
-        Ok(Self {
-            row,
-            column,
-            shot,
-            payload: codebook.payload().map(|payload| payload.text(shot.label)),
-            marks: codebook.marks(shot.label, shot.word),
-            chips: codebook.chips(),
-            design,
-        })
-    }
-
-    fn json(&self) -> Value {
-        json!({
-            "row": self.row,
-            "column": self.column,
-            "label": self.shot.label,
-            "payload": self.payload,
-            "code_word": self.shot.word,
-            "marks": self.marks,
-            "chips": self.chips,
-            "fired_at_fs": self.shot.fired_at_fs,
-        })
-    }
-
-    fn text(&self) -> String {
-        let mut columns = Columns::default();
-        columns.push("pixel", format!("row {}, column {}", self.row, self.column));
-        columns.push("fired at", format!("{} fs", grouped(self.shot.fired_at_fs.unsigned_abs())));
-        match &self.payload {
-            Some(payload) => {
-                columns.push("label", self.shot.label.to_string());
-                columns.push("payload", format!("{payload} ({} bits)", payload.len()));
-                columns.push("code word", self.shot.word.to_string());
-            }
-            None => columns.push("payload", "none: this sensor sends one mark per shot"),
+/// A macropulse for people.
+fn text(macropulse: &Macropulse, design: &Design) -> String {
+    let mut columns = Columns::default();
+    columns.push("pixel", format!("row {}, column {}", macropulse.row, macropulse.column));
+    columns.push("fired at", format!("{} fs", grouped(macropulse.shot.fired_at_fs.unsigned_abs())));
+    match &macropulse.payload {
+        Some(payload) => {
+            columns.push("label", macropulse.shot.label.to_string());
+            columns.push("payload", format!("{payload} ({} bits)", payload.len()));
+            columns.push("code word", macropulse.shot.word.to_string());
         }
-        let chip_ps = self.design.coding.chip_fs as f64 * 1e-3;
-        columns.push("chips", format!("{} of {chip_ps} ps", self.chips));
-        let list: Vec<String> = self.marks.iter().map(u16::to_string).collect();
-        columns.push("marks", format!("{} lit chips, counted from 0:", self.marks.len()));
-        columns
-            .push("", if list.is_empty() { "none: no light".to_owned() } else { list.join(" ") });
-        columns.text()
+        None => columns.push("payload", "none: this sensor sends one mark per shot"),
     }
+    let chip_ps = design.coding.chip_fs as f64 * 1e-3;
+    columns.push("chips", format!("{} of {chip_ps} ps", macropulse.chips));
+    let list: Vec<String> = macropulse.marks.iter().map(u16::to_string).collect();
+    columns.push("marks", format!("{} lit chips, counted from 0:", macropulse.marks.len()));
+    columns.push("", if list.is_empty() { "none: no light".to_owned() } else { list.join(" ") });
+    columns.text()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Why a shot was decided as it was: for people, for programs, and as a picture.
 
-mod picture;
+mod light;
 mod text;
 
 use std::path::Path;
@@ -9,7 +9,9 @@ use macropulse::codec::decode::Explanation;
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::formats::write_atomically;
+use macropulse::sim::{Arrivals, Stretch};
 use macropulse::units::{range_from_tof, s_from_fs};
+use macropulse_study::record::pixel_picture;
 use serde_json::{Value, json};
 
 use crate::fault::Fault;
@@ -58,6 +60,10 @@ pub struct Explained<'a> {
     /// Pixels of the other shots whose light is there.
     others: Vec<Pixel>,
     explanation: Explanation,
+    /// Channel of its detector.
+    channel: u16,
+    /// What came to the detector, where that is known.
+    arrivals: Option<Arrivals>,
 }
 
 impl<'a> Explained<'a> {
@@ -80,7 +86,23 @@ impl<'a> Explained<'a> {
             word: log.word[shot],
             others: explanation.others.iter().map(|other| pixel(other.shot)).collect(),
             explanation,
+            channel: log.channel[shot],
+            arrivals: None,
         })
+    }
+
+    /// The time that is explained: from the shot, or where its gate opens, to the end of the last
+    /// macropulse within the gate.
+    pub fn stretch(&self) -> Stretch {
+        let Explanation { fired_tick, gate, marks, width, .. } = &self.explanation;
+        let lasts = i64::from(marks.last().map_or(0, |last| last + width));
+        let ticks = gate.start.min(0)..gate.end + lasts;
+        Stretch { channel: self.channel, from: *fired_tick, ticks }
+    }
+
+    /// The same with what came to the detector in [`Self::stretch`]: of a simulation it is known.
+    pub fn with(self, arrivals: Arrivals) -> Self {
+        Self { arrivals: Some(arrivals), ..self }
     }
 
     /// The range, m, of light that comes `lag` ticks after the shot.
@@ -141,6 +163,7 @@ impl<'a> Explained<'a> {
             "ticks_of_others": self.claimed(),
             "density": self.explanation.density,
             "threshold_marks": self.explanation.threshold,
+            "light": self.light_json(),
             "peak": at(self.explanation.peak),
             "sidelobe": at(self.explanation.sidelobe),
             "others": others,
@@ -153,9 +176,12 @@ impl<'a> Explained<'a> {
         let Explanation { ticks, gate, step, found, left, .. } = &self.explanation;
         json["ticks"] = ticks.iter().map(|(tick, _)| *tick).collect();
         json["is_of_others"] = ticks.iter().map(|(_, claimed)| *claimed).collect();
+        self.add_arrivals(&mut json["light"]);
         json["correlation"] = json!({
             "first_lag_ticks": gate.start,
             "step_ticks": step,
+            "first_range_m": self.range(gate.start),
+            "step_m": self.range(gate.start + step) - self.range(gate.start),
             "marks": found,
             "marks_without_others": left,
         });
@@ -167,11 +193,12 @@ impl<'a> Explained<'a> {
         let (row, column) = self.pixel;
         let scan = self.id / self.design.shots_per_scan();
         let name = format!("explain-{scan:06}-{row}-{column}");
-        let picture = self.picture();
+        let whole = self.whole_json();
+        let picture = pixel_picture(&whole);
         let png = picture.png().map_err(|error| Fault::Ours(error.to_string()))?;
         let files = [
             (format!("{name}.txt"), self.text().into_bytes()),
-            (format!("{name}.json"), self.whole_json().to_string().into_bytes()),
+            (format!("{name}.json"), whole.to_string().into_bytes()),
             (format!("{name}.svg"), picture.svg().into_bytes()),
             (format!("{name}.png"), png),
         ];

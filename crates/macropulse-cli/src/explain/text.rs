@@ -129,6 +129,7 @@ impl Explained<'_> {
                 grouped((gate.end - gate.start) as u64)
             ),
         );
+        columns.push("light", self.light_text());
         columns.push(
             "ticks",
             format!(

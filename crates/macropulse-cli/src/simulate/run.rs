@@ -55,7 +55,7 @@ impl<'a> Run<'a> {
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
-        let mut page = Page::new(design, &scenario.scene);
+        let mut page = Page::new(design, Some(&scenario.scene));
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         let stage = (design, Some(&scenario.scene));
         let mut recorded = folder
@@ -116,7 +116,7 @@ impl<'a> Run<'a> {
             run.files.push(PAGE.to_owned());
             interrupt.undisturbed(|| {
                 let manifest = run.manifest();
-                page.write(folder.path(), &manifest)?;
+                page.write(folder.path(), &manifest.value())?;
                 manifest.write(folder.path())
             })?;
         }
@@ -134,13 +134,15 @@ impl<'a> Run<'a> {
             let is_there =
                 |band: &Band| explain::shot_of(&band.shot_log(self.design), *pixel).is_some();
             let band = bands(self.design, 0).find(is_there);
-            let record = band.map(|band| scans.record(&band));
-            let shot = record.as_ref().and_then(|(log, _)| explain::shot_of(log, *pixel));
-            let (Some((log, ticks)), Some(shot)) = (record, shot) else {
+            let record = band.map(|band| (scans.record(&band), band));
+            let shot = record.as_ref().and_then(|((log, _), _)| explain::shot_of(log, *pixel));
+            let (Some(((log, ticks), band)), Some(shot)) = (record, shot) else {
                 self.warnings.push("a pixel of --explain has no shot".to_owned());
                 continue;
             };
             let explained = Explained::of(self.design, (&log, &ticks), shot)?;
+            let arrivals = scans.arrivals(&band, &explained.stretch());
+            let explained = explained.with(arrivals);
             self.explained.push((explained.text(), explained.json()));
             if let Some(folder) = folder {
                 self.files.extend(explained.write(folder.path())?);
@@ -191,15 +193,7 @@ impl<'a> Run<'a> {
                 "too many pixels for a picture in colour; there is the 16-bit one".to_owned(),
             );
         }
-        let older = folder.map_or_else(Vec::new, |folder| folder.older(&self.files));
-        if let (Some(folder), [first, ..]) = (folder, older.as_slice()) {
-            let (folder, count) = (folder.path().display(), older.len());
-            let others = if count == 1 { "is" } else { "and others like it are" };
-            found.push(format!(
-                "{folder}/{first} {others} of an older run ({count} in all), and not in the \
-                 manifest: remove what is older, or write into a folder of its own"
-            ));
-        }
+        found.extend(folder.and_then(|folder| folder.warning_of_older(&self.files)));
         found.iter().for_each(|warning| warn(&format!("{}: {warning}", self.design.name)));
         self.warnings.extend(found);
     }

@@ -140,7 +140,7 @@ impl Run<'_> {
 
     /// The same for programs: the manifest, and what depends on this machine.
     pub fn json(&self) -> Value {
-        let mut json = serde_json::to_value(self.manifest()).unwrap_or_default();
+        let mut json = self.manifest().value();
         json["speed"] = self.speed().into();
         json["folder"] = (!self.folder.is_empty()).then_some(self.folder.as_str()).into();
         if !self.explained.is_empty() {

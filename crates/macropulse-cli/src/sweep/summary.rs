@@ -4,7 +4,6 @@ use std::path::Path;
 
 use macropulse::formats::versioned;
 use macropulse_study::sweep::{Plan, Point, Shard, Table};
-use serde_json::{Value, json};
 
 use crate::text::{NO_BREAK, counted, grouped};
 
@@ -44,27 +43,12 @@ pub fn text_of_missing(plan: &Plan, missing: &[usize], shard: Shard) -> String {
 
 /// The table for programs.
 pub fn json(plan: &Plan, table: &Table) -> String {
-    let mut value = header(plan);
-    value["rows"] = table.json();
-    format!("{:#}\n", versioned(value))
+    format!("{:#}\n", versioned(plan.json(table)))
 }
 
 /// What is left to do, for programs.
 pub fn json_of_missing(plan: &Plan, missing: &[usize], shard: Shard) -> String {
-    let mut value = header(plan);
-    value["missing"] = missing.len().into();
-    value["missing_shards"] = shard.with_any(missing).into();
-    format!("{:#}\n", versioned(value))
-}
-
-fn header(plan: &Plan) -> Value {
-    json!({
-        "sensors": plan.sensors(),
-        "scene": plan.scene,
-        "vary": plan.axes.iter().map(|axis| &axis.key).collect::<Vec<_>>(),
-        "seeds": plan.seeds.end - plan.seeds.start,
-        "scans": plan.count(),
-    })
+    format!("{:#}\n", versioned(plan.json_of_missing(missing, shard)))
 }
 
 fn headline(plan: &Plan) -> String {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import NARROW, macropulse, read_pcd, write_pcd
+from conftest import NARROW, WIDE, macropulse, read_pcd, write_pcd
 
 # Half of the field of view of the page, from top to bottom.
 HALF_FIELD = math.tan(math.radians(25))
@@ -318,7 +318,7 @@ def test_a_pixel_that_is_explained_leads_to_its_ticks(visit, coarse, tmp_path):
         "ticks": [141, 146, 150, 161],
         "is_of_others": [False] * 4,
         "peak": {"lag_ticks": 141, "range_m": 47.9, "marks": 4},
-        "correlation": {"first_lag_ticks": 140, "step_ticks": 1, "marks": [0, 4, 1], "marks_without_others": [0, 4, 1]},
+        "correlation": {"first_lag_ticks": 140, "step_ticks": 1, "first_range_m": 47.5, "step_m": 0.4, "marks": [0, 4, 1], "marks_without_others": [0, 4, 1]},
     }
     (folder / "explain-000000-13-30.json").write_text(json.dumps(told))
     manifest = json.loads((folder / "manifest.json").read_text())
@@ -336,7 +336,7 @@ def test_a_pixel_that_is_explained_leads_to_its_ticks(visit, coarse, tmp_path):
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     lines = page.locator(".at-pointer p").all_inner_texts()
-    assert lines == ["Lag, ticks: 141", "all ticks: 4", "without those of other shots: 4"]
+    assert lines == ["Range, m: 47.9", "all ticks: 4", "without those of other shots: 4"]
 
 
 def test_an_empty_cloud_says_so(visit, tmp_path):
@@ -362,3 +362,86 @@ def test_pages_at_both_widths_in_light_and_dark(visit, street, coarse, pictures)
                 # Points are seen: a part of the view is neither ground nor line.
                 share = np.mean(np.abs(view - ground).max(axis=2) > 40)
                 assert share > 0.01, (name, width, scheme, share)
+
+
+@pytest.fixture(scope="session")
+def explained(tmp_path_factory):
+    """Folders of a simulation and of what was decoded of its ticks, with the same pixel explained; and
+    that pixel."""
+    folder = tmp_path_factory.mktemp("runs")
+    sensor = "--sensor kim-park-2016-fixed --set scan.raster.rows=24 --set scan.raster.columns=48"
+    pixel = "--explain 13,30"
+    macropulse("simulate", *f"{sensor} --scene street {pixel} --format pcd,ticks -o".split(), folder / "was")
+    files = [folder / "was" / name for name in ("shots-000000.mps", "ticks-000000.mpt")]
+    macropulse("decode", *sensor.split(), *files, *pixel.split(), "-o", folder / "again")
+    return folder, (13, 30)
+
+
+def lanes(page):
+    """The ticks in each lane of the first chart of the pixel, by its name; and the names from the top."""
+    chart = page.locator("#pixel-13-30 svg.mp").first
+    texts = chart.locator("text").evaluate_all(
+        "(all) => all.map((one) => [one.textContent, one.getBoundingClientRect().y])"
+    )
+    named = sorted((y, text) for text, y in texts if text in LANES)
+    told = json.loads(chart.locator("metadata").text_content())
+    points = [point for series in told["series"] for point in series["points"]]
+    ticks = {name: [float(tick) for *_, tick, lane in points if lane == name] for _, name in named}
+    return ticks, [name for _, name in named]
+
+
+LANES = [
+    "marks sent",
+    "ticks on a mark",
+    "ticks of other shots",
+    "other ticks",
+    "detection events",
+    "light of others",
+    "light of this shot",
+]
+
+
+def test_a_simulation_shows_light_above_the_ticks_and_a_decoding_says_it_knows_none(visit, explained):
+    folder, pixel = explained
+    whole = json.loads((folder / "was" / "explain-000000-13-30.json").read_text())
+    page = opened(visit(folder / "was" / "index.html"))
+    click_pixel(page, pixel, (24, 48))
+    page.locator("#to-pixel").click()
+    ticks, names = lanes(page)
+    assert names == LANES[::-1], "light is above the ticks"
+    (ours,) = [train for train in whole["light"]["trains"] if train["of"] == "this_shot"]
+    assert len(ticks["light of this shot"]) == len(ours["marks_ticks"]) > 100
+    # Nearly each mark that arrived made an event, told to the nearest tick, and that a tick.
+    on_mark = {int(tick) for tick in ticks["ticks on a mark"]}
+    events = {int(tick) - less for tick in ticks["detection events"] for less in (0, 1)}
+    assert on_mark <= events and len(on_mark) > 0.9 * len(ours["marks_ticks"])
+    page = opened(visit(folder / "again" / "index.html"))
+    assert "decoded" in page.title()
+    ticks, names = lanes(page)
+    assert names == LANES[3::-1] and len(ticks["marks sent"]) > 100
+    assert "What light there was is not known" in page.locator("#pixel-13-30").inner_text()
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW], ids=["1400", "390"])
+def test_an_explained_pixel_is_light_and_dark_at_both_widths(visit, explained, size, pictures):
+    folder, _ = explained
+    for scheme in ("light", "dark"):
+        page = opened(visit(folder / "was" / "index.html", size=size, scheme=scheme))
+        section = page.locator("#pixel-13-30")
+        section.scroll_into_view_if_needed()
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        section.screenshot(path=pictures / f"pixel-{size['width']}-{scheme}.png")
+        assert picture(section.locator("svg.mp").first).std() > 10
+
+
+def test_an_intensity_that_is_a_bound_says_so(visit, coarse):
+    cloud = read_pcd(coarse / "scan-000000.pcd")
+    page = opened(visit(coarse / "index.html"))
+    seen = set()
+    for pixel in returns(cloud):
+        click_pixel(page, pixel, cloud.shape)
+        point = cloud[pixel]
+        is_bound = bool(point["peak"] == point["marks"])
+        assert told(page)["intensity"].endswith(" or more") == is_bound
+        seen.add(is_bound)
+    assert True in seen

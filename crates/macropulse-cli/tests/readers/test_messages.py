@@ -240,6 +240,9 @@ def test_osi(run, scan, points):
     percent = np.clip(points["intensity"].astype(float) * 100, 0, 100)
     np.testing.assert_allclose(column(lambda d: d.intensity), percent, rtol=1e-12)
     np.testing.assert_array_equal(column(lambda d: d.beam_id.value), points["row"])
+    # Right and near are surfaces (1, other), wrong is invalid (2), false is clutter (3).
+    kinds = np.array([3, 1, 1, 2, 3, 3])[points["outcome"]]
+    np.testing.assert_array_equal(column(lambda d: int(d.classification)), kinds)
     objects = np.where(points["object"] == 65535, 2**64 - 1, points["object"].astype("u8"))
     np.testing.assert_array_equal(column(lambda d: d.object_id.value), objects)
     (reflections,) = [view.reflection for view in views[scan].lidar_sensor_view]

@@ -2,6 +2,9 @@
 
 import csv
 import math
+import os
+import shutil
+import subprocess
 
 import laspy
 import numpy as np
@@ -67,6 +70,33 @@ def test_ply(run, scan, points):
     # Types that other readers drop are not used.
     kinds = {vertices.dtype[name].str for name in vertices.dtype.names}
     assert kinds == {"<f4", "<f8", "<i4", "|u1"}
+
+
+def test_ply_for_cloudcompare(run, scan, points):
+    vertices = plyfile.PlyData.read(run / f"scan-{scan:06}-cloudcompare.ply")["vertex"].data
+    plain = {"x", "y", "z", "intensity"}
+    named = {name: name if name in plain else f"scalar_{name}" for name in points.dtype.names}
+    assert list(vertices.dtype.names) == list(named.values())
+    same({name: vertices[called] for name, called in named.items()}, points)
+
+
+@pytest.mark.skipif(shutil.which("CloudCompare") is None, reason="there is no CloudCompare")
+def test_cloudcompare_has_all_attributes(run, points, tmp_path):
+    """Without asking anybody, and all of them as scalar fields."""
+    shutil.copy(run / "scan-000000-cloudcompare.ply", tmp_path / "cloud.ply")
+    points = np.load(run / "scan-000000.npy")
+    command = "CloudCompare -SILENT -O cloud.ply -C_EXPORT_FMT ASC -PREC 12 -ADD_HEADER -SAVE_CLOUDS"
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    subprocess.run(command.split(), cwd=tmp_path, env=environment, check=True, capture_output=True)
+    (written,) = tmp_path.glob("cloud*.asc")
+    header, *lines = written.read_text().splitlines()
+    names = header.removeprefix("//").lower().split()
+    assert sorted(names) == sorted(points.dtype.names)
+    read = np.array([line.split() for line in lines], float)
+    assert len(read) == len(points)
+    for column, name in enumerate(names):
+        # It keeps scalar fields as floats of four bytes.
+        np.testing.assert_allclose(read[:, column], points[name].astype("f4"), rtol=1e-6, atol=1e-9, err_msg=name)
 
 
 @pytest.mark.parametrize("ending", ["las", "laz"])

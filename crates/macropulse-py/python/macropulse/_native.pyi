@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
-from typing import Any, Final, Literal, TypeAlias, final
+from typing import Any, Final, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -199,6 +199,11 @@ class Scans(Iterator[Scan]):
     def __len__(self) -> int: ...
 
 @final
+class StoredScans(Iterator[Scan]):
+    def __iter__(self) -> StoredScans: ...
+    def __next__(self) -> Scan: ...
+
+@final
 class Records(Iterator[tuple[dict[str, Any], dict[str, Any]]]):
     def __iter__(self) -> Records: ...
     def __next__(self) -> tuple[dict[str, Any], dict[str, Any]]: ...
@@ -214,6 +219,7 @@ def scans(
     sensor: _Sensor, scene: _Scene, n: int, *, seed: int = 1, first: int = 0, threads: int = 0
 ) -> Scans: ...
 def record(sensor: _Sensor, scene: _Scene, *, seed: int = 1, scan: int = 0) -> Records: ...
+@overload
 def decode(
     sensor: _Sensor,
     shots: dict[str, Any],
@@ -221,7 +227,23 @@ def decode(
     *,
     environment: str | dict[str, Any] | None = None,
 ) -> Scan: ...
+@overload
+def decode(
+    sensor: _Sensor,
+    shots: _Path,
+    ticks: _Path,
+    *,
+    environment: str | dict[str, Any] | None = None,
+) -> Scan: ...
+def decode_scans(
+    sensor: _Sensor,
+    shots: _Path,
+    ticks: _Path,
+    *,
+    environment: str | dict[str, Any] | None = None,
+) -> StoredScans: ...
 def load(path: _Path) -> Scan: ...
+def load_scans(path: _Path) -> StoredScans: ...
 def encode(sensor: _Sensor, row: int, column: int, *, scan: int = 0) -> dict[str, Any]: ...
 def codes(*families: str) -> list[dict[str, Any]]: ...
 def code_words(family: str) -> _Bytes: ...

@@ -68,7 +68,7 @@ pub(super) fn trial(
     let mut recorded = record::Files::new(&folder, &formats, (design, Some(&scene)));
     let mut files = recorded.add(&cloud)?;
     recorded.finish()?;
-    let mut page = record::Page::new(design, &scene);
+    let mut page = record::Page::new(design, Some(&scene));
     page.add(&cloud);
     files.push(record::PAGE.to_owned());
     let writing = writing.elapsed().as_secs_f64();
@@ -87,7 +87,7 @@ pub(super) fn trial(
         elapsed,
     };
     let manifest = record::manifest(&run);
-    page.write(&folder, &manifest)?;
+    page.write(&folder, &manifest.value())?;
     manifest.write(&folder)?;
     let samples = samples_on_car(design, &scene);
     let image = cloud.image(cloud.pick);

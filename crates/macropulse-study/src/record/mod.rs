@@ -1,5 +1,7 @@
 //! What a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
 
+mod decoded;
+mod folder;
 mod page;
 mod pixel;
 
@@ -20,20 +22,49 @@ use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::Tally;
 
-pub use page::{PAGE, Page, describe, explain};
+pub use decoded::Decoded;
+pub use folder::{CloudsAt, Left};
+pub use page::{PAGE, Page, describe, explain, title};
+pub use pixel::picture as pixel_picture;
 
 /// How the names of range images in colour end.
 pub const COLOUR: &str = "-colour.png";
 
-/// Why a result could not be written.
+/// Why what a run leaves could not be written, or read again.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A file could not be written.
+    /// A file could not be written, or a cloud not be read.
     #[error(transparent)]
     Formats(#[from] formats::Error),
     /// A picture could not be drawn.
     #[error(transparent)]
     View(#[from] crate::view::Error),
+    /// A folder or a manifest could not be read.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    Unreadable {
+        /// What was to be read.
+        path: PathBuf,
+        /// What the operating system said.
+        cause: std::io::Error,
+    },
+    /// A manifest is none.
+    #[error("{}: is not the manifest of a run: {cause}; name a cloud instead", path.display())]
+    Manifest {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        cause: serde_json::Error,
+    },
+    /// A folder holds no cloud.
+    #[error(
+        "{folder}: holds no point cloud that can be read; write one with `macropulse simulate … \
+         --format pcd -o {folder}`",
+        folder = folder.display()
+    )]
+    NoCloud {
+        /// The folder.
+        folder: PathBuf,
+    },
 }
 
 /// The files of a run of one sensor, written scan by scan.

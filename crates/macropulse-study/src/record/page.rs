@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::formats::{self, Manifest, Names, write_atomically};
+use macropulse::formats::{self, Names, write_atomically};
 use macropulse::points::PointCloud;
 use macropulse::scene::Scene;
 use serde_json::Value;
@@ -24,12 +24,14 @@ pub struct Page {
 }
 
 impl Page {
-    /// The page of a run that has no scan yet.
-    pub fn new(design: &Design, scene: &Scene) -> Self {
+    /// The page of a run of a sensor that has no scan yet, in a scene if one is known.
+    pub fn new(design: &Design, scene: Option<&Scene>) -> Self {
+        let title = titled(&design.name, scene.map(|scene| scene.name.as_str()));
+        let names = |of: fn(&Scene) -> Vec<String>| scene.map(of).unwrap_or_default();
         Self {
-            explorer: Explorer::new(&format!("{} in {}", design.name, scene.name)),
-            objects: scene.objects.iter().map(|object| object.name.clone()).collect(),
-            materials: scene.materials.iter().map(|material| material.name.clone()).collect(),
+            explorer: Explorer::new(&title),
+            objects: names(|scene| scene.objects.iter().map(|one| one.name.clone()).collect()),
+            materials: names(|scene| scene.materials.iter().map(|one| one.name.clone()).collect()),
         }
     }
 
@@ -44,16 +46,28 @@ impl Page {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn write(mut self, folder: &Path, manifest: &Manifest) -> Result<(), formats::Error> {
-        // Names are strings and numbers finite or null: there is nothing JSON could refuse.
-        describe(&mut self.explorer, &serde_json::to_value(manifest).unwrap_or_default());
+    pub fn write(mut self, folder: &Path, manifest: &Value) -> Result<(), formats::Error> {
+        describe(&mut self.explorer, manifest);
         self.explorer.file("manifest.json");
-        let files = manifest.files.iter().filter(|file| *file != PAGE);
-        for file in files {
+        let files = manifest["files"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        for file in files.filter(|file| *file != PAGE) {
             self.explorer.file(file);
             explain(&mut self.explorer, &folder.join(file));
         }
         write_atomically(&folder.join(PAGE), |out| out.write_all(self.explorer.html().as_bytes()))
+    }
+}
+
+/// What a page of a run is called, by its `manifest`; nothing if that names no sensor.
+pub fn title(manifest: &Value) -> Option<String> {
+    let name = |what: &str| manifest[what]["name"].as_str();
+    Some(titled(name("sensor")?, name("scene")))
+}
+
+fn titled(sensor: &str, scene: Option<&str>) -> String {
+    match scene {
+        Some(scene) => format!("{sensor} in {scene}"),
+        None => format!("{sensor}, decoded"),
     }
 }
 
@@ -67,7 +81,8 @@ pub fn explain(page: &mut Explorer, path: &Path) {
     }
 }
 
-/// Tells on a page what the `manifest` of a run does: what was simulated, and what was counted.
+/// Tells on a page what the `manifest` of a run does: what was simulated or decoded, and what was
+/// counted.
 pub fn describe(page: &mut Explorer, manifest: &Value) {
     let text = |value: &Value| match (value.as_str(), value.as_u64()) {
         (Some(text), _) => text.to_owned(),
@@ -80,6 +95,8 @@ pub fn describe(page: &mut Explorer, manifest: &Value) {
         ("environment", &manifest["environment"]["name"]),
         ("conditions", &manifest["environment"]["conditions"]),
         ("seed", &manifest["seed"]),
+        ("shots of", &manifest["recorded"]["shots"]),
+        ("ticks of", &manifest["recorded"]["ticks"]),
     ];
     for (what, value) in facts.into_iter().filter(|(_, value)| !value.is_null()) {
         page.fact(what, &text(value));
@@ -124,5 +141,7 @@ mod tests {
             assert!(html.contains(&line), "{line}");
         }
         assert!(!html.contains("<dt>scene</dt>") && !html.contains("77.5"));
+        assert_eq!(title(&manifest).as_deref(), Some("mine, decoded"));
+        assert_eq!(title(&json!({ "files": [] })), None);
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::view::{Axis, Chart, Figure, Hue, Line, Note, Section, Series, Style};
+use crate::view::{Axis, Chart, Figure, Hue, Line, Note, Section, Series, Stack, Style};
 
 /// Places of a curve: of each the highest lag is drawn.
 const PLACES: usize = 1200;
@@ -23,37 +23,59 @@ pub fn section(path: &Path) -> Option<Section> {
     of(&serde_json::from_str(&text).ok()?)
 }
 
-/// The section of a pixel: why it was decided so, what was sent and what came back, and the
-/// correlation of both.
+/// The section of a pixel: why it was decided so, what was sent, what came to the detector and what it
+/// made of that, and the correlation.
 fn of(told: &Value) -> Option<Section> {
     let (row, column) = (told["row"].as_u64()?, told["column"].as_u64()?);
-    let decided = told["decided"].as_str()?.replace('_', " ");
+    let (_, decided) = headline(told)?;
     let why = told["why"].as_str().unwrap_or_default();
     let mut section = Section::new(&format!("Pixel {row},{column}"))
         .paragraph(&format!("Shot {}: **{decided}**. {why}", told["shot"]));
     if let Some(chart) = arrivals(told) {
-        section = section.figure(Figure::svg(
-            &chart.svg(),
-            "The marks of the macropulse where the correlation is highest, and the ticks there: of \
-             the light a receiver has nothing else.",
-        ));
+        let said = match told["light"].is_null() {
+            true => {
+                "The marks of the macropulse where the correlation is highest, and the ticks there. \
+                 What light there was is not known: ticks are all that was decoded."
+            }
+            false => {
+                "From the top: light and what the detector made of it, which the receiver never \
+                 sees; the ticks, which are all it has; and the marks of the macropulse where the \
+                 correlation is highest."
+            }
+        };
+        section = section.figure(Figure::svg(&chart.svg(), said));
     }
-    let counts = Counts::of(told)?;
-    let all = 0..counts.found.len();
-    section =
-        section.figure(Figure::svg(&counts.chart("Marks found, over the gate", all).svg(), ""));
-    if let Some((place, _)) = counts.peak {
-        let around = place.saturating_sub(AROUND)..(place + AROUND + 1).min(counts.found.len());
-        let chart = counts.chart("Marks found, about the peak", around);
+    for chart in Counts::of(told)?.charts() {
         section = section.figure(Figure::svg(&chart.svg(), ""));
     }
     Some(section)
 }
 
-/// Ticks in the time of the macropulse at the peak, beside its marks.
+/// The picture of the pixel that `told` explains, as its JSON file has it.
+pub fn picture(told: &Value) -> Stack {
+    let (pixel, decided) = headline(told).unwrap_or_default();
+    let counts = Counts::of(told).into_iter().flat_map(|counts| counts.charts());
+    Stack {
+        title: format!("{pixel}: {decided}"),
+        charts: arrivals(told).into_iter().chain(counts).collect(),
+    }
+}
+
+/// Which pixel it is, and what was decided of it.
+fn headline(told: &Value) -> Option<(String, String)> {
+    let decided = told["decided"].as_str()?.replace('_', " ");
+    Some((format!("Row {}, column {}", told["row"], told["column"]), decided))
+}
+
+/// What arrives in the time of one macropulse: where the correlation is highest, or else where light
+/// of the shot is.
 fn arrivals(told: &Value) -> Option<Chart> {
-    let lag = told["peak"]["lag_ticks"].as_i64()?;
-    let marks: Vec<i64> = whole(&told["marks_ticks"]).map(|mark| mark + lag).collect();
+    let light = Light::of(&told["light"]);
+    let sent: Vec<i64> = whole(&told["marks_ticks"]).collect();
+    let of_light = || Some(light.ours.first()?.floor() as i64 - sent.first()?);
+    let peak = told["peak"]["lag_ticks"].as_i64();
+    let lag = peak.or_else(of_light)?;
+    let marks: Vec<i64> = sent.iter().map(|mark| mark + lag).collect();
     let window = told["window_ticks"].as_i64().unwrap_or(1).max(1);
     let (first, last) = (*marks.first()?, *marks.last()? + window);
     let claimed = told["is_of_others"].as_array()?.iter().map(|claimed| claimed == true);
@@ -62,30 +84,66 @@ fn arrivals(told: &Value) -> Option<Chart> {
     for (tick, is_of_others) in ticks.filter(|(tick, _)| (first..=last).contains(tick)) {
         let before = marks.partition_point(|mark| *mark <= tick);
         let is_on_mark = before > 0 && tick - marks[before - 1] < window;
-        let (place, lane) = match (is_on_mark, is_of_others) {
-            (true, _) => (1.0, &mut ours),
-            (false, true) => (2.0, &mut others),
-            (false, false) => (3.0, &mut rest),
+        let lane = match (is_on_mark, is_of_others) {
+            (true, _) => &mut ours,
+            (false, true) => &mut others,
+            (false, false) => &mut rest,
         };
-        lane.push([tick as f64, place]);
+        lane.push(tick as f64);
     }
-    let lanes = ["marks sent", "ticks on a mark", "ticks of other shots", "other ticks"];
+    let sent = marks.iter().map(|mark| *mark as f64).collect();
+    let mut lanes = vec![
+        ("marks sent", Hue::Blue, sent),
+        ("ticks on a mark", Hue::Green, ours),
+        ("ticks of other shots", Hue::Orange, others),
+        ("other ticks", Hue::Grey, rest),
+    ];
+    if light.is_known {
+        lanes.push(("detection events", Hue::Grey, light.events));
+        lanes.push(("light of others", Hue::Orange, light.others));
+        lanes.push(("light of this shot", Hue::Green, light.ours));
+    }
+    let names: Vec<&str> = lanes.iter().map(|(name, ..)| *name).collect();
     let x = Axis::linear("Ticks since the shot").limits(first as f64, last as f64);
     let mut chart =
-        Chart::new("Marks and ticks of the macropulse", x, Axis::categories("Arrivals", &lanes));
-    chart.size = [904.0, 240.0];
-    let sent = marks.iter().map(|mark| [*mark as f64, 0.0]).collect();
-    let hues = [Hue::Blue, Hue::Green, Hue::Orange, Hue::Grey];
-    for (points, hue) in [sent, ours, others, rest].into_iter().zip(hues) {
+        Chart::new("What was sent and what came back", x, Axis::categories("Arrivals", &names));
+    chart.size = [904.0, 80.0 + 40.0 * lanes.len() as f64];
+    let is_shown = |at: &f64| (first as f64..=last as f64 + 1.0).contains(at);
+    for (place, (_, hue, times)) in lanes.into_iter().enumerate() {
+        let times = times.into_iter().filter(is_shown);
+        let points = times.map(|at| [at, place as f64]).collect();
         chart.series.push(Series { label: String::new(), points, style: Style::Points, hue });
     }
     Some(chart)
 }
 
+/// When light and detection events come, ticks since the shot.
+#[derive(Default)]
+struct Light {
+    is_known: bool,
+    ours: Vec<f64>,
+    others: Vec<f64>,
+    events: Vec<f64>,
+}
+
+impl Light {
+    fn of(told: &Value) -> Self {
+        let mut light = Self { is_known: !told.is_null(), ..Self::default() };
+        for train in told["trains"].as_array().into_iter().flatten() {
+            let is_ours = train["of"] == "this_shot";
+            let lane = if is_ours { &mut light.ours } else { &mut light.others };
+            lane.extend(reals(&train["marks_ticks"]));
+        }
+        light.events.extend(reals(&told["detections_ticks"]));
+        light
+    }
+}
+
 /// Marks found at the lags of the gate.
 struct Counts {
-    first: i64,
-    step: i64,
+    /// Range of the first lag, and from one to the next, m.
+    first: f64,
+    step: f64,
     found: Vec<i64>,
     left: Vec<i64>,
     marks: usize,
@@ -97,15 +155,18 @@ struct Counts {
 impl Counts {
     fn of(told: &Value) -> Option<Self> {
         let correlation = &told["correlation"];
-        let first = correlation["first_lag_ticks"].as_i64()?;
-        let step = correlation["step_ticks"].as_i64()?.max(1);
+        let [first_lag, step_lags] = ["first_lag_ticks", "step_ticks"].map(|key| &correlation[key]);
+        let (first_lag, step_lags) = (first_lag.as_i64()?, step_lags.as_i64()?.max(1));
+        let (first, step) =
+            (correlation["first_range_m"].as_f64()?, correlation["step_m"].as_f64()?);
         let found: Vec<i64> = whole(&correlation["marks"]).collect();
         let left = whole(&correlation["marks_without_others"]).collect();
         let marks = whole(&told["marks_ticks"]).count();
         let peak = &told["peak"];
         let peak = peak["lag_ticks"].as_i64().and_then(|lag| {
-            let place =
-                usize::try_from((lag - first) / step).ok().filter(|at| *at < found.len())?;
+            let place = usize::try_from((lag - first_lag) / step_lags)
+                .ok()
+                .filter(|at| *at < found.len())?;
             let range = peak["range_m"].as_f64()?;
             Some((place, format!("{} of {marks} at {range:.3} m", peak["marks"])))
         });
@@ -113,13 +174,23 @@ impl Counts {
         Some(Self { first, step, found, left, marks, threshold, peak })
     }
 
-    fn lag(&self, place: usize) -> f64 {
-        (self.first + place as i64 * self.step) as f64
+    fn range(&self, place: usize) -> f64 {
+        self.first + place as f64 * self.step
+    }
+
+    /// Over the whole gate and, if there is a peak, about that.
+    fn charts(&self) -> Vec<Chart> {
+        let mut charts = vec![self.chart("Marks found, over the gate", 0..self.found.len())];
+        if let Some((place, _)) = self.peak {
+            let around = place.saturating_sub(AROUND)..(place + AROUND + 1).min(self.found.len());
+            charts.push(self.chart("Marks found, about the peak", around));
+        }
+        charts
     }
 
     fn chart(&self, title: &str, places: std::ops::Range<usize>) -> Chart {
-        let ends = [places.start, places.end.max(places.start + 1) - 1].map(|at| self.lag(at));
-        let x = Axis::linear("Lag, ticks").limits(ends[0], ends[1].max(ends[0] + 1.0));
+        let ends = [places.start, places.end.max(places.start + 1) - 1].map(|at| self.range(at));
+        let x = Axis::linear("Range, m").limits(ends[0], ends[1].max(ends[0] + 1e-3));
         let y = Axis::linear("Marks").limits(0.0, self.marks.max(1) as f64 * 1.08);
         let mut chart = Chart::new(title, x, y);
         chart.size = [904.0, 320.0];
@@ -132,7 +203,7 @@ impl Counts {
             let counts = counts.get(places.clone()).unwrap_or_default().chunks(together);
             let highest = counts.enumerate().filter_map(|(part, counts)| {
                 let (at, count) = counts.iter().enumerate().max_by_key(|(_, count)| **count)?;
-                Some([self.lag(places.start + part * together + at), *count as f64])
+                Some([self.range(places.start + part * together + at), *count as f64])
             });
             let points = highest.collect();
             chart.series.push(Series { label: label.to_owned(), points, style: Style::Line, hue });
@@ -141,11 +212,16 @@ impl Counts {
             chart.lines.push(Line::AtY(threshold, format!("threshold {threshold}")));
         }
         if let Some((place, text)) = self.peak.as_ref().filter(|(at, _)| places.contains(at)) {
-            let at = [self.lag(*place), self.found[*place] as f64];
+            let at = [self.range(*place), self.found[*place] as f64];
             chart.notes.push(Note { at, text: text.clone() });
         }
         chart
     }
+}
+
+/// The numbers of a list.
+fn reals(list: &Value) -> impl Iterator<Item = f64> + '_ {
+    list.as_array().into_iter().flatten().filter_map(Value::as_f64)
 }
 
 /// The whole numbers of a list.
@@ -166,7 +242,7 @@ mod tests {
             "ticks": [41, 46, 47, 50, 61, 900], "is_of_others": [false, false, true, false, false, true],
             "peak": { "lag_ticks": 41, "range_m": 30.5, "marks": 4 },
             "correlation": {
-                "first_lag_ticks": 40, "step_ticks": 1,
+                "first_lag_ticks": 40, "step_ticks": 1, "first_range_m": 30.1, "step_m": 0.4,
                 "marks": [1, 4, 2], "marks_without_others": [1, 3, 0],
             },
         })
@@ -197,6 +273,32 @@ mod tests {
             of(2).is_empty() && of(3).is_empty(),
             "what lies beyond the macropulse is not drawn"
         );
+    }
+
+    /// Of a simulation what came to the detector stands above.
+    #[test]
+    fn light_is_shown_where_it_is_known() {
+        let mut told = told();
+        assert!(html(&told).contains("What light there was is not known"));
+        told["light"] = json!({
+            "trains": [
+                { "of": "this_shot", "marks_ticks": [41.5, 46.5, 50.5, 61.5] },
+                { "of": "another_shot", "marks_ticks": [47.25, 300.0] },
+                { "of": "another_lidar", "marks_ticks": [44.0] },
+            ],
+            "detections_ticks": [41.75, 46.5, 47.25, 500.0],
+        });
+        let chart = arrivals(&told).unwrap();
+        let of = |at: usize| chart.series[at].points.iter().map(|p| p[0]).collect::<Vec<f64>>();
+        assert_eq!(of(6), [41.5, 46.5, 50.5, 61.5]);
+        assert_eq!(of(5), [47.25, 44.0], "what lies beyond the macropulse is not drawn");
+        assert_eq!(of(4), [41.75, 46.5, 47.25]);
+        assert!(html(&told).contains("light of this shot"));
+        // A shot that was missed is shown where its light is.
+        told["peak"] = Value::Null;
+        assert_eq!(arrivals(&told).unwrap().series[0].points[0], [41.0, 0.0]);
+        assert_eq!(picture(&told).charts.len(), 2);
+        assert_eq!(picture(&told).title, "Row 3, column 10: right");
     }
 
     #[test]

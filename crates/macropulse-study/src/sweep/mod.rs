@@ -5,10 +5,11 @@
 //! 2. `job`: one point with one seed. Its counts are one small file named by a hash of all that
 //!    decides them, so that jobs can be done in any order, by any machine, and never twice.
 //! 3. `metric`: the scores that the counts allow, each with an interval ([`macropulse::score::Estimate`]).
-//! 4. `table`, `picture`: what is left when every job is done.
+//! 4. `table`, `picture`: what is left when every job is done; `json` tells it to programs.
 
 mod axis;
 mod job;
+mod json;
 mod metric;
 mod picture;
 mod plan;

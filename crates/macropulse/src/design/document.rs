@@ -22,6 +22,9 @@ pub const WITH: &str = "with";
 /// The key of a change that puts an effect on the list `idealised`.
 pub const WITHOUT: &str = "without";
 
+/// The key of the effects left out.
+const IDEALISED: &str = "idealised";
+
 /// What a file that extends another does not take from it: a sentence about that one.
 const PROSE: &str = "summary";
 
@@ -53,6 +56,8 @@ pub(super) struct Chain {
     documents: Vec<Document>,
     /// What the chain says when read as one.
     pub merged: Table,
+    /// Whether effects were switched on the command line.
+    is_switched: bool,
 }
 
 /// Where a key was typed.
@@ -131,7 +136,7 @@ impl Chain {
         fill_in(&mut merged, &fitting);
         merged.remove("extends");
         documents.push(defaults);
-        let mut chain = Self { documents, merged };
+        let mut chain = Self { documents, merged, is_switched: !switched.is_empty() };
         for (key, effect) in &switched {
             chain.switch(key == WITHOUT, effect);
         }
@@ -140,8 +145,7 @@ impl Chain {
 
     /// Puts an effect on the list of those left out, or takes it off.
     fn switch(&mut self, out: bool, effect: &str) {
-        let Some(list) = self.merged.get_mut("idealised").and_then(toml::Value::as_array_mut)
-        else {
+        let Some(list) = self.merged.get_mut(IDEALISED).and_then(toml::Value::as_array_mut) else {
             return;
         };
         list.retain(|name| name.as_str() != Some(effect));
@@ -164,7 +168,11 @@ impl Chain {
     }
 
     /// Where the key at the dotted `path` was typed, if it was: with `--set`, or in the file itself.
+    /// Who switches an effect has typed the list of them.
     pub fn typed(&self, path: &str) -> Option<Typed> {
+        if self.is_switched && path == IDEALISED {
+            return Some(Typed::Set);
+        }
         let mut documents = self.documents.iter();
         let first = documents.next()?;
         let set = (first.origin == OVERRIDES).then_some(first);

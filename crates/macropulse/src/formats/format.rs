@@ -11,6 +11,8 @@ pub enum Format {
     Pcd,
     /// Polygon file format, binary little endian; returns only.
     Ply,
+    /// The same with names by which CloudCompare takes all attributes for scalar fields.
+    PlyCloudCompare,
     /// LAS 1.4, point format 6, with extra bytes; returns only.
     Las,
     /// The same, compressed.
@@ -40,6 +42,7 @@ impl Format {
     pub const ALL: &'static [Self] = &[
         Self::Pcd,
         Self::Ply,
+        Self::PlyCloudCompare,
         Self::Las,
         Self::Laz,
         Self::E57,
@@ -64,6 +67,7 @@ impl Format {
         match self {
             Self::Pcd => "pcd",
             Self::Ply => "ply",
+            Self::PlyCloudCompare => "ply-cloudcompare",
             Self::Las => "las",
             Self::Laz => "laz",
             Self::E57 => "e57",
@@ -89,6 +93,7 @@ impl Format {
     pub fn extension(self) -> &'static str {
         match self {
             Self::Kitti => "bin",
+            Self::PlyCloudCompare => "ply",
             Self::Mcap(_) => "mcap",
             Self::RangeNpy => "npy",
             other => other.name(),
@@ -100,6 +105,7 @@ impl Format {
         let extension = self.extension();
         match self {
             Self::Png | Self::RangeNpy => format!("range-{scan:06}.{extension}"),
+            Self::PlyCloudCompare => format!("scan-{scan:06}-cloudcompare.{extension}"),
             Self::Mcap(_) => format!("{}.{extension}", self.name().replace("mcap", "scans")),
             _ => format!("scan-{scan:06}.{extension}"),
         }
@@ -164,7 +170,9 @@ mod tests {
     #[test]
     fn a_misspelt_format_names_its_neighbour() {
         let told = Format::parse("pdc").unwrap_err().to_string();
-        assert!(told.starts_with("unknown format `pdc`; did you mean `pcd`? known: pcd, ply, las"));
+        assert!(
+            told.starts_with("unknown format `pdc`; did you mean `pcd`? known: pcd, ply, ply-cl")
+        );
         let told = Format::parse("holograms").unwrap_err().to_string();
         assert!(told.starts_with("unknown format `holograms`; known: pcd, ply,"), "{told}");
     }

@@ -73,7 +73,7 @@ impl Format {
     pub(super) fn holds(self, attribute: Attribute) -> Holding {
         use Holding::{Not, Partly, Whole};
         match self {
-            Self::Pcd | Self::Ply | Self::Npy | Self::Csv => Whole,
+            Self::Pcd | Self::Ply | Self::PlyCloudCompare | Self::Npy | Self::Csv => Whole,
             #[cfg(feature = "parquet")]
             Self::Parquet => Whole,
             Self::Las | Self::Laz => match attribute {
@@ -113,7 +113,9 @@ impl Format {
         use Further::{EmptyPixels, Names, Pose};
         match self {
             Self::Pcd => true,
-            Self::Ply | Self::Las | Self::Laz | Self::E57 => further != EmptyPixels,
+            Self::Ply | Self::PlyCloudCompare | Self::Las | Self::Laz | Self::E57 => {
+                further != EmptyPixels
+            }
             #[cfg(feature = "parquet")]
             Self::Parquet => further != EmptyPixels,
             Self::Npy | Self::Kitti => false,
@@ -139,6 +141,7 @@ fn osi(attribute: Attribute) -> Holding {
         Attribute::TimeNs => Partly("of the scan alone"),
         Attribute::TrueRange => Partly("`time_of_flight` of a reflection"),
         Attribute::Object => Partly("`object_id`"),
+        Attribute::Outcome => Partly("`classification`: right and near, wrong, false"),
         _ => Not,
     }
 }
@@ -155,7 +158,7 @@ mod tests {
     fn table() -> String {
         let columns = [
             ("pcd", Format::Pcd),
-            ("ply", Format::Ply),
+            ("ply (both)", Format::Ply),
             ("las, laz", Format::Las),
             ("e57", Format::E57),
             ("npy", Format::Npy),

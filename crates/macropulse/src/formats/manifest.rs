@@ -149,9 +149,15 @@ impl Default for Manifest {
 }
 
 impl Manifest {
+    /// The manifest as a JSON object.
+    pub fn value(&self) -> serde_json::Value {
+        // Names are strings and numbers finite or null: there is nothing JSON could refuse.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
     /// The manifest as indented JSON with a final newline.
     pub fn json(&self) -> String {
-        // Names are strings and numbers finite or null: there is nothing JSON could refuse.
+        // As above.
         let text = serde_json::to_string_pretty(self).unwrap_or_default();
         text + "\n"
     }
@@ -161,8 +167,16 @@ impl Manifest {
     /// # Errors
     /// [`Error::Write`] if it cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
-        write_atomically(&folder.join("manifest.json"), |out| out.write_all(self.json().as_bytes()))
+        write_manifest(&self.json(), folder)
     }
+}
+
+/// Writes what a run says of itself, as `json`, into `folder`.
+///
+/// # Errors
+/// [`Error::Write`] if it cannot be written.
+pub fn write_manifest(json: &str, folder: &Path) -> Result<(), Error> {
+    write_atomically(&folder.join("manifest.json"), |out| out.write_all(json.as_bytes()))
 }
 
 #[cfg(test)]

@@ -35,7 +35,9 @@ pub use clouds::{Clouds, read_cloud, read_pcd};
 pub use csv::quoted;
 pub use error::Error;
 pub use format::Format;
-pub use manifest::{Begun, Entries, Manifest, Named, SCHEMA_VERSION, Surroundings, versioned};
+pub use manifest::{
+    Begun, Entries, Manifest, Named, SCHEMA_VERSION, Surroundings, versioned, write_manifest,
+};
 pub use mcap::{Message, Profile};
 pub use png16::{RangeImage, read_range_png};
 pub use recording::Recording;
@@ -68,7 +70,8 @@ pub fn write_cloud(
     attributes::check_even(cloud)?;
     write_atomically(path, |out| match format {
         Format::Pcd => pcd::write(cloud, names, out),
-        Format::Ply => ply::write(cloud, names, out),
+        Format::Ply => ply::write(cloud, names, ply::Called::AsTheyAre, out),
+        Format::PlyCloudCompare => ply::write(cloud, names, ply::Called::Scalars, out),
         Format::Las => las::write(cloud, names, false, out),
         Format::Laz => las::write(cloud, names, true, out),
         Format::E57 => e57::write(cloud, names, out),

@@ -1,4 +1,8 @@
 //! PLY, binary little endian: the returns as vertices.
+//!
+//! There is no agreement on names of properties beyond `x`, `y` and `z`. Readers that take any have
+//! them by our names; CloudCompare, where nobody picks them in its dialogue, takes for scalar fields
+//! those with `scal` in their name, and intensity.
 
 use super::Names;
 use super::about::all_lines;
@@ -6,10 +10,28 @@ use super::attributes::{Attribute, Value, returns};
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
+/// What stands before the names of attributes that CloudCompare is to take for scalar fields; it is
+/// no part of the name there.
+pub(super) const SCALAR: &str = "scalar_";
+
+/// How properties are called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Called {
+    /// As the attributes.
+    AsTheyAre,
+    /// With [`SCALAR`] before all but coordinates and intensity.
+    Scalars,
+}
+
 /// Writes the returns of a cloud whose columns are even.
 ///
 /// Numbers of two bytes become `int`: readers that many use drop a `ushort`.
-pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(
+    cloud: &PointCloud,
+    names: &Names,
+    called: Called,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
     writeln!(out, "ply\nformat binary_little_endian 1.0")?;
     writeln!(out, "comment metres, radians; x forward, y left, z up")?;
@@ -24,7 +46,10 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
             Value::F4(_) => "float",
             Value::F8(_) => "double",
         };
-        writeln!(out, "property {kind} {}", attribute.name())?;
+        let is_known =
+            matches!(attribute, Attribute::X | Attribute::Y | Attribute::Z | Attribute::Intensity);
+        let before = if is_known || called == Called::AsTheyAre { "" } else { SCALAR };
+        writeln!(out, "property {kind} {before}{}", attribute.name())?;
     }
     writeln!(out, "end_header")?;
     let mut bytes = Vec::new();
@@ -49,7 +74,7 @@ mod tests {
 
     fn written(cloud: &PointCloud, names: &Names) -> (String, Vec<u8>) {
         let mut bytes = Vec::new();
-        write(cloud, names, &mut bytes).unwrap();
+        write(cloud, names, Called::AsTheyAre, &mut bytes).unwrap();
         let end = b"end_header\n";
         let at = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
         (String::from_utf8(bytes[..at].to_vec()).unwrap(), bytes[at..].to_vec())

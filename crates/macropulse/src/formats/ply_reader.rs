@@ -4,6 +4,7 @@
 use super::about::About;
 use super::attributes::Attribute;
 use super::number::Kind;
+use super::ply;
 use super::table::{self, Gathered, Layout, Record};
 use crate::points::PointCloud;
 
@@ -86,6 +87,8 @@ impl Header {
                 return Err("a point has a list; single numbers are read".to_owned());
             }
             ["property", kind, name] if !self.is_over => {
+                // As CloudCompare calls scalar fields.
+                let name = name.strip_prefix(ply::SCALAR).unwrap_or(name);
                 let known = kind_of(kind).ok_or_else(|| format!("`{kind}` is no type"))?;
                 self.words.push(Attribute::named(name));
                 self.layout.push(name, known, 1)?;
@@ -137,15 +140,25 @@ fn text(header: &Header, body: &[u8], points: usize) -> Result<PointCloud, Strin
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Names, ply, sample_cloud};
+    use super::super::ply::Called;
+    use super::super::{Names, sample_cloud};
     use super::*;
 
     #[test]
     fn what_was_written_is_read() {
         let cloud = sample_cloud();
         let objects = ["car".to_owned(), "road".to_owned()];
-        let mut bytes = Vec::new();
-        ply::write(&cloud, &Names { objects: &objects, materials: &[] }, &mut bytes).unwrap();
+        let names = Names { objects: &objects, materials: &[] };
+        let [bytes, scalars] = [Called::AsTheyAre, Called::Scalars].map(|called| {
+            let mut bytes = Vec::new();
+            ply::write(&cloud, &names, called, &mut bytes).unwrap();
+            bytes
+        });
+        let header = String::from_utf8_lossy(&scalars);
+        assert!(
+            header.contains("float z\nproperty float intensity\nproperty float scalar_range\n")
+        );
+        assert_eq!(parse(&scalars).unwrap().0.time_ns, cloud.time_ns);
         let (read, about) = parse(&bytes).unwrap();
         assert_eq!((read.scan, read.viewpoint, read.pick), (3, cloud.viewpoint, cloud.pick));
         assert_eq!((&read.range, &read.margin), (&cloud.range, &cloud.margin));

@@ -17,9 +17,17 @@ function attributesOf(cloud, at, outcomes) {
       const value = values[at];
       if (Number.isNaN(value)) return [name, "none"];
       const text = named[name]?.(value) ?? value.toFixed(digitsOf(cloud.steps[name]));
+      if (name === "intensity" && isBound(cloud, at)) return [name, `${text} or more`];
       const unit = cloud.units[name];
       return [name.replace("_ns", "").replaceAll("_", " "), unit ? `${text} ${unit}` : text];
     });
+}
+
+// Whether all marks were found: then a detector that counts them tells no more of the energy than that.
+// One that never misses has no scale for it, and says 1.
+function isBound(cloud, at) {
+  const { intensity, peak, marks } = cloud.values;
+  return marks?.[at] > 1 && peak[at] >= marks[at] && intensity[at] !== 1;
 }
 
 // Decimals that values of this step have.

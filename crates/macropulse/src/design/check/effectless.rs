@@ -140,4 +140,22 @@ mod tests {
         assert_eq!(told("[receiver]\nkind = \"literal\"\nbit_threshold = 12\n", &set), "");
         assert_eq!(told("", &[]), "");
     }
+
+    /// Who leaves an effect out need not take its keys out of the file; what is typed beside it counts.
+    #[test]
+    fn an_effect_that_is_switched_off_takes_its_keys_with_it() {
+        let ready = |set: &[(&str, &str)]| {
+            let set: Vec<(String, String)> =
+                set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+            Design::open("coded-practical", &set)
+        };
+        let without = ("without", "footprint");
+        let design = ready(&[without]).unwrap();
+        assert!(!design.text.contains("footprint_rays"), "{}", design.text);
+        let again = Design::from_toml(&design.text, "again", Path::new(""), &[]).unwrap();
+        assert_eq!(again.text, design.text);
+        let told = ready(&[without, ("light.footprint_rays", "7")]).unwrap_err().to_string();
+        assert!(told.starts_with("--set: light.footprint_rays: has no effect"), "{told}");
+        assert!(ready(&[]).unwrap().text.contains("footprint_rays"));
+    }
 }

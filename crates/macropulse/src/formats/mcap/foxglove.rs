@@ -154,6 +154,7 @@ const PACKAGES: [Package; 2] = [
         syntax: "proto3",
         imports: &[],
         messages: &[("Timestamp", &[("seconds", 1, Of::I8), ("nanos", 2, Of::I4)])],
+        choices: &[],
     },
     Package {
         file: "foxglove/messages.proto",
@@ -161,6 +162,7 @@ const PACKAGES: [Package; 2] = [
         syntax: "proto3",
         imports: &["google/protobuf/timestamp.proto"],
         messages: MESSAGES,
+        choices: &[],
     },
 ];
 

@@ -3,7 +3,7 @@
 use super::super::attributes::has_truth;
 use super::protobuf::{Described, Of, Package, descriptor_set};
 use super::{Payload, Topic, stamp_ns};
-use crate::points::{NO_OBJECT, PointCloud};
+use crate::points::{NO_OBJECT, Outcome, PointCloud};
 use crate::units::tof_from_range;
 use ::mcap::records::Metadata;
 use prost::Message;
@@ -62,6 +62,8 @@ struct LidarDetection {
     position: Option<Spherical3d>,
     #[prost(double, optional, tag = "7")]
     intensity: Option<f64>,
+    #[prost(int32, optional, tag = "9")]
+    classification: Option<i32>,
     #[prost(double, optional, tag = "10")]
     reflectivity: Option<f64>,
     #[prost(message, optional, tag = "13")]
@@ -156,6 +158,20 @@ const QUALIFIERS: &[&str] = &[
 /// Of [`QUALIFIERS`], that the sensor works.
 const AVAILABLE: i32 = 2;
 
+const CLASSIFICATIONS: &[&str] = &[
+    "DETECTION_CLASSIFICATION_UNKNOWN",
+    "DETECTION_CLASSIFICATION_OTHER",
+    "DETECTION_CLASSIFICATION_INVALID",
+    "DETECTION_CLASSIFICATION_CLUTTER",
+    "DETECTION_CLASSIFICATION_OVERDRIVABLE",
+    "DETECTION_CLASSIFICATION_UNDERDRIVABLE",
+];
+
+/// Of [`CLASSIFICATIONS`], a surface; one at a wrong range; and nothing but noise.
+const SURFACE: i32 = 1;
+const INVALID: i32 = 2;
+const CLUTTER: i32 = 3;
+
 const MESSAGES: &[Described] = &[
     (
         "InterfaceVersion",
@@ -170,6 +186,7 @@ const MESSAGES: &[Described] = &[
             ("object_id", 2, IDENTIFIER),
             ("position", 3, Of::Message(".osi3.Spherical3d")),
             ("intensity", 7, Of::F8),
+            ("classification", 9, Of::Kind(".osi3.DetectionClassification")),
             ("reflectivity", 10, Of::F8),
             ("beam_id", 13, IDENTIFIER),
         ],
@@ -231,6 +248,7 @@ const PACKAGE: Package = Package {
     syntax: "proto2",
     imports: &[],
     messages: MESSAGES,
+    choices: &[(".osi3.DetectionClassification", CLASSIFICATIONS)],
 };
 
 pub(super) fn topics() -> Vec<Topic> {
@@ -303,7 +321,7 @@ fn identifier(value: u64) -> Option<Identifier> {
     Some(Identifier { value: Some(value) })
 }
 
-/// A return. Its object is known with the truth alone.
+/// A return. Its object and what it is are known with the truth alone.
 fn detection(cloud: &PointCloud, at: usize) -> LidarDetection {
     let [x, y, z] = [&cloud.x, &cloud.y, &cloud.z].map(|column| f64::from(column[at]));
     let reflectivity = f64::from(cloud.intensity[at]);
@@ -316,8 +334,18 @@ fn detection(cloud: &PointCloud, at: usize) -> LidarDetection {
             elevation: Some(libm::atan2(z, libm::hypot(x, y))),
         }),
         intensity: Some((100.0 * reflectivity).clamp(0.0, 100.0)),
+        classification: cloud.truth.returns.outcome.get(at).map(classification),
         reflectivity: Some(reflectivity),
         beam_id: identifier(cloud.row[at].into()),
+    }
+}
+
+/// What consumers of detections are to take a return for.
+fn classification(outcome: &Outcome) -> i32 {
+    match outcome {
+        Outcome::Right | Outcome::Near => SURFACE,
+        Outcome::Wrong => INVALID,
+        Outcome::False | Outcome::Empty | Outcome::Missed => CLUTTER,
     }
 }
 

@@ -21,6 +21,8 @@ pub(super) enum Of {
     Bytes,
     /// An enumeration within the same message, by its full name, and its values from 0.
     Choice(&'static str, &'static [&'static str]),
+    /// An enumeration of its package, by its full name.
+    Kind(&'static str),
     /// A message by its full name.
     Message(&'static str),
     /// Any number of a message.
@@ -33,6 +35,9 @@ pub(super) type Field = (&'static str, i32, Of);
 /// A message: its name, its fields.
 pub(super) type Described = (&'static str, &'static [Field]);
 
+/// An enumeration: its full name, and its values from 0.
+pub(super) type Choices = (&'static str, &'static [&'static str]);
+
 /// A file of messages.
 pub(super) struct Package {
     pub file: &'static str,
@@ -40,6 +45,8 @@ pub(super) struct Package {
     pub syntax: &'static str,
     pub imports: &'static [&'static str],
     pub messages: &'static [Described],
+    /// Enumerations that stand beside the messages.
+    pub choices: &'static [Choices],
 }
 
 /// A set of descriptions, in the order in which one needs the other, encoded.
@@ -53,6 +60,7 @@ fn file(package: &Package) -> FileDescriptorProto {
         package: Some(package.package.to_owned()),
         dependency: package.imports.iter().map(|import| (*import).to_owned()).collect(),
         message_type: package.messages.iter().map(message).collect(),
+        enum_type: package.choices.iter().map(enumeration).collect(),
         syntax: Some(package.syntax.to_owned()),
         ..FileDescriptorProto::default()
     }
@@ -62,23 +70,28 @@ fn message((name, fields): &Described) -> DescriptorProto {
     DescriptorProto {
         name: Some((*name).to_owned()),
         field: fields.iter().map(field).collect(),
-        enum_type: fields.iter().filter_map(choice).collect(),
+        enum_type: fields
+            .iter()
+            .filter_map(|(_, _, of)| match of {
+                Of::Choice(name, values) => Some(enumeration(&(name, values))),
+                _ => None,
+            })
+            .collect(),
         ..DescriptorProto::default()
     }
 }
 
-fn choice((_, _, of): &Field) -> Option<EnumDescriptorProto> {
-    let Of::Choice(name, values) = of else { return None };
+fn enumeration((name, values): &Choices) -> EnumDescriptorProto {
     let value = |(number, name): (usize, &&str)| EnumValueDescriptorProto {
         name: Some((*name).to_owned()),
         number: Some(number as i32),
         ..EnumValueDescriptorProto::default()
     };
-    Some(EnumDescriptorProto {
+    EnumDescriptorProto {
         name: name.rsplit('.').next().map(str::to_owned),
         value: values.iter().enumerate().map(value).collect(),
         ..EnumDescriptorProto::default()
-    })
+    }
 }
 
 fn field(&(name, number, of): &Field) -> FieldDescriptorProto {
@@ -91,7 +104,7 @@ fn field(&(name, number, of): &Field) -> FieldDescriptorProto {
         Of::Fixed4 => (Type::Fixed32, None),
         Of::Text => (Type::String, None),
         Of::Bytes => (Type::Bytes, None),
-        Of::Choice(name, _) => (Type::Enum, Some(name.to_owned())),
+        Of::Choice(name, _) | Of::Kind(name) => (Type::Enum, Some(name.to_owned())),
         Of::Message(name) | Of::Many(name) => (Type::Message, Some(name.to_owned())),
     };
     let label = if matches!(of, Of::Many(_)) { Label::Repeated } else { Label::Optional };

@@ -23,7 +23,24 @@ const TF_MESSAGE: &str = "tf2_msgs/msg/TFMessage";
 /// The frames above that of the sensor.
 pub(super) const FRAMES: [&str; 3] = ["map", "odom", "base_link"];
 
-const POINT_CLOUD2_SCHEMA: &str = "\
+/// What every message with a stamp tells of its header.
+macro_rules! header {
+    () => {
+        "\
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"
+    };
+}
+
+const POINT_CLOUD2_SCHEMA: &str = concat!(
+    "\
 std_msgs/Header header
 uint32 height
 uint32 width
@@ -33,14 +50,9 @@ uint32 point_step
 uint32 row_step
 uint8[] data
 bool is_dense
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
+",
+    header!(),
+    "\
 ================================================================================
 MSG: sensor_msgs/PointField
 uint8 INT8=1
@@ -55,23 +67,20 @@ string name
 uint32 offset
 uint8 datatype
 uint32 count
-";
+"
+);
 
-const TF_SCHEMA: &str = "\
+const TF_SCHEMA: &str = concat!(
+    "\
 geometry_msgs/TransformStamped[] transforms
 ================================================================================
 MSG: geometry_msgs/TransformStamped
 std_msgs/Header header
 string child_frame_id
 geometry_msgs/Transform transform
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
+",
+    header!(),
+    "\
 ================================================================================
 MSG: geometry_msgs/Transform
 geometry_msgs/Vector3 translation
@@ -87,7 +96,8 @@ float64 x
 float64 y
 float64 z
 float64 w
-";
+"
+);
 
 /// What `ros2 bag` and nodes are told of the quality of service of a topic whose last message is for
 /// those, too, who come later.

@@ -1,0 +1,202 @@
+//! What a run has left in a folder, and which files of it hold the clouds.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use macropulse::formats::{Clouds, Names};
+use macropulse::points::PointCloud;
+use serde_json::Value;
+
+use super::Error;
+
+/// Endings of the files in a folder that hold clouds, the one that keeps most first. What ends as one
+/// of the last may be many things: there the name must begin as that of a scan.
+const ENDINGS: [&str; 9] = ["pcd", "ply", "las", "laz", "e57", "mcap", "npy", "csv", "bin"];
+
+/// How many of the endings are of clouds alone.
+const OF_CLOUDS: usize = 6;
+
+/// A folder that a run has left, or any other with clouds.
+#[derive(Debug, Clone)]
+pub struct Left {
+    /// Its manifest, if it has one.
+    pub manifest: Option<Value>,
+    /// Names of its files: those of the manifest, or else all that may hold clouds.
+    pub files: Vec<String>,
+}
+
+impl Left {
+    /// What is in `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] if it cannot be listed, [`Error::Manifest`] if its manifest is none.
+    pub fn of(folder: &Path) -> Result<Self, Error> {
+        let manifest = manifest(folder)?;
+        let files = match &manifest {
+            Some(manifest) => named(&manifest["files"]),
+            None => listed(folder)?,
+        };
+        Ok(Self { manifest, files })
+    }
+
+    /// Names of the files with its clouds. Of several files of one cloud, which differ in their
+    /// endings, the one that keeps most; files with all scans of a run only where no others hold them.
+    pub fn clouds(&self) -> Vec<&String> {
+        let mut chosen: Vec<(usize, &String)> = Vec::new();
+        for file in &self.files {
+            let Some(rank) = rank(file) else { continue };
+            let cloud = cloud_of(file);
+            match chosen.iter_mut().find(|(_, other)| cloud_of(other) == cloud) {
+                Some(other) if rank < other.0 => *other = (rank, file),
+                Some(_) => {}
+                None => chosen.push((rank, file)),
+            }
+        }
+        let is_of_run = |file: &String| file.to_lowercase().ends_with(".mcap");
+        let has_others = chosen.iter().any(|(_, file)| !is_of_run(file));
+        chosen.retain(|(_, file)| !has_others || !is_of_run(file));
+        // Of one run in several kinds of messages, the first: they sort with what we read before the
+        // rest.
+        chosen.dedup_by(|(_, one), (_, other)| is_of_run(one) && is_of_run(other));
+        chosen.into_iter().map(|(_, file)| file).collect()
+    }
+}
+
+/// What the files of one cloud have in common: their name without an ending, and without what tells
+/// two of the same ending apart.
+fn cloud_of(file: &str) -> String {
+    let stem = Path::new(file).with_extension("");
+    let stem = stem.to_string_lossy();
+    stem.strip_suffix("-cloudcompare").unwrap_or(&stem).to_owned()
+}
+
+/// The place of a file of a folder among [`ENDINGS`], if it may hold a cloud.
+fn rank(name: &str) -> Option<usize> {
+    let ending = Path::new(name).extension()?.to_str()?.to_lowercase();
+    let rank = ENDINGS.iter().position(|known| *known == ending)?;
+    (rank < OF_CLOUDS || name.starts_with("scan-")).then_some(rank)
+}
+
+fn manifest(folder: &Path) -> Result<Option<Value>, Error> {
+    let path = folder.join("manifest.json");
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = fs::read_to_string(&path).map_err(|cause| unreadable(&path, cause))?;
+    let manifest = serde_json::from_str(&text);
+    manifest.map(Some).map_err(|cause| Error::Manifest { path, cause })
+}
+
+fn named(list: &Value) -> Vec<String> {
+    let names = list.as_array().into_iter().flatten();
+    names.filter_map(Value::as_str).map(str::to_owned).collect()
+}
+
+/// Names of the clouds in a folder without a manifest.
+fn listed(folder: &Path) -> Result<Vec<String>, Error> {
+    let unreadable = |cause| unreadable(folder, cause);
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(unreadable)? {
+        let name = entry.map_err(unreadable)?.file_name().to_string_lossy().into_owned();
+        if rank(&name).is_some() {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn unreadable(path: &Path, cause: std::io::Error) -> Error {
+    Error::Unreadable { path: path.to_owned(), cause }
+}
+
+/// The clouds of a file, or of all files of a folder, one after the other; of each it has one in
+/// memory.
+pub struct CloudsAt {
+    /// Files that are still to be opened, the next one last.
+    left: Vec<PathBuf>,
+    open: Option<Clouds>,
+}
+
+impl CloudsAt {
+    /// The clouds at `path`, a file or a folder.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is a folder that holds none.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        if !path.is_dir() {
+            return Ok(Self { left: Vec::new(), open: Some(Clouds::open(path)?) });
+        }
+        let left = Left::of(path)?;
+        let mut files: Vec<PathBuf> = left.clouds().iter().map(|file| path.join(file)).collect();
+        if files.is_empty() {
+            return Err(Error::NoCloud { folder: path.to_owned() });
+        }
+        files.reverse();
+        Ok(Self { left: files, open: None })
+    }
+
+    /// The next cloud, with the names of what it has the numbers of.
+    ///
+    /// # Errors
+    /// If its file cannot be read.
+    pub fn next_cloud(&mut self) -> Result<Option<(PointCloud, Names<'_>)>, Error> {
+        let mut next = self.open.as_mut().and_then(Iterator::next);
+        while next.is_none() {
+            let Some(path) = self.left.pop() else { return Ok(None) };
+            next = self.open.insert(Clouds::open(&path)?).next();
+        }
+        let cloud = next.transpose()?;
+        Ok(cloud.zip(self.open.as_ref().map(Clouds::names)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use macropulse::formats::{Format, write_cloud};
+
+    fn clouds(files: &[&str]) -> Vec<String> {
+        let files = files.iter().map(|file| (*file).to_owned()).collect();
+        Left { manifest: None, files }.clouds().into_iter().cloned().collect()
+    }
+
+    #[test]
+    fn each_cloud_is_taken_once() {
+        let files = ["scan-0.pcd", "range-0.png", "scan-1.PCD", "scan-0.csv"];
+        assert_eq!(clouds(&files), ["scan-0.pcd", "scan-1.PCD"]);
+        let files = ["range-0.npy", "scan-0.npy", "scans.mcap", "shots-0.csv"];
+        assert_eq!(clouds(&files), ["scan-0.npy"]);
+        assert_eq!(clouds(&files[2..]), ["scans.mcap"]);
+        let files = ["scan-0.ply", "scan-0-cloudcompare.ply", "scan-1-cloudcompare.ply"];
+        assert_eq!(clouds(&files), ["scan-0.ply", "scan-1-cloudcompare.ply"]);
+    }
+
+    #[test]
+    fn the_clouds_of_a_folder_come_one_after_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let named = |scan: u64| folder.path().join(format!("scan-{scan:06}.ply"));
+        for scan in [0, 1, 2] {
+            let cloud = PointCloud { scan, ..PointCloud::default() };
+            write_cloud(Format::Ply, &cloud, &Names::default(), &named(scan)).unwrap();
+        }
+        let numbers = |path: &Path| -> Result<Vec<u64>, Error> {
+            let mut clouds = CloudsAt::open(path)?;
+            let mut numbers = Vec::new();
+            while let Some((cloud, _)) = clouds.next_cloud()? {
+                numbers.push(cloud.scan);
+            }
+            Ok(numbers)
+        };
+        assert_eq!(numbers(folder.path()).unwrap(), [0, 1, 2]);
+        assert_eq!(numbers(&named(1)).unwrap(), [1]);
+        fs::write(folder.path().join("manifest.json"), r#"{"files": ["scan-000002.ply"]}"#)
+            .unwrap();
+        assert_eq!(numbers(folder.path()).unwrap(), [2]);
+        fs::write(folder.path().join("manifest.json"), "[").unwrap();
+        let told = numbers(folder.path()).unwrap_err().to_string();
+        assert!(told.contains("is not the manifest of a run"), "{told}");
+        let told = numbers(tempfile::tempdir().unwrap().path()).unwrap_err().to_string();
+        assert!(told.contains("holds no point cloud that can be read"), "{told}");
+    }
+}
