@@ -8,6 +8,7 @@ mod air;
 mod effect;
 mod file;
 mod ready;
+mod schema;
 mod spectrum;
 
 use toml::Value;
@@ -16,6 +17,8 @@ pub use crate::names::toml_value as value;
 pub use effect::Effect;
 pub use file::{WITH, WITHOUT, change};
 pub use ready::{names, text};
+pub(crate) use schema::in_scene;
+pub use schema::schema;
 
 /// The environment of a scene that names none.
 pub const DEFAULT: &str = "clear-day";
