@@ -81,7 +81,7 @@ fn check_digest(design: &Design, digest: Option<Digest>, name: &str) -> Result<(
     match digest {
         Some(digest) if digest != ours => Err(Fault::Wrong(format!(
             "{name}: is of another sensor: its code, timing or pixels have the digest {digest}, those of {} \
-             {ours}; name the sensor it was recorded with",
+             {ours}; name the sensor it was recorded with, and the same --set",
             design.name
         ))),
         _ => Ok(()),
