@@ -213,7 +213,9 @@ mod tests {
         for name in names() {
             let environment = Environment::named(name).unwrap();
             assert_eq!(environment.name, name);
-            assert!(text(name).unwrap().starts_with("# "), "{name}");
+            let mut lines = text(name).unwrap().lines();
+            assert_eq!(lines.next(), Some("#:schema ../schemas/environment.json"), "{name}");
+            assert!(lines.next().unwrap().starts_with("# "), "{name}");
             assert!(environment.extinction(905e-9).is_finite());
             assert!(environment.irradiance(905e-9).is_some());
         }

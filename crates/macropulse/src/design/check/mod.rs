@@ -263,7 +263,7 @@ fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Err
             format!("{unknown} here; it belongs in {}", elsewhere.join(" or "))
         }
         (Some((unknown, _)), []) if OF_SCENES.contains(&wrong) => {
-            format!("{unknown}; that is a scene's, as --set scene:{wrong}…; this is a sensor")
+            format!("{unknown} of a sensor; it is one of a scene, as --set scene:{wrong}…")
         }
         _ => message,
     };
