@@ -34,14 +34,15 @@ use crate::work;
 #[pyo3(signature = (sensor, row, column, *, scan = 0))]
 pub fn encode<'py>(
     sensor: &Bound<'py, PyAny>,
-    row: u32,
-    column: u32,
+    row: i64,
+    column: i64,
     scan: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let py = sensor.py();
     let design = Arc::clone(&Sensor::of(sensor)?.get().design);
     check_scan(&design, scan)?;
-    let Some(shot) = shot_of_pixel(&design, scan, row, column) else {
+    let [in_row, in_column] = [row, column].map(|one| u32::try_from(one).unwrap_or(u32::MAX));
+    let Some(shot) = shot_of_pixel(&design, scan, in_row, in_column) else {
         let (rows, columns) = (design.scan.rows - 1, design.scan.columns - 1);
         return Err(wrong(format!(
             "pixel {row}, {column}: {} has rows 0 to {rows} and columns 0 to {columns}",
