@@ -4,7 +4,7 @@
 //! 2, the answer is one sentence for each thing that is wrong, in no words of the language that the
 //! program is written in, and nothing is written.
 
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 #[path = "../common/mod.rs"]
 mod common;
