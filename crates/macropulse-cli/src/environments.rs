@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::completions;
 use crate::fault::Fault;
 use crate::scenes::summary;
-use crate::text::{Columns, print, print_json};
+use crate::text::{Columns, print, print_json, to_start_from};
 
 /// List the ready environments, sun and air of a scene, or print one as TOML to start from
 #[derive(Args)]
@@ -40,7 +40,7 @@ pub fn run(options: &Environments) -> Result<(), Fault> {
 
 fn one(name: &str, as_json: bool) -> Result<(), Fault> {
     let environment = Environment::named(name)?;
-    let toml = environment::text(name).unwrap_or_default();
+    let toml = to_start_from(environment::text(name).unwrap_or_default());
     if as_json {
         let environment = json!({
             "name": name,

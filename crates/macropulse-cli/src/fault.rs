@@ -4,8 +4,9 @@ use std::io;
 use std::process::ExitCode;
 
 use anstyle::AnsiColor;
-use clap::error::ErrorKind;
-use macropulse::{channel, design, environment, formats, scene, sim};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use macropulse::formats::Format;
+use macropulse::{channel, design, environment, formats, scene, sim, told};
 use macropulse_study::text::broken;
 use macropulse_study::{decoding, paper, record, sweep, validate};
 
@@ -27,14 +28,7 @@ pub enum Fault {
 impl Fault {
     /// A file that cannot be read, in words of ours.
     pub fn unreadable(name: &str, error: &io::Error) -> Self {
-        let reason = match error.kind() {
-            io::ErrorKind::NotFound => "there is no such file".to_owned(),
-            io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
-            io::ErrorKind::InvalidData => "it is not text".to_owned(),
-            io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-            _ => error.to_string(),
-        };
-        Self::Wrong(format!("{name}: cannot be read: {reason}"))
+        Self::Wrong(format!("{name}: cannot be read: {}", told::unreadable(error)))
     }
 
     /// Says on stderr, in one sentence for each reason, what is to be said, and gives the exit code.
@@ -92,15 +86,68 @@ pub fn usage(error: &clap::Error) -> Result<(), Fault> {
             eprint!("{}", error.render());
             Err(Fault::Told)
         }
-        _ => Err(Fault::Wrong(sentence_of(&error.render().to_string()))),
+        kind => {
+            let sentence = sentence_of(&error.render().to_string());
+            let stray = match error.get(ContextKind::InvalidArg) {
+                Some(ContextValue::String(stray)) if kind == ErrorKind::UnknownArgument => stray,
+                _ => return Err(Fault::Wrong(sentence)),
+            };
+            Err(Fault::Wrong(match remedy(stray, &sentence) {
+                Some(remedy) => format!("{sentence}; {remedy}"),
+                None => sentence,
+            }))
+        }
     }
+}
+
+/// What to do about a word that stands where none is wanted, which is what the `sentence` says.
+fn remedy(stray: &str, sentence: &str) -> Option<&'static str> {
+    let is_of = |command: &str| sentence.contains(&format!("`macropulse {command} "));
+    match stray {
+        "=" => Some("a change is one word, as --set scan.max_range_m=90, or in quotes"),
+        _ if Format::parse(stray).is_ok() => {
+            Some("several formats are one word, with commas between them, as --format pcd,ply")
+        }
+        _ if stray.starts_with('-') => None,
+        _ if is_of("decode") => Some("the sensor is named with --sensor"),
+        _ if is_of("simulate") || is_of("sweep") => {
+            Some("the folder for the results is named with -o")
+        }
+        _ => None,
+    }
+}
+
+/// What the parsers of numbers say, and what we do.
+const NUMBERS: [(&str, &str); 5] = [
+    ("invalid digit found in string", "it must be a whole number, 0 or more"),
+    ("cannot parse integer from empty string", "it must be a whole number, 0 or more"),
+    ("number too large to fit in target type", "it is too large"),
+    ("invalid float literal", "it must be a number, without its unit"),
+    ("cannot parse float from empty string", "it must be a number"),
+];
+
+/// A complaint about a number, in words of ours.
+fn of_number(wrong: &str) -> String {
+    if let Some((what, limits)) = wrong.split_once(" is not in ")
+        && let Some((least, most)) = limits.split_once("..")
+    {
+        let value = what.rsplit_once(": ").map_or(what, |(_, value)| value);
+        let before = what.strip_suffix(value).unwrap_or_default();
+        let limits = match most.strip_prefix('=') {
+            Some(most) => format!("from {least} to {most}"),
+            None => format!("{least} at least"),
+        };
+        return format!("{before}it must be {limits}");
+    }
+    let known = NUMBERS.iter().find(|(theirs, _)| wrong.ends_with(theirs));
+    known.map_or(wrong.to_owned(), |(theirs, ours)| wrong.replace(theirs, ours))
 }
 
 /// Clap writes a paragraph of what is wrong, tips, the usage, and where to find more.
 fn sentence_of(rendered: &str) -> String {
     let mut paragraphs = rendered.split("\n\n");
     let wrong = one_line(paragraphs.next().unwrap_or_default());
-    let wrong = wrong.strip_prefix("error: ").unwrap_or(&wrong).to_owned();
+    let wrong = of_number(wrong.strip_prefix("error: ").unwrap_or(&wrong));
     let rest: Vec<&str> = paragraphs.flat_map(str::lines).map(str::trim).collect();
     let tips = rest.iter().filter_map(|line| line.strip_prefix("tip: "));
     let usage = rest.iter().find_map(|line| line.strip_prefix("Usage: "));
@@ -223,6 +270,27 @@ mod tests {
             "unexpected argument '--sead' found; a similar argument exists: '--seed'; \
              see `macropulse simulate --help`"
         );
+    }
+
+    #[test]
+    fn numbers_are_asked_for_in_words_of_ours() {
+        for (theirs, ours) in [
+            (
+                "invalid value 'a' for '--seed <N>': invalid digit found in string",
+                "'--seed <N>': it must be a whole number, 0 or more",
+            ),
+            (
+                "invalid value '0' for '--seeds <N>': 0 is not in 1..=10000",
+                "'--seeds <N>': it must be from 1 to 10000",
+            ),
+            (
+                "invalid value '0' for '--shots <N>': 0 is not in 1..18446744073709551615",
+                "'--shots <N>': it must be 1 at least",
+            ),
+            ("unexpected argument 'x' found", "unexpected argument 'x' found"),
+        ] {
+            assert!(of_number(theirs).ends_with(ours), "{}", of_number(theirs));
+        }
     }
 
     #[test]

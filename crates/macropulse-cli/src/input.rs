@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use macropulse::design::Design;
+use macropulse::design::{Design, preset_text};
 use macropulse::scene::Scene;
 
 use crate::fault::Fault;
@@ -25,6 +25,9 @@ const LONGEST: u64 = 16 << 20;
 pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault> {
     match name {
         STDIN => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
+        scene if Scene::builtin(scene).is_some() => Err(Fault::Wrong(format!(
+            "{scene}: is a scene, where a sensor is wanted; `macropulse sensors` lists the ready ones"
+        ))),
         name => Ok(Design::open(name, changes)?),
     }
 }
@@ -36,6 +39,9 @@ pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault>
 pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
     match name {
         STDIN => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
+        sensor if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
+            "{sensor}: is a sensor, where a scene is wanted; `macropulse scenes` lists the ready ones"
+        ))),
         name => Ok(Scene::open_changed(name, changes)?),
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use macropulse::design::{preset_names, preset_text};
 use macropulse::names::nearest;
 use macropulse::scene::Scene;
+use macropulse::told;
 use toml::{Table, Value};
 
 use crate::fault::Fault;
@@ -60,17 +61,36 @@ impl Kind {
 
     fn of_table(table: &Table) -> Option<Self> {
         let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+        let is_like =
+            |keys: &[&str]| table.keys().any(|key| nearest(key, keys.iter().copied()).is_some());
         match table.get("sensor") {
-            // What a scenario names, and where in a scene the sensor stands.
+            // Of these a scenario has none; a scene says where the sensor stands.
+            _ if has(&["object", "ground", "material"]) => Some(Self::Scene),
+            // What a scenario names.
             Some(Value::String(_)) => Some(Self::Scenario),
             _ if table.contains_key("sensors") => Some(Self::Scenario),
             _ if has(&OF_SENSORS) => Some(Self::Sensor),
             _ if has(&OF_SCENES) => Some(Self::Scene),
             _ if has(&OF_SCENARIOS) => Some(Self::Scenario),
             Some(Value::Table(_)) => Some(Self::Scene),
+            // A slip of the pen is told as one.
+            _ if is_like(&OF_SENSORS) => Some(Self::Sensor),
+            _ if is_like(&OF_SCENES) => Some(Self::Scene),
             _ => None,
         }
     }
+}
+
+/// Refuses a scene and a sensor that are named the wrong way round for `command`.
+pub fn in_order(command: &str, sensor: &str, scene: &str) -> Result<(), Fault> {
+    let is = |name: &str, kind: Kind| Kind::of(name).is_ok_and(|found| found == kind);
+    if !(is(scene, Kind::Sensor) && is(sensor, Kind::Scene)) {
+        return Ok(());
+    }
+    Err(Fault::Wrong(format!(
+        "{sensor}: is a scene, and {scene} a sensor; the sensor comes first, as in \
+         `macropulse {command} {scene} {sensor}`"
+    )))
 }
 
 fn unknown(name: &str) -> String {
@@ -85,7 +105,7 @@ fn not_toml(name: &str, text: &str, error: &toml::de::Error) -> String {
     let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
     let line = before.matches('\n').count() + 1;
     let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-    format!("{name}:{line}:{column}: is not TOML: {}", error.message())
+    format!("{name}:{line}:{column}: {}", told::syntax(text, error))
 }
 
 #[cfg(test)]
@@ -108,6 +128,8 @@ mod tests {
         // A slip of the pen makes no sensor of it.
         assert_eq!(kind("sensors = []\nscan = 3"), Some(Kind::Scenario));
         assert_eq!(kind("[sensor]\nyaw_deg = 3"), Some(Kind::Scene));
+        assert_eq!(kind("sensor = \"a\"\n[[object]]"), Some(Kind::Scene));
+        assert_eq!(kind("[[objects]]"), Some(Kind::Scene));
         assert_eq!(kind("version = 1"), None);
     }
 

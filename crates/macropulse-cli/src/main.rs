@@ -19,6 +19,7 @@ mod options;
 mod paper;
 mod progress;
 mod scenes;
+mod schema;
 mod sensors;
 mod simulate;
 mod speed;
@@ -29,7 +30,7 @@ mod view;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::CompleteEnv;
 
 use fault::Fault;
@@ -58,6 +59,7 @@ enum Command {
     Sensors(sensors::Sensors),
     Scenes(scenes::Scenes),
     Environments(environments::Environments),
+    Schema(schema::Schema),
     Check(check::Check),
     Budget(budget::Budget),
     Codes(codes::Codes),
@@ -73,7 +75,10 @@ enum Command {
 fn main() -> ExitCode {
     // A shell that completes a line calls the program once more, with this in its environment.
     CompleteEnv::with_factory(Options::command).var(completions::VARIABLE).complete();
-    let done = match Options::try_parse() {
+    // -1 is no option: what wants a number refuses it in its own words.
+    let command = Options::command().mut_subcommands(|one| one.allow_negative_numbers(true));
+    let parsed = command.try_get_matches().and_then(|typed| Options::from_arg_matches(&typed));
+    let done = match parsed {
         Ok(options) => {
             kernels().and_then(|()| options.common.use_threads()).and_then(|()| run(&options))
         }
@@ -97,6 +102,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Sensors(sensors) => sensors::run(sensors),
         Command::Scenes(scenes) => scenes::run(scenes),
         Command::Environments(environments) => environments::run(environments),
+        Command::Schema(schema) => schema::run(schema),
         Command::Check(check) => check::run(check, common),
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),

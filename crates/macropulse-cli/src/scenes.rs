@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::completions;
 use crate::fault::Fault;
-use crate::text::{Columns, first_sentence, print, print_json};
+use crate::text::{Columns, first_sentence, print, print_json, to_start_from};
 
 /// List the ready scenes, or print one as TOML to start from
 #[derive(Args)]
@@ -32,7 +32,7 @@ pub fn run(options: &Scenes) -> Result<(), Fault> {
 }
 
 fn one(name: &str, as_json: bool) -> Result<(), Fault> {
-    let Some(toml) = Scene::builtin(name) else {
+    let Some(toml) = Scene::builtin(name).map(to_start_from) else {
         let hint = nearest(name, Scene::builtin_names())
             .map(|near| format!("did you mean `{near}`? "))
             .unwrap_or_default();
@@ -65,8 +65,11 @@ fn all(as_json: bool) -> Result<(), Fault> {
 
 /// The file of a scene or an environment begins with a comment; its first sentence says what it is.
 pub fn summary(toml: &str) -> String {
-    let comment: Vec<&str> =
-        toml.lines().map_while(|line| line.strip_prefix('#')).map(str::trim).collect();
+    let comment: Vec<&str> = to_start_from(toml)
+        .lines()
+        .map_while(|line| line.strip_prefix('#'))
+        .map(str::trim)
+        .collect();
     first_sentence(&comment.join(" ")).to_owned()
 }
 

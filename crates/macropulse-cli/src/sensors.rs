@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::completions;
 use crate::fault::Fault;
-use crate::text::{Columns, print, print_json};
+use crate::text::{Columns, print, print_json, to_start_from};
 
 /// List the ready sensors, or print one as TOML to start from
 #[derive(Args)]
@@ -32,7 +32,7 @@ pub fn run(options: &Sensors) -> Result<(), Fault> {
 
 fn one(name: &str, as_json: bool) -> Result<(), Fault> {
     let design = Design::open(name, &[])?;
-    let toml = preset_text(name).unwrap_or(&design.text);
+    let toml = preset_text(name).map_or(design.text.as_str(), to_start_from);
     if as_json {
         let sensor = json!({ "name": design.name, "summary": design.summary, "toml": toml });
         return print_json(vec![sensor]);

@@ -26,6 +26,15 @@ pub fn print_json(values: Vec<serde_json::Value>) -> Result<(), Fault> {
     print(&format!("{value:#}\n"))
 }
 
+/// The text of a ready file to start from: its first line names a schema beside it, which is not
+/// where the text will be.
+pub fn to_start_from(toml: &str) -> &str {
+    match toml.split_once('\n') {
+        Some((first, rest)) if first.starts_with("#:schema ") => rest,
+        _ => toml,
+    }
+}
+
 /// A duration in the unit that suits it.
 pub fn lasted(seconds: f64) -> String {
     match seconds {
@@ -53,6 +62,12 @@ pub fn counted(number: u64, one: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_schema_is_not_named_where_it_is_not() {
+        assert_eq!(to_start_from("#:schema ../s.json\n# A wall.\n"), "# A wall.\n");
+        assert_eq!(to_start_from("# A wall.\na = 1\n"), "# A wall.\na = 1\n");
+    }
 
     #[test]
     fn counts_are_grouped_and_durations_have_a_unit() {

@@ -53,6 +53,13 @@ pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
         let output = options.output.clone().unwrap_or_else(|| path.with_extension("html"));
         (of_file(path, &output)?, output)
     };
+    let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
+    if ending.is_none_or(|ending| ending != "html" && ending != "htm") {
+        return Err(Fault::Wrong(format!(
+            "{}: what is written is a page: give it a name that ends in .html",
+            output.display()
+        )));
+    }
     write_atomically(&output, |out| out.write_all(page.html().as_bytes()))?;
     if !common.quiet {
         print(&format!("open {}\n", output.display()))?;

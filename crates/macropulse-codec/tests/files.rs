@@ -172,7 +172,7 @@ fn what_is_wrong_in_text_has_its_line() {
         ("7,5,0,0,16,0\n", 3, "label 16 is not among the 16 labels of the codebook"),
         ("7,5,0,0,0,5\n", 3, "word 5 is not among the 5 words of the codebook"),
         ("7,5.5,0,0,0,0\n", 3, "fired_fs: `5.5` is no whole number"),
-        ("7,5,0,0,0\n", 3, "5 numbers, where there are 6 columns"),
+        ("7,5,0,0,0\n", 3, "5 values, where the line of names has 6"),
         ("7,9100000000000000000,0,0,0,0\n", 3, "more than 9000 s"),
         ("7,5,0,0,-1,0\n", 3, "label: `-1`"),
     ] {

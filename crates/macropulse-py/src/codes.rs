@@ -34,8 +34,8 @@ use crate::work;
 #[pyo3(signature = (sensor, row, column, *, scan = 0))]
 pub fn encode<'py>(
     sensor: &Bound<'py, PyAny>,
-    row: u32,
-    column: u32,
+    row: i64,
+    column: i64,
     scan: u64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = sensor.py();

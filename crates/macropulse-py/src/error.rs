@@ -6,7 +6,7 @@ use std::path::Path;
 
 use macropulse::{channel, codec, design, emit, environment, formats, scene, sim};
 use macropulse_study::{decoding, record, sent, sweep, view};
-use pyo3::exceptions::{PyIsADirectoryError, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(
@@ -66,10 +66,23 @@ pub fn of_file(path: &Path, why: &io::Error) -> PyErr {
             let said = said.split(" (os error").next().unwrap_or(&said).to_owned();
             PyOSError::new_err((number, said, path))
         }
-        None if why.kind() == io::ErrorKind::IsADirectory => {
-            PyIsADirectoryError::new_err(format!("{path}: is a folder, where a file is wanted"))
-        }
-        None => PyOSError::new_err(format!("{path}: {why}")),
+        None => match number(why.kind()) {
+            Some((number, said)) => PyOSError::new_err((number, said, path)),
+            None => PyOSError::new_err(format!("{path}: {why}")),
+        },
+    }
+}
+
+/// The number that systems have for a kind of error, by which Python chooses its exception, and what
+/// they say of it; for errors that came without.
+fn number(kind: io::ErrorKind) -> Option<(i32, &'static str)> {
+    match kind {
+        io::ErrorKind::NotFound => Some((2, "No such file or directory")),
+        io::ErrorKind::PermissionDenied => Some((13, "Permission denied")),
+        io::ErrorKind::NotADirectory => Some((20, "Not a directory")),
+        io::ErrorKind::IsADirectory => Some((21, "Is a directory")),
+        io::ErrorKind::StorageFull => Some((28, "No space left on device")),
+        _ => None,
     }
 }
 

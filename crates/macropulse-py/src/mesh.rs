@@ -56,12 +56,22 @@ impl Mesh {
         })?;
         let triangles = triangles.as_array();
         if triangles.ncols() != 3 {
-            return Err(wrong(format!("triangles has shape {}; it must be (m, 3)", shape(&given))));
+            let remedy = match triangles.ncols() {
+                4 => ": cut each quadrangle into two triangles",
+                _ => "",
+            };
+            let shape = shape(&given);
+            return Err(wrong(format!("triangles has shape {shape}; it must be (m, 3){remedy}")));
         }
         let count = vertices.nrows();
+        let from_one = triangles.iter().min() == Some(&1)
+            && triangles.iter().max().is_some_and(|most| usize::try_from(*most) == Ok(count));
         let corner = |index: &i64| {
             u32::try_from(*index).ok().filter(|index| (*index as usize) < count).ok_or_else(|| {
-                wrong(format!("triangles names the corner {index}, but there are {count}, from 0"))
+                wrong(format!(
+                    "triangles names the corner {index}, but there are {count}, from 0{}",
+                    if from_one { ": these are counted from 1, so take 1 from each" } else { "" }
+                ))
             })
         };
         let triangles = triangles

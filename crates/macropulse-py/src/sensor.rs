@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use macropulse::design::{Design, preset_names, preset_text};
+use macropulse::scene::Scene;
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple, PyType};
@@ -263,7 +264,18 @@ impl Sensor {
 /// `TypeError` if it is neither.
 pub fn named(given: &Bound<'_, PyAny>, (what, class): (&str, &str)) -> PyResult<String> {
     if let Ok(text) = given.cast::<PyString>() {
-        return Ok(text.to_str()?.to_owned());
+        let text = text.to_str()?;
+        let other = match what {
+            "sensor" => Scene::builtin(text).map(|_| "scene"),
+            _ => preset_text(text).map(|_| "sensor"),
+        };
+        return match other {
+            Some(other) => Err(wrong(format!(
+                "{text}: is a {other}, where a {what} is wanted; the sensor comes first, then the \
+                 scene"
+            ))),
+            None => Ok(text.to_owned()),
+        };
     }
     given.extract::<PathBuf>().map(|path| path.display().to_string()).map_err(|_| {
         let kind = given.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());

@@ -4,6 +4,8 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import macropulse as mp
 import numpy as np
@@ -16,6 +18,13 @@ def plate(**keys):
     return mp.Scene.from_dict({"object": [{"name": "plate", "shape": {"box": {"size_m": [1, 1, 1]}},
                                            "position_m": [9, 0, 0], "material": "grey50", **keys}]})
 
+
+def sweep(vary, **options):
+    return mp.sweep("peregrine", "wall", vary, folder=NOWHERE, **options)
+
+
+# A folder that no mistake makes.
+NOWHERE = Path(tempfile.gettempdir()) / f"macropulse-nowhere-{os.getpid()}"
 
 MISTAKES = [
     # What is done, and the beginning and the end of what is said.
@@ -31,7 +40,7 @@ MISTAKES = [
      "scan.max_range_m: a value cannot be of type NoneType", "or leave the key out"),
     (lambda: mp.Sensor("peregrine", {"scan.max_range_m": 10**30}), "scan.max_range_m: 1", "can hold"),
     (lambda: mp.Sensor("peregrine", {3: 4}), "changes: the key 3 is no text", ""),
-    (lambda: mp.Sensor("peregrine", {"without": ["sunlihgt"]}), "peregrine:6:1: idealised: `sunlihgt` is no effect", ""),
+    (lambda: mp.Sensor("peregrine", {"without": ["sunlihgt"]}), "peregrine:7:1: idealised: `sunlihgt` is no effect", ""),
     (lambda: mp.Sensor.from_dict({"extends": "peregrin"}), "the dictionary: extends: ", ""),
     (lambda: mp.Sensor.from_dict({"extends": "peregrine", "scan": {"max_range_m": "x"}}),
      "the dictionary: scan.max_range_m: ", ""),
@@ -39,7 +48,7 @@ MISTAKES = [
     (lambda: mp.Scene("wall", {"object.wal.position_m.x": 3}), "object.wal.position_m.x: nothing in it",
      "there are wall"),
     (lambda: mp.Scene("wall", {"environment": "fog"}), "environment", ""),
-    (lambda: plate(materail="grey50"), "the dictionary: object[0].materail: unknown field",
+    (lambda: plate(materail="grey50"), "the dictionary: object[0].materail: unknown key",
      "did you mean `material`?"),
     (lambda: plate(material="gray50"), "the dictionary: object[0].material: there is no material",
      'did you mean "grey50"?'),
@@ -66,6 +75,61 @@ MISTAKES = [
     (lambda: mp.budget("coded-practical", "fogg"), "environment: ", ""),
     (lambda: mp.budget("coded-practical", pd=2), "pd is 2; it must be from", ""),
     (lambda: mp.scans("peregrine", "wall", 10**9), "1000000000 scans from number 0 on last longer", ""),
+    (lambda: mp.simulate("wall", "peregrine"), "wall: is a scene, where a sensor is wanted", "then the scene"),
+    (lambda: mp.Scene("peregrine"), "peregrine: is a sensor, where a scene is wanted", ""),
+    (lambda: mp.Sensor("vlp"), "vlp: no such sensor; did you mean `vlp-16`?", ""),
+    (lambda: mp.Sensor("peregrine", {"max_range_m": 3}), "max_range_m: unknown key", "it belongs in [scan]"),
+    (lambda: mp.Sensor("peregrine", {"scan": {"max_rnage_m": 3}}), "scan.max_rnage_m: unknown key",
+     "did you mean `max_range_m`?"),
+    (lambda: mp.Sensor("peregrine", {"scan.max_range_m": "3"}), 'scan.max_range_m: is the text "3"',
+     "take the quotes away"),
+    (lambda: mp.Sensor("peregrine", {"scan.max_range_m": np.array([3])}), "scan.max_range_m: is a list",
+     "a number from 0.01 to 100000"),
+    (lambda: mp.Sensor("peregrine", {"scan.flash.rows": 1.5}), "scan.flash.rows: is 1.5",
+     "a whole number from 1 to 16384"),
+    (lambda: mp.Sensor("peregrine", {"light.wavelength_nm": 905e-9}), "light.wavelength_nm: is 0.000000905",
+     "between 200 and 20000"),
+    (lambda: mp.Sensor("peregrine", {"scan.max_range_m": float("nan")}), "scan.max_range_m: is NaN", ""),
+    (lambda: mp.Sensor.from_dict({"name": "mine"}), "the dictionary: ", "from a ready sensor"),
+    (lambda: mp.Sensor.from_dict({"extends": "peregrine", "code": "prime"}), "the dictionary: code: is the text", ""),
+    (lambda: mp.Sensor.from_toml('name = mine'), "", 'text stands in quotes, as "street"'),
+    (lambda: mp.Scene.car(float("nan")), "range_m is NaN; it must be from 1 to 10000", ""),
+    (lambda: mp.Scene.car(30_000), "range_m is 30000; it must be from 1 to 10000", ""),
+    (lambda: mp.Scene.from_dict({"object": {"car": {}}}), "the dictionary: object", ""),
+    (lambda: mp.Scene.from_dict({"objects": [{"car": {}}]}), "the dictionary: objects", "did you mean `object`?"),
+    (lambda: mp.Scene.from_dict({"object": [{"shape": "box"}]}), "the dictionary: object[0].shape: must be { plane", ""),
+    (lambda: plate(position_m=9), "the dictionary: object[0].position_m: is 9", "as [1.0, 2.0, 3.0]"),
+    (lambda: plate(position_m="9, 0, 0"), "the dictionary: object[0].position_m: is the text", ""),
+    (lambda: plate(position=[9, 0, 0]), "the dictionary: object[0].position: unknown key", "did you mean `position_m`?"),
+    (lambda: plate(yaw=90), "the dictionary: object[0].yaw: unknown key", "did you mean `yaw_deg`?"),
+    (lambda: mp.Scene.from_dict({"material": [{"name": "m", "diffuse": 10}], "object": [{"car": {}}]}),
+     "the dictionary: material[0].diffuse: diffuse is 10; it must be from 0 to 1", ""),
+    (lambda: mp.Scene("wall", {"environment": "foggy"}), "environment: there is no environment `foggy`", ""),
+    (lambda: mp.Scene("wall", {"object.wall.positon_m.x": 3}), "object.wall.positon_m.x: ", "did you mean `position_m`?"),
+    (lambda: mp.Mesh(CORNERS, [[1, 2, 3]]), "triangles names the corner 3, but there are 3, from 0",
+     "take 1 from each"),
+    (lambda: mp.Mesh(CORNERS, [[0, 1, 2, 0]]), "triangles has shape (1, 4)", "cut each quadrangle into two triangles"),
+    (lambda: mp.Mesh(np.zeros((3, 8)), [[0, 1, 2]]), "vertices has shape (3, 8); it must be (n, 3)", ""),
+    (lambda: mp.Mesh([0, 0, 0], [[0, 1, 2]]), "vertices has shape (3,); it must be (n, 3)", ""),
+    (lambda: mp.Mesh(CORNERS, [[True, False, True]]), "triangles are of type bool", "whole numbers"),
+    (lambda: mp.encode("kim-park-2016", -1, 0), "pixel -1,0: kim-park-2016 has rows 0 to 479", "0 to 847"),
+    (lambda: mp.codes("prime"), "prime: write it as in a sensor file, as prime=29", ""),
+    (lambda: mp.code_words("kim-park-2016"), "kim-park-2016: write it as in a sensor file", ""),
+    (lambda: mp.budget("wall"), "wall: is a scene, where a sensor is wanted", ""),
+    (lambda: mp.budget("coded-practical", pd=90), "pd is 90; it must be from", ""),
+    (lambda: mp.budget("coded-practical", reflectance=-0.1), "reflectance is -0.1; it must be from", ""),
+    (lambda: mp.budget("coded-practical", {"visibility_km": "a"}), 'environment.visibility_km: is the text "a"',
+     "a number from 0.01 to 1000"),
+    (lambda: mp.budget("coded-practical", {"visibility_m": 50}), "environment.visibility_m: unknown key",
+     "did you mean `visibility_km`?"),
+    (lambda: sweep({}), "nothing is varied; give a key with its values", ""),
+    (lambda: sweep({"scan.max_range_m": []}), "scan.max_range_m", ""),
+    (lambda: sweep({"scan.max_rnage_m": [3, 4]}), "with scan.max_rnage_m = 3: ", "did you mean `max_range_m`?"),
+    (lambda: sweep({"scan.max_range_m": np.array([3.0, -4.0])}), "with scan.max_range_m = -4", "between 0.01 and 100000"),
+    (lambda: sweep({"scan.max_range_m": ["a", "b"]}), "with scan.max_range_m = ", "a number from 0.01 to 100000"),
+    (lambda: sweep({"scan.max_range_m": [3, 4]}, score=["pdd"]), "unknown score `pdd`", ""),
+    (lambda: sweep({"scan.max_range_m": [3, 4]}, seeds=0), "seeds is 0; it must be from 1 to 10000", ""),
+    (lambda: sweep({"scan.max_range_m": [3, 4]}, shard="3/2"), "there is no shard 3/2", ""),
 ]
 
 
@@ -77,8 +141,10 @@ def test_a_mistake_is_answered_with_place_and_remedy(at):
     said = str(raised.value)
     assert said.startswith(begins) and said.endswith(ends) and len(said) > 20, said
     # No words of the language that it is written in.
-    for word in ("Err(", "None`", "Option", "unwrap", "panick", "i64", "u16", "--set"):
+    for word in ("Err(", "None`", "Option", "unwrap", "panick", "i64", "u16", "f64", "u32", "variant", "struct ",
+                 "unknown field", "invalid type", "os error", "--set"):
         assert word not in said, said
+    assert not NOWHERE.exists()
     assert isinstance(raised.value, ValueError)
 
 
@@ -98,7 +164,7 @@ def test_a_file_that_is_not_there(mistake):
 def test_a_folder_and_a_place_that_cannot_be_written_to(scan, tmp_path):
     with pytest.raises(IsADirectoryError):
         mp.Sensor(tmp_path / ".." / tmp_path.name)
-    with pytest.raises(OSError):
+    with pytest.raises(FileNotFoundError, match="there-is-none"):
         scan.save(tmp_path / "there-is-none" / "scan.pcd")
     with pytest.raises(mp.Error, match="no ending that says a format"):
         scan.save(tmp_path / "scan")

@@ -38,7 +38,7 @@ pub enum Error {
     /// A file is of another sensor.
     #[error(
         "{name}: is of another sensor: its code, timing or pixels have the digest {found}, those of \
-         {sensor} {wanted}; name the sensor it was recorded with"
+         {sensor} {wanted}; name the sensor it was recorded with, and the same --set"
     )]
     OfAnother {
         /// The file as it was named.

@@ -13,9 +13,9 @@ pub enum Error {
     )]
     Pixel {
         /// The row asked for.
-        row: u32,
+        row: i64,
         /// The column asked for.
-        column: u32,
+        column: i64,
         /// Name of the sensor.
         sensor: String,
         /// Its last row.
@@ -57,14 +57,16 @@ impl<'a> Macropulse<'a> {
     ///
     /// # Errors
     /// If it has no such pixel or scan.
-    pub fn to(design: &'a Design, scan: u64, (row, column): (u32, u32)) -> Result<Self, Error> {
+    pub fn to(design: &'a Design, scan: u64, (row, column): (i64, i64)) -> Result<Self, Error> {
         let (last_row, last_column) = (design.scan.rows - 1, design.scan.columns - 1);
+        let sensor = || design.name.clone();
+        let within = |at: i64, last: u32| u32::try_from(at).ok().filter(|at| *at <= last);
+        let (Some(row), Some(column)) = (within(row, last_row), within(column, last_column)) else {
+            return Err(Error::Pixel { row, column, sensor: sensor(), last_row, last_column });
+        };
         let shot = shot_of_pixel(design, scan, row, column).ok_or_else(|| {
-            let sensor = design.name.clone();
-            match row <= last_row && column <= last_column {
-                true => Error::Scan { scan, sensor, last: most_scans(design).saturating_sub(1) },
-                false => Error::Pixel { row, column, sensor, last_row, last_column },
-            }
+            let last = most_scans(design).saturating_sub(1);
+            Error::Scan { scan, sensor: sensor(), last }
         })?;
         let codebook = &design.coding.codebook;
         Ok(Self {

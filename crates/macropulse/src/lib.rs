@@ -40,6 +40,8 @@ pub mod predict;
 pub mod random;
 pub mod units;
 pub mod names;
+pub mod told;
 pub mod digest;
 pub mod processor;
+mod schema;
 mod kernels;

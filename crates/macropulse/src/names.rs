@@ -3,17 +3,25 @@
 use toml::de::{DeTable, DeValue};
 
 /// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
-/// apart, or the beginning of it, as `yaw_deg` is of `yaw_degrees`.
+/// apart, or one the beginning of the other, as `yaw` and `yaw_degrees` of `yaw_deg`. Capitals do
+/// not matter.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let typed = typed.to_lowercase();
     known
         .into_iter()
-        .map(|name| (strsim::damerau_levenshtein(typed, name), name))
-        .min()
+        .map(|name| (strsim::damerau_levenshtein(&typed, name), name))
         .filter(|(distance, name)| {
-            // Words written out, as `yaw_degrees`, are far from what they mean but begin with it.
-            *distance <= 1 + name.chars().count().max(3) / 3
+            // Of a short word few letters are left if some are changed.
+            let most = match name.chars().count() {
+                0..=2 => 0,
+                3 | 4 => 1,
+                count => 1 + count / 3,
+            };
+            *distance <= most
                 || (name.len() > 3 && typed.starts_with(name))
+                || (typed.len() > 2 && name.starts_with(&typed))
         })
+        .min()
         .map(|(_, name)| name)
 }
 
@@ -130,5 +138,8 @@ mod tests {
         assert_eq!(nearest("perigrine", known), Some("peregrine"));
         assert_eq!(nearest("banana", known), None);
         assert_eq!(nearest("yaw_degrees", ["scale", "yaw_deg"]), Some("yaw_deg"));
+        assert_eq!(nearest("yaw", ["car", "yaw_deg"]), Some("yaw_deg"));
+        assert_eq!(nearest("Z", ["x", "z"]), Some("z"));
+        assert_eq!((nearest("xyz", ["laz"]), nearest("w", ["x"])), (None, None));
     }
 }

@@ -68,6 +68,16 @@ const SIMULATOR: Layers = Layers {
             because: "the likeness of words depends on nothing",
         },
         Rule {
+            module: "told",
+            may_name: &["names"],
+            because: "the words of parsers are put into ours whatever is parsed",
+        },
+        Rule {
+            module: "schema",
+            may_name: &["told"],
+            because: "what a file may say follows from its types, of which it knows none",
+        },
+        Rule {
             module: "random",
             may_name: &["kernels"],
             because: "random numbers are a function of their counter",
@@ -79,12 +89,12 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "environment",
-            may_name: &["names"],
+            may_name: &["names", "schema"],
             because: "sun and air are there whatever looks at them",
         },
         Rule {
             module: "design",
-            may_name: &["digest", "environment", "names", "units"],
+            may_name: &["digest", "environment", "names", "schema", "told", "units"],
             because: "a design is checked data: it imports no stage",
         },
         Rule {
@@ -94,7 +104,17 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "scene",
-            may_name: &["design", "digest", "emit", "environment", "kernels", "names", "units"],
+            may_name: &[
+                "design",
+                "digest",
+                "emit",
+                "environment",
+                "kernels",
+                "names",
+                "schema",
+                "told",
+                "units",
+            ],
             because: "surfaces do not know what their echoes become",
         },
         Rule {

@@ -272,7 +272,7 @@ fn a_wrong_motion_is_refused_at_its_place() {
     assert!(message.contains("other lidars are not simulated where something moves"), "{message}");
     assert!(read(other).is_ok());
     let message = told("[[interferers]]\nsensor = \"hdl-64e\"\nvelocity_m_s = [1, 0, 0]\n");
-    assert!(message.contains("unknown field `velocity_m_s`"), "{message}");
+    assert!(message.contains("unknown key `velocity_m_s`"), "{message}");
 }
 
 /// The bytes of a scan of the spinning sensor on a pool of so many threads.

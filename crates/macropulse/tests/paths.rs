@@ -168,7 +168,7 @@ fn what_is_wrong_with_a_table_is_told_with_its_line() {
         (good.replace("\n0.03990,", "\n0.93990,"), "off the even pace"),
         ("azimuth,zenith\n0,200\n0,90\n".to_owned(), "points -110.000 degrees up"),
         ("azimuth,zenith,elevation\n0,90,0\n".to_owned(), "has both elevation and zenith"),
-        ("azimuth,elevation\n".to_owned(), "0 directions are no whole number"),
+        ("azimuth,elevation\n".to_owned(), "0 directions; there must be two at least"),
         (String::new(), "pattern.csv:1: needs a header"),
         ("time,azimuth,elevation\n1,0,0\n1,1,0\n".to_owned(), "its times do not grow"),
     ] {
@@ -179,7 +179,10 @@ fn what_is_wrong_with_a_table_is_told_with_its_line() {
     let told = sensor(&good, "firings_per_s = 9.0").unwrap_err();
     assert!(told.contains("has no effect because of `scan.table.file`"), "{told}");
     let told = sensor(&good, "lines = 3").unwrap_err();
-    assert!(told.contains("400 directions are no whole number of 3"), "{told}");
+    assert!(
+        told.contains("400 directions; there must be two at least, a multiple of the 3"),
+        "{told}"
+    );
     let told = Design::from_toml(SENSOR, "mine.toml", Path::new("/nowhere"), &[]).unwrap_err();
     assert!(told.to_string().contains("/nowhere/pattern.csv: cannot be read"), "{told}");
     let quick = sensor(&good.replace("0.0", "0.000000"), "");

@@ -57,13 +57,13 @@ fn it_is_the_scene_that_the_file_makes() {
 fn what_is_wrong_is_named_by_its_key() {
     let told = |text: &str| given(text, square()).unwrap_err();
     let misspelt = told(&OBJECT.replace("position_m", "positon_m"));
-    assert!(misspelt.starts_with("a dictionary: object[0].positon_m: unknown field"), "{misspelt}");
+    assert!(misspelt.starts_with("a dictionary: object[0].positon_m: unknown key"), "{misspelt}");
     assert!(misspelt.ends_with("did you mean `position_m`?"), "{misspelt}");
     let material = told(&OBJECT.replace("grey50", "gray50"));
     assert!(material.starts_with("a dictionary: object[0].material: there is no"), "{material}");
     let nowhere = told(&OBJECT.replace("7.5", "nan"));
     assert!(nowhere.starts_with("a dictionary: object[0].position_m: "), "{nowhere}");
-    assert_eq!(told("name = \"x\"\n"), "a dictionary: missing field `version`");
+    assert_eq!(told("name = \"x\"\n"), "a dictionary: the key `version` is missing");
     let mut broken = square();
     broken.triangles[1][2] = 4;
     let broken = given(OBJECT, broken).unwrap_err();

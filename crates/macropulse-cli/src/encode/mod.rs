@@ -84,7 +84,7 @@ pub fn run(options: &Encode) -> Result<(), Fault> {
     let macropulses: Vec<Macropulse> = options
         .pixels
         .iter()
-        .map(|&pixel| Macropulse::to(&design, options.scan, pixel))
+        .map(|&(row, column)| Macropulse::to(&design, options.scan, (row.into(), column.into())))
         .collect::<Result<_, _>>()
         // The error begins with the name of what was typed: that of its option.
         .map_err(|error| Fault::Wrong(format!("--{error}")))?;

@@ -8,8 +8,8 @@ use macropulse::codec::files::Form;
 use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
-use macropulse::names::nearest;
 use macropulse::scene::{Changes, Scene};
+use macropulse::told;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -17,7 +17,7 @@ use super::formats::{Formats, form};
 use crate::explain::Pixel;
 use crate::fault::Fault;
 use crate::input::{self, STDIN};
-use crate::kind::Kind;
+use crate::kind;
 
 /// The format this program reads.
 const VERSION: i64 = 1;
@@ -66,13 +66,8 @@ impl Scenario {
                     .to_owned(),
             ));
         }
-        if let ([sensor], Ok(Kind::Sensor)) = (sensors, Kind::of(scene))
-            && Kind::of(sensor).is_ok_and(|kind| kind == Kind::Scene)
-        {
-            return Err(Fault::Wrong(format!(
-                "{sensor}: is a scene, and {scene} a sensor; the sensor comes first, as in \
-                 `macropulse simulate {scene} {sensor}`"
-            )));
+        if let [sensor] = sensors {
+            kind::in_order("simulate", sensor, scene)?;
         }
         let designs: Result<Vec<_>, _> =
             sensors.iter().map(|sensor| input::design(sensor, &changes.of_sensor)).collect();
@@ -208,22 +203,10 @@ impl Source<'_> {
         Fault::Wrong(format!("{}:{line}:{column}: {message}", self.origin))
     }
 
-    /// The parser quotes an unknown key in backticks, and those it knows behind it.
     fn typed_wrongly(&self, error: &toml::de::Error) -> Fault {
-        let said = error.message();
-        let mut quoted = said.split('`').skip(1).step_by(2);
-        let message = match (said.starts_with("unknown field"), quoted.next()) {
-            (true, Some(wrong)) => {
-                let known: Vec<&str> = quoted.collect();
-                let hint = nearest(wrong, known.iter().copied())
-                    .map(|near| format!("did you mean `{near}`?"))
-                    .unwrap_or_else(|| format!("known are {}", known.join(", ")));
-                format!("unknown key `{wrong}`; {hint}")
-            }
-            (false, Some(key)) if said.starts_with("missing field") => {
-                format!("the key `{key}` is missing")
-            }
-            _ => said.to_owned(),
+        let message = match self.text.parse::<toml::Table>() {
+            Ok(_) => told::wrong(error.message(), None),
+            Err(syntax) => told::syntax(self.text, &syntax),
         };
         self.fault(error.span().unwrap_or(0..0), &message)
     }

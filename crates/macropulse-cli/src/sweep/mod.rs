@@ -14,6 +14,7 @@ use crate::completions;
 use crate::fault::{Fault, warn};
 use crate::input::STDIN;
 use crate::interrupt::Interrupt;
+use crate::kind;
 use crate::options::{Changes, Common, Surroundings};
 use crate::progress::Progress;
 use crate::text::{NO_BREAK, counted, print};
@@ -130,6 +131,9 @@ impl Sweep {
                  sensor or scene into a file"
                     .to_owned(),
             ));
+        }
+        if let [sensor] = &sensors[..] {
+            kind::in_order("sweep", sensor, &scene)?;
         }
         Ok(Request {
             sensors,

@@ -46,6 +46,7 @@ pub enum ReceiverKind {
 
 /// How much the matched receiver does for faint light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Effort {
     /// Searches for one shot in so many where light is faint, finds the others from there, and

@@ -7,6 +7,7 @@ pub const MOST_RETURNS: u8 = 8;
 
 /// Which of several returns of a shot comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Pick {
     /// The nearest.

@@ -19,6 +19,9 @@ impl Keys {
         let Some(rest) = line.strip_prefix("# macropulse ") else {
             return source.refuse(format!("does not begin with `# macropulse {name} {VERSION}`"));
         };
+        if rest.contains(';') {
+            return source.refuse("has semicolons: values stand between commas");
+        }
         let mut parts = rest.split(',').map(str::trim);
         let (kind, version) = match parts.next().and_then(|kind| kind.split_once(' ')) {
             Some((kind, version)) => (kind.trim(), version.trim()),
@@ -129,6 +132,9 @@ impl Columns {
                 .refuse("behind its first line the file ends: the names of columns are missing");
         };
         let names: Vec<&str> = line.split(',').map(str::trim).collect();
+        if line.contains(';') {
+            return source.refuse("has semicolons: columns stand between commas");
+        }
         if let Some(wrong) = names.iter().find(|name| !known.contains(name)) {
             let known = known.join(", ");
             return source.refuse(format!("unknown column `{wrong}`; known are {known}"));
@@ -157,7 +163,7 @@ impl Columns {
         };
         if count != self.wide {
             return source
-                .refuse(format!("{count} numbers, where there are {} columns", self.wide));
+                .refuse(format!("{count} values, where the line of names has {}", self.wide));
         }
         Ok(true)
     }

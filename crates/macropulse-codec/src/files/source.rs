@@ -7,6 +7,9 @@ use super::{Error, Form, Place, What};
 /// No line is longer, bytes.
 const LONGEST_LINE: u64 = 4096;
 
+/// The mark of the byte order of UTF-8.
+const MARK: [u8; 3] = [0xef, 0xbb, 0xbf];
+
 /// Bytes asked for at once.
 const BLOCK: usize = 1 << 16;
 
@@ -27,7 +30,12 @@ impl<R: Read> Source<R> {
     /// The file of `reader`, whose form its first byte tells.
     pub fn new(reader: R, what: What) -> Result<Self, Error> {
         let mut bytes = BufReader::with_capacity(BLOCK, reader);
-        let first = first_byte(&mut bytes).map_err(|cause| Error::Read { what, cause })?;
+        let mut first = first_byte(&mut bytes).map_err(|cause| Error::Read { what, cause })?;
+        // Some programs put a mark of the byte order before text.
+        if first == Some(MARK[0]) && bytes.buffer().starts_with(&MARK) {
+            bytes.consume(MARK.len());
+            first = first_byte(&mut bytes).map_err(|cause| Error::Read { what, cause })?;
+        }
         let (form, place) = match first {
             Some(b'#') => (Form::Text, Place::Line(1)),
             _ => (Form::Binary, Place::Byte(0)),

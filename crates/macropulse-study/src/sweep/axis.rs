@@ -97,6 +97,12 @@ fn of_list(key: &str, typed: &str) -> Result<Axis, Error> {
     }
     let numbers: Option<Vec<f64>> = values.iter().map(|value| value.parse().ok()).collect();
     let Some(numbers) = numbers else {
+        if let [one] = &values[..]
+            && one.contains(':')
+            && one.split(':').all(|part| part.parse::<f64>().is_ok())
+        {
+            return Error::asked(format!("{key}: {one} is no list and no range; {REMEDY}"));
+        }
         return Axis::new(key, values, Spread::Names);
     };
     if let Some(wrong) = numbers.iter().position(|number| !number.is_finite()) {

@@ -143,6 +143,9 @@ impl Plan {
                 };
                 Error::asked(format!("{place} holds another sweep{of}; {remedy}"))
             }
+            Err(error) if error.kind() == ErrorKind::NotADirectory => {
+                Error::asked(format!("{place}: a file is in the way; {remedy}"))
+            }
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 Error::asked(format!("{place}/{DESCRIPTION} cannot be read: {error}; {remedy}"))
             }

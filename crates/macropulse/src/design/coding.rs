@@ -1,5 +1,6 @@
 //! How shots are told apart: `[code]`.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::family::{FamilyFile, family};
@@ -8,29 +9,43 @@ use super::{Error, Scan, Tdc};
 use macropulse_codec::code::{Codebook, Crc, Keying, Payload};
 
 /// `[code]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CodeFile {
+    /// Family of code words, one, as { prime = 29 }.
     family: FamilyFile,
+    /// Length of a chip, ps: a whole number of ticks.
+    #[schemars(range(min = 0.001, max = 1e9))]
     chip_ps: f64,
+    /// What a bit is: 1 is the code word, 0 is dark or its complement.
     keying: KeyingFile,
+    /// What a shot carries.
     pub label: Label,
+    /// Bits of the label, which must number all columns.
+    #[schemars(range(min = 1, max = 16))]
     label_bits: u32,
+    /// Checksum behind the label.
     crc: CrcFile,
+    /// Whether a lit bit goes before the label.
     sync_bit: bool,
+    /// Whether labels that send no light are accepted.
     allow_dark: bool,
+    /// Which code word a pixel is sent with: pixel n, row by row, with word `first` + n mod
+    /// `modulus`.
     word: WordFile,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum KeyingFile {
+    /// A 0 bit is dark.
     OnOff,
+    /// A 0 bit is the complement of the code word; for the receiver `balanced`.
     Inversion,
 }
 
 /// Which number a macropulse carries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Label {
     /// The column of its pixel.
@@ -39,18 +54,25 @@ pub enum Label {
     None,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CrcFile {
+    /// Bits of the checksum.
+    #[schemars(range(min = 1, max = 8))]
     width: u8,
+    /// Its polynomial, without the leading term.
     polynomial: u8,
+    /// What its register holds at the start.
     init: u8,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WordFile {
+    /// First word in use, from 0.
     first: u32,
+    /// How many words are in use.
+    #[schemars(range(min = 1))]
     modulus: u32,
 }
 

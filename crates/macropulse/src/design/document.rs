@@ -9,6 +9,7 @@ use super::family::FAMILIES;
 use super::presets;
 use super::{Detector, Effect, Error, Pattern};
 use crate::names::{line_column, offset_of_key, toml_value};
+use crate::told;
 
 /// Where values come from that are changed on the command line.
 const SET: &str = "--set";
@@ -30,7 +31,7 @@ const PROSE: &str = "summary";
 
 /// Where exactly one of several tables may stand: naming another kind than the parent's replaces
 /// the parent's table instead of adding to it. So with keys of which there may be one.
-const ALTERNATIVES: [(&str, &[&str]); 5] = [
+pub(super) const ALTERNATIVES: [(&str, &[&str]); 5] = [
     ("scan", Pattern::NAMES),
     ("detector", Detector::NAMES),
     ("family", FAMILIES),
@@ -113,8 +114,9 @@ impl Chain {
             if documents.len() > LONGEST_CHAIN {
                 return Err(place(&documents, path).error("goes round in a circle"));
             }
-            let (text, origin, next_folder) = open(&parent, &folder)
-                .map_err(|error| place(&documents, path).error(error.message))?;
+            let (text, origin, next_folder) = open(&parent, &folder).map_err(|error| {
+                place(&documents, path).error(format!("{parent}: {}", error.message))
+            })?;
             folder = next_folder;
             documents.push(Document::parse(&text, &origin, &folder)?);
         }
@@ -158,6 +160,17 @@ impl Chain {
     /// An error about the value at the dotted `path`, pointing at the document that gave it.
     pub fn error(&self, path: &str, message: impl Into<String>) -> Error {
         place(&self.documents, path).error(message)
+    }
+
+    /// An error about what is not there at the dotted `path`: of the documents that were typed.
+    pub fn lacks(&self, path: &str, message: &str) -> Error {
+        let typed = &self.documents[..self.documents.len() - 1];
+        let extends = typed.iter().any(|document| document.table.contains_key("extends"));
+        let remedy = match extends {
+            true => "",
+            false => "; extends = \"NAME\" takes what is left open from a ready sensor",
+        };
+        place(typed, path).error(format!("{message}{remedy}"))
     }
 
     /// The file called `name` at the dotted `path`: beside the document that says so.
@@ -221,7 +234,7 @@ impl Document {
             origin: origin.to_owned(),
             line_column: error.span().map(|span| line_column(text, span.start)),
             path: String::new(),
-            message: error.message().to_owned(),
+            message: told::syntax(text, &error),
             others: Vec::new(),
         })?;
         let (origin, text) = (origin.to_owned(), text.to_owned());
@@ -239,9 +252,23 @@ pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String,
         return Err(Error::whole(name_or_file, presets::unknown(name_or_file)));
     }
     let text = std::fs::read_to_string(&path)
-        .map_err(|error| Error::whole(name_or_file, format!("cannot be read: {}", error.kind())))?;
+        .map_err(|error| Error::whole(name_or_file, not_read(name_or_file, &error)))?;
     let next = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok((text, path.display().to_string(), next))
+}
+
+/// Why a sensor file is not read, and how the ready sensor is named that may be meant.
+fn not_read(name: &str, error: &std::io::Error) -> String {
+    let why = told::unreadable(error);
+    let ready =
+        Path::new(name).file_stem().and_then(|stem| presets::text(stem.to_str()?).map(|_| stem));
+    match ready {
+        Some(stem) => format!(
+            "cannot be read: {why}; the ready sensor is called `{}`, without .toml",
+            stem.display()
+        ),
+        None => format!("cannot be read: {why}"),
+    }
 }
 
 /// `--set a.b=1` as a document. A value that is not TOML is taken as text.

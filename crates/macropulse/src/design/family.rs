@@ -1,9 +1,11 @@
 //! A code family on its own, as it would stand in a sensor file.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::Error;
 use crate::names::nearest;
+use crate::told;
 use macropulse_codec::code::{self, Family};
 
 /// Code families by the names they have in a sensor file.
@@ -19,33 +21,49 @@ pub(super) const FAMILIES: &[&str] = &[
 ];
 
 /// `code.family` as typed.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum FamilyFile {
+    /// Prime sequence code over an odd prime p up to 251: p words of p² chips, p of them lit.
     Prime(u32),
+    /// The same in blocks of 2p − 1 chips, of which any two words share one mark at most; p up to
+    /// 181.
     ExtendedPrime(u32),
+    /// Quadratic congruence code over an odd prime p up to 251: p − 1 words of p² chips.
     QuadraticCongruence(u32),
+    /// The same in blocks of 2p − 1 chips; p up to 181.
     ExtendedQuadraticCongruence(u32),
+    /// Optical orthogonal code: any two words share one mark at most.
     Orthogonal(OrthogonalFile),
+    /// Marks drawn at random for each word.
     Sparse(SparseFile),
+    /// One word of 2ⁿ − 1 chips, half of them lit, n from 3 to 15.
     MSequence(u32),
+    /// Gold code: 2ⁿ + 1 words of 2ⁿ − 1 chips, about half of them lit, n one of 5, 6, 7, 9, 10, 11.
     Gold(u32),
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OrthogonalFile {
+    /// Chips of a word.
     length: u32,
+    /// Marks of a word.
     weight: u32,
+    /// Number of words; without it as many as a search finds.
     words: Option<u32>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SparseFile {
+    /// Chips of a word, up to 65535.
     length: u32,
+    /// Marks of a word.
     weight: u32,
+    /// Number of words, up to 65535.
     words: u32,
+    /// What the words are drawn by.
     seed: u64,
 }
 
@@ -82,13 +100,13 @@ pub fn family_from_toml(text: &str) -> Result<Family, Error> {
     };
     if !FAMILIES.contains(&name) {
         let hint = nearest(name, FAMILIES.iter().copied())
-            .map(|near| format!("; did you mean `{near}`?"))
+            .map(|near| format!("did you mean `{near}`? "))
             .unwrap_or_default();
         let known = FAMILIES.join(", ");
-        return Err(wrong(format!("`{name}` is no code family{hint} Known are {known}")));
+        return Err(wrong(format!("`{name}` is no code family; {hint}known are {known}")));
     }
     let file = FamilyFile::deserialize(toml::Value::Table(table.clone()))
-        .map_err(|error: toml::de::Error| wrong(error.message().to_owned()))?;
+        .map_err(|error: toml::de::Error| wrong(told::wrong(error.message(), None)))?;
     family(file).map_err(|error| wrong(error.to_string()))
 }
 
@@ -124,8 +142,12 @@ mod tests {
         assert!(refusal("golf=7").contains("did you mean `gold`?"), "{}", refusal("golf=7"));
         assert!(refusal("29").contains("as prime=29"));
         assert!(refusal("prime=29\ngold=7").contains("one family at a time"));
-        assert!(refusal("gold='x'").contains("invalid type"), "{}", refusal("gold='x'"));
-        assert!(refusal("sparse={length=9}").contains("missing field"));
+        assert!(
+            refusal("gold='x'").contains("but must be a whole number"),
+            "{}",
+            refusal("gold='x'")
+        );
+        assert!(refusal("sparse={length=9}").contains("`weight` is missing"));
         assert!(refusal("gold=99999999999").starts_with("gold=99999999999: "));
     }
 }

@@ -1,5 +1,6 @@
 //! The light a sensor sends: `[light]`.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::limits::Check;
@@ -7,25 +8,39 @@ use super::{Effect, Error};
 use crate::units::RMS_OF_FWHM;
 
 /// `[light]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LightFile {
+    /// Wavelength, nm.
+    #[schemars(range(min = 200, max = 20000))]
     wavelength_nm: f64,
+    /// Diameter of the beam at the sensor, mm, at 1/e².
+    #[schemars(range(min = 0, max = 1000))]
     beam_diameter_mm: f64,
+    /// Divergence, mrad, full angle at 1/e².
+    #[schemars(range(min = 0, max = 500))]
     divergence_mrad: f64,
+    /// Rays that stand for the footprint of the beam: 1, 7 or 19; 7 or 19 unless the list
+    /// `idealised` names `footprint`.
+    #[schemars(extend("enum" = [1, 7, 19]))]
     footprint_rays: u32,
+    /// Length of a micropulse, ps, full width at half maximum.
+    #[schemars(range(min = 0.001, max = 1e9))]
     pulse_ps: f64,
+    /// Energy of a shot, the mean over its labels (of a flash, of a pixel); with a link budget.
     pub energy: Option<EnergyFile>,
 }
 
 /// The energy of a shot as typed.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) enum EnergyFile {
+    /// What laser class 1 allows.
     #[serde(rename = "class-1")]
     Class1,
+    /// Energy, nJ.
     #[serde(rename = "shot_nj")]
-    ShotNj(f64),
+    ShotNj(#[schemars(range(min = 1e-9, max = 1e12))] f64),
 }
 
 /// The light a sensor sends.

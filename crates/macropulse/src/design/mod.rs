@@ -24,6 +24,7 @@ mod receiver;
 mod recorded;
 pub mod safety;
 mod scan;
+mod schema;
 mod tdc;
 
 use std::path::Path;
@@ -43,6 +44,7 @@ pub use scan::{
     Directions, Extent, Firing, Flash, Grid, Laser, Mirror, Pattern, Prism, Raster, Rosette, Scan,
     Spinning, Table,
 };
+pub use schema::schema;
 pub use tdc::Tdc;
 
 use crate::digest::Digest;

@@ -1,5 +1,6 @@
 //! From ticks to returns: `[receiver]`.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::band::TOO_FINE;
@@ -10,25 +11,43 @@ use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::decode::{Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind};
 
 /// `[receiver]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReceiverFile {
+    /// How ticks become returns.
     pub kind: ReceiverKindFile,
+    /// How much the receiver `matched` does for faint light.
     effort: Effort,
+    /// False returns accepted per shot (matched, balanced).
+    #[schemars(range(min = 1e-30, max = 0.5))]
     false_alarm: f64,
+    /// Marks that make a bit a 1 (literal, blind).
+    #[schemars(range(min = 1))]
     bit_threshold: u32,
+    /// Range error up to which a return counts as right, m; follows from the timing unless it is
+    /// given.
+    #[schemars(range(min = 0, max = 0.35))]
     pub right_within_m: Option<f64>,
+    /// Returns of a shot at most: 4 with `matched`, 1 with `literal`, `blind` and `balanced`.
+    #[schemars(range(min = 1, max = 8))]
     returns: u32,
+    /// Which returns are kept of more, and which one of a pixel its image shows.
     pick: Option<Pick>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum ReceiverKindFile {
+    /// As the paper prints it: bit by bit from the first light on.
     Literal,
+    /// Bit by bit, but tries how many leading zero bits were dark.
     Blind,
+    /// Correlates the whole known macropulse of every shot in flight.
     Matched,
+    /// As `matched`, but what falls on dark chips counts against it; for words of which about half
+    /// the chips are lit.
     Balanced,
+    /// For shots without a code: the ticks in the range gate.
     Direct,
 }
 

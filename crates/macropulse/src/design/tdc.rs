@@ -1,5 +1,6 @@
 //! From detection events to ticks: `[tdc]`.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::limits::Check;
@@ -7,13 +8,23 @@ use super::{Error, Scan};
 use crate::units::fs_from_s;
 
 /// `[tdc]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TdcFile {
+    /// Converters of the whole bank, divided evenly among the detectors: one for each at least.
+    #[schemars(range(min = 1, max = 16777216))]
     converters: u32,
+    /// Length of a tick, ps: a whole number of femtoseconds.
+    #[schemars(range(min = 0.001, max = 1e9))]
     resolution_ps: f64,
+    /// Period of the coarse counter, ps: a whole number of ticks.
+    #[schemars(range(min = 0.001, max = 1e9))]
     clock_ps: f64,
+    /// Bits of the fine counter, which must hold the ticks of one period.
+    #[schemars(range(min = 1, max = 16))]
     bits: u32,
+    /// Time for which a converter is busy with an event, ns.
+    #[schemars(range(min = 0, max = 1e6))]
     dead_time_ns: f64,
 }
 

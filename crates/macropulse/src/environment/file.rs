@@ -1,5 +1,6 @@
 //! An environment as typed: a name, or keys over one that is ready.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -13,24 +14,43 @@ pub const WITH: &str = "with";
 pub const WITHOUT: &str = "without";
 
 /// Keys over an environment.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Typed {
+pub(super) struct Typed {
+    /// Ready environment that fills in what is left open; `clear-day` unless it is given.
+    #[serde(default)]
+    #[schemars(schema_with = "super::schema::ready_name")]
     base: Option<String>,
+    /// Light of the sky.
     sky: Option<Sky>,
+    /// Spectral irradiance of the sun, W/m² per nm, in place of the table it is otherwise from.
+    #[schemars(range(min = 0, max = 1000))]
     irradiance_w_m2_nm: Option<f64>,
+    /// Height of the sun over level ground, degrees, by day.
+    #[schemars(range(min = 0, max = 90))]
     sun_elevation_deg: Option<f64>,
+    /// Mean reflectance of what lies in the field, 0 to 1.
+    #[schemars(range(min = 0, max = 1))]
     albedo: Option<f64>,
+    /// Meteorological visibility, km; below 1 km it is fog.
+    #[schemars(range(min = 0.01, max = 1000))]
     visibility_km: Option<f64>,
+    /// Rain, mm in an hour.
+    #[schemars(range(min = 0, max = 500))]
     rain_mm_h: Option<f64>,
+    /// Effects that are left out.
+    #[schemars(with = "Option<Vec<Effect>>")]
     idealised: Option<Vec<String>>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Sky {
+    /// The sun in a clear sky.
     Day,
+    /// Closed clouds.
     Overcast,
+    /// No sun.
     Night,
 }
 
@@ -238,20 +258,9 @@ fn typed_wrongly(error: &serde_path_to_error::Error<toml::de::Error>) -> Error {
     let path = error.path().to_string();
     let path = if path == "." { String::new() } else { path };
     let said = error.inner().message();
-    let quoted: Vec<&str> = said.split('`').skip(1).step_by(2).collect();
-    match quoted.split_first() {
-        Some((wrong, known)) if said.starts_with("unknown ") => {
-            let known = || known.iter().copied().filter(|name| name != wrong);
-            let hint = nearest(wrong, known()).map(|near| format!("did you mean `{near}`? "));
-            let (hint, all) = (hint.unwrap_or_default(), known().collect::<Vec<_>>().join(", "));
-            let (what, key) = match said.starts_with("unknown field") {
-                true => ("key", (*wrong).to_owned()),
-                false => ("value", path),
-            };
-            Error { key, message: format!("unknown {what} `{wrong}`; {hint}known are {all}") }
-        }
-        _ => Error { key: path, message: said.to_owned() },
-    }
+    let wrong = said.split('`').nth(1).filter(|_| said.starts_with("unknown field"));
+    let (path, message) = crate::schema::told(&super::schema(), &path, said);
+    Error { key: wrong.map_or(path, str::to_owned), message }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod air;
 mod effect;
 mod file;
 mod ready;
+mod schema;
 mod spectrum;
 
 use toml::Value;
@@ -16,6 +17,8 @@ pub use crate::names::toml_value as value;
 pub use effect::Effect;
 pub use file::{WITH, WITHOUT, change};
 pub use ready::{names, text};
+pub(crate) use schema::in_scene;
+pub use schema::schema;
 
 /// The environment of a scene that names none.
 pub const DEFAULT: &str = "clear-day";
@@ -210,7 +213,9 @@ mod tests {
         for name in names() {
             let environment = Environment::named(name).unwrap();
             assert_eq!(environment.name, name);
-            assert!(text(name).unwrap().starts_with("# "), "{name}");
+            let mut lines = text(name).unwrap().lines();
+            assert_eq!(lines.next(), Some("#:schema ../schemas/environment.json"), "{name}");
+            assert!(lines.next().unwrap().starts_with("# "), "{name}");
             assert!(environment.extinction(905e-9).is_finite());
             assert!(environment.irradiance(905e-9).is_some());
         }

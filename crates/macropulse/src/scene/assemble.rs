@@ -3,12 +3,11 @@
 mod shapes;
 
 use std::collections::{BTreeMap, HashMap};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 use std::rc::Rc;
 
 use glam::DVec3;
-use toml::Spanned;
 
 use super::car;
 use super::closed_form::{Shape, Solid};
@@ -24,6 +23,7 @@ use super::moving::{Mover, MovingShape};
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
 use super::readers::{self, WithoutMaterials};
+use super::spanned::Spanned;
 use super::{Object, Scene};
 use crate::digest::Digest;
 use crate::environment::Environment;
@@ -149,6 +149,9 @@ pub(super) fn scene(
     })
 }
 
+/// Longest sides of meshes, m, that are no sign of another unit.
+const USUAL_SIZES: RangeInclusive<f64> = 0.02..=1000.0;
+
 impl Assembly<'_> {
     fn define(&mut self, file: &SceneFile) -> Result<(), Error> {
         for typed in &file.materials {
@@ -204,8 +207,8 @@ impl Assembly<'_> {
     fn ground(&mut self, ground: &Ground) -> Result<f64, Error> {
         let material = self.material_typed(&ground.material)?;
         let spans = [
-            ground.velocity_m_s.as_ref().map(Spanned::span),
-            ground.turn_rate_deg_s.as_ref().map(Spanned::span),
+            ground.velocity_m_s.as_ref().map(|typed| typed.span()),
+            ground.turn_rate_deg_s.as_ref().map(|typed| typed.span()),
         ];
         if let Some(span) = spans.into_iter().flatten().next() {
             let message = "the ground cannot move; let the sensor and the objects move over it";
@@ -244,7 +247,7 @@ impl Assembly<'_> {
         let written = spanned.get_ref();
         let kinds = [written.mesh.is_some(), written.car.is_some(), written.shape.is_some()];
         if kinds.iter().filter(|given| **given).count() != 1 {
-            let message = "an object needs exactly one of `mesh`, `car` and `shape`";
+            let message = format!("{name} needs exactly one of `mesh`, `car` and `shape`");
             return Err(self.source.fault(spanned.span(), message));
         }
         let mut stands = vec![written.stand()];
@@ -271,6 +274,13 @@ impl Assembly<'_> {
             self.notes.push(format!(
                 "{name}: {count} triangles, {x:.2} m long, {y:.2} m wide, {z:.2} m high"
             ));
+            let (longest, is_typed) = (x.max(y).max(z), written.unit.is_some());
+            if !is_typed && written.scale.is_none() && !USUAL_SIZES.contains(&longest) {
+                self.notes.push(format!(
+                    "{name}: hardly anything is {longest} m long; say with `unit` what its mesh is \
+                     drawn in, as unit = \"mm\""
+                ));
+            }
         }
         let mut at = Vec::new();
         let mut moving = Vec::new();

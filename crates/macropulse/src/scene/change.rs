@@ -127,7 +127,7 @@ fn change(table: &mut Table, key: &str, typed: &str) -> Result<(), String> {
     let mut at = None;
     for step in above.split('.').filter(|step| !step.is_empty()) {
         at = Some(match at {
-            None => table.get_mut(step).ok_or_else(|| absent(step))?,
+            None => entry(table, step)?,
             Some(value) => below(value, step)?,
         });
     }
@@ -142,7 +142,7 @@ fn change(table: &mut Table, key: &str, typed: &str) -> Result<(), String> {
 /// What `step` leads to from `value`.
 fn below<'a>(value: &'a mut Value, step: &str) -> Result<&'a mut Value, String> {
     match value {
-        Value::Table(inner) => inner.get_mut(step).ok_or_else(|| absent(step)),
+        Value::Table(inner) => entry(inner, step),
         Value::Array(list) => {
             let names: Vec<String> = match list.first().is_some_and(Value::is_table) {
                 true => object_names(&list.iter().map(name).collect::<Vec<_>>()),
@@ -165,8 +165,15 @@ fn name(object: &Value) -> Option<&str> {
     object.get("name").and_then(Value::as_str)
 }
 
-fn absent(step: &str) -> String {
-    format!("the scene does not have `{step}`; write it there first")
+/// What the scene has under the key `step` of a table.
+fn entry<'a>(table: &'a mut Table, step: &str) -> Result<&'a mut Value, String> {
+    let hint = nearest(step, table.keys().map(String::as_str));
+    let remedy = match hint {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => "write it there first".to_owned(),
+    };
+    let absent = || format!("the scene does not have `{step}`; {remedy}");
+    table.get_mut(step).ok_or_else(absent)
 }
 
 #[cfg(test)]

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::told;
+
 /// Why a scene could not be made. Every message says where and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file is not there or may not be read.
-    #[error("{}: cannot be read ({source}); check the path, which counts from the folder of the scene file", path.display())]
+    #[error("{}: cannot be read: {}; files of a scene are looked for in the folder of its file", path.display(), told::unreadable(source))]
     Unreadable {
         /// The file.
         path: PathBuf,

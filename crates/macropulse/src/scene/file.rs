@@ -5,43 +5,76 @@
 use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use toml::{Spanned, Table};
+use toml::Table;
 
 use super::error::Error;
-use crate::names::{key_at, line_column, nearest, offset_of_key};
+use super::schema;
+use super::spanned::Spanned;
+use crate::names::{key_at, line_column, offset_of_key};
+use crate::told;
+
+/// Keys whose tables are many, each with a header in two brackets.
+const LISTS: [&str; 3] = ["material", "object", "interferers"];
 
 /// A whole scene file.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
+    /// Format of this file: 1.
+    #[schemars(range(min = 1, max = 1))]
     pub version: Spanned<i64>,
+    /// Short name; that of the file unless it is given.
     pub name: Option<String>,
+    /// Where the sensor stands, and how it moves.
     #[serde(default)]
     pub sensor: Stand,
+    /// Sun and air: the name of a ready environment, or a table of its keys. Without it
+    /// `clear-day`.
+    #[serde(default)]
+    #[schemars(schema_with = "schema::environment")]
     pub environment: Option<Spanned<toml::Value>>,
+    /// An endless plane.
     pub ground: Option<Ground>,
+    /// Materials of the scene's own, or in place of those of the library.
     #[serde(default, rename = "material")]
     pub materials: Vec<Spanned<Defined>>,
+    /// What stands in the scene.
     #[serde(default, rename = "object")]
     pub objects: Vec<Spanned<ObjectTyped>>,
+    /// Other lidars that shine into the scene; not where anything moves.
     #[serde(default)]
+    #[schemars(length(max = 255))]
     pub interferers: Vec<Spanned<InterfererTyped>>,
 }
 
 /// `[[interferers]]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct InterfererTyped {
+    /// Name; that of its sensor with a number unless it is given.
     pub name: Option<String>,
+    /// Ready sensor, or a file, from the folder of the scene.
+    #[schemars(schema_with = "schema::sensor")]
     pub sensor: Spanned<String>,
+    /// Values of it that are changed, as { "code.word.first" = 15 }.
     #[serde(default)]
+    #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: Table,
+    /// Where it stands, m: x forward, y left, z up.
     pub position_m: Option<Spanned<[f64; 3]>>,
+    /// Turn to the left, degrees.
     pub yaw_deg: Option<Spanned<f64>>,
+    /// Tilt, degrees: positive looks down.
     pub pitch_deg: Option<Spanned<f64>>,
+    /// Roll, degrees: positive lifts the left side.
     pub roll_deg: Option<Spanned<f64>>,
+    /// Time of ours at which its clock reads 0, ns.
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub phase_ns: Option<Spanned<f64>>,
+    /// Millionths by which its clock runs fast.
+    #[schemars(range(min = -1000, max = 1000))]
     pub drift_ppm: Option<Spanned<f64>>,
 }
 
@@ -59,65 +92,117 @@ impl InterfererTyped {
 }
 
 /// `[sensor]`, and each entry of `copies`.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stand {
+    /// Where it stands, m: x forward, y left, z up.
     pub position_m: Option<Spanned<[f64; 3]>>,
+    /// Turn to the left, degrees.
     pub yaw_deg: Option<Spanned<f64>>,
+    /// Tilt, degrees: positive looks down.
     pub pitch_deg: Option<Spanned<f64>>,
+    /// Roll, degrees: positive lifts the left side.
     pub roll_deg: Option<Spanned<f64>>,
+    /// Motion in the world, m/s; the position is where it is when the first scan begins.
     pub velocity_m_s: Option<Spanned<[f64; 3]>>,
+    /// Turn about the vertical axis through the position, degrees per second, positive to the left.
+    #[schemars(range(min = -1e5, max = 1e5))]
     pub turn_rate_deg_s: Option<Spanned<f64>>,
 }
 
 /// `ground = { … }`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Ground {
+    /// What it is made of: a material of the library, or one of the scene.
+    #[schemars(schema_with = "schema::material")]
     pub material: Spanned<String>,
+    /// Its height, m.
     pub z_m: Option<Spanned<f64>>,
-    /// Known only to be refused.
+    // Known only to be refused.
+    #[schemars(skip)]
     pub velocity_m_s: Option<Spanned<toml::Value>>,
+    #[schemars(skip)]
     pub turn_rate_deg_s: Option<Spanned<toml::Value>>,
 }
 
 /// `[[material]]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Defined {
+    /// Name, of which case, spaces and underscores do not matter.
     pub name: String,
+    /// Lambertian reflectance, 0 to 1; may be left out for a material of the library.
+    #[schemars(range(min = 0, max = 1))]
     pub diffuse: Option<Spanned<f64>>,
+    /// Height of the specular lobe over a white surface.
+    #[schemars(range(min = 0, max = 1e4))]
     pub specular: Option<Spanned<f64>>,
+    /// Exponent of the lobe: the larger, the narrower it is.
+    #[schemars(range(min = 0, max = 1e6))]
     pub gloss: Option<Spanned<f64>>,
+    /// Retroreflective gain over a white surface.
+    #[schemars(range(min = 0, max = 1e5))]
     pub retro: Option<Spanned<f64>>,
+    /// Transmission, one way, 0 to 1.
+    #[schemars(range(min = 0, max = 1))]
     pub transmission: Option<Spanned<f64>>,
 }
 
 /// `[[object]]`
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [
+    { "required": ["mesh"] }, { "required": ["car"] }, { "required": ["shape"] }
+]))]
 pub(super) struct ObjectTyped {
+    /// Name, which no other object has; `object-N` unless it is given.
     pub name: Option<Spanned<String>>,
+    /// OBJ, STL, PLY, glTF or GLB file, from the folder of the scene; or `car`, or `shape`.
     pub mesh: Option<Spanned<String>>,
+    /// A saloon of 4.70 × 1.82 × 1.42 m that looks along x and stands on z = 0; or `mesh`, or
+    /// `shape`.
     pub car: Option<Car>,
+    /// A shape about the position, upright; or `mesh`, or `car`.
     pub shape: Option<Spanned<ShapeTyped>>,
+    /// Unit of length of the mesh; metres unless it is given.
     pub unit: Option<Unit>,
+    /// Number by which the mesh is multiplied.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<Spanned<f64>>,
+    /// Axis of the mesh that points up; `z` unless it is given, `y` of glTF.
     pub up: Option<Spanned<Axis>>,
+    /// Axis of the mesh that points forward; `x` unless it is given, `z` of glTF.
     pub forward: Option<Spanned<Axis>>,
+    /// Where it stands, m: x forward, y left, z up.
     pub position_m: Option<Spanned<[f64; 3]>>,
+    /// Turn to the left, degrees.
     pub yaw_deg: Option<Spanned<f64>>,
+    /// Tilt, degrees: positive looks down.
     pub pitch_deg: Option<Spanned<f64>>,
+    /// Roll, degrees: positive lifts the left side.
     pub roll_deg: Option<Spanned<f64>>,
+    /// Motion in the world, m/s; the position is where it is when the first scan begins.
     pub velocity_m_s: Option<Spanned<[f64; 3]>>,
+    /// Turn about the vertical axis through the position, degrees per second, positive to the left.
+    #[schemars(range(min = -1e5, max = 1e5))]
     pub turn_rate_deg_s: Option<Spanned<f64>>,
+    /// Whether the object is lifted so that its lowest point is at its z.
     #[serde(default)]
     pub rest_on_ground: bool,
-    pub material: Option<Spanned<String>>,
+    /// Material of the whole object: one of the library, or of the scene.
     #[serde(default)]
+    #[schemars(schema_with = "schema::material")]
+    pub material: Option<Spanned<String>>,
+    /// Materials by their names in the mesh, as { "name in the mesh" = "material" }; they win over
+    /// `material`.
+    #[serde(default)]
+    #[schemars(schema_with = "schema::materials")]
     pub materials: BTreeMap<String, Spanned<String>>,
+    /// Whether the points on it are counted.
     #[serde(default)]
     pub target: bool,
+    /// Further positions and angles, each with a motion of its own or none.
     #[serde(default)]
     pub copies: Vec<Stand>,
 }
@@ -137,39 +222,42 @@ impl ObjectTyped {
 }
 
 /// `car = {}`: it has no options yet.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Car {}
 
 /// `shape = { … }`
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum ShapeTyped {
-    /// `normal` is a direction in the frame of the object.
+    /// Without end, through the object's position; `normal` is a direction in its frame.
     Plane { normal: [f64; 3] },
-    /// About the object's position.
+    /// About the object's position; radius in metres.
     Sphere { radius_m: f64 },
-    /// About the object's position; length, width, height.
+    /// About the object's position; length, width, height in metres.
     Box { size_m: [f64; 3] },
-    /// Upright, about the object's position.
+    /// Upright, about the object's position; radius and height in metres.
     Cylinder { radius_m: f64, height_m: f64 },
-    /// Upright, about the object's position, the tip up.
+    /// Upright, about the object's position, the tip up; in metres.
     Cone {
         radius_m: f64,
         height_m: f64,
         #[serde(default)]
         top_radius_m: f64,
     },
-    /// Upright, about the object's position; its height with both half balls.
+    /// Upright, about the object's position; in metres, its height with both half balls.
     Capsule { radius_m: f64, height_m: f64 },
-    /// About the object's position; length, width, height.
+    /// About the object's position; length, width, height in metres.
     Ellipsoid { size_m: [f64; 3] },
-    /// Stands on the object's position and looks along x.
-    Person { height_m: f64 },
+    /// Stands on the object's position and looks along x; from 0.4 to 2.6 m high.
+    Person {
+        #[schemars(range(min = 0.4, max = 2.6))]
+        height_m: f64,
+    },
 }
 
 /// The unit of length of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Unit {
     M,
@@ -193,7 +281,8 @@ impl Unit {
 }
 
 /// A signed axis of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[schemars(extend("enum" = ["x", "+x", "y", "+y", "z", "+z", "-x", "-y", "-z"]))]
 pub(super) enum Axis {
     #[serde(rename = "x", alias = "+x")]
     X,
@@ -276,8 +365,33 @@ impl<'a> Source<'a> {
 
     /// Reads the file.
     pub(super) fn parse(&self) -> Result<SceneFile, Error> {
-        toml::from_str(self.text)
-            .map_err(|fault| self.fault(fault.span().unwrap_or(0..0), with_advice(fault.message())))
+        toml::from_str(self.text).map_err(|fault| {
+            let span = fault.span().unwrap_or(0..0);
+            let message = match self.text.parse::<Table>() {
+                Ok(_) => self.wrong_value(span.start, fault.message()),
+                Err(syntax) => told::syntax(self.text, &syntax),
+            };
+            self.fault(span, message)
+        })
+    }
+
+    /// What is wrong with a value that TOML allows, from what the parser `said` of it.
+    fn wrong_value(&self, at: usize, said: &str) -> String {
+        let path = key_at(self.text, at).unwrap_or_default();
+        if LISTS.contains(&path.as_str()) && said.ends_with("expected a sequence") {
+            return match self.place {
+                Place::Line => format!("write [[{path}]], in two brackets: there may be several"),
+                Place::Key => "must be a list: there may be several".to_owned(),
+            };
+        }
+        let (path, message) = crate::schema::told(&schema::schema(), &path, said);
+        // The place is the key itself where the text is not of a file.
+        let key = path.rsplit('.').next().unwrap_or_default();
+        let is_of_a_key = ["is ", "has ", "must "].iter().any(|begin| message.starts_with(begin));
+        match is_of_a_key && !key.is_empty() && self.place == Place::Line {
+            true => format!("`{key}` {message}"),
+            false => message,
+        }
     }
 
     /// An error at the dotted `key`, or else at `span`.
@@ -305,17 +419,6 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Adds the nearest known word to a complaint about an unknown one. The parser quotes words in
-/// backticks: first the unknown one, then those it knows.
-fn with_advice(message: &str) -> String {
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let unknown = message.starts_with("unknown");
-    match quoted.next().filter(|_| unknown).and_then(|word| nearest(word, quoted)) {
-        Some(known) => format!("{message}; did you mean `{known}`?"),
-        None => message.to_owned(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -334,7 +437,7 @@ mod tests {
     #[test]
     fn an_unknown_key_is_named_with_its_place_and_the_nearest_known_one() {
         let message = told("version = 1\n[[object]]\n  positon_m = [1, 0, 0]\n");
-        assert!(message.starts_with("a.toml:3:3: unknown field `positon_m`"), "{message}");
+        assert!(message.starts_with("a.toml:3:3: unknown key `positon_m`"), "{message}");
         assert!(message.ends_with("did you mean `position_m`?"), "{message}");
     }
 
@@ -346,8 +449,23 @@ mod tests {
 
     #[test]
     fn wrong_types_and_missing_keys_are_refused() {
-        assert!(told("version = 1\nname = 3\n").starts_with("a.toml:2:8: invalid type"));
-        assert!(told("name = \"a\"\n").contains("missing field `version`"));
-        assert!(told("version = 1\n[[object]]\nunit = \"km\"\n").contains("unknown variant `km`"));
+        let told = |text: &str| told(&format!("version = 1\n{text}"));
+        let wrong = told("name = 3\n");
+        assert_eq!(wrong, "a.toml:2:8: `name` is 3, but must be text in quotes");
+        let wrong = told("[[object]]\nshape = { box = { size_m = [1, 2] } }\n");
+        assert!(
+            wrong.ends_with(
+                "`size_m` has 2 entries, but must be a list of 3 numbers, as [1.0, 2.0, 3.0]"
+            ),
+            "{wrong}"
+        );
+        assert!(told("[object]\n").contains("write [[object]], in two brackets"));
+        assert!(
+            told("[[object]]\nunit = \"km\"\n")
+                .contains("unknown value `km`; known are m, cm, mm, in, ft")
+        );
+        assert!(told("name = a\n").contains("is not TOML: text stands in quotes"));
+        let missing = Source::typed("name = \"a\"\n", "a.toml").parse().unwrap_err().to_string();
+        assert!(missing.contains("the key `version` is missing"), "{missing}");
     }
 }

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use toml::{Spanned, Table, Value};
+use toml::{Table, Value};
 
 use super::error::Error;
 use super::file::{InterfererTyped, Source, Stand};
 use super::pose::Pose;
+use super::spanned::Spanned;
 use crate::design::{Design, preset_text};
 use crate::digest::Digest;
 use crate::emit::Clock;
@@ -164,7 +165,7 @@ mod tests {
         assert!(message.contains("three finite numbers"), "{message}");
         let message = told("[[interferers]]\nsensor = \"hdl-64e\"\nset = { \"scan.rate\" = 3 }\n");
         assert!(message.contains("unknown key `rate`"), "{message}");
-        assert!(told("[[interferers]]\nyaw_deg = 3\n").contains("missing field `sensor`"));
+        assert!(told("[[interferers]]\nyaw_deg = 3\n").contains("the key `sensor` is missing"));
         assert!(told("[[interferer]]\nsensor = \"a\"\n").contains("did you mean `interferers`?"));
         let many = "[[interferers]]\nsensor = \"peregrine\"\n".repeat(MOST + 1);
         assert!(told(&many).contains("at most 255 other lidars"));

@@ -25,6 +25,8 @@ mod placed;
 mod pose;
 mod raycast;
 mod readers;
+mod schema;
+mod spanned;
 mod trace;
 mod typed;
 mod world;
@@ -45,6 +47,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use motion::{Motion, Moving};
 pub use pose::{Pose, Transform};
+pub use schema::schema;
 pub use trace::{SUB_MACROPULSES, Traced};
 
 use crate::digest::Digest;

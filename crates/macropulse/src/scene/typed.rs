@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use toml::Spanned;
 
 use super::closed_form::Shape;
 use super::error::Error;
@@ -11,6 +10,7 @@ use super::file::{ObjectTyped, ShapeTyped, Source, Stand};
 use super::motion::{FASTEST, FASTEST_TURN_DEG, Motion};
 use super::person::{self, Part};
 use super::pose::Pose;
+use super::spanned::Spanned;
 
 impl Source<'_> {
     /// Where something stands and how it moves.
@@ -115,9 +115,9 @@ impl Source<'_> {
     /// Keys that mean something only for the mesh of a file.
     pub(super) fn refuse_mesh_keys(&self, written: &ObjectTyped) -> Result<(), Error> {
         let spans: [(Option<Range<usize>>, &str); 3] = [
-            (written.scale.as_ref().map(Spanned::span), "scale"),
-            (written.up.as_ref().map(Spanned::span), "up"),
-            (written.forward.as_ref().map(Spanned::span), "forward"),
+            (written.scale.as_ref().map(|typed| typed.span()), "scale"),
+            (written.up.as_ref().map(|typed| typed.span()), "up"),
+            (written.forward.as_ref().map(|typed| typed.span()), "forward"),
         ];
         for (span, key) in spans {
             if let Some(span) = span {

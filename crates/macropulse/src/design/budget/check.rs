@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Budget, CoScanned, Field, solid_angle};
@@ -13,36 +14,52 @@ use crate::design::{Coding, Effect, Error, Light, Scan};
 use crate::units::tof_from_range;
 
 /// `[optics]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::design) struct OpticsFile {
+    /// Diameter of the receiving aperture, mm.
+    #[schemars(range(min = 0.01, max = 1e4))]
     aperture_mm: f64,
+    /// Transmission of the optics, both ways together.
+    #[schemars(range(min = 1e-6, max = 1))]
     transmission: f64,
+    /// Width of the optical filter, nm.
+    #[schemars(range(min = 0.001, max = 1000))]
     filter_nm: f64,
+    /// What a detector looks at.
     field: FieldFile,
 }
 
 /// What a detector looks at, as typed.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 enum FieldFile {
+    /// The whole field of a raster.
     #[serde(rename = "staring")]
     Staring,
+    /// The cell of its pixel, with the beam; of a flash it stays there.
     #[serde(rename = "descanned")]
     Descanned,
+    /// All pixels of a raster whose light may still be under way.
     #[serde(rename = "in-flight")]
     InFlight,
+    /// So many pixels of a raster, from that of the beam back.
     #[serde(rename = "co_scanned_pixels")]
-    CoScannedPixels(f64),
+    CoScannedPixels(#[schemars(range(min = 1))] f64),
+    /// A round field about the cell of its pixel, mrad, full angle.
     #[serde(rename = "cone_mrad")]
-    ConeMrad(f64),
+    ConeMrad(#[schemars(range(min = 0.001, max = 1000))] f64),
 }
 
 /// `[safety]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::design) struct SafetyFile {
+    /// Distance of the eye, mm.
+    #[schemars(range(min = 1, max = 1e5))]
     distance_mm: f64,
+    /// Whether the groups of shots that cross an eye, as the lines of a raster, count as repeated
+    /// exposures.
     count_lines: bool,
 }
 

@@ -4,6 +4,7 @@ mod effectless;
 
 use std::sync::OnceLock;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::band::TOO_FINE;
@@ -17,25 +18,41 @@ use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
 use crate::design::tdc::TdcFile;
+use crate::schema;
+use crate::told;
 use crate::units::{range_from_tof, s_from_fs};
 use macropulse_codec::decode::Receiver;
 
 /// A sensor file as typed: keys with units, nothing checked yet but names and types.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::design) struct SensorFile {
+    /// Format of this file: 1.
+    #[schemars(range(min = 1, max = 1))]
     pub version: u32,
+    /// Short name.
     pub name: String,
+    /// What the sensor is, in one sentence.
     #[serde(default)]
     pub summary: String,
+    /// Effects that are left out.
+    #[schemars(with = "Vec<Effect>")]
     pub idealised: Vec<String>,
+    /// Where and when the sensor looks: scans, ranges, and one scan pattern.
     pub scan: ScanFile,
+    /// The light it sends.
     pub light: LightFile,
+    /// What its shots carry; leave the table out for shots without a code.
     pub code: Option<CodeFile>,
+    /// From light to detection events: one kind of detector.
     pub detector: DetectorFile,
+    /// The optics of the receiver; with a link budget.
     pub optics: Option<OpticsFile>,
+    /// How the energy that laser class 1 allows is worked out.
     pub safety: Option<SafetyFile>,
+    /// From detection events to ticks: the bank of converters.
     pub tdc: TdcFile,
+    /// From ticks to returns.
     pub receiver: ReceiverFile,
 }
 
@@ -48,6 +65,9 @@ const WIDEST: f64 = 0.35;
 /// Where sun and air were written before they belonged to the scene: tables of the sensor file, and
 /// what to say of each.
 const MOVED: [&str; 3] = ["sun", "atmosphere", "environment"];
+
+/// Keys of a scene file, of which a sensor has none.
+const OF_SCENES: [&str; 4] = ["object", "ground", "material", "interferers"];
 
 pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     refuse_moved(chain)?;
@@ -215,30 +235,39 @@ fn refuse_moved(chain: &Chain) -> Result<(), Error> {
 /// Turns serde's words into a sentence with a place and the nearest known key.
 fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Error>) -> Error {
     let path = error.path().to_string();
-    let said = error.inner().message().to_owned();
+    let said = error.inner().message();
     let path = if path == "." { String::new() } else { path };
-    let quoted: Vec<&str> = said.split('`').skip(1).step_by(2).collect();
-    if said.starts_with("unknown field") || said.starts_with("unknown variant") {
-        let (wrong, known) = (quoted[0], &quoted[1..]);
-        let hint = crate::names::nearest(wrong, known.iter().copied())
-            .map(|near| format!("; did you mean `{near}`?"))
-            .unwrap_or_else(|| format!("; known are {}", known.join(", ")));
-        let what = if said.starts_with("unknown field") { "key" } else { "value" };
-        let place = match (what, path.as_str()) {
-            ("value", _) => path.clone(),
-            (_, "") => wrong.to_owned(),
-            (_, inside) if inside.ends_with(wrong) => path.clone(),
-            (_, inside) => format!("{inside}.{wrong}"),
-        };
-        return chain.error(&place, format!("unknown {what} `{wrong}`{hint}"));
-    }
     if path == "code.family" && said.starts_with("wanted exactly 1 element") {
         return chain.error(&path, "needs exactly one family, as { prime = 29 }");
     }
-    if said.starts_with("missing field") {
-        return chain.error(&path, format!("the key `{}` is missing", quoted[0]));
-    }
-    chain.error(&path, said)
+    let schema = super::schema();
+    let wrong = said.split('`').nth(1).filter(|_| said.starts_with("unknown field"));
+    let Some(wrong) = wrong else {
+        let (path, message) = schema::told(&schema, &path, said);
+        return match said.starts_with("missing field") {
+            true => chain.lacks(&path, &message),
+            false => chain.error(&path, message),
+        };
+    };
+    let place = match path.as_str() {
+        "" => wrong.to_owned(),
+        inside if inside.ends_with(wrong) => path.clone(),
+        inside => format!("{inside}.{wrong}"),
+    };
+    let message = told::wrong(said, None);
+    // A key that stands in another table is no misspelt one.
+    let homes = schema::homes(&schema, wrong);
+    let elsewhere: Vec<String> = homes.iter().take(3).map(|home| format!("[{home}]")).collect();
+    let message = match (message.split_once("; known are "), &elsewhere[..]) {
+        (Some((unknown, _)), [_, ..]) => {
+            format!("{unknown} here; it belongs in {}", elsewhere.join(" or "))
+        }
+        (Some((unknown, _)), []) if OF_SCENES.contains(&wrong) => {
+            format!("{unknown} of a sensor; it is one of a scene, as --set scene:{wrong}…")
+        }
+        _ => message,
+    };
+    chain.error(&place, message)
 }
 
 impl Check<'_> {
@@ -258,10 +287,10 @@ impl Check<'_> {
                 None => {
                     let known: Vec<&str> = Effect::ALL.iter().map(|e| e.name()).collect();
                     let hint = crate::names::nearest(name, known.iter().copied())
-                        .map(|near| format!("; did you mean `{near}`?"))
+                        .map(|near| format!("did you mean `{near}`? "))
                         .unwrap_or_default();
                     let message =
-                        format!("`{name}` is no effect{hint} known are {}", known.join(", "));
+                        format!("`{name}` is no effect; {hint}known are {}", known.join(", "));
                     return self.refuse("idealised", message);
                 }
             }

@@ -1,6 +1,7 @@
 //! Cells in Geiger mode (a SPAD array) that share the light: each is blind for a while after it has
 //! fired.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::table::MOST_COUNTS;
@@ -17,15 +18,28 @@ use crate::units::{fs_from_s, s_from_fs};
 const DEAD_TIMES: i64 = 4;
 
 /// `[detector.geiger]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// What it sees, declared; where the list `idealised` names `link-budget`.
     sensitivity: Option<SensitivityFile>,
+    /// Detections per photon; with a link budget.
+    #[schemars(range(min = 1e-6, max = 1))]
     efficiency: Option<f64>,
+    /// Cells that share the light.
+    #[schemars(range(min = 1, max = 1048576))]
     cells: u32,
+    /// Time for which a cell is blind after a count, ns.
+    #[schemars(range(min = 0, max = 1e6))]
     dead_time_ns: f64,
+    /// Rate of dark counts (DCR), per second.
+    #[schemars(range(min = 0, max = 1e12))]
     dark_counts_hz: f64,
+    /// Rate of counts by sunlight, per second; without a link budget, from which it follows.
+    #[schemars(range(min = 0, max = 1e12))]
     background_hz: f64,
+    /// Timing jitter, ps rms.
+    #[schemars(range(min = 0, max = 1e6))]
     jitter_ps: f64,
 }
 

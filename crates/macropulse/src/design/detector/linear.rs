@@ -1,6 +1,7 @@
 //! A linear detector: a photodiode with an amplifier and a threshold.
 
 use macropulse_codec::statistics::{normal_tail, poisson};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::table::MOST_COUNTS;
@@ -17,16 +18,32 @@ const NEGLIGIBLE: f64 = 1e-15;
 const MANY: f64 = 1e4;
 
 /// `[detector.linear]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// Detections per photon.
+    #[schemars(range(min = 1e-6, max = 1))]
     efficiency: f64,
+    /// Gain of the photodiode: 1 where it multiplies nothing.
+    #[schemars(range(min = 1, max = 1e6))]
     gain: f64,
+    /// Ratio of the ionisation rates of the photodiode, which its excess noise follows from.
+    #[schemars(range(min = 0, max = 1))]
     ionisation_ratio: f64,
+    /// Bandwidth at 3 dB, MHz.
+    #[schemars(range(min = 0.001, max = 1e9))]
     bandwidth_mhz: f64,
+    /// Noise at the input of the amplifier, pA/√Hz.
+    #[schemars(range(min = 0, max = 1e6))]
     amplifier_pa_rthz: f64,
+    /// Dark current that is multiplied, nA.
+    #[schemars(range(min = 0, max = 1e6))]
     dark_current_na: f64,
+    /// Crossings by noise per second: sets the threshold.
+    #[schemars(range(min = 0.001, max = 1e12))]
     false_alarm_hz: f64,
+    /// Timing jitter, ps rms, beside what the noise makes of the slope.
+    #[schemars(range(min = 0, max = 1e6))]
     jitter_ps: f64,
 }
 

@@ -15,6 +15,7 @@ mod photon_counting;
 mod single_stop;
 mod table;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use amplifier::Amplifier;
@@ -50,10 +51,10 @@ macro_rules! kinds {
         }
 
         /// `[detector]` as typed: a table for each kind, of which a sensor has one.
-        #[derive(Debug, Deserialize)]
+        #[derive(Debug, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub(in crate::design) struct DetectorFile {
-            $(#[serde(rename = $name)] $file: Option<$file::File>,)+
+            $($(#[$doc])* #[serde(rename = $name)] $file: Option<$file::File>,)+
         }
 
         impl DetectorFile {

@@ -1,5 +1,6 @@
 //! Photon counting, fast enough for every chip: every mark is a Bernoulli trial of its own.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
@@ -9,14 +10,25 @@ use super::{
 use crate::design::{Error, Light};
 
 /// `[detector.photon-counting]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// What it sees, declared; where the list `idealised` names `link-budget`.
     sensitivity: Option<SensitivityFile>,
+    /// Detections per photon; with a link budget.
+    #[schemars(range(min = 1e-6, max = 1))]
     efficiency: Option<f64>,
+    /// Share of marks that are lost otherwise.
+    #[schemars(range(min = 0, max = 1))]
     missed_marks: f64,
+    /// Rate of dark counts (DCR), per second.
+    #[schemars(range(min = 0, max = 1e12))]
     dark_counts_hz: f64,
+    /// Rate of counts by sunlight, per second; without a link budget, from which it follows.
+    #[schemars(range(min = 0, max = 1e12))]
     background_hz: f64,
+    /// Timing jitter, ps rms.
+    #[schemars(range(min = 0, max = 1e6))]
     jitter_ps: f64,
 }
 

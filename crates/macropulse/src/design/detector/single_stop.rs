@@ -1,6 +1,7 @@
 //! Single-stop timing: one event per shot, when enough photons have come \[KP16 Fig. 7\].
 
 use macropulse_codec::statistics::{normal_order, normal_quantile, normal_tail};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
@@ -11,14 +12,25 @@ use crate::design::{Error, Light};
 use crate::units::RMS_OF_FWHM;
 
 /// `[detector.single-stop]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// What it sees, declared; where the list `idealised` names `link-budget`.
     sensitivity: Option<SensitivityFile>,
+    /// Detections per photon; with a link budget.
+    #[schemars(range(min = 1e-6, max = 1))]
     efficiency: Option<f64>,
+    /// Photons needed for an event; 1 is a Geiger detector, which measures no amplitude.
+    #[schemars(range(min = 1, max = 1048576))]
     firing_photons: u32,
+    /// White noise over a pulse, photons rms.
+    #[schemars(range(min = 0, max = 1e6))]
     noise_photons: f64,
+    /// Rate of events by noise, per second.
+    #[schemars(range(min = 0, max = 1e9))]
     false_firing_hz: f64,
+    /// Timing jitter, ps rms.
+    #[schemars(range(min = 0, max = 1e6))]
     jitter_ps: f64,
 }
 

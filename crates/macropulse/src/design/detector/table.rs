@@ -1,5 +1,6 @@
 //! The table of a detector in a sensor file, as its kind reads it.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::Sensitivity;
@@ -11,11 +12,17 @@ use crate::design::{Coding, Error, Light, Scan};
 pub(super) const MOST_COUNTS: f64 = 1e12;
 
 /// `sensitivity` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::design) struct SensitivityFile {
+    /// Range of the target, m.
+    #[schemars(range(min = 0.01, max = 1e6))]
     range_m: f64,
+    /// Reflectance of the target, which is seen square on: 1 is white.
+    #[schemars(range(min = 1e-6, max = 1e6))]
     reflectance: f64,
+    /// Probability that a mark is detected.
+    #[schemars(range(min = 1e-6, max = 1))]
     pd: f64,
 }
 

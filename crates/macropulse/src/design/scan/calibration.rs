@@ -21,6 +21,7 @@ use serde_saphyr::{Location, Spanned};
 
 use super::laser::{AZIMUTH, ELEVATION, Laser, Limit, MOST_LASERS, ORIGIN, RANGE_OFFSET};
 use crate::digest::Digest;
+use crate::told;
 
 /// Bytes of the largest calibration: those of 64 lasers have some 20 000.
 const MOST_BYTES: u64 = 1 << 20;
@@ -79,14 +80,29 @@ pub(super) fn read(path: &Path) -> Result<Calibration, String> {
     Ok(calibration)
 }
 
+/// What the parser `said`, in words of ours.
+fn in_words(said: &str) -> String {
+    let unknown = said.strip_prefix("unknown field `").and_then(|rest| {
+        let (wrong, known) = rest.split_once("`, expected one of ")?;
+        let known: Vec<&str> = known.split(", ").map(|name| name.trim_matches('`')).collect();
+        Some(told::unknown("key", wrong, &known))
+    });
+    unknown.unwrap_or_else(|| match said {
+        "invalid floating point" | "invalid float" => "must be a number".to_owned(),
+        "expected sequence start" => "a list is wanted here, as `- laser_id: 0`".to_owned(),
+        _ => told::wrong(said, None),
+    })
+}
+
 /// As [`read`], of a `text`.
 fn parse(text: &str, origin: &str) -> Result<Calibration, String> {
     let file: File = serde_saphyr::from_str(text).map_err(|error| {
         let said = error.without_snippet().to_string();
-        let said = said.lines().next().unwrap_or_default().to_owned();
+        let said = said.lines().next().unwrap_or_default();
+        let said = in_words(said.split(" at line ").next().unwrap_or(said));
         match error.location() {
-            Some(at) if !said.contains("line ") => fault(origin, at, &said),
-            _ => format!("{origin}: {said}"),
+            Some(at) => fault(origin, at, &said),
+            None => format!("{origin}: {said}"),
         }
     })?;
     let count = file.lasers.len();

@@ -1,5 +1,6 @@
 //! Every direction lit at once, a detector for each.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::grid::{self, Grid};
@@ -20,12 +21,20 @@ pub struct Flash {
 }
 
 /// `[scan.flash]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// Rows of pixels, each with a detector: 65536 in all at most.
+    #[schemars(range(min = 1, max = 16384))]
     rows: u32,
+    /// Pixels of a row.
+    #[schemars(range(min = 1, max = 32768))]
     columns: u32,
+    /// Full field from left to right, degrees.
+    #[schemars(range(min = 0.001, max = 360))]
     horizontal_deg: f64,
+    /// Full field from top to bottom, degrees.
+    #[schemars(range(min = 0.001, max = 180))]
     vertical_deg: f64,
 }
 

@@ -1,5 +1,6 @@
 //! A laser of a turning head: where it points, where its beam begins, and how late its clock starts.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::design::Error;
@@ -19,15 +20,23 @@ pub struct Laser {
 }
 
 /// A laser as typed: an entry of `scan.spinning.lasers`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// Elevation of the beam, degrees.
+    #[schemars(range(min = -90, max = 90))]
     elevation_deg: f64,
+    /// Azimuth of the beam from that of the head, degrees, positive to the left.
     #[serde(default)]
+    #[schemars(range(min = -180, max = 180))]
     azimuth_deg: f64,
+    /// What is added to the range it measures, mm, because its clock starts too late by it.
     #[serde(default)]
+    #[schemars(range(min = -10000, max = 10000))]
     range_offset_mm: f64,
+    /// Where the beam begins, mm: forward along its azimuth, left, up.
     #[serde(default)]
+    #[schemars(inner(range(min = -1000, max = 1000)))]
     origin_mm: [f64; 3],
 }
 

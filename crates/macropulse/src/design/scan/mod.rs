@@ -17,6 +17,7 @@ mod table;
 
 use std::ops::RangeInclusive;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub use directions::Directions;
@@ -56,15 +57,26 @@ macro_rules! patterns {
         }
 
         /// `[scan]` as typed: its own keys, and a table for each pattern, of which it has one.
-        #[derive(Debug, Deserialize)]
+        #[derive(Debug, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub(super) struct ScanFile {
+            /// Scans per second, to a thousandth.
+            #[schemars(range(min = 0.001, max = 1e5))]
             scans_per_s: f64,
+            /// Nearest range accepted, m: at most where the range gate ends.
+            #[schemars(range(min = 0))]
             min_range_m: f64,
+            /// Rated range, m: what the sensor is declared to reach.
+            #[schemars(range(min = 0.01, max = 1e5))]
             max_range_m: f64,
+            /// How far the range gate goes on behind `max_range_m`, m.
+            #[schemars(range(min = 0, max = 1e5))]
             gate_beyond_m: f64,
+            /// Range to which the light of a shot is followed, m; twice the end of the range gate
+            /// unless it is given. What comes from beyond the gate falls into that of a later shot.
+            #[schemars(range(max = 1e5))]
             light_range_m: Option<f64>,
-            $(#[serde(rename = $name)] $file: Option<$file::File>,)+
+            $($(#[$doc])* #[serde(rename = $name)] $file: Option<$file::File>,)+
         }
 
         impl ScanFile {

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::grid::{self, Grid};
@@ -23,7 +24,7 @@ pub struct Raster {
 }
 
 /// How the fast axis of a raster moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mirror {
     /// Constant angular speed, every line in the same direction.
@@ -49,14 +50,25 @@ impl Mirror {
 }
 
 /// `[scan.raster]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// Rows of pixels, which are lines of the beam.
+    #[schemars(range(min = 1, max = 16384))]
     rows: u32,
+    /// Pixels of a row.
+    #[schemars(range(min = 1, max = 32768))]
     columns: u32,
+    /// Full field from left to right, degrees.
+    #[schemars(range(min = 0.001, max = 360))]
     horizontal_deg: f64,
+    /// Full field from top to bottom, degrees.
+    #[schemars(range(min = 0.001, max = 180))]
     vertical_deg: f64,
+    /// Motion of the fast axis.
     mirror: Mirror,
+    /// Share of the time of a line in which shots are fired.
+    #[schemars(range(min = 0.01, max = 1))]
     duty: f64,
 }
 

@@ -1,6 +1,7 @@
 //! One beam through two thin prisms that turn, as in the lidars with which rosettes came into use:
 //! a pattern that hardly repeats.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::directions::{Directions, Path, Way};
@@ -34,19 +35,29 @@ pub struct Prism {
 }
 
 /// `[scan.rosette]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// Shots per second: 65535 in a scan at most.
+    #[schemars(range(min = 1, max = 1e9))]
     shots_per_s: f64,
+    /// The two prisms.
+    #[schemars(length(equal = 2))]
     prisms: Vec<PrismFile>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PrismFile {
+    /// Angle by which it bends the beam, degrees.
+    #[schemars(range(min = 0, max = 45))]
     deflection_deg: f64,
+    /// Turns per second, positive from the left to the top.
+    #[schemars(range(min = -1e5, max = 1e5))]
     turns_per_s: f64,
+    /// Where it stands when the first scan begins, degrees from the left.
     #[serde(default)]
+    #[schemars(range(min = -360, max = 360))]
     phase_deg: f64,
 }
 

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::calibration::{self, Calibration};
@@ -40,7 +41,7 @@ pub struct Spinning {
 }
 
 /// In which order the lasers of a spinning sensor fire while it turns by one azimuth step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Firing {
     /// One laser of each block in turn; lasers of a list are one block.
@@ -59,23 +60,41 @@ struct Pace {
 }
 
 /// `[scan.spinning]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// Turn between columns, degrees; or `cycle_us`.
+    #[schemars(range(min = 0.012, max = 90))]
     azimuth_step_deg: Option<f64>,
+    /// Time between columns, µs; or `azimuth_step_deg`.
+    #[schemars(range(min = 0))]
     cycle_us: Option<f64>,
+    /// Lasers in blocks of even steps, from the top down; or `lasers`, or `calibration`.
     blocks: Option<Vec<LaserBlockFile>>,
+    /// Lasers one by one, in the order in which they fire; or `blocks`, or `calibration`.
+    #[schemars(length(min = 1, max = 1024))]
     lasers: Option<Vec<laser::File>>,
+    /// Calibration file of the ROS driver of Velodyne sensors (YAML), beside this file; or
+    /// `blocks`, or `lasers`.
     calibration: Option<String>,
+    /// Order within one column.
     firing: Firing,
+    /// Time from one laser to the next, µs, with a pause behind the last; without it they fire
+    /// evenly over the column.
+    #[schemars(range(min = 0))]
     firing_us: Option<f64>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct LaserBlockFile {
+    /// Lasers of the block.
+    #[schemars(range(min = 1, max = 1024))]
     lasers: u32,
+    /// Elevation of its first laser, degrees.
+    #[schemars(range(min = -90, max = 90))]
     first_deg: f64,
+    /// Elevation from one laser to the next, degrees: negative from the top down.
     step_deg: f64,
 }
 

@@ -8,6 +8,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::directions::{self, Directions, Way};
@@ -17,6 +18,7 @@ use crate::design::Error;
 use crate::design::limits::Check;
 use crate::design::safety::Beams;
 use crate::digest::Digest;
+use crate::told;
 
 /// Bytes of the largest table: 2²² entries of some 40.
 const MOST_BYTES: u64 = 1 << 28;
@@ -43,11 +45,17 @@ pub struct Table {
 }
 
 /// `[scan.table]` as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
+    /// CSV file with azimuth and elevation (or zenith), and the time if there is one; beside this
+    /// file.
     file: String,
+    /// Beams that take turns in the table, each with a detector of its own.
+    #[schemars(range(min = 1, max = 1024))]
     lines: u32,
+    /// Directions per second, all lines together, of a table without times.
+    #[schemars(range(min = 1, max = 1e9))]
     firings_per_s: Option<f64>,
 }
 
@@ -73,9 +81,12 @@ impl Typed for File {
         };
         let origin = path.display();
         if directions.len() < 2 || !directions.len().is_multiple_of(lines as usize) {
+            let (count, of_lines) = match lines {
+                1 => (directions.len(), String::new()),
+                _ => (directions.len(), format!(", a multiple of the {lines} of scan.table.lines")),
+            };
             return refuse(format!(
-                "{origin}: {} directions are no whole number of {lines} and two at least",
-                directions.len()
+                "{origin}: {count} directions; there must be two at least{of_lines}"
             ));
         }
         let rate = match (times.is_empty(), self.firings_per_s) {
@@ -113,8 +124,9 @@ impl Typed for File {
 
 /// The bytes of the file at `path`, of which there may be so many at most.
 pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
-    let unread =
-        |error: std::io::Error| format!("{}: cannot be read: {}", path.display(), error.kind());
+    let unread = |error: std::io::Error| {
+        format!("{}: cannot be read: {}", path.display(), told::unreadable(&error))
+    };
     let mut bytes = Vec::new();
     let file = Disk::open(path).map_err(unread)?;
     file.take(most + 1).read_to_end(&mut bytes).map_err(unread)?;

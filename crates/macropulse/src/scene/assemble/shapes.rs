@@ -1,7 +1,5 @@
 //! Objects that are shapes: of one part, or of several, as a person.
 
-use toml::Spanned;
-
 use super::super::closed_form::Solid;
 use super::super::error::Error;
 use super::super::file::{ObjectTyped, ShapeTyped};
@@ -9,6 +7,7 @@ use super::super::motion::Motion;
 use super::super::moving::MovingShape;
 use super::super::person::Part;
 use super::super::pose::Pose;
+use super::super::spanned::Spanned;
 use super::Assembly;
 
 impl Assembly<'_> {
