@@ -79,12 +79,16 @@ pub fn of_html(text: &str) -> Text {
 
 #[test]
 fn links_and_anchors_are_found() {
-    let text = "# A `b_c`: d, e\n[x](y.md#z) `[no](code)` [web](https://a.b)\n```\n[no](n)\n```\n[s](#a)";
+    let text =
+        "# A `b_c`: d, e\n[x](y.md#z) `[no](code)` [web](https://a.b)\n```\n[no](n)\n```\n[s](#a)";
     let text = of_markdown(text);
     assert_eq!(text.anchors, BTreeSet::from(["a-b_c-d-e".to_owned()]));
     let found: Vec<_> = text.links.iter().map(|link| (link.line, link.target())).collect();
     assert_eq!(found, [(2, "y.md#z".to_owned()), (6, "#a".to_owned())]);
     let text = of_html("<h2 id=\"a\"><a href=\"b.html#c\"><img src=\"d.png\">");
     let found: Vec<_> = text.links.iter().map(Link::target).collect();
-    assert_eq!((found, text.anchors.contains("a")), (vec!["b.html#c".into(), "d.png".into()], true));
+    assert_eq!(
+        (found, text.anchors.contains("a")),
+        (vec!["b.html#c".into(), "d.png".into()], true)
+    );
 }

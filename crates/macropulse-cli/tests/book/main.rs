@@ -102,7 +102,8 @@ fn the_book_is_made_and_its_links_hold() {
 
     for page in files(&root.join("docs"), ".md") {
         for link in of_markdown(&fs::read_to_string(&page).unwrap()).links {
-            let linked = page.parent().unwrap().join(&link.file).canonicalize().unwrap();
+            let linked = page.parent().unwrap().join(&link.file).canonicalize();
+            let linked = linked.unwrap_or_else(|why| panic!("{}: {why}", link.file));
             let inside = linked.strip_prefix(&root).unwrap();
             if !inside.starts_with("docs") {
                 assert!(!link.file.ends_with(".md"), "{}: no page of the book", link.file);

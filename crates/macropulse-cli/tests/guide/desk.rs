@@ -125,7 +125,8 @@ fn a_command_that_fails_is_named() {
 #[test]
 fn options_that_there_are_not_are_noticed_without_a_run() {
     let desk = desk();
-    desk.parse("ros2 bag play\nmacropulse sweep peregrine \\\n  --shots 5 -o out   # later").unwrap();
+    desk.parse("ros2 bag play\nmacropulse sweep peregrine \\\n  --shots 5 -o out   # later")
+        .unwrap();
     let why = desk.parse("$ macropulse sweep peregrine --shoots 5").unwrap_err();
     assert!(why.contains("--shoots"), "{why}");
     assert!(desk.parse("macropulse sweeps peregrine").is_err());

@@ -30,6 +30,8 @@ pub struct Sources {
     told: HashMap<String, Value>,
     /// The name of the last one.
     last: String,
+    /// What has been found on the page.
+    found: Vec<String>,
 }
 
 impl Sources {
@@ -42,11 +44,33 @@ impl Sources {
         for line in &held.lines {
             let outcome = match command(line) {
                 Some((name, command)) => desk.json(command).map(|told| self.know(name, told)),
-                None => self.filled(line).and_then(|line| once(&line, &page.words)),
+                None => self.filled(line).and_then(|line| {
+                    once(&line, &page.words)?;
+                    self.found.push(line);
+                    Ok(())
+                }),
             };
             wrong.extend(outcome.err());
         }
         if wrong.is_empty() { Ok(()) } else { Err(wrong.join("\n")) }
+    }
+
+    /// That the numbers in a row of a table have been found.
+    ///
+    /// # Errors
+    /// That they have not.
+    pub fn cover(&self, row: &str) -> Result<(), String> {
+        let plain: String = row.split('`').step_by(2).collect();
+        let is_figure =
+            |word: &str| word.trim_start_matches('(').starts_with(|c: char| c.is_ascii_digit());
+        let has_none = !plain.split_whitespace().any(is_figure);
+        match has_none || self.found.iter().any(|found| row.contains(found) || found.contains(row))
+        {
+            true => Ok(()),
+            false => {
+                Err(format!("no comment says where the figures of this row are from:\n    {row}"))
+            }
+        }
     }
 
     fn know(&mut self, name: &str, told: Value) {
@@ -59,9 +83,11 @@ impl Sources {
         let mut pieces = line.split('{');
         let mut filled = pieces.next().unwrap_or_default().to_owned();
         for piece in pieces {
-            let (place, after) = piece.split_once('}').ok_or(format!("`{line}`: a `}}` is missing"))?;
+            let (place, after) =
+                piece.split_once('}').ok_or(format!("`{line}`: a `}}` is missing"))?;
             let (pointers, form) = place.split_once(':').unwrap_or((place, ""));
-            filled.push_str(&self.figure(pointers, form).map_err(|why| format!("`{line}`: {why}"))?);
+            filled
+                .push_str(&self.figure(pointers, form).map_err(|why| format!("`{line}`: {why}"))?);
             filled.push_str(after);
         }
         if filled == line { Err(format!("`{line}` has no figure")) } else { Ok(one_blank(&filled)) }
@@ -211,7 +237,8 @@ fn numbers_are_written_as_on_the_pages() {
 
 #[test]
 fn figures_are_filled_in() {
-    let told = serde_json::json!({ "right": 0.5, "list": [{ "n": 3 }, { "n": 2000 }], "word": "yes" });
+    let told =
+        serde_json::json!({ "right": 0.5, "list": [{ "n": 3 }, { "n": 2000 }], "word": "yes" });
     let mut sources = Sources::default();
     sources.know("a", told);
     for line in [
@@ -224,13 +251,17 @@ fn figures_are_filled_in() {
         assert!(sources.filled(line).is_err(), "{line}");
     }
     assert!(once("a b", "a b").is_ok() && once("a b", "a c").is_err() && once("a", "a a").is_err());
+    sources.found.push("b | 5 m |".to_owned());
+    assert!(sources.cover("| b | 5 m |").is_ok() && sources.cover("| c | `7` |").is_ok());
+    assert!(sources.cover("| b | 6 m |").is_err());
     assert_eq!(command("a_1 = cat a = b"), Some(("a_1", "cat a = b")));
     assert_eq!(command("| x = y |"), None);
 }
 
 #[test]
 fn output_is_held_but_for_times() {
-    let printed = "1 scan, 0.02 s (speed 1.7938)\n  shots   4 096\n  rejects 3\n  time  emit 84 us,\n  12 ms";
+    let printed =
+        "1 scan, 0.02 s (speed 1.7938)\n  shots   4 096\n  rejects 3\n  time  emit 84 us,\n  12 ms";
     shown("1 scan, 1.5 s (speed 1/7)\n shots 4 096\n…\n time emit 3 ms, 1 ms\n", printed).unwrap();
     for wrong in ["2 scan", "shots 4 097", "rejects 3 … shots", "time emit"] {
         let outcome = shown(wrong, printed);

@@ -106,6 +106,10 @@ fn holds(page: &str) {
             wrong.push(format!("{}:{}: {why}", page.name, part.line()));
         }
     }
+    for (line, row) in page.rows.iter().filter(|_| page.name.starts_with("docs/guide/")) {
+        let outcome = sources.cover(row);
+        wrong.extend(outcome.err().map(|why| format!("{}:{line}: {why}", page.name)));
+    }
     assert!(wrong.is_empty(), "\n{}\n", wrong.join("\n\n"));
 }
 

@@ -8,6 +8,9 @@ pub struct Page {
     pub parts: Vec<Part>,
     /// All of it but the comments, in words with one blank between them.
     pub words: String,
+    /// The rows of its tables with their lines, but for headers, and for tables with a comment
+    /// `<!-- no figures: … -->` below that says what their numbers are.
+    pub rows: Vec<(usize, String)>,
 }
 
 /// What there is to do about a page.
@@ -57,6 +60,7 @@ impl Page {
     /// A sentence with the place of a fence or comment that is not closed or not understood.
     pub fn of(name: &str, text: &str) -> Result<Self, String> {
         let (mut parts, mut words, mut paragraph) = (Vec::new(), Vec::new(), String::new());
+        let (mut rows, mut table) = (Vec::new(), 0);
         let mut lines = text.lines().enumerate();
         while let Some((number, line)) = lines.next() {
             let place = number + 1;
@@ -76,12 +80,20 @@ impl Page {
                     until(&mut lines, "-->")
                         .ok_or(format!("{name}:{place}: the comment is not closed"))?
                 };
-                if line == "<!-- figures" {
+                if line.starts_with("<!-- no figures: ") {
+                    rows.truncate(table);
+                } else if line == "<!-- figures" {
                     let lines = body.iter().map(|line| (*line).to_owned()).collect();
                     parts.push(Part::Figures(Held { line: place, lines }));
                 }
             } else {
                 words.push(line);
+                if line.starts_with("|-") {
+                    rows.pop();
+                    table = rows.len();
+                } else if line.starts_with('|') {
+                    rows.push((place, one_blank(line)));
+                }
                 if line.trim().is_empty() {
                     // A paragraph stays in mind over the blank line between it and a block.
                     continue;
@@ -93,7 +105,7 @@ impl Page {
                 paragraph.push('\n');
             }
         }
-        Ok(Self { name: name.to_owned(), parts, words: one_blank(&words.join("\n")) })
+        Ok(Self { name: name.to_owned(), parts, words: one_blank(&words.join("\n")), rows })
     }
 
     /// Its fenced blocks.
@@ -154,6 +166,8 @@ print(1)
 sbatch far.sh
 ```
 
+| a |
+|---|
 | 1 |
 
 <!-- figures
@@ -161,6 +175,12 @@ a = cat a.json
 | {a.b} |
 -->
 Of `a.toml`, 2\u{a0}000.
+
+| b |
+|---|
+| 3 |
+
+<!-- no figures: they are made up -->
 ";
 
 #[test]
@@ -172,8 +192,13 @@ fn a_page_is_taken_apart() {
     assert_eq!((python.line, python.file.as_deref()), (4, Some("make.py")));
     assert_eq!((python.text.as_str(), &python.not_run), ("print(1)\n", &None));
     assert_eq!((slurm.file.as_deref(), slurm.not_run.as_deref()), (None, Some("needs Slurm")));
-    assert_eq!((held.line, &held.lines[..]), (14, &["a = cat a.json", "| {a.b} |"].map(String::from)[..]));
-    assert!(page.words.ends_with("sbatch far.sh | 1 | Of `a.toml`, 2 000."), "{}", page.words);
+    assert_eq!(page.rows, [(14, "| 1 |".to_owned())]);
+    assert_eq!(
+        (held.line, &held.lines[..]),
+        (16, &["a = cat a.json", "| {a.b} |"].map(String::from)[..])
+    );
+    let end = "sbatch far.sh | a | |---| | 1 | Of `a.toml`, 2 000. | b | |---| | 3 |";
+    assert!(page.words.ends_with(end), "{}", page.words);
 }
 
 #[test]
