@@ -13,9 +13,9 @@
 //! page with places for figures: filled in, it must stand on the page exactly once. In braces stands
 //! where the figure is: keys and numbers in lists with points between, behind the name of a command or
 //! nothing for the last one; also a sum of them, as `{.outcomes.right + .outcomes.near}`, or a
-//! difference. Behind a colon stands how it is written: `.2` with two decimals, `.2 %` in per cent,
-//! `.1 mm` in millimetres, `.1 MB` in megabytes, `.1e` as 4.1·10⁻⁷. Without that it is a whole number or
-//! a text.
+//! difference. Behind a colon stands how it is written: `.2` with two decimals; `.2 %` in per cent, rounded
+//! down as the program does, so that 100 % is all; `.1 mm` in millimetres, `.1 MB` in megabytes; `.1e` as
+//! 4.1·10⁻⁷. Without that it is a whole number or a text.
 
 use std::collections::HashMap;
 
@@ -153,14 +153,18 @@ fn written(number: f64, form: &str) -> Option<String> {
         None if form.is_empty() && number.fract() == 0.0 => 0,
         None => return None,
     };
-    let scale = match unit {
-        "" => 1.0,
-        "%" => 100.0,
-        "mm" => 1000.0,
-        "MB" => 1e-6,
+    let number = match unit {
+        "" => number,
+        "%" => {
+            let steps = 10_f64.powi(2 + decimals as i32);
+            // What is a whole number of steps stays one.
+            (number * steps + 1e-6).floor() / steps * 100.0
+        }
+        "mm" => number * 1e3,
+        "MB" => number * 1e-6,
         _ => return None,
     };
-    let text = grouped(&format!("{:.decimals$}", number * scale));
+    let text = grouped(&format!("{number:.decimals$}"));
     Some(if unit.is_empty() { text } else { format!("{text} {unit}") })
 }
 
@@ -222,7 +226,8 @@ fn numbers_are_written_as_on_the_pages() {
         (-1234.0, "", "-1 234"),
         (-123.0, "", "-123"),
         (99.0, "", "99"),
-        (0.99176, ".2 %", "99.18 %"),
+        (0.99999, ".2 %", "99.99 %"),
+        (0.29, ".0 %", "29 %"),
         (0.002_46, ".1 mm", "2.5 mm"),
         (1234.5678, ".3", "1 234.568"),
         (4.04e-7, ".0e", "4·10⁻⁷"),
