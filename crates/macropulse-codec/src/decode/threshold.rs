@@ -42,12 +42,19 @@ pub(super) fn least_balance(lags: f64, chips: (u32, u32), density: f64, false_al
 pub(super) struct Thresholds {
     lags: f64,
     false_alarm: f64,
-    /// Whether densities are taken as they are.
-    exact: bool,
     /// Chips of a macropulse, if what falls on the dark ones is taken off.
     balanced: Option<u32>,
-    /// By marks, then by step of density; 0 where not yet known.
-    known: Vec<Option<Box<[u32; STEPS]>>>,
+    /// By marks.
+    known: Vec<Option<Box<Known>>>,
+}
+
+/// What is known of a number of marks.
+#[derive(Debug, Clone)]
+struct Known {
+    /// By step of density; 0 where not yet known.
+    at_step: [u32; STEPS],
+    /// The density up to which so many marks are enough; NaN where not yet known.
+    enough_to: Vec<f64>,
 }
 
 /// Steps of density, eight to an octave: the exponent and the first three bits of the fraction of
@@ -57,42 +64,41 @@ const STEP_BITS: u32 = 49;
 const FIRST_STEP: u64 = (0x3FF_u64 << 3) - (STEPS as u64 - 1);
 
 impl Thresholds {
-    /// For `lags` tried places and `false_alarm` false answers accepted among them; densities are
-    /// taken as they are, where they are to be `exact`.
-    pub fn new(lags: f64, false_alarm: f64, exact: bool) -> Self {
-        Self { lags, false_alarm, exact, balanced: None, known: Vec::new() }
+    /// For `lags` tried places and `false_alarm` false answers accepted among them.
+    pub fn new(lags: f64, false_alarm: f64) -> Self {
+        Self { lags, false_alarm, balanced: None, known: Vec::new() }
     }
 
-    /// The same for the balance of macropulses of so many `chips`, densities rounded.
+    /// The same for the balance of macropulses of so many `chips`; densities are rounded up by less than
+    /// an eighth.
     pub fn balanced(lags: f64, false_alarm: f64, chips: u32) -> Self {
-        Self { balanced: Some(chips), ..Self::new(lags, false_alarm, false) }
+        Self { balanced: Some(chips), ..Self::new(lags, false_alarm) }
     }
 
     /// Whether it gives what `other` gives.
     pub fn is_as(&self, other: &Self) -> bool {
-        (self.lags, self.false_alarm, self.exact) == (other.lags, other.false_alarm, other.exact)
+        (self.lags, self.false_alarm) == (other.lags, other.false_alarm)
     }
 
-    /// The fewest of `marks` to believe at `density`; where that need not be exact, it is rounded
-    /// up by less than an eighth.
+    /// The fewest of `marks` to believe at `density`.
     pub fn least(&mut self, marks: u32, density: f64) -> u32 {
         if density <= 0.0 {
             return 1;
         }
-        if self.exact {
-            return least_marks(self.lags, marks, density, self.false_alarm);
-        }
+        let (lags, false_alarm) = (self.lags, self.false_alarm);
         let above = (density.min(1.0).to_bits() + (1 << STEP_BITS) - 1) >> STEP_BITS;
         let step = above.saturating_sub(FIRST_STEP).min(STEPS as u64 - 1);
         if self.known.len() <= marks as usize {
             self.known.resize(marks as usize + 1, None);
         }
-        let of_marks = self.known[marks as usize].get_or_insert_with(|| Box::new([0; STEPS]));
-        let known = &mut of_marks[step as usize];
-        if *known == 0 {
+        let nothing = || {
+            Box::new(Known { at_step: [0; STEPS], enough_to: vec![f64::NAN; marks as usize + 1] })
+        };
+        let known = self.known[marks as usize].get_or_insert_with(nothing);
+        let at_step = &mut known.at_step[step as usize];
+        if *at_step == 0 {
             let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
-            let (lags, false_alarm) = (self.lags, self.false_alarm);
-            *known = match self.balanced {
+            *at_step = match self.balanced {
                 None => least_marks(lags, marks, density, false_alarm),
                 Some(chips) => {
                     let dark = chips.saturating_sub(marks);
@@ -100,7 +106,35 @@ impl Thresholds {
                 }
             };
         }
-        *known
+        let mut least = *at_step;
+        if self.balanced.is_some() {
+            return least;
+        }
+        // At the end of the step so many are needed; here fewer may do.
+        while least > 1 {
+            let enough_to = &mut known.enough_to[least as usize - 1];
+            if enough_to.is_nan() {
+                *enough_to = highest_density((lags, false_alarm), marks, least - 1);
+            }
+            if density > *enough_to {
+                break;
+            }
+            least -= 1;
+        }
+        least
+    }
+}
+
+/// The highest density d at which `least` of `marks` are enough, L · P(Bin(N, d) ≥ k) ≤ α.
+fn highest_density((lags, false_alarm): (f64, f64), marks: u32, least: u32) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    loop {
+        let middle = f64::midpoint(low, high);
+        if middle <= low || middle >= high {
+            return low;
+        }
+        let chance = binomial_tail(marks as usize, middle, least as usize);
+        if lags * chance <= false_alarm { low = middle } else { high = middle }
     }
 }
 
@@ -155,16 +189,18 @@ mod tests {
     fn what_chance_always_reaches_is_never_believed() {
         assert_eq!(least_marks(4e5, 58, 1.0, 1e-3), 59);
         assert_eq!(least_marks(4e5, 58, 0.99, 1e-3), 59);
-        assert_eq!(Thresholds::new(4e5, 1e-3, false).least(58, 0.0), 1);
+        assert_eq!(Thresholds::new(4e5, 1e-3).least(58, 0.0), 1);
     }
 
     #[test]
-    fn a_remembered_threshold_is_never_too_low() {
-        let mut thresholds = Thresholds::new(4e5, 1e-3, false);
-        for density in [1e-4, 0.003, 0.011, 0.2, 0.7] {
-            let exact = least_marks(4e5, 174, density, 1e-3);
-            let remembered = thresholds.least(174, density);
-            assert!((exact..=exact + exact / 8 + 1).contains(&remembered), "{density}");
+    fn a_remembered_threshold_is_that_of_its_density() {
+        let mut thresholds = Thresholds::new(4e5, 1e-3);
+        for step in 0..400 {
+            let density = 1e-6 * 1.035_f64.powi(step);
+            for marks in [29, 174] {
+                let exact = least_marks(4e5, marks, density, 1e-3);
+                assert_eq!(thresholds.least(marks, density), exact, "{density} {marks}");
+            }
         }
     }
 }

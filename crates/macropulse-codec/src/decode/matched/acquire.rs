@@ -32,6 +32,8 @@ pub(super) struct Search {
     /// Where the word may begin in the pictures, from the first lag of a range on.
     words: Vec<u64>,
     counts: Counts<WIDE>,
+    /// Lags that were counted one by one in the last search.
+    counted: i64,
     pictures: Pictures,
     /// Where marks count as found.
     lit: Timeline,
@@ -110,6 +112,11 @@ impl Pictures {
 const PER_WORD: i64 = 64 * COARSE as i64;
 
 impl Search {
+    /// Lags that were counted one by one in the last search.
+    pub fn counted(&self) -> i64 {
+        self.counted
+    }
+
     /// Forgets the pictures.
     pub fn forget(&mut self) {
         self.pictures.shown = None;
@@ -166,6 +173,7 @@ impl Band<'_> {
     ) -> Option<(i64, u32)> {
         let (sent, fired) = (self.sent, self.sent.fired[shot]);
         let (Some(from), Some(to)) = (lags.first(), lags.last()) else { return None };
+        self.search.counted = 0;
         if least > sent.weight(shot) {
             return None;
         }
@@ -228,6 +236,7 @@ impl Band<'_> {
         let search = &mut self.search;
         let (words, begin) = self.field.lit_in(source, &span, &mut search.lit).at(start);
         let farthest = self.marks.last().copied().unwrap_or(0);
+        search.counted += BLOCK;
         search.counts.clear();
         search.counts.add(words, begin as u32, &self.marks, farthest);
         let allowed = below(lags.start - first, [u64::MAX; WIDE], false);

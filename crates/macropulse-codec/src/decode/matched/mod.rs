@@ -170,7 +170,7 @@ impl<'a> Band<'a> {
         let bits = sent.bits_of_payload() as f64;
         let (of_lags, of_bits) = ((lags, false_alarm), (bits, false_alarm));
         let wanted = [of_lags, of_bits, (1.0, BY_CHANCE), (2.0 * 64.0 * bits, 0.5)]
-            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm, sent.is_thorough()));
+            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
         let mut remembered = memory.thresholds;
         let [thresholds, bit_thresholds, end_thresholds, word_thresholds] =
             wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
