@@ -72,7 +72,11 @@ fn a_cluster_gives_what_one_machine_does() {
     let requirements = here().join("tests/requirements.txt");
     let site = installed(&python(&requirements).unwrap());
     match python(&here().join("tests/requirements-ray.txt")) {
-        Ok(interpreter) => println!("{}", passed(&interpreter, site, &["tests/cluster"])),
+        Ok(interpreter) => {
+            let guide = "tests/test_guide.py::test_the_python_of_a_page_does_what_it_says\
+                         [docs/guide/cluster.md]";
+            println!("{}", passed(&interpreter, site, &["tests/cluster", guide]));
+        }
         Err(why) => {
             assert_ne!(std::env::var("MACROPULSE_RAY").as_deref(), Ok("required"), "{why}");
             let told = format!("\nNOT TESTED: macropulse.cluster, for want of Ray: {why}\n");

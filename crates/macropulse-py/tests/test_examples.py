@@ -1,7 +1,6 @@
 """The examples run as they stand, each in a folder of its own."""
 
 import importlib.util
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -38,13 +37,3 @@ def test_an_example_runs(path, tmp_path):
     assert said in done.stdout, done.stdout
     for file in files:
         assert (tmp_path / file).stat().st_size > 0, file
-
-
-def test_the_guide_prints_what_it_says(tmp_path):
-    guide = Path(__file__).resolve().parents[3] / "docs" / "guide" / "python.md"
-    source, printed = re.search(
-        r"```python\n(.*?)```.*?```text\n(.*?)```", guide.read_text(), re.DOTALL
-    ).groups()
-    done = subprocess.run([sys.executable, "-c", source], cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, printed), done.stderr
-    assert (tmp_path / "car.pcd").exists()

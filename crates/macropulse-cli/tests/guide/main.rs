@@ -1,0 +1,136 @@
+//! The guide does what it says. Every command of README.md and of the pages in docs runs, what a page
+//! shows of the output is printed, and the figures in its tables and sentences are those of a command.
+//! How pages say where their figures come from: "A page of the guide" in CONTRIBUTING.md.
+//!
+//! Python that is not saved to a file is run by the tests of the Python package.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+mod desk;
+mod figures;
+mod page;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use desk::Desk;
+use figures::Sources;
+use page::{Block, Page, Part};
+
+/// Each page is a test, so that one alone can be asked for by its name.
+macro_rules! pages {
+    ($($name:ident: $path:literal,)*) => {
+        $(#[test] fn $name() { holds($path); })*
+        const PAGES: &[&str] = &[$($path),*];
+    };
+}
+
+pages! {
+    readme: "README.md",
+    introduction: "docs/README.md",
+    codes: "docs/codes.md",
+    formats: "docs/formats.md",
+    glossary: "docs/glossary.md",
+    paper: "docs/paper.md",
+    performance: "docs/performance.md",
+    physics: "docs/physics.md",
+    references: "docs/references.md",
+    bipolar_gold: "docs/guide/bipolar-gold.md",
+    budget: "docs/guide/budget.md",
+    cluster: "docs/guide/cluster.md",
+    coded_360: "docs/guide/coded-360.md",
+    coded_practical: "docs/guide/coded-practical.md",
+    explore: "docs/guide/explore.md",
+    first_scan: "docs/guide/first-scan.md",
+    golden_model: "docs/guide/golden-model.md",
+    interference: "docs/guide/interference.md",
+    own_code: "docs/guide/own-code.md",
+    own_scanner: "docs/guide/own-scanner.md",
+    python: "docs/guide/python.md",
+    ros: "docs/guide/ros.md",
+    sweep: "docs/guide/sweep.md",
+}
+
+/// The root of the repository.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+#[test]
+fn every_page_is_tried() {
+    let mut there = vec!["README.md".to_owned()];
+    for folder in ["docs", "docs/guide"] {
+        for entry in fs::read_dir(root().join(folder)).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            if name.ends_with(".md") && name != "SUMMARY.md" {
+                there.push(format!("{folder}/{name}"));
+            }
+        }
+    }
+    there.sort();
+    let mut tried: Vec<_> = PAGES.to_vec();
+    tried.sort_unstable();
+    assert_eq!(tried, there);
+}
+
+/// What a reader has before a page begins. Of the README: ticks recorded of two lines of its sensor.
+const BEFORE: [(&str, &str); 1] = [(
+    "README.md",
+    "macropulse encode kim-park-2016-fixed --set scan.raster.rows=2 --set scan.scans_per_s=14400 \\\n\
+         --wall-m 30 --format ticks-csv -o recorded\n\
+     for what in shots ticks; do\n\
+         sed '1s/, digest=[0-9a-f]*//' recorded/$what-000000.csv > $what.csv\n\
+     done\n",
+)];
+
+/// Does what `page` says, in its order, and panics with all that is not so.
+fn holds(page: &str) {
+    let page = Page::of(page, &fs::read_to_string(root().join(page)).unwrap()).unwrap();
+    let desk = Desk::new(&root());
+    for (_, commands) in BEFORE.iter().filter(|(name, _)| *name == page.name) {
+        desk.run(commands).unwrap();
+    }
+    let mut wrong = Vec::new();
+    for block in page.blocks() {
+        if let Some(file) = &block.file {
+            desk.put(file, &block.text);
+        }
+    }
+    let mut sources = Sources::default();
+    let mut printed = None;
+    for part in &page.parts {
+        let outcome = match part {
+            Part::Block(block) => obey(block, &desk, &mut printed),
+            Part::Figures(held) => sources.hold(held, &page, &desk),
+        };
+        if let Err(why) = outcome {
+            wrong.push(format!("{}:{}: {why}", page.name, part.line()));
+        }
+    }
+    for (line, row) in page.rows.iter().filter(|_| page.name.starts_with("docs/guide/")) {
+        let outcome = sources.cover(row);
+        wrong.extend(outcome.err().map(|why| format!("{}:{line}: {why}", page.name)));
+    }
+    assert!(wrong.is_empty(), "\n{}\n", wrong.join("\n\n"));
+}
+
+/// Runs a block of commands, or holds a block of output against what the last one has `printed`.
+fn obey(block: &Block, desk: &Desk, printed: &mut Option<String>) -> Result<(), String> {
+    match block.language.as_str() {
+        _ if block.file.is_some() => Ok(()),
+        "sh" | "console" if block.not_run.is_some() => {
+            *printed = None;
+            desk.parse(&block.text)
+        }
+        "sh" => {
+            *printed = Some(desk.run(&block.text)?);
+            Ok(())
+        }
+        "console" => Err("a console block is not run: give the reason behind its name".to_owned()),
+        "python" => {
+            *printed = None;
+            Ok(())
+        }
+        "text" => printed.as_ref().map_or(Ok(()), |printed| figures::shown(&block.text, printed)),
+        _ => Ok(()),
+    }
+}
