@@ -203,6 +203,11 @@ const STUDY: Layers = Layers {
             because: "a sweep repeats whole scans, counts, and names them as records do",
         },
         Rule {
+            module: "validate",
+            may_name: &["view"],
+            because: "figures beside each other are a report",
+        },
+        Rule {
             module: "paper",
             may_name: &["record", "view"],
             because: "the experiment is runs and a report",

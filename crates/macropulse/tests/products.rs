@@ -54,7 +54,8 @@ fn measure(design: &Design, scene: &Scene) -> Scan {
 fn a_sensor_takes_less_than_25_lines() {
     for name in SENSORS {
         let text = std::fs::read_to_string(file(name)).unwrap();
-        assert!(text.lines().count() < 25, "{name}");
+        // The first line names the schema for editors.
+        assert!(text.lines().skip(1).count() < 25, "{name}");
     }
 }
 

@@ -62,7 +62,8 @@ const SURFACES: usize = 3;
 /// Returns of a shot that this receiver can give at most.
 pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
-/// How often chance may light an end of a macropulse where there is none.
+/// How often chance may light an end of a macropulse where there is none, or leave out as many marks of a
+/// code word in all of its bits as are missing.
 const BY_CHANCE: f64 = 1e-3;
 
 thread_local! {
@@ -129,8 +130,8 @@ struct Band<'a> {
     thresholds: Thresholds,
     /// For the bits of one macropulse instead of the lags of a gate.
     bit_thresholds: Thresholds,
-    /// For the first marks of a macropulse, or the last ones.
-    end_thresholds: Thresholds,
+    /// For what chance may do in a single place.
+    once_thresholds: Thresholds,
     /// For the places of a code word in the pictures that are told by one machine word.
     word_thresholds: Thresholds,
     usual: Usual,
@@ -172,7 +173,7 @@ impl<'a> Band<'a> {
         let wanted = [of_lags, of_bits, (1.0, BY_CHANCE), (2.0 * 64.0 * bits, 0.5)]
             .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
         let mut remembered = memory.thresholds;
-        let [thresholds, bit_thresholds, end_thresholds, word_thresholds] =
+        let [thresholds, bit_thresholds, once_thresholds, word_thresholds] =
             wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
@@ -208,7 +209,7 @@ impl<'a> Band<'a> {
             further,
             thresholds,
             bit_thresholds,
-            end_thresholds,
+            once_thresholds,
             word_thresholds,
             usual: Usual::new(),
             at_hand: 0..0,
@@ -263,7 +264,7 @@ impl<'a> Band<'a> {
             thresholds: vec![
                 self.thresholds,
                 self.bit_thresholds,
-                self.end_thresholds,
+                self.once_thresholds,
                 self.word_thresholds,
             ],
         };

@@ -197,7 +197,7 @@ impl Band<'_> {
         let density = self.field.density_without(&sent.light(shot, lag), 0, 0);
         [first, last].into_iter().zip(&sent.bits(shot).ends).all(|(bit, (marks, pattern))| {
             let found = self.field.lit().lit_in(bit, pattern);
-            found >= self.end_thresholds.least(*marks, density)
+            found >= self.once_thresholds.least(*marks, density)
         })
     }
 }

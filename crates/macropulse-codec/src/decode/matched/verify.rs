@@ -179,8 +179,8 @@ impl Band<'_> {
     /// or two of its marks in every bit, and makes many marks of few.
     ///
     /// Where a share q is found in each of B bits, a mark of the word is found in none of them with
-    /// probability (1 − q)ᴮ. It is not spread if chance would leave out as many of the W marks with a
-    /// probability of α over the bits of a payload at most.
+    /// probability (1 − q)ᴮ. It is not spread if chance leaves out as many of the W marks no more often than
+    /// `BY_CHANCE`.
     fn is_spread(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let bits = sent.lit_bits(shot).len();
@@ -194,7 +194,7 @@ impl Band<'_> {
         let found = sent.bits(shot).marks.iter().filter(is_found).count() as u32;
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
         let (word, left_out) = (sent.in_word(shot), (1.0 - share).powi(bits as i32));
-        word - found < self.bit_thresholds.least(word, left_out)
+        word - found < self.once_thresholds.least(word, left_out)
     }
 
     /// What earlier shots in the word of `shot`, found with `count` marks, would be found with if their

@@ -1,0 +1,28 @@
+//! What is published and what is forecast, beside what is computed; and the page of the guide on it.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod common;
+
+use common::Desk;
+
+/// `docs/validation.md` is what the command writes. Where that changes, copy it:
+/// `macropulse validate -o validation && cp validation/validation.md docs/`.
+#[test]
+fn the_page_of_the_guide_is_what_the_command_writes() {
+    let desk = Desk::new();
+    let ran = desk.run("validate -o out --json");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let here = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/validation.md");
+    let page = std::fs::read_to_string(here).unwrap();
+    let written = std::fs::read_to_string(desk.path("out/validation.md")).unwrap();
+    for (page, written) in page.lines().zip(written.lines()) {
+        assert_eq!(page, written, "docs/validation.md");
+    }
+    assert_eq!(page.lines().count(), written.lines().count());
+    let told: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    assert!(told["published"].as_array().unwrap().len() >= 60);
+    assert!(told["forecasts"].as_array().unwrap().len() >= 20);
+    let html = std::fs::read_to_string(desk.path("out/index.html")).unwrap();
+    assert!(html.contains("Published") || html.contains("published"));
+}
