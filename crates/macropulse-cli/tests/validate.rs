@@ -15,7 +15,7 @@ fn the_page_of_the_guide_is_what_the_command_writes() {
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     let here = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/validation.md");
     let page = std::fs::read_to_string(here).unwrap();
-    let written = std::fs::read_to_string(desk.path("out/validation.md")).unwrap();
+    let written = std::fs::read_to_string(desk.path().join("out/validation.md")).unwrap();
     for (page, written) in page.lines().zip(written.lines()) {
         assert_eq!(page, written, "docs/validation.md");
     }
@@ -23,6 +23,6 @@ fn the_page_of_the_guide_is_what_the_command_writes() {
     let told: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
     assert!(told["published"].as_array().unwrap().len() >= 60);
     assert!(told["forecasts"].as_array().unwrap().len() >= 20);
-    let html = std::fs::read_to_string(desk.path("out/index.html")).unwrap();
+    let html = std::fs::read_to_string(desk.path().join("out/index.html")).unwrap();
     assert!(html.contains("Published") || html.contains("published"));
 }

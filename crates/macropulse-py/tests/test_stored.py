@@ -96,7 +96,7 @@ def test_what_cannot_be_decoded_is_one_sentence(sensor, run, tmp_path):
 
     assert "give two dictionaries of columns, or the paths of two files" in told({}, ticks)
     assert "No such file" in told("nowhere.mps", ticks, kind=FileNotFoundError)
-    assert "is a folder, where a file is wanted" in told(run, ticks, kind=IsADirectoryError)
+    assert "Is a directory" in told(run, ticks, kind=IsADirectoryError)
     assert "MPTICKS" in told(ticks, ticks) or "shot" in told(ticks, ticks)
     cut = tmp_path / "cut.mpt"
     cut.write_bytes(ticks.read_bytes()[:-3])

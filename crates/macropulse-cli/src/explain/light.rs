@@ -70,28 +70,43 @@ impl Explained<'_> {
         let Some(arrivals) = &self.arrivals else {
             return "not known: what is decoded is ticks alone".to_owned();
         };
-        let mut said: Vec<String> = self
-            .ours()
-            .map(|train| {
-                let photons = match train.photons.is_finite() {
-                    true => format!("{} photons a mark", short(round(train.photons))),
-                    false => "more than the detector can miss".to_owned(),
-                };
-                let marks = counted(train.marks.len() as u64, "mark");
-                let from = self.comes_from(train).map(|m| format!(" from {} m", short(m)));
-                format!("{marks} of this shot{}, {photons}", from.unwrap_or_default())
-            })
-            .collect();
+        let ours: Vec<&Arrival> = self.ours().collect();
+        let mut said: Vec<String> = match ours.len() {
+            0..=MOST_TRAINS => ours.iter().map(|train| self.train_text(train)).collect(),
+            // Of a footprint every ray has some.
+            all => {
+                let photons: f64 =
+                    ours.iter().map(|train| train.photons * train.marks.len() as f64).sum();
+                vec![format!(
+                    "{all} pulse trains of this shot, {} photons in all",
+                    short(round(photons))
+                )]
+            }
+        };
         if said.is_empty() {
             said.push("none of this shot".to_owned());
         }
-        let others = (arrivals.trains.len() - self.ours().count()) as u64;
+        let others = (arrivals.trains.len() - ours.len()) as u64;
         said.push(format!("{} of other shots", counted(others, "pulse train")));
         said.push(counted(arrivals.events.len() as u64, "detection event"));
         said.push(format!("background {} /s", grouped(arrivals.background.round() as u64)));
         said.join("; ")
     }
+
+    /// A pulse train of this shot.
+    fn train_text(&self, train: &Arrival) -> String {
+        let photons = match train.photons.is_finite() {
+            true => format!("{} photons a mark", short(round(train.photons))),
+            false => "more than the detector can miss".to_owned(),
+        };
+        let marks = counted(train.marks.len() as u64, "mark");
+        let from = self.comes_from(train).map(|m| format!(" from {} m", short(m)));
+        format!("{marks} of this shot{}, {photons}", from.unwrap_or_default())
+    }
 }
+
+/// So many pulse trains of a shot are told one by one.
+const MOST_TRAINS: usize = 3;
 
 /// Three digits behind the point.
 fn round(value: f64) -> f64 {

@@ -34,6 +34,7 @@ pages! {
     performance: "docs/performance.md",
     physics: "docs/physics.md",
     references: "docs/references.md",
+    validation: "docs/validation.md",
     bipolar_gold: "docs/guide/bipolar-gold.md",
     budget: "docs/guide/budget.md",
     cluster: "docs/guide/cluster.md",
