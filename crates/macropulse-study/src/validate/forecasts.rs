@@ -84,7 +84,7 @@ impl Place {
     }
 }
 
-/// Tries the forecasts of the ready `sensor` by night at [`PART`] of its range.
+/// Tries the forecasts of the ready `sensor` by night, at 70 % of its range.
 ///
 /// # Errors
 /// Where the sensor cannot be simulated there.
