@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anstyle::AnsiColor;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use macropulse::formats::Format;
-use macropulse::{channel, design, environment, formats, scene, sim, told};
+use macropulse::{channel, design, environment, formats, predict, scene, sim, told};
 use macropulse_study::text::broken;
 use macropulse_study::{decoding, paper, record, sweep, validate};
 
@@ -179,6 +179,12 @@ impl From<environment::Error> for Fault {
 
 impl From<channel::Error> for Fault {
     fn from(error: channel::Error) -> Self {
+        Self::Wrong(error.to_string())
+    }
+}
+
+impl From<predict::Error> for Fault {
+    fn from(error: predict::Error) -> Self {
         Self::Wrong(error.to_string())
     }
 }

@@ -4,7 +4,7 @@ use std::error::Error as StdError;
 use std::io;
 use std::path::Path;
 
-use macropulse::{channel, codec, design, emit, environment, formats, scene, sim};
+use macropulse::{channel, codec, design, emit, environment, formats, predict, scene, sim};
 use macropulse_study::{decoding, record, sent, sweep, view};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -109,6 +109,12 @@ impl Raise for environment::Error {
 }
 
 impl Raise for channel::Error {
+    fn raise(self) -> PyErr {
+        wrong(self.to_string())
+    }
+}
+
+impl Raise for predict::Error {
     fn raise(self) -> PyErr {
         wrong(self.to_string())
     }

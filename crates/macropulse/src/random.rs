@@ -33,6 +33,10 @@ pub enum Stage {
     Blind = 8,
     /// Background that lasts for a stretch of time. Indexed by its beginning, parts by channel.
     Stretch = 9,
+    /// The noise of an amplifier. Indexed by blocks of its samples, parts by channel.
+    Amplifier = 10,
+    /// How late does a comparator answer? Indexed by the sample at which it does, parts by channel.
+    Comparator = 11,
 }
 
 /// The counter at which a run of random numbers begins.

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use macropulse::codec::code::correlation::{
     CrossCorrelation, aperiodic_sidelobe, balanced, bipolar, periodic, periodic_sidelobe,
 };
-use macropulse::codec::code::{CodeWord, Family};
+use macropulse::codec::code::{CodeWord, Family, Sparse};
 use macropulse::predict::multiple_access::{Hits, MultipleAccess, bit_error_hard, bit_error_soft};
 
 const PRIMES: [u32; 8] = [5, 7, 11, 13, 17, 19, 23, 29];
@@ -94,18 +94,23 @@ fn orthogonal_words_meet_once_whatever_the_shift() {
     }
 }
 
+/// `words` words of `weight` marks in the chips of a macropulse of the paper.
+fn sparse(weight: u32, words: u32) -> Family {
+    Family::sparse(Sparse { length: 10_933, weight, words, gap: 1, seed: 1 }).unwrap()
+}
+
 /// Words of 32 marks in 10 933 chips meet in w²/N = 0.0937 of them on average, exactly. H0: how
 /// many meet is nearly Poisson. N = 12 million distinct values of 48 words, seed 1: six meet
 /// somewhere with a chance of α = 0.01. Negative control: words of four times the marks do.
 #[test]
 fn sparse_words_hardly_ever_meet() {
-    let family = Family::sparse(10_933, 32, 4096, 1).unwrap();
+    let family = sparse(32, 4096);
     assert_eq!((family.length(), family.weight(), family.count()), (10_933, 32, 4096));
     let words = &family.words()[..48];
     let cross = CrossCorrelation::of(words);
     assert_eq!(cross.periodic.sum, 48 * 47 * 32 * 32, "mean w²/N");
     assert!((4..=5).contains(&cross.periodic_max), "{cross:?}");
-    let dense = Family::sparse(10_933, 128, 48, 1).unwrap();
+    let dense = sparse(128, 48);
     assert!(CrossCorrelation::of(&dense.words()).periodic_max > 5);
     approx::assert_relative_eq!(cross.periodic.variance(), 0.0937, max_relative = 0.02);
     let (periodic, aperiodic) = sidelobes(words);

@@ -46,6 +46,21 @@ pub enum Error {
         /// Chips of the word.
         length: u32,
     },
+    /// Marks that do not fit into a word so far apart.
+    #[error(
+        "{weight} marks that are {gap} chips apart are not possible in a code word of {length} \
+         chips; use a gap of 1 to {widest}"
+    )]
+    Gap {
+        /// Gap asked for.
+        gap: u32,
+        /// Marks of the word.
+        weight: u32,
+        /// Chips of the word.
+        length: u32,
+        /// The widest gap that fits.
+        widest: u32,
+    },
     /// More words than have an index, or none.
     #[error("a family of {words} words is not possible; use 1 to {possible}")]
     Words {

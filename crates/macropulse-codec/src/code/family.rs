@@ -11,6 +11,7 @@ use std::fmt;
 
 use super::{CodeWord, Error};
 pub use prime::prime_sequence;
+pub use sparse::Sparse;
 
 /// A set of code words. A family that exists is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -57,16 +58,7 @@ pub enum Family {
     },
     /// Marks drawn at random for each word. Made by [`Family::sparse`].
     #[non_exhaustive]
-    Sparse {
-        /// Chips of a word.
-        length: u32,
-        /// Marks of a word.
-        weight: u32,
-        /// Number of words.
-        words: u32,
-        /// Seed of what is drawn.
-        seed: u64,
-    },
+    Sparse(Sparse),
     /// A single word of 2ⁿ − 1 chips, half of them lit, that is dark at every shift to a receiver
     /// that subtracts what falls on its dark chips. Made by [`Family::m_sequence`].
     #[non_exhaustive]
@@ -132,14 +124,14 @@ impl Family {
         Ok(Self::Orthogonal { length, weight, words })
     }
 
-    /// `words` words of `weight` marks each, drawn at random from `length` chips by (`seed`, index
-    /// of the word).
+    /// Words whose marks are drawn at random, each by (seed, index of the word).
     ///
     /// # Errors
-    /// Where `length` is not 1 to 65535, `weight` not 1 to `length`, or `words` not 1 to 65535.
-    pub fn sparse(length: u32, weight: u32, words: u32, seed: u64) -> Result<Self, Error> {
-        sparse::checked(length, weight, words)?;
-        Ok(Self::Sparse { length, weight, words, seed })
+    /// Where the length is not 1 to 65535, the weight not 1 to the length, the number of words not
+    /// 1 to 65535, or the gap 0 or so wide that the marks do not fit into the word.
+    pub fn sparse(sparse: Sparse) -> Result<Self, Error> {
+        sparse::checked(&sparse)?;
+        Ok(Self::Sparse(sparse))
     }
 
     /// The m-sequence of `degree`. It is one word: its shifts cannot be told from delay.
@@ -166,8 +158,8 @@ impl Family {
             Self::QuadraticCongruence { p } => congruence::words(p, p),
             Self::ExtendedQuadraticCongruence { p } => congruence::words(p, 2 * p - 1),
             Self::Orthogonal { length, weight, words } => orthogonal::words(length, weight, words),
-            Self::Sparse { length, weight, words, seed } => {
-                (0..words).map(|index| sparse::word(length, weight, seed, index)).collect()
+            Self::Sparse(sparse) => {
+                (0..sparse.words).map(|index| sparse::word(&sparse, index)).collect()
             }
             Self::MSequence { degree } => vec![shift_register::m_sequence(degree)],
             Self::Gold { degree } => shift_register::gold(degree),
@@ -180,7 +172,7 @@ impl Family {
         match *self {
             Self::Prime { p } | Self::QuadraticCongruence { p } => p * p,
             Self::ExtendedPrime { p } | Self::ExtendedQuadraticCongruence { p } => p * (2 * p - 1),
-            Self::Orthogonal { length, .. } | Self::Sparse { length, .. } => length,
+            Self::Orthogonal { length, .. } | Self::Sparse(Sparse { length, .. }) => length,
             Self::MSequence { degree } | Self::Gold { degree } => shift_register::length(degree),
             Self::Single => 1,
         }
@@ -193,7 +185,9 @@ impl Family {
             | Self::ExtendedPrime { p }
             | Self::QuadraticCongruence { p }
             | Self::ExtendedQuadraticCongruence { p } => p as usize,
-            Self::Orthogonal { weight, .. } | Self::Sparse { weight, .. } => weight as usize,
+            Self::Orthogonal { weight, .. } | Self::Sparse(Sparse { weight, .. }) => {
+                weight as usize
+            }
             Self::MSequence { degree } => 1 << (degree - 1),
             Self::Gold { degree } => shift_register::gold_weight(degree),
             Self::Single => 1,
@@ -207,7 +201,7 @@ impl Family {
             Self::QuadraticCongruence { p } | Self::ExtendedQuadraticCongruence { p } => {
                 p as usize - 1
             }
-            Self::Orthogonal { words, .. } | Self::Sparse { words, .. } => words as usize,
+            Self::Orthogonal { words, .. } | Self::Sparse(Sparse { words, .. }) => words as usize,
             Self::Gold { degree } => (1 << degree) + 1,
             Self::MSequence { .. } | Self::Single => 1,
         }
@@ -225,7 +219,12 @@ impl fmt::Display for Family {
                 write!(f, "extended quadratic congruence {p}")
             }
             Self::Orthogonal { length, weight, .. } => write!(f, "orthogonal {length}, {weight}"),
-            Self::Sparse { length, weight, .. } => write!(f, "sparse {length}, {weight}"),
+            Self::Sparse(Sparse { length, weight, gap: 1, .. }) => {
+                write!(f, "sparse {length}, {weight}")
+            }
+            Self::Sparse(Sparse { length, weight, gap, .. }) => {
+                write!(f, "sparse {length}, {weight}, {gap} apart")
+            }
             Self::MSequence { degree } => write!(f, "m-sequence {degree}"),
             Self::Gold { degree } => write!(f, "Gold {degree}"),
             Self::Single => write!(f, "single mark"),
@@ -263,7 +262,7 @@ mod tests {
             Family::quadratic_congruence(7),
             Family::extended_quadratic_congruence(7),
             Family::orthogonal(63, 3, None),
-            Family::sparse(100, 6, 9, 1),
+            Family::sparse(Sparse { length: 100, weight: 6, words: 9, gap: 5, seed: 1 }),
             Family::m_sequence(5),
             Family::gold(5),
         ];

@@ -44,7 +44,7 @@ impl Figures<'_> {
             "false_points_per_shot": there.false_per_shot,
             "false_points_wanted": self.wanted.false_points,
             "snr": finite(there.snr),
-            "precision_mm": there.precision * 1e3,
+            "precision_mm": there.precision.map(|precision| precision * 1e3),
             "precision_bound_mm": there.bound * 1e3,
             "converter_loss": there.bank_loss,
             "mark_by_mark_shortfall": self.mark_by_mark,
@@ -67,7 +67,7 @@ fn farthest_json(farthest: &Farthest) -> Value {
         "snr": finite(farthest.there.snr),
         "pd": farthest.there.pd,
         "false_points_per_shot": farthest.there.false_per_shot,
-        "precision_mm": farthest.there.precision * 1e3,
+        "precision_mm": farthest.there.precision.map(|precision| precision * 1e3),
         "range_of_pd_m": farthest.range,
         "range_of_pd_at_night_m": farthest.range_at_night,
     })

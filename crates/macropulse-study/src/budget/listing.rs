@@ -130,14 +130,14 @@ impl Figures<'_> {
         let metres = |range: Option<f64>| range.map_or("-".to_owned(), |r| format!("{r:.1} m"));
         for Farthest { reflectance, range, range_at_night, there } in &self.farthest {
             text += &format!(
-                "  {:>4.0} % {:>9} {:>9} {:>8} {:>8.4} {:>9.1e} {:>7.3} mm {:>9} {:>9}\n",
+                "  {:>4.0} % {:>9} {:>9} {:>8} {:>8.4} {:>9.1e} {:>10} {:>9} {:>9}\n",
                 reflectance * 100.0,
                 short(there.photons_per_shot),
                 short(there.detected_per_mark),
                 short(there.snr),
                 there.pd,
                 there.false_per_shot,
-                there.precision * 1e3,
+                there.precision.map_or("-".to_owned(), |told| format!("{:.3} mm", told * 1e3)),
                 metres(*range),
                 metres(*range_at_night)
             );

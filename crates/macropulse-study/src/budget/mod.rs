@@ -7,11 +7,10 @@ mod json;
 mod listing;
 mod page;
 
-use macropulse::channel::Error;
 use macropulse::design::Design;
 use macropulse::environment::Environment;
 use macropulse::predict::verdict::{Check, Wanted, checks, mark_by_mark};
-use macropulse::predict::{Forecast, Forecaster};
+use macropulse::predict::{Error, Forecast, Forecaster};
 use macropulse::units::s_from_fs;
 
 /// Reflectances that tables and curves show.

@@ -52,7 +52,7 @@ impl Kind {
             Self::Photons => forecast.photons_per_shot,
             Self::Pd => forecast.pd,
             Self::Snr => forecast.snr,
-            Self::Precision => forecast.precision * 1e3,
+            Self::Precision => forecast.precision.map_or(f64::NAN, |precision| precision * 1e3),
             Self::False => forecast.false_per_shot,
         }
     }

@@ -59,7 +59,7 @@ pub struct Place {
     /// Probability of detection, forecast and found.
     pub pd: [f64; 2],
     /// Standard deviation of the range, forecast and found, m; not found of few points.
-    pub precision_m: (f64, Option<f64>),
+    pub precision_m: (Option<f64>, Option<f64>),
     /// False and wrong points per shot, forecast and found.
     pub false_per_shot: [f64; 2],
 }
@@ -80,7 +80,8 @@ impl Place {
     /// Whether the precision is as forecast; `None` where it was not found.
     pub fn precision_holds(&self) -> Option<bool> {
         let (forecast, found) = self.precision_m;
-        found.map(|found| (forecast - found).abs() <= PRECISION_WITHIN * found)
+        let (forecast, found) = forecast.zip(found)?;
+        Some((forecast - found).abs() <= PRECISION_WITHIN * found)
     }
 }
 

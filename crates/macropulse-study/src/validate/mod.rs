@@ -31,6 +31,9 @@ pub enum Error {
     /// A ready sensor cannot work in a ready environment.
     #[error(transparent)]
     Operating(#[from] macropulse::channel::Error),
+    /// There is no forecast of a ready sensor.
+    #[error(transparent)]
+    Forecast(#[from] macropulse::predict::Error),
     /// A scan could not be made.
     #[error(transparent)]
     Simulation(#[from] macropulse::sim::Error),

@@ -83,7 +83,7 @@ fn place_cells(place: &Place) -> [String; 9] {
         share(place.pd[0]),
         share(place.pd[1]),
         said(place.pd_holds()).to_owned(),
-        millimetres(precision),
+        precision.map_or_else(|| "none".to_owned(), millimetres),
         found.map_or_else(|| "few".to_owned(), millimetres),
         place.precision_holds().map_or("", said).to_owned(),
     ]

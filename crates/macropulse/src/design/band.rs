@@ -58,7 +58,9 @@ impl Design {
 
     /// How far jitter, and the length of a micropulse, can displace a detection event, fs.
     pub fn most_jitter_fs(&self) -> i64 {
-        let most = MOST_SIGMA * (self.detector.model().jitter() + self.light.spread.unwrap_or(0.0));
+        let most = MOST_SIGMA
+            * (self.detector.model().jitter()
+                + self.light.spread_at(&self.detector).unwrap_or(0.0));
         (most * FS_PER_S as f64).ceil() as i64
     }
 

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::Error;
 use crate::names::nearest;
 use crate::told;
-use macropulse_codec::code::{self, Family};
+use macropulse_codec::code::{self, Family, Sparse};
 
 /// Code families by the names they have in a sensor file.
 pub(super) const FAMILIES: &[&str] = &[
@@ -63,8 +63,16 @@ pub(super) struct SparseFile {
     weight: u32,
     /// Number of words, up to 65535.
     words: u32,
+    /// From each mark to the next there are so many chips at least.
+    #[serde(default = "one")]
+    gap: u32,
     /// What the words are drawn by.
     seed: u64,
+}
+
+/// The gap that leaves marks as they fall.
+fn one() -> u32 {
+    1
 }
 
 /// The code family that a sensor file names.
@@ -77,8 +85,8 @@ pub(super) fn family(file: FamilyFile) -> Result<Family, code::Error> {
         FamilyFile::Orthogonal(OrthogonalFile { length, weight, words }) => {
             Family::orthogonal(length, weight, words)
         }
-        FamilyFile::Sparse(SparseFile { length, weight, words, seed }) => {
-            Family::sparse(length, weight, words, seed)
+        FamilyFile::Sparse(SparseFile { length, weight, words, gap, seed }) => {
+            Family::sparse(Sparse { length, weight, words, gap, seed })
         }
         FamilyFile::MSequence(degree) => Family::m_sequence(degree),
         FamilyFile::Gold(degree) => Family::gold(degree),
@@ -116,6 +124,7 @@ mod tests {
 
     #[test]
     fn every_family_can_be_written() {
+        let sparse = |gap| Family::sparse(Sparse { length: 99, weight: 3, words: 2, gap, seed: 4 });
         let texts = [
             ("prime=29", Family::prime(29)),
             ("extended-prime = 7", Family::extended_prime(7)),
@@ -123,7 +132,8 @@ mod tests {
             ("extended-quadratic-congruence=7", Family::extended_quadratic_congruence(7)),
             ("orthogonal={length=63,weight=3}", Family::orthogonal(63, 3, None)),
             ("orthogonal={length=63,weight=3,words=2}", Family::orthogonal(63, 3, Some(2))),
-            ("sparse={length=99,weight=3,words=2,seed=4}", Family::sparse(99, 3, 2, 4)),
+            ("sparse={length=99,weight=3,words=2,seed=4}", sparse(1)),
+            ("sparse={length=99,weight=3,words=2,gap=5,seed=4}", sparse(5)),
             ("m-sequence=5", Family::m_sequence(5)),
             ("gold=5", Family::gold(5)),
         ];

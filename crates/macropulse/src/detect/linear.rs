@@ -7,9 +7,10 @@
 //!    the noise does to the slope.
 //! 5. Between marks, noise crosses the threshold at the rate the threshold was set for.
 //!
-//! The light of one shot that comes within the response of the amplifier adds up. Light of several
-//! shots does not, and the walk of the crossing with the amplitude is taken to be calibrated out
-//! (docs/physics.md#linear).
+//! So it is where the list `idealised` names `inter-chip`: the light of one shot that comes within
+//! the response of the amplifier adds up, light of several shots does not, marks of one word that
+//! follow each other sooner are told apart, and the walk of the crossing with the amplitude is taken
+//! to be calibrated out. Else it is [`super::waveform`] (docs/physics.md#linear).
 
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
@@ -22,7 +23,7 @@ use crate::random::{Chance, Stage, Stream};
 use crate::units::fs_from_s;
 
 /// A mark of more photons than this is never below a threshold.
-const PLENTY: f64 = 1e12;
+pub(super) const PLENTY: f64 = 1e12;
 
 /// A linear detector and the crossings that its noise makes.
 #[derive(Debug)]
@@ -34,13 +35,13 @@ pub(super) struct Thresholding {
 }
 
 /// Light of one shot that comes within the response of the amplifier.
-struct Together {
+pub(super) struct Together {
     /// The first of the pulse trains.
-    train: usize,
+    pub train: usize,
     /// How much later the mean of their light comes, fs.
-    later_fs: i64,
+    pub later_fs: i64,
     /// Photons of all of them, per mark.
-    photons: f64,
+    pub photons: f64,
 }
 
 impl Thresholding {
@@ -57,7 +58,8 @@ impl Kind for Thresholding {
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         let mut events: Vec<(u32, f32)> = Vec::new();
         let span = channel.whole_span();
-        for Together { train, later_fs, photons } in self.gather(channel) {
+        let response_fs = fs_from_s(self.linear.response);
+        for Together { train, later_fs, photons } in gather(channel, response_fs) {
             let mut stream = chance.at(Stage::Photons, channel.light.trains.address(train));
             let photons = Poisson::new(photons.min(PLENTY)).ok();
             for mark_fs in channel.light.arrivals_fs(train) {
@@ -82,39 +84,36 @@ impl Kind for Thresholding {
     }
 }
 
-impl Thresholding {
-    /// The pulse trains of a channel, those of one shot that the amplifier cannot tell apart as
-    /// one.
-    fn gather(&self, channel: &Channel) -> Vec<Together> {
-        let trains = &channel.light.trains;
-        let mut order: Vec<usize> =
-            channel.order.iter().map(|arrival| *arrival as u32 as usize).collect();
-        let whose =
-            |train: usize| (trains.transmitter[train], trains.shot[train], trains.marks[train]);
-        let begins = |train: usize| trains.arrives_fs[train];
-        order.sort_by_key(|&train| (whose(train), begins(train)));
-        let response_fs = fs_from_s(self.linear.response);
-        let mut together = Vec::new();
-        let mut rest = order.as_slice();
-        while let Some(&first) = rest.first() {
-            let is_with = |train: &usize| {
-                whose(*train) == whose(first) && begins(*train) <= begins(first) + response_fs
-            };
-            let count = rest.iter().take_while(|train| is_with(train)).count();
-            let (one, others) = rest.split_at(count);
-            let photons: f64 = one.iter().map(|&train| trains.photons[train]).sum();
-            let later = |&train: &usize| {
-                (begins(train) - begins(first)) as f64 * (trains.photons[train] / photons)
-            };
-            // A detector that never misses has no end of photons.
-            let later: f64 = one.iter().map(later).sum();
-            let later_fs = if later.is_finite() { later as i64 } else { 0 };
-            together.push(Together { train: first, later_fs, photons });
-            rest = others;
-        }
-        together
+/// The pulse trains of a channel, those of one shot that begin within `within_fs` as one.
+pub(super) fn gather(channel: &Channel, within_fs: i64) -> Vec<Together> {
+    let trains = &channel.light.trains;
+    let mut order: Vec<usize> =
+        channel.order.iter().map(|arrival| *arrival as u32 as usize).collect();
+    let whose = |train: usize| (trains.transmitter[train], trains.shot[train], trains.marks[train]);
+    let begins = |train: usize| trains.arrives_fs[train];
+    order.sort_by_key(|&train| (whose(train), begins(train)));
+    let mut together = Vec::new();
+    let mut rest = order.as_slice();
+    while let Some(&first) = rest.first() {
+        let is_with = |train: &usize| {
+            whose(*train) == whose(first) && begins(*train) <= begins(first) + within_fs
+        };
+        let count = rest.iter().take_while(|train| is_with(train)).count();
+        let (one, others) = rest.split_at(count);
+        let photons: f64 = one.iter().map(|&train| trains.photons[train]).sum();
+        let later = |&train: &usize| {
+            (begins(train) - begins(first)) as f64 * (trains.photons[train] / photons)
+        };
+        // A detector that never misses has no end of photons.
+        let later: f64 = one.iter().map(later).sum();
+        let later_fs = if later.is_finite() { later as i64 } else { 0 };
+        together.push(Together { train: first, later_fs, photons });
+        rest = others;
     }
+    together
+}
 
+impl Thresholding {
     /// How late, fs, a mark of `count` detected photons crosses the threshold, and its amplitude;
     /// `None` if it does not.
     fn crossing(&self, count: f64, stream: &mut Stream) -> Option<(i64, f64)> {
@@ -139,7 +138,8 @@ mod tests {
     /// are seven. N = 8 marks of one shot, seed 1.
     #[test]
     fn light_that_comes_together_adds_up() {
-        let quiet = [("detector.linear.false_alarm_hz".to_owned(), "1.0".to_owned())];
+        let quiet = [("detector.linear.false_alarm_hz", "1.0"), ("without", "inter-chip")];
+        let quiet = quiet.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let design = Design::open("coded-practical", &quiet).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);
         let shot = log.owned.start;

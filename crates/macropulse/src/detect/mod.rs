@@ -14,6 +14,7 @@ mod noise;
 mod photon_counting;
 mod shape;
 mod single_stop;
+mod waveform;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -29,6 +30,7 @@ use linear::Thresholding;
 use marks::ExactWords;
 use photon_counting::Counting;
 use shape::Shape;
+use waveform::Waveform;
 
 use crate::channel::{Light, Operating};
 use crate::design::{Design, Detector};
@@ -89,7 +91,11 @@ impl<'a> Detectors<'a> {
             Detector::PhotonCounting(counting) => Box::new(Counting::new(counting, design)),
             Detector::Geiger(geiger) => Box::new(Cells::new(geiger)),
             Detector::Linear(linear) => {
-                Box::new(Thresholding::new(linear.setting(sunlight), design))
+                let setting = linear.setting(sunlight);
+                match setting.comparator {
+                    Some(comparator) => Box::new(Waveform::new(setting, comparator, design)),
+                    None => Box::new(Thresholding::new(setting, design)),
+                }
             }
             Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
         };

@@ -22,10 +22,10 @@ pub(super) struct Shape {
 
 impl Shape {
     /// The micropulse of a sensor whose light is followed beyond its chip: its detector sees every
-    /// photon by itself, or the sensor would have had to declare `inter-chip` as left out. `None` for
-    /// the others.
+    /// photon by itself. `None` for the others, of which a linear one follows what the pulse becomes
+    /// behind its amplifier.
     pub fn of(design: &Design) -> Option<Self> {
-        let rms = design.light.spread?;
+        let rms = design.light.spread_at(&design.detector)?;
         let width = FINEST * rms;
         let reach = (FARTHEST * rms / width).ceil() as i64;
         let below = |place: f64| normal_tail(-place * width / rms);

@@ -101,6 +101,7 @@ fn spread(counts: &[u64]) -> (f64, f64) {
 mod tests {
     use super::super::multiple_access::{Words, bit_error_soft};
     use super::*;
+    use macropulse_codec::code::Sparse;
     use macropulse_codec::code::correlation::CrossCorrelation;
 
     #[test]
@@ -129,7 +130,10 @@ mod tests {
 
     #[test]
     fn of_a_large_family_the_first_words_are_compared() {
-        let found = Comparison::of(Family::sparse(10_933, 32, 4096, 1).unwrap());
+        let found = Comparison::of(
+            Family::sparse(Sparse { length: 10_933, weight: 32, words: 4096, gap: 1, seed: 1 })
+                .unwrap(),
+        );
         assert_eq!((found.compared, found.matrix.len()), (105, 105 * 105));
         assert!(found.users(4096).is_some());
     }

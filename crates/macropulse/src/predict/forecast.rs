@@ -5,13 +5,37 @@
 
 use std::collections::BTreeMap;
 
+use macropulse_codec::decode::ReceiverKind;
+
 use super::converters::bank_loss;
-use super::matched;
-use crate::channel::{Error, Operating};
+use super::{balanced, matched};
+use crate::channel::{self, Operating};
 use crate::design::detector::{Awaited, Lit};
-use crate::design::{Design, Tdc};
+use crate::design::{Design, Detector, Tdc};
 use crate::environment::Environment;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
+
+/// There is no forecast of a sensor: why, and what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// It cannot be simulated in the environment either.
+    #[error(transparent)]
+    Operating(#[from] channel::Error),
+    /// It can be simulated, but what becomes of its light has no closed form here.
+    #[error("{sensor}: there is no forecast of {what}: {remedy}")]
+    NotModelled {
+        /// The sensor.
+        sensor: String,
+        /// What has no closed form.
+        what: &'static str,
+        /// What to do instead.
+        remedy: String,
+    },
+}
+
+/// Over the threshold, the amplitude at which the marks of a word must be told apart for there to be a
+/// forecast: marks that are just seen, and twice as bright.
+const TOLD_APART: f64 = 2.0;
 
 /// A sensor in an environment, perhaps with more or less light than it has.
 #[derive(Debug, Clone)]
@@ -28,6 +52,9 @@ pub struct Forecaster<'a> {
     /// Factor on the dark and background counts.
     background: f64,
 }
+
+/// Fewer returns than one in so many shots have no precision.
+const FEWEST: f64 = 1e6;
 
 /// What is to be expected of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,8 +81,9 @@ pub struct Forecast {
     pub pd: f64,
     /// False returns per shot that meets nothing.
     pub false_per_shot: f64,
-    /// Standard deviation of the range, m.
-    pub precision: f64,
+    /// Standard deviation of the range of returns, m; `None` where there are next to none, fewer than
+    /// one in [`FEWEST`].
+    pub precision: Option<f64>,
     /// The least that any unbiased estimate could have from as many photons, m: c/2·σ/√n, σ the
     /// rms length of a micropulse with the jitter.
     pub bound: f64,
@@ -65,9 +93,13 @@ impl<'a> Forecaster<'a> {
     /// The sensor as it is, in `environment`.
     ///
     /// # Errors
-    /// As [`Operating::of`].
+    /// As [`Operating::of`]; for the receivers that decide bit by bit; and where marks of a code word
+    /// follow each other so soon that they are one to the detector.
     pub fn new(design: &'a Design, environment: &Environment) -> Result<Self, Error> {
         let operating = Operating::of(design, environment)?;
+        if let Some((what, remedy)) = not_modelled(design, &operating) {
+            return Err(Error::NotModelled { sensor: design.name.clone(), what, remedy });
+        }
         let codebook = &design.coding.codebook;
         let mut weights = BTreeMap::new();
         let sent = (0..codebook.labels() as u16)
@@ -124,14 +156,21 @@ impl<'a> Forecaster<'a> {
         // then makes the rest no clearer.
         let density = -libm::expm1(-(false_events + own) * place.width);
         let seen = place.seen(design, &mark) * (1.0 - loss);
-        let mark_pd = 1.0 - (1.0 - seen) * (1.0 - density);
+        // Shots that meet the same range overlap where a macropulse is longer than the time to the next.
+        let false_density = -libm::expm1(-false_events * place.width);
+        let codebook = &design.coding.codebook;
+        let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
+        let at_the_lag = if macropulse <= channel_period { false_density } else { density };
+        let mark_pd = 1.0 - (1.0 - seen) * (1.0 - at_the_lag);
 
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
         let (pd, false_per_shot) = match design.is_coded() {
             true => {
-                let false_density = -libm::expm1(-false_events * place.width);
                 let found = matched::Found { seen: mark_pd, density, false_density };
-                matched::chances(design, operating.background, &self.weights, &found)
+                match design.receiver.kind {
+                    ReceiverKind::Balanced => balanced::chances(design, &self.weights, &found),
+                    _ => matched::chances(design, operating.background, &self.weights, &found),
+                }
             }
             // The first event in the gate is taken.
             false => {
@@ -170,7 +209,7 @@ impl<'a> Forecaster<'a> {
             },
             pd,
             false_per_shot,
-            precision: timing.precision(marks_seen),
+            precision: (pd * FEWEST >= 1.0).then(|| timing.precision(marks_seen)),
             bound: SPEED_OF_LIGHT / 2.0 * timing.spread / photons.sqrt(),
         }
     }
@@ -202,6 +241,42 @@ impl<'a> Forecaster<'a> {
             found => Some(found.unwrap_or(farthest)),
         }
     }
+}
+
+/// What of `design` where it is `operating` has no closed form, and what to do instead.
+fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str, String)> {
+    if design.is_coded()
+        && !matches!(design.receiver.kind, ReceiverKind::Matched | ReceiverKind::Balanced)
+    {
+        return Some((
+            "receivers that decide bit by bit",
+            "simulate it, or --set receiver.kind='\"matched\"'".to_owned(),
+        ));
+    }
+    let Detector::Linear(linear) = &design.detector else { return None };
+    let setting = linear.setting(operating.background);
+    let needed = setting.comparator?.apart(&setting, TOLD_APART * setting.threshold);
+    let codebook = &design.coding.codebook;
+    let labels = 0..codebook.labels() as u16;
+    let sent = labels.flat_map(|label| (0..codebook.words() as u16).map(move |word| (label, word)));
+    let gaps = sent.filter_map(|(label, word)| {
+        codebook.marks(label, word).windows(2).map(|pair| pair[1] - pair[0]).min()
+    });
+    let least = s_from_fs(i64::from(gaps.min()?) * design.coding.chip_fs);
+    let chip = s_from_fs(design.coding.chip_fs);
+    (least < needed).then(|| {
+        (
+            "marks that merge behind the amplifier",
+            format!(
+                "marks of a word follow each other by {:.0} ps and are told apart from {:.0} ps on; \
+                 simulate it, or take a code with {:.0} chips from mark to mark, as a sparse one \
+                 with this `gap`",
+                least * 1e12,
+                needed * 1e12,
+                (needed / chip).ceil()
+            ),
+        )
+    })
 }
 
 /// The least number from `low` to `high` of which `holds` is true, to a part in a million, if it

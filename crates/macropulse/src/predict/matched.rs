@@ -54,7 +54,7 @@ impl Place {
     /// Probability that a mark is found where it is looked for. Photons of a micropulse that
     /// reaches beyond its chip fall there or not each by itself; else its one event does.
     pub fn seen(&self, design: &Design, mark: &Lit) -> f64 {
-        match design.light.spread {
+        match design.light.spread_at(&design.detector) {
             Some(_) => pd_of_share(design, mark, self.share),
             None => pd_of_share(design, mark, 1.0) * self.share,
         }
@@ -68,7 +68,9 @@ fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
 
 /// Ticks that a mark lights on average, each with the share of the light that falls into it.
 pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
-    let Some(spread) = design.light.spread else { return pd_of_share(design, mark, 1.0) };
+    let Some(spread) = design.light.spread_at(&design.detector) else {
+        return pd_of_share(design, mark, 1.0);
+    };
     let width = spread / s_from_fs(design.tdc.tick_fs);
     let below = |place: f64| normal_tail(-place / width);
     let farthest = (4.0 * 2_f64.sqrt() * width).ceil() as i32;
@@ -109,6 +111,12 @@ pub(super) fn chances(
     sums
 }
 
+/// Places of the gate at which a macropulse may begin.
+pub(super) fn lags(design: &Design) -> f64 {
+    let (nearest, farthest) = design.receiver.gate_ticks;
+    f64::from(farthest - nearest) + 1.0
+}
+
 /// What the threshold depends on beside the light.
 struct Gate {
     /// Places at which a macropulse may begin.
@@ -124,8 +132,7 @@ const MANY: f64 = 100.0;
 
 impl Gate {
     fn of(design: &Design, background: f64) -> Self {
-        let (nearest, farthest) = design.receiver.gate_ticks;
-        let lags = f64::from(farthest - nearest) + 1.0;
+        let lags = lags(design);
         let tick = s_from_fs(design.tdc.tick_fs);
         let of_one_photon = Lit { photons: 1.0, background, falling: 0.0 };
         let chips = i64::from(design.coding.codebook.chips());

@@ -1,7 +1,8 @@
 //! Closed form: what theory says a simulation will measure.
 
 pub mod comparison;
-pub mod converters;
+mod balanced;
+mod converters;
 mod forecast;
 pub mod interference;
 pub mod link;
@@ -10,4 +11,4 @@ pub mod multiple_access;
 pub mod ranging;
 pub mod verdict;
 
-pub use forecast::{Forecast, Forecaster};
+pub use forecast::{Error, Forecast, Forecaster};

@@ -7,7 +7,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::sent::{Sent, Words};
 use super::{Band, Memory, decode};
-use crate::code::{Codebook, Crc, Family, Keying, Payload};
+use crate::code::{Codebook, Crc, Family, Keying, Payload, Sparse};
 use crate::decode::field::Source;
 use crate::decode::{Effort, Pick, Receiver, Returns};
 use crate::{ShotLog, Ticks};
@@ -57,7 +57,7 @@ fn books() -> Vec<Codebook> {
         Family::quadratic_congruence(11),
         Family::extended_quadratic_congruence(7),
         Family::orthogonal(120, 4, None),
-        Family::sparse(120, 9, 11, 1),
+        Family::sparse(Sparse { length: 120, weight: 9, words: 11, gap: 1, seed: 1 }),
         Family::gold(5),
         Family::gold(7),
     ];

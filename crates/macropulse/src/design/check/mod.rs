@@ -170,8 +170,9 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
     // Without a detector the receiver has no timing, of which none of its limits depends.
-    let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
-    let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
+    let timing = detector.as_ref().map_or(0.0, |detector| {
+        libm::hypot(detector.model().jitter(), light.spread_at(detector).unwrap_or(0.0))
+    });
     let inputs =
         Inputs { detector: &file.detector, scan: &scan, tdc: &tdc, coding: &coding, timing };
     let receiver = faults.keep(check.receiver(&file.receiver, &inputs));

@@ -9,6 +9,7 @@
 
 mod amplifier;
 mod check;
+mod comparator;
 mod geiger;
 mod linear;
 mod photon_counting;
@@ -20,6 +21,9 @@ use serde::Deserialize;
 
 pub use amplifier::Amplifier;
 pub(in crate::design) use check::Efficiency;
+pub use comparator::{
+    Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, Timing,
+};
 pub use geiger::Geiger;
 pub use linear::{Linear, LinearSetting};
 pub use photon_counting::PhotonCounting;
