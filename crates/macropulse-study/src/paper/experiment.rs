@@ -46,7 +46,7 @@ pub struct Trial {
     pub stands: f64,
     /// Depth of the lower edge of the field below the sensor, at the car's front, m.
     pub edge: f64,
-    /// Mean range error of the points on the car, m; NaN without one.
+    /// Median range error of the points on the car, m; NaN without one.
     pub bias: f64,
     /// Root of their mean squared range error, m; NaN without one.
     pub error: f64,
@@ -130,7 +130,8 @@ pub(super) fn trial(
     })
 }
 
-/// Mean of the range errors of the points on the car, and the root of their mean square, m.
+/// Median of the range errors of the points on the car, which those that stand on a sidelobe of the
+/// code do not move, and the root of their mean square, m.
 fn range_errors(cloud: &PointCloud, scene: &Scene) -> (f64, f64) {
     let truth = &cloud.truth.returns;
     let on_car = (0..cloud.range.len()).filter(|&at| {
@@ -138,10 +139,11 @@ fn range_errors(cloud: &PointCloud, scene: &Scene) -> (f64, f64) {
             && is_target(scene, truth.object[at])
     });
     let off = |at: usize| f64::from(cloud.range[at]) - f64::from(truth.range[at]);
-    let errors: Vec<f64> = on_car.map(off).collect();
-    let count = errors.len() as f64;
+    let mut errors: Vec<f64> = on_car.map(off).collect();
+    errors.sort_by(f64::total_cmp);
+    let median = errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN);
     let squares = errors.iter().map(|error| error * error).sum::<f64>();
-    (errors.iter().sum::<f64>() / count, (squares / count).sqrt())
+    (median, (squares / errors.len() as f64).sqrt())
 }
 
 /// Name of the folder of a trial.

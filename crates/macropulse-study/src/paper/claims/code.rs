@@ -103,15 +103,14 @@ pub(super) fn words(words: &Words, timing: &Timing) -> Vec<Claim> {
             "Spreading resists intentional and unintentional interference",
             "greater resistance",
         )
-        .holds_if(
+        .holds_or_partly(
+            timing.noise_printed > timing.noise_first && timing.noise_matched > timing.noise_first,
             timing.noise_matched > timing.noise_first,
             format!(
-                "before an echo from {:.0} m a receiver that takes the first detection bears {:.0} \
-                 false ones per \u{b5}s, one that matches whole macropulses {:.1e}. The receiver as \
-                 printed starts at the first mark, and is of the former kind",
-                timing.rated_range,
-                timing.noise_first * 1e-6,
-                timing.noise_matched * 1e-6
+                "nine of ten echoes from {:.0} m are still found beside {:.1e} false detections per \
+                 second if a receiver takes the first one, {:.1e} if the first opens a macropulse, \
+                 as printed, {:.1e} if whole macropulses are matched",
+                timing.rated_range, timing.noise_first, timing.noise_printed, timing.noise_matched
             ),
         ),
         said(

@@ -55,7 +55,7 @@ fn proposal(measured: &Measured) -> Vec<Claim> {
         .holds_or_partly(
             dark == 0,
             dark < payloads.columns as usize,
-            format!("all columns but {dark} of {}, without any light", payloads.columns),
+            format!("{dark} of {} columns without any light", payloads.columns),
         ),
         said(
             "end-mirror",

@@ -185,8 +185,8 @@ pub(super) fn head(found: &Head) -> Vec<Claim> {
             found.at_once == 64,
             lasers == 64,
             format!(
-                "{lasers} lasers, of which {} fire at a time; from the first to the last of an \
-                 azimuth step {:.0} \u{b5}s go by",
+                "{lasers} lasers, in our preset {} at a time; from the first to the last of an azimuth \
+                 step {:.0} \u{b5}s go by",
                 found.at_once,
                 found.in_turn * 1e6
             ),

@@ -40,7 +40,7 @@ pub struct Seen {
     pub stands: f64,
     /// Height of the lower edge of the field below the sensor, at the car.
     pub edge: f64,
-    /// Mean range error of the points on the car; NaN without one.
+    /// Median range error of the points on the car; NaN without one.
     pub bias: f64,
     /// Root of their mean squared range error; NaN without one.
     pub error: f64,

@@ -53,7 +53,7 @@ impl OnPaper {
             words: Words::of(design)?,
             payloads: Payloads::of(design),
             equations: Equations::of(design),
-            timing: Timing::of(design)?,
+            timing: Timing::of(design),
             converters: Converters::of(design),
             light: Light::of(design)?,
             head: Head::of(&Design::open("hdl-64e", &[])?),

@@ -53,7 +53,7 @@ impl Outlook {
             let [right, left] = design.scan.extent().azimuth;
             left - right
         };
-        let (walsh_in_step, walsh) = greatest(&walsh_words());
+        let (walsh_in_step, walsh) = greatest(&walsh_words(), 64);
         let gold: Vec<Signs> = slow.coding.codebook.family().words().iter().map(signs).collect();
         Ok(Self {
             field: width(design),
@@ -64,46 +64,41 @@ impl Outlook {
             practical_macropulse: derived.macropulse / derived.pixel_period,
             practical_words: derived.unambiguous_range.unwrap_or(f64::INFINITY),
             slower: slow.coding.chip_fs as f64 / design.coding.chip_fs as f64,
-            gold: greatest(&gold).1,
+            gold: greatest(&gold, slow.coding.codebook.family().length()).1,
             walsh_in_step,
             walsh,
         })
     }
 }
 
-/// Words as +1 and −1.
-type Signs = Vec<i32>;
+/// A word of some length as bits: its lit chips are −1, the others +1.
+type Signs = u128;
 
-/// The greatest correlation of two different words over their length: without a delay, and at any.
-fn greatest(words: &[Signs]) -> (f64, f64) {
+/// The greatest correlation of two different words of `length` chips over that length: without a
+/// delay, and at any.
+fn greatest(words: &[Signs], length: u32) -> (f64, f64) {
+    let whole = (1 << length) - 1;
+    let met = |own: Signs, other: Signs| length.abs_diff(2 * (own ^ other).count_ones());
     let (mut in_step, mut at_any) = (0, 0);
-    for (i, own) in words.iter().enumerate() {
-        // Twice, so that it goes on behind its end.
-        let round = [own.as_slice(), own].concat();
-        for other in &words[..i] {
-            for delay in 0..own.len() {
-                let shifted = &round[delay..delay + own.len()];
-                let met = shifted.iter().zip(other).map(|(a, b)| a * b).sum::<i32>().abs();
-                at_any = at_any.max(met);
-                if delay == 0 {
-                    in_step = in_step.max(met);
-                }
+    for (i, &own) in words.iter().enumerate() {
+        for &other in &words[..i] {
+            in_step = in_step.max(met(own, other));
+            let mut shifted = own;
+            for _ in 0..length {
+                at_any = at_any.max(met(shifted, other));
+                shifted = (shifted << 1 | shifted >> (length - 1)) & whole;
             }
         }
     }
-    let length = words.first().map_or(1, Vec::len) as f64;
-    (f64::from(in_step) / length, f64::from(at_any) / length)
+    (f64::from(in_step) / f64::from(length), f64::from(at_any) / f64::from(length))
 }
 
-/// Lit chips as −1, dark ones as +1.
 fn signs(word: &CodeWord) -> Signs {
-    let mut signs = vec![1; word.length as usize];
-    word.marks.iter().for_each(|&mark| signs[usize::from(mark)] = -1);
-    signs
+    word.marks.iter().fold(0, |signs, mark| signs | 1 << mark)
 }
 
 /// The 64 Walsh words of 64 chips: chip n of word k is −1 if k and n share an odd number of bits.
 fn walsh_words() -> Vec<Signs> {
-    let sign = |k: u32, n: u32| if (k & n).count_ones() % 2 == 1 { -1 } else { 1 };
-    (0..64).map(|k| (0..64).map(|n| sign(k, n)).collect()).collect()
+    let sign = |k: u32, n: u32| Signs::from((k & n).count_ones() % 2);
+    (0..64).map(|k| (0..64).fold(0, |signs, n| signs | sign(k, n) << n)).collect()
 }

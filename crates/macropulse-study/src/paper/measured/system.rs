@@ -63,21 +63,19 @@ pub struct Timing {
     /// False detections per second with which a receiver that takes the first one still finds nine
     /// echoes of ten at the rated range.
     pub noise_first: f64,
+    /// The same of one that takes the first mark for the beginning of a macropulse: none may come
+    /// within a macropulse before the echo.
+    pub noise_printed: f64,
     /// The same of one that matches whole macropulses, of those with the fewest marks.
     pub noise_matched: f64,
 }
 
 impl Timing {
-    pub(super) fn of(design: &Design) -> Result<Self, Error> {
+    pub(super) fn of(design: &Design) -> Self {
         let derived = design.derived();
         let tick = s_from_fs(design.tdc.tick_fs);
-        let resonant = [
-            ("scan.raster.mirror".to_owned(), "sinusoidal".to_owned()),
-            ("scan.raster.duty".to_owned(), "1.0".to_owned()),
-        ];
-        let resonant = Design::open("kim-park-2016", &resonant)?;
         let columns = f64::from(design.scan.columns);
-        Ok(Self {
+        Self {
             pixel_period: derived.pixel_period,
             gate: derived.gate,
             rated_range: design.scan.rated_range,
@@ -93,11 +91,12 @@ impl Timing {
             clock: s_from_fs(design.tdc.clock_fs),
             conversion_range: f64::from(1 << CONVERTER_BITS) * tick,
             scan: design.scan_period(),
-            resonant_dwell: resonant.derived().shortest_dwell,
+            resonant_dwell: derived.pixel_period * 2.0 / PI,
             chip_rate: 1.0 / s_from_fs(design.coding.chip_fs),
             noise_first: -libm::log(0.9) / derived.gate,
+            noise_printed: -libm::log(0.9) / derived.macropulse,
             noise_matched: -libm::log1p(-bearable(derived.marks.0, derived.gate / tick)) / tick,
-        })
+        }
     }
 }
 
