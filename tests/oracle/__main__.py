@@ -14,6 +14,7 @@ QUESTIONS = {
     "field": link.field,
     "seen": counting.seen,
     "of-sensitivity": counting.of_sensitivity,
+    "seen-by-cells": counting.seen_by_cells,
     "fired": counting.fired,
     "fired-drawn": counting.fired_drawn,
     "payloads": lambda labels, **how: [words.payload(label, **how) for label in labels],

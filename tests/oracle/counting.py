@@ -18,6 +18,13 @@ def fired(rate_hz, cells, dead_s):
     return rate_hz / (1.0 + rate_hz * dead_s / cells)
 
 
+def seen_by_cells(photons, rate_hz, cells, dead_s):
+    """Probability that a mark fires one cell at least, each of which waits for its share of it."""
+    waiting = 1.0 / (1.0 + rate_hz * dead_s / cells)
+    fires = waiting * -np.expm1(-photons / cells)
+    return 1.0 - (1.0 - fires) ** cells
+
+
 def fired_drawn(rate_hz, cells, dead_s, lasts_s, seed):
     """The same, count by count: each falls on a cell, which fires if it has waited long enough."""
     chance = np.random.default_rng(seed)

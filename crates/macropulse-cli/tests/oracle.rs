@@ -7,7 +7,7 @@
 
 mod common;
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -168,6 +168,44 @@ mod counting {
             // A detector that misses nothing else would be noticed.
             assert!((found - seen(0.0)).abs() > four);
         }
+    }
+
+    /// Four cells, half of them blind by their dark counts, and shots of one mark.
+    #[test]
+    fn cells_see_a_mark_if_one_that_waits_does() {
+        let desk = Desk::new();
+        desk.put(
+            "cells.toml",
+            "version = 1\nname = \"cells\"\nextends = \"kim-park-2016\"\n[code]\nlabel = \"none\"\n\
+             family = { sparse = { length = 2, weight = 1, words = 2, seed = 1 } }\n\
+             word = { first = 0, modulus = 2 }\n[detector.geiger]\ncells = 4\ndead_time_ns = 20\n\
+             sensitivity = { range_m = 50.0, reflectance = 1.0, pd = 0.9 }\ndark_counts_hz = 2e8\n",
+        );
+        let ran = desk.run(&format!("simulate --sensor cells.toml --scene wall {NARROW} -o one"));
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        let numbers = |file: &str| -> Vec<Vec<i64>> {
+            let text = fs::read_to_string(desk.path().join(file)).unwrap();
+            let number = |number: &str| number.parse().unwrap();
+            text.lines().skip(2).map(|line| line.split(',').map(number).collect()).collect()
+        };
+        let ticks: BTreeSet<i64> =
+            numbers("one/ticks-000000.csv").iter().map(|tick| tick[0]).collect();
+        let flight = (2.0 * 50.0 / 299_792_458.0 / 2.5e-12) as i64;
+        // The mark is on the first or the second chip; a dark count in these ticks comes once in
+        // a thousand shots.
+        let is_seen = |shot: &&Vec<i64>| {
+            let expected = shot[1] / 2500 + flight;
+            ticks.range(expected - 1..expected + 4).next().is_some()
+        };
+        let shots = numbers("one/shots-000000.csv");
+        let seen = shots.iter().filter(is_seen).count() as f64 / shots.len() as f64;
+        let photons = -0.1_f64.ln();
+        let given = json!({ "photons": photons, "rate_hz": 2e8, "cells": 4, "dead_s": 20e-9 });
+        let expected = ask(&desk, "seen-by-cells", &given).as_f64().unwrap();
+        let four = 4.0 * (expected * (1.0 - expected) / shots.len() as f64).sqrt();
+        assert!((seen - expected).abs() < four, "{seen}, the oracle {expected}");
+        // Light that is halved instead of cells would be noticed.
+        assert!((seen + (-photons / 2.0).exp_m1()).abs() > four);
     }
 
     /// As many counts as the cells could bear between them, and ten times as many.
