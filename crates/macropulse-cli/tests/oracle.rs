@@ -1,8 +1,8 @@
 //! A second opinion: `tests/oracle` works out in NumPy, from the equations alone, what the program
 //! must say, and both are compared.
 //!
-//! Arithmetic agrees to rounding; what is drawn agrees to four standard errors; what is decoded from
-//! clean light agrees to a tick, shot by shot.
+//! Arithmetic agrees to rounding; what is drawn, to four standard errors; what is decoded from clean
+//! light, to a tick, shot by shot.
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 mod common;
@@ -321,18 +321,22 @@ mod ranges {
     const SENSOR: &str =
         "kim-park-2016-fixed --set scan.raster.rows=2 --set scan.scans_per_s=14400";
 
-    /// Range of every point of a cloud in text, by row and column.
-    fn points(desk: &Desk, cloud: &str) -> HashMap<(u64, u64), f64> {
+    /// Range and marks found of every point, by row and column.
+    type Points = HashMap<(u64, u64), (f64, u64)>;
+
+    /// Those of a cloud in text.
+    fn points(desk: &Desk, cloud: &str) -> Points {
         let text = fs::read_to_string(desk.path().join(cloud)).unwrap();
         let mut lines = text.lines();
         let names: Vec<&str> = lines.next().unwrap().split(',').collect();
         let at = |name: &str| names.iter().position(|known| *known == name).unwrap();
-        let (row, column, range) = (at("row"), at("column"), at("range_m"));
+        let (row, column) = (at("row"), at("column"));
+        let (range, peak) = (at("range_m"), at("peak"));
         lines
             .map(|line| {
                 let cells: Vec<&str> = line.split(',').collect();
                 let pixel = (cells[row].parse().unwrap(), cells[column].parse().unwrap());
-                (pixel, cells[range].parse().unwrap())
+                (pixel, (cells[range].parse().unwrap(), cells[peak].parse().unwrap()))
             })
             .collect()
     }
@@ -343,17 +347,19 @@ mod ranges {
         ask(desk, "ranges", &given).as_array().unwrap().clone()
     }
 
-    /// Shots of the oracle, and how many of them the program has at the same range, to `ticks`.
-    fn agreed(points: &HashMap<(u64, u64), f64>, found: &[Value], ticks: f64) -> usize {
+    /// How many shots of the oracle the program has at the same range, to a tick, by as many marks.
+    fn agreed(points: &Points, found: &[Value]) -> usize {
         let agrees = |shot: &&Value| {
             let pixel = (shot["row"].as_u64().unwrap(), shot["column"].as_u64().unwrap());
             let range = shot["range_m"].as_f64().unwrap();
-            points.get(&pixel).is_some_and(|point| (point - range).abs() <= ticks * TICK_M)
+            points.get(&pixel).is_some_and(|(point, peak)| {
+                (point - range).abs() <= TICK_M && shot["lit"] == *peak
+            })
         };
         found.iter().filter(agrees).count()
     }
 
-    fn decode(desk: &Desk, folder: &str) -> HashMap<(u64, u64), f64> {
+    fn decode(desk: &Desk, folder: &str) -> Points {
         let files = format!("{folder}/shots-000000.csv {folder}/ticks-000000.csv");
         desk.json(&format!(
             "decode --sensor {SENSOR} {files} --format csv -o {folder}-again --json"
@@ -370,7 +376,7 @@ mod ranges {
         let (shots, ticks) = ("wall/shots-000000.csv", "wall/ticks-000000.csv");
         let found = found(&desk, shots, ticks, 8);
         assert_eq!(found.len(), 212);
-        assert_eq!(agreed(&points, &found, 1.0), found.len());
+        assert_eq!(agreed(&points, &found), found.len());
         for shot in &found {
             assert_eq!(shot["lit"], shot["marks"], "{shot}");
             assert!((shot["range_m"].as_f64().unwrap() - 61.7).abs() <= TICK_M, "{shot}");
@@ -384,9 +390,9 @@ mod ranges {
         street(&desk, "clean", "pd=1.0", "0", "0");
         let points = decode(&desk, "clean");
         let found = found(&desk, "clean/shots-000000.csv", "clean/ticks-000000.csv", 8);
-        let clear: Vec<Value> = found.iter().filter(|shot| is_clear(shot)).cloned().collect();
+        let clear: Vec<Value> = found.iter().filter(is_clear).cloned().collect();
         assert!(clear.len() > 205, "{} of {}", clear.len(), found.len());
-        assert_eq!(agreed(&points, &clear, 1.0), clear.len());
+        assert_eq!(agreed(&points, &clear), clear.len());
     }
 
     /// A fifth of the marks missed, a thousand false ticks in every microsecond.
@@ -397,9 +403,9 @@ mod ranges {
         let points = decode(&desk, "noise");
         let (shots, ticks) = ("noise/shots-000000.csv", "noise/ticks-000000.csv");
         let all = found(&desk, shots, ticks, 8);
-        let clear: Vec<Value> = all.iter().filter(|shot| is_clear(shot)).cloned().collect();
+        let clear: Vec<Value> = all.iter().filter(is_clear).cloned().collect();
         assert!(clear.len() > 205, "{} of {}", clear.len(), all.len());
-        let both = agreed(&points, &clear, 2.0);
+        let both = agreed(&points, &clear);
         assert!(both * 50 >= clear.len() * 49, "{both} of {}", clear.len());
         controls(&desk, &points, (shots, ticks), both);
     }
@@ -412,12 +418,7 @@ mod ranges {
 
     /// What is wrong with the files is noticed: ticks that come seven ticks late, words of the shots
     /// beside them.
-    fn controls(
-        desk: &Desk,
-        points: &HashMap<(u64, u64), f64>,
-        (shots, ticks): (&str, &str),
-        both: usize,
-    ) {
+    fn controls(desk: &Desk, points: &Points, (shots, ticks): (&str, &str), both: usize) {
         let edited = |from: &str, to: &str, edit: &dyn Fn(&mut Vec<i64>)| {
             let text = fs::read_to_string(desk.path().join(from)).unwrap();
             let line = |line: &str| {
@@ -432,10 +433,10 @@ mod ranges {
         };
         edited(ticks, "late.csv", &|tick| tick[0] += 7);
         let late = found(desk, shots, "late.csv", 8);
-        assert!(agreed(points, &late, 2.0) * 20 < both);
+        assert!(agreed(points, &late) * 20 < both);
         edited(shots, "mixed.csv", &|shot| shot[5] = 1 + shot[5] % 28);
         let mixed = found(desk, "mixed.csv", ticks, 8);
-        assert!(agreed(points, &mixed, 2.0) * 20 < both);
+        assert!(agreed(points, &mixed) * 20 < both);
     }
 
     /// Two rows of a street, written as text.

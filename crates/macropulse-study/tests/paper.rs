@@ -1,12 +1,12 @@
 //! Every number of [KP16] that can be checked by arithmetic: computed here, and found again in the
 //! row of the report that judges it.
 //!
-//! Correlations, error curves and payloads have laws of their own in `laws.rs`; the experiment
-//! of Table 4 is repeated in `clean_scan.rs`.
+//! Correlations, error curves and payloads have laws of their own in `laws.rs`; Table 4 follows from
+//! angles in `table_4.rs`, its experiment is repeated in `clean_scan.rs`; `claims.rs` plants a number
+//! in every row.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::f64::consts::PI;
-use std::path::Path;
 use std::sync::LazyLock;
 
 use approx::assert_relative_eq;
@@ -16,7 +16,6 @@ use macropulse::design::safety::{Class1, Rule};
 use macropulse::design::{Derived, Design, Pattern};
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
-use macropulse::points::NO_OBJECT;
 use macropulse::predict::link::{diffraction, spot_depth};
 use macropulse::predict::multiple_access::{mean_overlap, shots_in_flight, word_reuse_range};
 use macropulse::predict::ranging;
@@ -24,9 +23,7 @@ use macropulse::scene::Scene;
 use macropulse::sim;
 use macropulse::units::{SPEED_OF_LIGHT, s_from_fs};
 use macropulse_study::paper::Verdict::{Assumed, Fails, Holds, Partly, Unsaid};
-use macropulse_study::paper::{
-    Claim, DISTANCES, OnPaper, SENSORS, Verdict, judge_on_paper, predict,
-};
+use macropulse_study::paper::{Claim, OnPaper, Verdict, judge_on_paper};
 
 static DESIGN: LazyLock<Design> = LazyLock::new(|| Design::open("kim-park-2016", &[]).unwrap());
 static DERIVED: LazyLock<Derived> = LazyLock::new(|| DESIGN.derived());
@@ -396,81 +393,5 @@ mod others {
         reported("elevations", Unsaid, &["31 steps of 0.33", "31 of 0.50", "-24.3"]);
         let equal = steps("hdl-64e-equal-spacing");
         assert!(equal.iter().all(|step| (step - 26.8 / 64.0).abs() < 1e-9));
-    }
-
-    /// A board as large as the front of a car, 1.82 m × 1.42 m, at the height of the sensor.
-    fn board(distance: u32) -> Scene {
-        let middle = f64::from(distance) + 0.1;
-        let text = format!(
-            "version = 1\n[sensor]\nposition_m = [0, 0, 2]\n[[object]]\ntarget = true\n\
-             material = \"white\"\nposition_m = [{middle}, 0, 2]\n\
-             shape.box.size_m = [0.2, 1.82, 1.42]\n"
-        );
-        Scene::from_toml(&text, "board", Path::new("")).unwrap()
-    }
-
-    /// Table 4 as derived from angles alone, for [`SENSORS`] × [`DISTANCES`].
-    const TABLE_4: [[f64; 4]; 3] =
-        [[3658.0, 1317.0, 672.0, 229.0], [353.0, 127.0, 65.0, 22.0], [172.0, 62.0, 32.0, 0.0]];
-
-    #[test]
-    fn table_4_follows_from_angles() {
-        for (sensor, row) in SENSORS.into_iter().zip(TABLE_4) {
-            let design = Design::open(sensor, &[]).unwrap();
-            for (distance, expected) in DISTANCES.into_iter().zip(row) {
-                let predicted = predict(&design, &board(distance)).samples;
-                // The table is rounded to whole samples, the silhouette to a 300th of its side.
-                assert!(
-                    (predicted - expected).abs() <= 0.5 + 0.01 * expected,
-                    "{sensor} at {distance} m: {predicted}, not {expected}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn ten_and_twenty_times_as_many_points_follow_from_the_pitches() {
-        let samples = |sensor: &str, distance| {
-            predict(&Design::open(sensor, &[]).unwrap(), &board(distance)).samples
-        };
-        for distance in [30, 50, 70] {
-            let ours = samples("kim-park-2016", distance);
-            let ratio = ours / samples("hdl-64e", distance);
-            assert_relative_eq!(ratio, 10.35, max_relative = 0.01);
-            let ratio = ours / samples("peregrine", distance);
-            assert_relative_eq!(ratio, 21.3, max_relative = 0.01);
-        }
-    }
-
-    /// The lowest sample on the car, in metres above the ground.
-    fn lowest_on_car(distance: u32) -> f64 {
-        let design = Design::open("peregrine", &[]).unwrap();
-        let scene = Scene::open(&format!("car-{distance}m")).unwrap();
-        let cloud = sim::scan(&design, &scene, 1, 0).unwrap().cloud();
-        let image = cloud.image(cloud.pick);
-        let heights = (0..image.len()).filter_map(|pixel| {
-            let seen = image.surface(&cloud, pixel);
-            let object = seen.object;
-            let (row, column) = (pixel / cloud.columns, pixel % cloud.columns);
-            let [_, _, up] = design.directions().of(row as u16, column as u16);
-            let height = scene.sensor.pose.position[2] + up * f64::from(seen.range);
-            (object != NO_OBJECT && scene.objects[usize::from(object)].is_target).then_some(height)
-        });
-        heights.fold(f64::INFINITY, f64::min)
-    }
-
-    /// Peregrine sees tyres partly at 30 m and wholly at 50 m: so it stands higher than the lower
-    /// edge of its field rises in 30 m, and by less than a tyre of 0.6 m.
-    #[test]
-    fn tyres_are_cut_off_for_a_sensor_between_1_97_and_2_57_m() {
-        let edge = 30.0 * (7.5_f64 / 2.0).to_radians().tan();
-        assert_relative_eq!(edge, 1.97, max_relative = 3e-3);
-        assert_relative_eq!(edge + 0.6, 2.57, max_relative = 3e-3);
-        let stands = Scene::open("car-30m").unwrap().sensor.pose.position[2];
-        assert!((edge..edge + 0.6).contains(&stands), "{stands}");
-        let (near, far) = (lowest_on_car(30), lowest_on_car(50));
-        assert!((stands - edge..0.6).contains(&near), "{near}");
-        let row_apart = 50.0 * (7.5_f64 / 32.0).to_radians();
-        assert!(far < row_apart, "{far}");
     }
 }

@@ -221,7 +221,7 @@ fn wishes(measured: &Measured) -> Vec<Claim> {
         )
         .holds_if(
             (chip_rate / 0.5e12 - 1.0).abs() < 0.1,
-            format!("{:.0} GHz, as printed in 2.2, are 0.4 THz", chip_rate * 1e-9),
+            format!("{:.0} GHz, as printed in 2.2, are {:.1} THz", chip_rate * 1e-9, chip_rate * 1e-12),
         ),
         said("end-slower", "4", "Its pulses must become slower", "lower down the speed").holds_or_partly(
             light.smear > 1.0 && outlook.slower > 1.0,

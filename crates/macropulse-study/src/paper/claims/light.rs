@@ -36,7 +36,7 @@ fn beam(found: &Light) -> Vec<Claim> {
         ),
         said("wavelength", "2.2", "The wavelength is 905 mm", "905 mm").holds_if(
             (found.wavelength - 0.905).abs() < 1e-3,
-            format!("{:.0} nm meant", found.wavelength * 1e9),
+            format!("{:.0} nm", found.wavelength * 1e9),
         ),
         said(
             "beam",
@@ -134,9 +134,9 @@ fn energy(found: &Light) -> Vec<Claim> {
             found.pd_by_night >= 0.5,
             format!(
                 "at {:.2} nJ, 25 mm aperture and 0.7 optics: {:.1} photons a macropulse, {:.2} a \
-                 micropulse. By night that is enough for a receiver that matches whole macropulses: \
-                 Pd {:.3} at {:.0} m, 0.9 at {:.0} m. By day a receiver that stares has {:.0} \
-                 photons of sunlight in every chip: Pd {:.3}. Mark by mark it would need {:.1} a \
+                 micropulse. A receiver that matches whole macropulses has by night Pd {:.3} at \
+                 {:.0} m and 0.9 at {:.0} m, by day, staring, with {:.0} photons of sunlight in \
+                 every chip, Pd {:.3}. Mark by mark it would need {:.1} a \
                  micropulse. Declared by sensitivity instead",
                 found.energy * 1e9,
                 found.photons,

@@ -90,7 +90,8 @@ pub(super) fn timing(found: &Timing) -> Vec<Claim> {
             (stays - 40.0).abs() < 1.5 && found.pixel_period >= found.macropulse,
             format!(
                 "{stays:.2} ns on average; a resonant mirror spends {:.2} ns at the centre of a \
-                 line, less than the {:.2} ns of a macropulse, and moves {:.2} pixel meanwhile",
+                 line, and a macropulse lasts {:.2} ns, in which the mirror moves {:.2} pixel on \
+                 average",
                 found.resonant_dwell * 1e9,
                 found.macropulse * 1e9,
                 found.macropulse / found.pixel_period
