@@ -360,7 +360,7 @@ mod light {
         // Instead, white at 150 m is declared to be seen with 0.99 a mark: −ln 0.01 photons.
         assert_relative_eq!(DERIVED.reference_photons, -0.01_f64.ln(), max_relative = 1e-9);
         reported(
-            "reach",
+            "rated-range",
             Partly,
             &["17.8 photons", "0.10 a micropulse", "947 photons of sunlight"],
         );

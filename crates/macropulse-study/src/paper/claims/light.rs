@@ -124,7 +124,7 @@ fn energy(found: &Light) -> Vec<Claim> {
             ),
         ),
         said(
-            "reach",
+            "rated-range",
             "2.3",
             "The receiver sees a white surface at 150 m",
             "150 m at 100 % remission",
