@@ -41,14 +41,54 @@ pub struct Claim {
     /// What it says.
     pub claim: &'static str,
     /// The paper's number or word.
-    pub paper: String,
+    pub paper: &'static str,
     /// What was measured, and how.
     pub measured: String,
     /// Whether it holds.
     pub verdict: Verdict,
 }
 
-/// `Holds` or `Fails`.
-pub(super) fn holds(is_true: bool) -> Verdict {
-    if is_true { Verdict::Holds } else { Verdict::Fails }
+/// What the paper says, before it is judged: `id`, section, claim, and its number or word.
+pub(super) fn said(
+    id: &'static str,
+    section: &'static str,
+    claim: &'static str,
+    paper: &'static str,
+) -> Said {
+    Said { id, section, claim, paper }
+}
+
+/// A sentence of the paper.
+pub(super) struct Said {
+    id: &'static str,
+    section: &'static str,
+    claim: &'static str,
+    paper: &'static str,
+}
+
+impl Said {
+    /// Judged so, for what was `measured`.
+    pub fn is(self, verdict: Verdict, measured: String) -> Claim {
+        let Self { id, section, claim, paper } = self;
+        Claim { id, section, claim, paper, measured, verdict }
+    }
+
+    /// Holds or fails.
+    pub fn holds_if(self, is_true: bool, measured: String) -> Claim {
+        self.is(if is_true { Verdict::Holds } else { Verdict::Fails }, measured)
+    }
+
+    /// Holds if it does `wholly`, in part if what is left of it does, else fails.
+    pub fn holds_or_partly(self, wholly: bool, in_part: bool, measured: String) -> Claim {
+        self.is(in_three(wholly, in_part), measured)
+    }
+}
+
+/// Holds `wholly`, partly, or not at all.
+pub(super) fn in_three(wholly: bool, in_part: bool) -> Verdict {
+    match (wholly, in_part) {
+        (true, _) => Verdict::Holds,
+        (false, true) => Verdict::Partly,
+        (false, false) => Verdict::Fails,
+    }
 }

@@ -40,6 +40,16 @@ pub struct Trial {
     pub rows_on_car: usize,
     /// Height above ground of the lowest sample on the car, m; NaN without one.
     pub lowest_sample: f64,
+    /// Distance of the two lowest rows at the car, m.
+    pub row_apart: f64,
+    /// Height of the sensor above the ground, m.
+    pub stands: f64,
+    /// Depth of the lower edge of the field below the sensor, at the car's front, m.
+    pub edge: f64,
+    /// Median range error of the points on the car, m; NaN without one.
+    pub bias: f64,
+    /// Root of their mean squared range error, m; NaN without one.
+    pub error: f64,
 }
 
 /// The scene with the car so far away, m.
@@ -99,6 +109,9 @@ pub(super) fn trial(
         samples.iter().filter(|s| found(s)).map(|s| s.pixel / cloud.columns).collect();
     rows.dedup();
     let lost = samples.iter().filter(|sample| !found(sample));
+    let (bias, error) = range_errors(&cloud, &scene);
+    let bottom = design.scan.extent().elevation[0];
+    let [_, down] = geometry::pitch(design, bottom);
     Ok(Trial {
         sensor,
         distance,
@@ -106,10 +119,31 @@ pub(super) fn trial(
         rows_on_car: rows.len(),
         lowest_sample: samples.iter().map(|sample| sample.height).fold(f64::NAN, f64::min),
         predicted: geometry::predict(design, &scene),
+        row_apart: libm::tan(down) * f64::from(distance),
+        stands: scene.sensor.pose.position[2],
+        edge: libm::tan(-bottom) * f64::from(distance),
+        bias,
+        error,
         score: scan.score,
         tally: scan.tally,
         cloud,
     })
+}
+
+/// Median of the range errors of the points on the car, which those that stand on a sidelobe of the
+/// code do not move, and the root of their mean square, m.
+fn range_errors(cloud: &PointCloud, scene: &Scene) -> (f64, f64) {
+    let truth = &cloud.truth.returns;
+    let on_car = (0..cloud.range.len()).filter(|&at| {
+        matches!(truth.outcome[at], Outcome::Right | Outcome::Near)
+            && is_target(scene, truth.object[at])
+    });
+    let off = |at: usize| f64::from(cloud.range[at]) - f64::from(truth.range[at]);
+    let mut errors: Vec<f64> = on_car.map(off).collect();
+    errors.sort_by(f64::total_cmp);
+    let median = errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN);
+    let squares = errors.iter().map(|error| error * error).sum::<f64>();
+    (median, (squares / errors.len() as f64).sqrt())
 }
 
 /// Name of the folder of a trial.

@@ -2,12 +2,11 @@
 //! every claim confirmed or refuted.
 
 mod claim;
-mod claims_code;
-mod claims_experiment;
-mod claims_system;
+mod claims;
 mod conclusion;
 mod experiment;
 mod geometry;
+pub mod measured;
 mod pictures;
 mod receivers;
 mod report;
@@ -18,8 +17,10 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 pub use claim::{Claim, Verdict};
+pub use claims::{NOT_MEASURED, RECOGNISED, judge, judge_on_paper};
 pub use experiment::{DISTANCES, SENSORS, Trial};
 pub use geometry::{Prediction, predict};
+pub use measured::{Measured, OnPaper};
 pub use receivers::{Comparison, PERFECT};
 
 use macropulse::design::Design;
@@ -41,6 +42,11 @@ pub enum Error {
     /// It was asked to stop.
     #[error("stopped before the end")]
     Stopped,
+    /// The claims were asked of a sensor that is not built as that of the paper.
+    #[error(
+        "the claims are judged on a raster with a prime code, and one with a link budget beside it"
+    )]
+    Sensor,
     /// A ready sensor was refused.
     #[error(transparent)]
     Design(#[from] macropulse::design::Error),
@@ -84,6 +90,8 @@ pub struct Findings {
     pub trials: Vec<Trial>,
     /// The receivers compared.
     pub comparisons: Vec<Comparison>,
+    /// What the claims are judged by.
+    pub measured: Measured,
     /// What the paper says, and whether it holds.
     pub claims: Vec<Claim>,
 }
@@ -116,9 +124,10 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     });
     let trials = trials.collect::<Result<Vec<_>, Error>>()?;
     let comparisons = receivers::compare(seed, watch)?;
-    let claims = claims(&designs[0], &trials, &comparisons)?;
+    let measured = Measured::of(&designs[0], &trials, &comparisons)?;
+    let claims = judge(&measured);
     let environment = experiment::scene(DISTANCES[0])?.environment;
-    let findings = Findings { designs, environment, trials, comparisons, claims };
+    let findings = Findings { designs, environment, trials, comparisons, measured, claims };
     write_atomically(&folder.join("points.csv"), |out| {
         out.write_all(tables::points_csv(&findings.trials).as_bytes())
     })?;
@@ -129,34 +138,4 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let html = report::page(&findings, seed)?.html();
     write_atomically(&folder.join("index.html"), |out| out.write_all(html.as_bytes()))?;
     Ok(findings)
-}
-
-/// The claims that need no experiment, on the sensor of the paper.
-///
-/// # Errors
-/// If the sensor's code has no closed form; none of the ready sensors is refused, unless the
-/// program is broken.
-pub fn claims_on_paper(design: &Design) -> Result<Vec<Claim>, Error> {
-    let mut claims = claims_code::words(design)?;
-    claims.extend(claims_code::payload(design));
-    claims.extend(claims_system::timing(design));
-    let honest = [false, true].map(|counted| {
-        let set = [("safety.count_lines".to_owned(), counted.to_string())];
-        Design::open("kim-park-2016-physical", &set)
-    });
-    let [lax, strict] = honest;
-    let day = Environment::default();
-    claims.extend(claims_system::light(design, &lax?, &strict?, &day));
-    claims.extend(claims_system::elevations(&Design::open("hdl-64e", &[])?));
-    Ok(claims)
-}
-
-fn claims(
-    design: &Design,
-    trials: &[Trial],
-    comparisons: &[Comparison],
-) -> Result<Vec<Claim>, Error> {
-    let mut claims = claims_on_paper(design)?;
-    claims.extend(claims_experiment::claims(trials, comparisons));
-    Ok(claims)
 }

@@ -26,7 +26,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     .section(title(findings))
     .section(receivers(findings))
     .section(claims(findings))
-    .section(conclusion(findings)?)
+    .section(conclusion(findings))
     .section(idealisations(findings))
     .files(&files(findings))
     .footer(&format!(
@@ -195,12 +195,13 @@ fn claims(findings: &Findings) -> Section {
         .table(tables::claims(&findings.claims))
 }
 
-fn conclusion(findings: &Findings) -> Result<Section, Error> {
-    let section = Section::new("The conclusion, sentence by sentence").paragraph(
-        "Whether each sentence of the paper's conclusion holds, what has to be idealised for it, \
-         and what replaces it among the ready sensors.",
-    );
-    Ok(section.table(conclusion::table(findings)?))
+fn conclusion(findings: &Findings) -> Section {
+    Section::new("The conclusion, sentence by sentence")
+        .paragraph(
+            "Whether each sentence of the paper's conclusion holds, what has to be idealised for \
+             it, and what replaces it among the ready sensors.",
+        )
+        .table(conclusion::table(findings))
 }
 
 fn idealisations(findings: &Findings) -> Section {

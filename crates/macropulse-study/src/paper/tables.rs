@@ -192,19 +192,23 @@ pub(super) fn claims(claims: &[Claim]) -> Table {
         ("verdict", Align::Left),
     ];
     claims.iter().fold(Table::new("", &header), |table, claim| {
-        let name = claim.verdict.name();
-        let verdict = match claim.verdict {
-            Verdict::Holds => Cell::verdict(view::Verdict::Holds, name),
-            Verdict::Partly => Cell::verdict(view::Verdict::Partly, name),
-            Verdict::Fails => Cell::verdict(view::Verdict::Fails, name),
-            Verdict::Unsaid | Verdict::Assumed => Cell::from(name),
-        };
         table.row(vec![
             Cell::from(claim.section),
             Cell::from(claim.claim),
-            Cell::from(&claim.paper),
+            Cell::from(claim.paper),
             Cell::from(&claim.measured),
-            verdict,
+            verdict(claim),
         ])
     })
+}
+
+/// The verdict of a claim, in its colour.
+pub(super) fn verdict(claim: &Claim) -> Cell {
+    let name = claim.verdict.name();
+    match claim.verdict {
+        Verdict::Holds => Cell::verdict(view::Verdict::Holds, name),
+        Verdict::Partly => Cell::verdict(view::Verdict::Partly, name),
+        Verdict::Fails => Cell::verdict(view::Verdict::Fails, name),
+        Verdict::Unsaid | Verdict::Assumed => Cell::from(name),
+    }
 }

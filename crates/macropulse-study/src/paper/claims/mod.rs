@@ -1,0 +1,37 @@
+//! What the paper says, judged by what was measured. Nothing is measured here: the same numbers
+//! give the same verdicts, and other ones others.
+
+mod code;
+mod conclusion;
+mod equations;
+mod experiment;
+mod light;
+mod system;
+
+pub use experiment::RECOGNISED;
+
+use super::claim::Claim;
+use super::measured::{Measured, OnPaper};
+
+/// The rows of which the verdict follows from no number, because the sentence has none to measure.
+pub const NOT_MEASURED: [&str; 2] = ["end-robots", "end-surroundings"];
+
+/// All rows.
+pub fn judge(measured: &Measured) -> Vec<Claim> {
+    let mut claims = judge_on_paper(&measured.on_paper);
+    claims.extend(experiment::claims(measured));
+    claims.extend(conclusion::claims(measured));
+    claims
+}
+
+/// The rows that need no experiment.
+pub fn judge_on_paper(found: &OnPaper) -> Vec<Claim> {
+    let mut claims = code::words(&found.words, &found.timing);
+    claims.extend(code::payload(&found.payloads, &found.timing));
+    claims.extend(equations::claims(&found.equations));
+    claims.extend(system::timing(&found.timing));
+    claims.extend(system::converters(&found.converters));
+    claims.extend(light::claims(&found.light, &found.timing));
+    claims.extend(system::head(&found.head));
+    claims
+}

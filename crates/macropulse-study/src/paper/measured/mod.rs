@@ -1,0 +1,88 @@
+//! What was measured for the claims, as plain numbers; how it is judged stands in `claims`.
+//!
+//! Lengths are in metres, times in seconds, angles in radians, energies in joules.
+
+mod code;
+mod equations;
+mod experiment;
+mod outlook;
+mod roles;
+mod system;
+
+pub use code::{Payloads, Repaired, Words};
+pub use equations::Equations;
+pub use experiment::{Experiment, Seen, Share};
+pub use outlook::Outlook;
+pub use roles::{Part, Role};
+pub use system::{Converters, Head, Light, Timing};
+
+use super::Error;
+use super::experiment::Trial;
+use super::receivers::Comparison;
+use macropulse::design::Design;
+
+/// What follows from the sensors alone, without an experiment.
+#[derive(Debug, Clone)]
+pub struct OnPaper {
+    /// Code words and their correlations.
+    pub words: Words,
+    /// Labels, checksums, and the marks they make.
+    pub payloads: Payloads,
+    /// Eqs. 1, 3 and 4, tried out.
+    pub equations: Equations,
+    /// Shots, pixels and clocks.
+    pub timing: Timing,
+    /// The bank of converters.
+    pub converters: Converters,
+    /// Beam, mirror, energy and what comes back.
+    pub light: Light,
+    /// The HDL-64E.
+    pub head: Head,
+    /// What the conclusion hopes for.
+    pub outlook: Outlook,
+}
+
+impl OnPaper {
+    /// Of the sensor of the paper, `design`, and the ready sensors it is held against.
+    ///
+    /// # Errors
+    /// If the sensor has no prime code or no raster; none of the ready sensors is refused, unless
+    /// the program is broken.
+    pub fn of(design: &Design) -> Result<Self, Error> {
+        Ok(Self {
+            words: Words::of(design)?,
+            payloads: Payloads::of(design),
+            equations: Equations::of(design),
+            timing: Timing::of(design),
+            converters: Converters::of(design),
+            light: Light::of(design)?,
+            head: Head::of(&Design::open("hdl-64e", &[])?),
+            outlook: Outlook::of(design)?,
+        })
+    }
+}
+
+/// Everything the claims are judged by.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// What follows from the sensors alone.
+    pub on_paper: OnPaper,
+    /// What the experiment found.
+    pub experiment: Experiment,
+    /// What the text makes of the blocks of Fig. 7.
+    pub roles: Vec<Role>,
+}
+
+impl Measured {
+    pub(super) fn of(
+        design: &Design,
+        trials: &[Trial],
+        comparisons: &[Comparison],
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            on_paper: OnPaper::of(design)?,
+            experiment: Experiment::of(trials, comparisons),
+            roles: roles::printed(),
+        })
+    }
+}

@@ -1,0 +1,244 @@
+//! Every row of the claims follows from what was measured: each has the verdict named here, and
+//! another one when one measured number is planted.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use macropulse::sim::Watch;
+use macropulse_study::paper::Verdict::{Assumed, Fails, Holds, Partly, Unsaid};
+use macropulse_study::paper::measured::{Part, Seen};
+use macropulse_study::paper::{
+    self, DISTANCES, Measured, NOT_MEASURED, SENSORS, Verdict, judge, judge_on_paper,
+};
+
+/// The whole experiment, once, seed 1.
+static MEASURED: LazyLock<Measured> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let watch = Watch { done: &|_| (), stop: &|| false };
+    paper::run(folder.path(), 1, &watch).unwrap().measured
+});
+
+/// A row, its verdict, what is planted, and the verdict then.
+type Flip = (&'static str, Verdict, fn(&mut Measured), Verdict);
+
+fn seen<'a>(measured: &'a mut Measured, sensor: &str, distance: u32) -> &'a mut Seen {
+    let seen = &mut measured.experiment.seen;
+    seen.iter_mut().find(|s| s.sensor == sensor && s.distance == distance).unwrap()
+}
+
+fn right<'a>(measured: &'a mut Measured, receiver: &str) -> &'a mut f64 {
+    let shares = measured.experiment.shares.iter_mut();
+    let is = |s: &&mut paper::measured::Share| {
+        (s.sensor, s.detector, s.receiver) == ("kim-park-2016", "perfect detector", receiver)
+    };
+    &mut shares.into_iter().find(is).unwrap().right
+}
+
+const CODE: &[Flip] = &[
+    ("prime-code", Holds, |m| m.on_paper.words.count = 28, Fails),
+    ("starts-with-c0", Partly, |m| m.on_paper.words.mark_first = 28, Fails),
+    ("cross-correlation", Holds, |m| m.on_paper.words.most_shared = 3, Fails),
+    (
+        "orthogonal",
+        Fails,
+        |m| (m.on_paper.words.mean_shared, m.on_paper.words.variance) = (0.0, 0.0),
+        Holds,
+    ),
+    (
+        "autocorrelation",
+        Partly,
+        |m| (m.on_paper.words.sidelobes, m.on_paper.words.c0_sidelobe) = ((1, 2), 2),
+        Holds,
+    ),
+    ("interferers", Holds, |m| m.on_paper.words.harmless = 13, Fails),
+    ("interference", Fails, |m| m.on_paper.words.interference = 28, Holds),
+    ("resistance", Holds, |m| m.on_paper.timing.noise_matched = 1.0, Fails),
+    ("twenty-five-words", Partly, |m| m.on_paper.timing.shots_in_flight = 25.5, Holds),
+    ("payload", Holds, |m| m.on_paper.payloads.bits = 14, Fails),
+    ("macropulse-chips", Holds, |m| m.on_paper.payloads.chips = 11_774, Fails),
+    ("macropulse-length", Fails, |m| m.on_paper.payloads.macropulse = 27.4875e-9, Holds),
+    ("ones", Fails, |m| m.on_paper.payloads.marks = (377, 377.0, 377), Holds),
+    ("micropulses", Partly, |m| m.on_paper.payloads.chips = 11_774, Fails),
+    ("first-is-one", Fails, |m| m.on_paper.payloads.begin_dark = 0, Holds),
+    ("dark-column", Fails, |m| m.on_paper.payloads.dark.clear(), Holds),
+    ("crc", Partly, |m| m.on_paper.payloads.distance = 1, Fails),
+    ("column-identifies", Partly, |m| m.on_paper.payloads.column_apart = 24, Fails),
+    ("word-of-pixel", Unsaid, |m| m.on_paper.timing.word_range = 140.0, Fails),
+    ("fixed-payload", Unsaid, |m| m.on_paper.payloads.repaired = None, Fails),
+    ("eq1-amcw", Partly, |m| m.on_paper.equations.amplitude = 43.0, Fails),
+    ("eq1-fmcw", Partly, |m| m.on_paper.equations.frequency_printed = 42.0, Holds),
+    ("eq3-support", Partly, |m| m.on_paper.equations.peak_printed = 29, Holds),
+    ("eq4-sign", Holds, |m| m.on_paper.equations.wrong_with_minus = 1, Fails),
+];
+
+const SYSTEM: &[Flip] = &[
+    ("refresh", Partly, |m| m.on_paper.timing.word_range = f64::INFINITY, Holds),
+    ("shots-in-flight", Holds, |m| m.on_paper.timing.shots_in_flight = 25.5, Fails),
+    ("overlap", Holds, |m| m.on_paper.timing.shots_in_flight = 1.0, Fails),
+    ("rollover", Holds, |m| m.on_paper.timing.clock = 50e-12, Fails),
+    ("converter-range", Holds, |m| m.on_paper.timing.conversion_range = 1.28e-9, Fails),
+    ("mirror", Partly, |m| m.on_paper.timing.resonant_dwell = 28e-9, Holds),
+    ("dead-time-rate", Holds, |m| m.on_paper.converters.dead_time = 5e-9, Fails),
+    ("converters", Partly, |m| m.on_paper.converters.most_marks = 1149, Holds),
+    ("pitch", Holds, |m| m.on_paper.light.pitch[1] = 0.0509_f64.to_radians(), Fails),
+    ("wavelength", Fails, |m| m.on_paper.light.wavelength = 0.905, Holds),
+    ("beam", Partly, |m| m.on_paper.light.spread = 0.5e-3, Holds),
+    ("mirror-size", Holds, |m| m.on_paper.light.mirror[0] = 1.0e-3, Partly),
+    ("chips-survive", Assumed, |m| m.on_paper.light.is_line = false, Fails),
+    ("eye-safety", Assumed, |m| m.on_paper.light.is_unlimited = false, Fails),
+    ("rated-range", Partly, |m| m.on_paper.light.pd_by_night = 0.3, Fails),
+    ("parts", Assumed, |m| m.on_paper.light.is_unbounded = false, Fails),
+    ("elevations", Unsaid, |m| m.on_paper.head.elevations = even_steps(), Holds),
+    ("hdl-simultaneous", Partly, |m| m.on_paper.head.at_once = 64, Holds),
+    ("hdl-step", Partly, |m| m.on_paper.head.step_of_unit = 0.08, Holds),
+];
+
+fn even_steps() -> Vec<f64> {
+    (0..64).map(|laser| 2.0 - 0.425 * f64::from(laser)).collect()
+}
+
+const EXPERIMENT: &[Flip] = &[
+    ("eq1-tof", Holds, |m| seen(m, "kim-park-2016", 70).bias = 1e-3, Fails),
+    (
+        "accuracy-range",
+        Partly,
+        |m| m.experiment.seen.iter_mut().for_each(|s| s.error = 1e-3),
+        Fails,
+    ),
+    ("more-points", Holds, more_points_are_worse, Fails),
+    ("ratio-hdl-64e", Partly, |m| m.experiment.seen.iter_mut().for_each(all_hit), Holds),
+    ("ratio-peregrine", Partly, |m| m.experiment.seen.iter_mut().for_each(all_hit), Holds),
+    ("table-4", Unsaid, |m| seen(m, "hdl-64e", 50).samples = 300, Fails),
+    ("tyres", Partly, |m| seen(m, "peregrine", 30).cut_off = 0.0, Fails),
+    ("fig-8", Partly, |m| seen(m, "hdl-64e", 30).rows = 8, Holds),
+    ("fig-9", Partly, all_see_50_m, Holds),
+    ("fig-10", Holds, |m| seen(m, "hdl-64e", 70).rows = 9, Partly),
+    ("fig-11", Holds, |m| seen(m, "kim-park-2016", 120).rows = 3, Partly),
+    ("peregrine-120m", Holds, |m| seen(m, "peregrine", 120).points = 5, Fails),
+    (
+        "fig-7-roles",
+        Fails,
+        |m| m.roles.iter_mut().for_each(|r| r.repeated_for = r.belongs_to),
+        Holds,
+    ),
+    ("receiver", Fails, |m| *right(m, "literal") = 0.999, Holds),
+    ("converters-needed", Partly, |m| seen(m, "kim-park-2016", 30).lost = 7, Fails),
+];
+
+/// The errors of all sensors at a distance in the order of their points.
+fn more_points_are_worse(measured: &mut Measured) {
+    measured.experiment.seen.iter_mut().for_each(|seen| seen.error = seen.points as f64);
+}
+
+fn all_hit(seen: &mut Seen) {
+    seen.points = seen.samples;
+}
+
+fn all_see_50_m(measured: &mut Measured) {
+    for sensor in ["hdl-64e", "peregrine"] {
+        let seen = seen(measured, sensor, 50);
+        (seen.rows, seen.points) = (8, 64);
+    }
+}
+
+const CONCLUSION: &[Flip] = &[
+    ("end-waiting", Holds, |m| *right(m, "matched") = 0.5, Fails),
+    ("end-macropulse", Partly, |m| m.on_paper.payloads.dark.clear(), Holds),
+    ("end-mirror", Partly, |m| m.on_paper.timing.macropulse = 50e-9, Fails),
+    ("end-emission-time", Partly, |m| *right(m, "matched") = 0.5, Fails),
+    ("end-refresh", Partly, |m| m.on_paper.outlook.lacks.clear(), Holds),
+    ("end-applications", Partly, |m| m.on_paper.light.pd_by_day = 0.95, Holds),
+    ("end-survey", Unsaid, |m| seen(m, "kim-park-2016", 30).error = 1.0, Fails),
+    ("end-cameras", Partly, |m| seen(m, "kim-park-2016", 120).rows = 3, Fails),
+    ("end-front", Holds, |m| m.on_paper.outlook.field = 4.0, Fails),
+    ("end-360", Holds, |m| m.on_paper.outlook.field_360 = 4.0, Fails),
+    ("half-terahertz", Fails, |m| m.on_paper.timing.chip_rate = 0.5e12, Holds),
+    ("end-slower", Holds, |m| m.on_paper.light.smear = 0.5, Partly),
+    ("end-synchronous", Partly, |m| m.on_paper.outlook.walsh = 0.1, Holds),
+];
+
+fn flips() -> Vec<Flip> {
+    [CODE, SYSTEM, EXPERIMENT, CONCLUSION].concat()
+}
+
+fn verdict(measured: &Measured, id: &str) -> Verdict {
+    judge(measured).iter().find(|claim| claim.id == id).unwrap_or_else(|| panic!("{id}")).verdict
+}
+
+#[test]
+fn every_row_has_its_verdict_and_another_one_when_a_number_is_planted() {
+    let mut wrong = Vec::new();
+    for (id, is, plant, becomes) in flips() {
+        assert_ne!(is, becomes, "{id}");
+        let found = verdict(&MEASURED, id);
+        let mut measured = MEASURED.clone();
+        plant(&mut measured);
+        let then = verdict(&measured, id);
+        if (found, then) != (is, becomes) {
+            wrong.push(format!("{id}: {found:?} and {then:?}, not {is:?} and {becomes:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Rows without a number are two, and say so.
+#[test]
+fn every_row_is_planted_but_those_with_nothing_to_measure() {
+    let claims = judge(&MEASURED);
+    let rows: BTreeSet<&str> = claims.iter().map(|claim| claim.id).collect();
+    assert_eq!(rows.len(), claims.len());
+    let planted: BTreeSet<&str> = flips().iter().map(|flip| flip.0).chain(NOT_MEASURED).collect();
+    assert_eq!(rows, planted);
+    for claim in claims.iter().filter(|claim| NOT_MEASURED.contains(&claim.id)) {
+        assert_eq!(claim.verdict, Unsaid);
+        assert!(claim.measured.contains("nothing to measure"), "{claim:?}");
+    }
+}
+
+#[test]
+fn the_text_of_a_row_has_what_was_measured() {
+    let mut measured = MEASURED.clone();
+    let before = judge_on_paper(&measured.on_paper);
+    measured.on_paper.words.most_shared = 7;
+    measured.on_paper.light.pd_by_night = 0.125;
+    let after = judge_on_paper(&measured.on_paper);
+    let differs = before.iter().zip(&after).filter(|(a, b)| a != b);
+    let ids: Vec<&str> = differs.map(|(_, claim)| claim.id).collect();
+    assert_eq!(ids, ["cross-correlation", "rated-range"]);
+    assert!(after.iter().any(|claim| claim.measured.contains("Pd 0.125")));
+}
+
+/// The points on the car that the README and docs/paper.md quote are those of the run.
+#[test]
+fn quoted_points_are_those_found() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let [readme, paper] = ["README.md", "docs/paper.md"]
+        .map(|page| std::fs::read_to_string(root.join(page)).unwrap());
+    for sensor in SENSORS {
+        let counts = DISTANCES.map(|distance| {
+            let seen = MEASURED.experiment.at(sensor, distance).unwrap();
+            (seen.points, seen.samples)
+        });
+        let is_quoted = |page: &str, cell: &dyn Fn(&(u64, u64)) -> String| {
+            let cells: Vec<String> = counts.iter().map(cell).collect();
+            let row = cells.join(" | ");
+            page.lines().any(|line| line.contains(sensor) && line.contains(&row))
+        };
+        let in_readme = is_quoted(&readme, &|(points, samples)| format!("{points} ({samples})"));
+        let in_paper = is_quoted(&paper, &|(points, samples)| format!("{samples} → {points}"));
+        assert!(in_readme && in_paper, "{sensor}: {counts:?}");
+    }
+}
+
+/// What is planted for one part of Fig. 7 names it.
+#[test]
+fn a_block_that_stands_with_the_wrong_part_is_named() {
+    let mut measured = MEASURED.clone();
+    measured.roles.iter_mut().for_each(|role| role.repeated_for = role.belongs_to);
+    measured.roles[3].repeated_for = Part::Transmitter;
+    let claims = judge(&measured);
+    let row = claims.iter().find(|claim| claim.id == "fig-7-roles").unwrap();
+    assert!(row.measured.contains("1 of 4") && row.measured.contains("(red)"), "{}", row.measured);
+}
