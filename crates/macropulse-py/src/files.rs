@@ -49,6 +49,7 @@ fn format_of(path: &Path, named: Option<&str>) -> PyResult<Format> {
     let ending = path.extension().map(|end| end.to_string_lossy().to_lowercase());
     let Some(ending) = ending else {
         let mut known: Vec<&str> = Format::ALL.iter().map(|format| format.extension()).collect();
+        known.sort_unstable();
         known.dedup();
         let (path, known) = (path.display(), known.join(", ."));
         return Err(wrong(format!("{path}: has no ending that says a format; known are .{known}")));
