@@ -104,6 +104,10 @@ pub fn usage(error: &clap::Error) -> Result<(), Fault> {
             let sentence = sentence_of(&error.render().to_string());
             let stray = match error.get(ContextKind::InvalidArg) {
                 Some(ContextValue::String(stray)) if kind == ErrorKind::UnknownArgument => stray,
+                _ if sentence.contains("--output") && sentence.contains("`macropulse convert ") => {
+                    let remedy = "the file to write is named with -o, as -o cloud.ply";
+                    return Err(Fault::Wrong(format!("{sentence}; {remedy}")));
+                }
                 _ => return Err(Fault::Wrong(sentence)),
             };
             Err(Fault::Wrong(match remedy(stray, &sentence) {
