@@ -59,8 +59,27 @@ impl Convert {
                 let remedy = "--format: nothing is to be written; name a format, as `ply`";
                 return Err(Fault::Wrong(remedy.to_owned()));
             }
+            (Some(Formats(formats, _)), Some(other))
+                if !output.is_dir()
+                    && !matches!(formats[..], [one] if one.extension() == other.extension()) =>
+            {
+                let output = output.display();
+                return Err(Fault::Wrong(format!(
+                    "{output}: ends as a {} file does, where --format wants a folder or another \
+                     ending; leave --format out, or give OUT another name",
+                    other.extension()
+                )));
+            }
             (Some(formats), _) => formats.0.clone(),
             (None, Some(format)) => vec![format],
+            (None, None)
+                if output.is_dir() || output.as_os_str().to_string_lossy().ends_with('/') =>
+            {
+                return Err(Fault::Wrong(format!(
+                    "{}: is a folder; say what to write into it, as --format ply",
+                    output.display()
+                )));
+            }
             (None, None) => {
                 let output = output.display();
                 return Err(Fault::Wrong(format!(
@@ -82,8 +101,14 @@ impl Convert {
 }
 
 impl Target {
-    /// Refuses inputs whose files would take each other's place, or that of an input.
+    /// Refuses inputs that are folders, and those whose files would take each other's place, or that of an input.
     fn check(&self, inputs: &[PathBuf]) -> Result<(), Fault> {
+        if let Some(folder) = inputs.iter().find(|input| input.is_dir()) {
+            let folder = folder.display();
+            return Err(Fault::Wrong(format!(
+                "{folder}: is a folder; name the files in it, as {folder}/scan-000000.pcd"
+            )));
+        }
         let Some(file) = &self.file else {
             for (at, input) in inputs.iter().enumerate() {
                 let is_same = |other: &&PathBuf| other.file_stem() == input.file_stem();

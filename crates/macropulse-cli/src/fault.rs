@@ -31,6 +31,20 @@ impl Fault {
         Self::Wrong(format!("{name}: cannot be read: {}", told::unreadable(error)))
     }
 
+    /// What the `sentence` says could not be written: the name of the place was wrong, or the machine
+    /// does not take it.
+    pub fn unwritten(sentence: String, error: &io::Error) -> Self {
+        match told::is_of_the_machine(error) {
+            true => Self::Ours(sentence),
+            false => Self::Wrong(sentence),
+        }
+    }
+
+    /// What could not be written to standard output.
+    pub fn unprinted(error: &io::Error) -> Self {
+        Self::Ours(format!("cannot write to standard output: {}", told::unwritable(error)))
+    }
+
     /// Says on stderr, in one sentence for each reason, what is to be said, and gives the exit code.
     pub fn report(&self) -> ExitCode {
         match self {
@@ -90,6 +104,10 @@ pub fn usage(error: &clap::Error) -> Result<(), Fault> {
             let sentence = sentence_of(&error.render().to_string());
             let stray = match error.get(ContextKind::InvalidArg) {
                 Some(ContextValue::String(stray)) if kind == ErrorKind::UnknownArgument => stray,
+                _ if sentence.contains("--output") && sentence.contains("`macropulse convert ") => {
+                    let remedy = "the file to write is named with -o, as -o cloud.ply";
+                    return Err(Fault::Wrong(format!("{sentence}; {remedy}")));
+                }
                 _ => return Err(Fault::Wrong(sentence)),
             };
             Err(Fault::Wrong(match remedy(stray, &sentence) {
@@ -202,6 +220,7 @@ impl From<formats::Error> for Fault {
     fn from(error: formats::Error) -> Self {
         match error {
             formats::Error::Uneven { .. } => Self::Ours(error.to_string()),
+            formats::Error::Write { ref cause, .. } => Self::unwritten(error.to_string(), cause),
             _ => Self::Wrong(error.to_string()),
         }
     }
@@ -254,7 +273,7 @@ impl From<paper::Error> for Fault {
     fn from(error: paper::Error) -> Self {
         match error {
             paper::Error::Stopped => Self::Interrupted,
-            paper::Error::Folder { .. } => Self::Wrong(error.to_string()),
+            paper::Error::Folder { ref source, .. } => Self::unwritten(error.to_string(), source),
             paper::Error::Record(error) => error.into(),
             paper::Error::Formats(error) => error.into(),
             ours => Self::Ours(ours.to_string()),

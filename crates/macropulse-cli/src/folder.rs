@@ -1,9 +1,13 @@
 //! A folder that is not left half filled.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use macropulse::told;
+
 use crate::fault::Fault;
+use crate::input::STREAM;
 
 /// A folder for results. Until it is kept, what we made of it goes away again.
 pub struct Folder {
@@ -11,18 +15,31 @@ pub struct Folder {
     /// The topmost folder that was not there before.
     made: Option<PathBuf>,
     kept: bool,
+    /// Whether no other run may write into it meanwhile, and what holds that.
+    is_of_one: bool,
+    lock: Option<File>,
 }
 
 impl Folder {
     /// A folder that is proven to be writable. Nothing of it is there yet that was not before.
     pub fn claim(path: &Path) -> Result<Self, Fault> {
-        let mut folder = Self { path: path.to_owned(), made: None, kept: false };
+        refuse_stream(path)?;
+        let path = path.to_owned();
+        let mut folder = Self { path, made: None, kept: false, is_of_one: false, lock: None };
         folder.make()?;
-        let proof = path.join(".macropulse-proof");
+        let proof = folder.path.join(".macropulse-proof");
         fs::write(&proof, "")
             .and_then(|()| fs::remove_file(&proof))
             .map_err(|error| folder.not_writable(&error))?;
         folder.clear();
+        Ok(folder)
+    }
+
+    /// As [`Folder::claim`], of a run whose files no other one may write meanwhile.
+    pub fn claim_alone(path: &Path) -> Result<Self, Fault> {
+        let mut folder = Self::claim(path)?;
+        folder.is_of_one = true;
+        folder.lock()?;
         Ok(folder)
     }
 
@@ -31,7 +48,33 @@ impl Folder {
         let ancestors = self.path.ancestors().filter(|folder| !folder.as_os_str().is_empty());
         let missing = ancestors.take_while(|folder| !folder.exists()).last();
         self.made = missing.map(Path::to_path_buf);
-        fs::create_dir_all(&self.path).map_err(|error| self.not_writable(&error))
+        fs::create_dir_all(&self.path).map_err(|error| self.not_writable(&error))?;
+        self.lock()
+    }
+
+    /// Keeps other runs out of a folder that is for one, if it is there already. Where the system
+    /// knows no locks on folders none is kept out.
+    fn lock(&mut self) -> Result<(), Fault> {
+        if !self.is_of_one || self.lock.is_some() {
+            return Ok(());
+        }
+        let Ok(opened) = File::open(&self.path) else { return Ok(()) };
+        match opened.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                // It is the other one's, whoever made it.
+                self.made = None;
+                Err(Fault::Wrong(format!(
+                    "another run is writing into the folder {}; give this one a folder of its own \
+                     with -o",
+                    self.path.display()
+                )))
+            }
+            Err(TryLockError::Error(_)) => Ok(()),
+            Ok(()) => {
+                self.lock = Some(opened);
+                Ok(())
+            }
+        }
     }
 
     /// Makes the folder, if that was not done before.
@@ -80,10 +123,10 @@ impl Folder {
     }
 
     fn not_writable(&self, error: &io::Error) -> Fault {
-        let (path, reason) = (self.path.display(), reason(error));
-        Fault::Wrong(format!(
-            "cannot write into the folder {path}: {reason}; choose another one with -o"
-        ))
+        let (path, reason) = (self.path.display(), told::unwritable(error));
+        let sentence =
+            format!("cannot write into the folder {path}: {reason}; choose another one with -o");
+        Fault::unwritten(sentence, error)
     }
 }
 
@@ -95,20 +138,21 @@ impl Drop for Folder {
     }
 }
 
+/// Refuses standard output as the place of a folder.
+pub fn refuse_stream(path: &Path) -> Result<(), Fault> {
+    match path == Path::new(STREAM) {
+        true => Err(Fault::Wrong(
+            "-o -: standard output takes one stream, and these are files: name a folder for them"
+                .to_owned(),
+        )),
+        false => Ok(()),
+    }
+}
+
 /// Whether a file is named as that of a scan: a word, a hyphen, a number of at least six digits.
 fn is_of_scan(name: &str) -> bool {
     let word = ["scan-", "range-", "shots-", "ticks-"].iter().find_map(|w| name.strip_prefix(w));
     word.is_some_and(|rest| rest.bytes().take_while(u8::is_ascii_digit).count() >= 6)
-}
-
-fn reason(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
-            "a file is in the way".to_owned()
-        }
-        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
-        _ => error.to_string(),
-    }
 }
 
 #[cfg(test)]

@@ -9,8 +9,8 @@ use macropulse::scene::Scene;
 
 use crate::fault::Fault;
 
-/// What standard input is called on the command line.
-pub const STDIN: &str = "-";
+/// What standard input and output are called on the command line.
+pub const STREAM: &str = "-";
 
 /// What it is called in messages.
 const ORIGIN: &str = "standard input";
@@ -24,7 +24,7 @@ const LONGEST: u64 = 16 << 20;
 /// What is wrong with the name, the text or a change.
 pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault> {
     match name {
-        STDIN => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
+        STREAM => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
         scene if Scene::builtin(scene).is_some() => Err(Fault::Wrong(format!(
             "{scene}: is a scene, where a sensor is wanted; `macropulse sensors` lists the ready ones"
         ))),
@@ -38,7 +38,7 @@ pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault>
 /// What is wrong with the name, the text or a change.
 pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
     match name {
-        STDIN => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
+        STREAM => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
         sensor if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
             "{sensor}: is a sensor, where a scene is wanted; `macropulse scenes` lists the ready ones"
         ))),
@@ -52,7 +52,7 @@ pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
 /// If it cannot be read.
 pub fn text(name: &str) -> Result<(String, String), Fault> {
     match name {
-        STDIN => Ok((stdin()?.to_owned(), ORIGIN.to_owned())),
+        STREAM => Ok((stdin()?.to_owned(), ORIGIN.to_owned())),
         name => match std::fs::read_to_string(name) {
             Ok(text) => Ok((text, name.to_owned())),
             Err(error) => Err(Fault::unreadable(name, &error)),

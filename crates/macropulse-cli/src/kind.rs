@@ -9,7 +9,7 @@ use macropulse::told;
 use toml::{Table, Value};
 
 use crate::fault::Fault;
-use crate::input::{self, STDIN};
+use crate::input::{self, STREAM};
 
 /// What can be checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Kind {
             return Ok(Self::Scene);
         }
         let path = Path::new(name);
-        if name != STDIN
+        if name != STREAM
             && !path.exists()
             && path.extension().is_none()
             && path.components().count() == 1

@@ -106,7 +106,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Check(check) => check::run(check, common),
         Command::Budget(budget) => budget::run(budget, common),
         Command::Codes(codes) => codes::run(codes, common),
-        Command::Encode(encode) => encode::run(encode),
+        Command::Encode(encode) => encode::run(encode, common),
         Command::Decode(decode) => decode::run(decode, common),
         Command::View(view) => view::run(view, common),
         Command::Convert(convert) => convert::run(convert, common),

@@ -34,7 +34,7 @@ pub struct Paper {
 }
 
 pub fn run(options: &Paper, common: &Common) -> Result<(), Fault> {
-    let mut folder = Folder::claim(&options.output)?;
+    let mut folder = Folder::claim_alone(&options.output)?;
     let interrupt = Interrupt::listen()?;
     folder.make()?;
     let progress = Progress::of(common, "paper", paper::shots()?);

@@ -1,11 +1,12 @@
 //! `macropulse schema`: what editors complete and check typed files by.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use macropulse::{design, environment, scene};
 
 use crate::fault::Fault;
+use crate::input::STREAM;
 use crate::text::print;
 
 /// Print the JSON Schema of a kind of file, by which editors complete and check what is typed
@@ -44,6 +45,7 @@ pub fn run(options: &Schema) -> Result<(), Fault> {
     let text = format!("{schema:#}\n");
     match &options.output {
         None => print(&text),
+        Some(path) if path == Path::new(STREAM) => print(&text),
         Some(path) => {
             Ok(macropulse::formats::write_atomically(path, |out| out.write_all(text.as_bytes()))?)
         }

@@ -9,11 +9,14 @@ use crate::fault::Fault;
 
 /// Writes to stdout. A reader who has seen enough (`| head`) is no fault.
 pub fn print(text: &str) -> Result<(), Fault> {
+    print_bytes(text.as_bytes())
+}
+
+/// As [`print`], what is no text.
+pub fn print_bytes(bytes: &[u8]) -> Result<(), Fault> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Fault::Ours(format!("cannot write to stdout: {error}")))
-        }
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Fault::unprinted(&error)),
         _ => Ok(()),
     }
 }

@@ -57,3 +57,15 @@ fn the_text_names_what_the_json_does() {
         assert!(ran.out.contains(word), "{}", ran.out);
     }
 }
+
+/// The log of a scan through a pipe is that of the file, and --quiet is.
+#[test]
+fn a_shot_log_leaves_through_standard_output() {
+    let desk = Desk::new();
+    let line = "encode kim-park-2016-fixed --set scan.raster.rows=2 --scan 3 --format ticks-csv";
+    let ran = desk.run(&format!("{line} -o out -q"));
+    assert_eq!((ran.code, ran.out.as_str(), ran.err.as_str()), (Some(0), "", ""));
+    let log = std::fs::read_to_string(desk.path().join("out/shots-000003.csv")).unwrap();
+    assert!(log.lines().count() > 2 * 848, "{log}");
+    assert_eq!(desk.run(&format!("{line} -o -")).out, log);
+}

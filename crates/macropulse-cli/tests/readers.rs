@@ -9,8 +9,8 @@ use std::process::Command;
 
 use common::Desk;
 
-const FORMATS: &str = "pcd,ply,ply-cloudcompare,las,laz,e57,npy,csv,kitti,mcap,mcap-velodyne,mcap-ouster,\
-                       mcap-livox,mcap-autoware,mcap-foxglove,mcap-osi,range-npy";
+const FORMATS: &str = "pcd,ply,ply-cloudcompare,las,laz,e57,npy,csv,kitti,parquet,mcap,mcap-velodyne,\
+                       mcap-ouster,mcap-livox,mcap-autoware,mcap-foxglove,mcap-osi,range-npy";
 
 /// A sensor that turns and moves in a street, by 2 m in a second, so that its poses differ.
 const SCENE: &str = "--set scene:sensor.velocity_m_s=[2,0,0]";

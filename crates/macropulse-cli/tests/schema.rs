@@ -4,6 +4,8 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod common;
+#[path = "schema/scenes.rs"]
+mod scenes;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -184,3 +184,16 @@ fn ctrl_c_ends_after_the_scan_with_whole_files() {
     // The folder, the manifest, the page, and one file for each scan: nothing half done.
     assert_eq!(desk.files().len(), 3 + scans);
 }
+
+/// Where an image is asked for and there is none, that is said.
+#[test]
+fn the_range_image_of_a_rosette_is_told_to_be_a_strip() {
+    let desk = Desk::new();
+    let ran = desk.run("simulate rosette-mid-40 wall --format png -o a -q");
+    assert_eq!((ran.code, ran.err.lines().count()), (Some(0), 1), "{}", ran.err);
+    assert!(ran.err.contains("a range image of it is a strip"), "{}", ran.err);
+    let warnings = fs::read_to_string(desk.path().join("a/manifest.json")).unwrap();
+    assert!(warnings.contains("is a strip, shot after shot"), "{warnings}");
+    let ran = desk.run("simulate rosette-mid-40 wall --format ply -o b -q");
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+}

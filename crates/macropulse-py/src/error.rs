@@ -6,7 +6,7 @@ use std::path::Path;
 
 use macropulse::{channel, codec, design, emit, environment, formats, predict, scene, sim};
 use macropulse_study::{decoding, record, sent, sweep, view};
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(
@@ -50,6 +50,15 @@ impl<T, E: Raise> OrRaise<T> for Result<T, E> {
 /// What is asked for cannot be.
 pub fn wrong(sentence: impl Into<String>) -> PyErr {
     Error::new_err(sentence.into())
+}
+
+/// Warns of what a user should know although nothing went wrong, as of the line that called us.
+///
+/// # Errors
+/// What warnings are turned into, if they are.
+pub fn warned(py: Python<'_>, told: impl Into<String>) -> PyResult<()> {
+    let category = py.get_type::<PyUserWarning>();
+    py.import("warnings")?.call_method1("warn", (told.into(), category, 2)).map(|_| ())
 }
 
 /// A fault of ours.

@@ -47,8 +47,9 @@ fn format_of(path: &Path, named: Option<&str>) -> PyResult<Format> {
         return Format::parse(name).or_raise();
     }
     let ending = path.extension().map(|end| end.to_string_lossy().to_lowercase());
-    let Some(ending) = ending else {
+    let Some(ending) = ending.filter(|ending| !ending.is_empty()) else {
         let mut known: Vec<&str> = Format::ALL.iter().map(|format| format.extension()).collect();
+        known.sort_unstable();
         known.dedup();
         let (path, known) = (path.display(), known.join(", ."));
         return Err(wrong(format!("{path}: has no ending that says a format; known are .{known}")));

@@ -11,12 +11,12 @@ use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
 use macropulse::points::{Piece, PointCloud, Truth};
 use macropulse::random::Chance;
 use macropulse::scene::Scene as Simulated;
-use macropulse::tdc;
+use macropulse::{tdc, told};
 use numpy::{Element, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 
-use crate::error::{OrRaise, check_scan, wrong};
+use crate::error::{OrRaise, check_scan, warned, wrong};
 use crate::files::{StoredScans, ticks_at};
 use crate::scan::{About, Scan};
 use crate::scene::Scene;
@@ -25,6 +25,11 @@ use crate::{values, work};
 
 /// Shots are numbered up to here: more than any sensor fires in its time.
 const MOST_SHOTS: u64 = 1 << 60;
+
+/// What the dictionaries of shots and ticks may hold.
+const SHOTS: [&str; 8] =
+    ["first", "owned", "fired_at_fs", "row", "column", "label", "word", "channel"];
+const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
 
 /// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`.
 #[pyclass(frozen, module = "macropulse")]
@@ -182,13 +187,24 @@ pub fn decode(
         let several = "iterate over them: `for scan in macropulse.decode_scans(...)`";
         return ticks_at(py, (design, operating), paths(shots, ticks)?)?.only(py, several);
     };
+    if shots.contains("tick")? && ticks.contains("row")? {
+        return Err(wrong("shots: has a column `tick`; the shots come first, then the ticks"));
+    }
+    check_keys(shots, "shots", &SHOTS)?;
+    check_keys(ticks, "ticks", &TICKS)?;
     let log = shot_log(&design, shots)?;
     let ticks = Ticks {
-        epoch: entry(ticks, "ticks", "epoch", || 0)?,
+        epoch: entry(ticks, ("ticks", "epoch", "a whole number, of ticks"), || 0)?,
         tick: column(ticks, ("ticks", "tick"), None)?,
         channel: column(ticks, ("ticks", "channel"), Some(Vec::new()))?,
         amplitude: column(ticks, ("ticks", "amplitude"), Some(Vec::new()))?,
     };
+    check_below(&design, ("ticks", "channel"), &ticks.channel, design.channels())?;
+    if ticks.tick.is_empty() {
+        warned(py, "not a single point: there are no ticks")?;
+    } else if log.row.is_empty() {
+        warned(py, "not a single point: there are no shots")?;
+    }
     let receiver = Arc::clone(&design);
     let cloud = work::done(py, 0, move |_| {
         let design = &*receiver;
@@ -251,57 +267,100 @@ fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBu
 fn shot_log(design: &Design, shots: &Bound<'_, PyDict>) -> PyResult<ShotLog> {
     let row: Vec<u16> = column(shots, ("shots", "row"), None)?;
     let columns: Vec<u16> = column(shots, ("shots", "column"), None)?;
-    for (name, entries, end) in
-        [("row", &row, design.scan.rows), ("column", &columns, design.scan.columns)]
-    {
-        if let Some(beyond) = entries.iter().find(|entry| u32::from(**entry) >= end) {
-            let last = end - 1;
-            return Err(wrong(format!(
-                "shots: {name} has {beyond}, and {} has 0 to {last}; is it the sensor that they were \
-                 recorded with?",
-                design.name
-            )));
-        }
-    }
+    check_below(design, ("shots", "row"), &row, design.scan.rows)?;
+    check_below(design, ("shots", "column"), &columns, design.scan.columns)?;
     let sent = row
         .iter()
         .zip(&columns)
         .map(|(row, column)| shot_of_pixel(design, 0, u32::from(*row), u32::from(*column)));
     let sent: Vec<Shot> = sent.flatten().collect();
-    let first: u64 = entry(shots, "shots", "first", || 0)?;
+    let first: u64 = entry(shots, ("shots", "first", "a whole number, 0 or more"), || 0)?;
     if first > MOST_SHOTS {
         return Err(wrong(format!("shots: first is {first}; it must be {MOST_SHOTS} at most")));
     }
-    let owned: (usize, usize) = entry(shots, "shots", "owned", || (0, row.len()))?;
+    let owned = ("shots", "owned", "two whole numbers, from and until, as (0, 1700)");
+    let owned: (usize, usize) = entry(shots, owned, || (0, row.len()))?;
+    let channel: Vec<u16> = column(shots, ("shots", "channel"), Some(vec![0; row.len()]))?;
+    check_below(design, ("shots", "channel"), &channel, design.channels())?;
     Ok(ShotLog {
         first,
         fired_at_fs: column(shots, ("shots", "fired_at_fs"), None)?,
         label: column(shots, ("shots", "label"), Some(sent.iter().map(|s| s.label).collect()))?,
         word: column(shots, ("shots", "word"), Some(sent.iter().map(|s| s.word).collect()))?,
-        channel: column(shots, ("shots", "channel"), Some(vec![0; row.len()]))?,
+        channel,
         owned: owned.0..owned.1,
         row,
         column: columns,
     })
 }
 
-/// A single value of a dictionary.
+/// Refuses a column that has a number beyond those of the sensor, which are below `end`.
+fn check_below(
+    design: &Design,
+    (what, name): (&str, &str),
+    entries: &[u16],
+    end: u32,
+) -> PyResult<()> {
+    let Some(beyond) = entries.iter().find(|entry| u32::from(**entry) >= end) else {
+        return Ok(());
+    };
+    let (sensor, last) = (&design.name, end.saturating_sub(1));
+    Err(wrong(format!(
+        "{what}: {name} has {beyond}, and {sensor} has 0 to {last}; is it the sensor that they were \
+         recorded with?"
+    )))
+}
+
+/// A single value of a dictionary; `wanted` says what it must be.
 fn entry<'py, T: for<'a> FromPyObject<'a, 'py>>(
     given: &Bound<'py, PyDict>,
-    what: &str,
-    key: &str,
+    (what, key, wanted): (&str, &str, &str),
     otherwise: impl FnOnce() -> T,
 ) -> PyResult<T> {
     match given.get_item(key)? {
         None => Ok(otherwise()),
         Some(value) => value
             .extract()
-            .map_err(|_| wrong(format!("{what}: {key} is {value}, which it cannot be"))),
+            .map_err(|_| wrong(format!("{what}: {key} is {value}; it must be {wanted}"))),
     }
 }
 
+/// Refuses a key of a dictionary that is none of those `known`: a misspelt one would be passed over.
+fn check_keys(given: &Bound<'_, PyDict>, what: &str, known: &[&str]) -> PyResult<()> {
+    for key in given.keys() {
+        let key = key.str()?.to_string();
+        if !known.contains(&key.as_str()) {
+            return Err(wrong(format!("{what}: {}", told::unknown("column", &key, known))));
+        }
+    }
+    Ok(())
+}
+
+/// A kind of number that columns have, in words.
+trait Number: Element + Copy {
+    const WORDS: &'static str;
+    const IS_WHOLE: bool = true;
+}
+
+impl Number for u16 {
+    const WORDS: &'static str = "whole numbers from 0 to 65535";
+}
+
+impl Number for u32 {
+    const WORDS: &'static str = "whole numbers from 0 to 4294967295";
+}
+
+impl Number for i64 {
+    const WORDS: &'static str = "whole numbers";
+}
+
+impl Number for f32 {
+    const WORDS: &'static str = "finite numbers";
+    const IS_WHOLE: bool = false;
+}
+
 /// A column of a dictionary, copied; whole numbers that do not fit are refused, not cut.
-fn column<T: Element + Copy>(
+fn column<T: Number>(
     given: &Bound<'_, PyDict>,
     (what, key): (&str, &str),
     otherwise: Option<Vec<T>>,
@@ -310,16 +369,48 @@ fn column<T: Element + Copy>(
     let Some(value) = given.get_item(key)? else {
         return otherwise.ok_or_else(|| wrong(format!("{what}: there is no column `{key}`")));
     };
+    let refused = |found: String| {
+        let wanted = T::WORDS;
+        wrong(format!("{what}: the column `{key}` must be {wanted}, in a list or array; {found}"))
+    };
     let numpy = py.import("numpy")?;
-    let typed = numpy.call_method1("asarray", (&value,))?;
-    let wanted = numpy::dtype::<T>(py);
-    let fits = typed.call_method1("astype", (&wanted,))?;
-    let is_same = numpy.call_method1("array_equal", (&typed, &fits))?.is_truthy()?;
-    let array: Option<PyReadonlyArray1<'_, T>> = fits.extract().ok();
-    match array.filter(|_| is_same || typed.len().is_ok_and(|length| length == 0)) {
-        Some(array) => Ok(array.as_array().to_vec()),
-        None => Err(wrong(format!(
-            "{what}: the column `{key}` must be numbers of type {wanted}, one after the other"
-        ))),
+    let typed = numpy
+        .call_method1("asarray", (&value,))
+        .map_err(|_| refused("its entries are lists".into()))?;
+    if typed.getattr("ndim")?.extract::<usize>()? != 1 {
+        return Err(refused(format!("its shape is {}", typed.getattr("shape")?)));
     }
+    if typed.len()? == 0 {
+        return Ok(Vec::new());
+    }
+    let kind: String = typed.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !["i", "u", "f"].contains(&kind.as_str()) {
+        return Err(refused(format!("its first entry is {}", typed.get_item(0)?.repr()?)));
+    }
+    let fits = quietly(&numpy, || typed.call_method1("astype", (numpy::dtype::<T>(py),)))?;
+    let is_same = match T::IS_WHOLE {
+        true => numpy.call_method1("equal", (&typed, &fits))?,
+        false => numpy.call_method1("isfinite", (&fits,))?,
+    };
+    let first = is_same.call_method0("argmin")?;
+    if !is_same.get_item(&first)?.is_truthy()? {
+        let entry = typed.get_item(&first)?;
+        return Err(refused(format!("entry {first} is {entry}")));
+    }
+    let array: PyReadonlyArray1<'_, T> = fits.extract()?;
+    Ok(array.as_array().to_vec())
+}
+
+/// What `made` gives, without the warning of NumPy that a number does not fit, which is asked after.
+fn quietly<'py, T>(
+    numpy: &Bound<'py, PyModule>,
+    made: impl FnOnce() -> PyResult<T>,
+) -> PyResult<T> {
+    let py = numpy.py();
+    let options = [("invalid", "ignore"), ("over", "ignore")].into_py_dict(py)?;
+    let quiet = numpy.call_method("errstate", (), Some(&options))?;
+    quiet.call_method0("__enter__")?;
+    let outcome = made();
+    quiet.call_method1("__exit__", (py.None(), py.None(), py.None()))?;
+    outcome
 }

@@ -9,11 +9,10 @@ use macropulse::scene::Scene as Simulated;
 use macropulse::score::Score;
 use macropulse::sim::{self, Tally, Watch};
 use macropulse_study::record::{Run, manifest};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use serde_json::Value;
 
-use crate::error::{Fault, OrRaise, check_scan, wrong};
+use crate::error::{Fault, OrRaise, check_scan, warned, wrong};
 use crate::scan::{About, Scan};
 use crate::scene::Scene;
 use crate::sensor::Sensor;
@@ -53,9 +52,7 @@ impl Stage {
             return Err(Fault::new_err("the scan was stopped, and by no signal"));
         };
         if let Some(reason) = tally.where_all_was_lost() {
-            let told = format!("{}: not a single point: {reason}", self.design.name);
-            let category = py.get_type::<PyUserWarning>();
-            py.import("warnings")?.call_method1("warn", (told, category, 2))?;
+            warned(py, format!("{}: not a single point: {reason}", self.design.name))?;
         }
         let scene = &self.scene;
         Ok(Scan::new(

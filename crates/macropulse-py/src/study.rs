@@ -10,6 +10,7 @@ use macropulse::score::RangeError;
 use macropulse::sim::Watch;
 use macropulse_study::budget::{Figures, usual};
 use macropulse_study::sweep::{Axis, Job, Metric, Plan, Request, Shard};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 use serde_json::{Value, json};
@@ -235,7 +236,14 @@ fn axis(key: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
 /// Raises:
 ///     Error: If the scan has no truth.
 #[pyfunction]
-pub fn score<'py>(scan: &Bound<'py, Scan>) -> PyResult<Bound<'py, PyAny>> {
+pub fn score<'py>(scan: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let Ok(scan) = scan.cast::<Scan>() else {
+        let kind = scan.get_type().name()?;
+        return Err(PyTypeError::new_err(format!(
+            "scan: a macropulse.Scan is wanted, not of type {kind}; `macropulse.load(path)` reads one, \
+             and of several each is judged by itself: `[macropulse.score(scan) for scan in scans]`"
+        )));
+    };
     let this = scan.get();
     if !this.has_truth() {
         return Err(wrong(

@@ -17,6 +17,36 @@ pub fn unreadable(error: &io::Error) -> String {
     }
 }
 
+/// Why a file or folder cannot be written, or standard output.
+pub fn unwritable(error: &io::Error) -> String {
+    let known = match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file or folder",
+        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => "a file is in the way",
+        io::ErrorKind::IsADirectory => "a folder is in the way",
+        io::ErrorKind::PermissionDenied => "permission denied",
+        io::ErrorKind::ReadOnlyFilesystem => "nothing can be written to this file system",
+        io::ErrorKind::StorageFull => "the disk is full",
+        io::ErrorKind::QuotaExceeded => "your share of the disk is used up",
+        io::ErrorKind::FileTooLarge => "a file may not be as large as this here",
+        // What the system says, without its number.
+        _ => return error.to_string().split(" (os error").next().unwrap_or_default().to_owned(),
+    };
+    known.to_owned()
+}
+
+/// Whether an `error` in writing is that of the machine, and not of whoever typed the name of a place.
+pub fn is_of_the_machine(error: &io::Error) -> bool {
+    !matches!(
+        error.kind(),
+        io::ErrorKind::NotFound
+            | io::ErrorKind::NotADirectory
+            | io::ErrorKind::AlreadyExists
+            | io::ErrorKind::IsADirectory
+            | io::ErrorKind::InvalidFilename
+            | io::ErrorKind::InvalidInput
+    )
+}
+
 /// Why `text` is not TOML.
 pub fn syntax(text: &str, error: &toml::de::Error) -> String {
     let said = error.message();
@@ -37,6 +67,9 @@ pub fn syntax(text: &str, error: &toml::de::Error) -> String {
         },
         _ if said.starts_with("duplicate key") => {
             "this key or table is there twice; put into one what belongs together"
+        }
+        _ if text.trim_start().starts_with('{') => {
+            "it looks like JSON; a line of TOML says KEY = VALUE"
         }
         _ if said.starts_with("key with no value") => "a line says KEY = VALUE",
         _ => said,
@@ -156,6 +189,7 @@ mod tests {
             ("a = 1\na = 2", "there twice"),
             ("[a]\n[a]", "there twice"),
             ("name: mine", "KEY = VALUE"),
+            ("{ \"name\": 1 }", "it looks like JSON"),
         ] {
             let said = not_toml(text);
             assert!(said.starts_with("is not TOML: ") && said.contains(told), "{text}: {said}");

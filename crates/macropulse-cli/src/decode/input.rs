@@ -7,6 +7,7 @@ use macropulse::design::Design;
 use macropulse_study::decoding::{Decoding, Input};
 
 use crate::fault::Fault;
+use crate::input::STREAM;
 
 /// The decoding of the shots and ticks at these paths, `-` for stdin, of the sensor `design`; and
 /// what they are called.
@@ -22,7 +23,7 @@ pub fn open(shots: &Path, ticks: &Path, design: &Design) -> Result<(Decoding, [S
 }
 
 fn is_stdin(path: &Path) -> bool {
-    path == Path::new("-")
+    path == Path::new(STREAM)
 }
 
 fn input(path: &Path) -> Result<Input, Fault> {

@@ -14,6 +14,7 @@ use crate::completions;
 use crate::explain::{self, Pixel};
 use crate::fault::Fault;
 use crate::folder::Folder;
+use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::options::{self, Common, Surroundings};
 use crate::simulate::formats::Formats;
@@ -79,8 +80,8 @@ pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
     let formats = options.formats()?;
     let sink = match options.output.as_deref() {
         None => Sink::Nothing,
-        Some(path) if path == Path::new("-") => Sink::Lines,
-        Some(path) => Sink::Folder(Folder::claim(path)?, formats),
+        Some(path) if path == Path::new(STREAM) => Sink::Lines,
+        Some(path) => Sink::Folder(Folder::claim_alone(path)?, formats),
     };
     if matches!(sink, Sink::Lines) && (options.json || !options.explain.is_empty()) {
         return Err(Fault::Wrong(

@@ -171,7 +171,7 @@ impl<'a> Run<'a> {
         match written.and_then(|()| out.flush()) {
             // A reader who has seen enough is no fault.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => Err(Fault::Told),
-            Err(error) => Err(Fault::Ours(format!("cannot write to stdout: {error}"))),
+            Err(error) => Err(Fault::unprinted(&error)),
             Ok(()) => Ok(()),
         }
     }

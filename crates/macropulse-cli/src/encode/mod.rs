@@ -3,7 +3,7 @@
 
 mod scan;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
@@ -12,7 +12,8 @@ use macropulse::design::Design;
 use macropulse_study::sent::Macropulse;
 
 use crate::fault::Fault;
-use crate::options::Changes;
+use crate::input::STREAM;
+use crate::options::{Changes, Common};
 use crate::simulate::ticks::Recorded;
 use crate::text::{Columns, grouped, print, print_json};
 use crate::{completions, input};
@@ -48,7 +49,7 @@ pub struct Encode {
     #[arg(long, value_name = "N", default_value_t = 0)]
     scan: u64,
 
-    /// Folder for the shot log of the scan, made if need be
+    /// Folder for the shot log of the scan, made if need be; - writes the log to stdout
     #[arg(short, long, value_name = "DIR", conflicts_with = "pixels")]
     #[arg(required_unless_present = "pixels")]
     output: Option<PathBuf>,
@@ -73,13 +74,25 @@ fn pixel(typed: &str) -> Result<(u32, u32), String> {
         .ok_or_else(|| "write it as row,column with both from 0, as in --pixel 0,1".to_owned())
 }
 
-pub fn run(options: &Encode) -> Result<(), Fault> {
+pub fn run(options: &Encode, common: &Common) -> Result<(), Fault> {
     let sensor = options.sensor.as_ref().or(options.named.as_ref()).map_or("", String::as_str);
     let design = input::design(sensor, &options.changes.of_sensor()?)?;
     if let Some(output) = &options.output {
         let form = options.format.unwrap_or(Form::Binary);
         let recorded = Recorded { design: &design, number: options.scan, form };
-        return scan::write(recorded, output, (options.wall_m, options.json));
+        let is_told = !common.quiet || options.json;
+        if output == Path::new(STREAM) {
+            return match options.wall_m.is_some() || options.json {
+                true => Err(Fault::Wrong(
+                    "-o - writes the shot log to standard output: --wall-m and --json have no place \
+                     there; write to a folder with -o DIR"
+                        .to_owned(),
+                )),
+                false => scan::stream(recorded),
+            };
+        }
+        let told = scan::write(recorded, output, (options.wall_m, options.json))?;
+        return if is_told { print(&told) } else { Ok(()) };
     }
     let macropulses: Vec<Macropulse> = options
         .pixels

@@ -9,7 +9,7 @@ use macropulse::codec::Tick;
 use macropulse::codec::files::{Form, TickWriter};
 use macropulse::design::Design;
 use macropulse::emit::{logs, most_scans, shots_of_scan};
-use macropulse::formats::WholeFile;
+use macropulse::formats::{WholeFile, versioned};
 use macropulse::units::{fs_from_s, tof_from_range};
 use serde_json::json;
 
@@ -17,27 +17,45 @@ use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::simulate::formats;
 use crate::simulate::ticks::Recorded;
-use crate::text::{grouped, print, print_json};
+use crate::text::{grouped, print_bytes};
 
 /// A form as typed.
 pub fn form(typed: &str) -> Result<Form, String> {
     formats::form(typed).ok_or_else(|| "known are ticks (binary) and ticks-csv (text)".to_owned())
 }
 
-/// Writes the shot log, and the ticks of a wall if there is one.
+/// Writes the shot log to standard output.
+pub fn stream(recorded: Recorded) -> Result<(), Fault> {
+    check(recorded)?;
+    let mut log = Vec::new();
+    recorded.write_shots(&mut log, LEVEL).map_err(|error| Fault::unprinted(&error))?;
+    print_bytes(&log)
+}
+
+/// The pose of a sensor of which nothing else is known.
+const LEVEL: ([f64; 3], [f64; 4]) = ([0.0; 3], [1.0, 0.0, 0.0, 0.0]);
+
+/// Refuses a scan that the clock of the sensor does not count to.
+fn check(recorded: Recorded) -> Result<(), Fault> {
+    let Recorded { design, number, .. } = recorded;
+    let last = most_scans(design).saturating_sub(1);
+    match number > last {
+        true => Err(Fault::Wrong(format!(
+            "--scan {number}: scans of {} are numbered 0 to {last}",
+            design.name
+        ))),
+        false => Ok(()),
+    }
+}
+
+/// Writes the shot log, and the ticks of a wall if there is one; gives what is told of it.
 pub fn write(
     recorded: Recorded,
     output: &Path,
     (wall, as_json): (Option<f64>, bool),
-) -> Result<(), Fault> {
+) -> Result<String, Fault> {
+    check(recorded)?;
     let Recorded { design, number, .. } = recorded;
-    let last = most_scans(design).saturating_sub(1);
-    if number > last {
-        let name = &design.name;
-        return Err(Fault::Wrong(format!(
-            "--scan {number}: scans of {name} are numbered 0 to {last}"
-        )));
-    }
     if let Some(range) = wall.filter(|range| !(0.0..=design.scan.light_range).contains(range)) {
         return Err(Fault::Wrong(format!(
             "--wall-m {range}: light of {} is followed from 0 to {} m",
@@ -49,8 +67,7 @@ pub fn write(
     let [shots, ticks] = recorded.names();
     let path = |name: &str| folder.path().join(name);
     let mut log = WholeFile::create(&path(&shots))?;
-    let level = ([0.0; 3], [1.0, 0.0, 0.0, 0.0]);
-    recorded.write_shots(&mut log, level).map_err(|cause| log.failed(cause))?;
+    recorded.write_shots(&mut log, LEVEL).map_err(|cause| log.failed(cause))?;
     let mut files = vec![shots];
     let mut count = None;
     if let Some(range) = wall {
@@ -65,7 +82,7 @@ pub fn write(
     let fired = shots_of_scan(design, number);
     let fired = fired.end - fired.start;
     if as_json {
-        return print_json(vec![json!({
+        let told = versioned(json!({
             "sensor": design.name,
             "scan": number,
             "shots": fired,
@@ -73,11 +90,12 @@ pub fn write(
             "digest": design.recorded_digest().to_string(),
             "folder": folder.path().display().to_string(),
             "files": files,
-        })]);
+        }));
+        return Ok(format!("{told:#}\n"));
     }
     let ticks = count.map_or(String::new(), |count| format!(", {} ticks", grouped(count)));
     let (fired, files) = (grouped(fired), files.join(" and "));
-    print(&format!("{files}: {fired} shots, guard shots included{ticks}\n"))
+    Ok(format!("{files}: {fired} shots, guard shots included{ticks}\n"))
 }
 
 /// Writes the ticks of an echo of every shot from `range`; gives how many.

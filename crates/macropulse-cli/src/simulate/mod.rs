@@ -158,7 +158,7 @@ impl Simulate {
             [_] => vec![output.clone()],
             several => subfolders(output, several.iter().map(|design| design.name.as_str())),
         };
-        paths.iter().map(|path| Folder::claim(path).map(Some)).collect()
+        paths.iter().map(|path| Folder::claim_alone(path).map(Some)).collect()
     }
 }
 

@@ -193,6 +193,17 @@ impl<'a> Run<'a> {
                 "too many pixels for a picture in colour; there is the 16-bit one".to_owned(),
             );
         }
+        let is_image = |format: &Format| matches!(format, Format::Png | Format::RangeNpy);
+        if !self.design.scan.has_image()
+            && scenario.formats.iter().any(is_image)
+            && !self.files.is_empty()
+        {
+            found.push(
+                "its directions are no rows and columns of an image: a range image of it is a strip, \
+                 shot after shot; index.html shows the cloud in space"
+                    .to_owned(),
+            );
+        }
         found.extend(folder.and_then(|folder| folder.warning_of_older(&self.files)));
         found.iter().for_each(|warning| warn(&format!("{}: {warning}", self.design.name)));
         self.warnings.extend(found);

@@ -16,7 +16,7 @@ use toml::Spanned;
 use super::formats::{Formats, form};
 use crate::explain::Pixel;
 use crate::fault::Fault;
-use crate::input::{self, STDIN};
+use crate::input::{self, STREAM};
 use crate::kind;
 
 /// The format this program reads.
@@ -58,7 +58,7 @@ struct ScenarioFile {
 impl Scenario {
     /// One scan of the sensors in the scene, each a ready one or a file.
     pub fn of(sensors: &[String], scene: &str, changes: &Changes) -> Result<Self, Fault> {
-        if sensors.iter().map(String::as_str).chain([scene]).filter(|name| *name == STDIN).count()
+        if sensors.iter().map(String::as_str).chain([scene]).filter(|name| *name == STREAM).count()
             > 1
         {
             return Err(Fault::Wrong(

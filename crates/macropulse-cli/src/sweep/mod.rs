@@ -12,7 +12,8 @@ use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
 use crate::completions;
 use crate::fault::{Fault, warn};
-use crate::input::STDIN;
+use crate::folder::refuse_stream;
+use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
 use crate::options::{Changes, Common, Surroundings};
@@ -125,7 +126,7 @@ impl Sweep {
     fn request(&self) -> Result<Request, Fault> {
         let sensors: Vec<String> = self.sensor.iter().chain(&self.sensors).cloned().collect();
         let scene = self.scene.as_ref().or(self.named_scene.as_ref()).cloned().unwrap_or_default();
-        if sensors.iter().chain([&scene]).any(|name| name == STDIN) {
+        if sensors.iter().chain([&scene]).any(|name| name == STREAM) {
             return Err(Fault::Wrong(
                 "- is no name for a sweep, which goes on later with the same command: write the \
                  sensor or scene into a file"
@@ -147,6 +148,7 @@ impl Sweep {
 }
 
 pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
+    refuse_stream(&options.output)?;
     let plan = Plan::of(&options.request()?)?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;

@@ -10,6 +10,7 @@
 mod common;
 
 mod commands;
+mod places;
 mod recorded;
 mod scenarios;
 mod scenes;

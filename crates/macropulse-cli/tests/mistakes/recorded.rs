@@ -61,6 +61,7 @@ const LINES: &[Row] = &[
     ("encode kim-park-2016 -o out --wall-m -5", &["--wall-m -5", "from 0 to 300 m"]),
     ("encode kim-park-2016 -o out --wall-m 50m", &["--wall-m", "a number, without its unit"]),
     ("encode kim-park-2016 -o out --format csv", &["ticks (binary) and ticks-csv (text)"]),
+    ("encode kim-park-2016 -o - --wall-m 30", &["-o -", "--wall-m", "a folder with -o DIR"]),
 ];
 
 /// A shot log and ticks, and what becomes of them in careless hands.

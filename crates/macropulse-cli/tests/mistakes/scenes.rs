@@ -92,6 +92,7 @@ const ROWS: &[Row] = &[
         &["mine.toml:4:14:", "`position_m` is 30", "as [1.0, 2.0, 3.0]"],
     ),
     ("[[object]]\ncar = {}\nposition_m = [30, 0]", &["mine.toml:4:14:", "has 2 entries"]),
+    ("[[object]]\ncar = {}\nposition_m = [30, 0, 1, 90]", &["mine.toml:4:14:", "has 4 entries"]),
     (
         "[[object]]\ncar = {}\nposition = [30, 0, 0]",
         &["mine.toml:4:1:", "did you mean `position_m`?"],
@@ -103,6 +104,14 @@ const ROWS: &[Row] = &[
     (
         "[[object]]\ncar = {}\nvelocity_km_h = [10, 0, 0]",
         &["mine.toml:4:1:", "did you mean `velocity_m_s`?"],
+    ),
+    (
+        "[[object]]\nshape = { sphere = { radius_m = 1 } }\nunit = \"cm\"",
+        &["mine.toml:4:8:", "`unit` belongs to objects with a `mesh`"],
+    ),
+    (
+        "[[object]]\nshape = { sphere = { radius_m = 1 } }\nmaterials = { all = \"white\" }",
+        &["mine.toml:4:21:", "`materials` belongs to objects with a `mesh` or `car`"],
     ),
     ("ground = \"asphalt\"", &["mine.toml:2:10:", "`ground` is the text", "{ material = … }"]),
     ("ground = { material = \"asphlat\" }", &["mine.toml:2:23:", "did you mean \"asphalt\"?"]),

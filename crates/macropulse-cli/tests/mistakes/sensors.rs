@@ -103,7 +103,7 @@ const WHOLE: &[Row] = &[
     ),
     ("version = 1\nidealised = []", &["mine.toml: ", "is missing", "extends = \"NAME\""]),
     ("version: 1\nextends: peregrine", &["mine.toml:1:", "is not TOML", "KEY = VALUE"]),
-    ("{ \"version\": 1 }", &["mine.toml:1:1:", "is not TOML"]),
+    ("{ \"version\": 1 }", &["mine.toml:1:1:", "is not TOML: it looks like JSON"]),
 ];
 
 #[test]

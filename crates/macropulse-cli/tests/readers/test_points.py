@@ -9,6 +9,7 @@ import subprocess
 import laspy
 import numpy as np
 import plyfile
+import pyarrow.parquet
 import pye57
 import pypcd4
 import pytest
@@ -172,6 +173,29 @@ def fields(file, header, names):
         buffers.append(lib.SourceDestBuffer(*args))
     header.points.reader(buffers).read()
     return columns
+
+
+def test_parquet(run, scan, points):
+    file = pyarrow.parquet.ParquetFile(run / f"scan-{scan:06}.parquet")
+    table = file.read()
+    assert table.column_names == list(points.dtype.names) and table.num_rows == len(points)
+    for column in table.columns:
+        assert column.null_count == 0
+    read = {name: table[name].to_numpy() for name in table.column_names}
+    assert {name: column.dtype for name, column in read.items()} == {
+        name: points.dtype[name] for name in points.dtype.names
+    }
+    same(read, points)
+    # Scan, image, pose and names, as a PCD has them.
+    lines = file.schema_arrow.metadata[b"macropulse"].decode().splitlines()
+    assert lines[0] == f"macropulse scan {scan}" and lines[1].startswith("macropulse list 24 40 ")
+    pose = [float(word) for word in lines[2].removeprefix("macropulse viewpoint ").split()]
+    np.testing.assert_allclose(pose[:3], [2.0 * scan_seconds(run, scan), 0.0, 2.0])
+    names = {"object": {}, "material": {}}
+    for line in lines[3:]:
+        what, number, name = line.split(maxsplit=2)
+        names[what][int(number)] = name
+    assert names == pypcd_names(run, scan) and names["object"]
 
 
 def test_kitti(run, scan, points):

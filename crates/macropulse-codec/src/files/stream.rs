@@ -86,7 +86,8 @@ impl<S: Read, T: Read> Stream<S, T> {
         let epoch = self.cut.epoch(log.fired_at_fs[0]);
         if span.end - epoch > i64::from(u32::MAX) {
             return self.shots.refuse(format!(
-                "shots {} to {} are fired too far apart to be decoded together",
+                "shots {} to {} are fired too far apart to be decoded together; is it the sensor \
+                 that they were recorded with, with the same changes?",
                 first,
                 self.left.start - 1
             ));

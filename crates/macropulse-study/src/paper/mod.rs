@@ -32,7 +32,7 @@ use macropulse::sim::Watch;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A folder could not be made.
-    #[error("cannot make the folder {}: {source}; choose another one with -o", path.display())]
+    #[error("cannot make the folder {}: {source}; choose another one with -o", path.display(), source = macropulse::told::unwritable(source))]
     Folder {
         /// The folder.
         path: PathBuf,

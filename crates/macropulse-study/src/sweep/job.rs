@@ -11,11 +11,12 @@ use serde_json::Value;
 use super::plan::folder_of_jobs;
 use super::{Error, Plan, Point};
 use macropulse::digest::Digest;
-use macropulse::formats::write_atomically;
+use macropulse::formats::{self, write_atomically};
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::{RangeError, Score};
 use macropulse::sim::{Scans, Watch};
+use macropulse::told;
 
 /// The file that says which sweep a folder holds.
 const DESCRIPTION: &str = "sweep.json";
@@ -146,9 +147,10 @@ impl Plan {
             Err(error) if error.kind() == ErrorKind::NotADirectory => {
                 Error::asked(format!("{place}: a file is in the way; {remedy}"))
             }
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                Error::asked(format!("{place}/{DESCRIPTION} cannot be read: {error}; {remedy}"))
-            }
+            Err(error) if error.kind() != ErrorKind::NotFound => Error::asked(format!(
+                "{place}/{DESCRIPTION} cannot be read: {}; {remedy}",
+                told::unreadable(&error)
+            )),
             Err(_) if folder.join("manifest.json").exists() => {
                 Error::asked(format!("{place} holds the results of another run; {remedy}"))
             }
@@ -162,9 +164,8 @@ impl Plan {
     /// # Errors
     /// If it cannot be made or written into.
     pub fn claim_folder(&self, folder: &Path) -> Result<(), Error> {
-        fs::create_dir_all(folder_of_jobs(folder)).map_err(|error| {
-            let place = folder.display();
-            Error::Asked(format!("cannot write into {place}: {error}; choose another folder"))
+        fs::create_dir_all(folder_of_jobs(folder)).map_err(|cause| {
+            Error::Formats(formats::Error::Write { path: folder.to_owned(), cause })
         })?;
         write_atomically(&folder.join(DESCRIPTION), |out| out.write_all(self.text().as_bytes()))?;
         Ok(())

@@ -29,7 +29,11 @@ impl Clouds {
     /// says, [`Error::Unreadable`] if no cloud is read from files of that ending.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let format = Format::of_extension(ending).ok_or_else(|| Error::unreadable(path))?;
+        let Some(format) = Format::of_extension(ending) else {
+            // A name that is misspelt is no format that is unknown.
+            std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?;
+            return Err(Error::unreadable(path));
+        };
         if let Format::Mcap(_) = format {
             return Ok(Self(Source::Many(Box::new(Messages::open(path)?))));
         }

@@ -18,7 +18,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
         header.split(',').map(|name| Attribute::named(name.trim().trim_matches('"'))).collect();
     let attributes: Vec<Attribute> = columns.iter().flatten().copied().collect();
     check_coordinates(&attributes).map_err(|fault| {
-        format!("{fault}; its first line has the names of columns, as `x_m,y_m,z_m`")
+        format!(
+            "{fault}; its first line has the names of columns with commas between, as `x_m,y_m,z_m`"
+        )
     })?;
     let mut about = About::default();
     let mut gathered = Gathered::new(&about, &attributes)?;

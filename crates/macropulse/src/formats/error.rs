@@ -1,6 +1,7 @@
 //! What can go wrong with a file, and whose fault it is.
 
 use super::Format;
+use crate::told;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -108,14 +109,16 @@ fn known() -> Vec<&'static str> {
 
 /// The cause in words that also say what to do, where we know.
 fn reason(cause: &io::Error) -> String {
-    match cause.kind() {
-        io::ErrorKind::NotFound => "there is no such file or folder".into(),
-        io::ErrorKind::PermissionDenied => {
-            "permission denied; choose a place that is open to you".into()
+    let remedy = match cause.kind() {
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "; choose a place that is open to you"
         }
-        io::ErrorKind::StorageFull => "the disk is full".into(),
-        _ => cause.to_string(),
-    }
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+            "; make room, or choose another place"
+        }
+        _ => "",
+    };
+    told::unwritable(cause) + remedy
 }
 
 #[cfg(test)]
@@ -131,5 +134,9 @@ mod tests {
             "cannot write a/b.pcd: permission denied; choose a place that is open to you"
         );
         assert!(error.source().is_none());
+        let full = Error::write(Path::new("a.pcd"), io::ErrorKind::StorageFull.into());
+        assert!(
+            full.to_string().ends_with(": the disk is full; make room, or choose another place")
+        );
     }
 }

@@ -164,6 +164,8 @@ mod tests {
             ("npy", Format::Npy),
             ("csv", Format::Csv),
             ("kitti", Format::Kitti),
+            #[cfg(feature = "parquet")]
+            ("parquet", Format::Parquet),
             ("mcap", Format::Mcap(Message::Ros2(Profile::Extended))),
             ("-velodyne", Format::Mcap(Message::Ros2(Profile::Velodyne))),
             ("-ouster", Format::Mcap(Message::Ros2(Profile::Ouster))),
@@ -209,6 +211,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "parquet")]
     fn the_documentation_has_the_table() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md");
         let documented = std::fs::read_to_string(path).unwrap();

@@ -328,7 +328,8 @@ impl Assembly<'_> {
         if written.unit.is_none() && written.scale.is_none() {
             self.notes.push(format!("{name}: no unit given, its lengths are read as metres"));
         }
-        Ok(scale * written.unit.unwrap_or(Unit::M).metres())
+        let unit = written.unit.as_ref().map_or(Unit::M, |unit| *unit.get_ref());
+        Ok(scale * unit.metres())
     }
 
     /// Up and forward of a mesh, as unit vectors in its own axes.

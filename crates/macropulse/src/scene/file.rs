@@ -11,7 +11,7 @@ use toml::Table;
 
 use super::error::Error;
 use super::schema;
-use super::spanned::Spanned;
+use super::spanned::{Spanned, Triple};
 use crate::names::{key_at, line_column, offset_of_key};
 use crate::told;
 
@@ -63,7 +63,7 @@ pub(super) struct InterfererTyped {
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: Table,
     /// Where it stands, m: x forward, y left, z up.
-    pub position_m: Option<Spanned<[f64; 3]>>,
+    pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
     pub yaw_deg: Option<Spanned<f64>>,
     /// Tilt, degrees: positive looks down.
@@ -96,7 +96,7 @@ impl InterfererTyped {
 #[serde(deny_unknown_fields)]
 pub(super) struct Stand {
     /// Where it stands, m: x forward, y left, z up.
-    pub position_m: Option<Spanned<[f64; 3]>>,
+    pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
     pub yaw_deg: Option<Spanned<f64>>,
     /// Tilt, degrees: positive looks down.
@@ -104,7 +104,9 @@ pub(super) struct Stand {
     /// Roll, degrees: positive lifts the left side.
     pub roll_deg: Option<Spanned<f64>>,
     /// Motion in the world, m/s; the position is where it is when the first scan begins.
-    pub velocity_m_s: Option<Spanned<[f64; 3]>>,
+    #[serde(default)]
+    #[schemars(schema_with = "schema::velocity")]
+    pub velocity_m_s: Option<Spanned<Triple>>,
     /// Turn about the vertical axis through the position, degrees per second, positive to the left.
     #[schemars(range(min = -1e5, max = 1e5))]
     pub turn_rate_deg_s: Option<Spanned<f64>>,
@@ -166,7 +168,7 @@ pub(super) struct ObjectTyped {
     /// A shape about the position, upright; or `mesh`, or `car`.
     pub shape: Option<Spanned<ShapeTyped>>,
     /// Unit of length of the mesh; metres unless it is given.
-    pub unit: Option<Unit>,
+    pub unit: Option<Spanned<Unit>>,
     /// Number by which the mesh is multiplied.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<Spanned<f64>>,
@@ -175,7 +177,7 @@ pub(super) struct ObjectTyped {
     /// Axis of the mesh that points forward; `x` unless it is given, `z` of glTF.
     pub forward: Option<Spanned<Axis>>,
     /// Where it stands, m: x forward, y left, z up.
-    pub position_m: Option<Spanned<[f64; 3]>>,
+    pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
     pub yaw_deg: Option<Spanned<f64>>,
     /// Tilt, degrees: positive looks down.
@@ -183,7 +185,9 @@ pub(super) struct ObjectTyped {
     /// Roll, degrees: positive lifts the left side.
     pub roll_deg: Option<Spanned<f64>>,
     /// Motion in the world, m/s; the position is where it is when the first scan begins.
-    pub velocity_m_s: Option<Spanned<[f64; 3]>>,
+    #[serde(default)]
+    #[schemars(schema_with = "schema::velocity")]
+    pub velocity_m_s: Option<Spanned<Triple>>,
     /// Turn about the vertical axis through the position, degrees per second, positive to the left.
     #[schemars(range(min = -1e5, max = 1e5))]
     pub turn_rate_deg_s: Option<Spanned<f64>>,
@@ -231,24 +235,46 @@ pub(super) struct Car {}
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum ShapeTyped {
     /// Without end, through the object's position; `normal` is a direction in its frame.
-    Plane { normal: [f64; 3] },
+    Plane { normal: Triple },
     /// About the object's position; radius in metres.
-    Sphere { radius_m: f64 },
+    Sphere {
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_m: f64,
+    },
     /// About the object's position; length, width, height in metres.
-    Box { size_m: [f64; 3] },
+    Box {
+        #[schemars(schema_with = "schema::size")]
+        size_m: Triple,
+    },
     /// Upright, about the object's position; radius and height in metres.
-    Cylinder { radius_m: f64, height_m: f64 },
+    Cylinder {
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_m: f64,
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        height_m: f64,
+    },
     /// Upright, about the object's position, the tip up; in metres.
     Cone {
+        #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
+        #[schemars(extend("exclusiveMinimum" = 0))]
         height_m: f64,
         #[serde(default)]
+        #[schemars(range(min = 0))]
         top_radius_m: f64,
     },
     /// Upright, about the object's position; in metres, its height with both half balls.
-    Capsule { radius_m: f64, height_m: f64 },
+    Capsule {
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius_m: f64,
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        height_m: f64,
+    },
     /// About the object's position; length, width, height in metres.
-    Ellipsoid { size_m: [f64; 3] },
+    Ellipsoid {
+        #[schemars(schema_with = "schema::size")]
+        size_m: Triple,
+    },
     /// Stands on the object's position and looks along x; from 0.4 to 2.6 m high.
     Person {
         #[schemars(range(min = 0.4, max = 2.6))]
@@ -431,7 +457,7 @@ mod tests {
     fn a_small_scene_is_read() {
         let text = "version = 1\n[[object]]\nshape.sphere.radius_m = 2\nposition_m = [10, 0, 0]\n";
         let scene = Source::typed(text, "a.toml").parse().unwrap();
-        assert_eq!(scene.objects[0].get_ref().position_m.as_ref().unwrap().get_ref()[0], 10.0);
+        assert_eq!(scene.objects[0].get_ref().position_m.as_ref().unwrap().get_ref().0[0], 10.0);
     }
 
     #[test]

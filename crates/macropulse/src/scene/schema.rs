@@ -4,7 +4,7 @@ use schemars::{Schema, SchemaGenerator, json_schema};
 use serde_json::Value;
 
 use super::file::SceneFile;
-use super::material;
+use super::{material, motion};
 use crate::{design, schema};
 
 pub(super) use crate::environment::in_scene as environment;
@@ -28,4 +28,20 @@ pub(super) fn material(_: &mut SchemaGenerator) -> Schema {
 /// Materials by what they are called in a mesh.
 pub(super) fn materials(generator: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": "object", "additionalProperties": material(generator) })
+}
+
+/// Length, width and height, m.
+pub(super) fn size(_: &mut SchemaGenerator) -> Schema {
+    three(json_schema!({ "type": "number", "exclusiveMinimum": 0 }))
+}
+
+/// A velocity in the world, m/s; as fast as [`motion::FASTEST`] at most, whichever way.
+pub(super) fn velocity(_: &mut SchemaGenerator) -> Schema {
+    let fastest = motion::FASTEST;
+    three(json_schema!({ "type": "number", "minimum": -fastest, "maximum": fastest }))
+}
+
+/// A list of three.
+fn three(each: Schema) -> Schema {
+    json_schema!({ "type": "array", "items": each, "minItems": 3, "maxItems": 3 })
 }

@@ -1,4 +1,4 @@
-//! Values of a scene file with their places.
+//! Values of a scene file with their places, and lists of three.
 
 use std::borrow::Cow;
 use std::ops::Deref;
@@ -34,5 +34,35 @@ impl<T: JsonSchema> JsonSchema for Spanned<T> {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         T::json_schema(generator)
+    }
+}
+
+/// A list of three numbers. More of them, which an array would pass over, are refused.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+pub(super) struct Triple(pub [f64; 3]);
+
+impl TryFrom<Vec<f64>> for Triple {
+    type Error = String;
+
+    fn try_from(list: Vec<f64>) -> Result<Self, String> {
+        let length = list.len();
+        // In the words of the parser, which are told in ours.
+        let refused = |_| format!("invalid length {length}, expected an array of length 3");
+        list.try_into().map(Self).map_err(refused)
+    }
+}
+
+impl JsonSchema for Triple {
+    fn schema_name() -> Cow<'static, str> {
+        "Triple".into()
+    }
+
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        <[f64; 3]>::json_schema(generator)
     }
 }

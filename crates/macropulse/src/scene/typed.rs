@@ -10,21 +10,22 @@ use super::file::{ObjectTyped, ShapeTyped, Source, Stand};
 use super::motion::{FASTEST, FASTEST_TURN_DEG, Motion};
 use super::person::{self, Part};
 use super::pose::Pose;
-use super::spanned::Spanned;
+use super::spanned::{Spanned, Triple};
 
 impl Source<'_> {
     /// Where something stands and how it moves.
     pub(super) fn motion(&self, stand: &Stand) -> Result<Motion, Error> {
         let mut motion = Motion::still(self.pose(stand)?);
         if let Some(typed) = &stand.velocity_m_s {
-            let speed = DVec3::from(*typed.get_ref()).length();
+            let Triple(velocity) = *typed.get_ref();
+            let speed = DVec3::from(velocity).length();
             if !(0.0..=FASTEST).contains(&speed) {
                 let message = format!(
                     "velocity_m_s must be three finite numbers, {FASTEST} m/s together at most"
                 );
                 return Err(self.fault(typed.span(), message));
             }
-            motion.velocity = *typed.get_ref();
+            motion.velocity = velocity;
         }
         if let Some(typed) = &stand.turn_rate_deg_s {
             let rate = *typed.get_ref();
@@ -42,12 +43,13 @@ impl Source<'_> {
     /// Where something stands.
     pub(super) fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
         let mut pose = Pose::default();
-        if let Some(position) = &stand.position_m {
-            if position.get_ref().iter().any(|value| !value.is_finite()) {
+        if let Some(typed) = &stand.position_m {
+            let Triple(position) = *typed.get_ref();
+            if position.iter().any(|value| !value.is_finite()) {
                 let message = "position_m must be three finite numbers";
-                return Err(self.fault(position.span(), message));
+                return Err(self.fault(typed.span(), message));
             }
-            pose.position = *position.get_ref();
+            pose.position = position;
         }
         let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
             Some(typed) => Ok(self.finite(typed, key)?.to_radians()),
@@ -66,12 +68,12 @@ impl Source<'_> {
             true => Ok(value),
             false => Err(fault(&format!("`{key}` must be finite and above zero"))),
         };
-        let each = |sizes: [f64; 3]| match sizes.iter().all(|s| *s > 0.0 && s.is_finite()) {
+        let each = |Triple(sizes): Triple| match sizes.iter().all(|s| *s > 0.0 && s.is_finite()) {
             true => Ok(sizes.map(|side| side / 2.0)),
             false => Err(fault("each of `size_m` must be finite and above zero")),
         };
         let shape = match *typed.get_ref() {
-            ShapeTyped::Plane { normal } => match DVec3::from(normal).try_normalize() {
+            ShapeTyped::Plane { normal } => match DVec3::from(normal.0).try_normalize() {
                 Some(normal) => Shape::Plane { normal: normal.to_array() },
                 None => return Err(fault("`normal` must be a finite direction, not zero")),
             },
@@ -114,7 +116,8 @@ impl Source<'_> {
 
     /// Keys that mean something only for the mesh of a file.
     pub(super) fn refuse_mesh_keys(&self, written: &ObjectTyped) -> Result<(), Error> {
-        let spans: [(Option<Range<usize>>, &str); 3] = [
+        let spans: [(Option<Range<usize>>, &str); 4] = [
+            (written.unit.as_ref().map(|typed| typed.span()), "unit"),
             (written.scale.as_ref().map(|typed| typed.span()), "scale"),
             (written.up.as_ref().map(|typed| typed.span()), "up"),
             (written.forward.as_ref().map(|typed| typed.span()), "forward"),

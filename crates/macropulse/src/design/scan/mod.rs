@@ -173,6 +173,12 @@ impl Scan {
         moment(0) == moment(self.shots() - 1)
     }
 
+    /// Whether rows and columns are an image of the field, the same in every scan. Where they are none
+    /// a row is a laser and the column counts its shots.
+    pub fn has_image(&self) -> bool {
+        self.model().is_lattice()
+    }
+
     /// The pixel, row and column, in whose cell the unit vector `direction` of the sensor frame
     /// lies; `None` outside the field of view, and where the pattern is no lattice. A cell reaches half
     /// of the way to its neighbours.

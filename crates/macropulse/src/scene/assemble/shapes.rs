@@ -19,6 +19,11 @@ impl Assembly<'_> {
         motions: &[Motion],
     ) -> Result<(), Error> {
         let parts = self.source.shape(shape)?;
+        if let Some((_, first)) = written.materials.first_key_value() {
+            let message = "`materials` belongs to objects with a `mesh` or `car`; give a shape one \
+                           `material`";
+            return Err(self.source.fault(first.span(), message));
+        }
         let typed = written.material.as_ref();
         let typed = typed.map(|typed| self.material_typed(typed)).transpose()?;
         let mut materials = Vec::with_capacity(parts.len());
