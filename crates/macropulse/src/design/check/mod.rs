@@ -172,8 +172,14 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     // Without a detector the receiver has no timing, of which none of its limits depends.
     let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let timing = libm::hypot(jitter, light.spread.unwrap_or(0.0));
-    let inputs =
-        Inputs { detector: &file.detector, scan: &scan, tdc: &tdc, coding: &coding, timing };
+    let inputs = Inputs {
+        detector: &file.detector,
+        scan: &scan,
+        tdc: &tdc,
+        coding: &coding,
+        timing,
+        photons_apart: light.spread.is_some(),
+    };
     let receiver = faults.keep(check.receiver(&file.receiver, &inputs));
     if !faults.is_empty() {
         return None;
