@@ -107,7 +107,7 @@ fn materials(wavelengths: &[f64], as_json: bool) -> Result<(), Fault> {
         return print_json(vec![json!({ "wavelengths_nm": wavelengths, "materials": list })]);
     }
     let columns = |values: &mut dyn Iterator<Item = String>| -> String {
-        values.map(|value| format!("{value:>7}")).collect()
+        values.map(|value| format!("{value:>9}")).collect()
     };
     let mut text = Columns::default();
     text.push("", columns(&mut wavelengths.iter().map(|nm| format!("{nm} nm"))));

@@ -26,19 +26,23 @@ const SHARPLY_SQUARE_ON: f32 = 0.3;
 /// columns are looked at.
 const ROWS: [u32; 2] = [4, 12];
 
-/// Ready sensors, those that differ in the order of their shots alone left out; with the sun they work
-/// in, and a dark wall at a range at which even a counter of marks can tell how dark it is.
-const SENSORS: [(&str, &str, [f64; 2]); 10] = [
-    ("kim-park-2016", "clear-day", [0.5, 140.0]),
-    ("kim-park-2016-fixed", "clear-day", [0.1, 100.0]),
-    ("kim-park-2016-physical", "night", [0.3, 50.0]),
-    ("bipolar-gold", "clear-day", [0.5, 140.0]),
-    ("coded-practical", "clear-day", [0.1, 145.0]),
-    ("coded-360", "clear-day", [0.1, 145.0]),
-    ("hdl-64e", "clear-day", [0.1, 30.0]),
-    ("vlp-16", "clear-day", [0.1, 30.0]),
-    ("peregrine", "clear-day", [0.5, 50.0]),
-    ("rosette-mid-40", "clear-day", [0.1, 50.0]),
+/// A sensor, the sun it works in, and reflectance and range of a wall that is so dark that even a counter
+/// of marks can tell how dark; none of eight marks across a threshold, between nothing and all of
+/// which lies a third of the light.
+type Case = (&'static str, &'static str, Option<[f64; 2]>);
+
+/// Ready sensors, those that differ in the order of their lasers alone left out.
+const SENSORS: [Case; 10] = [
+    ("kim-park-2016", "clear-day", Some([0.5, 140.0])),
+    ("kim-park-2016-fixed", "clear-day", Some([0.1, 100.0])),
+    ("kim-park-2016-physical", "night", Some([0.3, 50.0])),
+    ("bipolar-gold", "clear-day", Some([0.5, 140.0])),
+    ("coded-practical", "clear-day", None),
+    ("coded-360", "clear-day", None),
+    ("hdl-64e", "clear-day", Some([0.1, 30.0])),
+    ("vlp-16", "clear-day", Some([0.1, 30.0])),
+    ("peregrine", "clear-day", Some([0.5, 50.0])),
+    ("rosette-mid-40", "clear-day", Some([0.1, 50.0])),
 ];
 
 /// What a sensor says of a wall.
@@ -101,13 +105,13 @@ fn of_cloud(cloud: &PointCloud, within_deg: f32) -> Told {
 
 /// H0: the median is the reflectance of the wall to 5 %, where the detector can tell. Seed 11; N as
 /// printed, 51 at least. Where it cannot, the bound holds. Returns what is wrong.
-fn wrong((sensor, environment, dark): (&str, &str, [f64; 2])) -> Vec<String> {
+fn wrong((sensor, environment, dark): Case) -> Vec<String> {
     let rated = Design::open(sensor, &[]).unwrap().scan.rated_range;
     let white = [10.0, 25.0, 50.0, 100.0, 140.0].into_iter().filter(|range| *range <= rated);
     // At its farthest a wall is beyond the gate but for one place.
     let white = white.map(|range: f64| [1.0, range.min(0.98 * rated)]);
     let mut wrong = Vec::new();
-    for place in white.chain([dark]) {
+    for place in white.chain(dark) {
         let told = told(sensor, environment, place);
         let [reflectance, range] = place;
         let Told { returns, saturated, median } = told;
@@ -116,7 +120,7 @@ fn wrong((sensor, environment, dark): (&str, &str, [f64; 2])) -> Vec<String> {
         );
         let share = f64::from(median) / reflectance;
         let is_told = saturated < 0.5;
-        if share > 1.05 || is_told && share < 0.95 || place == dark && !is_told {
+        if share > 1.05 || is_told && share < 0.95 || Some(place) == dark && !is_told {
             wrong.push(format!("{sensor} at {place:?}: {told:?}"));
         }
     }

@@ -79,7 +79,6 @@ fn intensities() -> Result<Vec<Figure>, Error> {
     let walls = [
         ("kim-park-2016", 0.5, 140.0),
         ("bipolar-gold", 0.5, 140.0),
-        ("coded-practical", 0.1, 145.0),
         ("vlp-16", 0.1, 30.0),
         ("hdl-64e", 0.1, 50.0),
         ("peregrine", 0.5, 50.0),
