@@ -9,7 +9,7 @@ use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
 use macropulse::random::{Chance, Stage};
-use macropulse::scene::{Hits, Material, Scene};
+use macropulse::scene::{Finish, Hits, Material, Scene};
 use macropulse::{tdc, units};
 use rand::RngExt;
 
@@ -89,7 +89,7 @@ pub struct Sample {
     /// The sensor.
     pub design: Design,
     operating: Operating,
-    materials: Vec<Material>,
+    finishes: Vec<Finish>,
     bands: Vec<(Band, Hits)>,
 }
 
@@ -101,17 +101,20 @@ impl Sample {
     /// the second scan: its first band has guard shots before it.
     pub fn of(design: Design, scene: &str, every: usize) -> Fallible<Self> {
         let bands = bands(&design, 1).step_by(every);
-        let (materials, bands) = if scene == "random" {
+        let (finishes, bands) = if scene == "random" {
             let met = |band: Band| (band, anywhere(&design, &band.shot_log(&design)));
-            (vec![Material::matt("white", 1.0)], bands.map(met).collect())
+            (
+                vec![Material::matt("white", 1.0).at(design.light.wavelength)],
+                bands.map(met).collect(),
+            )
         } else {
             let scene = Scene::open(scene)?;
             let met = |band: Band| (band, scene.trace(&design, &band.shot_log(&design)).middle);
             let bands = bands.map(met).collect();
-            (scene.materials, bands)
+            (scene.finishes(design.light.wavelength), bands)
         };
         let operating = Operating::of(&design, &Environment::vacuum_dark())?;
-        Ok(Self { design, operating, materials, bands })
+        Ok(Self { design, operating, finishes, bands })
     }
 
     /// Shots of which returns are wanted.
@@ -131,7 +134,7 @@ impl Sample {
         for (band, hits) in &self.bands {
             let log = band.shot_log(&self.design);
             let mut light = light_of_echoes(&self.design, &log, []);
-            let surfaces = (&self.operating.link, &*self.materials);
+            let surfaces = (&self.operating.link, &*self.finishes);
             channel::echoes(&mut light.trains, surfaces, &log, hits);
             let response = detectors.response(&log, &light, &mut memory);
             let ticks = tdc::ticks(&self.design, response, 0).ticks;

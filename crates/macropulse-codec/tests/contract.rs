@@ -261,7 +261,7 @@ prop_compose! {
     ) -> Receiver {
         let kind = KINDS[kind];
         Receiver {
-            kind, effort, gate_ticks, light_ticks, ticks_per_chip, tick_fs, jitter_ticks,
+            kind, effort, gate_ticks, light_ticks, ticks_per_chip, tick_fs, jitter_ticks, photons_apart: false,
             false_alarm, bit_threshold, returns, pick,
         }
     }

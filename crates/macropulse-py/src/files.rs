@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use macropulse::channel::Operating;
 use macropulse::design::Design;
 use macropulse::formats::{Format, Names, write_cloud};
-use macropulse::points::{PointCloud, Truth};
+use macropulse::points::{PointCloud, Scale, Truth};
 use macropulse_study::decoding::{self, Decoding};
 use macropulse_study::record::{self, CloudsAt};
 use pyo3::prelude::*;
@@ -62,7 +62,7 @@ enum Source {
     /// Points.
     Clouds(CloudsAt),
     /// Shots and ticks, which the receiver of a sensor decodes.
-    Ticks(Box<Decoding>, Arc<Design>, Box<Operating>),
+    Ticks(Box<Decoding>, Arc<Design>, Box<Scale>),
 }
 
 /// What can go wrong with a [`Source`].
@@ -103,8 +103,8 @@ impl Source {
                     Scan::new(cloud, About { objects, materials, ..About::default() })
                 }))
             }
-            Self::Ticks(decoding, design, operating) => {
-                let stage = (&**design, &operating.link);
+            Self::Ticks(decoding, design, scale) => {
+                let stage = (&**design, &**scale);
                 let next = decoding.next_scan(stage, |_| Ok::<_, decoding::Error>(stop.flow()))?;
                 let about = || About { sensor: Some(Arc::clone(design)), ..About::default() };
                 Ok(next.map(|cloud| Scan::new(cloud, about())))
@@ -228,6 +228,7 @@ pub fn ticks_at(
         let (shots, ticks) = (decoding::Input::open(&shots)?, decoding::Input::open(&ticks)?);
         Decoding::open(&receiver, shots, ticks)
     })?;
-    let source = Source::Ticks(Box::new(decoding.or_raise()?), design, Box::new(operating));
+    let scale = Box::new(Scale::of(&design, &operating));
+    let source = Source::Ticks(Box::new(decoding.or_raise()?), design, scale);
     Ok(StoredScans::new(source, name))
 }

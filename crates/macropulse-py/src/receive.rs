@@ -8,7 +8,7 @@ use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
-use macropulse::points::{Piece, PointCloud, Truth};
+use macropulse::points::{Piece, PointCloud, Scale, Truth};
 use macropulse::random::Chance;
 use macropulse::scene::Scene as Simulated;
 use macropulse::{tdc, told};
@@ -209,7 +209,7 @@ pub fn decode(
     let cloud = work::done(py, 0, move |_| {
         let design = &*receiver;
         let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
-        let piece = Piece::of(design, &operating.link, &log, &returns);
+        let piece = Piece::of(design, &Scale::of(design, &operating), &log, &returns);
         let frame = PointCloud::empty(design, piece.points.scan);
         let cloud = PointCloud::joined(&frame, &[piece]);
         // There is no truth to stand beside it.

@@ -194,7 +194,8 @@ impl Scan {
     }
 
     /// Bits: 1 for a return with fewer than half of its marks, 2 for one for which another lag had
-    /// as many.
+    /// as many, 4 for one whose intensity is a lower bound: no mark was missed, and no amplitude is
+    /// measured.
     #[getter]
     fn flags<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         column!(slf, "flags")

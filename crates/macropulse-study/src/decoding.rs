@@ -7,13 +7,12 @@ use std::io::{self, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use macropulse::channel::Link;
 use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::files::{self, Digest, ShotReader, Stream, TickReader, What};
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit;
-use macropulse::points::{Piece, PointCloud, Truth, Viewpoint};
+use macropulse::points::{Piece, PointCloud, Scale, Truth, Viewpoint};
 use rayon::prelude::*;
 
 /// Why recorded shots and ticks cannot be decoded.
@@ -121,10 +120,10 @@ pub struct Band {
 impl Band {
     fn of(
         (log, ticks): (ShotLog, Ticks),
-        (design, link): (&Design, &Link),
+        (design, scale): (&Design, &Scale),
     ) -> Result<Self, decode::Error> {
         let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
-        let piece = Piece::of(design, link, &log, &returns);
+        let piece = Piece::of(design, scale, &log, &returns);
         Ok(Self { log, ticks, returns, piece })
     }
 }
@@ -182,7 +181,7 @@ impl Decoding {
     /// What `watch` says; and [`Error::Invalid`], [`Error::Refused`], or [`Error::NoShot`] at the end.
     pub fn next_scan<E: From<Error>>(
         &mut self,
-        stage: (&Design, &Link),
+        stage: (&Design, &Scale),
         mut watch: impl FnMut(&Band) -> Result<ControlFlow<()>, E>,
     ) -> Result<Option<PointCloud>, E> {
         let mut pieces: Vec<Piece> = Vec::new();
@@ -212,7 +211,7 @@ impl Decoding {
     }
 
     /// Decodes some bands more.
-    fn decode(&mut self, stage: (&Design, &Link)) -> Result<(), Error> {
+    fn decode(&mut self, stage: (&Design, &Scale)) -> Result<(), Error> {
         let mut bands = Vec::new();
         while bands.len() < self.together && !self.is_over {
             let until = |shot: u64| emit::Band::of_shot(stage.0, shot).end(stage.0);

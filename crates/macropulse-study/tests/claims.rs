@@ -215,7 +215,7 @@ fn the_text_of_a_row_has_what_was_measured() {
 fn quoted_points_are_those_found() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let [readme, paper] = ["README.md", "docs/paper.md"]
-        .map(|page| std::fs::read_to_string(root.join(page)).unwrap());
+        .map(|page| std::fs::read_to_string(root.join(page)).unwrap().replace('\u{a0}', ""));
     for sensor in SENSORS {
         let counts = DISTANCES.map(|distance| {
             let seen = MEASURED.experiment.at(sensor, distance).unwrap();

@@ -3,11 +3,11 @@
 //! The detector sees every mark and nothing else, unless a test says otherwise; one seed.
 #![allow(clippy::unwrap_used)]
 
-use macropulse::channel::Link;
+use macropulse::channel::Operating;
 use macropulse::codec::decode::Returns;
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
-use macropulse::points::{Outcome, Piece};
+use macropulse::points::{Outcome, Piece, Scale};
 use macropulse::scene::Scene;
 use macropulse::score::{self, Score};
 use macropulse::sim;
@@ -77,11 +77,11 @@ fn nothing_is_found_when_nearly_all_marks_are_missed() {
 
 /// Samples on the car, without any light being sent.
 fn samples_on_car(design: &Design, scene: &Scene) -> u64 {
+    let scale = Scale::of(design, &Operating::of(design, &scene.environment).unwrap());
     let judged = bands(design, 0).map(|band| {
         let log = band.shot_log(design);
         let hits = scene.trace(design, &log).middle;
-        let link = Link::of(design, &scene.environment);
-        let mut nothing = Piece::of(design, &link, &log, &Returns::default());
+        let mut nothing = Piece::of(design, &scale, &log, &Returns::default());
         score::judge(&mut nothing, design, scene, &log, &hits).samples_on_target
     });
     judged.sum()

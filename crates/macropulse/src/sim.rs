@@ -11,7 +11,7 @@ use crate::channel::{Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
 use crate::emit::{Band, bands, scan_begins_fs};
-use crate::points::{Piece, PointCloud, Viewpoint};
+use crate::points::{Piece, PointCloud, Scale, Viewpoint};
 use crate::processor::thread_seconds;
 use crate::random::Chance;
 use crate::scene::{Hits, Pose, Scene};
@@ -108,6 +108,7 @@ pub struct Scans<'a> {
     design: &'a Design,
     scene: &'a Scene,
     operating: Operating,
+    scale: Scale,
     detectors: Detectors<'a>,
     memories: Vec<Memory>,
     scan: Scan,
@@ -127,7 +128,8 @@ impl<'a> Scans<'a> {
             tally: Tally::default(),
             frame: PointCloud::empty(design, 0),
         };
-        Ok(Self { design, scene, operating, detectors, memories: Vec::new(), scan })
+        let scale = Scale::of(design, &operating);
+        Ok(Self { design, scene, operating, scale, detectors, memories: Vec::new(), scan })
     }
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
@@ -194,7 +196,7 @@ impl<'a> Scans<'a> {
         watch: &Watch,
         keep: &(dyn Fn(&Record) + Sync),
     ) -> Result<Option<&Scan>, Error> {
-        let Self { design, scene, operating, detectors, memories, scan } = self;
+        let Self { design, scene, operating, scale, detectors, memories, scan } = self;
         let setup = Setup { seen: Seen { design, scene, operating }, detectors };
         let number = bands.first().map_or(0, |band| band.scan);
         scan.frame.scan = number;
@@ -212,7 +214,7 @@ impl<'a> Scans<'a> {
                 let known = counted.1.peak_busy;
                 let measured = measure(&setup, memory, (band, known))?;
                 keep(&Record { band, log: &measured.log, ticks: &measured.ticks });
-                let (score, tally, ticks) = measured.judged(&setup.seen, piece);
+                let (score, tally, ticks) = measured.judged(&setup.seen, scale, piece);
                 memory.take_back(ticks.tick);
                 counted.0.add(&score);
                 counted.1.add(&tally);
@@ -259,10 +261,10 @@ struct Measured<'a> {
 
 impl Measured<'_> {
     /// Makes the returns of a band the points of `piece`, and counts; and the ticks back.
-    fn judged(mut self, seen: &Seen, piece: &mut Piece) -> (Score, Tally, Ticks) {
-        let Seen { design, scene, operating } = *seen;
+    fn judged(mut self, seen: &Seen, scale: &Scale, piece: &mut Piece) -> (Score, Tally, Ticks) {
+        let Seen { design, scene, .. } = *seen;
         let began = thread_seconds();
-        piece.fill(design, &operating.link, &self.log, &self.returns);
+        piece.fill(design, scale, &self.log, &self.returns);
         let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
         score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
         self.tally.seconds[POINTS] += thread_seconds() - began;

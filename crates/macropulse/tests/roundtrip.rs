@@ -74,6 +74,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
         marks: count(5),
         margin: count(2),
         photons: vec![f32::NAN; all.len()],
+        saturated: all.iter().map(|point| place(point) % 3 == 1).collect(),
         fired_ns,
         truth,
     }
@@ -119,6 +120,7 @@ fn assert_same_returns(read: &PointCloud, written: &PointCloud) {
     assert_eq!(read.peak, written.peak);
     assert_eq!(read.marks, written.marks);
     assert_eq!(read.margin, written.margin);
+    assert_eq!(read.saturated, written.saturated);
     assert_same_truth(&read.truth.returns, &written.truth.returns);
 }
 

@@ -64,6 +64,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         marks,
         margin,
         photons,
+        saturated,
         fired_ns,
         truth: Truth { returns, pixels },
     } = cloud;
@@ -82,6 +83,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         .chain(reals.map(|column| column.iter().map(|value| u64::from(value.to_bits())).collect()))
         .chain(counts.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
         .chain(numbers.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
+        .chain([saturated.iter().map(|&is_bound| u64::from(is_bound)).collect()])
         .chain(times.map(|column| column.iter().map(|value| value.to_bits()).collect()))
         .chain(outcomes.map(|column| column.iter().map(|&outcome| outcome as u64).collect()))
         .collect()

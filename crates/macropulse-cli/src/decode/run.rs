@@ -9,7 +9,7 @@ use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::environment::Environment;
 use macropulse::formats::{write_csv_lines, write_manifest};
-use macropulse::points::PointCloud;
+use macropulse::points::{PointCloud, Scale};
 use macropulse_study::decoding::{Band, Decoding};
 use macropulse_study::record::{self, Decoded, PAGE, Page};
 use serde_json::Value;
@@ -101,7 +101,8 @@ impl<'a> Run<'a> {
             _ => None,
         };
         let mut page = Page::new(design, None);
-        while let Some(cloud) = decoding.next_scan((design, &operating.link), |band| {
+        let scale = Scale::of(design, operating);
+        while let Some(cloud) = decoding.next_scan((design, &scale), |band| {
             progress.add(band.log.owned.len() as u64);
             self.take(band, &mut sink)?;
             Ok::<_, Fault>(match interrupt.is_raised() {

@@ -17,7 +17,7 @@ mod grid;
 
 use super::threshold::Thresholds;
 use super::timing::{self, Known};
-use super::{GATES_PER_BLOCK, MIDDLE, Receiver, Reject, Return, Returns, photons_per_mark, window};
+use super::{Energy, GATES_PER_BLOCK, MIDDLE, Receiver, Reject, Return, Returns, window};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -105,13 +105,17 @@ impl<'a> Band<'a> {
         let fired_at_fs = self.log.fired_at_fs[shot];
         let others = f64::from(peak.stray) / f64::from(dark.max(1)) * 0.999;
         let late = self.late(start, marks, others);
+        let width = self.late as u32 + 1;
+        let window = timing::window(self.receiver, width, late);
+        let Energy { photons, saturated } = Energy::of((peak.found, weight.into()), others, window);
         Some(Return {
             shot,
             tof: self.receiver.tof(fired_at_fs, start + self.epoch, late),
             peak: score,
             marks: weight,
             margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
-            photons: photons_per_mark(peak.found, weight.into(), others),
+            photons,
+            saturated,
         })
     }
 
@@ -233,6 +237,7 @@ mod tests {
             ticks_per_chip,
             tick_fs: 1000,
             jitter_ticks,
+            photons_apart: false,
             false_alarm: 1e-2,
             bit_threshold: 1,
             returns: 1,

@@ -337,6 +337,7 @@ mod tests {
             marks,
             margin: 0,
             photons: 1.0,
+            saturated: false,
         };
         let judge = |receiver: &Receiver, seen: &Ticks, one: Return| {
             let mut returns = Returns::default();

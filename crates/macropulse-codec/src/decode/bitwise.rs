@@ -15,7 +15,7 @@
 use std::array;
 
 use super::field::{Field, Memory};
-use super::{FARTHEST_JITTER, MARGIN, MIDDLE, Receiver, Reject, Return, Returns, photons_per_mark};
+use super::{Energy, FARTHEST_JITTER, MARGIN, MIDDLE, Receiver, Reject, Return, Returns, Window};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -312,13 +312,16 @@ impl<'a> Band<'a> {
             let Some(claim) = self.claims[shot] else { continue };
             let start = self.fired[shot] + claim.lag;
             let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]).len() as u16;
+            let Energy { photons, saturated } =
+                Energy::of((claim.count.into(), marks.into()), 0.0, Window::WHOLE);
             self.returns.push(Return {
                 shot,
                 tof: self.receiver.tof(self.log.fired_at_fs[shot], start + self.epoch, MIDDLE),
                 peak: claim.count,
                 marks,
                 margin: claim.count - self.runner_up[shot],
-                photons: photons_per_mark(claim.count.into(), marks.into(), 0.0),
+                photons,
+                saturated,
             });
         }
         self.returns
@@ -404,6 +407,7 @@ mod tests {
             ticks_per_chip: 1,
             tick_fs: 2500,
             jitter_ticks: 0.0,
+            photons_apart: false,
             false_alarm: 1e-3,
             bit_threshold: 6,
             returns: 1,

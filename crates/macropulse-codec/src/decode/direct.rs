@@ -1,6 +1,6 @@
 //! The receiver of a sensor that is not coded: each detector listens for the ticks of its shot.
 
-use super::{MIDDLE, Receiver, Reject, Return, Returns, Strength};
+use super::{Energy, MIDDLE, Receiver, Reject, Return, Returns, Strength, Window};
 use crate::ShotLog;
 use crate::Ticks;
 
@@ -10,9 +10,9 @@ pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Retur
     let mut returns = Returns::default();
     // Places in the list of ticks.
     let mut found: Vec<usize> = Vec::new();
-    let photons = |place: usize| match ticks.amplitude.get(place) {
-        Some(&amplitude) => amplitude,
-        None => super::photons_per_mark(1, 1, 0.0),
+    let energy = |place: usize| match ticks.amplitude.get(place) {
+        Some(&photons) => Energy { photons, saturated: false },
+        None => Energy::of((1, 1), 0.0, Window::WHOLE),
     };
     for shot in log.owned.clone() {
         let fired = receiver.fired(log, shot);
@@ -34,16 +34,18 @@ pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Retur
         if found.is_empty() {
             returns.reject(Reject::NoPeak);
         }
-        let strength = |&place: &usize| Strength { peak: 1, light: photons(place) };
+        let strength = |&place: &usize| Strength { peak: 1, light: energy(place).photons };
         receiver.pick.keep(receiver.returns.into(), &mut found, strength);
         for &place in &found {
+            let Energy { photons, saturated } = energy(place);
             returns.push(Return {
                 shot,
                 tof: receiver.tof(log.fired_at_fs[shot], fired + lag(place), MIDDLE),
                 peak: 1,
                 marks: 1,
                 margin: 1,
-                photons: photons(place),
+                photons,
+                saturated,
             });
         }
     }
@@ -70,6 +72,7 @@ mod tests {
             ticks_per_chip: 1,
             tick_fs: 1_000_000,
             jitter_ticks: 0.0,
+            photons_apart: false,
             false_alarm: 1e-3,
             bit_threshold: 1,
             returns,

@@ -49,8 +49,11 @@ pub struct Returns {
     pub marks: Vec<u16>,
     /// Peak minus the best other lag the receiver looked at.
     pub margin: Vec<u16>,
-    /// Energy as the receiver can tell it, in detected photons per mark.
+    /// Energy as the receiver can tell it, in detected photons per mark: measured, or by the count of
+    /// the marks found as of a detector that every photon fires.
     pub photons: Vec<f32>,
+    /// Whether `photons` is a lower bound: no mark was missed, and no amplitude measured.
+    pub saturated: Vec<bool>,
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
 }
@@ -64,6 +67,7 @@ pub(super) struct Return {
     pub marks: u16,
     pub margin: u16,
     pub photons: f32,
+    pub saturated: bool,
 }
 
 impl Returns {
@@ -92,6 +96,7 @@ impl Returns {
             marks: Vec::with_capacity(returns),
             margin: Vec::with_capacity(returns),
             photons: Vec::with_capacity(returns),
+            saturated: Vec::with_capacity(returns),
             rejects: Default::default(),
         }
     }
@@ -105,6 +110,7 @@ impl Returns {
             marks: self.marks[at],
             margin: self.margin[at],
             photons: self.photons[at],
+            saturated: self.saturated[at],
         })
     }
 
@@ -127,6 +133,7 @@ impl Returns {
         self.marks.push(found.marks);
         self.margin.push(found.margin);
         self.photons.push(found.photons);
+        self.saturated.push(found.saturated);
     }
 
     /// Takes out those whose light came `closes` seconds after firing or later.
@@ -157,7 +164,8 @@ mod tests {
     fn returns_of_a_shot_are_numbered_from_one() {
         let mut returns = Returns::default();
         for (shot, tof) in [(3, 1e-7), (3, 2e-7), (4, 1e-7), (9, 5e-8), (9, 6e-8), (9, 7e-8)] {
-            returns.push(Return { shot, tof, peak: 1, marks: 1, margin: 1, photons: 1.0 });
+            let (photons, saturated) = (1.0, true);
+            returns.push(Return { shot, tof, peak: 1, marks: 1, margin: 1, photons, saturated });
         }
         assert_eq!(returns.number, [1, 2, 1, 1, 2, 3]);
         assert_eq!(returns.shot, [3, 3, 4, 9, 9, 9]);

@@ -27,6 +27,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use super::{Receiver, Window};
 use crate::statistics::{normal_quantile, normal_tail};
 
 /// Steps of the scoring at most. From the fullest places on it takes two or three; more where
@@ -99,6 +100,25 @@ pub(super) fn about(width: u32, sigma: f64, count: impl Fn(i64) -> u32) -> (Vec<
         end += 1;
     }
     (counts.into(), first)
+}
+
+/// The `width` ticks in which `receiver` looks for what a mark makes, if its light is `late` ticks behind
+/// the beginning of the first.
+pub(super) fn window(receiver: &Receiver, width: u32, late: f64) -> Window {
+    let &Receiver { jitter_ticks: sigma, photons_apart, .. } = receiver;
+    let coverage = match width {
+        // Jitter that hardly leaves a tick.
+        1 => 1.0,
+        _ => coverage(f64::from(width), late, sigma),
+    };
+    Window { coverage, photons_apart }
+}
+
+/// The share of events that `width` ticks hold if they come `late` ticks behind the beginning of the
+/// first, give or take `sigma`.
+fn coverage(width: f64, late: f64, sigma: f64) -> f64 {
+    let (before, behind) = (normal_tail(late / sigma), normal_tail((width - late) / sigma));
+    (1.0 - before - behind).max(f64::MIN_POSITIVE)
 }
 
 /// How far, in ticks, other marks are from each of the ascending `marks`, at most `reach`, and from
@@ -368,6 +388,12 @@ mod tests {
         // As many before the end of a tick as behind it: on its end.
         assert!((late_by(&[0, 50, 50, 0], 0, &known) - 2.0).abs() < 1e-3);
         assert!(late_by(&[0; 4], 3, &known).is_finite());
+    }
+
+    #[test]
+    fn a_window_of_two_sigma_to_both_sides_holds_19_of_20_marks() {
+        assert!((coverage(4.0, 2.0, 1.0) - 0.9545).abs() < 1e-4);
+        assert!((coverage(4.0, 4.0, 1.0) - 0.5).abs() < 1e-4);
     }
 
     #[test]

@@ -34,6 +34,7 @@ impl Figures<'_> {
             "cw_ael_mw": class.map(|class| class.continuous() * 1e3),
             "limits": budget.map(|budget| budget.limits.iter().map(|limit| json!({
                 "rule": limit.rule.name(),
+                "distance_mm": limit.distance * 1e3,
                 "shots": limit.shots,
                 "brightness": limit.brightness,
                 "duration_s": limit.duration,

@@ -1,7 +1,7 @@
 //! What a budget says, as text for people.
 
 use macropulse::channel::idealised as idealised_in;
-use macropulse::design::safety::ASSUMED;
+use macropulse::design::safety::{ASSUMED, TELESCOPE};
 use macropulse::environment::Environment;
 
 use super::{Farthest, Figures};
@@ -108,10 +108,14 @@ impl Figures<'_> {
                 "1" => String::new(),
                 times => format!(", {times} times as bright as the mean"),
             };
+            let far = match limit.distance == TELESCOPE {
+                true => format!(", {} m away", short(limit.distance)),
+                false => String::new(),
+            };
             columns.push(
                 limit.rule.name(),
                 format!(
-                    "{} nJ a shot ({} of them in {}{bright})",
+                    "{} nJ a shot ({} of them in {}{bright}{far})",
                     short(limit.energy * 1e9),
                     short(limit.shots),
                     time(limit.duration)

@@ -1,14 +1,18 @@
 //! Published figures of light, eyes, detectors, converters and scanners.
 
 use std::collections::HashSet;
+use std::path::Path;
 
 use macropulse::codec::statistics::erlang_b;
 use macropulse::design::Design;
 use macropulse::design::detector::Amplifier;
 use macropulse::design::safety::Class1;
-use macropulse::emit::bands;
+use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
+use macropulse::predict::Forecaster;
 use macropulse::predict::link::diffraction;
+use macropulse::scene::{Scene, library};
+use macropulse::sim;
 
 use super::Error;
 use super::published::{Figure, Figures, Within};
@@ -47,7 +51,71 @@ fn sun_and_air() -> Result<Vec<Figure>, Error> {
         air.add(what, published, found, Within::Share(2e-3));
     }
     all.extend(air.done());
+    all.extend(surfaces());
+    all.extend(intensities()?);
     Ok(all)
+}
+
+/// Diffuse reflectance of materials, by wavelength, nm, in per cent.
+fn surfaces() -> Vec<Figure> {
+    let road = [(850.0, 10.8), (905.0, 10.9), (940.0, 11.0), (1064.0, 11.4), (1550.0, 13.9)];
+    let sidewalk = [(905.0, 31.4), (1550.0, 38.9)];
+    let mut all = reflectances("SB", &[("asphalt", &road), ("concrete", &sidewalk)]);
+    let grass = [(905.0, 50.9), (1550.0, 24.3)];
+    let leaves = [(905.0, 55.4), (1550.0, 25.3)];
+    let (pine, aluminium) = ([(905.0, 91.8), (1550.0, 56.5)], [(905.0, 59.6), (1550.0, 81.3)]);
+    all.extend(reflectances(
+        "ASTER",
+        &[("grass", &grass), ("vegetation", &leaves), ("wood", &pine), ("aluminium", &aluminium)],
+    ));
+    all.extend(reflectances("KZ04", &[("snow", &[(905.0, 78.0), (1064.0, 62.0)])]));
+    all
+}
+
+/// What ready sensors say of a wall of known reflectance that they see square on: the median of some
+/// thousand intensities.
+fn intensities() -> Result<Vec<Figure>, Error> {
+    let mut figures = Figures::of("intensity", "by definition");
+    let walls = [
+        ("kim-park-2016", 0.5, 140.0),
+        ("bipolar-gold", 0.5, 140.0),
+        ("vlp-16", 0.1, 30.0),
+        ("hdl-64e", 0.1, 50.0),
+        ("peregrine", 0.5, 50.0),
+    ];
+    for (sensor, reflectance, range) in walls {
+        let design = Design::open(sensor, &[])?;
+        let text = format!(
+            "version = 1\nenvironment = \"clear-day\"\n[[material]]\nname = \"paint\"\n\
+             diffuse = {reflectance}\n[[object]]\nshape.sphere.radius_m = {range}\n\
+             material = \"paint\"\n"
+        );
+        let scene = Scene::from_toml(&text, sensor, Path::new(""))?;
+        let some: Vec<Band> = bands(&design, 0).take(4).collect();
+        let cloud = sim::scan_part(&design, &scene, 1, &some)?.cloud();
+        let mut told = cloud.intensity;
+        told.sort_by(f32::total_cmp);
+        let median = told.get(told.len() / 2).copied().unwrap_or(f32::NAN);
+        let what = format!("{sensor}: a wall of {reflectance} at {range} m");
+        figures.add(what, reflectance, median.into(), Within::Share(0.05));
+    }
+    Ok(figures.done())
+}
+
+/// Reflectance in per cent at wavelengths in nm.
+type Spectrum<'a> = &'a [(f64, f64)];
+
+fn reflectances(source: &'static str, published: &[(&str, Spectrum)]) -> Vec<Figure> {
+    let mut figures = Figures::of("materials", source);
+    for (name, spectrum) in published {
+        let material = library().find(|material| material.name == *name);
+        for (nm, percent) in *spectrum {
+            let found = material.as_ref().map(|one| one.at(nm * 1e-9).diffuse * 100.0);
+            let what = format!("{name} at {nm} nm, %");
+            figures.add(what, *percent, found.unwrap_or(f64::NAN), Within::Absolute(0.05));
+        }
+    }
+    figures.done()
 }
 
 /// The limits of class 1, by wavelength, nm.
@@ -112,6 +180,7 @@ pub(super) fn detectors() -> Vec<Figure> {
 pub(super) fn scanners() -> Result<Vec<Figure>, Error> {
     let mut all = paper()?;
     all.extend(vlp_16()?);
+    all.extend(hdl_64e()?);
     let mut rosette = Figures::of("scanners", "Mid40");
     let design = Design::open("rosette-mid-40", &[])?;
     for (seconds, published) in [(0.1, 0.144), (0.2, 0.269), (0.5, 0.562), (1.0, 0.839)] {
@@ -171,6 +240,39 @@ fn vlp_16() -> Result<Vec<Figure>, Error> {
     }
     let per_second = design.shots_per_scan() as f64 / design.scan_period();
     figures.add("shots a second, some 300 000", 3e5, per_second, Within::Share(0.05));
+    let day = Environment::named("clear-day")?;
+    let forecaster = Forecaster::new(&design, &day)?;
+    for (reflectance, range) in [(0.8, 25.0), (0.1, 25.0), (0.8, 98.0)] {
+        let what = format!("\u{3c3} of its range at {reflectance} and {range} m, mm");
+        let found = forecaster.forecast(reflectance, range).precision.unwrap_or(f64::NAN) * 1e3;
+        figures.add(what, 30.0, found, Within::AtMost);
+    }
+    let seen = forecaster.forecast(0.8, 100.0).pd;
+    figures.add("echoes seen of 0.8 at 100 m", 0.99, seen, Within::AtLeast);
+    Ok(figures.done())
+}
+
+/// The data sheet's head on the roof of a car, 1.73 m above the pavement that it sees aslant.
+fn hdl_64e() -> Result<Vec<Figure>, Error> {
+    let mut figures = Figures::of("scanners", "HDL64");
+    let design = Design::open("hdl-64e", &[])?;
+    let forecaster = Forecaster::new(&design, &Environment::named("clear-day")?)?;
+    let precision = forecaster.forecast(0.1, 50.0).precision.unwrap_or(f64::NAN) * 1e3;
+    figures.add(
+        "hdl-64e: \u{3c3} of its range at 0.1 and 50 m, mm",
+        20.0,
+        precision,
+        Within::AtMost,
+    );
+    let seen = forecaster.forecast(0.8, 119.0).pd;
+    figures.add("echoes seen of 0.8 at 119 m", 0.99, seen, Within::AtLeast);
+    // Downwards from where nearly all is seen: the first range at which half of it is.
+    let pavement = |range: f64| forecaster.forecast(0.1 * 1.73 / range, range).pd;
+    let ranges = (200..=1190).map(|tenth| f64::from(tenth) / 10.0);
+    let half = ranges.into_iter().find(|range| pavement(*range) < 0.5).unwrap_or(f64::NAN);
+    figures.add("range at which it loses the pavement, m", 50.0, half, Within::Share(0.05));
+    let per_second = design.shots_per_scan() as f64 / design.scan_period();
+    figures.add("shots a second, above", 1.333e6, per_second, Within::AtLeast);
     Ok(figures.done())
 }
 

@@ -43,6 +43,8 @@ fn within(figure: &Figure) -> String {
         Within::Share(most) | Within::Absolute(most) if most < 1e-6 => "rounding".to_owned(),
         Within::Share(share) => format!("{} %", number(100.0 * share)),
         Within::Absolute(most) => number(most),
+        Within::AtMost => "no more".to_owned(),
+        Within::AtLeast => "no less".to_owned(),
     }
 }
 

@@ -20,6 +20,10 @@ pub enum Within {
     Share(f64),
     /// By so much.
     Absolute(f64),
+    /// By any amount, downwards: it is published as the most there is.
+    AtMost,
+    /// By any amount, upwards: it is published as the least there is.
+    AtLeast,
 }
 
 /// A published figure, and ours.
@@ -47,6 +51,8 @@ impl Figure {
             Within::Exactly => off == 0.0,
             Within::Share(share) => off <= share * self.published.abs(),
             Within::Absolute(most) => off <= most,
+            Within::AtMost => self.ours <= self.published,
+            Within::AtLeast => self.ours >= self.published,
         }
     }
 }

@@ -23,7 +23,7 @@ use std::ops::Range;
 use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains, Transmitter};
 use crate::design::Design;
 use crate::emit::shot_at;
-use crate::scene::{Illuminated, Interferer, LineOfSight, Material, Scene};
+use crate::scene::{Finish, Illuminated, Interferer, LineOfSight, Scene};
 use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
 use macropulse_codec::ShotLog;
 
@@ -53,6 +53,7 @@ pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, 
         let around_fs = around_fs(other);
         let farthest = design.scan.light_range.max(other.design.scan.light_range);
         let direct = Direct::of(scene, other, 2.0 * farthest);
+        let finishes = scene.finishes(other.design.light.wavelength);
         let longest_fs = fs_from_s(2.0 * farthest / SPEED_OF_LIGHT);
         for open in listening(design, log, around_fs) {
             let channel = |pixel| channel_of(design, log, pixel);
@@ -68,7 +69,7 @@ pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, 
                     listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
                 };
                 let lit = scene.illuminated(other, &theirs, farthest, &look);
-                arrivals.add_reflected(&scene.materials, &theirs, &lit);
+                arrivals.add_reflected(&finishes, &theirs, &lit);
                 if let Some(direct) = &direct {
                     arrivals.add_direct((other, direct), &theirs, &look);
                 }
@@ -192,12 +193,12 @@ struct Arrivals<'a> {
 }
 
 impl Arrivals<'_> {
-    /// Adds light of the shots in `log` that surfaces of `materials` reflect.
-    fn add_reflected(&mut self, materials: &[Material], log: &ShotLog, lit: &Illuminated) {
+    /// Adds light of the shots in `log` that surfaces with these `finishes` reflect.
+    fn add_reflected(&mut self, finishes: &[Finish], log: &ShotLog, lit: &Illuminated) {
         for i in 0..lit.shot.len() {
-            let material = &materials[usize::from(lit.material[i])];
+            let finish = &finishes[usize::from(lit.material[i])];
             let cosines = [lit.cosine[i], lit.half_cosine[i]].map(f64::from);
-            let reflectance = material.scatter(cosines[0], cosines[1]) * f64::from(lit.weight[i]);
+            let reflectance = finish.scatter(cosines[0], cosines[1]) * f64::from(lit.weight[i]);
             let way = lit.there[i] + lit.back[i];
             let photons = self.link.photons_by((way, lit.back[i]), reflectance);
             self.add((log, lit.shot[i] as usize), lit.ray[i], (way, photons), lit.pixel[i]);

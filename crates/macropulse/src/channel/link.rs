@@ -2,7 +2,7 @@
 
 use crate::design::{Design, Field};
 use crate::environment::Environment;
-use crate::scene::{Hits, Material};
+use crate::scene::{Finish, Hits};
 use crate::units::tof_from_range;
 
 /// Half of the width of a receiver's filter, m: what sensor files leave unsaid.
@@ -67,11 +67,11 @@ impl Link {
         self.photons_at_one_metre * reflectance * self.transmission(way) / (back * back)
     }
 
-    /// Mean photons detected per mark of what ray `i` of `hits` has met in a scene of `materials`.
+    /// Mean photons detected per mark of what ray `i` of `hits` has met in a scene of materials with these `finishes`.
     #[inline]
-    pub(super) fn echo(&self, materials: &[Material], hits: &Hits, i: usize) -> f64 {
-        let material = &materials[usize::from(hits.material[i])];
-        let reflectance = material.backscatter(f64::from(hits.cosine[i]));
+    pub(super) fn echo(&self, finishes: &[Finish], hits: &Hits, i: usize) -> f64 {
+        let finish = &finishes[usize::from(hits.material[i])];
+        let reflectance = finish.backscatter(f64::from(hits.cosine[i]));
         self.photons(reflectance * f64::from(hits.weight[i]), hits.range[i])
     }
 

@@ -27,7 +27,7 @@ pub use operating::{Error, Idealised, Operating, idealised};
 use macropulse_codec::ShotLog;
 
 use crate::design::Design;
-use crate::scene::{Hits, Material, SUB_MACROPULSES, Scene, Traced};
+use crate::scene::{Finish, Hits, SUB_MACROPULSES, Scene, Traced};
 use crate::units::{fs_from_s, tof_from_range, tof_fs_from_ranges};
 
 /// A sensor in a scene, at work in the environment of the scene.
@@ -49,9 +49,11 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
         background: Background { steady: operating.background, ..Background::default() },
         ..Light::default()
     };
+    let finishes = scene.finishes(design.light.wavelength);
+    let surfaces = (&operating.link, &*finishes);
     match traced.sub_macropulses.as_slice() {
-        [] => echoes(&mut light.trains, (&operating.link, &scene.materials), log, &traced.middle),
-        each => echoes_of_sub_macropulses(&mut light.trains, seen, log, each),
+        [] => echoes(&mut light.trains, surfaces, log, &traced.middle),
+        each => echoes_of_sub_macropulses(&mut light.trains, (design, surfaces), log, each),
     }
     start_late(&mut light.trains, design, log);
     interferers::add(&mut light, design, scene, log);
@@ -76,13 +78,13 @@ fn start_late(trains: &mut PulseTrains, design: &Design, log: &ShotLog) {
 /// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out.
 pub fn echoes(
     trains: &mut PulseTrains,
-    (link, materials): (&Link, &[Material]),
+    (link, finishes): (&Link, &[Finish]),
     log: &ShotLog,
     hits: &Hits,
 ) {
     let delay_fs = tof_fs_from_ranges(&hits.range);
     let from = trains.photons.len();
-    trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(materials, hits, i)));
+    trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(finishes, hits, i)));
     let lit = &trains.photons[from..];
     // Nearly always all of them.
     if lit.iter().all(|&photons| photons > 0.0) {
@@ -119,9 +121,13 @@ fn add_columns(trains: &mut PulseTrains, log: &ShotLog, shots: &[u32], delay_fs:
 
 /// Adds the echoes of the sub-macropulses of all shots, which have met `each`, the one sent first
 /// first; ordered by shot.
-fn echoes_of_sub_macropulses(trains: &mut PulseTrains, seen: &Seen, log: &ShotLog, each: &[Hits]) {
-    let (link, materials) = (&seen.operating.link, &seen.scene.materials);
-    let codebook = &seen.design.coding.codebook;
+fn echoes_of_sub_macropulses(
+    trains: &mut PulseTrains,
+    (design, (link, finishes)): (&Design, (&Link, &[Finish])),
+    log: &ShotLog,
+    each: &[Hits],
+) {
+    let codebook = &design.coding.codebook;
     let mut order: Vec<(u32, u8, usize)> = Vec::new();
     for (sub, hits) in each.iter().enumerate() {
         order.extend(hits.shot.iter().enumerate().map(|(i, shot)| (*shot, sub as u8, i)));
@@ -130,7 +136,7 @@ fn echoes_of_sub_macropulses(trains: &mut PulseTrains, seen: &Seen, log: &ShotLo
     for met in order.chunk_by(|one, next| one.0 == next.0) {
         for (way, &(shot, sub, i)) in met.iter().enumerate() {
             let hits = &each[usize::from(sub)];
-            let photons = link.echo(materials, hits, i);
+            let photons = link.echo(finishes, hits, i);
             if photons <= 0.0 {
                 continue;
             }
@@ -205,11 +211,12 @@ fn echo(log: &ShotLog, shot: usize, delay_fs: i64, train: PulseTrain) -> PulseTr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Material;
 
     #[test]
     fn what_has_no_light_is_no_echo() {
         let design = Design::open("kim-park-2016", &[]).unwrap();
-        let materials = [Material::matt("white", 1.0), Material::matt("black", 0.0)];
+        let finishes = [1.0, 0.0].map(|diffuse| Material::matt("", diffuse).at(905e-9));
         let hits = Hits {
             shot: vec![3, 5, 5, 9],
             weight: vec![1.0; 4],
@@ -221,7 +228,7 @@ mod tests {
         let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
         let mut trains = PulseTrains::default();
         let link = Link::of(&design, &crate::environment::Environment::vacuum_dark());
-        echoes(&mut trains, (&link, &materials), &log, &hits);
+        echoes(&mut trains, (&link, &finishes), &log, &hits);
         assert_eq!((&trains.shot[..], &trains.way[..]), (&[3, 5][..], &[0, 0][..]));
         let delay_fs = crate::units::fs_from_s(crate::units::tof_from_range(30.0));
         assert_eq!(trains.arrives_fs[1], log.fired_at_fs[5] + delay_fs);

@@ -59,11 +59,13 @@ pub(super) struct Inputs<'a> {
     pub coding: &'a Coding,
     /// Standard deviation of the time of a mark, s.
     pub timing: f64,
+    /// As [`Receiver::photons_apart`].
+    pub photons_apart: bool,
 }
 
 impl Check<'_> {
     pub(super) fn receiver(&self, file: &ReceiverFile, inputs: &Inputs) -> Result<Receiver, Error> {
-        let &Inputs { detector, scan, tdc, coding, timing } = inputs;
+        let &Inputs { detector, scan, tdc, coding, timing, photons_apart } = inputs;
         let kind = match file.kind {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
             ReceiverKindFile::Blind => ReceiverKind::Blind,
@@ -94,6 +96,7 @@ impl Check<'_> {
             ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
             tick_fs: tdc.tick_fs,
             jitter_ticks: timing * 1e15 / tdc.tick_fs as f64,
+            photons_apart,
             false_alarm: self.within("receiver.false_alarm", file.false_alarm, 1e-30, 0.5)?,
             bit_threshold: match kind {
                 ReceiverKind::Literal | ReceiverKind::Blind => {

@@ -279,6 +279,7 @@ pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
         ("marks", cloud.marks.len()),
         ("margin", cloud.margin.len()),
         ("photons", cloud.photons.len()),
+        ("saturated", cloud.saturated.len()),
     ];
     let (seen, first) = (&cloud.truth.returns, &cloud.truth.pixels);
     let true_returns = [
@@ -349,6 +350,8 @@ mod tests {
         assert_eq!(flags(&cloud, Point::Return(2)), Value::U1(1));
         cloud.margin[2] = 0;
         assert_eq!(flags(&cloud, Point::Return(2)), Value::U1(3));
+        cloud.saturated[0] = true;
+        assert_eq!(flags(&cloud, Point::Return(0)), Value::U1(4));
         // No return: no flag, no number.
         assert_eq!(flags(&cloud, Point::Unanswered(2)), Value::U1(0));
         assert_eq!(Attribute::ReturnNumber.value(&cloud, Point::Unanswered(2)), Value::U1(0));

@@ -129,6 +129,7 @@ fn sample_cloud() -> PointCloud {
         marks: vec![174, 174, 174, 174, 58],
         margin: vec![80, 70, 3, 81, 20],
         photons: vec![nan; 5],
+        saturated: vec![false; 5],
         fired_ns,
         truth: Truth {
             returns: Surfaces {

@@ -3,7 +3,7 @@
 use super::about::{About, List};
 use super::attributes::{Attribute, outcome_from_code};
 use super::number::Kind;
-use crate::points::{NO_OBJECT, Outcome, PointCloud, Surface, Surfaces, Truth};
+use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Surface, Surfaces, Truth};
 
 /// Pixels that a cloud is given at most, so that a file that lies about its size costs no memory: as
 /// many as a sensor may have.
@@ -163,6 +163,7 @@ pub(super) struct Record {
     peak: u16,
     marks: u16,
     margin: u16,
+    saturated: bool,
     surface: Surface,
 }
 
@@ -180,6 +181,7 @@ impl Default for Record {
             peak: 0,
             marks: 0,
             margin: 0,
+            saturated: false,
             surface: Surface::NONE,
         }
     }
@@ -218,8 +220,8 @@ impl Record {
             Attribute::Peak => self.peak = short()?,
             Attribute::Marks => self.marks = short()?,
             Attribute::Margin => self.margin = short()?,
-            // They follow from the other columns.
-            Attribute::Flags => {}
+            // The others follow from the columns beside them, and not every writer's are ours.
+            Attribute::Flags => self.saturated = value as u64 & u64::from(SATURATED) != 0,
             Attribute::TrueRange => self.surface.range = value as f32,
             Attribute::Object => self.surface.object = name()?,
             Attribute::Material => self.surface.material = name()?,
@@ -317,6 +319,7 @@ impl Gathered {
         cloud.marks.push(record.marks);
         cloud.margin.push(record.margin);
         cloud.photons.push(f32::NAN);
+        cloud.saturated.push(record.saturated);
         cloud.truth.returns.push(record.surface);
     }
 

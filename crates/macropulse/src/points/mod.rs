@@ -6,10 +6,12 @@
 
 mod image;
 mod piece;
+mod scale;
 
 pub use image::Image;
 pub use macropulse_codec::decode::Pick;
 pub use piece::Piece;
+pub use scale::Scale;
 
 use crate::design::Design;
 use macropulse_codec::decode::Strength;
@@ -86,9 +88,12 @@ pub struct PointCloud {
     pub y: Vec<f32>,
     /// Up, m.
     pub z: Vec<f32>,
-    /// Apparent reflectance, 1 = white Lambertian facing the sensor, range and its own energy
-    /// estimate taken into account.
+    /// Apparent reflectance, 1 = white Lambertian facing the sensor, by range, link and its own
+    /// energy estimate ([`Scale`]); a lower bound where it is `saturated`.
     pub intensity: Vec<f32>,
+    /// Whether the detector cannot tell how much light it was: no mark was missed, and no amplitude
+    /// is measured.
+    pub saturated: Vec<bool>,
     /// One-way range, m.
     pub range: Vec<f32>,
     /// Time at which the shot was fired, ns from the beginning of the first scan.
@@ -236,6 +241,9 @@ pub const FAINT: u8 = 1;
 /// Flag of a return for which another lag had as many marks.
 pub const AMBIGUOUS: u8 = 2;
 
+/// Flag of a return of which every mark was found: its intensity is a lower bound.
+pub const SATURATED: u8 = 4;
+
 /// Object and material index of a pixel that met nothing.
 pub const NO_OBJECT: u16 = u16::MAX;
 
@@ -258,11 +266,14 @@ impl PointCloud {
         self.range.len()
     }
 
-    /// What is to be known of return `at`, as bits: [`FAINT`], [`AMBIGUOUS`]; 0 for a sound one.
+    /// What is to be known of return `at`, as bits: [`FAINT`], [`AMBIGUOUS`],
+    /// [`SATURATED`]; 0 for a sound one that tells how bright it is.
     pub fn flags(&self, at: usize) -> u8 {
         let faint = 2 * self.peak[at] < self.marks[at];
         let ambiguous = self.margin[at] == 0;
-        (u8::from(faint) * FAINT) | (u8::from(ambiguous) * AMBIGUOUS)
+        let saturated = self.saturated[at];
+        let bits = [(faint, FAINT), (ambiguous, AMBIGUOUS), (saturated, SATURATED)];
+        bits.into_iter().map(|(is_set, bit)| u8::from(is_set) * bit).sum()
     }
 
     /// One return of each pixel, by `pick`.

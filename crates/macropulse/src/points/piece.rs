@@ -4,8 +4,7 @@
 //! another. The pieces in the order of the bands are the cloud; who wants it as one list has them
 //! joined.
 
-use super::{Outcome, PointCloud, Truth};
-use crate::channel::Link;
+use super::{Outcome, PointCloud, Scale, Truth};
 use crate::design::Design;
 use crate::units::range_from_tof;
 use macropulse_codec::ShotLog;
@@ -25,19 +24,22 @@ pub struct Piece {
 }
 
 impl Piece {
-    /// The returns of one band of a scan, by the `link` of the sensor through its air, and the firing
-    /// times of its owned shots.
-    pub fn of(design: &Design, link: &Link, log: &ShotLog, returns: &Returns) -> Self {
+    /// The returns of one band of a scan, their light told by `scale`, and the firing times of its
+    /// owned shots.
+    pub fn of(design: &Design, scale: &Scale, log: &ShotLog, returns: &Returns) -> Self {
         let mut piece = Self::default();
-        piece.fill(design, link, log, returns);
+        piece.fill(design, scale, log, returns);
         piece
     }
 
     /// As [`Piece::of`], in the memory of what was in it before.
-    ///
-    /// Intensity is the photons a mark brought over the photons a white surface seen square on
-    /// would have brought from the same range; 1 for a detector without a photon scale.
-    pub(crate) fn fill(&mut self, design: &Design, link: &Link, log: &ShotLog, returns: &Returns) {
+    pub(crate) fn fill(
+        &mut self,
+        design: &Design,
+        scale: &Scale,
+        log: &ShotLog,
+        returns: &Returns,
+    ) {
         self.clear();
         let scan = (log.first + log.owned.start as u64) / design.shots_per_scan();
         let points = &mut self.points;
@@ -56,7 +58,8 @@ impl Piece {
         points.peak.extend(&returns.peak);
         points.marks.extend(&returns.marks);
         points.margin.extend(&returns.margin);
-        points.photons.extend(&returns.photons);
+        points.photons.extend(returns.photons.iter().map(|&photons| scale.detected(photons)));
+        points.saturated.extend(&returns.saturated);
         // The last number among those of a shot is how many they are.
         points.number_of_returns.extend(&returns.number);
         for at in (1..returns.len()).rev().filter(|&at| returns.number[at] > 1) {
@@ -73,7 +76,7 @@ impl Piece {
         }
         let directions = design.directions();
         let beside = directions.have_origins();
-        for (at, (&tof, &photons)) in returns.tof.iter().zip(&returns.photons).enumerate() {
+        for (at, &tof) in returns.tof.iter().enumerate() {
             let (row, column) = (points.row[at], points.column[at]);
             let range = range_from_tof(tof) + design.scan.range_offset(row);
             let mut point =
@@ -86,9 +89,7 @@ impl Piece {
             points.y[at] = point[1] as f32;
             points.z[at] = point[2] as f32;
             points.range[at] = range as f32;
-            let white = link.photons(1.0, range);
-            let share = || (f64::from(photons) / white) as f32;
-            points.intensity[at] = if white.is_finite() { share() } else { 1.0 };
+            points.intensity[at] = scale.reflectance(points.photons[at], range);
         }
     }
 
@@ -121,10 +122,11 @@ impl PointCloud {
         let mut cloud = frame.clone();
         cloud.fired_ns.resize(pixels, f64::NAN);
         cloud.truth.pixels.blank(pixels);
-        let Columns { bytes, counts, reals, times, outcomes } = cloud.columns();
+        let Columns { bytes, bits, counts, reals, times, outcomes } = cloud.columns();
         // Each column by itself: which thread takes which makes no difference.
         rayon::scope(|scope| {
             bytes.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
+            bits.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
             counts.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
             reals.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
             times.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
@@ -135,8 +137,9 @@ impl PointCloud {
 
     /// Empties all columns, and keeps their memory.
     fn clear(&mut self) {
-        let Columns { bytes, counts, reals, times, outcomes } = self.columns();
+        let Columns { bytes, bits, counts, reals, times, outcomes } = self.columns();
         bytes.into_iter().for_each(|column| column.entries.clear());
+        bits.into_iter().for_each(|column| column.entries.clear());
         counts.into_iter().for_each(|column| column.entries.clear());
         reals.into_iter().for_each(|column| column.entries.clear());
         times.into_iter().for_each(|column| column.entries.clear());
@@ -154,6 +157,7 @@ impl PointCloud {
                     &points.number_of_returns
                 }),
             ],
+            bits: [Column::new(Return, &mut self.saturated, |points| &points.saturated)],
             counts: [
                 Column::new(Return, &mut self.row, |points| &points.row),
                 Column::new(Return, &mut self.column, |points| &points.column),
@@ -192,6 +196,7 @@ impl PointCloud {
 /// The columns of a cloud by the type of their entries.
 struct Columns<'a> {
     bytes: [Column<'a, u8>; 2],
+    bits: [Column<'a, bool>; 1],
     counts: [Column<'a, u16>; 9],
     reals: [Column<'a, f32>; 10],
     times: [Column<'a, f64>; 2],
@@ -240,8 +245,8 @@ impl<'a, T: Copy> Column<'a, T> {
 mod tests {
     use super::*;
 
-    fn dark(design: &Design) -> Link {
-        crate::channel::Operating::in_the_dark(design).link
+    fn dark(design: &Design) -> Scale {
+        Scale::of(design, &crate::channel::Operating::in_the_dark(design))
     }
 
     /// One return of every owned shot, two of every second one.
@@ -254,6 +259,7 @@ mod tests {
                 returns.number.push(number);
                 returns.tof.push(1e-7 * f64::from(number));
                 returns.photons.push(1.0);
+                returns.saturated.push(number == 2);
                 for column in [&mut returns.peak, &mut returns.marks, &mut returns.margin] {
                     column.push(u16::from(number));
                 }
@@ -289,6 +295,8 @@ mod tests {
         assert!(cloud.time_ns.is_sorted());
         assert_eq!(cloud.fired_ns.iter().filter(|time| !time.is_nan()).count(), 12);
         for at in 0..cloud.returns() {
+            let is_saturated = cloud.flags(at) & super::super::SATURATED != 0;
+            assert_eq!(is_saturated, cloud.return_number[at] == 2);
             let pixel = usize::from(cloud.row[at]) * cloud.columns + usize::from(cloud.column[at]);
             assert_eq!(cloud.time_ns[at], cloud.fired_ns[pixel]);
             let next_is_further = cloud.return_number.get(at + 1) == Some(&2);

@@ -101,8 +101,8 @@ pub(super) fn chances(
     let labels: usize = weights.values().sum();
     let mut sums = (0.0, 0.0);
     for (&marks, &count) in weights {
-        for (noise, probability) in gate.noise(found) {
-            let least = gate.least_marks(marks, found, noise);
+        for (density, probability) in gate.around(marks, found) {
+            let least = gate.least_marks(marks, density);
             let share = probability * count as f64 / labels as f64;
             sums.0 += share * binomial_tail(marks, found.seen, least);
             sums.1 += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
@@ -127,7 +127,7 @@ struct Gate {
     false_alarm: f64,
 }
 
-/// Beyond so many events in a gate their number is taken for its mean.
+/// Beyond so many events in a gate, on average, their number is taken for its mean.
 const MANY: f64 = 100.0;
 
 impl Gate {
@@ -144,24 +144,35 @@ impl Gate {
         }
     }
 
-    /// The share of places of a gate that events of no shot light, with its probability: their
-    /// number follows Poisson's law.
-    fn noise(&self, found: &Found) -> Vec<(f64, f64)> {
-        let mean = found.false_density / self.event;
-        if mean <= 0.0 || mean > MANY {
-            return vec![(found.false_density, 1.0)];
+    /// The share of places of a gate that events light which are not of the very shot, with its
+    /// probability: those of no shot follow Poisson's law, each mark of another shot is found or not.
+    fn around(&self, marks: usize, found: &Found) -> Vec<(f64, f64)> {
+        let noise = found.false_density / self.event;
+        let of_shots = (found.density - found.false_density).max(0.0) / self.event;
+        let of_others = (of_shots - marks as f64 * found.seen).max(0.0);
+        let mean = noise + of_others;
+        if mean > MANY {
+            return vec![(mean * self.event, 1.0)];
         }
-        let most = (mean + 8.0 * mean.sqrt() + 8.0) as u32;
-        let of = |events: u32| (f64::from(events) * self.event, poisson(mean, events.into()));
-        (0..=most).map(of).collect()
+        let most = (noise + 8.0 * noise.sqrt() + 8.0) as u32;
+        let of_noise: Vec<f64> = (0..=most).map(|events| poisson(noise, events.into())).collect();
+        let marks_of_others = (of_others / found.seen.max(f64::MIN_POSITIVE)).round() as usize;
+        let found_of_others = binomial(marks_of_others, found.seen);
+        let mut chances = vec![0.0; of_noise.len() + found_of_others.len()];
+        for (noise, chance) in of_noise.iter().enumerate() {
+            for (others, of_others) in found_of_others.iter().enumerate() {
+                chances[noise + others] += chance * of_others;
+            }
+        }
+        let density = |events: usize| events as f64 * self.event;
+        (0..chances.len()).map(|events| (density(events), chances[events])).collect()
     }
 
-    /// The fewest of `marks` that are believed where `noise` lights such a share of the places; one more
-    /// than there are if none will do.
-    fn least_marks(&self, marks: usize, found: &Found, noise: f64) -> usize {
-        // Light of other shots, and one event more than there are.
-        let shots = (found.density - found.false_density).max(0.0);
-        let density = (noise + shots + self.event).min(1.0);
+    /// The fewest of `marks` that are believed where other events light such a share of the places; one
+    /// more than there are if none will do.
+    fn least_marks(&self, marks: usize, others: f64) -> usize {
+        // One event more than there are.
+        let density = (others + self.event).min(1.0);
         let is_common =
             |least: usize| self.lags * binomial_tail(marks, density, least) > self.false_alarm;
         let (mut common, mut rare) = (0, marks + 1);
@@ -259,14 +270,13 @@ mod tests {
     #[test]
     fn the_least_marks_are_rare_and_one_fewer_is_not() {
         let gate = Gate { lags: 4e5, event: 0.0, false_alarm: 1e-6 };
-        let found = |density, false_density| Found { seen: 1.0, density, false_density };
-        let least = gate.least_marks(180, &found(0.01, 0.0), 0.0);
+        let least = gate.least_marks(180, 0.01);
         assert!(4e5 * binomial_tail(180, 0.01, least) <= 1e-6);
         assert!(4e5 * binomial_tail(180, 0.01, least - 1) > 1e-6);
-        assert_eq!(gate.least_marks(5, &found(0.5, 0.5), 0.5), 6);
+        assert_eq!(gate.least_marks(5, 0.5), 6);
         // One event more than there are is counted.
         let few = Gate { event: 1e-3, ..gate };
-        assert!(few.least_marks(180, &found(0.01, 0.01), 0.01) > least);
+        assert!(few.least_marks(180, 0.01) > least);
     }
 
     #[test]

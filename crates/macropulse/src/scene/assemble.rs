@@ -15,7 +15,7 @@ use super::error::Error;
 use super::file::{Axis, Ground, ObjectTyped, SceneFile, Source, Stand, Unit, object_names};
 use super::inside;
 use super::interferer;
-use super::material::{self, Material, plain};
+use super::material::{self, Diffuse, Material, plain};
 use super::mesh::Mesh;
 use super::meshes::{Meshes, Origin};
 use super::motion::{Motion, Moving};
@@ -167,8 +167,9 @@ impl Assembly<'_> {
                 return Err(self.source.fault(typed.span(), message));
             }
             made.name = plain(&defined.name);
+            let mut diffuse = 0.0;
             let fields = [
-                (&defined.diffuse, &mut made.diffuse, "diffuse", 1.0),
+                (&defined.diffuse, &mut diffuse, "diffuse", 1.0),
                 (&defined.specular, &mut made.specular, "specular", 1e4),
                 (&defined.gloss, &mut made.gloss, "gloss", 1e6),
                 (&defined.retro, &mut made.retro, "retro", 1e5),
@@ -182,6 +183,9 @@ impl Assembly<'_> {
                     return Err(self.source.fault(typed.span(), message));
                 }
                 *field = value;
+            }
+            if defined.diffuse.is_some() {
+                made.diffuse = Diffuse::Even(diffuse);
             }
             self.defined.retain(|known| known.name != made.name);
             self.defined.push(made);
@@ -455,10 +459,10 @@ impl Assembly<'_> {
     fn unnamed(&mut self, whose: &str) -> u16 {
         let material =
             self.known(material::UNNAMED).unwrap_or_else(|| Material::matt(material::UNNAMED, 0.3));
-        self.notes.push(format!(
-            "{whose}: no known material, diffuse reflectance {} is assumed",
-            material.diffuse
-        ));
+        // One number for all wavelengths, whether it is the library's or the file's.
+        let diffuse = material.diffuse.at(0.0);
+        self.notes
+            .push(format!("{whose}: no known material, diffuse reflectance {diffuse} is assumed"));
         self.enlist(material)
     }
 

@@ -1,6 +1,7 @@
 //! What of a scene goes into its digest: all that decides what light meets.
 
 use super::closed_form::{Shape, Solid};
+use super::material::Diffuse;
 use super::motion::Motion;
 use super::placed::Placed;
 use super::pose::Pose;
@@ -23,6 +24,17 @@ impl Digest {
         [value, *albedo, *visibility, *rain_mm_h].into_iter().for_each(|value| self.number(value));
         let effects = Effect::ALL.map(|effect| u8::from(idealised.contains(&effect)));
         self.bytes(&effects);
+    }
+
+    /// Takes in a diffuse reflectance, at every wavelength at which it is known.
+    pub(super) fn diffuse(&mut self, diffuse: Diffuse) {
+        match diffuse {
+            Diffuse::Even(diffuse) => self.number(diffuse),
+            Diffuse::At(known) => known.iter().for_each(|&(nm, diffuse)| {
+                self.number(nm);
+                self.number(diffuse);
+            }),
+        }
     }
 
     /// Takes in a pose.

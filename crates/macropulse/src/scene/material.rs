@@ -1,17 +1,18 @@
-//! How much light surfaces send back, at 905 nm.
+//! How much light surfaces send back, by wavelength.
 //!
-//! The numbers are round values for clean, dry surfaces near 905 nm, in the middle of what
-//! spectral libraries list for the class (\[ASTER\], \[USGS7\]); the lobes and retroreflective
-//! gains are engineering estimates. They set how bright things are relative to each other, not a
-//! calibrated reflectance. Each can be overridden in a scene file.
+//! A material of the library has its diffuse reflectance at some wavelengths, medians of open spectral
+//! libraries (\[ASTER\], \[SB\], docs/formats.md#materials says which). Between them it is linear, beyond
+//! them constant. What no library tells, lobes and retroreflective gains among it, are round
+//! engineering estimates for clean, dry surfaces, the same at every wavelength. Each can be overridden
+//! in a scene file, by one number for all wavelengths.
 
-/// A surface as a monostatic lidar sees it.
+/// A material: what surfaces are made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Name, as scene files and mesh files use it.
     pub name: String,
-    /// Diffuse (Lambertian) reflectance, 0…1.
-    pub diffuse: f64,
+    /// Diffuse (Lambertian) reflectance.
+    pub diffuse: Diffuse,
     /// Height of the specular lobe at normal incidence, relative to white Lambertian.
     pub specular: f64,
     /// Exponent of the lobe; larger is narrower.
@@ -22,13 +23,70 @@ pub struct Material {
     pub transmission: f64,
 }
 
+/// Diffuse reflectance, 0…1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Diffuse {
+    /// The same at every wavelength.
+    Even(f64),
+    /// At these wavelengths, nm, ascending.
+    At(&'static [(f64, f64)]),
+}
+
+impl Diffuse {
+    /// At `wavelength` metres: linear between those known, as at the nearest beyond them.
+    pub fn at(&self, wavelength: f64) -> f64 {
+        let known = match *self {
+            Self::Even(diffuse) => return diffuse,
+            Self::At(known) => known,
+        };
+        let nm = wavelength * 1e9;
+        let behind = known.partition_point(|(at, _)| *at < nm);
+        let before = behind.checked_sub(1).and_then(|before| known.get(before));
+        match (before, known.get(behind)) {
+            (Some(&(low, from)), Some(&(high, to))) => {
+                from + (to - from) * (nm - low) / (high - low)
+            }
+            (Some(&(_, end)), None) | (None, Some(&(_, end))) => end,
+            (None, None) => 0.0,
+        }
+    }
+}
+
 impl Material {
-    /// A matt, opaque surface.
+    /// A matt, opaque surface, the same at every wavelength.
     pub fn matt(name: &str, diffuse: f64) -> Self {
-        let name = name.to_owned();
+        let (name, diffuse) = (name.to_owned(), Diffuse::Even(diffuse));
         Self { name, diffuse, specular: 0.0, gloss: 1.0, retro: 0.0, transmission: 0.0 }
     }
 
+    /// As light of `wavelength` metres sees it.
+    pub fn at(&self, wavelength: f64) -> Finish {
+        let &Self { specular, gloss, retro, .. } = self;
+        Finish { diffuse: self.diffuse.at(wavelength), specular, gloss, retro }
+    }
+
+    /// Height of the lobe of a surface that mirrors the fraction `mirrored` of the light into a
+    /// lobe of exponent `gloss`: `ρ_s = F·(g+2)/8`, that is `π·F·D/4` for the normal distribution
+    /// `D = (g+2)/2π · cosᵍ` that keeps the energy \[WMLT07\].
+    pub fn lobe_height(mirrored: f64, gloss: f64) -> f64 {
+        mirrored * (gloss + 2.0) / 8.0
+    }
+}
+
+/// A surface of some material as a monostatic lidar of one wavelength sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finish {
+    /// Diffuse (Lambertian) reflectance, 0…1.
+    pub diffuse: f64,
+    /// As [`Material::specular`].
+    pub specular: f64,
+    /// As [`Material::gloss`].
+    pub gloss: f64,
+    /// As [`Material::retro`].
+    pub retro: f64,
+}
+
+impl Finish {
     /// Effective reflectance of backscatter at an incidence angle of this `cosine`; 1 is a white
     /// Lambertian surface seen square on.
     ///
@@ -52,7 +110,7 @@ impl Material {
     /// middle of both directions.
     ///
     /// `ρ_eff = ρ_d·cos o + ρ_s·cosᵍ h`: the Lambertian part falls with the angle it is seen at, and
-    /// the lobe is that of [`Material::backscatter`] \[Bli77\]. What a retroreflector sends back
+    /// the lobe is that of [`Finish::backscatter`] \[Bli77\]. What a retroreflector sends back
     /// goes to the source alone.
     pub fn scatter(&self, cosine: f64, half_cosine: f64) -> f64 {
         let [cosine, half_cosine] = [cosine, half_cosine].map(|cosine| cosine.abs().min(1.0));
@@ -61,13 +119,6 @@ impl Material {
             false => 0.0,
         };
         self.diffuse * cosine + lobe
-    }
-
-    /// Height of the lobe of a surface that mirrors the fraction `mirrored` of the light into a
-    /// lobe of exponent `gloss`: `ρ_s = F·(g+2)/8`, that is `π·F·D/4` for the normal distribution
-    /// `D = (g+2)/2π · cosᵍ` that keeps the energy \[WMLT07\].
-    pub fn lobe_height(mirrored: f64, gloss: f64) -> f64 {
-        mirrored * (gloss + 2.0) / 8.0
     }
 }
 
@@ -79,49 +130,99 @@ const FAINT: f64 = 1e-9;
 
 /// A row of the library: name, diffuse, mirrored fraction, gloss, retroreflective gain,
 /// transmission.
-type Row = (&'static str, f64, f64, f64, f64, f64);
+type Row = (&'static str, Diffuse, f64, f64, f64, f64);
 
 /// Name of the material that surfaces get of which nothing is known.
 pub const UNNAMED: &str = "unnamed";
 
+/// Retroreflective gain over white of sheeting with a coefficient of retroreflection of `r_a`
+/// cd/lx/m²: white Lambertian has 1/π of these.
+const fn sheeting(r_a: f64) -> f64 {
+    std::f64::consts::PI * r_a
+}
+
 const LIBRARY: &[Row] = &[
     // References.
-    ("white", 1.0, 0.0, 1.0, 0.0, 0.0),
-    ("grey10", 0.1, 0.0, 1.0, 0.0, 0.0),
-    ("grey50", 0.5, 0.0, 1.0, 0.0, 0.0),
-    (UNNAMED, 0.3, 0.0, 1.0, 0.0, 0.0),
+    ("white", Diffuse::Even(1.0), 0.0, 1.0, 0.0, 0.0),
+    ("grey10", Diffuse::Even(0.1), 0.0, 1.0, 0.0, 0.0),
+    ("grey50", Diffuse::Even(0.5), 0.0, 1.0, 0.0, 0.0),
+    (UNNAMED, Diffuse::Even(0.3), 0.0, 1.0, 0.0, 0.0),
     // Ground and buildings.
-    ("asphalt", 0.2, 0.0, 1.0, 0.0, 0.0),
-    ("concrete", 0.4, 0.0, 1.0, 0.0, 0.0),
-    ("brick", 0.45, 0.0, 1.0, 0.0, 0.0),
-    ("plaster", 0.7, 0.0, 1.0, 0.0, 0.0),
-    ("marble", 0.6, 0.03, 20.0, 0.0, 0.0),
-    ("wood", 0.55, 0.0, 1.0, 0.0, 0.0),
-    ("soil", 0.3, 0.0, 1.0, 0.0, 0.0),
-    ("snow", 0.85, 0.0, 1.0, 0.0, 0.0),
-    // Living things: the plateau of leaves beyond the red edge; skin and cloth are bright too.
-    ("grass", 0.5, 0.0, 1.0, 0.0, 0.0),
-    ("vegetation", 0.5, 0.0, 1.0, 0.0, 0.0),
-    ("skin", 0.5, 0.0, 1.0, 0.0, 0.0),
-    ("fabric", 0.4, 0.0, 1.0, 0.0, 0.0),
+    ("asphalt", Diffuse::At(ROAD), 0.0, 1.0, 0.0, 0.0),
+    ("concrete", Diffuse::At(SIDEWALK), 0.0, 1.0, 0.0, 0.0),
+    ("brick", Diffuse::Even(0.45), 0.0, 1.0, 0.0, 0.0),
+    ("plaster", Diffuse::Even(0.7), 0.0, 1.0, 0.0, 0.0),
+    ("marble", Diffuse::Even(0.6), 0.03, 20.0, 0.0, 0.0),
+    ("wood", Diffuse::At(PINE), 0.0, 1.0, 0.0, 0.0),
+    ("soil", Diffuse::Even(0.3), 0.0, 1.0, 0.0, 0.0),
+    ("snow", Diffuse::At(SNOW), 0.0, 1.0, 0.0, 0.0),
+    // Living things: the plateau of leaves beyond the red edge, and the water in them.
+    ("grass", Diffuse::At(GRASS), 0.0, 1.0, 0.0, 0.0),
+    ("grass-dry", Diffuse::At(DRY_GRASS), 0.0, 1.0, 0.0, 0.0),
+    ("vegetation", Diffuse::At(LEAVES), 0.0, 1.0, 0.0, 0.0),
+    ("conifer", Diffuse::At(NEEDLES), 0.0, 1.0, 0.0, 0.0),
+    ("skin", Diffuse::At(SKIN), 0.0, 1.0, 0.0, 0.0),
+    ("fabric", Diffuse::Even(0.4), 0.0, 1.0, 0.0, 0.0),
     // Vehicles. Paint is a pigment under clear coat of index 1.5, which mirrors 4 %.
-    ("paint-white", 0.8, 0.04, 200.0, 0.0, 0.0),
-    ("paint-silver", 0.45, 0.08, 60.0, 0.0, 0.0),
-    ("paint-red", 0.55, 0.04, 200.0, 0.0, 0.0),
-    ("paint-blue", 0.25, 0.04, 200.0, 0.0, 0.0),
-    ("paint-black", 0.05, 0.04, 200.0, 0.0, 0.0),
-    ("rubber", 0.05, 0.0, 1.0, 0.0, 0.0),
-    ("plastic", 0.3, 0.04, 20.0, 0.0, 0.0),
-    ("plastic-black", 0.08, 0.04, 10.0, 0.0, 0.0),
-    ("metal", 0.35, 0.3, 30.0, 0.0, 0.0),
-    ("chrome", 0.05, 0.6, 400.0, 0.0, 0.0),
+    ("paint-white", Diffuse::Even(0.8), 0.04, 200.0, 0.0, 0.0),
+    ("paint-silver", Diffuse::Even(0.45), 0.08, 60.0, 0.0, 0.0),
+    ("paint-red", Diffuse::Even(0.55), 0.04, 200.0, 0.0, 0.0),
+    ("paint-blue", Diffuse::Even(0.25), 0.04, 200.0, 0.0, 0.0),
+    ("paint-black", Diffuse::Even(0.05), 0.04, 200.0, 0.0, 0.0),
+    ("rubber", Diffuse::Even(0.05), 0.0, 1.0, 0.0, 0.0),
+    ("plastic", Diffuse::Even(0.3), 0.04, 20.0, 0.0, 0.0),
+    ("plastic-black", Diffuse::Even(0.08), 0.04, 10.0, 0.0, 0.0),
+    ("metal", Diffuse::Even(0.35), 0.3, 30.0, 0.0, 0.0),
+    ("aluminium", Diffuse::At(ALUMINIUM), 0.0, 1.0, 0.0, 0.0),
+    ("chrome", Diffuse::Even(0.05), 0.6, 400.0, 0.0, 0.0),
     // Two faces mirror 8 %, and dust scatters a little.
-    ("glass", 0.02, 0.08, 400.0, 0.0, 0.8),
-    ("number-plate", 0.5, 0.0, 1.0, 20.0, 0.0),
-    ("road-sign", 0.4, 0.0, 1.0, 50.0, 0.0),
-    ("headlamp", 0.1, 0.08, 200.0, 3.0, 0.0),
-    ("tail-lamp", 0.2, 0.04, 200.0, 10.0, 0.0),
+    ("glass", Diffuse::Even(0.02), 0.08, 400.0, 0.0, 0.8),
+    // Sheeting of type I and of type III, new, seen 0.2° beside the light.
+    ("number-plate", Diffuse::Even(0.5), 0.0, 1.0, sheeting(70.0), 0.0),
+    ("road-sign", Diffuse::Even(0.4), 0.0, 1.0, sheeting(250.0), 0.0),
+    ("headlamp", Diffuse::Even(0.1), 0.08, 200.0, 3.0, 0.0),
+    ("tail-lamp", Diffuse::Even(0.2), 0.04, 200.0, 10.0, 0.0),
 ];
+
+/// Median of 170 roads \[SB\].
+const ROAD: &[(f64, f64)] =
+    &[(850.0, 0.108), (905.0, 0.109), (940.0, 0.110), (1064.0, 0.114), (1550.0, 0.139)];
+
+/// Median of 60 sidewalks of concrete \[SB\].
+const SIDEWALK: &[(f64, f64)] =
+    &[(850.0, 0.307), (905.0, 0.314), (940.0, 0.316), (1064.0, 0.346), (1550.0, 0.389)];
+
+/// Planed pine \[ASTER\].
+const PINE: &[(f64, f64)] =
+    &[(850.0, 0.917), (905.0, 0.918), (940.0, 0.915), (1064.0, 0.905), (1550.0, 0.565)];
+
+/// Grains with 20 m² of surface to a kilogram, as of snow some days old: exp(−7·√(χ·6/(ρ·SSA))) and
+/// the absorption of ice \[KZ04\]; at 1550 nm a few per cent.
+const SNOW: &[(f64, f64)] = &[(905.0, 0.78), (1064.0, 0.62), (1550.0, 0.05)];
+
+/// Green grass \[ASTER\].
+const GRASS: &[(f64, f64)] =
+    &[(850.0, 0.497), (905.0, 0.509), (940.0, 0.507), (1064.0, 0.525), (1550.0, 0.243)];
+
+/// Dry grass \[ASTER\].
+const DRY_GRASS: &[(f64, f64)] =
+    &[(850.0, 0.566), (905.0, 0.598), (940.0, 0.618), (1064.0, 0.650), (1550.0, 0.569)];
+
+/// Deciduous trees \[ASTER\].
+const LEAVES: &[(f64, f64)] =
+    &[(850.0, 0.550), (905.0, 0.554), (940.0, 0.548), (1064.0, 0.569), (1550.0, 0.253)];
+
+/// Conifers \[ASTER\].
+const NEEDLES: &[(f64, f64)] =
+    &[(850.0, 0.515), (905.0, 0.515), (940.0, 0.504), (1064.0, 0.524), (1550.0, 0.188)];
+
+/// Rounded to 0.05 after the shape of the mean forearm of \[CAT17\]: ours.
+const SKIN: &[(f64, f64)] =
+    &[(850.0, 0.60), (905.0, 0.60), (940.0, 0.55), (1064.0, 0.60), (1550.0, 0.10)];
+
+/// Weathered aluminium \[ASTER\].
+const ALUMINIUM: &[(f64, f64)] =
+    &[(850.0, 0.538), (905.0, 0.596), (940.0, 0.628), (1064.0, 0.710), (1550.0, 0.813)];
 
 fn material(&(name, diffuse, mirrored, gloss, retro, transmission): &Row) -> Material {
     let specular = Material::lobe_height(mirrored, gloss);
@@ -148,9 +249,33 @@ pub fn plain(name: &str) -> String {
 mod tests {
     use super::*;
 
+    const NM_905: f64 = 905e-9;
+
+    #[test]
+    fn reflectance_goes_by_wavelength() {
+        let at = |name: &str, nm: f64| named(name).unwrap().at(nm * 1e-9).diffuse;
+        approx::assert_relative_eq!(at("asphalt", 905.0), 0.109, max_relative = 1e-12);
+        approx::assert_relative_eq!(at("asphalt", 922.5), 0.1095, max_relative = 1e-9);
+        approx::assert_relative_eq!(at("grass", 1550.0), 0.243, max_relative = 1e-12);
+        // Beyond what is known, as at its end.
+        assert_eq!([300.0, 2000.0].map(|nm| at("snow", nm)), [0.78, 0.05]);
+        assert_eq!([300.0, 2000.0].map(|nm| at("brick", nm)), [0.45, 0.45]);
+        for (name, diffuse, ..) in LIBRARY {
+            let Diffuse::At(known) = diffuse else { continue };
+            assert!(known.is_sorted_by(|one, next| one.0 < next.0), "{name}");
+        }
+    }
+
+    /// A coefficient of retroreflection of 250 cd/lx/m² is 785 times that of white.
+    #[test]
+    fn sheeting_sends_back_by_its_coefficient() {
+        let sign = named("road-sign").unwrap().at(NM_905);
+        approx::assert_relative_eq!(sign.backscatter(1.0), 785.4 + 0.4, max_relative = 1e-4);
+    }
+
     #[test]
     fn white_sends_everything_back_by_the_cosine() {
-        let white = named("white").unwrap();
+        let white = named("white").unwrap().at(NM_905);
         assert_eq!(white.backscatter(1.0), 1.0);
         assert_eq!(white.backscatter(0.25), 0.25);
         assert_eq!(white.backscatter(0.0), 0.0);
@@ -158,7 +283,7 @@ mod tests {
 
     #[test]
     fn seen_from_the_source_it_scatters_what_it_sends_back_but_for_retroreflectors() {
-        for material in library() {
+        for material in library().map(|material| material.at(NM_905)) {
             for cosine in [0.0, 0.3, 1.0] {
                 let back = material.backscatter(cosine) - material.retro * cosine;
                 approx::assert_relative_eq!(
@@ -169,13 +294,13 @@ mod tests {
             }
         }
         // A mirror 30° off both ways is bright; seen from 45° it is not.
-        let chrome = named("chrome").unwrap();
+        let chrome = named("chrome").unwrap().at(NM_905);
         assert!(chrome.scatter(0.87, 1.0) > 100.0 * chrome.scatter(0.71, 0.97));
     }
 
     #[test]
     fn a_lobe_is_bright_only_square_on() {
-        let paint = named("paint-black").unwrap();
+        let paint = named("paint-black").unwrap().at(NM_905);
         assert!(paint.backscatter(1.0) > 1.0);
         // 20° off, cos²⁰⁰ has left nothing but the pigment.
         let off = 20f64.to_radians().cos();
@@ -186,11 +311,12 @@ mod tests {
     fn what_is_left_out_far_off_the_lobe_changes_no_bit() {
         let mut left_out = 0;
         for material in library().filter(|material| material.specular > 0.0) {
-            let Material { diffuse, specular, gloss, retro, .. } = material;
+            let finish = material.at(NM_905);
+            let Finish { diffuse, specular, gloss, retro } = finish;
             for i in 0..=1000 {
                 let cosine = f64::from(i) / 1000.0;
                 let whole = (diffuse + retro) * cosine + specular * libm::pow(cosine, gloss);
-                assert_eq!(material.backscatter(cosine).to_bits(), whole.to_bits());
+                assert_eq!(finish.backscatter(cosine).to_bits(), whole.to_bits());
                 left_out += usize::from(gloss * (1.0 - cosine) > FAR_OFF);
             }
         }
@@ -202,8 +328,10 @@ mod tests {
         for material in library() {
             // A lobe of height ρ_s carries about 8·ρ_s/(g+2) of the light.
             let mirrored = 8.0 * material.specular / (material.gloss + 2.0);
-            let sum = material.diffuse + mirrored + material.transmission;
-            assert!(sum <= 1.0 + 1e-12, "{} sends out {sum}", material.name);
+            for nm in [300.0, 905.0, 1064.0, 1550.0, 2000.0] {
+                let sum = material.at(nm * 1e-9).diffuse + mirrored + material.transmission;
+                assert!(sum <= 1.0 + 1e-12, "{} sends out {sum} at {nm} nm", material.name);
+            }
         }
     }
 

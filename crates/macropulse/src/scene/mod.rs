@@ -43,7 +43,7 @@ pub use error::Error;
 pub use hits::{CastRays, Hit, Hits, Ray};
 pub use illuminated::{Illuminated, LineOfSight};
 pub use interferer::Interferer;
-pub use material::Material;
+pub use material::{Diffuse, Finish, Material, library};
 pub use mesh::Mesh;
 pub use motion::{Motion, Moving};
 pub use pose::{Pose, Transform};
@@ -227,6 +227,11 @@ impl Scene {
         self.world.triangles()
     }
 
+    /// Its materials as light of `wavelength` metres sees them.
+    pub fn finishes(&self, wavelength: f64) -> Vec<Finish> {
+        self.materials.iter().map(|material| material.at(wavelength)).collect()
+    }
+
     /// A hash of everything that decides what light meets, and which light there is beside that
     /// of the sensor: surfaces, materials, sensor pose, motion, other lidars.
     /// The same on every machine and run.
@@ -235,7 +240,8 @@ impl Scene {
         for material in &self.materials {
             hash.bytes(material.name.as_bytes());
             let Material { diffuse, specular, gloss, retro, transmission, .. } = *material;
-            for value in [diffuse, specular, gloss, retro, transmission] {
+            hash.diffuse(diffuse);
+            for value in [specular, gloss, retro, transmission] {
                 hash.number(value);
             }
         }

@@ -95,7 +95,7 @@ impl<'a> Interference<'a> {
 mod tests {
     use super::*;
     use crate::channel::{Operating, PulseTrain, Transmitter};
-    use crate::points::Surface;
+    use crate::points::{Scale, Surface};
     use macropulse_codec::decode::Returns;
 
     /// One shot of the coded sensor that was answered from 30 m, with `outcome`; light of an interferer
@@ -111,9 +111,11 @@ mod tests {
             marks: vec![40],
             margin: vec![40],
             photons: vec![1.0],
+            saturated: vec![false],
             ..Returns::default()
         };
-        let mut piece = Piece::of(&design, &Operating::in_the_dark(&design).link, &log, &answered);
+        let scale = Scale::of(&design, &Operating::in_the_dark(&design));
+        let mut piece = Piece::of(&design, &scale, &log, &answered);
         piece.points.truth.returns.push(Surface { outcome, ..Surface::NONE });
         let tof_fs = fs_from_s(tof_from_range(30.0));
         // What the interferer sends is what we send, without its last marks.

@@ -97,6 +97,7 @@ impl Sensor {
                 ticks_per_chip: 1,
                 tick_fs: TICK_FS,
                 jitter_ticks: 0.0,
+                photons_apart: false,
                 false_alarm: 1e-6,
                 bit_threshold: 15,
                 returns: 1,

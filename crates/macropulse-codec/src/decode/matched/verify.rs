@@ -7,7 +7,7 @@ use super::{Band, Detection};
 use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
 use crate::decode::timing::{self, Known};
-use crate::decode::{MIDDLE, Reject, Return, Returns, Strength, photons_per_mark};
+use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
@@ -280,15 +280,23 @@ impl Band<'_> {
     fn measured(&mut self, shot: usize, detection: Detection) -> Return {
         let marks = self.sent.weight(shot);
         let light = self.sent.light(shot, detection.lag);
-        let density =
-            if detection.count == marks { 0.0 } else { self.density_beside(shot, detection) };
-        let photons = self.photons.per_mark(detection.count, marks, density);
         let (peak, margin) = (detection.count as u16, detection.margin as u16);
         let sent = self.sent;
         let start = light.start + sent.epoch;
         let late = self.late(shot, detection);
+        let Energy { photons, saturated } = match detection.count == marks {
+            true => self.photons.of_all(marks),
+            false => {
+                let density = self.density_beside(shot, detection);
+                Energy::of(
+                    (detection.count, marks),
+                    density,
+                    timing::window(self.sent.receiver, self.sent.width, late),
+                )
+            }
+        };
         let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start, late);
-        Return { shot, tof, peak, marks: marks as u16, margin, photons }
+        Return { shot, tof, peak, marks: marks as u16, margin, photons, saturated }
     }
 
     /// Share of lit places around a shot found at `detection`, its own marks apart.
@@ -365,20 +373,18 @@ impl Band<'_> {
     }
 }
 
-/// Photons per mark where all marks were found, by their number: in clear weather a logarithm for
-/// each shot would take longer than the rest.
+/// The energy of returns of which all marks were found, by their number: in clear weather a logarithm
+/// for each shot would take longer than the rest.
 #[derive(Debug, Default)]
 pub(super) struct Photons {
-    all_found: Vec<f32>,
+    all_found: Vec<Energy>,
 }
 
 impl Photons {
-    fn per_mark(&mut self, count: u32, marks: u32, density: f64) -> f32 {
-        if count < marks {
-            return photons_per_mark(count, marks, density);
-        }
+    fn of_all(&mut self, marks: u32) -> Energy {
         let known = self.all_found.len() as u32;
-        self.all_found.extend((known..=marks).map(|marks| photons_per_mark(marks, marks, 0.0)));
+        self.all_found
+            .extend((known..=marks).map(|marks| Energy::of((marks, marks), 0.0, Window::WHOLE)));
         self.all_found[marks as usize]
     }
 }

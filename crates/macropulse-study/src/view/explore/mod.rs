@@ -189,6 +189,7 @@ mod tests {
             peak: vec![0; points],
             marks: vec![0; points],
             margin: vec![0; points],
+            saturated: vec![false; points],
             ..PointCloud::default()
         }
     }

@@ -1,6 +1,6 @@
 // What is told in words and numbers: the point that is picked, the legend.
 
-const FLAGS = [[1, "faint"], [2, "ambiguous"]];
+const FLAGS = [[1, "faint"], [2, "ambiguous"], [4, "saturated"]];
 
 // Attributes of a point as pairs of name and text.
 function attributesOf(cloud, at, outcomes) {
@@ -23,11 +23,11 @@ function attributesOf(cloud, at, outcomes) {
     });
 }
 
-// Whether all marks were found: then a detector that counts them tells no more of the energy than that.
-// One that never misses has no scale for it, and says 1.
+// Whether the detector is saturated: then it tells of the energy that it was as much at least. One that
+// never misses has no scale for it, and says 1.
 function isBound(cloud, at) {
-  const { intensity, peak, marks } = cloud.values;
-  return marks?.[at] > 1 && peak[at] >= marks[at] && intensity[at] !== 1;
+  const { intensity, flags } = cloud.values;
+  return (flags?.[at] & 4) !== 0 && intensity[at] !== 1;
 }
 
 // Decimals that values of this step have.

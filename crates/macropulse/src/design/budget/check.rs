@@ -9,7 +9,9 @@ use super::{Budget, CoScanned, Field, solid_angle};
 use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
 use crate::design::limits::Check;
-use crate::design::safety::{Class1, Limit, Sender, exposure, limits, strictest};
+use crate::design::safety::{
+    Class1, Condition, Limit, Sender, exposure, limits, strictest, strictest_of_each,
+};
 use crate::design::{Coding, Effect, Error, Light, Scan};
 use crate::units::tof_from_range;
 
@@ -177,8 +179,11 @@ impl Check<'_> {
         let Some(class) = Class1::at(parts.light.wavelength) else { return Ok(Vec::new()) };
         let Parts { scan, light, coding, .. } = parts;
         let count_groups = safety.count_lines;
-        let sender = Sender { scan, light, coding, distance, count_groups };
-        Ok(limits(&class, &exposure(&class, &sender)))
+        let all = [Condition::bare_eye(distance), class.telescope()].map(|condition| {
+            let sender = Sender { scan, light, coding, condition, count_groups };
+            limits(&class, &exposure(&class, &sender))
+        });
+        Ok(strictest_of_each(&all.concat()))
     }
 
     /// What each detector looks at: of a raster as the file says, of several detectors the cell of

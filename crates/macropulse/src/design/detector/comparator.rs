@@ -69,7 +69,12 @@ impl Comparator {
                 let slope = (-ago * pulse(ago) + FRACTION * now * pulse(now)) * amplitude / rms;
                 let common = libm::exp(-(DELAY / MEMORY).powi(2) / 2.0);
                 let variance = 1.0 + FRACTION * FRACTION - 2.0 * FRACTION * common;
-                setting.noise * variance.sqrt() / slope
+                // The slope is as noisy as noise of that memory is steep, 1/v for each part. Of the ratio
+                // of a normal variable to 1 + x·g the variance is 1 + 3x² + 15x⁴ times as large.
+                let steepness = (1.0 + FRACTION * FRACTION).sqrt() / (MEMORY * setting.response);
+                let x = setting.noise * steepness / slope;
+                let by_slope = (1.0 + 3.0 * x.powi(2) + 15.0 * x.powi(4)).min(2.0);
+                setting.noise * (variance * by_slope).sqrt() / slope
             }
             Timing::LeadingEdge => {
                 let before = (2.0 * libm::log(amplitude / setting.threshold)).max(0.0).sqrt();

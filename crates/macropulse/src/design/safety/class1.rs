@@ -3,6 +3,9 @@
 /// Exposures are judged up to this time, s, beyond which the limit is a power.
 pub const LONGEST: f64 = 10.0;
 
+/// How far away an eye behind a telescope is, m.
+pub const TELESCOPE: f64 = 2.0;
+
 /// Limits of emission at one wavelength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Class1 {
@@ -24,6 +27,22 @@ pub struct Opening {
     pub diameter: f64,
     /// It judges exposures longer than the first and up to the second, s.
     pub durations: [f64; 2],
+}
+
+/// Where light is judged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Condition {
+    /// Distance of the opening, m.
+    pub distance: f64,
+    /// How many times as wide as for the bare eye it is.
+    pub widened: f64,
+}
+
+impl Condition {
+    /// Condition 3, the bare eye, so many metres away.
+    pub fn bare_eye(distance: f64) -> Self {
+        Self { distance, widened: 1.0 }
+    }
 }
 
 impl Class1 {
@@ -103,6 +122,13 @@ impl Class1 {
         ends.windows(2).map(opening).collect()
     }
 
+    /// Condition 1, an eye behind a telescope or binoculars: 2 m away, through 50 mm to the retina, above
+    /// 1400 nm through seven times the openings of the bare eye.
+    pub fn telescope(&self) -> Condition {
+        let widened = if let Self::Retina { .. } = self { 50.0 / 7.0 } else { 7.0 };
+        Condition { distance: TELESCOPE, widened }
+    }
+
     /// C5 = 1 for N ≤ 600 groups within 10 s, else max(5·N^−0.25, 0.4); for the retina alone.
     pub(super) fn c5(&self, groups: f64) -> f64 {
         match self {
@@ -126,6 +152,17 @@ mod tests {
         assert_relative_eq!(limits.continuous(), 1.00e-3, max_relative = 3e-3);
         assert_relative_eq!(limits.single_exposure(100.0), 0.1002, max_relative = 1e-3);
         assert_eq!(limits.single_exposure(2.5e-12), 3.8e-8);
+    }
+
+    #[test]
+    fn a_telescope_has_50_mm_or_seven_times_the_opening() {
+        let diameter = |nm: f64, of: fn(&Class1) -> f64| {
+            let class = Class1::at(nm * 1e-9).unwrap();
+            class.telescope().widened * of(&class)
+        };
+        assert_relative_eq!(diameter(905.0, |class| class.aperture(1.0)), 0.05);
+        assert_relative_eq!(diameter(1550.0, |class| class.aperture(0.1)), 7e-3);
+        assert_relative_eq!(diameter(1450.0, |class| class.aperture(20.0)), 24.5e-3);
     }
 
     #[test]

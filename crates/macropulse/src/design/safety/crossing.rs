@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_4;
 
 use super::beams::{LineBeams, Lines};
-use super::class1::{Class1, Opening};
+use super::class1::{Class1, Condition, Opening};
 use super::exposure::{Crossing, Crossings, Exposure};
 use super::scattered::Scattered;
 use super::share::Share;
@@ -27,8 +27,8 @@ pub(in crate::design) struct Sender<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
     pub coding: &'a Coding,
-    /// Distance of the eye, m.
-    pub distance: f64,
+    /// Where the eye is, and what it looks through.
+    pub condition: Condition,
     /// Whether groups of shots that cross the eye count as repeated exposures.
     pub count_groups: bool,
 }
@@ -38,7 +38,9 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
     let Sender { scan, light, coding, .. } = sender;
     let chips = i64::from(coding.codebook.chips());
     let energies = Energies::of(scan, coding);
-    let openings = class.openings();
+    let Condition { distance, widened } = sender.condition;
+    let wide = |one: Opening| Opening { diameter: widened * one.diameter, ..one };
+    let openings: Vec<Opening> = class.openings().into_iter().map(wide).collect();
     let (places, passed, brightest) = match scan.model().beams() {
         Beams::Flood(sides) => {
             let flood = |opening| sender.flood(opening, sides, &energies);
@@ -53,14 +55,14 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
             let scattered = Scattered { scan, beams: &beams, energies: &energies };
             let at = |(opening, share): (&Opening, &Share)| Crossings {
                 durations: opening.durations,
-                shots: scattered.crossing(share, sender.distance),
+                shots: scattered.crossing(share, distance),
             };
             let places = openings.iter().zip(&shares).map(at).collect();
             let passed = shares.first().map_or(1.0, |share| share.at(0.0));
             (places, passed, passed * energies.most())
         }
         Beams::Lines(lines) => {
-            let beams = LineBeams::new(scan, lines, &energies, sender.distance);
+            let beams = LineBeams::new(scan, lines, &energies, distance);
             let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
             let at = |(opening, share): (&Opening, &Share)| {
                 let aims = beams.aims(share, class.counted_as_one());
@@ -76,6 +78,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
         }
     };
     Exposure {
+        distance,
         scan_period: scan.period(),
         shot: light.pulse.max(s_from_fs(chips * coding.chip_fs)),
         mark: light.pulse,
@@ -89,7 +92,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
 impl Sender<'_> {
     /// The radius of the beam at 1/e² at the eye, m.
     fn spot(&self) -> f64 {
-        (self.light.beam_diameter + self.light.divergence * self.distance) / 2.0
+        (self.light.beam_diameter + self.light.divergence * self.condition.distance) / 2.0
     }
 
     fn share(&self, opening: &Opening) -> Share {
@@ -101,8 +104,9 @@ impl Sender<'_> {
     fn flood(&self, opening: &Opening, sides: [f64; 2], energies: &Energies) -> Crossings {
         let field = solid_angle(sides[0], sides[1]);
         let wide = 2.0 * self.spot();
-        let [across, down] = sides.map(|side| self.distance * side);
-        let lit = field * self.distance * self.distance + (across + down) * wide + wide * wide;
+        let distance = self.condition.distance;
+        let [across, down] = sides.map(|side| distance * side);
+        let lit = field * distance * distance + (across + down) * wide + wide * wide;
         let seen = opening.diameter.min(across + wide) * opening.diameter.min(down + wide);
         let area = (FRAC_PI_4 * opening.diameter * opening.diameter).min(seen);
         let share = (area / lit).min(1.0);

@@ -28,6 +28,8 @@ pub struct Crossings {
 /// What a sensor sends to an eye.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposure {
+    /// How far away the eye is, m.
+    pub distance: f64,
     /// Duration of a scan, s.
     pub scan_period: f64,
     /// Length of a shot, s.
@@ -84,6 +86,8 @@ impl Rule {
 pub struct Limit {
     /// The rule.
     pub rule: Rule,
+    /// How far away the eye is that it protects, m.
+    pub distance: f64,
     /// Shots it adds up: their shares through the aperture.
     pub shots: f64,
     /// How bright those are on average, the mean shot being 1.
@@ -99,6 +103,16 @@ pub fn strictest(limits: &[Limit]) -> Option<&Limit> {
     limits.iter().min_by(|a, b| a.energy.total_cmp(&b.energy))
 }
 
+/// Of each rule the smallest of `limits`, the rules in the order of growing duration; a rule that none is
+/// of is left out.
+pub fn strictest_of_each(limits: &[Limit]) -> Vec<Limit> {
+    let of_rule = |rule: Rule| {
+        let limits = limits.iter().filter(|limit| limit.rule == rule);
+        limits.min_by(|a, b| a.energy.total_cmp(&b.energy)).copied()
+    };
+    Rule::ALL.into_iter().filter_map(of_rule).collect()
+}
+
 /// What each rule allows to `exposure`, the rules in the order of growing duration; a rule that no
 /// exposure falls under is left out.
 ///
@@ -110,7 +124,7 @@ pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
     let mut all = Vec::new();
     let mut add = |rule, shots: f64, brightness: f64, duration| {
         let energy = class.single_exposure(duration) / (shots * brightness);
-        all.push(Limit { rule, shots, brightness, duration, energy });
+        all.push(Limit { rule, distance: exposure.distance, shots, brightness, duration, energy });
     };
     if exposure.mark < exposure.shot {
         add(Rule::Mark, exposure.brightest_mark, 1.0, exposure.mark);
@@ -123,11 +137,7 @@ pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
         all.extend(train.repeated());
         all.extend(train.average());
     }
-    let of_rule = |rule: Rule| {
-        let limits: Vec<Limit> = all.iter().filter(|limit| limit.rule == rule).copied().collect();
-        strictest(&limits).copied()
-    };
-    Rule::ALL.into_iter().filter_map(of_rule).collect()
+    strictest_of_each(&all)
 }
 
 /// The shots that cross an aperture in two scans, and the sums of what they bring.
@@ -170,7 +180,14 @@ impl<'a> Train<'a> {
         (duration, factor): (f64, f64),
     ) -> Limit {
         let allowed = factor * self.class.single_exposure(duration) / energy;
-        Limit { rule, shots, brightness: energy / shots, duration, energy: allowed }
+        Limit {
+            rule,
+            distance: self.exposure.distance,
+            shots,
+            brightness: energy / shots,
+            duration,
+            energy: allowed,
+        }
     }
 
     /// The runs of shots that fit into `longest` seconds and into no more, one for each first shot
@@ -287,6 +304,7 @@ mod tests {
         limits(
             &CLASS,
             &Exposure {
+                distance: 0.1,
                 scan_period: 0.1,
                 shot: 1e-9,
                 mark: 1e-9,

@@ -13,17 +13,19 @@ mod scattered;
 mod share;
 
 pub(crate) use beams::{Line, Lines};
-pub use class1::Class1;
+pub use class1::{Class1, Condition, TELESCOPE};
 pub(crate) use crossing::Beams;
 pub(super) use crossing::{Sender, exposure};
-pub use exposure::{Crossing, Crossings, Exposure, Limit, Rule, limits, strictest};
+pub use exposure::{
+    Crossing, Crossings, Exposure, Limit, Rule, limits, strictest, strictest_of_each,
+};
 
 /// What the limits take for granted, for people to read.
 pub const ASSUMED: &str = "IEC 60825-1:2014 class 1, point source, through the aperture at \
-    safety.distance_mm where most light crosses it; every shot as bright as the brightest word of \
-    its label; groups of shots within T_i counted as repeated exposures if safety.count_lines; above \
-    1400 nm condition 1 (2 m, seven times the aperture) is not modelled; a scan that stops is taken \
-    to switch the laser off. Our reading, not a certification";
+    safety.distance_mm (condition 3), or 2 m away through 50 mm or, above 1400 nm, seven times the \
+    aperture (condition 1), where most light crosses it; every shot as bright as the brightest word of \
+    its label; groups of shots within T_i counted as repeated exposures if safety.count_lines; a \
+    scan that stops is taken to switch the laser off. Our reading, not a certification";
 
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,8 @@ fn open(name: &str, set: &[(&str, &str)]) -> Design {
 fn of(design: &Design, count_groups: bool) -> Vec<Limit> {
     let Design { scan, light, coding, .. } = design;
     let class = Class1::at(light.wavelength).unwrap();
-    let sender = Sender { scan, light, coding, distance: 0.1, count_groups };
+    let condition = Condition::bare_eye(0.1);
+    let sender = Sender { scan, light, coding, condition, count_groups };
     limits(&class, &exposure(&class, &sender))
 }
 
