@@ -196,8 +196,8 @@ const SIDEWALK: &[(f64, f64)] =
 const PINE: &[(f64, f64)] =
     &[(850.0, 0.917), (905.0, 0.918), (940.0, 0.915), (1064.0, 0.905), (1550.0, 0.565)];
 
-/// Grains with 20 m² of surface to a kilogram, as of snow some days old: exp(−7·√(χ·6/(ρ·SSA))) and
-/// the absorption of ice \[KZ04\]; at 1550 nm a few per cent.
+/// Grains with 20 m² of surface to a kilogram, as of snow some days old, by the absorption of ice
+/// \[KZ04\]; at 1550 nm a few per cent.
 const SNOW: &[(f64, f64)] = &[(905.0, 0.78), (1064.0, 0.62), (1550.0, 0.05)];
 
 /// Green grass \[ASTER\].
