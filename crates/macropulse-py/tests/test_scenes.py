@@ -83,12 +83,12 @@ def test_sensors_by_name_file_and_dictionary(tmp_path):
 
 
 def test_effects_are_switched_by_name(tmp_path):
-    assert mp.Sensor("coded-practical").idealised == ["inter-chip"]
+    assert mp.Sensor("coded-practical").idealised == []
     without = mp.Sensor("coded-practical", {"without": ["eye-safety", "mirror-motion"]})
-    assert set(without.idealised) == {"inter-chip", "eye-safety", "mirror-motion"}
+    assert set(without.idealised) == {"eye-safety", "mirror-motion"}
     (tmp_path / "sensor.toml").write_text(without.to_toml())
     again = mp.Sensor(tmp_path / "sensor.toml", {"with": "mirror-motion"})
-    assert set(again.idealised) == {"inter-chip", "eye-safety"}
+    assert set(again.idealised) == {"eye-safety"}
 
 
 def test_sun_and_air_are_changed_with_the_scene():

@@ -12,7 +12,8 @@ fn beside(claim: &Claim, findings: &Findings) -> (&'static str, String) {
     match claim.id {
         "end-waiting" => (
             "those of `kim-park-2016`, below",
-            "`coded-practical` does it with one of them".to_owned(),
+            "`coded-practical` does it with none of them, on surfaces that are not aslant"
+                .to_owned(),
         ),
         "end-macropulse" => (
             "none",
@@ -37,7 +38,7 @@ fn beside(claim: &Claim, findings: &Findings) -> (&'static str, String) {
                 outlook.practical_pd, found.timing.rated_range
             ),
         ),
-        "end-360" => ("`inter-chip`", "`coded-360`".to_owned()),
+        "end-360" => ("nothing", "`coded-360`".to_owned()),
         "half-terahertz" | "end-slower" | "end-synchronous" => {
             ("those of `kim-park-2016`", "`bipolar-gold`".to_owned())
         }

@@ -1,6 +1,7 @@
 //! Forecasts beside what is simulated: walls all around a ready sensor, of such a reflectance that one
 //! shot in ten, half of them, and nearly all are to be seen.
 
+use macropulse::codec::decode::ReceiverKind;
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
@@ -90,7 +91,14 @@ impl Place {
 /// # Errors
 /// Where the sensor cannot be simulated there.
 pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Error> {
-    let design = Design::open(sensor, &[])?;
+    let ready = Design::open(sensor, &[])?;
+    let design = match ready.receiver.kind {
+        // What is forecast is what is there to be found.
+        ReceiverKind::Matched => {
+            Design::open(sensor, &[("receiver.effort".into(), "\"thorough\"".into())])?
+        }
+        _ => ready,
+    };
     let around = Environment::named(ENVIRONMENT)?;
     let forecaster = Forecaster::new(&design, &around)?;
     let range = PART * design.scan.max_range;

@@ -14,10 +14,12 @@ fn of_forecasts(findings: &Findings) -> String {
          a reflectance that one shot in ten, half of them, and nearly all should be seen. N is {SHOTS} \
          shots or a few more, as many as a scan has where that is less; seed {}. Seen are returns \
          within 0.35 m. A forecast holds if the share is right within 0.02 or three standard \
-         deviations, and the standard deviation of the range, sidelobes and all, within 20 %. What \
-         forecasts leave out so far: sidelobes, in the precision; words that differ; what falls on the \
-         dark chips of a balanced receiver; that amplitudes which are seen are higher than those of all \
-         pulses; and shots that a quick receiver does not search for.",
+         deviations, and the standard deviation of the range, sidelobes and all, within 20 %. The \
+         matched receivers are thorough: quick ones, as the ready sensors have them, find fewer where \
+         most shots are lost, as they begin with those that stand alone. What forecasts leave out so \
+         far: sidelobes, in the precision; that light of other shots in step may have a higher balance; \
+         and that pulses which only just cross a threshold are told later or earlier than others, and \
+         fall beside the places where they are looked for.",
         findings.seed
     )
 }

@@ -2,7 +2,7 @@
 
 pub mod comparison;
 mod balanced;
-mod converters;
+pub mod converters;
 mod forecast;
 pub mod interference;
 pub mod link;
