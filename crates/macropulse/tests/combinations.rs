@@ -249,11 +249,13 @@ fn all_reasons_are_told_at_once() {
         "mine.toml:9:1: light.pulse_ps: is 0, but must lie between 0.001 and 1000000000",
     ];
     assert_eq!(told.to_string(), expected.join("\n"));
-    let text = text.replace("rows = 0", "rows = 4").replace("\"inter-chip\"", "\"eye-safety\"");
+    let text = text
+        .replace("rows = 0", "rows = 4")
+        .replace("wavelength_nm = 1550.0", "wavelength_nm = 1.0");
     let text = text.replace("pulse_ps = 0.0", "pulse_ps = 200.0");
     let told = Design::from_toml(&text, "mine.toml", Path::new(""), &[]).unwrap_err();
     let told = told.to_string();
     assert!(told.lines().count() == 2, "{told}");
     assert!(told.contains("divided evenly among 32 detectors: write 32"), "{told}");
-    assert!(told.contains("this detector judges every mark alone"), "{told}");
+    assert!(told.contains("light.wavelength_nm: is 1, but must lie between"), "{told}");
 }

@@ -151,7 +151,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "formats",
-            may_name: &["names", "points", "units"],
+            may_name: &["names", "points", "told", "units"],
             because: "files hold columns, no physics; of units they know the speed of light, by \
                       which some have a time in place of a range",
         },

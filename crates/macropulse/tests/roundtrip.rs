@@ -275,7 +275,10 @@ fn only_files_with_clouds_are_read() {
         let (_folder, path) = write(Format::parse(name).unwrap(), &cloud(true));
         assert!(read_cloud(&path).is_err(), "{name}");
     }
-    let told = read_cloud(Path::new("scene.docx")).unwrap_err().to_string();
+    let (folder, _) = write(Format::Ply, &cloud(true));
+    let text = folder.path().join("scene.docx");
+    std::fs::write(&text, "no points").unwrap();
+    let told = read_cloud(&text).unwrap_err().to_string();
     assert!(told.contains("no point cloud is read from such a file; read are"), "{told}");
 }
 

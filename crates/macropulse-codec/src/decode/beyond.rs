@@ -57,9 +57,9 @@ pub(super) fn exclude(
     let mut field = Field::new(&ticks.tick, width, extent, length, MEMORY.take());
     // At most so many are lit: neighbours overlap.
     let lit = ticks.tick.len() as f64 * f64::from(width);
-    let lasts =
-        ticks.tick.last().zip(ticks.tick.first()).map_or(1, |(last, first)| last - first + 1);
-    let density = (lit / f64::from(lasts)).clamp(1e-6, 0.999);
+    let ends = ticks.tick.last().zip(ticks.tick.first());
+    let lasts = 1.0 + ends.map_or(0.0, |(last, first)| f64::from(last - first));
+    let density = (lit / lasts).clamp(1e-6, 0.999);
     let mut kept = Returns::with_capacity(returns.len());
     kept.add_rejects(returns);
     for one in returns.each() {

