@@ -9,7 +9,8 @@ import csv
 
 import macropulse as mp
 
-CODES = [(1 + 4 * marks, marks) for marks in (4, 6, 8, 12, 16)]
+# Marks stand six chips apart at least, so that the amplifier tells them apart.
+CODES = [(1 + 9 * marks, marks) for marks in (4, 6, 8, 12, 16)]
 REFLECTANCES = (0.05, 0.1, 0.3, 0.8)
 SUNLIGHT = ("clear-day", "night")
 PD = 0.9
@@ -17,7 +18,7 @@ PD = 0.9
 
 def sensor(chips, marks):
     """Eye-safe with every one of these codes: 100 nJ a shot."""
-    family = {"sparse": {"length": chips, "weight": marks, "words": 64, "seed": 1}}
+    family = {"sparse": {"length": chips, "weight": marks, "words": 64, "gap": 6, "seed": 1}}
     return mp.Sensor("coded-practical", {"code.family": family, "light.energy": {"shot_nj": 100.0}})
 
 

@@ -40,7 +40,7 @@ MISTAKES = [
      "scan.max_range_m: a value cannot be of type NoneType", "or leave the key out"),
     (lambda: mp.Sensor("peregrine", {"scan.max_range_m": 10**30}), "scan.max_range_m: 1", "can hold"),
     (lambda: mp.Sensor("peregrine", {3: 4}), "changes: the key 3 is no text", ""),
-    (lambda: mp.Sensor("peregrine", {"without": ["sunlihgt"]}), "peregrine:7:1: idealised: `sunlihgt` is no effect", ""),
+    (lambda: mp.Sensor("peregrine", {"without": ["sunlihgt"]}), "peregrine:8:1: idealised: `sunlihgt` is no effect", ""),
     (lambda: mp.Sensor.from_dict({"extends": "peregrin"}), "the dictionary: extends: ", ""),
     (lambda: mp.Sensor.from_dict({"extends": "peregrine", "scan": {"max_range_m": "x"}}),
      "the dictionary: scan.max_range_m: ", ""),

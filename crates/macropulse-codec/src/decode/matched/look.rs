@@ -34,7 +34,7 @@ pub(super) struct Paced {
 
 impl Default for Paced {
     fn default() -> Self {
-        Self { next: 0, pause: 1.0 }
+        Self { next: 0, pause: LONGEST_PAUSE }
     }
 }
 
