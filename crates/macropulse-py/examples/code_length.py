@@ -38,9 +38,9 @@ for row in rows:
     cells = (f"{one:.1f}" if isinstance(one, float) else "-" if one is None else one for one in row)
     print(" ".join(f"{cell:>16}" for cell in cells))
 
-# A plate of a tenth across the line of sight, where the forecast says 0.9; `-` is never: too few marks
-# to stand out of the dark counts.
-chips, marks, _, _, farthest, *_ = next(row for row in rows if row[4] is not None)
+# A plate of a tenth across the line of sight, where the forecast says 0.9, within the range gate; `-` is
+# never: too few marks to stand out of the dark counts.
+chips, marks, _, _, farthest, *_ = next(row for row in rows if row[4] is not None and row[4] < 150.0)
 corners = [[0, -12, -12], [0, 12, -12], [0, 12, 12], [0, -12, 12]]
 plate = mp.Scene.from_mesh(corners, [[0, 1, 2], [0, 2, 3]], material="grey10",
                            position_m=[farthest, 0, 0])

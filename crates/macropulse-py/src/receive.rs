@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use macropulse::channel::{self, Operating, Seen};
+use macropulse::channel::Operating;
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
-use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
 use macropulse::points::{Piece, PointCloud, Scale, Truth};
-use macropulse::random::Chance;
 use macropulse::scene::Scene as Simulated;
-use macropulse::{tdc, told};
+use macropulse::sim::{self, Scans};
+use macropulse::told;
 use numpy::{Element, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
@@ -61,16 +60,7 @@ impl Records {
         let (design, scene) = (Arc::clone(&self.design), Arc::clone(&self.scene));
         let seed = self.seed;
         let made = work::done(py, 0, move |_| {
-            let operating = Operating::of(&design, &scene.environment)?;
-            let detectors = Detectors::new(&design, &operating, Chance::new(seed));
-            let seen = Seen { design: &design, scene: &scene, operating: &operating };
-            let log = band.shot_log(&design);
-            let traced = scene.trace(&design, &log);
-            let light = channel::light(&seen, &log, &traced);
-            let mut memory = Memory::default();
-            let response = detectors.response(&log, &light, &mut memory);
-            let ticks = tdc::ticks(&design, response, 0).ticks;
-            Ok::<_, channel::Error>((log, ticks))
+            Ok::<_, sim::Error>(Scans::new(&design, &scene, seed)?.record(&band))
         })?;
         let (log, ticks) = made.or_raise()?;
         Ok(Some((told_of_shots(py, log)?, told_of_ticks(py, ticks)?)))
