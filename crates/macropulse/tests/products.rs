@@ -96,7 +96,7 @@ fn the_forecast_of_every_sensor_is_what_is_simulated() {
         ("spinning-32", 90.0, 0.12),
         ("flash-cells", 35.0, 0.03),
         ("flash-linear", 58.0, 0.02),
-        ("flash-coded", 58.0, 0.0135),
+        ("flash-coded", 58.0, 0.0105),
     ];
     for (name, range, reflectance) in walls {
         let design = sensor(name, &[]);
