@@ -82,7 +82,7 @@ pub struct Forecast {
     /// False returns per shot that meets nothing.
     pub false_per_shot: f64,
     /// Standard deviation of the range of returns, m; `None` where there are next to none, fewer than
-    /// one in [`FEWEST`].
+    /// one in a million.
     pub precision: Option<f64>,
     /// The least that any unbiased estimate could have from as many photons, m: c/2·σ/√n, σ the
     /// rms length of a micropulse with the jitter.

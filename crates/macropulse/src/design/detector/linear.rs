@@ -195,7 +195,7 @@ impl Linear {
 impl LinearSetting {
     /// Standard deviation, s, of the time at which a mark of `amplitude` detected photons is told:
     /// noise over the slope with the jitter of the input. The slope is amplitude/τ where marks are
-    /// judged alone, else that of the pulse ([`Comparator::error`]).
+    /// judged alone, else that of the pulse there.
     pub fn timing(&self, amplitude: f64) -> f64 {
         let amplitude = amplitude.max(self.threshold);
         let error = match self.comparator {
