@@ -9,7 +9,7 @@ use super::{Farthest, Figures};
 use crate::text::{Columns, section, short};
 
 /// Below such a probability a quick receiver may find fewer shots than there are to be found: of rooms
-/// with 0.95 it loses none, with 0.5 one in a hundred, with 0.1 a third to all (docs/validation.md).
+/// with 0.95 it loses next to none, with 0.5 one in a hundred, with 0.1 half to nearly all.
 const LIKELY: f64 = 0.9;
 
 impl Figures<'_> {

@@ -35,12 +35,12 @@ pub struct Comparator {
 /// The fraction of a constant-fraction discriminator.
 pub const FRACTION: f64 = 0.5;
 
-/// Its delay, in responses: so it tells a moment behind the peak, where the threshold has been
-/// crossed, on the steepest slope that the difference has there.
+/// Its delay, in responses: so it tells a moment 0.88 rms lengths behind the peak, when the threshold
+/// has been crossed even by a pulse that just reaches it.
 pub const DELAY: f64 = 1.0;
 
 /// The v of the noise, in responses: √3/π.
-const MEMORY: f64 = 0.551_328_895_421_792_1;
+const MEMORY: f64 = 1.732_050_807_568_877_2 / PI;
 
 /// By how much, on average, the signal about the peak of a pulse at the threshold is higher than at the
 /// peak itself, in detected photons: noise that rises there puts the maximum beside it,
@@ -110,7 +110,6 @@ impl Comparator {
     /// Standard deviation, s, of the Gaussian that white noise is smoothed with to have this memory:
     /// v/√2.
     pub fn smoothing(response: f64) -> f64 {
-        debug_assert!((MEMORY - 3_f64.sqrt() / PI).abs() < 1e-12);
         MEMORY * response / std::f64::consts::SQRT_2
     }
 }

@@ -16,6 +16,7 @@ mod photon_counting;
 mod single_stop;
 mod table;
 
+use macropulse_codec::statistics::{normal_quantile, normal_tail};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -288,4 +289,19 @@ impl FirstEvent {
 /// it displaced.
 fn length_followed(light: &Light) -> f64 {
     light.spread.unwrap_or(0.0)
+}
+
+/// Slices of equal probability over which an error is averaged: of 512 the averages differ by less
+/// than 0.2 %.
+const SLICES: u32 = 32;
+
+/// Of a normal variable of such a `mean` and `spread`, where it lies above `threshold`: the middles of
+/// [`SLICES`] slices of equal probability, the highest first.
+fn slices_above(threshold: f64, mean: f64, spread: f64) -> impl Iterator<Item = f64> {
+    let spread = spread.max(f64::MIN_POSITIVE);
+    let above = normal_tail((threshold - mean) / spread).max(f64::MIN_POSITIVE);
+    (0..SLICES).map(move |slice| {
+        let beyond = above * (f64::from(slice) + 0.5) / f64::from(SLICES);
+        (mean - spread * normal_quantile(beyond)).max(threshold)
+    })
 }

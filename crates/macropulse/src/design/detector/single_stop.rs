@@ -5,15 +5,11 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, Sensitivity, SensitivityFile,
-    Table, Typed,
+    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, SLICES, Sensitivity,
+    SensitivityFile, Table, Typed, slices_above,
 };
 use crate::design::{Error, Light};
 use crate::units::RMS_OF_FWHM;
-
-/// Slices of equal probability over which an error is averaged: of 64 and of 32 the averages differ
-/// by less than 1 %.
-const SLICES: u32 = 32;
 
 /// `[detector.single-stop]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -220,14 +216,9 @@ impl Model for SingleStop {
     fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64 {
         let SingleStopSetting { needed, noise, .. } = self.setting(lit.background);
         let needed = f64::from(needed);
-        let spread = (lit.photons + noise * noise).sqrt().max(f64::MIN_POSITIVE);
-        let seen = normal_tail((needed - lit.photons) / spread).max(f64::MIN_POSITIVE);
-        // The middles of slices of equal probability.
-        let squares = (0..SLICES).map(|slice| {
-            let beyond = seen * (f64::from(slice) + 0.5) / f64::from(SLICES);
-            let photons = lit.photons - spread * normal_quantile(beyond);
-            normal_order(needed, photons.max(needed)).1.powi(2)
-        });
+        let spread = (lit.photons + noise * noise).sqrt();
+        let squares = slices_above(needed, lit.photons, spread)
+            .map(|photons| normal_order(needed, photons).1.powi(2));
         light.pulse * RMS_OF_FWHM * (squares.sum::<f64>() / f64::from(SLICES)).sqrt()
     }
 
