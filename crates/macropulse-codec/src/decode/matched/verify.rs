@@ -1,13 +1,17 @@
 //! Exclusion and verification: what becomes of a shot that was found, and what is measured of it.
 
+use std::cmp::Reverse;
 use std::ops::Range;
 
-use super::track::BLOCK;
+use super::track::{BLOCK, NEAREST_SIDE, WIDEST_GAP};
 use super::{Band, Detection};
 use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
 use crate::decode::timing::{self, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
+
+/// Shots before a doubtful one that tell where it is to be expected.
+const SETTLED: usize = 3;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
@@ -60,32 +64,86 @@ impl Band<'_> {
         self.further.retain(|(shot, _)| *shot >= oldest);
     }
 
-    /// Takes for the lag of `shot`, of several with as many marks, the one nearest to where it is to be
-    /// expected after its neighbours, and keeps the earliest where there are none.
+    /// Takes for the lag of `shot`, of several with as many marks, the one nearest to where its neighbours
+    /// let it be expected, and keeps the earliest where there are none.
     ///
     /// The marks of a word may be a comb, as those of the first prime sequence are. Shifted by a tooth,
     /// only the last marks in every run of lit bits have nothing to fall upon; where these are missed
-    /// as many marks are found there, and nothing in the light of the shot tells which it is.
+    /// as many marks are found there, and nothing in the light of the shot tells which it is. Where a
+    /// tick may be one of two marks even more may be found, so here it counts for one. A neighbour may
+    /// be mistaken, too: the two that agree best count.
     fn choose_of_equals(&mut self, shot: usize) {
-        let Some(found) = self.found[shot].filter(|found| found.margin == 0) else { return };
-        let at = |ways: &[usize]| ways.iter().find_map(|way| self.expected(shot, 1, *way));
-        // The middle between both sides, or a line or plane through others. The one before is settled;
-        // one behind that is as doubtful tells nothing.
-        let Some(nearest) = at(&[0, 2, 1, 3, 5, 4]) else { return };
-        let next = self.found.get(shot + 1).copied().flatten();
-        let behind = next.filter(|next| next.margin > 0).map(|next| next.lag);
-        let (before, behind) = at(&[1]).zip(behind).unwrap_or((nearest, nearest));
-        self.best_in_block(shot, found.lag);
-        let equal = self.counts.at_least(found.count);
-        let is_equal = |lag: i64| equal[(lag / 64) as usize] >> (lag % 64) & 1 == 1;
-        let (first, reach) = (found.lag - BLOCK / 2, self.sent.reach());
-        // Of those side by side, the first one.
-        let lags = (0..BLOCK).filter(|lag| is_equal(*lag) && (*lag == 0 || !is_equal(lag - 1)));
-        let lags = lags.map(|lag| first + lag).filter(|lag| reach.contains(lag));
-        let nearest = lags.min_by_key(|lag| (2 * lag).abs_diff(before + behind));
-        if let (Some(lag), Some(kept)) = (nearest, &mut self.found[shot]) {
-            kept.lag = lag;
+        let weight = self.sent.weight(shot);
+        let Some(found) = self.found[shot].filter(|found| found.count < weight) else { return };
+        let is_near = |lag: i64, other: i64| lag.abs_diff(other) < NEAREST_SIDE as u64;
+        let twice = self.sent.bits(shot).shared * self.sent.lit_bits(shot).len() as u32;
+        let likely = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
+        if found.margin > twice && likely.is_none_or(|likely| is_near(likely, found.lag)) {
+            return;
         }
+        let expected = self.expected_lags(shot);
+        let mut middles = vec![found.lag];
+        for lag in &expected {
+            if !middles.iter().any(|middle| is_near(*middle, *lag)) {
+                middles.push(*lag);
+            }
+        }
+        let (reach, mut most) = (self.sent.reach(), found.count);
+        let mut lags = Vec::new();
+        for middle in middles {
+            let Some(best) = self.best_in_block(shot, middle) else { continue };
+            most = most.max(best.count);
+            let as_many = self.counts.at_least(most.saturating_sub(twice));
+            let is_among = |at: &i64| as_many[(at / 64) as usize] >> (at % 64) & 1 == 1;
+            lags.extend((0..BLOCK).filter(is_among).map(|at| middle - BLOCK / 2 + at));
+        }
+        self.lay_out(shot);
+        let away = |lag: i64| {
+            let mut away: Vec<u64> = expected.iter().map(|other| lag.abs_diff(*other)).collect();
+            away.sort_unstable();
+            away.iter().take(2).sum::<u64>()
+        };
+        let ranked = lags.into_iter().filter(|lag| reach.contains(lag));
+        let ranked =
+            ranked.map(|lag| (self.marks_with_ticks(shot, lag), Reverse((away(lag), lag))));
+        let Some((count, Reverse((_, mut lag)))) = ranked.max() else { return };
+        // Of those side by side, the first one.
+        while reach.contains(&(lag - 1)) && self.marks_with_ticks(shot, lag - 1) == count {
+            lag -= 1;
+        }
+        if lag != found.lag {
+            self.cancel(shot, lag);
+            self.found[shot] = Some(Detection { lag, count, is_sure: false, ..found });
+        }
+    }
+
+    /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
+    /// behind it that is not as doubtful.
+    fn expected_lags(&self, shot: usize) -> Vec<i64> {
+        let known = |shots: &mut dyn Iterator<Item = usize>, is_told: fn(&Detection) -> bool| {
+            let found = shots.take(WIDEST_GAP).filter_map(|shot| *self.found.get(shot)?);
+            found.filter(is_told).map(|found| found.lag).take(SETTLED).collect::<Vec<_>>()
+        };
+        let before = known(&mut (0..shot).rev(), |_| true);
+        let behind = known(&mut (shot + 1..self.found.len()), |found| found.margin > 0);
+        let sides = before.first().zip(behind.first());
+        let middle = sides.map(|(before, behind)| i64::midpoint(*before, *behind));
+        let lines = [0, 2, 3, 6].into_iter().filter_map(|way| self.expected(shot, 1, way));
+        lines.chain(middle).chain(before).chain(behind.first().copied()).collect()
+    }
+
+    /// Marks of `shot`, which are at hand, found at `lag`, where each tick counts for one of them: the
+    /// earliest that it may be.
+    fn marks_with_ticks(&self, shot: usize, lag: i64) -> u32 {
+        let (sent, seen) = (self.sent, self.field.seen());
+        let start = sent.fired[shot] + lag;
+        let (mut count, mut free) = (0, start);
+        for mark in &self.marks {
+            let first = start + i64::from(*mark);
+            let tick = seen.next_lit(first.max(free)..first + i64::from(sent.width));
+            (count, free) = tick.map_or((count, free), |tick| (count + 1, tick + 1));
+        }
+        count
     }
 
     /// Why a `surface` of `shot` gives no return, if it does not.
