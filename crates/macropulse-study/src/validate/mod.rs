@@ -3,7 +3,9 @@
 mod devices;
 mod forecasts;
 mod page;
+mod paper;
 mod published;
+mod simulated;
 
 use std::path::Path;
 
@@ -82,6 +84,8 @@ pub fn published() -> Result<Vec<Figure>, Error> {
     all.extend(devices::light()?);
     all.extend(devices::detectors());
     all.extend(devices::scanners()?);
+    all.extend(paper::paper()?);
+    all.extend(simulated::simulated()?);
     Ok(all)
 }
 

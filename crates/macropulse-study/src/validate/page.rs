@@ -5,7 +5,10 @@ use super::{Figure, Findings, Place, SHOTS};
 use crate::view::{Align, Cell, Page, Section, Table, Verdict};
 
 const LEAD: &str = "What others have published beside what Macropulse says, and what it forecasts \
-                    beside what it simulates. Sources are those of the references.";
+                    beside what it simulates. Sources are those of the references; computed apart is \
+                    what others worked out from the same definitions, sharing no code. A figure may \
+                    differ by its rounding, by what its source allows, or by three standard \
+                    deviations where it was drawn.";
 
 /// What stands above the forecasts.
 fn of_forecasts(findings: &Findings) -> String {
@@ -105,9 +108,14 @@ const OF_PLACES: [&str; 9] = [
     "verdict",
 ];
 
+/// Each once, in the order in which they come first.
 fn topics(findings: &Findings) -> Vec<&'static str> {
-    let mut topics: Vec<&str> = findings.published.iter().map(|figure| figure.topic).collect();
-    topics.dedup();
+    let mut topics = Vec::new();
+    for figure in &findings.published {
+        if !topics.contains(&figure.topic) {
+            topics.push(figure.topic);
+        }
+    }
     topics
 }
 
