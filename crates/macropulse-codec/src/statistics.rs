@@ -113,6 +113,44 @@ pub fn binomial_tail(trials: usize, p: f64, least: usize) -> f64 {
     sum.min(1.0)
 }
 
+/// P(X ≥ k) of the hypergeometric X: the chance that `least` or more of `drawn` are `marked` ones, drawn
+/// without putting back from so many `marked` and `others`. Summed from the smaller side.
+pub fn hypergeometric_tail((marked, others): (u32, u32), drawn: u32, least: u32) -> f64 {
+    let all = u64::from(marked) + u64::from(others);
+    let (fewest, most) = (drawn.saturating_sub(others), marked.min(drawn));
+    if least <= fewest || u64::from(drawn) > all {
+        return 1.0;
+    }
+    if least > most {
+        return 0.0;
+    }
+    let [marked, others, drawn, k] = [marked, others, drawn, least].map(f64::from);
+    let choose =
+        |of: f64, some: f64| lgamma(of + 1.0) - lgamma(some + 1.0) - lgamma(of - some + 1.0);
+    let first = exp(choose(marked, k) + choose(others, drawn - k) - choose(all as f64, drawn));
+    // P(X = k + 1)/P(X = k). Away from the mean each term is smaller than the one before it.
+    let growth = |k: f64| (marked - k) * (drawn - k) / ((k + 1.0) * (others - drawn + k + 1.0));
+    let (mut sum, mut term) = (0.0, first);
+    if k < drawn * marked / all as f64 {
+        for k in (fewest..least).rev() {
+            term /= growth(f64::from(k));
+            sum += term;
+            if term < sum * NEGLIGIBLE {
+                break;
+            }
+        }
+        return (1.0 - sum).max(0.0);
+    }
+    for k in least..=most {
+        sum += term;
+        if term < sum * NEGLIGIBLE {
+            break;
+        }
+        term *= growth(f64::from(k));
+    }
+    sum.min(1.0)
+}
+
 /// P(X = 0), P(X = 1) … P(X = n) of X ~ Bin(n, p), n being `trials`; `p` is held within
 /// \[1e-12, 1 − 1e-12\].
 pub fn binomial(trials: usize, p: f64) -> Vec<f64> {
@@ -181,7 +219,7 @@ mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
     use statrs::distribution::{
-        Binomial, ContinuousCDF, Discrete, DiscreteCDF, Normal, Poisson, StudentsT,
+        Binomial, ContinuousCDF, Discrete, DiscreteCDF, Hypergeometric, Normal, Poisson, StudentsT,
     };
 
     #[test]
@@ -279,6 +317,32 @@ mod tests {
         }
         assert_eq!(normal_order(7.0, 3.0), normal_order(3.0, 3.0));
         assert!([1e9, f64::INFINITY].iter().all(|count| normal_order(1.0, *count).0.is_finite()));
+    }
+
+    #[test]
+    fn hypergeometric_tails_are_those_of_the_reference() {
+        for (marked, others) in [(64, 63), (56, 71), (5, 145), (400, 10_500), (1, 1)] {
+            let all = marked + others;
+            for drawn in [0, 1, 2, all / 9, all / 3, all / 2, all - 1, all] {
+                let (few, many) = (u64::from(marked), u64::from(drawn));
+                let reference = Hypergeometric::new(u64::from(all), few, many).unwrap();
+                let mut tail = 0.0;
+                for least in (0..=marked.min(drawn).min(90)).rev() {
+                    let found = hypergeometric_tail((marked, others), drawn, least);
+                    if least == 90 {
+                        tail = found;
+                    } else {
+                        // The reference has no number for what cannot be.
+                        let pmf = reference.pmf(u64::from(least));
+                        tail += if pmf.is_nan() { 0.0 } else { pmf };
+                    }
+                    assert_relative_eq!(found, tail, max_relative = 1e-8, epsilon = 1e-300);
+                }
+            }
+        }
+        // Two of two marks among four, in one of six draws of two.
+        assert_relative_eq!(hypergeometric_tail((2, 2), 2, 2), 1.0 / 6.0, max_relative = 1e-12);
+        assert_eq!(hypergeometric_tail((2, 2), 2, 3), 0.0);
     }
 
     /// 10 Erlang offered to 10 lines: 21.46 %; 1 to 1: one half; far too many: what is not served.

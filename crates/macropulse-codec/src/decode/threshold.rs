@@ -1,6 +1,6 @@
 //! How many marks must be found together before a return is believed.
 
-use crate::statistics::{binomial, binomial_tail};
+use crate::statistics::binomial_tail;
 
 /// The fewest marks that chance does not reach: the smallest k with
 /// L · P(Bin(N, d) ≥ k) ≤ α, where L is the number of `lags` tried, N the number of `marks`,
@@ -20,30 +20,11 @@ pub(super) fn least_marks(lags: f64, marks: u32, density: f64, false_alarm: f64)
     low
 }
 
-/// The fewest marks, less the dark chips that are lit, that chance does not reach: the smallest s
-/// with L · P(X − Y ≥ s) ≤ α, X ~ Bin(N, d) for the `marks` and Y ~ Bin(M, d) for the `dark`
-/// chips. N + 1 where no s will do.
-pub(super) fn least_balance(lags: f64, chips: (u32, u32), density: f64, false_alarm: f64) -> u32 {
-    let [marks, dark] = [chips.0, chips.1].map(|chips| binomial(chips as usize, density));
-    // P(X ≥ k), the last one beyond all.
-    let mut at_least = vec![0.0; marks.len() + 1];
-    for found in (0..marks.len()).rev() {
-        at_least[found] = at_least[found + 1] + marks[found];
-    }
-    let tail = |least: u32| -> f64 {
-        let beyond = at_least.iter().skip(least as usize);
-        dark.iter().zip(beyond).map(|(stray, beyond)| stray * beyond).sum()
-    };
-    (1..=chips.0).find(|&least| lags * tail(least) <= false_alarm).unwrap_or(chips.0 + 1)
-}
-
-/// [`least_marks`], or [`least_balance`], for fixed lags and false alarms, remembered.
+/// [`least_marks`] for fixed lags and false alarms, remembered.
 #[derive(Debug, Clone)]
 pub(super) struct Thresholds {
     lags: f64,
     false_alarm: f64,
-    /// Chips of a macropulse, if what falls on the dark ones is taken off.
-    balanced: Option<u32>,
     /// By marks.
     known: Vec<Option<Box<Known>>>,
 }
@@ -66,13 +47,7 @@ const FIRST_STEP: u64 = (0x3FF_u64 << 3) - (STEPS as u64 - 1);
 impl Thresholds {
     /// For `lags` tried places and `false_alarm` false answers accepted among them.
     pub fn new(lags: f64, false_alarm: f64) -> Self {
-        Self { lags, false_alarm, balanced: None, known: Vec::new() }
-    }
-
-    /// The same for the balance of macropulses of so many `chips`; densities are rounded up by less than
-    /// an eighth.
-    pub fn balanced(lags: f64, false_alarm: f64, chips: u32) -> Self {
-        Self { balanced: Some(chips), ..Self::new(lags, false_alarm) }
+        Self { lags, false_alarm, known: Vec::new() }
     }
 
     /// Whether it gives what `other` gives.
@@ -98,18 +73,9 @@ impl Thresholds {
         let at_step = &mut known.at_step[step as usize];
         if *at_step == 0 {
             let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
-            *at_step = match self.balanced {
-                None => least_marks(lags, marks, density, false_alarm),
-                Some(chips) => {
-                    let dark = chips.saturating_sub(marks);
-                    least_balance(lags, (marks, dark), density, false_alarm)
-                }
-            };
+            *at_step = least_marks(lags, marks, density, false_alarm);
         }
         let mut least = *at_step;
-        if self.balanced.is_some() {
-            return least;
-        }
         // At the end of the step so many are needed; here fewer may do.
         while least > 1 {
             let enough_to = &mut known.enough_to[least as usize - 1];
@@ -160,29 +126,6 @@ mod tests {
                 assert!((found - share).abs() < 0.012, "{density} {marks}: {found} not {share}");
             }
         }
-    }
-
-    #[test]
-    fn a_balance_is_reached_as_often_as_pairs_of_binomials_say() {
-        // Two coins against one: both heads and the other tails, one outcome in eight; at least
-        // one more is that and a head against a tail, 1/8 + 2/8.
-        let chance = |lags| least_balance(lags, (2, 1), 0.5, 1.0);
-        assert_eq!([7.9, 8.1].map(chance), [2, 3]);
-        // P(X − Y ≥ 1) = P(1, 0) + P(2, 0) + P(2, 1) = 1/4 + 1/8 + 1/8.
-        assert_eq!([1.9, 2.1].map(chance), [1, 2]);
-        // Where nothing counts against, it is the threshold of the marks.
-        for density in [0.01, 0.2] {
-            let marks = least_marks(4e5, 58, density, 1e-3);
-            assert_eq!(least_balance(4e5, (58, 0), density, 1e-3), marks);
-        }
-    }
-
-    #[test]
-    fn a_bright_sky_raises_a_balance_less_than_a_count() {
-        let [dim, bright] = [0.01, 0.3].map(|density| {
-            (least_balance(4e5, (64, 63), density, 1e-6), least_marks(4e5, 64, density, 1e-6))
-        });
-        assert!(bright.0 - dim.0 < bright.1 - dim.1, "{dim:?} {bright:?}");
     }
 
     #[test]

@@ -81,10 +81,7 @@ impl Grid {
         let mut best = None;
         let (mut least, mut better) = (least, better);
         for phase in 0..self.scale {
-            let first =
-                (starts.start - self.origin - phase + self.scale - 1).div_euclid(self.scale);
-            let end = (starts.end - self.origin - phase + self.scale - 1).div_euclid(self.scale);
-            let places = first.max(0) as usize..(end.max(0) as usize).min(64 * self.width);
+            let places = self.places_of(phase, &starts);
             let Some(found) = self.best_of_phase(phase, places, (chips, least)) else { continue };
             let start = self.origin + self.scale * found.place as i64 + phase;
             // Of equals the earliest counts, whichever phase it is at.
@@ -106,6 +103,53 @@ impl Grid {
         sides.into_iter().filter_map(best).map(Balance::score).max().unwrap_or(0)
     }
 
+    /// At how many of `starts` a macropulse of these `chips` would have how many chips lit, marks or not,
+    /// where at least so many are: `counts[lit - least]`.
+    pub fn lit_about(
+        &self,
+        starts: &Range<i64>,
+        (chips, length): (&Chips, usize),
+        least: u32,
+        counts: &mut Vec<u32>,
+    ) {
+        counts.clear();
+        counts.resize((length + 1).saturating_sub(least as usize), 0);
+        for phase in 0..self.scale {
+            let places = self.places_of(phase, starts);
+            let words = self.phase(phase);
+            let lit = |place: usize| {
+                words.get(place / 64).map_or(0, |word| (word >> (place % 64) & 1) as u32)
+            };
+            for word in places.start / 64..places.end.div_ceil(64) {
+                if places.is_empty() || self.lit_in(phase, word..word + chips.reach()) < least {
+                    continue;
+                }
+                let run = (64 * word).max(places.start)..(64 * (word + 1)).min(places.end);
+                let mut now: u32 = (run.start..run.start + length).map(lit).sum();
+                for place in run {
+                    if let Some(count) = now.checked_sub(least) {
+                        counts[count as usize] += 1;
+                    }
+                    now = now + lit(place + length) - lit(place);
+                }
+            }
+        }
+    }
+
+    /// The places of `phase` at which one of `starts` is.
+    fn places_of(&self, phase: i64, starts: &Range<i64>) -> Range<usize> {
+        let place =
+            |start: i64| (start - self.origin - phase + self.scale - 1).div_euclid(self.scale);
+        place(starts.start).max(0) as usize
+            ..(place(starts.end).max(0) as usize).min(64 * self.width)
+    }
+
+    /// Lit places of `phase` in these machine words.
+    fn lit_in(&self, phase: i64, words: Range<usize>) -> u32 {
+        let before = &self.before[phase as usize * (self.width + 1)..][..=self.width];
+        before[words.end.min(self.width)] - before[words.start.min(self.width)]
+    }
+
     /// The best of some `places` of one phase. Runs of them with too few lit places are left out.
     fn best_of_phase(
         &self,
@@ -113,11 +157,8 @@ impl Grid {
         places: Range<usize>,
         (chips, least): (&Chips, i32),
     ) -> Option<Balance> {
-        let before = &self.before[phase as usize * (self.width + 1)..][..=self.width];
         let words = self.phase(phase);
-        let lit = |from: usize, to: usize| {
-            (before[to.min(self.width)] - before[from.min(self.width)]) as i32
-        };
+        let lit = |from: usize, to: usize| self.lit_in(phase, from..to) as i32;
         let (first, last) = (places.start / 64, places.end.div_ceil(64));
         if places.is_empty() || lit(first, last + chips.reach()) < least {
             return None;
