@@ -77,7 +77,8 @@ impl Band<'_> {
         let Some(found) = self.found[shot].filter(|found| found.count < weight) else { return };
         let is_near = |lag: i64, other: i64| lag.abs_diff(other) < NEAREST_SIDE as u64;
         let twice = self.sent.bits(shot).shared * self.sent.lit_bits(shot).len() as u32;
-        let likely = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
+        let lines = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
+        let likely = lines.or_else(|| self.expected(shot, WIDEST_GAP, 1));
         if found.margin > twice && likely.is_none_or(|likely| is_near(likely, found.lag)) {
             return;
         }
