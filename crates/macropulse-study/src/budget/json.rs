@@ -46,6 +46,10 @@ impl Figures<'_> {
             "false_points_wanted": self.wanted.false_points,
             "snr": finite(there.snr),
             "precision_mm": there.precision.map(|precision| precision * 1e3),
+            "on_sidelobe": there.aside.map(|aside| json!({
+                "share": aside.share,
+                "rms_mm": aside.rms * 1e3,
+            })),
             "precision_bound_mm": there.bound * 1e3,
             "converter_loss": there.bank_loss,
             "mark_by_mark_shortfall": self.mark_by_mark,

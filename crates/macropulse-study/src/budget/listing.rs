@@ -158,6 +158,14 @@ impl Figures<'_> {
         );
         let receiver = &self.design.receiver;
         let is_quick = receiver.kind == ReceiverKind::Matched && receiver.effort == Effort::Quick;
+        if let Some(aside) = self.there.aside.filter(|aside| aside.share >= RARELY) {
+            text += &format!(
+                "  on a sidelobe {:.1e} of the returns at the rated range, {:.0} mm off (rms), apart from \
+                 precision\n",
+                aside.share,
+                aside.rms * 1e3
+            );
+        }
         if self.design.is_coded() && is_quick && self.there.pd < LIKELY {
             text += "  Pd is that of receiver.effort = \"thorough\": a quick one finds fewer so faint shots\n";
         }
@@ -179,6 +187,9 @@ impl Figures<'_> {
         columns
     }
 }
+
+/// Returns on a sidelobe that are rarer are not spoken of.
+const RARELY: f64 = 1e-6;
 
 /// A duration in the unit that suits it.
 fn time(seconds: f64) -> String {

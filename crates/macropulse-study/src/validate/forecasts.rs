@@ -1,5 +1,5 @@
 //! Forecasts beside what is simulated: walls all around a ready sensor, of such a reflectance that one
-//! shot in ten, half of them, and nearly all are to be seen.
+//! shot in ten, half of them, four in five, and nearly all are to be seen.
 
 use macropulse::codec::decode::ReceiverKind;
 use macropulse::design::Design;
@@ -35,13 +35,21 @@ const ENVIRONMENT: &str = "night";
 const PART: f64 = 0.7;
 
 /// Probabilities of detection at which a forecast is tried.
-const WANTED: [f64; 3] = [0.1, 0.5, 0.95];
+const WANTED: [f64; 4] = [0.1, 0.5, 0.8, 0.95];
 
 /// A probability may be off by so much, or by so many standard deviations of what was found.
 const PD_WITHIN: (f64, f64) = (0.02, 3.0);
 
 /// A precision may be off by such a share of what was found.
 const PRECISION_WITHIN: f64 = 0.2;
+
+/// The share of points on a sidelobe may be off by so much, or by so many standard deviations of what was
+/// found.
+const ASIDE_WITHIN: (f64, f64) = (0.002, 3.0);
+
+/// Points so many standard deviations from the truth, and not right either, lie on a sidelobe. Of normal
+/// errors one in 500 million is as large.
+const BESIDE: f64 = 6.0;
 
 /// Standard deviations of fewer points are not compared: of 1000 they are known to 2 %.
 const FEWEST_POINTS: u64 = 1000;
@@ -61,6 +69,11 @@ pub struct Place {
     pub pd: [f64; 2],
     /// Standard deviation of the range, forecast and found, m; not found of few points.
     pub precision_m: (Option<f64>, Option<f64>),
+    /// Share of the points on a sidelobe of their own macropulse, forecast and found; where there is such a
+    /// forecast.
+    pub aside: Option<[f64; 2]>,
+    /// Points with light, of which `aside` is a share.
+    pub points: usize,
     /// False and wrong points per shot, forecast and found.
     pub false_per_shot: [f64; 2],
 }
@@ -75,7 +88,15 @@ impl Place {
 
     /// Whether all that was found is as forecast.
     pub fn holds(&self) -> bool {
-        self.pd_holds() && self.precision_holds() != Some(false)
+        let aside = self.aside_holds() != Some(false);
+        self.pd_holds() && self.precision_holds() != Some(false) && aside
+    }
+
+    /// Whether as many points lie on a sidelobe as forecast; `None` where there is no such forecast.
+    pub fn aside_holds(&self) -> Option<bool> {
+        let [forecast, found] = self.aside?;
+        let deviation = (forecast * (1.0 - forecast) / self.points.max(1) as f64).sqrt();
+        Some((forecast - found).abs() <= ASIDE_WITHIN.0.max(ASIDE_WITHIN.1 * deviation))
     }
 
     /// Whether the precision is as forecast; `None` where it was not found.
@@ -119,13 +140,22 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
         let of = |outcome| scan.score.count(outcome);
         let lit = scan.score.with_echo();
         let share = |count: u64| count as f64 / lit.max(1) as f64;
+        let errors = errors(&scan.cloud());
+        // A normal error is no sidelobe.
+        let beside = forecast.precision.map_or(f64::INFINITY, |sigma| BESIDE * sigma);
+        let beside =
+            if forecast.aside.is_some() { beside.max(design.right_within) } else { f64::INFINITY };
+        let peak: Vec<f64> = errors.iter().copied().filter(|error| error.abs() <= beside).collect();
+        let aside = (errors.len() - peak.len()) as f64 / errors.len().max(1) as f64;
         places.push(Place {
             sensor: sensor.to_owned(),
             reflectance,
             range_m: range,
             shots: lit,
             pd: [forecast.pd, share(of(Outcome::Right) + of(Outcome::Near))],
-            precision_m: (forecast.precision, deviation(&scan.cloud())),
+            precision_m: (forecast.precision, deviation(&peak)),
+            aside: forecast.aside.map(|forecast| [forecast.share, aside]),
+            points: errors.len(),
             false_per_shot: [
                 forecast.false_per_shot,
                 share(of(Outcome::Wrong) + of(Outcome::False)),
@@ -159,13 +189,16 @@ fn room(reflectance: f64, range: f64) -> Result<Scene, Error> {
     Ok(Scene::from_toml(&text, "room", std::path::Path::new(""))?)
 }
 
-/// Standard deviation of the range errors of right and near points, m.
-fn deviation(cloud: &PointCloud) -> Option<f64> {
+/// The range errors of right and near points, m.
+fn errors(cloud: &PointCloud) -> Vec<f64> {
     let truth = &cloud.truth.returns;
     let answers = (0..cloud.range.len())
         .filter(|&at| matches!(truth.outcome[at], Outcome::Right | Outcome::Near));
-    let errors: Vec<f64> =
-        answers.map(|at| f64::from(cloud.range[at]) - f64::from(truth.range[at])).collect();
+    answers.map(|at| f64::from(cloud.range[at]) - f64::from(truth.range[at])).collect()
+}
+
+/// Their standard deviation; `None` of few.
+fn deviation(errors: &[f64]) -> Option<f64> {
     let count = errors.len() as f64;
     let mean = errors.iter().sum::<f64>() / count;
     let squares: f64 = errors.iter().map(|error| (error - mean).powi(2)).sum();

@@ -10,45 +10,46 @@ use std::collections::BTreeMap;
 
 use macropulse_codec::statistics::binomial;
 
-use super::matched::{Found, lags};
+use super::matched::{Chances, Found, lags};
 use crate::design::Design;
 
-/// Probability of a return from a lit shot and from one that meets nothing; the mean over labels,
-/// of which so many have so many marks.
-pub(super) fn chances(
-    design: &Design,
-    weights: &BTreeMap<usize, usize>,
-    found: &Found,
-) -> (f64, f64) {
+/// What comes of shots by the marks of labels, of which so many have so many.
+pub(super) fn chances(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found) -> Chances {
     let chips = design.coding.codebook.chips() as usize;
     let labels: usize = weights.values().sum();
-    let mut sums = (0.0, 0.0);
+    let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
         let dark = chips.saturating_sub(marks);
         let gate = Gate { lags: lags(design), false_alarm: design.receiver.false_alarm };
         let share = count as f64 / labels as f64;
         let dark_lit = binomial(dark, found.false_density);
-        let lit = beyond(&binomial(marks, found.seen));
-        let by_chance = beyond(&binomial(marks, found.density));
-        let mut seen = 0.0;
+        let of_lit = binomial(marks, found.seen);
+        let lit = beyond(&of_lit);
+        let shares: Vec<f64> =
+            (0..).zip(&of_lit).map(|(k, chance)| f64::from(k) / marks as f64 * chance).collect();
+        let lit_shares = beyond(&shares);
+        let reach = beyond(&binomial(marks, found.density));
+        let at = |tails: &[f64], least: usize| tails.get(least).copied().unwrap_or(0.0);
+        let (mut seen, mut seen_share) = (0.0, 0.0);
         for (stray, chance) in dark_lit.iter().enumerate() {
             if *chance < NEGLIGIBLE {
                 continue;
             }
             let on_dark = (stray as f64 + 1.0) / (dark as f64 + 1.0);
             let least = gate.least_balance((marks, dark), found.density.max(on_dark).min(1.0));
-            seen += chance * lit.get(least + stray).copied().unwrap_or(0.0);
+            seen += chance * at(&lit, least + stray);
+            seen_share += chance * at(&lit_shares, least + stray);
         }
         // Where nothing is, a place of the gate may be lit by other shots as well as by noise.
         let least = gate.least_balance((marks, dark), found.density);
-        let reached = |(stray, chance): (usize, &f64)| {
-            chance * by_chance.get(least + stray).copied().unwrap_or(0.0)
-        };
+        let reached = |(stray, chance): (usize, &f64)| chance * at(&reach, least + stray);
         let reached: f64 = binomial(dark, found.density).iter().enumerate().map(reached).sum();
-        sums.0 += share * seen;
-        sums.1 += share * (gate.lags * reached).min(1.0);
+        pd += share * seen;
+        share_found += share * seen_share;
+        by_chance += share * (gate.lags * reached).min(1.0);
     }
-    sums
+    let found = if pd > 0.0 { share_found / pd } else { 0.0 };
+    Chances { pd, false_per_shot: by_chance, found }
 }
 
 /// So many lit dark chips are left out as are less likely than this.

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use macropulse_codec::decode::ReceiverKind;
 
 use super::converters::bank_loss;
+use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, matched};
 use crate::channel::{self, Operating};
 use crate::design::detector::{Awaited, Lit};
@@ -47,6 +48,8 @@ pub struct Forecaster<'a> {
     /// How many macropulses have so many marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
     mean_weight: f64,
+    /// Those of a matched receiver; the dark chips of a balanced one have none.
+    sidelobes: Option<Sidelobes>,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the dark and background counts.
@@ -81,9 +84,12 @@ pub struct Forecast {
     pub pd: f64,
     /// False returns per shot that meets nothing.
     pub false_per_shot: f64,
-    /// Standard deviation of the range of returns, m; `None` where there are next to none, fewer than
-    /// one in a million.
+    /// Standard deviation of the range of returns, m, sidelobes apart; `None` where there are next to
+    /// none, fewer than one in a million.
     pub precision: Option<f64>,
+    /// Returns that lie on a sidelobe of their own macropulse, where neighbours tell which of several as
+    /// high ones is the peak; `None` without a matched receiver, and where there is no precision.
+    pub aside: Option<Aside>,
     /// The least that any unbiased estimate could have from as many photons, m: c/2·σ/√n, σ the
     /// rms length of a micropulse with the jitter.
     pub bound: f64,
@@ -111,7 +117,18 @@ impl<'a> Forecaster<'a> {
         let channel_period = design.scan.channel_period();
         let mean_weight = codebook.mean_weight();
         let (light, background) = (1.0, 1.0);
-        Ok(Self { design, operating, channel_period, weights, mean_weight, light, background })
+        let is_matched = design.is_coded() && design.receiver.kind == ReceiverKind::Matched;
+        let sidelobes = is_matched.then(|| Sidelobes::of(design));
+        Ok(Self {
+            design,
+            operating,
+            channel_period,
+            weights,
+            mean_weight,
+            sidelobes,
+            light,
+            background,
+        })
     }
 
     /// The sensor.
@@ -164,7 +181,7 @@ impl<'a> Forecaster<'a> {
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - at_the_lag);
 
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
-        let (pd, false_per_shot) = match design.is_coded() {
+        let chances = match design.is_coded() {
             true => {
                 let found = matched::Found { seen: mark_pd, density, false_density };
                 match design.receiver.kind {
@@ -185,12 +202,15 @@ impl<'a> Forecaster<'a> {
                 let echo = detector.first_event(&awaited);
                 let since = since_opening(design, design.scan.max_range);
                 let nothing = Awaited { since, photons: 0.0, mark_pd: 0.0, ..awaited };
-                (echo.is_echo, detector.first_event(&nothing).is_false)
+                let false_per_shot = detector.first_event(&nothing).is_false;
+                matched::Chances { pd: echo.is_echo, false_per_shot, found: 1.0 }
             }
         };
         let spread = (density * (1.0 - density)).max(f64::MIN_POSITIVE).sqrt();
         let timing = matched::Timing::of(design, &mark);
-        let marks_seen = (mean_weight * seen).max(1.0);
+        let matched::Chances { pd, false_per_shot, found } = chances;
+        let marks_seen = (mean_weight * found).max(1.0);
+        let is_seen = pd * FEWEST >= 1.0;
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
         Forecast {
             range,
@@ -209,7 +229,12 @@ impl<'a> Forecaster<'a> {
             },
             pd,
             false_per_shot,
-            precision: (pd * FEWEST >= 1.0).then(|| timing.precision(marks_seen)),
+            precision: is_seen.then(|| timing.precision(marks_seen)),
+            aside: self
+                .sidelobes
+                .as_ref()
+                .filter(|_| is_seen)
+                .map(|sidelobes| sidelobes.aside(found, at_the_lag)),
             bound: SPEED_OF_LIGHT / 2.0 * timing.spread / photons.sqrt(),
         }
     }

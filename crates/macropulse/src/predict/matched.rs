@@ -89,26 +89,40 @@ pub(super) struct Found {
     pub false_density: f64,
 }
 
-/// Probability of a return from a lit shot and from one that meets nothing; the mean over labels,
-/// of which so many have so many marks. `background` is the sunlight on the detector, 1/s.
+/// What comes of shots, the mean over labels.
+pub(super) struct Chances {
+    /// Probability of a return from a lit shot.
+    pub pd: f64,
+    /// Expected false returns of one that meets nothing.
+    pub false_per_shot: f64,
+    /// Share of their marks that is found of shots that give a return; 0 where none does.
+    pub found: f64,
+}
+
+/// What comes of shots by the marks of labels, of which so many have so many. `background` is the
+/// sunlight on the detector, 1/s.
 pub(super) fn chances(
     design: &Design,
     background: f64,
     weights: &BTreeMap<usize, usize>,
     found: &Found,
-) -> (f64, f64) {
+) -> Chances {
     let gate = Gate::of(design, background);
     let labels: usize = weights.values().sum();
-    let mut sums = (0.0, 0.0);
+    let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
         for (density, probability) in gate.around(marks, found) {
             let least = gate.least_marks(marks, density);
             let share = probability * count as f64 / labels as f64;
-            sums.0 += share * binomial_tail(marks, found.seen, least);
-            sums.1 += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
+            pd += share * binomial_tail(marks, found.seen, least);
+            // E(k/N; k ≥ m) = p·P(Bin(N − 1, p) ≥ m − 1).
+            let of_others = binomial_tail(marks - 1, found.seen, least.saturating_sub(1));
+            share_found += share * found.seen * of_others;
+            by_chance += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
         }
     }
-    sums
+    let found = if pd > 0.0 { share_found / pd } else { 0.0 };
+    Chances { pd, false_per_shot: by_chance, found }
 }
 
 /// Places of the gate at which a macropulse may begin.
@@ -126,6 +140,9 @@ struct Gate {
     /// False returns accepted.
     false_alarm: f64,
 }
+
+/// Where as large a share of the places is lit nothing is found.
+const MOST_LIT: f64 = 1.0 - 1e-6;
 
 /// Beyond so many events in a gate, on average, their number is taken for its mean.
 const MANY: f64 = 100.0;
@@ -147,8 +164,10 @@ impl Gate {
     /// The share of places of a gate that events light which are not of the very shot, with its
     /// probability: those of no shot follow Poisson's law, each mark of another shot is found or not.
     fn around(&self, marks: usize, found: &Found) -> Vec<(f64, f64)> {
-        let noise = found.false_density / self.event;
-        let of_shots = (found.density - found.false_density).max(0.0) / self.event;
+        // Events are counted, though two may light one place.
+        let events = |density: f64| -libm::log1p(-density.min(MOST_LIT)) / self.event;
+        let noise = events(found.false_density);
+        let of_shots = (events(found.density) - noise).max(0.0);
         let of_others = (of_shots - marks as f64 * found.seen).max(0.0);
         let mean = noise + of_others;
         if mean > MANY {

@@ -9,6 +9,8 @@ pub mod link;
 mod matched;
 pub mod multiple_access;
 pub mod ranging;
+mod sidelobes;
 pub mod verdict;
 
 pub use forecast::{Error, Forecast, Forecaster};
+pub use sidelobes::Aside;

@@ -10,8 +10,8 @@ use crate::decode::timeline::Timeline;
 use crate::decode::timing::{self, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
 
-/// Shots before a doubtful one that tell where it is to be expected.
-const SETTLED: usize = 3;
+/// Shots to a side of a doubtful one that tell where it is to be expected.
+const NEIGHBOURS: usize = 3;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
@@ -77,7 +77,8 @@ impl Band<'_> {
         let Some(found) = self.found[shot].filter(|found| found.count < weight) else { return };
         let is_near = |lag: i64, other: i64| lag.abs_diff(other) < NEAREST_SIDE as u64;
         let twice = self.sent.bits(shot).shared * self.sent.lit_bits(shot).len() as u32;
-        let likely = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
+        let lines = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
+        let likely = lines.or_else(|| self.expected(shot, WIDEST_GAP, 1));
         if found.margin > twice && likely.is_none_or(|likely| is_near(likely, found.lag)) {
             return;
         }
@@ -118,18 +119,19 @@ impl Band<'_> {
     }
 
     /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
-    /// behind it that is not as doubtful.
+    /// behind it that is not as doubtful; after any where few are settled.
     fn expected_lags(&self, shot: usize) -> Vec<i64> {
-        let known = |shots: &mut dyn Iterator<Item = usize>, is_told: fn(&Detection) -> bool| {
-            let found = shots.take(WIDEST_GAP).filter_map(|shot| *self.found.get(shot)?);
-            found.filter(is_told).map(|found| found.lag).take(SETTLED).collect::<Vec<_>>()
-        };
-        let before = known(&mut (0..shot).rev(), |_| true);
-        let behind = known(&mut (shot + 1..self.found.len()), |found| found.margin > 0);
+        let found = |shot: usize| *self.found.get(shot)?;
+        let before = (0..shot).rev().take(WIDEST_GAP).filter_map(found);
+        let before: Vec<i64> = before.map(|found| found.lag).take(NEIGHBOURS).collect();
+        let most = if before.len() < NEIGHBOURS { NEIGHBOURS } else { 1 };
+        let behind = (shot + 1..).take(WIDEST_GAP).filter_map(found);
+        let behind = behind.filter(|found| found.margin > 0 || most > 1);
+        let behind: Vec<i64> = behind.map(|found| found.lag).take(most).collect();
         let sides = before.first().zip(behind.first());
         let middle = sides.map(|(before, behind)| i64::midpoint(*before, *behind));
         let lines = [0, 2, 3, 6].into_iter().filter_map(|way| self.expected(shot, 1, way));
-        lines.chain(middle).chain(before).chain(behind.first().copied()).collect()
+        lines.chain(middle).chain(before).chain(behind).collect()
     }
 
     /// Marks of `shot`, which are at hand, found at `lag`, where each tick counts for one of them: the
