@@ -80,22 +80,18 @@ fn strays(score: &Score) -> [u64; 2] {
 /// the sphere with kim-park-2016-fixed, 16 with coded-360. Control: with words of a third of the length,
 /// judged mark by mark, and every second false return accepted there are many.
 ///
-/// FIXME: bipolar-gold exceeds it, at the dark sphere by far. Its balance is held against places lit as
-/// often as all ticks of the gate, or as its dark chips; but the light of all shots lies on the ticks that
-/// are whole chips apart from its own, and is 128 times as dense there.
+/// The light of all shots of bipolar-gold lies in step, so of it more is asked: none of more than 40 000
+/// shots, which bounds the share from above by 1 − 0.025^(1/N) = 9.2e-5 (Clopper–Pearson, 95 % two-sided).
 #[test]
 fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
     for (sensor, columns, degrees) in SENSORS {
         let scenes = [fence(30.0, (columns, degrees)), fence(100.0, (columns, degrees)), dark()];
+        let (every, fewest, most) =
+            if sensor == "bipolar-gold" { (8, 40_000, 0) } else { (24, 12_000, 9) };
         for (number, scene) in scenes.iter().enumerate() {
-            let score = scan(sensor, &[], (scene, 24));
+            let score = scan(sensor, &[], (scene, every));
             let [strays, shots] = strays(&score);
-            assert!(shots > 12_000, "{sensor}: {shots} shots");
-            let most = match (sensor, number) {
-                ("bipolar-gold", 2) => shots / 60,
-                ("bipolar-gold", _) => shots / 1000,
-                _ => 9,
-            };
+            assert!(shots > fewest, "{sensor}: {shots} shots");
             assert!(strays <= most, "{sensor}, scene {number}: {strays} of {shots}");
             let (empty, right) = (score.count(Outcome::Empty), score.count(Outcome::Right));
             let all_seen = score.count(Outcome::Missed) < shots / 500;

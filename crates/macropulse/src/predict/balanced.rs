@@ -1,52 +1,49 @@
 //! What the balanced receiver makes of ticks, in closed form.
 //!
-//! It believes the highest balance of L lags, marks found less dark chips lit, if chance would not
-//! give so much at any: the least s with L·P(X − Y ≥ s) ≤ α, X ~ Bin(N, d) of the marks and
-//! Y ~ Bin(M, d) of the dark chips. d is the share of places in the gate that are lit, or that of the
-//! dark chips of the very macropulse, one more of each, whichever is more. Shots that meet the same
-//! range do not overlap, so that noise alone falls on its dark chips.
+//! It takes as given how many chips are lit about each lag, and leaves to chance how many of them are
+//! marks (`balanced::chance` of the codec): X marks and Y dark chips of N and M are believed if
+//! X − Y ≥ n* and L(n*)·P(X' ≥ X) ≤ α, X' hypergeometric, L(n) the lags about which at least n chips
+//! are lit, n* the least n with L(n)·P(X' = n) ≤ α.
+//!
+//! Here L(n) is its mean. Shots leave on the chip clock, so those that meet the same range light the same
+//! few phases of it: L(n) = Σ_φ L_φ·P(Bin(N + M, d_φ) ≥ n), d_φ the share of places lit in a phase, and the
+//! lags about the shot's own light, where there is no other. How many phases that are depends on where
+//! in a tick the light comes. Shots that meet the same range do not
+//! overlap, so that noise alone falls on a macropulse's own dark chips.
 
 use std::collections::BTreeMap;
 
-use macropulse_codec::statistics::binomial;
+use macropulse_codec::statistics::{binomial, hypergeometric_tail, normal_tail};
 
 use super::matched::{Chances, Found, lags};
 use crate::design::Design;
+use crate::units::s_from_fs;
 
-/// What comes of shots by the marks of labels, of which so many have so many.
-pub(super) fn chances(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found) -> Chances {
-    let chips = design.coding.codebook.chips() as usize;
+/// What comes of shots by the marks of labels, of which so many have so many; all of them come back
+/// after `tof` seconds.
+pub(super) fn chances(
+    design: &Design,
+    weights: &BTreeMap<usize, usize>,
+    found: &Found,
+    tof: f64,
+) -> Chances {
     let labels: usize = weights.values().sum();
+    let late = (tof / s_from_fs(design.tdc.tick_fs)).fract();
+    let gate = Gate::of(design, weights, found, late);
     let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
-        let dark = chips.saturating_sub(marks);
-        let gate = Gate { lags: lags(design), false_alarm: design.receiver.false_alarm };
         let share = count as f64 / labels as f64;
-        let dark_lit = binomial(dark, found.false_density);
+        let mut threshold = gate.threshold(marks);
         let of_lit = binomial(marks, found.seen);
-        let lit = beyond(&of_lit);
         let shares: Vec<f64> =
             (0..).zip(&of_lit).map(|(k, chance)| f64::from(k) / marks as f64 * chance).collect();
-        let lit_shares = beyond(&shares);
-        let reach = beyond(&binomial(marks, found.density));
-        let at = |tails: &[f64], least: usize| tails.get(least).copied().unwrap_or(0.0);
-        let (mut seen, mut seen_share) = (0.0, 0.0);
-        for (stray, chance) in dark_lit.iter().enumerate() {
-            if *chance < NEGLIGIBLE {
-                continue;
-            }
-            let on_dark = (stray as f64 + 1.0) / (dark as f64 + 1.0);
-            let least = gate.least_balance((marks, dark), found.density.max(on_dark).min(1.0));
-            seen += chance * at(&lit, least + stray);
-            seen_share += chance * at(&lit_shares, least + stray);
-        }
-        // Where nothing is, a place of the gate may be lit by other shots as well as by noise.
-        let least = gate.least_balance((marks, dark), found.density);
-        let reached = |(stray, chance): (usize, &f64)| chance * at(&reach, least + stray);
-        let reached: f64 = binomial(dark, found.density).iter().enumerate().map(reached).sum();
-        pd += share * seen;
-        share_found += share * seen_share;
-        by_chance += share * (gate.lags * reached).min(1.0);
+        pd += share * threshold.passed(&beyond(&of_lit), found.false_density);
+        share_found += share * threshold.passed(&beyond(&shares), found.false_density);
+        // Where nothing is, a lag may be lit by other shots as well as by noise.
+        let of_nothing = gate.phases.iter().map(|phase| {
+            phase.lags * threshold.passed(&beyond(&binomial(marks, phase.density)), phase.density)
+        });
+        by_chance += share * of_nothing.sum::<f64>().min(1.0);
     }
     let found = if pd > 0.0 { share_found / pd } else { 0.0 };
     Chances { pd, false_per_shot: by_chance, found }
@@ -55,22 +52,134 @@ pub(super) fn chances(design: &Design, weights: &BTreeMap<usize, usize>, found: 
 /// So many lit dark chips are left out as are less likely than this.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// What the threshold depends on beside the light.
-struct Gate {
+/// Lags that are as bright as each other.
+struct Phase {
+    /// How many.
     lags: f64,
+    /// Share of the places of their chips that are lit.
+    density: f64,
+}
+
+/// What the threshold depends on.
+struct Gate {
+    /// Chips of a macropulse.
+    chips: usize,
     /// False returns accepted.
     false_alarm: f64,
+    phases: Vec<Phase>,
+    /// Lags about which at least so many chips are lit, by number of chips.
+    as_lit: Vec<f64>,
 }
 
 impl Gate {
-    /// The least balance of so many marks and dark chips that is believed where places are lit with
-    /// probability `density`; one more than there are marks if none will do.
-    fn least_balance(&self, (marks, dark): (usize, usize), density: f64) -> usize {
-        let (found, stray) = (beyond(&binomial(marks, density)), binomial(dark, density));
-        let tail = |least: usize| -> f64 {
-            stray.iter().zip(found.iter().skip(least)).map(|(stray, found)| stray * found).sum()
-        };
-        (1..=marks).find(|least| self.lags * tail(*least) <= self.false_alarm).unwrap_or(marks + 1)
+    /// The gate of a shot while all shots meet the same range; their light comes `late` in a tick, a share
+    /// of it.
+    fn of(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found, late: f64) -> Self {
+        let receiver = &design.receiver;
+        let (chips, sigma) = (design.coding.codebook.chips() as usize, receiver.jitter_ticks);
+        // As `decode::window`: a mark is looked for in so many ticks.
+        let width = if sigma > 0.05 { 1 + (4.0 * sigma).ceil() as i32 } else { 1 };
+        let phases = phases(design, (weights, found), (width, late));
+        // Farther chips than the first and the last lit one may be passed by without loss.
+        let own = |lit: usize| f64::from(width) * (1.0 + 2.0 * chips as f64 / (lit as f64 + 1.0));
+        let mut as_lit: Vec<f64> = (0..=chips).map(own).collect();
+        for phase in &phases {
+            let tails = beyond(&binomial(chips, phase.density));
+            as_lit.iter_mut().zip(&tails).for_each(|(sum, tail)| *sum += phase.lags * tail);
+        }
+        Self { chips, false_alarm: receiver.false_alarm, phases, as_lit }
+    }
+
+    /// What so many marks must come to.
+    fn threshold(&self, marks: usize) -> Threshold {
+        let words = (marks as u32, self.chips.saturating_sub(marks) as u32);
+        let all = |lit: usize| hypergeometric_tail(words, lit as u32, lit as u32);
+        let enough = |lit: &usize| self.as_lit[*lit] * all(*lit) <= self.false_alarm;
+        let balance = (1..=marks).find(enough).unwrap_or(marks + 1);
+        let chance = self.false_alarm / self.as_lit[balance.min(self.chips)];
+        Threshold { words, balance, chance, least: Vec::new() }
+    }
+}
+
+/// The lags of the gate, by how much of their chips is lit: phases of the chip clock at which light in
+/// step arrives, `late` in a tick, and all others, where there is noise. A mark is looked for in `width`
+/// ticks.
+fn phases(
+    design: &Design,
+    (weights, found): (&BTreeMap<usize, usize>, &Found),
+    (width, late): (i32, f64),
+) -> Vec<Phase> {
+    let receiver = &design.receiver;
+    let scale = receiver.ticks_per_chip as i32;
+    let codebook = &design.coding.codebook;
+    // The receiver looks beyond the gate by a macropulse.
+    let lags = lags(design) + f64::from(codebook.chips() * receiver.ticks_per_chip);
+    let sigma = receiver.jitter_ticks.max(f64::MIN_POSITIVE);
+    let marks: usize = weights.iter().map(|(marks, count)| marks * count).sum();
+    let mean = marks as f64 / weights.values().sum::<usize>() as f64;
+    let chip = s_from_fs(design.coding.chip_fs);
+    let seen = found.seen * (mean * chip / design.scan.channel_period()).min(1.0);
+    let farthest = (4.0 * sigma).ceil() as i32;
+    let mut dark: BTreeMap<i32, f64> = BTreeMap::new();
+    for first in 1 - width - farthest..=farthest {
+        let before = |end: i32| normal_tail((late - f64::from(end)) / sigma);
+        let share = before(first + width) - before(first);
+        *dark.entry(first.rem_euclid(scale)).or_insert(1.0) *= 1.0 - seen * share;
+    }
+    let of_one = lags / f64::from(scale);
+    let of_noise = of_one * f64::from(scale - dark.len() as i32);
+    let in_step = dark
+        .values()
+        .map(|dark| Phase { lags: of_one, density: 1.0 - dark * (1.0 - found.false_density) });
+    let noise = Phase { lags: of_noise, density: found.false_density };
+    in_step.chain([noise]).collect()
+}
+
+/// What so many marks must come to.
+struct Threshold {
+    /// Marks and dark chips.
+    words: (u32, u32),
+    /// The least balance.
+    balance: usize,
+    /// How likely chance may be to leave as many marks at one lag.
+    chance: f64,
+    /// The fewest marks, by lit dark chips; as far as they are known.
+    least: Vec<usize>,
+}
+
+impl Threshold {
+    /// The sum over lit dark chips, each of which is lit with probability `density`, of the entry of `tails` at the
+    /// fewest marks that are believed.
+    fn passed(&mut self, tails: &[f64], density: f64) -> f64 {
+        let mut sum = 0.0;
+        for (stray, chance) in binomial(self.words.1 as usize, density).into_iter().enumerate() {
+            let most = tails.get(self.balance + stray).copied().unwrap_or(0.0);
+            if most <= 0.0 {
+                break;
+            }
+            if chance >= NEGLIGIBLE && chance * most > f64::MIN_POSITIVE {
+                sum += chance * tails.get(self.least(stray)).copied().unwrap_or(0.0);
+            }
+        }
+        sum
+    }
+
+    /// The fewest marks that are believed where so many dark chips are lit; more than there are if none
+    /// will do.
+    fn least(&mut self, stray: usize) -> usize {
+        while self.least.len() <= stray {
+            let stray = self.least.len();
+            // Where more dark chips are lit, more marks are needed.
+            let before = self.least.last().map_or(self.balance, |least| least + 1);
+            let from = before.max(self.balance + stray);
+            let is_rare = |found: &usize| {
+                let lit = (found + stray) as u32;
+                hypergeometric_tail(self.words, lit, *found as u32) <= self.chance
+            };
+            let most = self.words.0 as usize;
+            self.least.push((from..=most).find(is_rare).unwrap_or(most + 1));
+        }
+        self.least[stray]
     }
 }
 
@@ -93,10 +202,38 @@ fn beyond(chances: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Two coins against one, as counted by hand: X − Y ≥ 2 in one case of eight, ≥ 1 in four.
+    /// Of 64 marks among 127 chips, by hand: Π_i<n (64 − i)/(127 − i) is 2.65e-11 at n = 29.
     #[test]
-    fn the_least_balance_is_that_of_coins() {
-        let least = |lags| Gate { lags, false_alarm: 1.0 }.least_balance((2, 1), 0.5);
-        assert_eq!([1.9, 2.1, 7.9, 8.1].map(least), [1, 2, 2, 3]);
+    fn the_least_balance_is_that_of_fractions() {
+        let all =
+            |lit: u32| (0..lit).map(|i| f64::from(64 - i) / f64::from(127 - i)).product::<f64>();
+        for least in [20_usize, 29, 40] {
+            let lags = 1e-6 / all(least as u32) * 0.999;
+            let gate =
+                Gate { chips: 127, false_alarm: 1e-6, phases: Vec::new(), as_lit: vec![lags; 128] };
+            let mut threshold = gate.threshold(64);
+            assert_eq!((threshold.balance, threshold.least(0)), (least, least));
+            // One dark chip: one mark more to keep the balance, and one more for what it may be.
+            assert!((least + 1..least + 4).contains(&threshold.least(1)), "{least}");
+        }
+    }
+
+    /// Light on the chip clock lies in some phases, which together hold all that is there.
+    #[test]
+    fn light_in_step_lies_in_few_phases() {
+        let design = Design::open("bipolar-gold", &[]).unwrap();
+        let found = Found { seen: 0.4, density: 1e-3, false_density: 1e-6 };
+        // Light in the middle of a tick is found where either of two begins; at its edge it is found where
+        // the one before it begins, and half of it one earlier and one later.
+        for (late, expected) in [(0.5, [0.4, 0.4, 0.0]), (0.0, [0.4, 0.2, 0.2])] {
+            let phases = phases(&design, (&BTreeMap::from([(64, 1)]), &found), (2, late));
+            let lags: f64 = phases.iter().map(|phase| phase.lags).sum();
+            assert!((lags / 416_347.0 - 1.0).abs() < 1e-3, "{lags}");
+            let mut bright: Vec<f64> = phases.iter().map(|phase| phase.density).collect();
+            bright.sort_by(|one, other| other.total_cmp(one));
+            for (bright, expected) in bright.iter().zip(expected) {
+                assert!((bright - 0.5 * expected).abs() < 0.005, "{late}: {bright}");
+            }
+        }
     }
 }

@@ -185,7 +185,9 @@ impl<'a> Forecaster<'a> {
             true => {
                 let found = matched::Found { seen: mark_pd, density, false_density };
                 match design.receiver.kind {
-                    ReceiverKind::Balanced => balanced::chances(design, &self.weights, &found),
+                    ReceiverKind::Balanced => {
+                        balanced::chances(design, &self.weights, &found, tof_from_range(range))
+                    }
                     _ => matched::chances(design, operating.background, &self.weights, &found),
                 }
             }
