@@ -10,6 +10,8 @@ use macropulse::{channel, design, environment, formats, predict, scene, sim, tol
 use macropulse_study::text::broken;
 use macropulse_study::{decoding, paper, record, sweep, validate};
 
+use crate::options::Common;
+
 /// Why a command did not do what was asked.
 #[derive(Debug)]
 pub enum Fault {
@@ -65,9 +67,18 @@ fn complain(sentence: &str) {
     tell(sentence, AnsiColor::Red);
 }
 
-/// What a user should know although nothing went wrong, as a sentence on stderr.
+/// What went otherwise than was asked for, as a sentence on stderr: a result without a point, a run
+/// that was stopped.
 pub fn warn(sentence: &str) {
     tell(sentence, AnsiColor::Yellow);
+}
+
+/// What a user should know although all went as asked, as a sentence on stderr, unless it is to be
+/// quiet.
+pub fn note(sentence: &str, common: &Common) {
+    if !common.quiet {
+        tell(sentence, AnsiColor::Yellow);
+    }
 }
 
 /// A sentence on stderr, with the name of the program before it: on a terminal in colour and broken

@@ -4,6 +4,7 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use macropulse::formats::clear_unfinished;
 use macropulse::told;
 
 use crate::fault::Fault;
@@ -21,7 +22,8 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// A folder that is proven to be writable. Nothing of it is there yet that was not before.
+    /// A folder that is proven to be writable. Nothing of it is there yet that was not before, and no
+    /// longer what runs have left that were killed while they wrote.
     pub fn claim(path: &Path) -> Result<Self, Fault> {
         refuse_stream(path)?;
         let path = path.to_owned();
@@ -32,6 +34,7 @@ impl Folder {
             .and_then(|()| fs::remove_file(&proof))
             .map_err(|error| folder.not_writable(&error))?;
         folder.clear();
+        clear_unfinished(&folder.path);
         Ok(folder)
     }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{Clouds, write_atomically};
+use macropulse::formats::{Clouds, clear_unfinished, write_atomically};
 use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
@@ -59,6 +59,9 @@ pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
             "{}: what is written is a page: give it a name that ends in .html",
             output.display()
         )));
+    }
+    if let Some(folder) = output.parent() {
+        clear_unfinished(folder);
     }
     write_atomically(&output, |out| out.write_all(page.html().as_bytes()))?;
     if !common.quiet {
