@@ -94,6 +94,7 @@ fn all_json_has_a_version_and_one_vocabulary() {
         "sensors --json",
         "sensors peregrine --json",
         "scenes --json",
+        "scenes wall --json",
         "environments --json",
         "sweep peregrine wall --vary scan.max_range_m=60,70 --seeds 1 -o swept --json",
     ];
@@ -120,6 +121,11 @@ fn all_json_has_a_version_and_one_vocabulary() {
             assert!(values.values().any(serde_json::Value::is_number), "{line}: {defaults}");
         }
     }
+    // Values, not the text of a file.
+    let values = |name: &str| &told.iter().find(|(line, _)| line == name).unwrap().1["values"];
+    assert_eq!(values("sensors peregrine --json")["scan"]["flash"]["rows"], 32);
+    assert_eq!(values("scenes wall --json")["object"][0]["name"], "wall");
+    assert_eq!(desk.json("environments fog-50m --json")["values"]["visibility_km"], 0.05);
     let of = |name: &str| {
         let mut json = told.iter().find(|(line, _)| line == name).unwrap().1.clone();
         // What depends on this machine.
