@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 use serde_json::{Value, json};
 
-use crate::error::{OrRaise, wrong};
+use crate::error::{OrRaise, warned, wrong};
 use crate::scan::Scan;
 use crate::scene::Scene;
 use crate::sensor::{Sensor, named};
@@ -162,12 +162,19 @@ pub fn sweep<'py>(
         let watch = Watch { done: &|_| {}, stop: &|| stop.is_raised() };
         plan.work(&folder, &todo, &watch)?;
         let missing: Vec<usize> = plan.missing(&folder).iter().map(|(job, _)| *job).collect();
-        Ok::<Value, macropulse_study::sweep::Error>(match missing.is_empty() {
-            true => plan.json(&plan.finish(&folder, &metrics)?),
-            false => plan.json_of_missing(&missing, shard),
+        Ok::<_, macropulse_study::sweep::Error>(match missing.is_empty() {
+            true => {
+                let table = plan.finish(&folder, &metrics)?;
+                (plan.json(&table), table.empty())
+            }
+            false => (plan.json_of_missing(&missing, shard), None),
         })
     })?;
-    from_json(py, &told.or_raise()?)
+    let (told, empty) = told.or_raise()?;
+    if let Some(empty) = empty {
+        warned(py, empty)?;
+    }
+    from_json(py, &told)
 }
 
 /// What a sweep knows a sensor by: a name, or a file that it keeps in its folder.
