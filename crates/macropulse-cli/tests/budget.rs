@@ -23,7 +23,7 @@ fn the_paper_with_honest_light_has_the_numbers_of_its_budget() {
     assert_about(&budget, "energy_per_macropulse_nj", 0.823, 0.005);
     assert_about(&budget, "photons_per_macropulse", 17.76, 0.005);
     assert_about(&budget, "photons_per_micropulse", 0.0988, 0.01);
-    assert_about(&budget, "background_photons_per_chip", 947.0, 0.002);
+    assert_about(&budget, "background_photons_per_chip", 969.0, 0.002);
     assert_about(&budget, "single_pulse_ael_nj", 197.9, 0.001);
     assert_about(&budget, "cw_ael_mw", 1.0, 0.003);
     assert_about(&budget, "mark_by_mark_shortfall", 99.1, 0.01);
