@@ -7,7 +7,7 @@ use clap::Args;
 use macropulse::formats::{Clouds, Format, Recording};
 use macropulse::points::PointCloud;
 
-use crate::fault::{Fault, warn};
+use crate::fault::{Fault, note, warn};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
@@ -157,6 +157,7 @@ impl Target {
 /// A conversion under way.
 struct Conversion<'a> {
     target: &'a Target,
+    common: &'a Common,
     folder: Folder,
     recording: Recording,
     /// Number of the scan that comes next at least, where they go into one file.
@@ -172,6 +173,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
     let interrupt = Interrupt::listen()?;
     let mut conversion = Conversion {
         target: &target,
+        common,
         folder: Folder::claim(&target.folder)?,
         recording: Recording::new(&target.folder, &target.formats),
         next: 0,
@@ -244,7 +246,8 @@ impl Conversion<'_> {
                 let left_out = format.leaves_out(&cloud, &names);
                 if !left_out.is_empty() {
                     let (name, left_out) = (format.name(), left_out.join(", "));
-                    warn(&format!("{name} cannot hold {left_out}: left out"));
+                    let told = format!("{name} cannot hold {left_out}: left out");
+                    note(&told, self.common);
                 }
             }
         }

@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::completions;
 use crate::fault::Fault;
 use crate::scenes::summary;
-use crate::text::{Columns, print, print_json, to_start_from};
+use crate::text::{Columns, print, print_json, to_start_from, values};
 
 /// List the ready environments, sun and air of a scene, or print one as TOML to start from
 #[derive(Args)]
@@ -47,6 +47,7 @@ fn one(name: &str, as_json: bool) -> Result<(), Fault> {
             "summary": summary(toml),
             "conditions": environment.conditions(),
             "toml": toml,
+            "values": values(toml),
         });
         return print_json(vec![environment]);
     }

@@ -10,6 +10,8 @@ use macropulse::{channel, design, environment, formats, predict, scene, sim, tol
 use macropulse_study::text::broken;
 use macropulse_study::{decoding, paper, record, sweep, validate};
 
+use crate::options::Common;
+
 /// Why a command did not do what was asked.
 #[derive(Debug)]
 pub enum Fault {
@@ -65,9 +67,18 @@ fn complain(sentence: &str) {
     tell(sentence, AnsiColor::Red);
 }
 
-/// What a user should know although nothing went wrong, as a sentence on stderr.
+/// What went otherwise than was asked for, as a sentence on stderr: a result without a point, a run
+/// that was stopped.
 pub fn warn(sentence: &str) {
     tell(sentence, AnsiColor::Yellow);
+}
+
+/// What a user should know although all went as asked, as a sentence on stderr, unless it is to be
+/// quiet.
+pub fn note(sentence: &str, common: &Common) {
+    if !common.quiet {
+        tell(sentence, AnsiColor::Yellow);
+    }
 }
 
 /// A sentence on stderr, with the name of the program before it: on a terminal in colour and broken
@@ -104,6 +115,10 @@ pub fn usage(error: &clap::Error) -> Result<(), Fault> {
             let sentence = sentence_of(&error.render().to_string());
             let stray = match error.get(ContextKind::InvalidArg) {
                 Some(ContextValue::String(stray)) if kind == ErrorKind::UnknownArgument => stray,
+                _ if kind == ErrorKind::ArgumentConflict && sentence.contains("--pixel") => {
+                    let remedy = "--pixel prints a macropulse, -o writes the log of all shots";
+                    return Err(Fault::Wrong(format!("{sentence}; {remedy}")));
+                }
                 _ if sentence.contains("--output") && sentence.contains("`macropulse convert ") => {
                     let remedy = "the file to write is named with -o, as -o cloud.ply";
                     return Err(Fault::Wrong(format!("{sentence}; {remedy}")));
@@ -118,6 +133,10 @@ pub fn usage(error: &clap::Error) -> Result<(), Fault> {
     }
 }
 
+/// What to do where a scene is named and none is wanted.
+const NO_SCENE: &str =
+    "it takes one sensor and no scene: sun and air are --environment, the target --reflectance";
+
 /// What to do about a word that stands where none is wanted, which is what the `sentence` says.
 fn remedy(stray: &str, sentence: &str) -> Option<&'static str> {
     let is_of = |command: &str| sentence.contains(&format!("`macropulse {command} "));
@@ -126,8 +145,22 @@ fn remedy(stray: &str, sentence: &str) -> Option<&'static str> {
         _ if Format::parse(stray).is_ok() => {
             Some("several formats are one word, with commas between them, as --format pcd,ply")
         }
+        "--sensor" if is_of("budget") || is_of("check") => {
+            Some("the sensor stands alone, as in `macropulse budget coded-practical`")
+        }
+        "--scene" if is_of("budget") => Some(NO_SCENE),
         _ if stray.starts_with('-') => None,
         _ if is_of("decode") => Some("the sensor is named with --sensor"),
+        _ if is_of("budget") => Some(NO_SCENE),
+        _ if is_of("encode") => {
+            Some("it takes one sensor, and a pixel is one word, as --pixel 0,1")
+        }
+        _ if is_of("view") => {
+            Some("one file or folder at a time; that of a run shows all its scans")
+        }
+        _ if is_of("sensors") || is_of("scenes") || is_of("environments") || is_of("schema") => {
+            Some("one at a time")
+        }
         _ if is_of("simulate") || is_of("sweep") => {
             Some("the folder for the results is named with -o")
         }
@@ -168,6 +201,8 @@ fn sentence_of(rendered: &str) -> String {
     let wrong = of_number(wrong.strip_prefix("error: ").unwrap_or(&wrong));
     let rest: Vec<&str> = paragraphs.flat_map(str::lines).map(str::trim).collect();
     let tips = rest.iter().filter_map(|line| line.strip_prefix("tip: "));
+    // Nobody means an option as a value.
+    let tips = tips.filter(|tip| !tip.starts_with("to pass "));
     let usage = rest.iter().find_map(|line| line.strip_prefix("Usage: "));
     let command = usage.map(|usage| {
         let words = usage.split(' ').take_while(|word| word.starts_with(char::is_lowercase));

@@ -1,13 +1,18 @@
 //! A folder that is not left half filled.
 
+use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use macropulse::formats::{Format, clear_unfinished};
 use macropulse::told;
 
 use crate::fault::Fault;
 use crate::input::STREAM;
+
+/// Endings of files, beside those of point clouds.
+const OF_FILES: [&str; 7] = ["html", "json", "toml", "svg", "txt", "mps", "mpt"];
 
 /// A folder for results. Until it is kept, what we made of it goes away again.
 pub struct Folder {
@@ -21,9 +26,10 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// A folder that is proven to be writable. Nothing of it is there yet that was not before.
+    /// A folder that is proven to be writable. Nothing of it is there yet that was not before, and no
+    /// longer what runs have left that were killed while they wrote.
     pub fn claim(path: &Path) -> Result<Self, Fault> {
-        refuse_stream(path)?;
+        refuse_no_folder(path)?;
         let path = path.to_owned();
         let mut folder = Self { path, made: None, kept: false, is_of_one: false, lock: None };
         folder.make()?;
@@ -32,6 +38,7 @@ impl Folder {
             .and_then(|()| fs::remove_file(&proof))
             .map_err(|error| folder.not_writable(&error))?;
         folder.clear();
+        clear_unfinished(&folder.path);
         Ok(folder)
     }
 
@@ -138,15 +145,24 @@ impl Drop for Folder {
     }
 }
 
-/// Refuses standard output as the place of a folder.
-pub fn refuse_stream(path: &Path) -> Result<(), Fault> {
-    match path == Path::new(STREAM) {
-        true => Err(Fault::Wrong(
+/// Refuses what is no place of a folder: standard output, and the name of a file that is not there.
+pub fn refuse_no_folder(path: &Path) -> Result<(), Fault> {
+    if path == Path::new(STREAM) {
+        return Err(Fault::Wrong(
             "-o -: standard output takes one stream, and these are files: name a folder for them"
                 .to_owned(),
-        )),
-        false => Ok(()),
+        ));
     }
+    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+    let is_of_file = Format::of_extension(ending).is_some() || OF_FILES.contains(&ending);
+    if path.exists() || !is_of_file {
+        return Ok(());
+    }
+    let (path, folder) = (path.display(), path.with_extension(""));
+    Err(Fault::Wrong(format!(
+        "-o {path}: ends as a file does, and these are several, in a folder: say -o {}",
+        folder.display()
+    )))
 }
 
 /// Whether a file is named as that of a scan: a word, a hyphen, a number of at least six digits.

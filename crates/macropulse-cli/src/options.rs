@@ -14,7 +14,7 @@ use crate::fault::Fault;
 #[derive(Args)]
 #[command(next_help_heading = "Everywhere")]
 pub struct Common {
-    /// Print nothing but what went wrong, and what --json asks for
+    /// Print nothing but what went wrong, as a result without a single point, and what --json asks for
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
 

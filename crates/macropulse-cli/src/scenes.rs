@@ -2,13 +2,14 @@
 
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::design::preset_text;
 use macropulse::names::nearest;
 use macropulse::scene::{Material, Scene, library};
 use serde_json::json;
 
 use crate::completions;
 use crate::fault::Fault;
-use crate::text::{Columns, first_sentence, print, print_json, to_start_from};
+use crate::text::{Columns, first_sentence, print, print_json, to_start_from, values};
 
 /// List the ready scenes, or print one as TOML to start from
 #[derive(Args)]
@@ -48,6 +49,10 @@ pub fn run(options: &Scenes) -> Result<(), Fault> {
 
 fn one(name: &str, as_json: bool) -> Result<(), Fault> {
     let Some(toml) = Scene::builtin(name).map(to_start_from) else {
+        if preset_text(name).is_some() {
+            let remedy = format!("`macropulse sensors {name}` prints it");
+            return Err(Fault::Wrong(format!("{name}: is a sensor, not a scene; {remedy}")));
+        }
         let hint = nearest(name, Scene::builtin_names())
             .map(|near| format!("did you mean `{near}`? "))
             .unwrap_or_default();
@@ -58,7 +63,8 @@ fn one(name: &str, as_json: bool) -> Result<(), Fault> {
         )));
     };
     if as_json {
-        let scene = json!({ "name": name, "summary": summary(toml), "toml": toml });
+        let scene =
+            json!({ "name": name, "summary": summary(toml), "toml": toml, "values": values(toml) });
         return print_json(vec![scene]);
     }
     print(toml)

@@ -7,7 +7,8 @@ use serde_json::json;
 
 use crate::completions;
 use crate::fault::Fault;
-use crate::text::{Columns, print, print_json, to_start_from};
+use crate::input;
+use crate::text::{Columns, print, print_json, to_start_from, values};
 
 /// List the ready sensors, or print one as TOML to start from
 #[derive(Args)]
@@ -31,10 +32,12 @@ pub fn run(options: &Sensors) -> Result<(), Fault> {
 }
 
 fn one(name: &str, as_json: bool) -> Result<(), Fault> {
-    let design = Design::open(name, &[])?;
+    let design = input::design(name, &[])?;
     let toml = preset_text(name).map_or(design.text.as_str(), to_start_from);
     if as_json {
-        let sensor = json!({ "name": design.name, "summary": design.summary, "toml": toml });
+        let (name, summary) = (&design.name, &design.summary);
+        let sensor =
+            json!({ "name": name, "summary": summary, "toml": toml, "values": values(toml) });
         return print_json(vec![sensor]);
     }
     print(toml)

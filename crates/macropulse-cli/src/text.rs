@@ -38,6 +38,12 @@ pub fn to_start_from(toml: &str) -> &str {
     }
 }
 
+/// The keys and values of a file in TOML, as JSON.
+pub fn values(toml: &str) -> serde_json::Value {
+    let table = toml.parse::<toml::Table>().ok();
+    table.and_then(|table| serde_json::to_value(table).ok()).unwrap_or_default()
+}
+
 /// A duration in the unit that suits it.
 pub fn lasted(seconds: f64) -> String {
     match seconds {

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{Clouds, write_atomically};
+use macropulse::design::preset_text;
+use macropulse::formats::{Clouds, clear_unfinished, write_atomically};
+use macropulse::scene::Scene;
 use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
@@ -46,6 +48,7 @@ fn add(page: &mut Explorer, name: &str, path: &Path) -> Result<(), Fault> {
 
 pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
     let path = &options.path;
+    refuse_name(path)?;
     let (page, output) = if path.is_dir() {
         let output = options.output.clone().unwrap_or_else(|| path.join(PAGE));
         (of_folder(path, &output)?, output)
@@ -60,11 +63,30 @@ pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
             output.display()
         )));
     }
+    if let Some(folder) = output.parent() {
+        clear_unfinished(folder);
+    }
     write_atomically(&output, |out| out.write_all(page.html().as_bytes()))?;
     if !common.quiet {
         print(&format!("open {}\n", output.display()))?;
     }
     Ok(())
+}
+
+/// Refuses a ready sensor or scene where what came of one is wanted.
+fn refuse_name(path: &Path) -> Result<(), Fault> {
+    let name = path.to_str().filter(|_| !path.exists()).unwrap_or_default();
+    let (is, sensor, scene) = if preset_text(name).is_some() {
+        ("sensor", name, "street")
+    } else if Scene::builtin(name).is_some() {
+        ("scene", "hdl-64e", name)
+    } else {
+        return Ok(());
+    };
+    Err(Fault::Wrong(format!(
+        "{name}: is a {is}, where a point cloud or the folder of a run is wanted; scan first, as \
+         `macropulse simulate {sensor} {scene} -o out`"
+    )))
 }
 
 fn of_file(path: &Path, output: &Path) -> Result<Explorer, Fault> {

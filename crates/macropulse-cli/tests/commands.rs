@@ -94,6 +94,7 @@ fn all_json_has_a_version_and_one_vocabulary() {
         "sensors --json",
         "sensors peregrine --json",
         "scenes --json",
+        "scenes wall --json",
         "environments --json",
         "sweep peregrine wall --vary scan.max_range_m=60,70 --seeds 1 -o swept --json",
     ];
@@ -120,6 +121,11 @@ fn all_json_has_a_version_and_one_vocabulary() {
             assert!(values.values().any(serde_json::Value::is_number), "{line}: {defaults}");
         }
     }
+    // Values, not the text of a file.
+    let values = |name: &str| &told.iter().find(|(line, _)| line == name).unwrap().1["values"];
+    assert_eq!(values("sensors peregrine --json")["scan"]["flash"]["rows"], 32);
+    assert_eq!(values("scenes wall --json")["object"][0]["name"], "wall");
+    assert_eq!(desk.json("environments fog-50m --json")["values"]["visibility_km"], 0.05);
     let of = |name: &str| {
         let mut json = told.iter().find(|(line, _)| line == name).unwrap().1.clone();
         // What depends on this machine.
@@ -129,6 +135,34 @@ fn all_json_has_a_version_and_one_vocabulary() {
         json
     };
     assert_eq!(of("simulate peregrine wall -o run --json"), of("run/manifest.json"));
+}
+
+/// What is left out, what lies there already, what was made: none of it, but a result without a point.
+#[test]
+fn a_quiet_command_says_nothing() {
+    let desk = Desk::new();
+    let few = "--set scan.raster.rows=4 --set scan.raster.columns=40";
+    let sensor = format!("kim-park-2016-fixed {few}");
+    for line in [
+        &format!("simulate {sensor} street --scans 2 --truth --format csv,kitti,ticks -o in"),
+        &format!("simulate {sensor} street --truth --format csv,kitti,ticks -o in"),
+        &format!("decode --sensor {sensor} in/shots-000000.mps in/ticks-000000.mpt -o in"),
+        &format!("encode {sensor} -o shots"),
+        "convert in/scan-000000.csv -o points.bin",
+        "view in/scan-000000.csv",
+        "view in",
+        "sweep peregrine wall --vary scan.max_range_m=60,70 --seeds 1 -o swept",
+        "budget coded-practical -o budget",
+        "codes prime=5 -o codes",
+        "check peregrine street",
+    ] {
+        let ran = desk.run(&format!("{line} -q"));
+        let said = (ran.code, ran.out.as_str(), ran.err.as_str());
+        assert_eq!(said, (Some(0), "", ""), "{line}");
+    }
+    let ran = desk.run("simulate peregrine wall --set scan.max_range_m=5 -o empty -q");
+    assert_eq!((ran.code, ran.err.lines().count()), (Some(0), 1), "{}", ran.err);
+    assert!(ran.err.contains("not a single point"), "{}", ran.err);
 }
 
 #[test]

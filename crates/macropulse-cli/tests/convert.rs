@@ -65,6 +65,8 @@ fn what_cannot_be_held_is_said() {
         ran.err
     );
     assert!(ran.err.contains("pixels without a return"), "{}", ran.err);
+    let ran = desk.run("convert in/scan-000000.pcd -o points.bin -q");
+    assert_eq!((ran.code, ran.out.as_str(), ran.err.as_str()), (Some(0), "", ""));
     assert_eq!(desk.run("convert points.bin -o points.npy").code, Some(0));
 }
 

@@ -312,6 +312,7 @@ fn light_that_is_explained_is_that_of_the_ticks() {
     let told = desk.json(&line);
     let text = fs::read(desk.path().join("out/explain-000000-3-500.json")).unwrap();
     let whole: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    assert_eq!(whole["schema_version"], 1);
     let light = &whole["light"];
     let list = |value: &serde_json::Value| -> Vec<f64> {
         value.as_array().unwrap().iter().filter_map(serde_json::Value::as_f64).collect()

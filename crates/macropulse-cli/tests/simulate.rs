@@ -185,15 +185,41 @@ fn ctrl_c_ends_after_the_scan_with_whole_files() {
     assert_eq!(desk.files().len(), 3 + scans);
 }
 
+/// A run that is killed leaves the file behind that it was writing; the next one clears it away.
+#[cfg(unix)]
+#[test]
+fn what_a_killed_run_has_left_is_gone_after_the_next() {
+    use std::time::{Duration, Instant};
+
+    let desk = Desk::new();
+    let unfinished = |file: &String| file.ends_with(".part");
+    let is_left = || desk.files().iter().any(unfinished);
+    let until = Instant::now() + Duration::from_secs(60);
+    while !is_left() {
+        assert!(Instant::now() < until, "it was never killed while it wrote");
+        let line = format!("{START} --scans 100000 --format csv -o out -q");
+        let mut program = desk.command(&line).spawn().unwrap();
+        while !is_left() {
+            assert!(program.try_wait().unwrap().is_none(), "it has ended");
+        }
+        program.kill().unwrap();
+        program.wait().unwrap();
+    }
+    assert_eq!(desk.run(&format!("{START} --format csv -o out -q")).code, Some(0));
+    assert!(!is_left(), "{:?}", desk.files());
+}
+
 /// Where an image is asked for and there is none, that is said.
 #[test]
 fn the_range_image_of_a_rosette_is_told_to_be_a_strip() {
     let desk = Desk::new();
-    let ran = desk.run("simulate rosette-mid-40 wall --format png -o a -q");
+    let ran = desk.run("simulate rosette-mid-40 wall --format png -o a");
     assert_eq!((ran.code, ran.err.lines().count()), (Some(0), 1), "{}", ran.err);
     assert!(ran.err.contains("a range image of it is a strip"), "{}", ran.err);
     let warnings = fs::read_to_string(desk.path().join("a/manifest.json")).unwrap();
     assert!(warnings.contains("is a strip, shot after shot"), "{warnings}");
-    let ran = desk.run("simulate rosette-mid-40 wall --format ply -o b -q");
-    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+    for quiet in ["--format ply -o b", "--format png -o c -q"] {
+        let ran = desk.run(&format!("simulate rosette-mid-40 wall {quiet}"));
+        assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""), "{quiet}");
+    }
 }

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 use serde_json::{Value, json};
 
-use crate::error::{OrRaise, wrong};
+use crate::error::{OrRaise, warned, wrong};
 use crate::scan::Scan;
 use crate::scene::Scene;
 use crate::sensor::{Sensor, named};
@@ -90,7 +90,7 @@ pub fn budget<'py>(
 ///         equal ratios.
 ///     folder: Folder for the results, made if need be.
 ///     changes: What is changed of all sensors and of the scene.
-///     score: Names of scores, as `macropulse sweep --help` lists them.
+///     score: Names of scores, a list or a text, as `macropulse sweep --help` lists them.
 ///     seeds: Scans of each value, with a seed each.
 ///     seed: The first seed.
 ///     shots: Only about so many shots of each scan, in whole bands, evenly over it.
@@ -106,7 +106,7 @@ pub fn budget<'py>(
 ///     Error: If a key, a value or a name is wrong, or the folder holds something else.
 #[pyfunction]
 #[pyo3(signature = (sensor, scene, vary = None, *, folder, changes = None,
-                    score = vec!["pd".to_owned(), "wrong".to_owned(), "precision".to_owned()],
+                    score = Names::of("pd,wrong,precision"),
                     seeds = 8, seed = 1, shots = None, shard = "1/1", dry = false, threads = 0),
        text_signature = "(sensor, scene, vary=None, *, folder, changes=None, \
                          score=('pd', 'wrong', 'precision'), seeds=8, seed=1, shots=None, \
@@ -118,7 +118,7 @@ pub fn sweep<'py>(
     vary: Option<&Bound<'py, PyDict>>,
     folder: PathBuf,
     changes: Option<&Bound<'py, PyDict>>,
-    score: Vec<String>,
+    score: Names,
     seeds: u64,
     seed: u64,
     shots: Option<u64>,
@@ -130,7 +130,7 @@ pub fn sweep<'py>(
     if !(1..=10_000).contains(&seeds) {
         return Err(wrong(format!("seeds is {seeds}; it must be from 1 to 10000")));
     }
-    let metrics = Metric::parse(&score.join(",")).or_raise()?;
+    let metrics = Metric::parse(&score.listed()).or_raise()?;
     let shard: Shard = shard.parse().or_raise()?;
     let mut files = Vec::new();
     let sensors = match sensor.cast::<PyList>() {
@@ -162,12 +162,42 @@ pub fn sweep<'py>(
         let watch = Watch { done: &|_| {}, stop: &|| stop.is_raised() };
         plan.work(&folder, &todo, &watch)?;
         let missing: Vec<usize> = plan.missing(&folder).iter().map(|(job, _)| *job).collect();
-        Ok::<Value, macropulse_study::sweep::Error>(match missing.is_empty() {
-            true => plan.json(&plan.finish(&folder, &metrics)?),
-            false => plan.json_of_missing(&missing, shard),
+        Ok::<_, macropulse_study::sweep::Error>(match missing.is_empty() {
+            true => {
+                let table = plan.finish(&folder, &metrics)?;
+                (plan.json(&table), table.empty())
+            }
+            false => (plan.json_of_missing(&missing, shard), None),
         })
     })?;
-    from_json(py, &told.or_raise()?)
+    let (told, empty) = told.or_raise()?;
+    if let Some(empty) = empty {
+        warned(py, empty)?;
+    }
+    from_json(py, &told)
+}
+
+/// Names: one, several in one text with commas between them, or a list of texts.
+#[derive(FromPyObject)]
+pub enum Names {
+    #[pyo3(annotation = "a text")]
+    Text(String),
+    #[pyo3(annotation = "a list of texts")]
+    List(Vec<String>),
+}
+
+impl Names {
+    fn of(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+
+    /// All of them, with commas between them.
+    fn listed(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::List(list) => list.join(","),
+        }
+    }
 }
 
 /// What a sweep knows a sensor by: a name, or a file that it keeps in its folder.

@@ -20,24 +20,49 @@ fn program() -> PathBuf {
     target().unwrap().join("debug").join("macropulse")
 }
 
-/// A folder with the package, installed from the root of the repository as a newcomer does it, but
-/// with the profile of the tests and by `interpreter`.
-fn installed(interpreter: &Path) -> &'static Path {
-    static SITE: OnceLock<PathBuf> = OnceLock::new();
-    SITE.get_or_init(|| {
-        let site = target().unwrap().join("python").join("site");
-        // What an older source has left.
-        let _ = std::fs::remove_dir_all(&site);
-        let options = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+/// An empty folder of this name.
+fn emptied(name: &str) -> PathBuf {
+    let folder = target().unwrap().join("python").join(name);
+    // What an older source has left.
+    let _ = std::fs::remove_dir_all(&folder);
+    folder
+}
+
+/// pip as `interpreter` has it.
+fn pip(interpreter: &Path, what: &str) -> Command {
+    let mut pip = Command::new(interpreter);
+    pip.args(["-m", "pip", what, "--quiet", "--disable-pip-version-check"]);
+    pip
+}
+
+/// The package, built from the root of the repository as `pip install .` does it, but with the
+/// profile of the tests.
+fn wheel() -> &'static Path {
+    static WHEEL: OnceLock<PathBuf> = OnceLock::new();
+    WHEEL.get_or_init(|| {
+        let interpreter = python(&here().join("tests/requirements.txt")).unwrap();
+        let folder = emptied("wheel");
+        let mut pip = pip(&interpreter, "wheel");
         // The builder is one of the requirements: nothing is fetched.
-        let offline = ["--no-build-isolation", "--no-deps", "--no-index", "--target"];
-        let mut pip = Command::new(interpreter);
-        pip.args(options).args(offline).arg(&site).arg(here().join("../.."));
+        pip.args(["--no-build-isolation", "--no-deps", "--no-index", "--wheel-dir"]);
+        pip.arg(&folder).arg(here().join("../.."));
         pip.env("CARGO_TARGET_DIR", target().unwrap()).env("MATURIN_PEP517_ARGS", "--profile dev");
         // The builder stands beside the interpreter.
         let beside = interpreter.parent().unwrap().display().to_string();
         pip.env("PATH", format!("{beside}:{}", std::env::var("PATH").unwrap_or_default()));
         call(&mut pip).unwrap();
+        let mut made = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        made.find(|file| file.extension().is_some_and(|ending| ending == "whl")).unwrap()
+    })
+}
+
+/// A folder with the package and nothing else, for any interpreter.
+fn installed(interpreter: &Path) -> &'static Path {
+    static SITE: OnceLock<PathBuf> = OnceLock::new();
+    SITE.get_or_init(|| {
+        let site = emptied("site");
+        let alone = ["--no-deps", "--no-index", "--target"];
+        call(pip(interpreter, "install").args(alone).arg(&site).arg(wheel())).unwrap();
         site
     })
 }
@@ -56,6 +81,29 @@ fn passed(interpreter: &Path, site: &Path, tests: &[&str]) -> String {
     .unwrap();
     assert!(printed.contains(" passed"), "{printed}");
     printed
+}
+
+/// What a newcomer has: a fresh environment in which nothing is installed but the package, with what
+/// it asks for itself. The ten lines are those of the guide.
+#[test]
+fn a_newcomer_has_a_cloud_after_ten_lines() {
+    let any = python(&here().join("tests/requirements.txt")).unwrap();
+    let environment = emptied("fresh");
+    call(Command::new(any).args(["-m", "venv"]).arg(&environment)).unwrap();
+    let interpreter = environment.join("bin").join("python");
+    call(pip(&interpreter, "install").arg(wheel())).unwrap();
+    let listed = call(&mut pip(&interpreter, "freeze")).unwrap();
+    let names = listed.lines().map(|line| line.split(['=', ' ']).next().unwrap_or_default());
+    assert_eq!(names.collect::<Vec<_>>(), ["macropulse", "numpy"]);
+    let lines = here().join("tests").join("newcomer.py");
+    let elsewhere = environment.join("desk");
+    std::fs::create_dir(&elsewhere).unwrap();
+    let printed = call(Command::new(&interpreter).current_dir(&elsewhere).arg(lines)).unwrap();
+    assert!(
+        printed.starts_with("<macropulse.Scan 0 of kim-park-2016-fixed: 178564 points"),
+        "{printed}"
+    );
+    assert!(elsewhere.join("car.pcd").exists());
 }
 
 #[test]

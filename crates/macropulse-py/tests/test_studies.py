@@ -67,6 +67,23 @@ def test_a_sweep_is_that_of_the_program(program, tmp_path):
     assert told["rows"][0]["pd"]["value"] > 0.9
 
 
+def test_a_sweep_without_a_return_says_so(tmp_path):
+    with pytest.warns(UserWarning, match="1 of 2 rows of the table are without a single return: no ray"):
+        mp.sweep("peregrine", "wall", {"scan.max_range_m": [20, 60]}, seeds=1, folder=tmp_path)
+
+
+def test_a_score_is_named_alone_or_among_others(tmp_path):
+    asked = dict(vary={"scan.max_range_m": [60, 70]}, seeds=1, folder=tmp_path)
+    (row, _) = mp.sweep("peregrine", "wall", score="pd", **asked)["rows"]
+    assert "pd" in row and "wrong" not in row
+    (row, _) = mp.sweep("peregrine", "wall", score=["pd", "wrong"], **asked)["rows"]
+    assert "pd" in row and "wrong" in row
+    with pytest.raises(mp.Error, match="unknown score `pdd`"):
+        mp.sweep("peregrine", "wall", score="pdd", **asked)
+    with pytest.raises(TypeError, match="a list of texts"):
+        mp.sweep("peregrine", "wall", score=3, **asked)
+
+
 def test_a_sweep_in_shards_goes_on_where_it_was(tmp_path):
     asked = dict(vary={"scan.max_range_m": "40..60:3"}, seeds=2, folder=tmp_path / "out",
                  changes={"scan.flash.rows": 8}, score=["pd"])

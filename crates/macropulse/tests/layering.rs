@@ -203,14 +203,15 @@ const STUDY: Layers = Layers {
             because: "a sweep repeats whole scans, counts, and names them as records do",
         },
         Rule {
-            module: "validate",
-            may_name: &["view"],
-            because: "figures beside each other are a report",
-        },
-        Rule {
             module: "paper",
             may_name: &["record", "view"],
             because: "the experiment is runs and a report",
+        },
+        Rule {
+            module: "validate",
+            may_name: &["paper", "view"],
+            because: "figures beside each other are a report; those of the paper are worked out where \
+                      it is checked",
         },
     ],
 };

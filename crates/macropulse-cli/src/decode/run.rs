@@ -15,7 +15,7 @@ use macropulse_study::record::{self, Decoded, PAGE, Page};
 use serde_json::Value;
 
 use crate::explain::{self, Pixel};
-use crate::fault::{Fault, warn};
+use crate::fault::{Fault, note, warn};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
@@ -126,7 +126,7 @@ impl<'a> Run<'a> {
         }
         progress.finish();
         self.elapsed = began.elapsed().as_secs_f64();
-        self.find_warnings(&sink);
+        self.find_warnings(&sink, common);
         if let (Sink::Folder(folder, _), 1..) = (&sink, self.scans) {
             self.folder = folder.path().display().to_string();
             self.files.push(PAGE.to_owned());
@@ -178,7 +178,7 @@ impl<'a> Run<'a> {
     }
 
     /// What its user should know, said at once.
-    fn find_warnings(&mut self, sink: &Sink) {
+    fn find_warnings(&mut self, sink: &Sink, common: &Common) {
         if self.returns == 0 && self.shots > 0 {
             let reason = match self.ticks {
                 0 => {
@@ -192,10 +192,13 @@ impl<'a> Run<'a> {
         if self.asked.len() > found {
             self.warnings.push("a pixel of --explain has no shot in the log".to_owned());
         }
-        if let Sink::Folder(folder, _) = sink {
-            self.warnings.extend(folder.warning_of_older(&self.files));
-        }
         self.warnings.iter().for_each(|warning| warn(warning));
+        if let Sink::Folder(folder, _) = sink
+            && let Some(older) = folder.warning_of_older(&self.files)
+        {
+            note(&older, common);
+            self.warnings.push(older);
+        }
     }
 
     /// What is needed to repeat the run, and what was counted.

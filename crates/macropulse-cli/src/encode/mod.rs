@@ -43,6 +43,7 @@ pub struct Encode {
 
     /// Pixel, both counted from 0, row 0 at the top and column 0 at the left; repeatable
     #[arg(long = "pixel", value_name = "ROW,COLUMN", value_parser = pixel)]
+    #[arg(allow_hyphen_values = true)]
     pixels: Vec<(u32, u32)>,
 
     /// Number of the scan, from 0

@@ -8,7 +8,7 @@ use std::path::Path;
 use macropulse::codec::decode::Explanation;
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
-use macropulse::formats::write_atomically;
+use macropulse::formats::{versioned, write_atomically};
 use macropulse::sim::{Arrivals, Stretch};
 use macropulse::units::{range_from_tof, s_from_fs};
 use macropulse_study::record::pixel_picture;
@@ -198,7 +198,7 @@ impl<'a> Explained<'a> {
         let png = picture.png().map_err(|error| Fault::Ours(error.to_string()))?;
         let files = [
             (format!("{name}.txt"), self.text().into_bytes()),
-            (format!("{name}.json"), whole.to_string().into_bytes()),
+            (format!("{name}.json"), versioned(whole).to_string().into_bytes()),
             (format!("{name}.svg"), picture.svg().into_bytes()),
             (format!("{name}.png"), png),
         ];

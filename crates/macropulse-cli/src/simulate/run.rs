@@ -15,7 +15,7 @@ use serde_json::Value;
 use super::scenario::Scenario;
 use super::ticks::{Recorded, TickFiles};
 use crate::explain::{self, Explained, Pixel};
-use crate::fault::{Fault, warn};
+use crate::fault::{Fault, note, warn};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
@@ -110,7 +110,7 @@ impl<'a> Run<'a> {
             run.explain(&scans, &scenario.explain, folder.as_ref())?;
         }
         progress.finish();
-        run.find_warnings(scenario, folder.as_ref());
+        run.find_warnings(scenario, folder.as_ref(), common);
         if let (Some(folder), 1..) = (&folder, run.scans) {
             run.folder = folder.path().display().to_string();
             run.files.push(PAGE.to_owned());
@@ -169,17 +169,18 @@ impl<'a> Run<'a> {
     }
 
     /// Adds what came to light during the run, and says it at once: it must not go under.
-    fn find_warnings(&mut self, scenario: &Scenario, folder: Option<&Folder>) {
+    fn find_warnings(&mut self, scenario: &Scenario, folder: Option<&Folder>, common: &Common) {
         let wanted = scenario.scans;
-        let mut found = Vec::new();
+        let mut wrong = Vec::new();
         if self.scans < wanted {
-            found.push(format!("stopped by Ctrl-C after {} of {wanted} scans", self.scans));
+            wrong.push(format!("stopped by Ctrl-C after {} of {wanted} scans", self.scans));
         }
         if self.scans > 0
             && let Some(reason) = self.tally.where_all_was_lost()
         {
-            found.push(format!("not a single point: {reason}"));
+            wrong.push(format!("not a single point: {reason}"));
         }
+        let mut found = Vec::new();
         for format in scenario.formats.iter().filter(|_| scenario.truth) {
             let left_out = format.leaves_out_of_truth();
             if !left_out.is_empty() {
@@ -205,8 +206,10 @@ impl<'a> Run<'a> {
             );
         }
         found.extend(folder.and_then(|folder| folder.warning_of_older(&self.files)));
-        found.iter().for_each(|warning| warn(&format!("{}: {warning}", self.design.name)));
-        self.warnings.extend(found);
+        let named = |warning: &String| format!("{}: {warning}", self.design.name);
+        wrong.iter().for_each(|warning| warn(&named(warning)));
+        found.iter().for_each(|warning| note(&named(warning), common));
+        self.warnings.extend(wrong.into_iter().chain(found));
     }
 
     /// What is needed to repeat the run and to judge it.

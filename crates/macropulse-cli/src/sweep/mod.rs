@@ -12,7 +12,7 @@ use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
 use crate::completions;
 use crate::fault::{Fault, warn};
-use crate::folder::refuse_stream;
+use crate::folder::refuse_no_folder;
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
@@ -148,7 +148,7 @@ impl Sweep {
 }
 
 pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
-    refuse_stream(&options.output)?;
+    refuse_no_folder(&options.output)?;
     let plan = Plan::of(&options.request()?)?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;

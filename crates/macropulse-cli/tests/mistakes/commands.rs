@@ -157,6 +157,79 @@ const LINES: &[Row] = &[
     ("convert a.csv -o a.csv", &["a.csv"]),
 ];
 
+/// Behind `budget coded-practical`.
+const BUDGETS: &[Row] = &[
+    ("peregrine", &["'peregrine'", "it takes one sensor and no scene"]),
+    ("wall", &["'wall'", "sun and air are --environment"]),
+    ("--scene wall", &["'--scene'", "no scene"]),
+    ("--range 0", &["--range", "a number between 0.000001"]),
+    ("--range -5", &["--range", "a number between"]),
+    ("--range 150m", &["'150m'", "a number"]),
+    ("--reflectance 0", &["--reflectance", "a number between"]),
+    ("--reflectance 10%", &["'10%'", "a number"]),
+    ("--pd 1", &["--pd", "between 0 and 1, as 0.9"]),
+    ("--pd high", &["'high'", "between 0 and 1, as 0.9"]),
+    ("--false-points 0", &["--false-points", "between 0 and 1"]),
+    ("--false-points 2", &["--false-points", "between 0 and 1"]),
+    ("--set scan.max_rnage_m=3", &["did you mean `max_range_m`?"]),
+    ("--set environment.visibility_m=3", &["did you mean `visibility_km`?"]),
+    ("--set environment.visibility_km=x", &["the text \"x\"", "a number from 0.01 to 1000"]),
+    ("--set scan.max_range_m", &["--set", "key=value"]),
+    ("--json=yes", &["'yes'", "--json"]),
+    ("-o budget.html", &["-o budget.html", "ends as a file does", "say -o budget"]),
+    ("-o gone.json", &["say -o gone"]),
+    ("--sensor peregrine", &["'--sensor'", "as in `macropulse budget coded-practical`"]),
+];
+
+/// Behind `view`, `codes`, `check`, `encode`, `sensors`, `scenes` and others.
+const OTHERS: &[Row] = &[
+    ("view a.csv folder", &["'folder'", "one file or folder at a time"]),
+    ("view peregrine", &["is a sensor", "`macropulse simulate peregrine street -o out`"]),
+    ("view street", &["is a scene", "`macropulse simulate hdl-64e street -o out`"]),
+    ("view scene.toml", &["no point cloud is read from such a file"]),
+    ("view empty.csv", &["empty.csv", "it is empty"]),
+    ("view -", &["-: there is no such file"]),
+    ("view a.csv -o -", &["a name that ends in .html"]),
+    ("view a.csv -o folder", &["folder", "a name that ends in .html"]),
+    ("view a.csv -o gone/a.html", &["gone/a.html", "there is no such file or folder"]),
+    ("view a.csv --format html", &["'--format'", "view --help"]),
+    ("view a.csv --json", &["'--json'", "view --help"]),
+    ("view folder/gone.pcd", &["folder/gone.pcd", "there is no such file"]),
+    ("codes prime 29", &["as prime=29"]),
+    ("codes prime=29,gold=7", &["as prime=29"]),
+    ("codes prime=-3", &["a whole number"]),
+    ("codes prime=1", &["1 is not an odd prime", "3"]),
+    ("codes prime=1000000", &["the largest possible prime is 251"]),
+    ("codes m-sequence=2", &["use 3 to 15"]),
+    ("codes orthogonal=5", &["as { key = value }"]),
+    ("codes orthogonal={length=10}", &["`weight` is missing"]),
+    ("codes orthogonal={length=10,weight=11}", &["use 1 to 10"]),
+    ("codes sparse={length=100000,weight=3,words=9,seed=1}", &["use 1 to 65535"]),
+    ("codes hadamard=8", &["no code family", "known are prime"]),
+    ("codes kim-park-2016", &["as prime=29"]),
+    ("codes prime=29 --format png", &["'--format'", "codes --help"]),
+    ("check --sensor peregrine", &["'--sensor'", "the sensor stands alone"]),
+    ("check wal", &["wal: no such sensor, scene or file", "did you mean `wall`?"]),
+    ("check peregrine -o out", &["'-o'", "check --help"]),
+    ("check peregrine --environment fog", &["did you mean `fog-50m`?"]),
+    ("check peregrine --with rain", &["`rain` is no effect"]),
+    ("check a.csv", &["a.csv:1:4: is not TOML"]),
+    ("check ./peregrine", &["./peregrine: cannot be read"]),
+    ("check peregrine --set", &["--set <KEY=VALUE>"]),
+    ("check empty.csv", &["neither a sensor", "`macropulse sensors NAME`"]),
+    ("encode kim-park-2016 --pixel -1,0", &["--pixel", "row,column"]),
+    ("encode kim-park-2016 wall", &["'wall'", "it takes one sensor"]),
+    ("encode kim-park-2016 --pixel 0 1", &["'1'", "as --pixel 0,1"]),
+    ("encode kim-park-2016 --pixel 0,1 -o out", &["--pixel prints a macropulse, -o writes"]),
+    ("encode kim-park-2016 -o shots.mps", &["ends as a file does", "say -o shots"]),
+    ("simulate peregrine wall -o cloud.pcd", &["-o cloud.pcd", "say -o cloud"]),
+    ("sensors wall", &["wall: is a scene, where a sensor is wanted"]),
+    ("sensors peregrine hdl-64e", &["'hdl-64e'", "one at a time"]),
+    ("scenes peregrine", &["is a sensor, not a scene", "`macropulse sensors peregrine`"]),
+    ("scenes --materials=x", &["a number of nanometres"]),
+    ("schema sensor scene", &["'scene'", "one at a time"]),
+];
+
 /// Behind `sweep`.
 const SWEEPS: &[Row] = &[
     ("peregrine wall -o out", &["nothing is varied; give a key with its values"]),
@@ -191,6 +264,7 @@ const SWEEPS: &[Row] = &[
         &["2/4 for the second of four"],
     ),
     ("peregrine wall -o out --vary scan.max_range_m=10,20 --shard 3/2", &["1/2 to 2/2"]),
+    ("peregrine wall -o out.csv --vary scan.max_range_m=10,20", &["say -o out"]),
     ("peregrine wall -o scene.toml --vary scan.max_range_m=10,20", &["a file is in the way"]),
 ];
 
@@ -198,7 +272,7 @@ fn desk() -> Desk {
     let desk = Desk::new();
     desk.put("scene.toml", "version = 1\n[[object]]\ncar = {}\nposition_m = [9, 0, 0]\n");
     desk.put("a.obj", "v 0 -2 -2\nv 0 2 -2\nv 0 0 2\nf 1 2 3\n").put("a.pcd", "");
-    desk.put("a.csv", "x_m,y_m,z_m\n1,2,3\n");
+    desk.put("a.csv", "x_m,y_m,z_m\n1,2,3\n").put("empty.csv", "");
     std::fs::create_dir(desk.path().join("folder")).unwrap();
     desk
 }
@@ -212,6 +286,17 @@ fn options() {
 #[test]
 fn lines() {
     refused(&desk(), LINES.iter().map(|(line, words)| ((*line).to_owned(), *words)));
+}
+
+#[test]
+fn budgets() {
+    let line = |typed: &str| format!("budget coded-practical {typed}");
+    refused(&desk(), BUDGETS.iter().map(|(typed, words)| (line(typed), *words)));
+}
+
+#[test]
+fn others() {
+    refused(&desk(), OTHERS.iter().map(|(line, words)| ((*line).to_owned(), *words)));
 }
 
 #[test]

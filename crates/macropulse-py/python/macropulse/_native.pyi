@@ -264,7 +264,7 @@ def sweep(
     *,
     folder: _Path,
     changes: dict[str, Any] | None = None,
-    score: Sequence[str] = ("pd", "wrong", "precision"),
+    score: str | Sequence[str] = ("pd", "wrong", "precision"),
     seeds: int = 8,
     seed: int = 1,
     shots: int | None = None,

@@ -7,7 +7,7 @@ use super::Error;
 use super::geometry::{self, Prediction};
 use crate::record;
 use macropulse::design::Design;
-use macropulse::formats::Format;
+use macropulse::formats::{Format, clear_unfinished};
 use macropulse::points::{Outcome, PointCloud};
 use macropulse::scene::{Ray, Scene};
 use macropulse::score::Score;
@@ -73,6 +73,7 @@ pub(super) fn trial(
     let folder = folder.join(self::folder(sensor, distance));
     std::fs::create_dir_all(&folder)
         .map_err(|source| Error::Folder { path: folder.clone(), source })?;
+    clear_unfinished(&folder);
     let formats = [Format::Pcd, Format::Png];
     let writing = Instant::now();
     let mut recorded = record::Files::new(&folder, &formats, (design, Some(&scene)));

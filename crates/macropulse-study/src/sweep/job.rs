@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::plan::folder_of_jobs;
 use super::{Error, Plan, Point};
 use macropulse::digest::Digest;
-use macropulse::formats::{self, write_atomically};
+use macropulse::formats::{self, clear_unfinished, write_atomically};
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::{RangeError, Score};
@@ -164,9 +164,12 @@ impl Plan {
     /// # Errors
     /// If it cannot be made or written into.
     pub fn claim_folder(&self, folder: &Path) -> Result<(), Error> {
-        fs::create_dir_all(folder_of_jobs(folder)).map_err(|cause| {
+        let jobs = folder_of_jobs(folder);
+        fs::create_dir_all(&jobs).map_err(|cause| {
             Error::Formats(formats::Error::Write { path: folder.to_owned(), cause })
         })?;
+        clear_unfinished(folder);
+        clear_unfinished(&jobs);
         write_atomically(&folder.join(DESCRIPTION), |out| out.write_all(self.text().as_bytes()))?;
         Ok(())
     }

@@ -230,7 +230,8 @@ impl Page {
         }
         html += &format!(
             "<h1>{}</h1>\n<p class=\"lead\">{}</p>\n</header>\n",
-            inline(&self.title),
+            // A dotted key breaks at its dots.
+            inline(&self.title).replace('.', ".<wbr>"),
             inline(&self.lead)
         );
         let ids = ids(&self.sections);

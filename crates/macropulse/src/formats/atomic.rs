@@ -1,10 +1,14 @@
 //! Whole files or none.
 
 use super::Error;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
+
+/// How files are called that are not whole yet: this, then letters drawn at random, then that.
+const UNFINISHED: [&str; 2] = [".macropulse-", ".part"];
 
 /// A file that is not there before it is kept, for one that is written bit by bit; see
 /// [`write_atomically`].
@@ -20,9 +24,7 @@ impl WholeFile {
     /// # Errors
     /// [`Error::Write`] if its folder cannot be written to.
     pub fn create(path: &Path) -> Result<Self, Error> {
-        // A bare file name has an empty parent, which is the current folder.
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let temporary = builder().tempfile_in(folder.unwrap_or(Path::new(".")));
+        let temporary = locked(named(path.parent().unwrap_or(Path::new(""))));
         let temporary = temporary.map_err(|cause| Error::write(path, cause))?;
         Ok(Self { path: path.to_owned(), out: BufWriter::with_capacity(1 << 16, temporary) })
     }
@@ -74,11 +76,41 @@ pub fn write_atomically(
     file.keep()
 }
 
+/// Removes from `folder` what runs have left there that were killed while they wrote: unfinished
+/// files that nobody holds. Those of living runs stay, and so does whatever cannot be removed; where
+/// the system knows no locks on files, all of them.
+pub fn clear_unfinished(folder: &Path) {
+    for entry in fs::read_dir(named(folder)).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_str().unwrap_or_default();
+        let is_ours = name.starts_with(UNFINISHED[0]) && name.ends_with(UNFINISHED[1]);
+        if is_ours && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// The folder of a bare file name is empty, which is the current one.
+fn named(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
+}
+
+/// A temporary file, held until it is closed so that [`clear_unfinished`] passes it over.
+fn locked(folder: &Path) -> io::Result<NamedTempFile> {
+    loop {
+        let temporary = builder().tempfile_in(folder)?;
+        // Who cleared the folder may have been quicker than the lock.
+        if temporary.as_file().lock().is_err() || temporary.path().exists() {
+            return Ok(temporary);
+        }
+    }
+}
+
 /// Temporary files are private by default; ours become results to be kept, so they take the
 /// permissions any new file gets.
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".macropulse-").suffix(".part");
+    builder.prefix(UNFINISHED[0]).suffix(UNFINISHED[1]);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -90,7 +122,6 @@ fn builder() -> tempfile::Builder<'static, 'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
     fn entries(folder: &Path) -> usize {
         fs::read_dir(folder).unwrap().count()
@@ -118,6 +149,25 @@ mod tests {
         assert!(error.to_string().ends_with("a.txt: no more paper"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(entries(folder.path()), 1);
+    }
+
+    #[test]
+    fn what_the_dead_have_left_goes_and_what_the_living_write_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let of_others = ["notes.part", ".macropulse-notes", "scan-000000.pcd"];
+        for name in of_others.iter().chain(&[".macropulse-a1B2c3.part"]) {
+            fs::write(path(name), "half").unwrap();
+        }
+        let mut living = WholeFile::create(&path("whole.txt")).unwrap();
+        clear_unfinished(folder.path());
+        assert!(!path(".macropulse-a1B2c3.part").exists());
+        assert!(of_others.iter().all(|name| path(name).exists()));
+        assert_eq!(entries(folder.path()), of_others.len() + 1);
+        living.write_all(b"whole").unwrap();
+        living.keep().unwrap();
+        assert_eq!(fs::read(path("whole.txt")).unwrap(), b"whole");
+        clear_unfinished(&path("no-such-folder"));
     }
 
     #[test]

@@ -30,7 +30,7 @@ mod png16;
 mod recording;
 mod table;
 
-pub use atomic::{WholeFile, write_atomically};
+pub use atomic::{WholeFile, clear_unfinished, write_atomically};
 pub use clouds::{Clouds, read_cloud, read_pcd};
 pub use csv::quoted;
 pub use error::Error;

@@ -137,6 +137,8 @@ struct Gate {
     lags: f64,
     /// What one event adds to the share of lit places where marks from within the gate may be.
     event: f64,
+    /// Ticks of a place.
+    ticks: f64,
     /// False returns accepted.
     false_alarm: f64,
 }
@@ -154,9 +156,11 @@ impl Gate {
         let of_one_photon = Lit { photons: 1.0, background, falling: 0.0 };
         let chips = i64::from(design.coding.codebook.chips());
         let macropulse = s_from_fs(chips * design.coding.chip_fs);
+        let width = Place::of(design, &of_one_photon).width;
         Self {
             lags,
-            event: Place::of(design, &of_one_photon).width / (lags * tick + macropulse),
+            event: width / (lags * tick + macropulse),
+            ticks: width / tick,
             false_alarm: design.receiver.false_alarm,
         }
     }
@@ -164,8 +168,9 @@ impl Gate {
     /// The share of places of a gate that events light which are not of the very shot, with its
     /// probability: those of no shot follow Poisson's law, each mark of another shot is found or not.
     fn around(&self, marks: usize, found: &Found) -> Vec<(f64, f64)> {
-        // Events are counted, though two may light one place.
-        let events = |density: f64| -libm::log1p(-density.min(MOST_LIT)) / self.event;
+        // Ticks are counted, though several may light one place: t of t·(1 − (1 − d)^(1/t)) ticks each.
+        let of_tick = |density: f64| -libm::expm1(libm::log1p(-density.min(MOST_LIT)) / self.ticks);
+        let events = |density: f64| self.ticks * of_tick(density) / self.event;
         let noise = events(found.false_density);
         let of_shots = (events(found.density) - noise).max(0.0);
         let of_others = (of_shots - marks as f64 * found.seen).max(0.0);
@@ -291,7 +296,7 @@ mod tests {
 
     #[test]
     fn the_least_marks_are_rare_and_one_fewer_is_not() {
-        let gate = Gate { lags: 4e5, event: 0.0, false_alarm: 1e-6 };
+        let gate = Gate { lags: 4e5, event: 0.0, ticks: 2.0, false_alarm: 1e-6 };
         let least = gate.least_marks(180, 0.01);
         assert!(4e5 * binomial_tail(180, 0.01, least) <= 1e-6);
         assert!(4e5 * binomial_tail(180, 0.01, least - 1) > 1e-6);
