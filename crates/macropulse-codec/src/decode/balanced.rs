@@ -356,10 +356,10 @@ mod tests {
         }
     }
 
-    /// H0: of gates with light in step, which is no shot's own, no more are believed than are accepted, one
-    /// in a hundred. N = 6000 gates, seed 6: 84 come with α = 0.002 or less. Half the time nothing is lit,
-    /// else a share of 0.1 to 0.6 of the places that are whole chips apart. Where the density is taken for
-    /// its mean in the gate, one in four is believed: the control asks for as much as that says.
+    /// H0: of gates with light in step, none of which is the shot's own, no more are believed than are
+    /// accepted, one in a hundred. N = 6000 gates, seed 6: 85 or more come with α = 0.001 (Poisson, mean 60).
+    /// In runs of 50 chips nothing is lit, or a share of 0.1 to 0.6 of the places that are whole chips apart.
+    /// Control: by the mean density of the gate more than one in ten would be believed.
     #[test]
     fn light_in_step_is_believed_no_more_often_than_is_accepted() {
         let book = &books()[1];
