@@ -357,7 +357,7 @@ mod tests {
     }
 
     /// H0: of gates with light in step, none of which is the shot's own, no more are believed than are
-    /// accepted, one in a hundred. N = 6000 gates, seed 6: 85 or more come with α = 0.001 (Poisson, mean 60).
+    /// accepted, one in a hundred. N = 6000 gates, seed 6: 85 or more come with α = 0.0014 (Poisson, mean 60).
     /// In runs of 50 chips nothing is lit, or a share of 0.1 to 0.6 of the places that are whole chips apart.
     /// Control: by the mean density of the gate more than one in ten would be believed.
     #[test]
