@@ -6,7 +6,7 @@ use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
 use macropulse::points::{Outcome, PointCloud};
-use macropulse::predict::Forecaster;
+use macropulse::predict::{Forecast, Forecaster};
 use macropulse::scene::Scene;
 use macropulse::sim::{Scans, Watch};
 
@@ -33,6 +33,9 @@ const ENVIRONMENT: &str = "night";
 
 /// The walls stand at this part of the range of the sensor.
 const PART: f64 = 0.7;
+
+/// So many places within a tick, at which walls stand, or one for each band where there are fewer.
+const PHASES: usize = 4;
 
 /// Probabilities of detection at which a forecast is tried.
 const WANTED: [f64; 4] = [0.1, 0.5, 0.8, 0.95];
@@ -126,8 +129,6 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
     let mut places = Vec::new();
     for wanted in WANTED {
         let Some(reflectance) = reflectance(&forecaster, wanted, range) else { continue };
-        let forecast = forecaster.forecast(reflectance, range);
-        let scene = room(reflectance, range)?;
         let mut shots = 0;
         let few = |band: &Band| {
             let is_enough = shots >= SHOTS;
@@ -135,12 +136,26 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
             !is_enough
         };
         let part: Vec<Band> = bands(&design, 0).take_while(few).collect();
-        let mut scans = Scans::new(&design, &scene, seed)?;
-        let scan = scans.part(&part, watch)?.ok_or(Error::Stopped)?;
-        let of = |outcome| scan.score.count(outcome);
-        let lit = scan.score.with_echo();
+        let phases = PHASES.min(part.len());
+        let step = design.derived().tick_range / phases as f64;
+        let ranges: Vec<f64> = (0..phases).map(|phase| range + phase as f64 * step).collect();
+        let forecasts: Vec<Forecast> =
+            ranges.iter().map(|at| forecaster.forecast(reflectance, *at)).collect();
+        let forecast = Expected::of(&forecasts);
+        let (mut counts, mut lit, mut errors) = ([0; Outcome::ALL.len()], 0, Vec::new());
+        for (phase, at) in ranges.iter().enumerate() {
+            let part: Vec<Band> = part.iter().skip(phase).step_by(phases).copied().collect();
+            let scene = room(reflectance, *at)?;
+            let mut scans = Scans::new(&design, &scene, seed)?;
+            let scan = scans.part(&part, watch)?.ok_or(Error::Stopped)?;
+            for (count, outcome) in counts.iter_mut().zip(Outcome::ALL) {
+                *count += scan.score.count(outcome);
+            }
+            lit += scan.score.with_echo();
+            errors.extend(errors_of(&scan.cloud()));
+        }
+        let of = |outcome: Outcome| counts[outcome as usize];
         let share = |count: u64| count as f64 / lit.max(1) as f64;
-        let errors = errors(&scan.cloud());
         // A normal error is no sidelobe.
         let beside = forecast.precision.map_or(f64::INFINITY, |sigma| BESIDE * sigma);
         let beside =
@@ -154,7 +169,7 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
             shots: lit,
             pd: [forecast.pd, share(of(Outcome::Right) + of(Outcome::Near))],
             precision_m: (forecast.precision, deviation(&peak)),
-            aside: forecast.aside.map(|forecast| [forecast.share, aside]),
+            aside: forecast.aside.map(|forecast| [forecast, aside]),
             points: errors.len(),
             false_per_shot: [
                 forecast.false_per_shot,
@@ -163,6 +178,30 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
         });
     }
     Ok(places)
+}
+
+/// The mean of what is to be expected at several ranges.
+struct Expected {
+    pd: f64,
+    false_per_shot: f64,
+    precision: Option<f64>,
+    aside: Option<f64>,
+}
+
+impl Expected {
+    fn of(forecasts: &[Forecast]) -> Self {
+        let count = forecasts.len().max(1) as f64;
+        let mean = |of: &dyn Fn(&Forecast) -> f64| forecasts.iter().map(of).sum::<f64>() / count;
+        let all = |of: &dyn Fn(&Forecast) -> Option<f64>| {
+            forecasts.iter().map(of).sum::<Option<f64>>().map(|sum| sum / count)
+        };
+        Self {
+            pd: mean(&|forecast| forecast.pd),
+            false_per_shot: mean(&|forecast| forecast.false_per_shot),
+            precision: all(&|forecast| Some(forecast.precision?.powi(2))).map(f64::sqrt),
+            aside: all(&|forecast| Some(forecast.aside?.share)),
+        }
+    }
 }
 
 /// The least reflectance, up to white, that is seen with probability `wanted` at `range`.
@@ -190,7 +229,7 @@ fn room(reflectance: f64, range: f64) -> Result<Scene, Error> {
 }
 
 /// The range errors of right and near points, m.
-fn errors(cloud: &PointCloud) -> Vec<f64> {
+fn errors_of(cloud: &PointCloud) -> Vec<f64> {
     let truth = &cloud.truth.returns;
     let answers = (0..cloud.range.len())
         .filter(|&at| matches!(truth.outcome[at], Outcome::Right | Outcome::Near));

@@ -13,19 +13,20 @@ const LEAD: &str = "What others have published beside what Macropulse says, and 
 /// What stands above the forecasts.
 fn of_forecasts(findings: &Findings) -> String {
     format!(
-        "A wall stands all around a ready sensor by night, square on, at 70 % of its range, of such \
-         a reflectance that one shot in ten, half of them, four in five, and nearly all should be \
-         seen. N is {SHOTS} shots or a few more, as many as a scan has where that is less; seed {}. Seen \
-         are returns within 0.35 m. A forecast holds if the share is right within 0.02 or three standard \
-         deviations, the standard deviation of the range about the peak within 20 %, and the share \
-         of points on a sidelobe of their own macropulse within 0.2 % of them or three standard \
-         deviations. Those are farther than six forecast standard deviations from the truth, and \
-         more than is called right. The matched receivers are thorough: quick ones, as the ready \
-         sensors have them, find fewer where most shots are lost, as they begin with those that stand \
-         alone. What forecasts leave out so far: that light of other shots in step may have a higher \
-         balance; peaks that have as many marks as a sidelobe where no neighbour tells them apart; \
-         and that pulses which only just cross a threshold are told later or earlier than others, \
-         and fall beside the places where they are looked for.",
+        "A wall stands all around a ready sensor by night, square on, at 70 % of its range, of \
+         such a reflectance that one shot in ten, half of them, four in five, and nearly all \
+         should be seen; at up to four places within a tick, a part of the shots at each. N is \
+         {SHOTS} shots or a few more, as many as a scan has where that is less; seed {}. Seen \
+         are returns within 0.35 m. A forecast holds if the share is right within 0.02 or three \
+         standard deviations, the standard deviation of the range about the peak within 20 %, \
+         and the share of points on a sidelobe of their own macropulse within 0.2 % of them or \
+         three standard deviations. Those are farther than six forecast standard deviations \
+         from the truth, and more than is called right. The matched receivers are thorough: \
+         quick ones, as the ready sensors have them, find fewer where most shots are lost, as \
+         they begin with those that stand alone. What forecasts leave out so far: peaks that \
+         have as many marks as a sidelobe where no neighbour tells them apart; and that pulses \
+         which only just cross a threshold are told later or earlier than others, and fall \
+         beside the places where they are looked for.",
         findings.seed
     )
 }
