@@ -8,14 +8,14 @@
 //! Here L(n) is its mean. Shots leave on the chip clock, so those that meet the same range light the same
 //! few phases of it: L(n) = Σ_φ L_φ·P(Bin(N + M, d_φ) ≥ n), d_φ the share of places lit in a phase, and the
 //! lags about the shot's own light, where there is no other. How many phases that are depends on where
-//! in a tick the light comes. Shots that meet the same range do not
-//! overlap, so that noise alone falls on a macropulse's own dark chips.
+//! in a tick the light comes. Shots that meet the same range do not overlap, so that noise alone falls on
+//! a macropulse's own dark chips.
 
 use std::collections::BTreeMap;
 
 use macropulse_codec::statistics::{binomial, hypergeometric_tail, normal_tail};
 
-use super::matched::{Chances, Found, lags};
+use super::matched::{Chances, Found, Place, lags};
 use crate::design::Design;
 use crate::units::s_from_fs;
 
@@ -76,9 +76,8 @@ impl Gate {
     /// of it.
     fn of(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found, late: f64) -> Self {
         let receiver = &design.receiver;
-        let (chips, sigma) = (design.coding.codebook.chips() as usize, receiver.jitter_ticks);
-        // As `decode::window`: a mark is looked for in so many ticks.
-        let width = if sigma > 0.05 { 1 + (4.0 * sigma).ceil() as i32 } else { 1 };
+        let chips = design.coding.codebook.chips() as usize;
+        let width = Place::ticks(design) as i32;
         let phases = phases(design, (weights, found), (width, late));
         // Farther chips than the first and the last lit one may be passed by without loss.
         let own = |lit: usize| f64::from(width) * (1.0 + 2.0 * chips as f64 / (lit as f64 + 1.0));

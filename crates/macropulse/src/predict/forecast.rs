@@ -188,7 +188,7 @@ impl<'a> Forecaster<'a> {
                     ReceiverKind::Balanced => {
                         balanced::chances(design, &self.weights, &found, tof_from_range(range))
                     }
-                    _ => matched::chances(design, operating.background, &self.weights, &found),
+                    _ => matched::chances(design, &self.weights, &found),
                 }
             }
             // The first event in the gate is taken.

@@ -35,18 +35,22 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A tick where events are exact, else one more than four deviations, rounded up; for a mark
-    /// whose own deviation may be less than that.
+    /// That of a receiver, for a mark whose own deviation may be less than that which it looks for.
     pub fn of(design: &Design, mark: &Lit) -> Self {
         let tick = s_from_fs(design.tdc.tick_fs);
-        let looked_for = design.receiver.jitter_ticks;
-        if !design.is_coded() || looked_for <= 0.05 {
+        let ticks = Self::ticks(design);
+        if ticks <= 1.0 {
             return Self { width: tick, share: 1.0 };
         }
-        let ticks = 1.0 + (4.0 * looked_for).ceil();
         let sigma = Timing::of(design, mark).sigma;
         let half = ticks / 2.0 / (sigma * std::f64::consts::SQRT_2);
         Self { width: ticks * tick, share: libm::erf(half) }
+    }
+
+    /// Its length in ticks: one where events are exact, else one more than four deviations, rounded up.
+    pub fn ticks(design: &Design) -> f64 {
+        let sigma = design.receiver.jitter_ticks;
+        if design.is_coded() && sigma > 0.05 { 1.0 + (4.0 * sigma).ceil() } else { 1.0 }
     }
 }
 
@@ -99,15 +103,9 @@ pub(super) struct Chances {
     pub found: f64,
 }
 
-/// What comes of shots by the marks of labels, of which so many have so many. `background` is the
-/// sunlight on the detector, 1/s.
-pub(super) fn chances(
-    design: &Design,
-    background: f64,
-    weights: &BTreeMap<usize, usize>,
-    found: &Found,
-) -> Chances {
-    let gate = Gate::of(design, background);
+/// What comes of shots by the marks of labels, of which so many have so many.
+pub(super) fn chances(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found) -> Chances {
+    let gate = Gate::of(design);
     let labels: usize = weights.values().sum();
     let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
@@ -150,17 +148,16 @@ const MOST_LIT: f64 = 1.0 - 1e-6;
 const MANY: f64 = 100.0;
 
 impl Gate {
-    fn of(design: &Design, background: f64) -> Self {
+    fn of(design: &Design) -> Self {
         let lags = lags(design);
         let tick = s_from_fs(design.tdc.tick_fs);
-        let of_one_photon = Lit { photons: 1.0, background, falling: 0.0 };
         let chips = i64::from(design.coding.codebook.chips());
         let macropulse = s_from_fs(chips * design.coding.chip_fs);
-        let width = Place::of(design, &of_one_photon).width;
+        let ticks = Place::ticks(design);
         Self {
             lags,
-            event: width / (lags * tick + macropulse),
-            ticks: width / tick,
+            event: ticks * tick / (lags * tick + macropulse),
+            ticks,
             false_alarm: design.receiver.false_alarm,
         }
     }
