@@ -13,6 +13,9 @@
 //! from beyond the gate is cancelled, too, from as far as it may come: it gives no return, but would
 //! pass for noise. A tick of which no macropulse without a gap can begin is left for the receivers
 //! that follow. Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
+//!
+//! Of the light of guard shots only that is cancelled which may overlap with light of owned ones: what is
+//! older tells nothing of these, and some of it is that of shots that the log does not know.
 
 use std::ops::Range;
 
@@ -53,10 +56,12 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Option<Cancelled> {
         oldest: 0,
         end: 0,
         next: 0,
+        owned: owned_light(sent),
         seen: Timeline::default(),
         residual: Timeline::default(),
     };
-    let mut place = 0;
+    let begin = canceller.owned - sent.length();
+    let mut place = ticks.partition_point(|tick| i64::from(*tick) < begin);
     while place < ticks.len() && canceller.patience > 0 {
         place += match canceller.in_a_row(place) {
             0 => canceller.woven(place),
@@ -82,6 +87,12 @@ fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> u32 {
     (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as u32
 }
 
+/// The first tick at which light of an owned shot may come.
+fn owned_light(sent: &Sent) -> i64 {
+    let first = sent.fired.get(sent.log.owned.start);
+    first.map_or(0, |fired| fired + sent.reach().start)
+}
+
 struct Canceller<'a> {
     sent: &'a Sent<'a>,
     ticks: &'a [u32],
@@ -93,6 +104,9 @@ struct Canceller<'a> {
     /// Ticks of which no macropulse without a gap can begin, in order.
     left: Vec<u32>,
     patience: usize,
+    /// The first tick at which light of an owned shot may come. What is left before that is of macropulses
+    /// that began even earlier.
+    owned: i64,
     /// Light of no shot before this one can come any more.
     oldest: usize,
     /// This one, and those after it, are not fired yet.
@@ -210,8 +224,10 @@ impl Canceller<'_> {
                 Some(ends) => last = last.max(ends),
                 None => {
                     self.residual.clear(tick);
-                    self.patience -= 1;
-                    self.left.push(tick as u32);
+                    if tick >= self.owned {
+                        self.patience -= 1;
+                        self.left.push(tick as u32);
+                    }
                 }
             }
         }

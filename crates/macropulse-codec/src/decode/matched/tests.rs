@@ -5,6 +5,7 @@ use proptest::test_runner::RngSeed;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use super::cancel::cancel;
 use super::sent::{Sent, Words};
 use super::{Band, Memory, decode};
 use crate::code::{Codebook, Crc, Family, Keying, Payload, Sparse};
@@ -398,6 +399,27 @@ fn shots_in_flight_do_not_hide_each_others_maximum() {
     }
     let lit = surfaces.iter().filter(|lags| !lags.is_empty()).count();
     assert!(wrong == 0 && returns.len() * 100 > lit * 98, "{wrong} of {} of {lit}", returns.len());
+}
+
+/// Ticks of a band begin while light of shots is under way that its log does not know.
+#[test]
+fn clear_light_is_cancelled_whatever_was_sent_before() {
+    let sensor = Sensor::crowded(codebook());
+    let all = sensor.log(60);
+    let (ticks, _) = sensor.ticks(&all, CLEAR, 3);
+    let log = ShotLog { owned: 12..32, ..all.part(8..60) };
+    let receiver = sensor.receiver(0.0);
+    let sent = Sent::new(&receiver, (&sensor.book, &log), (ticks.epoch, Words::default()));
+    let left = |ticks: &[u32]| cancel(&sent, ticks).map(|cancelled| cancelled.residual);
+    assert_eq!(left(&ticks.tick), Some(vec![]));
+    // A tick more is left where owned light may be, and is nobody's before.
+    let (before, among) = (ticks.tick[0] + 1, sent.fired[15] as u32 + 17);
+    for (more, expected) in [(before, vec![]), (among, vec![among])] {
+        let mut ticks = ticks.tick.clone();
+        let place = ticks.binary_search(&more).expect_err("lit already");
+        ticks.insert(place, more);
+        assert_eq!(left(&ticks), Some(expected));
+    }
 }
 
 /// A lidar that waits long between shots, as one pixel of a flash does.
