@@ -10,8 +10,10 @@ use crate::decode::timeline::Timeline;
 use crate::decode::timing::{self, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
 
-/// Shots to a side of a doubtful one that tell where it is to be expected.
-const NEIGHBOURS: usize = 3;
+/// Shots to a side of a doubtful one that tell where it is to be expected. Of 25 898 shots of a room of
+/// which one in three is seen 0.52 % are taken for a sidelobe with 3, as one mistake leads to the next,
+/// 0.30 % with 5, 0.21 % with 8 and with 12; `street` and `car-50m` are the same with all of them.
+const NEIGHBOURS: usize = 8;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
