@@ -99,6 +99,25 @@ pub enum Error {
         /// Words found.
         found: u32,
     },
+    /// There is no room, as far as a search finds, for so many distances between marks.
+    #[error(
+        "the search finds {found} of {words} words of {weight} marks in {length} chips of which all \
+         distances are {gap} chips or more and {apart} apart: ask for fewer, longer or nearer ones"
+    )]
+    Crowded {
+        /// Words asked for.
+        words: u32,
+        /// Marks of a word.
+        weight: u32,
+        /// Chips of a word.
+        length: u32,
+        /// Least distance.
+        gap: u32,
+        /// Least difference of distances.
+        apart: u32,
+        /// Words found.
+        found: u32,
+    },
     /// A label must have between 1 and 16 bits.
     #[error("a label of {bits} bits is not possible; use 1 to 16 bits")]
     LabelBits {

@@ -4,6 +4,7 @@ mod chance;
 mod congruence;
 mod orthogonal;
 mod prime;
+mod separated;
 mod shift_register;
 mod sparse;
 
@@ -11,6 +12,7 @@ use std::fmt;
 
 use super::{CodeWord, Error};
 pub use prime::prime_sequence;
+pub use separated::Separated;
 pub use sparse::Sparse;
 
 /// A set of code words. A family that exists is valid.
@@ -59,6 +61,9 @@ pub enum Family {
     /// Marks drawn at random for each word. Made by [`Family::sparse`].
     #[non_exhaustive]
     Sparse(Sparse),
+    /// Words of which all distances between marks differ. Made by [`Family::separated`].
+    #[non_exhaustive]
+    Separated(Separated),
     /// A single word of 2ⁿ − 1 chips, half of them lit, that is dark at every shift to a receiver
     /// that subtracts what falls on its dark chips. Made by [`Family::m_sequence`].
     #[non_exhaustive]
@@ -134,6 +139,16 @@ impl Family {
         Ok(Self::Sparse(sparse))
     }
 
+    /// Words of which all distances between marks differ: any two words, and a word and itself shifted, meet
+    /// in one mark at most.
+    ///
+    /// # Errors
+    /// Where the length is not 1 to 65535, the weight not 1 to 64, the number of words not 1 to 4096, or
+    /// a search finds fewer.
+    pub fn separated(separated: Separated) -> Result<Self, Error> {
+        separated::found(&separated).map(|_| Self::Separated(separated))
+    }
+
     /// The m-sequence of `degree`. It is one word: its shifts cannot be told from delay.
     ///
     /// # Errors
@@ -161,6 +176,8 @@ impl Family {
             Self::Sparse(sparse) => {
                 (0..sparse.words).map(|index| sparse::word(&sparse, index)).collect()
             }
+            // Found once, it is found again.
+            Self::Separated(separated) => separated::found(&separated).unwrap_or_default(),
             Self::MSequence { degree } => vec![shift_register::m_sequence(degree)],
             Self::Gold { degree } => shift_register::gold(degree),
             Self::Single => vec![CodeWord { length: 1, marks: vec![0] }],
@@ -172,7 +189,9 @@ impl Family {
         match *self {
             Self::Prime { p } | Self::QuadraticCongruence { p } => p * p,
             Self::ExtendedPrime { p } | Self::ExtendedQuadraticCongruence { p } => p * (2 * p - 1),
-            Self::Orthogonal { length, .. } | Self::Sparse(Sparse { length, .. }) => length,
+            Self::Orthogonal { length, .. }
+            | Self::Sparse(Sparse { length, .. })
+            | Self::Separated(Separated { length, .. }) => length,
             Self::MSequence { degree } | Self::Gold { degree } => shift_register::length(degree),
             Self::Single => 1,
         }
@@ -185,9 +204,9 @@ impl Family {
             | Self::ExtendedPrime { p }
             | Self::QuadraticCongruence { p }
             | Self::ExtendedQuadraticCongruence { p } => p as usize,
-            Self::Orthogonal { weight, .. } | Self::Sparse(Sparse { weight, .. }) => {
-                weight as usize
-            }
+            Self::Orthogonal { weight, .. }
+            | Self::Sparse(Sparse { weight, .. })
+            | Self::Separated(Separated { weight, .. }) => weight as usize,
             Self::MSequence { degree } => 1 << (degree - 1),
             Self::Gold { degree } => shift_register::gold_weight(degree),
             Self::Single => 1,
@@ -201,7 +220,9 @@ impl Family {
             Self::QuadraticCongruence { p } | Self::ExtendedQuadraticCongruence { p } => {
                 p as usize - 1
             }
-            Self::Orthogonal { words, .. } | Self::Sparse(Sparse { words, .. }) => words as usize,
+            Self::Orthogonal { words, .. }
+            | Self::Sparse(Sparse { words, .. })
+            | Self::Separated(Separated { words, .. }) => words as usize,
             Self::Gold { degree } => (1 << degree) + 1,
             Self::MSequence { .. } | Self::Single => 1,
         }
@@ -224,6 +245,9 @@ impl fmt::Display for Family {
             }
             Self::Sparse(Sparse { length, weight, gap, .. }) => {
                 write!(f, "sparse {length}, {weight}, {gap} apart")
+            }
+            Self::Separated(Separated { length, weight, gap, apart, .. }) => {
+                write!(f, "separated {length}, {weight}, {gap} and {apart} apart")
             }
             Self::MSequence { degree } => write!(f, "m-sequence {degree}"),
             Self::Gold { degree } => write!(f, "Gold {degree}"),
@@ -263,6 +287,14 @@ mod tests {
             Family::extended_quadratic_congruence(7),
             Family::orthogonal(63, 3, None),
             Family::sparse(Sparse { length: 100, weight: 6, words: 9, gap: 5, seed: 1 }),
+            Family::separated(Separated {
+                length: 100,
+                weight: 3,
+                words: 5,
+                gap: 4,
+                apart: 3,
+                seed: 1,
+            }),
             Family::m_sequence(5),
             Family::gold(5),
         ];

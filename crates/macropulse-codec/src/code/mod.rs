@@ -11,6 +11,6 @@ mod word;
 
 pub use codebook::{Codebook, Keying};
 pub use error::Error;
-pub use family::{Family, Sparse, prime_sequence};
+pub use family::{Family, Separated, Sparse, prime_sequence};
 pub use payload::{Crc, Payload, PayloadFault, ShiftAlias};
 pub use word::CodeWord;

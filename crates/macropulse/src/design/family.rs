@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::Error;
 use crate::names::nearest;
 use crate::told;
-use macropulse_codec::code::{self, Family, Sparse};
+use macropulse_codec::code::{self, Family, Separated, Sparse};
 
 /// Code families by the names they have in a sensor file.
 pub(super) const FAMILIES: &[&str] = &[
@@ -16,6 +16,7 @@ pub(super) const FAMILIES: &[&str] = &[
     "extended-quadratic-congruence",
     "orthogonal",
     "sparse",
+    "separated",
     "m-sequence",
     "gold",
 ];
@@ -37,6 +38,8 @@ pub(super) enum FamilyFile {
     Orthogonal(OrthogonalFile),
     /// Marks drawn at random for each word.
     Sparse(SparseFile),
+    /// Marks drawn at random so that all distances between marks, of all words, differ.
+    Separated(SeparatedFile),
     /// One word of 2ⁿ − 1 chips, half of them lit, n from 3 to 15.
     MSequence(u32),
     /// Gold code: 2ⁿ + 1 words of 2ⁿ − 1 chips, about half of them lit, n one of 5, 6, 7, 9, 10, 11.
@@ -70,6 +73,25 @@ pub(super) struct SparseFile {
     seed: u64,
 }
 
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SeparatedFile {
+    /// Chips of a word, up to 65535.
+    length: u32,
+    /// Marks of a word, up to 64.
+    weight: u32,
+    /// Number of words, up to 4096.
+    words: u32,
+    /// Every distance between marks of a word is so many chips at least.
+    #[serde(default = "one")]
+    gap: u32,
+    /// Every two distances, of all words, differ by so many chips at least.
+    #[serde(default = "one")]
+    apart: u32,
+    /// What the words are drawn by.
+    seed: u64,
+}
+
 /// The gap that leaves marks as they fall.
 fn one() -> u32 {
     1
@@ -87,6 +109,9 @@ pub(super) fn family(file: FamilyFile) -> Result<Family, code::Error> {
         }
         FamilyFile::Sparse(SparseFile { length, weight, words, gap, seed }) => {
             Family::sparse(Sparse { length, weight, words, gap, seed })
+        }
+        FamilyFile::Separated(SeparatedFile { length, weight, words, gap, apart, seed }) => {
+            Family::separated(Separated { length, weight, words, gap, apart, seed })
         }
         FamilyFile::MSequence(degree) => Family::m_sequence(degree),
         FamilyFile::Gold(degree) => Family::gold(degree),
