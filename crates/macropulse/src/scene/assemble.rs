@@ -22,7 +22,7 @@ use super::motion::{Motion, Moving};
 use super::moving::{Mover, MovingShape};
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
-use super::readers::{self, WithoutMaterials};
+use super::readers::{self, Reach, Read, WithoutMaterials};
 use super::spanned::Spanned;
 use super::{Object, Scene};
 use crate::digest::Digest;
@@ -33,6 +33,8 @@ use crate::names::line_column;
 struct Assembly<'a> {
     source: Source<'a>,
     base: &'a Path,
+    /// Whether meshes may name files anywhere.
+    outside: bool,
     /// Meshes in memory, by name; they go before files.
     given: &'a BTreeMap<String, Mesh>,
     /// Materials the file defines; they go before the library.
@@ -44,6 +46,7 @@ struct Assembly<'a> {
     moving_shapes: Vec<MovingShape>,
     moving: Vec<Moving>,
     notes: Vec<String>,
+    warnings: Vec<String>,
     meshes: Meshes,
 }
 
@@ -62,6 +65,7 @@ pub(super) fn scene(
     let mut assembly = Assembly {
         source,
         base,
+        outside: file.outside_files,
         given,
         defined: vec![],
         materials: vec![],
@@ -71,6 +75,7 @@ pub(super) fn scene(
         moving_shapes: vec![],
         moving: vec![],
         notes: vec![],
+        warnings: vec![],
         meshes: Meshes::default(),
     };
     assembly.define(&file)?;
@@ -111,7 +116,7 @@ pub(super) fn scene(
     assembly.notes.extend(assumed);
     let Assembly { materials, objects, solids, placed, moving_shapes, moving, meshes, .. } =
         assembly;
-    let mut notes = assembly.notes;
+    let (mut notes, warnings) = (assembly.notes, assembly.warnings);
     // The world has triangles of its own: nothing else may hold meshes while it is made.
     drop(meshes);
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
@@ -144,6 +149,7 @@ pub(super) fn scene(
         environment,
         interferers,
         notes,
+        warnings,
         world,
         surfaces,
     })
@@ -270,9 +276,10 @@ impl Assembly<'_> {
             return self.add_shape((&name, object), (written, shape), &motions);
         }
         let origin = self.mesh_origin(&name, written)?;
-        let given = self.given;
-        let known = self.meshes.of(&origin, || read(&origin, given))?;
+        let (given, reach) = (self.given, Reach { scene: self.base, outside: self.outside });
+        let known = self.meshes.of(&origin, || read(&origin, given, reach))?;
         let mesh = Rc::clone(&known.mesh);
+        self.warnings.extend(known.left_out.iter().map(|said| format!("{name}: {said}")));
         if origin != Origin::Car {
             let ([x, y, z], count) = (known.size, mesh.triangles.len());
             self.notes.push(format!(
@@ -406,7 +413,7 @@ impl Assembly<'_> {
                         "{name}: material {own:?} is not in the library, its visible colour is \
                          taken as a diffuse reflectance of {diffuse:.2}"
                     ));
-                    self.enlist(Material::matt(&format!("{name}/{}", plain(own)), *diffuse))
+                    self.guessed(&format!("{name}/{}", plain(own)), *diffuse)
                 }
                 (None, None, None, None) => self.unnamed(&format!("{name}, {own:?}")),
             });
@@ -466,6 +473,19 @@ impl Assembly<'_> {
         self.enlist(material)
     }
 
+    /// The index of a material of this `name` and visible colour. Another of the same name is told
+    /// apart by a number.
+    fn guessed(&mut self, name: &str, diffuse: f64) -> u16 {
+        let is_other = |called: &str| {
+            let known = self.materials.iter().find(|known| known.name == called);
+            known.is_some_and(|known| known.diffuse != Diffuse::Even(diffuse))
+        };
+        let numbered = (2_u32..).map(|number| format!("{name}-{number}"));
+        let mut names = std::iter::once(name.to_owned()).chain(numbered);
+        let free = names.find(|called| !is_other(called)).unwrap_or_default();
+        self.enlist(Material::matt(&free, diffuse))
+    }
+
     /// The index of `material` in the scene, which it enters if it is new there.
     fn enlist(&mut self, material: Material) -> u16 {
         let index = self.materials.iter().position(|known| known.name == material.name);
@@ -478,12 +498,13 @@ impl Assembly<'_> {
 }
 
 /// The mesh of this origin, as its file has it, or as it is `given`.
-fn read(origin: &Origin, given: &BTreeMap<String, Mesh>) -> Result<Mesh, Error> {
+fn read(origin: &Origin, given: &BTreeMap<String, Mesh>, reach: Reach<'_>) -> Result<Read, Error> {
     match origin {
-        Origin::Car => car::mesh(),
+        Origin::Car => car::mesh().map(Read::from),
         Origin::Given { name, .. } => {
-            given.get(name).cloned().unwrap_or_default().checked(Path::new(name))
+            let mesh = given.get(name).cloned().unwrap_or_default();
+            mesh.checked(Path::new(name)).map(Read::from)
         }
-        Origin::File { path, without, .. } => readers::read(path, *without),
+        Origin::File { path, without, .. } => readers::read(path, *without, reach),
     }
 }
