@@ -12,6 +12,9 @@ use super::mesh::Mesh;
 /// Share of the area of a polygon up to which a triangle may be turned over by rounding alone.
 const ROUNDING: f64 = 1e-9;
 
+/// Most corners of a polygon with a bay: the time to cut one grows with the square of them.
+const MOST_CORNERS: usize = 1 << 15;
+
 /// Cuts polygons into triangles, and keeps its memory from one to the next.
 #[derive(Default)]
 pub(super) struct Cutter {
@@ -24,20 +27,48 @@ pub(super) struct Cutter {
 impl Cutter {
     /// Adds the polygon with these corners to `mesh`. Fewer than three add nothing; a corner that is
     /// not there is left to [`Mesh::checked`].
-    pub(super) fn add(&mut self, mesh: &mut Mesh, corners: &[u32], material: u16) {
+    ///
+    /// # Errors
+    /// If it has a bay and too many corners: what goes on after its place.
+    pub(super) fn add(
+        &mut self,
+        mesh: &mut Mesh,
+        corners: &[u32],
+        material: u16,
+    ) -> Result<(), String> {
         if corners.len() <= 3 || !self.has_bay(mesh, corners) {
-            return mesh.fan(corners, material);
+            mesh.fan(corners, material);
+            return Ok(());
+        }
+        if corners.len() > MOST_CORNERS {
+            let count = corners.len();
+            return Err(format!(
+                "has a polygon with a bay of {count} corners, more than {MOST_CORNERS}, to be \
+                 exported as triangles"
+            ));
+        }
+        let Self { flat, ears, earcut, .. } = self;
+        earcut.get_or_insert_with(Earcut::new).earcut_slice(flat, &[], ears);
+        if ears.is_empty() {
+            mesh.fan(corners, material);
+        }
+        // As the polygon is seen, so are its triangles.
+        for ear in ears.as_chunks_mut::<3>().0 {
+            let [a, b, c] = ear.map(|corner| DVec2::from(flat[corner as usize]));
+            if (b - a).perp_dot(c - a) < 0.0 {
+                ear.swap(1, 2);
+            }
         }
         for three in self.ears.as_chunks::<3>().0 {
             mesh.triangles.push(three.map(|ear| corners[ear as usize]));
             mesh.material_of_triangle.push(material);
         }
+        Ok(())
     }
 
-    /// Whether a fan would not do; then `ears` are the triangles, by the places of their corners in
-    /// the list.
+    /// Whether a fan would not do; then `flat` is the polygon in its plane.
     fn has_bay(&mut self, mesh: &Mesh, corners: &[u32]) -> bool {
-        let Self { places, flat, ears, earcut } = self;
+        let Self { places, flat, .. } = self;
         places.clear();
         let Some(first) = mesh.vertices.get(corners[0] as usize).copied().map(DVec3::from) else {
             return false;
@@ -57,15 +88,7 @@ impl Cutter {
         let (right, up) = area.normalize().any_orthonormal_pair();
         flat.clear();
         flat.extend(places.iter().map(|place| [place.dot(right), place.dot(up)]));
-        earcut.get_or_insert_with(Earcut::new).earcut_slice(flat, &[], ears);
-        // As the polygon is seen, so are its triangles.
-        for ear in ears.as_chunks_mut::<3>().0 {
-            let [a, b, c] = ear.map(|corner| DVec2::from(flat[corner as usize]));
-            if (b - a).perp_dot(c - a) < 0.0 {
-                ear.swap(1, 2);
-            }
-        }
-        !ears.is_empty()
+        true
     }
 }
 
@@ -78,7 +101,7 @@ mod tests {
     fn cut(corners: Vec<[f64; 3]>) -> Mesh {
         let count = corners.len() as u32;
         let mut mesh = Mesh { vertices: corners, ..Mesh::default() };
-        Cutter::default().add(&mut mesh, &(0..count).collect::<Vec<_>>(), 0);
+        Cutter::default().add(&mut mesh, &(0..count).collect::<Vec<_>>(), 0).unwrap();
         mesh
     }
 
@@ -106,8 +129,24 @@ mod tests {
             assert_eq!(cut(line).triangles.len(), 2);
         }
         let mut mesh = Mesh { vertices: vec![[0.0; 3]; 3], ..Mesh::default() };
-        Cutter::default().add(&mut mesh, &[0, 1, 2, 9], 0);
+        Cutter::default().add(&mut mesh, &[0, 1, 2, 9], 0).unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 9]]);
+    }
+
+    #[test]
+    fn a_polygon_of_very_many_corners_needs_to_be_convex() {
+        let many = MOST_CORNERS as u32 + 1;
+        let corner = |radius: f64, index: u32| {
+            let (sin, cos) = (f64::from(index) / f64::from(many) * 6.28).sin_cos();
+            [radius * cos, radius * sin, 0.0]
+        };
+        let round: Vec<[f64; 3]> = (0..many).map(|index| corner(1.0, index)).collect();
+        assert_eq!(cut(round.clone()).triangles.len(), MOST_CORNERS - 1);
+        let mut mesh = Mesh { vertices: round, ..Mesh::default() };
+        mesh.vertices[9] = corner(0.5, 9);
+        let corners: Vec<u32> = (0..many).collect();
+        let told = Cutter::default().add(&mut mesh, &corners, 0).unwrap_err();
+        assert!(told.starts_with("has a polygon with a bay of 32769 corners"), "{told}");
     }
 
     proptest! {

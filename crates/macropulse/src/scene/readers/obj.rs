@@ -130,7 +130,7 @@ impl Obj {
         if self.corners.iter().any(|corner| *corner as usize >= count) {
             self.early.push((number, self.corners.clone(), material));
         } else {
-            self.cutter.add(&mut self.mesh, &self.corners, material);
+            self.cutter.add(&mut self.mesh, &self.corners, material).map_err(Fault::Line)?;
         }
         Ok(())
     }
@@ -161,7 +161,8 @@ impl Obj {
                 let named = u64::from(*corner) + 1;
                 return Err((number, format!("names vertex {named}, but there are only {count}")));
             }
-            self.cutter.add(&mut self.mesh, &corners, material);
+            let cut = self.cutter.add(&mut self.mesh, &corners, material);
+            cut.map_err(|problem| (number, problem))?;
         }
         Ok(())
     }

@@ -54,7 +54,7 @@ pub(super) fn read_from(file: &mut impl BufRead, path: &Path) -> Result<Mesh, Er
             _ => body.each(element, |_: &[Other]| Ok(()))?,
         }
     }
-    faces.cut_early(&mut mesh);
+    faces.cut_early(&mut mesh).map_err(|problem| Error::mesh(path, problem, DAMAGED))?;
     Ok(mesh)
 }
 
@@ -240,7 +240,7 @@ impl Faces {
             if mesh.vertices.is_empty() {
                 self.early.push((self.corners.clone(), material));
             } else {
-                self.cutter.add(mesh, &self.corners, material);
+                self.cutter.add(mesh, &self.corners, material)?;
             }
         }
         Ok(())
@@ -267,10 +267,11 @@ impl Faces {
     }
 
     /// Adds the faces that were told before the vertices.
-    fn cut_early(&mut self, mesh: &mut Mesh) {
+    fn cut_early(&mut self, mesh: &mut Mesh) -> Result<(), String> {
         for (corners, material) in std::mem::take(&mut self.early) {
-            self.cutter.add(mesh, &corners, material);
+            self.cutter.add(mesh, &corners, material)?;
         }
+        Ok(())
     }
 }
 

@@ -3,7 +3,9 @@
 //! Of the text only corners and the ends of their loops count: how many solids there are, what they
 //! are called and where their normals point does not change what light meets.
 
+use std::array;
 use std::io::{BufRead, Read};
+use std::ops::Range;
 use std::path::Path;
 
 use super::lines::{Lines, numbers};
@@ -17,8 +19,6 @@ const HEADER: usize = 84;
 
 /// Bytes of a facet: its normal and three corners as floats, and two bytes that say anything.
 const FACET: usize = 50;
-
-const TOO_MANY: &str = "has more corners than can be counted";
 
 pub(super) fn read(path: &Path) -> Result<Mesh, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
@@ -59,10 +59,10 @@ fn binary(file: &mut impl Read, path: &Path, length: u64) -> Result<Mesh, Error>
     let mut facet = [0; FACET];
     for index in 0..count {
         file.read_exact(&mut facet).map_err(|_| damaged(format!("ends within facet {index}")))?;
-        let numbers = facet[12..48].as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
-        let numbers: Vec<f64> = numbers.map(f64::from).collect();
-        add(&mut mesh, numbers.as_chunks().0, |mesh, corners| mesh.fan(corners, material))
-            .ok_or_else(|| Error::mesh(path, TOO_MANY, "export it in parts"))?;
+        let numbers = facet[12..48].as_chunks().0;
+        let numbers: [f64; 9] = array::from_fn(|axis| f32::from_le_bytes(numbers[axis]).into());
+        let own = add(&mut mesh, numbers.as_chunks().0).map_err(damaged)?;
+        mesh.fan(&[own.start, own.start + 1, own.start + 2], material);
     }
     Ok(mesh)
 }
@@ -112,10 +112,8 @@ impl Text {
                 if count < 3 {
                     return Err(format!("ends a facet of {count} corners"));
                 }
-                add(&mut self.mesh, &self.corners, |mesh, own| {
-                    self.cutter.add(mesh, own, material)
-                })
-                .ok_or(TOO_MANY)?;
+                let own: Vec<u32> = add(&mut self.mesh, &self.corners)?.collect();
+                self.cutter.add(&mut self.mesh, &own, material)?;
                 self.corners.clear();
             } else if is("facet") {
                 self.is_open = true;
@@ -130,14 +128,13 @@ impl Text {
     }
 }
 
-/// Adds a facet with corners of its own, of which `face` makes triangles; `None` where they cannot be
-/// counted any more.
-fn add(mesh: &mut Mesh, corners: &[[f64; 3]], face: impl FnOnce(&mut Mesh, &[u32])) -> Option<()> {
-    let first = u32::try_from(mesh.vertices.len()).ok()?;
-    let end = first.checked_add(u32::try_from(corners.len()).ok()?)?;
+/// Adds the corners of a facet, which no other shares; gives their indices.
+fn add(mesh: &mut Mesh, corners: &[[f64; 3]]) -> Result<Range<u32>, String> {
+    let index = |index| u32::try_from(index).map_err(|_| "has more corners than can be counted");
+    let count = mesh.vertices.len();
+    let own = index(count)?..index(count + corners.len())?;
     mesh.vertices.extend(corners);
-    face(mesh, &(first..end).collect::<Vec<_>>());
-    Some(())
+    Ok(own)
 }
 
 #[cfg(test)]
