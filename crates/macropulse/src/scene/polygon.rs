@@ -80,9 +80,10 @@ impl Cutter {
         // The area of a polygon as a vector is the sum of those of its fan, whatever its shape.
         let fan = || places.windows(2).map(|edge| edge[0].cross(edge[1]));
         let area: DVec3 = fan().sum();
-        let least = -ROUNDING * area.length_squared();
+        let square = area.length_squared();
         // What has no area, or is nowhere, has no plane.
-        if !(area.length_squared() > 0.0) || fan().all(|one| one.dot(area) >= least) {
+        let has_plane = square > 0.0 && square.is_finite();
+        if !has_plane || fan().all(|one| one.dot(area) >= -ROUNDING * square) {
             return false;
         }
         let (right, up) = area.normalize().any_orthonormal_pair();
@@ -137,7 +138,7 @@ mod tests {
     fn a_polygon_of_very_many_corners_needs_to_be_convex() {
         let many = MOST_CORNERS as u32 + 1;
         let corner = |radius: f64, index: u32| {
-            let (sin, cos) = (f64::from(index) / f64::from(many) * 6.28).sin_cos();
+            let (sin, cos) = (f64::from(index) / f64::from(many) * 6.0).sin_cos();
             [radius * cos, radius * sin, 0.0]
         };
         let round: Vec<[f64; 3]> = (0..many).map(|index| corner(1.0, index)).collect();

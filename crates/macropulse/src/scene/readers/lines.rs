@@ -17,6 +17,7 @@ const UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 pub(super) struct Lines<'a, R> {
     file: &'a mut R,
     path: &'a Path,
+    is_joined: bool,
     line: Vec<u8>,
     /// Of the line that was read last, from 1; of several that belong together, of the first.
     number: usize,
@@ -37,32 +38,27 @@ impl<'a, R: BufRead> Lines<'a, R> {
         if begins.starts_with(UTF_8) {
             file.consume(UTF_8.len());
         }
-        Ok(Self { file, path, line: Vec::new(), number: 0, read: 0 })
+        Ok(Self { file, path, is_joined: false, line: Vec::new(), number: 0, read: 0 })
     }
 
-    /// The next line without its end, and its number, from 1; `None` behind the last.
+    /// The same, where `\` at the end of a line leads on to the next, but for remarks.
+    pub(super) fn joined(self) -> Self {
+        Self { is_joined: true, ..self }
+    }
+
+    /// The next line without its end, and its number, from 1: the first of several that are joined.
+    /// `None` behind the last.
     ///
     /// # Errors
     /// If the file cannot be read, or a line is longer than any of a text.
     pub(super) fn next(&mut self) -> Result<Option<(usize, Cow<'_, str>)>, Error> {
         self.line.clear();
         self.number = self.read + 1;
-        Ok(if self.extend()? { Some((self.number, text(&self.line))) } else { None })
-    }
-
-    /// As [`Lines::next`], with the lines behind it to which `\` at the end of each leads on. The
-    /// end of a remark is none. The number is that of the first.
-    ///
-    /// # Errors
-    /// As [`Lines::next`].
-    pub(super) fn next_joined(&mut self) -> Result<Option<(usize, Cow<'_, str>)>, Error> {
-        self.line.clear();
-        self.number = self.read + 1;
         if !self.extend()? {
             return Ok(None);
         }
         let is_remark = self.line.trim_ascii_start().starts_with(b"#");
-        while !is_remark && self.line.ends_with(b"\\") {
+        while self.is_joined && !is_remark && self.line.ends_with(b"\\") {
             self.line.pop();
             self.line.push(b' ');
             if !self.extend()? {
@@ -72,8 +68,27 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Ok(Some((self.number, text(&self.line))))
     }
 
+    /// Lets `take` have the number of each line and the line; what that says is wrong with it, and
+    /// then what to do.
+    ///
+    /// # Errors
+    /// As [`Lines::next`], and what `take` says.
+    pub(super) fn each(
+        &mut self,
+        remedy: &str,
+        mut take: impl FnMut(usize, &str) -> Result<(), String>,
+    ) -> Result<(), Error> {
+        while let Some((number, line)) = self.next()? {
+            if let Err(problem) = take(number, &line) {
+                drop(line);
+                return Err(self.fault(problem, remedy));
+            }
+        }
+        Ok(())
+    }
+
     /// What is wrong in the line that was read last.
-    pub(super) fn fault(&self, problem: impl AsRef<str>, remedy: &str) -> Error {
+    fn fault(&self, problem: impl AsRef<str>, remedy: &str) -> Error {
         let number = self.number;
         Error::mesh(self.path, format!("line {number} {}", problem.as_ref()), remedy)
     }
@@ -145,9 +160,9 @@ mod tests {
     use super::*;
 
     fn lines(mut bytes: &[u8]) -> Vec<(usize, String)> {
-        let mut lines = Lines::of(&mut bytes, Path::new("a.obj")).unwrap();
+        let mut lines = Lines::of(&mut bytes, Path::new("a.obj")).unwrap().joined();
         let mut found = Vec::new();
-        while let Some((number, line)) = lines.next_joined().unwrap() {
+        while let Some((number, line)) = lines.next().unwrap() {
             found.push((number, line.into_owned()));
         }
         found

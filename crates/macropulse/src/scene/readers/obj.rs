@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::lines::{Lines, numbers};
-use super::{DAMAGED, Reach, Read, WithoutMaterials, no_surfaces, open, too_many_materials};
+use super::{DAMAGED, Reach, Read, WithoutMaterials, no_surfaces, open};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
 use crate::scene::polygon::Cutter;
@@ -21,18 +21,9 @@ pub(super) fn read(
     reach: Reach<'_>,
 ) -> Result<Read, Error> {
     let mut file = open(path)?;
-    let mut lines = Lines::of(&mut file, path)?;
     let mut obj = Obj::default();
-    loop {
-        let done = match lines.next_joined()? {
-            Some((number, line)) => obj.line(number, &line),
-            None => break,
-        };
-        done.map_err(|fault| match fault {
-            Fault::Line(problem) => lines.fault(problem, DAMAGED),
-            Fault::Materials => too_many_materials(path),
-        })?;
-    }
+    let mut lines = Lines::of(&mut file, path)?.joined();
+    lines.each(DAMAGED, |number, line| obj.line(number, line))?;
     obj.cut_early().map_err(|(number, problem)| {
         Error::mesh(path, format!("line {number} {problem}"), DAMAGED)
     })?;
@@ -52,6 +43,8 @@ pub(super) fn read(
     }
     Ok(Read { mesh, left_out })
 }
+
+const TOO_MANY: &str = "has one material more than the 65536 that can be told apart";
 
 /// What has been read so far.
 #[derive(Default)]
@@ -73,23 +66,15 @@ struct Obj {
     has_free_form: bool,
 }
 
-/// What is wrong.
-enum Fault {
-    /// With a line: what goes on after its number.
-    Line(String),
-    /// There are too many materials.
-    Materials,
-}
-
 impl Obj {
-    fn line(&mut self, number: usize, line: &str) -> Result<(), Fault> {
+    fn line(&mut self, number: usize, line: &str) -> Result<(), String> {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         // A name may have a hash in it; among numbers a remark begins there.
         let words = || rest.split_whitespace().take_while(|word| !word.starts_with('#'));
         match word {
-            "v" => self.vertex(&mut words()).map_err(Fault::Line)?,
+            "v" => self.vertex(&mut words())?,
             "f" => self.face(number, words())?,
             "l" => self.lines += 1,
             "p" => self.points += words().count(),
@@ -117,11 +102,11 @@ impl Obj {
         &mut self,
         number: usize,
         words: impl Iterator<Item = &'a str>,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), String> {
         self.corners.clear();
         let count = self.mesh.vertices.len();
         for word in words {
-            self.corners.push(corner(word, count).map_err(Fault::Line)?);
+            self.corners.push(corner(word, count)?);
         }
         if self.corners.len() < 3 {
             return Ok(());
@@ -130,13 +115,13 @@ impl Obj {
         if self.corners.iter().any(|corner| *corner as usize >= count) {
             self.early.push((number, self.corners.clone(), material));
         } else {
-            self.cutter.add(&mut self.mesh, &self.corners, material).map_err(Fault::Line)?;
+            self.cutter.add(&mut self.mesh, &self.corners, material)?;
         }
         Ok(())
     }
 
     /// The index of what the face is made of.
-    fn material(&mut self) -> Result<u16, Fault> {
+    fn material(&mut self) -> Result<u16, String> {
         let (name, index) = &mut self.material;
         if let Some(index) = index {
             return Ok(*index);
@@ -144,7 +129,7 @@ impl Obj {
         let found = match self.materials.get(name) {
             Some(known) => *known,
             None => {
-                let new = self.mesh.add_material(name, None).ok_or(Fault::Materials)?;
+                let new = self.mesh.add_material(name, None).ok_or(TOO_MANY)?;
                 self.materials.insert(name.clone(), new);
                 new
             }

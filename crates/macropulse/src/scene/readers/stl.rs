@@ -71,13 +71,7 @@ fn text(file: &mut impl BufRead, path: &Path) -> Result<Mesh, Error> {
     let mut lines = Lines::of(file, path)?;
     let mut text = Text::default();
     text.material = text.mesh.material("").unwrap_or_default();
-    loop {
-        let done = match lines.next()? {
-            Some((_, line)) => text.line(&line),
-            None => break,
-        };
-        done.map_err(|problem| lines.fault(problem, DAMAGED))?;
-    }
+    lines.each(DAMAGED, |_, line| text.line(line))?;
     if text.is_open || !text.corners.is_empty() {
         return Err(Error::mesh(path, "ends within a facet", DAMAGED));
     }

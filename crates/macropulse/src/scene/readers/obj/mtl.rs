@@ -58,14 +58,8 @@ pub(super) fn read(path: &Path, library: &mut Library) -> Result<(), Error> {
     let mut lines = Lines::of(&mut file, path)?;
     // The material that is told about, unless it is known already.
     let mut name: Option<String> = None;
-    loop {
-        let done = match lines.next()? {
-            Some((_, line)) => told(line.trim(), &mut name, library),
-            None => return Ok(()),
-        };
-        let remedy = "mend it, or give the object `material = \"…\"`";
-        done.map_err(|problem| lines.fault(problem, remedy))?;
-    }
+    let remedy = "mend it, or give the object `material = \"…\"`";
+    lines.each(remedy, |_, line| told(line.trim(), &mut name, library))
 }
 
 /// Takes in a line, of the material called `name`.
