@@ -64,7 +64,9 @@ def test_what_a_mesh_names_and_what_is_left_out_of_it(tmp_path):
     lines = ["mtllib ../paint.mtl", *(f"v {x} {y} {z}" for x, y, z in CORNERS)]
     lines += ["usemtl paint", "f 1 2 3", "l 1 2"]
     (folder / "plate.obj").write_text("\n".join(lines) + "\n")
-    text = 'version = 1\n[[object]]\nname = "plate"\nmesh = "plate.obj"\n'
+    text = (
+        'version = 1\n[[object]]\nname = "plate"\nmesh = "plate.obj"\nposition_m = [25, 0, 0]\n'
+    )
     (folder / "plate.toml").write_text(text)
     with pytest.raises(mp.Error, match="names ../paint.mtl, which lies outside the folder"):
         mp.Scene(folder / "plate.toml")
