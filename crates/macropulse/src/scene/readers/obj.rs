@@ -5,7 +5,7 @@
 
 mod mtl;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::lines::{Lines, numbers};
@@ -31,10 +31,14 @@ pub(super) fn read(
     let mut mesh = obj.mesh;
     // Colours are guesses for objects without a material of their own.
     if without == WithoutMaterials::Refused {
-        let mut library = Library::new();
+        let (mut library, mut known) = (Library::new(), HashSet::new());
         for named in &obj.libraries {
             for file in mtl::files(path, named, reach)? {
-                mtl::read(&file, &mut library)?;
+                // Some programs name it again before every part.
+                if !known.contains(&file) {
+                    mtl::read(&file, &mut library)?;
+                    known.insert(file);
+                }
             }
         }
         for (name, guess) in mesh.material_names.iter().zip(&mut mesh.diffuse_guesses) {
