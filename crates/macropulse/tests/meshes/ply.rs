@@ -60,6 +60,8 @@ fn what_is_no_surface_is_left_out_and_what_is_wrong_is_told_with_its_line() {
     let told = refused("a.ply", text.replace("5\n", "9\n"));
     assert!(told.contains("names vertex 9"), "{told}");
     assert!(refused("a.ply", "ply\nformat ascii 1.0\nelement point 1\n").contains("end_header"));
+    let told = refused("a.ply", text.replace("vertex 6", "vertex 4000000000"));
+    assert!(told.contains("says that it has 4000000001 elements, more than 67108864"), "{told}");
     let told = refused("a.ply", text.replace("property float z\n", ""));
     assert!(told.contains("without x, y or z"), "{told}");
 }

@@ -21,6 +21,9 @@ use crate::scene::polygon::Cutter;
 /// Longer headers are none, bytes.
 const LONGEST_HEADER: usize = 1 << 20;
 
+/// Most vertices, faces and other elements together.
+const MOST_ELEMENTS: usize = 1 << 26;
+
 /// So many elements are read at once, before they are laid into the mesh.
 const AT_ONCE: usize = 1 << 14;
 
@@ -83,10 +86,16 @@ fn header(file: &mut impl BufRead, path: &Path) -> Result<(Header, usize), Error
     let mut reader = Reader::new(Cursor::new(text));
     let header = Parser::<DefaultElement>::new().read_header(&mut reader);
     let header = header.map_err(|fault| damaged(&told(&fault, 0)))?;
+    let mut elements = 0_usize;
     for (name, element) in &header.elements {
         if let Some(problem) = lacks(name, element) {
             return Err(damaged(&problem));
         }
+        elements = elements.saturating_add(element.count);
+    }
+    if elements > MOST_ELEMENTS {
+        let problem = format!("says that it has {elements} elements, more than {MOST_ELEMENTS}");
+        return Err(Error::mesh(path, problem, "export it in parts"));
     }
     Ok((header, count))
 }
