@@ -112,6 +112,23 @@ impl Changes {
     }
 }
 
+/// What the files of a scene may name.
+#[derive(Args)]
+pub struct Outside {
+    /// Let meshes name files outside the folder of their scene, as materials and buffers: short for
+    /// --set scene:outside_files=true
+    #[arg(long = "outside-files")]
+    is_allowed: bool,
+}
+
+impl Outside {
+    /// The change of a scene that allows it.
+    pub fn changes(&self) -> Vec<(String, String)> {
+        let allowed = self.is_allowed.then_some(("outside_files", "true"));
+        allowed.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect()
+    }
+}
+
 /// Sun and air in place of those of the scene.
 #[derive(Args, Default)]
 pub struct Surroundings {

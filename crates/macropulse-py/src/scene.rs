@@ -24,7 +24,8 @@ use crate::work;
 ///     name_or_path: A ready one, as `macropulse.scenes()` lists them, or a TOML file.
 ///     changes: Values that are changed: dotted keys of the scene file, in which an object is called
 ///         by its name and a coordinate x, y or z, as `{"object.wall.position_m.x": 30}`;
-///         `{"environment": "fog-50m"}` for sun and air.
+///         `{"environment": "fog-50m"}` for sun and air; `{"outside_files": True}` lets meshes name
+///         files outside the folder of the scene.
 ///
 /// Raises:
 ///     Error: If a name, a key or a value is wrong; the sentence says where, and what to do.
@@ -268,6 +269,12 @@ impl Scene {
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.scene.notes.clone()
+    }
+
+    /// What is left out of what its files hold: lines, skins, animations.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.scene.warnings.clone()
     }
 
     /// A hash of everything that decides what light meets.

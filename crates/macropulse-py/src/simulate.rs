@@ -68,6 +68,7 @@ impl Stage {
 
     /// What the program writes of a run of this scan.
     fn manifest(&self, number: u64, score: &Score, tally: &Tally) -> Value {
+        let warnings = [&self.design.warnings[..], &self.scene.warnings].concat();
         let run = Run {
             design: &self.design,
             scene: &self.scene,
@@ -76,7 +77,7 @@ impl Stage {
             tally,
             score,
             files: &[],
-            warnings: &self.design.warnings,
+            warnings: &warnings,
             writing: 0.0,
             elapsed: 0.0,
         };

@@ -57,6 +57,31 @@ def test_an_own_mesh_in_a_dictionary(tmp_path):
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(mesh)).vertices, mesh.vertices)
 
 
+def test_what_a_mesh_names_and_what_is_left_out_of_it(tmp_path):
+    folder = tmp_path / "yard"
+    folder.mkdir()
+    (tmp_path / "paint.mtl").write_text("newmtl paint\nKd 0.25\n")
+    lines = ["mtllib ../paint.mtl", *(f"v {x} {y} {z}" for x, y, z in CORNERS)]
+    lines += ["usemtl paint", "f 1 2 3", "l 1 2"]
+    (folder / "plate.obj").write_text("\n".join(lines) + "\n")
+    text = (
+        'version = 1\n[[object]]\nname = "plate"\nmesh = "plate.obj"\nposition_m = [25, 0, 0]\n'
+    )
+    (folder / "plate.toml").write_text(text)
+    with pytest.raises(mp.Error, match="names ../paint.mtl, which lies outside the folder"):
+        mp.Scene(folder / "plate.toml")
+    allowed = mp.Scene(folder / "plate.toml", {"outside_files": True})
+    assert allowed.materials == ["plate/paint"]
+    left_out = ["plate: 1 line is no surface, and is left out"]
+    assert allowed.warnings == left_out
+    assert mp.Scene.from_toml("outside_files = true\n" + text, folder).digest == allowed.digest
+    table = {"outside_files": True, "object": [{"name": "plate", "mesh": "plate.obj"}]}
+    assert mp.Scene.from_dict(table, folder).warnings == left_out
+    again = pickle.loads(pickle.dumps(allowed))
+    assert again.digest == allowed.digest and again.warnings == left_out
+    assert mp.simulate("peregrine", again, seed=1).manifest["warnings"] == left_out
+
+
 def test_a_car_at_any_range():
     for range_m in (12.5, 30, 41):
         scan = mp.simulate("kim-park-2016-fixed", mp.Scene.car(range_m), seed=1)

@@ -209,7 +209,7 @@ fn broken_meshes_are_refused_with_what_to_do() {
     for (name, wanted) in [
         ("points.obj", "holds no triangles"),
         ("index.obj", "export it again"),
-        ("nan.obj", "vertex 0"),
+        ("nan.obj", "line 1 has \"nan\" where a number"),
         ("cut.stl", "cut short"),
         ("cut.ply", "cut short"),
         ("cut.glb", "cut short"),

@@ -14,7 +14,7 @@ use crate::completions;
 use crate::fault::Fault;
 use crate::input;
 use crate::kind::Kind;
-use crate::options::{Changes, Common, Surroundings};
+use crate::options::{Changes, Common, Outside, Surroundings};
 use crate::simulate::scenario::Scenario;
 use crate::text::{Columns, counted, print, print_json};
 
@@ -37,6 +37,9 @@ pub struct Check {
     #[command(flatten)]
     changes: Changes,
 
+    #[command(flatten)]
+    outside: Outside,
+
     /// Print as JSON: an object, or an array of them for several files
     #[arg(long)]
     json: bool,
@@ -47,7 +50,7 @@ pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
     let mut reports = Vec::new();
     let mut wrong = false;
     for file in &options.files {
-        match Report::of(file, &changes) {
+        match Report::of(file, &changes, &options.outside) {
             Ok(report) => reports.push(report),
             Err(fault) => {
                 fault.report();
@@ -77,14 +80,17 @@ struct Report {
 }
 
 impl Report {
-    fn of(name: &str, changes: &scenes::Changes) -> Result<Self, Fault> {
+    fn of(name: &str, changes: &scenes::Changes, outside: &Outside) -> Result<Self, Fault> {
+        // A sensor beside the scenes has no use for it, and is checked all the same.
+        let mut of_scenes = changes.clone();
+        of_scenes.of_scene.extend(outside.changes());
         match Kind::of(name)? {
             Kind::Sensor => {
                 let environment = Surroundings::alone(changes)?;
                 sensor::report(&input::design(name, &changes.of_sensor)?, &environment)
             }
-            Kind::Scene => Ok(scene::report(&input::scene(name, &changes.of_scene)?)),
-            Kind::Scenario => Ok(scenario(name, &Scenario::open(name, changes)?)),
+            Kind::Scene => Ok(scene::report(&input::scene(name, &of_scenes.of_scene)?)),
+            Kind::Scenario => Ok(scenario(name, &Scenario::open(name, &of_scenes)?)),
         }
     }
 }
@@ -108,6 +114,7 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
         .designs
         .iter()
         .flat_map(|design| design.warnings.iter().map(|w| format!("{}: {w}", design.name)))
+        .chain(scenario.scene.warnings.iter().cloned())
         .collect();
     columns.push_list("warnings", warnings.iter().cloned());
     columns.push_list("assumed", scenario.scene.notes.iter().cloned());

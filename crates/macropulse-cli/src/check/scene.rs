@@ -34,6 +34,7 @@ pub fn report(scene: &Scene) -> Report {
         "assumed",
         if scene.notes.is_empty() { vec!["nothing".into()] } else { notes.collect() },
     );
+    columns.push_list("warnings", scene.warnings.iter().cloned());
     Report {
         text: format!("{}: a scene\n\n{}", scene.name, columns.text()),
         json: json!({
@@ -58,6 +59,7 @@ pub fn report(scene: &Scene) -> Report {
             "interferers": scene.interferers.iter().map(json).collect::<Vec<_>>(),
             "digest": scene.digest(),
             "assumed": scene.notes,
+            "warnings": scene.warnings,
         }),
     }
 }

@@ -71,6 +71,9 @@ pub struct Simulate {
     #[command(flatten)]
     changes: options::Changes,
 
+    #[command(flatten)]
+    outside: options::Outside,
+
     /// Receiver that decodes the macropulses: short for --set receiver.kind=…
     #[arg(long, value_name = "KIND")]
     receiver: Option<ReceiverName>,
@@ -120,6 +123,7 @@ impl Simulate {
     /// What is to be done, all of it checked.
     fn scenario(&self) -> Result<Scenario, Fault> {
         let mut changes = self.changes.apart(&self.surroundings)?;
+        changes.of_scene.extend(self.outside.changes());
         if let Some(kind) = self.receiver.and_then(|receiver| receiver.to_possible_value()) {
             changes.of_sensor.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
         }

@@ -164,7 +164,7 @@ impl<'a> Run<'a> {
             folder: String::new(),
             files: Vec::new(),
             explained: Vec::new(),
-            warnings: design.warnings.clone(),
+            warnings: [&design.warnings[..], &scenario.scene.warnings].concat(),
         }
     }
 

@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::scene;
 use macropulse::sim::Watch;
 use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
 
@@ -16,7 +17,7 @@ use crate::folder::refuse_no_folder;
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
-use crate::options::{Changes, Common, Surroundings};
+use crate::options::{Changes, Common, Outside, Surroundings};
 use crate::progress::Progress;
 use crate::text::{NO_BREAK, counted, print};
 
@@ -59,6 +60,9 @@ pub struct Sweep {
 
     #[command(flatten)]
     changes: Changes,
+
+    #[command(flatten)]
+    outside: Outside,
 
     /// Scores, with commas between them
     #[arg(long, value_name = "LIST", default_value = "pd,wrong,precision")]
@@ -136,10 +140,13 @@ impl Sweep {
         if let [sensor] = &sensors[..] {
             kind::in_order("sweep", sensor, &scene)?;
         }
+        let mut set = self.changes.all(&self.surroundings)?;
+        let outside = self.outside.changes().into_iter();
+        set.extend(outside.map(|(key, value)| (format!("{}{key}", scene::OF_SCENE), value)));
         Ok(Request {
             sensors,
             scene,
-            set: self.changes.all(&self.surroundings)?,
+            set,
             vary: self.vary.clone(),
             seeds: self.seed..self.seed + self.seeds,
             shots: self.shots,

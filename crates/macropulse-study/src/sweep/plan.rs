@@ -71,7 +71,7 @@ pub struct Point {
     pub defaults: Entries<Value>,
     /// What was assumed in reading the scene.
     pub assumed: Vec<String>,
-    /// Warnings of the sensor.
+    /// Warnings of the sensor and of the scene.
     pub warnings: Vec<String>,
     /// The whole sensor as TOML.
     pub(super) text: String,
@@ -206,7 +206,7 @@ impl Point {
                 .map(|effect| effect.name.to_owned())
                 .collect(),
             assumed: scene.notes.clone(),
-            warnings: design.warnings.clone(),
+            warnings: [&design.warnings[..], &scene.warnings].concat(),
             defaults: defaults(&design),
             text: design.text,
             bands,

@@ -1,5 +1,6 @@
 //! From a scene file as typed to a scene that can be hit by rays.
 
+mod materials;
 mod shapes;
 
 use std::collections::{BTreeMap, HashMap};
@@ -15,14 +16,14 @@ use super::error::Error;
 use super::file::{Axis, Ground, ObjectTyped, SceneFile, Source, Stand, Unit, object_names};
 use super::inside;
 use super::interferer;
-use super::material::{self, Diffuse, Material, plain};
+use super::material::Material;
 use super::mesh::Mesh;
 use super::meshes::{Meshes, Origin};
 use super::motion::{Motion, Moving};
 use super::moving::{Mover, MovingShape};
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
-use super::readers::{self, WithoutMaterials};
+use super::readers::{self, Reach, Read, WithoutMaterials};
 use super::spanned::Spanned;
 use super::{Object, Scene};
 use crate::digest::Digest;
@@ -33,6 +34,8 @@ use crate::names::line_column;
 struct Assembly<'a> {
     source: Source<'a>,
     base: &'a Path,
+    /// Whether meshes may name files anywhere.
+    outside: bool,
     /// Meshes in memory, by name; they go before files.
     given: &'a BTreeMap<String, Mesh>,
     /// Materials the file defines; they go before the library.
@@ -44,6 +47,7 @@ struct Assembly<'a> {
     moving_shapes: Vec<MovingShape>,
     moving: Vec<Moving>,
     notes: Vec<String>,
+    warnings: Vec<String>,
     meshes: Meshes,
 }
 
@@ -62,6 +66,7 @@ pub(super) fn scene(
     let mut assembly = Assembly {
         source,
         base,
+        outside: file.outside_files,
         given,
         defined: vec![],
         materials: vec![],
@@ -71,6 +76,7 @@ pub(super) fn scene(
         moving_shapes: vec![],
         moving: vec![],
         notes: vec![],
+        warnings: vec![],
         meshes: Meshes::default(),
     };
     assembly.define(&file)?;
@@ -111,7 +117,7 @@ pub(super) fn scene(
     assembly.notes.extend(assumed);
     let Assembly { materials, objects, solids, placed, moving_shapes, moving, meshes, .. } =
         assembly;
-    let mut notes = assembly.notes;
+    let (mut notes, warnings) = (assembly.notes, assembly.warnings);
     // The world has triangles of its own: nothing else may hold meshes while it is made.
     drop(meshes);
     let name = file.name.unwrap_or_else(|| source.origin.to_owned());
@@ -144,6 +150,7 @@ pub(super) fn scene(
         environment,
         interferers,
         notes,
+        warnings,
         world,
         surfaces,
     })
@@ -153,46 +160,6 @@ pub(super) fn scene(
 const USUAL_SIZES: RangeInclusive<f64> = 0.02..=1000.0;
 
 impl Assembly<'_> {
-    fn define(&mut self, file: &SceneFile) -> Result<(), Error> {
-        for typed in &file.materials {
-            let defined = typed.get_ref();
-            // A name of the library overrides that entry and keeps what is not typed.
-            let mut made =
-                material::named(&defined.name).unwrap_or_else(|| Material::matt("", 0.0));
-            if made.name.is_empty() && defined.diffuse.is_none() {
-                let message = format!(
-                    "material {:?} is not in the library, so it needs at least `diffuse`",
-                    defined.name
-                );
-                return Err(self.source.fault(typed.span(), message));
-            }
-            made.name = plain(&defined.name);
-            let mut diffuse = 0.0;
-            let fields = [
-                (&defined.diffuse, &mut diffuse, "diffuse", 1.0),
-                (&defined.specular, &mut made.specular, "specular", 1e4),
-                (&defined.gloss, &mut made.gloss, "gloss", 1e6),
-                (&defined.retro, &mut made.retro, "retro", 1e5),
-                (&defined.transmission, &mut made.transmission, "transmission", 1.0),
-            ];
-            for (typed, field, key, most) in fields {
-                let Some(typed) = typed else { continue };
-                let value = *typed.get_ref();
-                if !(0.0..=most).contains(&value) {
-                    let message = format!("{key} is {value}; it must be from 0 to {most}");
-                    return Err(self.source.fault(typed.span(), message));
-                }
-                *field = value;
-            }
-            if defined.diffuse.is_some() {
-                made.diffuse = Diffuse::Even(diffuse);
-            }
-            self.defined.retain(|known| known.name != made.name);
-            self.defined.push(made);
-        }
-        Ok(())
-    }
-
     /// Sun and air; those of a clear day where the file names none.
     fn environment(&mut self, file: &SceneFile) -> Result<Environment, Error> {
         let Some(typed) = &file.environment else {
@@ -270,9 +237,10 @@ impl Assembly<'_> {
             return self.add_shape((&name, object), (written, shape), &motions);
         }
         let origin = self.mesh_origin(&name, written)?;
-        let given = self.given;
-        let known = self.meshes.of(&origin, || read(&origin, given))?;
+        let (given, reach) = (self.given, Reach { scene: self.base, outside: self.outside });
+        let known = self.meshes.of(&origin, || read(&origin, given, reach))?;
         let mesh = Rc::clone(&known.mesh);
+        self.warnings.extend(known.left_out.iter().map(|said| format!("{name}: {said}")));
         if origin != Origin::Car {
             let ([x, y, z], count) = (known.size, mesh.triangles.len());
             self.notes.push(format!(
@@ -367,53 +335,6 @@ impl Assembly<'_> {
         Ok((DVec3::from(up.vector()), DVec3::from(forward.vector())))
     }
 
-    /// For each material of the mesh, the index of the one it stands for in the scene.
-    fn material_indices(
-        &mut self,
-        name: &str,
-        written: &ObjectTyped,
-        mesh: &Mesh,
-    ) -> Result<Vec<u16>, Error> {
-        for (wanted, typed) in &written.materials {
-            if !mesh.material_names.contains(wanted) {
-                let own: Vec<&str> = mesh
-                    .material_names
-                    .iter()
-                    .map(String::as_str)
-                    .filter(|n| !n.is_empty())
-                    .collect();
-                let message = if own.is_empty() {
-                    format!(
-                        "the mesh of {name} names no materials; give all of it `material = \"…\"`"
-                    )
-                } else {
-                    format!(
-                        "the mesh of {name} has no material {wanted:?}; it has {}",
-                        own.join(", ")
-                    )
-                };
-                return Err(self.source.fault(typed.span(), message));
-            }
-        }
-        let mut indices = Vec::with_capacity(mesh.material_names.len());
-        for (own, guess) in mesh.material_names.iter().zip(&mesh.diffuse_guesses) {
-            let known = self.known(own);
-            indices.push(match (written.materials.get(own), &written.material, known, guess) {
-                (Some(typed), ..) | (None, Some(typed), ..) => self.material_typed(typed)?,
-                (None, None, Some(known), _) => self.enlist(known),
-                (None, None, None, Some(diffuse)) => {
-                    self.notes.push(format!(
-                        "{name}: material {own:?} is not in the library, its visible colour is \
-                         taken as a diffuse reflectance of {diffuse:.2}"
-                    ));
-                    self.enlist(Material::matt(&format!("{name}/{}", plain(own)), *diffuse))
-                }
-                (None, None, None, None) => self.unnamed(&format!("{name}, {own:?}")),
-            });
-        }
-        Ok(indices)
-    }
-
     /// Where the thing called `name` stands and how it moves; enters it among what moves.
     fn motion(&mut self, name: &str, stand: &Stand) -> Result<Motion, Error> {
         let motion = self.source.motion(stand)?;
@@ -430,60 +351,16 @@ impl Assembly<'_> {
         self.objects.push(Object { name, is_target });
         Ok(index)
     }
-
-    /// The material of this name: as the file defines it, else from the library.
-    fn known(&self, name: &str) -> Option<Material> {
-        let wanted = plain(name);
-        let defined = self.defined.iter().find(|known| known.name == wanted).cloned();
-        defined.or_else(|| material::named(name))
-    }
-
-    fn material_typed(&mut self, typed: &Spanned<String>) -> Result<u16, Error> {
-        let name = typed.get_ref();
-        if let Some(known) = self.known(name) {
-            return Ok(self.enlist(known));
-        }
-        let library: Vec<Material> =
-            self.defined.iter().cloned().chain(material::library()).collect();
-        let names = || library.iter().map(|known| known.name.as_str());
-        let message = match crate::names::nearest(&plain(name), names()) {
-            Some(near) => format!("there is no material {name:?}; did you mean {near:?}?"),
-            None => format!(
-                "there is no material {name:?}; define it as [[material]] or use one of {}",
-                names().collect::<Vec<_>>().join(", ")
-            ),
-        };
-        Err(self.source.fault(typed.span(), message))
-    }
-
-    fn unnamed(&mut self, whose: &str) -> u16 {
-        let material =
-            self.known(material::UNNAMED).unwrap_or_else(|| Material::matt(material::UNNAMED, 0.3));
-        // One number for all wavelengths, whether it is the library's or the file's.
-        let diffuse = material.diffuse.at(0.0);
-        self.notes
-            .push(format!("{whose}: no known material, diffuse reflectance {diffuse} is assumed"));
-        self.enlist(material)
-    }
-
-    /// The index of `material` in the scene, which it enters if it is new there.
-    fn enlist(&mut self, material: Material) -> u16 {
-        let index = self.materials.iter().position(|known| known.name == material.name);
-        let index = index.unwrap_or_else(|| {
-            self.materials.push(material);
-            self.materials.len() - 1
-        });
-        u16::try_from(index).unwrap_or(u16::MAX)
-    }
 }
 
 /// The mesh of this origin, as its file has it, or as it is `given`.
-fn read(origin: &Origin, given: &BTreeMap<String, Mesh>) -> Result<Mesh, Error> {
+fn read(origin: &Origin, given: &BTreeMap<String, Mesh>, reach: Reach<'_>) -> Result<Read, Error> {
     match origin {
-        Origin::Car => car::mesh(),
+        Origin::Car => car::mesh().map(Read::from),
         Origin::Given { name, .. } => {
-            given.get(name).cloned().unwrap_or_default().checked(Path::new(name))
+            let mesh = given.get(name).cloned().unwrap_or_default();
+            mesh.checked(Path::new(name)).map(Read::from)
         }
-        Origin::File { path, without, .. } => readers::read(path, *without),
+        Origin::File { path, without, .. } => readers::read(path, *without, reach),
     }
 }

@@ -50,9 +50,12 @@ impl Scene {
         changes: &[(String, String)],
     ) -> Result<Self, Error> {
         // What is wrong without the changes is said with its place in the file.
-        let scene = Self::from_toml(text, origin, base)?;
-        if changes.is_empty() {
-            return Ok(scene);
+        match Self::from_toml(text, origin, base) {
+            Ok(scene) if changes.is_empty() => return Ok(scene),
+            // A change may allow it.
+            Err(Error::Outside { .. }) if !changes.is_empty() => {}
+            Ok(_) => {}
+            Err(error) => return Err(error),
         }
         let keys = || changes.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>().join(", ");
         let refused = |message: String| {
@@ -81,7 +84,7 @@ impl Scene {
 }
 
 /// Keys of the scene stand behind this among those of a sensor.
-const OF_SCENE: &str = "scene:";
+pub const OF_SCENE: &str = "scene:";
 
 /// The table of sun and air.
 const ENVIRONMENT: &str = "environment";

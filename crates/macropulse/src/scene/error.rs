@@ -25,6 +25,14 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
+    /// A mesh names a file that lies outside the folder of the scene.
+    #[error("{}: names {named}, which lies outside the folder of the scene; put that file beside the mesh, or allow it with --outside-files (in the scene outside_files = true)", path.display())]
+    Outside {
+        /// The mesh.
+        path: PathBuf,
+        /// What it names.
+        named: String,
+    },
     /// A scene file says something that cannot be.
     #[error("{origin}:{line}:{column}: {message}")]
     Typed {

@@ -35,6 +35,9 @@ pub(super) struct SceneFile {
     #[serde(default)]
     #[schemars(schema_with = "schema::environment")]
     pub environment: Option<Spanned<toml::Value>>,
+    /// Whether meshes may name files outside the folder of the scene: their materials, their buffers.
+    #[serde(default)]
+    pub outside_files: bool,
     /// An endless plane.
     pub ground: Option<Ground>,
     /// Materials of the scene's own, or in place of those of the library.

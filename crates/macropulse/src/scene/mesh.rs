@@ -32,23 +32,55 @@ impl Mesh {
         }
     }
 
-    /// The index of the material called `name`, which is added if it is new.
-    pub(super) fn material(&mut self, name: &str) -> u16 {
-        let index =
-            self.material_names.iter().position(|known| known == name).unwrap_or_else(|| {
-                self.material_names.push(name.to_owned());
-                self.diffuse_guesses.push(None);
-                self.material_names.len() - 1
-            });
-        // Files with more than 65 536 materials share the last one.
-        u16::try_from(index).unwrap_or(u16::MAX)
+    /// The index of the material called `name`, which is added if it is new; `None` where there are
+    /// as many as can be counted.
+    pub(super) fn material(&mut self, name: &str) -> Option<u16> {
+        match self.material_names.iter().position(|known| known == name) {
+            Some(index) => u16::try_from(index).ok(),
+            None => self.add_material(name, None),
+        }
     }
 
-    /// Adds a flat or nearly flat polygon as a fan. Fewer than three corners add nothing.
-    pub(super) fn polygon(&mut self, corners: &[u32], material: u16) {
+    /// As [`Mesh::material`], of one that is new, whatever others are called.
+    pub(super) fn add_material(&mut self, name: &str, guess: Option<f64>) -> Option<u16> {
+        let index = u16::try_from(self.material_names.len()).ok()?;
+        self.material_names.push(name.to_owned());
+        self.diffuse_guesses.push(guess);
+        Some(index)
+    }
+
+    /// Adds a fan of triangles about the first of these corners. Fewer than three add nothing.
+    pub(super) fn fan(&mut self, corners: &[u32], material: u16) {
         for pair in corners.windows(2).skip(1) {
             self.triangles.push([corners[0], pair[0], pair[1]]);
             self.material_of_triangle.push(material);
+        }
+    }
+
+    /// Takes away the vertices that no triangle has, those of lines for example. Every corner must be
+    /// there.
+    pub(super) fn drop_loose_vertices(&mut self) {
+        const LOOSE: u32 = u32::MAX;
+        let mut places = vec![LOOSE; self.vertices.len()];
+        for corner in self.triangles.iter().flatten() {
+            places[*corner as usize] = 0;
+        }
+        if !places.contains(&LOOSE) {
+            return;
+        }
+        let mut kept = 0;
+        self.vertices = std::mem::take(&mut self.vertices)
+            .into_iter()
+            .zip(&mut places)
+            .filter(|(_, place)| **place != LOOSE)
+            .map(|(vertex, place)| {
+                *place = kept;
+                kept += 1;
+                vertex
+            })
+            .collect();
+        for corner in self.triangles.iter_mut().flatten() {
+            *corner = places[*corner as usize];
         }
     }
 
@@ -121,8 +153,8 @@ mod tests {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 2.0]],
             ..Mesh::default()
         };
-        let paint = mesh.material("paint");
-        mesh.polygon(&[0, 1, 2, 3], paint);
+        let paint = mesh.material("paint").unwrap();
+        mesh.fan(&[0, 1, 2, 3], paint);
         mesh
     }
 
@@ -136,9 +168,30 @@ mod tests {
     #[test]
     fn a_line_adds_nothing() {
         let mut mesh = square();
-        mesh.polygon(&[0, 1], 0);
+        mesh.fan(&[0, 1], 0);
         assert_eq!(mesh.triangles.len(), 2);
-        assert_eq!(mesh.material("paint"), 0);
+        assert_eq!(mesh.material("paint"), Some(0));
+    }
+
+    #[test]
+    fn vertices_of_no_triangle_are_dropped() {
+        let mut mesh = square();
+        let wanted = mesh.clone();
+        mesh.drop_loose_vertices();
+        assert_eq!(mesh, wanted, "all are used");
+        mesh.vertices.splice(1..1, [[9.0; 3], [8.0; 3]]);
+        mesh.vertices.push([7.0; 3]);
+        let corners = mesh.triangles.iter_mut().flatten().filter(|corner| **corner > 0);
+        corners.for_each(|corner| *corner += 2);
+        mesh.drop_loose_vertices();
+        assert_eq!(mesh, wanted);
+    }
+
+    #[test]
+    fn materials_that_cannot_be_counted_are_none() {
+        let mut mesh = square();
+        mesh.material_names.resize(1 << 16, "x".to_owned());
+        assert_eq!((mesh.material("paint"), mesh.material("y")), (Some(0), None));
     }
 
     #[test]

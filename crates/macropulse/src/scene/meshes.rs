@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::error::Error;
 use super::footing::Footing;
 use super::mesh::Mesh;
-use super::readers::WithoutMaterials;
+use super::readers::{Read, WithoutMaterials};
 
 /// What decides how a mesh comes out.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +50,8 @@ pub(super) struct Known {
     pub footing: Footing,
     /// Length, width and height, m.
     pub size: [f64; 3],
+    /// What its file holds beside it, in sentences.
+    pub left_out: Vec<String>,
 }
 
 /// The meshes that there are so far.
@@ -61,7 +63,7 @@ impl Meshes {
     pub fn of(
         &mut self,
         origin: &Origin,
-        read: impl FnOnce() -> Result<Mesh, Error>,
+        read: impl FnOnce() -> Result<Read, Error>,
     ) -> Result<&mut Known, Error> {
         let known = match self.0.iter().position(|known| known.origin == *origin) {
             Some(known) => known,
@@ -75,8 +77,8 @@ impl Meshes {
 }
 
 impl Known {
-    /// A `mesh` as its file has it.
-    fn new(origin: Origin, mut mesh: Mesh) -> Self {
+    /// A mesh as its file has it.
+    fn new(origin: Origin, Read { mut mesh, left_out }: Read) -> Self {
         if let Some((metres, up, forward)) = origin.frame() {
             let left = up.cross(forward);
             for vertex in &mut mesh.vertices {
@@ -88,6 +90,6 @@ impl Known {
         let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let mesh = Rc::new(mesh);
         let footing = Footing::of(Rc::clone(&mesh));
-        Self { origin, mesh, footing, size }
+        Self { origin, mesh, footing, size, left_out }
     }
 }

@@ -22,6 +22,7 @@ mod motion;
 mod moving;
 mod person;
 mod placed;
+mod polygon;
 mod pose;
 mod raycast;
 mod readers;
@@ -37,7 +38,7 @@ use std::path::Path;
 
 pub use builtin::builtin_names;
 pub use car::SIZE as CAR_SIZE;
-pub use change::{Changes, apart};
+pub use change::{Changes, OF_SCENE, apart};
 pub use closed_form::{Shape, Solid};
 pub use error::Error;
 pub use hits::{CastRays, Hit, Hits, Ray};
@@ -81,6 +82,8 @@ pub struct Scene {
     pub interferers: Vec<Interferer>,
     /// Every assumption made while reading: units, axes, materials. To be shown to the user.
     pub notes: Vec<String>,
+    /// What is left out of what its files hold: lines, skins, animations. To be shown to the user.
+    pub warnings: Vec<String>,
     world: World,
     /// Of the triangles and shapes, in the order of the file.
     surfaces: Digest,
@@ -267,6 +270,7 @@ impl fmt::Debug for Scene {
             .field("environment", &self.environment)
             .field("interferers", &self.interferers)
             .field("notes", &self.notes)
+            .field("warnings", &self.warnings)
             .field("triangles", &self.triangles())
             .finish_non_exhaustive()
     }

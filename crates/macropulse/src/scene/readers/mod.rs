@@ -1,6 +1,8 @@
 //! Meshes from files: the format follows from the extension.
 
+mod beside;
 mod gltf;
+mod lines;
 mod obj;
 mod ply;
 mod stl;
@@ -11,6 +13,7 @@ use std::path::Path;
 
 use super::error::Error;
 use super::mesh::Mesh;
+pub(super) use beside::Reach;
 
 /// What to do about a material file that is named but not there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,13 +26,31 @@ pub(super) enum WithoutMaterials {
 
 const DAMAGED: &str = "the file is damaged or cut short: export it again";
 
-/// Reads the mesh at `path`.
-pub(super) fn read(path: &Path, without: WithoutMaterials) -> Result<Mesh, Error> {
-    let mesh = match extension(path).as_str() {
-        "obj" => obj::read(path, without)?,
-        "stl" => stl::read(path)?,
-        "ply" => ply::read(path)?,
-        "glb" | "gltf" => gltf::read(path)?,
+/// What was read of a file.
+#[derive(Debug, Default)]
+pub(super) struct Read {
+    pub mesh: Mesh,
+    /// What the file holds beside it, in sentences that go on after the name of an object.
+    pub left_out: Vec<String>,
+}
+
+impl From<Mesh> for Read {
+    fn from(mesh: Mesh) -> Self {
+        Self { mesh, left_out: Vec::new() }
+    }
+}
+
+/// Reads the mesh at `path`, and the files it names within `reach`.
+pub(super) fn read(
+    path: &Path,
+    without: WithoutMaterials,
+    reach: Reach<'_>,
+) -> Result<Read, Error> {
+    let Read { mesh, left_out } = match extension(path).as_str() {
+        "obj" => obj::read(path, without, reach)?,
+        "stl" => stl::read(path)?.into(),
+        "ply" => ply::read(path)?.into(),
+        "glb" | "gltf" => gltf::read(path, reach)?,
         _ => {
             return Err(Error::mesh(
                 path,
@@ -38,7 +59,9 @@ pub(super) fn read(path: &Path, without: WithoutMaterials) -> Result<Mesh, Error
             ));
         }
     };
-    mesh.checked(path)
+    let mut mesh = mesh.checked(path)?;
+    mesh.drop_loose_vertices();
+    Ok(Read { mesh, left_out })
 }
 
 /// Reads the PLY file that `bytes` are; `path` is its name in messages.
@@ -60,6 +83,28 @@ fn open(path: &Path) -> Result<BufReader<File>, Error> {
         Ok(file) => Ok(BufReader::new(file)),
         Err(source) => Err(Error::Unreadable { path: path.to_owned(), source }),
     }
+}
+
+/// Refuses a file with more materials than can be counted.
+fn too_many_materials(path: &Path) -> Error {
+    Error::mesh(path, "has more than 65536 materials", "export it in parts, or with fewer")
+}
+
+/// So many things, as people say it.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+/// What is said of the lines and points of a file; `None` where there are none.
+fn no_surfaces(lines: usize, points: usize) -> Option<String> {
+    let said: Vec<String> = [(lines, "line"), (points, "point")]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| counted(count, what))
+        .collect();
+    let verb =
+        if lines + points == 1 { "is no surface, and is" } else { "are no surfaces, and are" };
+    (!said.is_empty()).then(|| format!("{} {verb} left out", said.join(" and ")))
 }
 
 /// Relative luminance of a linear colour, the guess for the diffuse reflectance of a surface of
@@ -86,8 +131,18 @@ mod tests {
 
     #[test]
     fn unknown_formats_and_missing_files_are_refused() {
-        let told = |name| read(Path::new(name), WithoutMaterials::Fine).unwrap_err().to_string();
+        let reach = Reach { scene: Path::new(""), outside: false };
+        let told =
+            |name| read(Path::new(name), WithoutMaterials::Fine, reach).unwrap_err().to_string();
         assert!(told("a.blend").contains("use .obj, .stl, .ply, .glb or .gltf"));
         assert!(told("nowhere.stl").starts_with("nowhere.stl: cannot be read"));
+    }
+
+    #[test]
+    fn lines_and_points_are_told_by_their_numbers() {
+        let said = |lines, points| no_surfaces(lines, points).unwrap_or_default();
+        assert_eq!(said(0, 0), "");
+        assert_eq!(said(1, 0), "1 line is no surface, and is left out");
+        assert_eq!(said(1, 2), "1 line and 2 points are no surfaces, and are left out");
     }
 }

@@ -1,66 +1,211 @@
 //! Wavefront OBJ with its MTL.
+//!
+//! Of the format that much is read as makes a surface: vertices, faces, and which material a face is
+//! of. Normals, texture and the names of parts do not change what light meets.
 
-use std::cell::RefCell;
-use std::path::{Path, PathBuf};
+mod mtl;
 
-use tobj::{LoadError, LoadOptions};
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
 
-use super::{DAMAGED, WithoutMaterials, luminance, open};
+use super::lines::{Lines, numbers};
+use super::{DAMAGED, Reach, Read, WithoutMaterials, no_surfaces, open};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
+use crate::scene::polygon::Cutter;
+use mtl::Library;
 
-pub(super) fn read(path: &Path, without: WithoutMaterials) -> Result<Mesh, Error> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    // The reader asks for each `mtllib`; what it cannot have is remembered for the message.
-    let missing: RefCell<Option<PathBuf>> = RefCell::new(None);
-    let materials = |name: &Path| {
-        let beside = folder.join(name);
-        match open(&beside) {
-            Ok(mut text) => tobj::load_mtl_buf(&mut text),
-            Err(_) => {
-                missing.borrow_mut().get_or_insert(beside);
-                Err(LoadError::OpenFileFailed)
+pub(super) fn read(
+    path: &Path,
+    without: WithoutMaterials,
+    reach: Reach<'_>,
+) -> Result<Read, Error> {
+    let mut file = open(path)?;
+    let mut obj = Obj::default();
+    let mut lines = Lines::of(&mut file, path)?.joined();
+    lines.each(DAMAGED, |number, line| obj.line(number, line))?;
+    obj.cut_early().map_err(|(number, problem)| {
+        Error::mesh(path, format!("line {number} {problem}"), DAMAGED)
+    })?;
+    let left_out = obj.left_out();
+    let mut mesh = obj.mesh;
+    // Colours are guesses for objects without a material of their own.
+    if without == WithoutMaterials::Refused {
+        let (mut library, mut known) = (Library::new(), HashSet::new());
+        for named in &obj.libraries {
+            for file in mtl::files(path, named, reach)? {
+                // Some programs name it again before every part.
+                if !known.contains(&file) {
+                    mtl::read(&file, &mut library)?;
+                    known.insert(file);
+                }
             }
         }
-    };
-    let options = LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..LoadOptions::default()
-    };
-    let (models, materials) = tobj::load_obj_buf(&mut open(path)?, &options, materials)
-        .map_err(|fault| Error::mesh(path, format!("is no readable OBJ ({fault})"), DAMAGED))?;
-    if let (Some(absent), WithoutMaterials::Refused) = (missing.take(), without) {
-        return Err(Error::mesh(
-            path,
-            format!("names its materials in {}, which is not there", absent.display()),
-            "put that file beside the mesh, or give the object `material = \"…\"`",
-        ));
-    }
-    let materials = match (materials, without) {
-        (Ok(materials), _) => materials,
-        (Err(_), WithoutMaterials::Fine) => Vec::new(),
-        (Err(fault), WithoutMaterials::Refused) => {
-            return Err(Error::mesh(
-                path,
-                format!("its MTL cannot be read ({fault})"),
-                "mend it, or give the object `material = \"…\"`",
-            ));
-        }
-    };
-    let mut mesh = Mesh::default();
-    for model in models {
-        let shift = mesh.vertices.len() as u32;
-        let own = model.mesh.material_id.and_then(|id| materials.get(id));
-        let material = mesh.material(own.map_or("", |own| &own.name));
-        if let Some(colour) = own.and_then(|own| own.diffuse) {
-            mesh.diffuse_guesses[material as usize] = Some(luminance(colour));
-        }
-        mesh.vertices.extend(model.mesh.positions.as_chunks().0);
-        for corners in model.mesh.indices.as_chunks::<3>().0 {
-            mesh.polygon(&corners.map(|corner| shift.saturating_add(corner)), material);
+        for (name, guess) in mesh.material_names.iter().zip(&mut mesh.diffuse_guesses) {
+            *guess = library.get(name).copied().flatten();
         }
     }
-    Ok(mesh)
+    Ok(Read { mesh, left_out })
+}
+
+const TOO_MANY: &str = "has one material more than the 65536 that can be told apart";
+
+/// What has been read so far.
+#[derive(Default)]
+struct Obj {
+    mesh: Mesh,
+    cutter: Cutter,
+    /// Materials by name, of those that have a face.
+    materials: HashMap<String, u16>,
+    /// What the faces that follow are made of: its name, and its index once it has a face.
+    material: (String, Option<u16>),
+    /// What lines `mtllib` name.
+    libraries: Vec<String>,
+    /// Those of a face.
+    corners: Vec<u32>,
+    /// Faces whose vertices are told behind them: line, corners, material.
+    early: Vec<(usize, Vec<u32>, u16)>,
+    lines: usize,
+    points: usize,
+    has_free_form: bool,
+}
+
+impl Obj {
+    fn line(&mut self, number: usize, line: &str) -> Result<(), String> {
+        let line = line.trim();
+        let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let rest = rest.trim();
+        // A name may have a hash in it; among numbers a remark begins there.
+        let words = || rest.split_whitespace().take_while(|word| !word.starts_with('#'));
+        match word {
+            "v" => self.vertex(&mut words())?,
+            "f" => self.face(number, words())?,
+            "l" => self.lines += 1,
+            "p" => self.points += words().count(),
+            "curv" | "curv2" | "surf" => self.has_free_form = true,
+            "usemtl" => self.material = (rest.to_owned(), None),
+            "mtllib" if !rest.is_empty() => self.libraries.push(rest.to_owned()),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn vertex<'a>(&mut self, words: &mut impl Iterator<Item = &'a str>) -> Result<(), String> {
+        let place = numbers(words).map_err(|word| match word {
+            Some(word) => format!("has {word:?} where a number of a vertex is due"),
+            None => "has a vertex of fewer than three numbers".to_owned(),
+        })?;
+        if self.mesh.vertices.len() >= u32::MAX as usize {
+            return Err("is one vertex more than can be counted".to_owned());
+        }
+        self.mesh.vertices.push(place);
+        Ok(())
+    }
+
+    fn face<'a>(
+        &mut self,
+        number: usize,
+        words: impl Iterator<Item = &'a str>,
+    ) -> Result<(), String> {
+        self.corners.clear();
+        let count = self.mesh.vertices.len();
+        for word in words {
+            self.corners.push(corner(word, count)?);
+        }
+        if self.corners.len() < 3 {
+            return Ok(());
+        }
+        let material = self.material()?;
+        if self.corners.iter().any(|corner| *corner as usize >= count) {
+            self.early.push((number, self.corners.clone(), material));
+        } else {
+            self.cutter.add(&mut self.mesh, &self.corners, material)?;
+        }
+        Ok(())
+    }
+
+    /// The index of what the face is made of.
+    fn material(&mut self) -> Result<u16, String> {
+        let (name, index) = &mut self.material;
+        if let Some(index) = index {
+            return Ok(*index);
+        }
+        let found = match self.materials.get(name) {
+            Some(known) => *known,
+            None => {
+                let new = self.mesh.add_material(name, None).ok_or(TOO_MANY)?;
+                self.materials.insert(name.clone(), new);
+                new
+            }
+        };
+        *index = Some(found);
+        Ok(found)
+    }
+
+    /// Adds the faces that were told before their vertices; or says which has none, by line.
+    fn cut_early(&mut self) -> Result<(), (usize, String)> {
+        let count = self.mesh.vertices.len();
+        for (number, corners, material) in std::mem::take(&mut self.early) {
+            if let Some(corner) = corners.iter().find(|corner| **corner as usize >= count) {
+                let named = u64::from(*corner) + 1;
+                return Err((number, format!("names vertex {named}, but there are only {count}")));
+            }
+            let cut = self.cutter.add(&mut self.mesh, &corners, material);
+            cut.map_err(|problem| (number, problem))?;
+        }
+        Ok(())
+    }
+
+    /// What the file holds beside the mesh.
+    fn left_out(&self) -> Vec<String> {
+        let free_form =
+            "its curves and free-form surfaces are left out: only its polygons are read";
+        let mut said: Vec<String> = no_surfaces(self.lines, self.points).into_iter().collect();
+        said.extend(self.has_free_form.then(|| free_form.to_owned()));
+        said
+    }
+}
+
+/// The index of the vertex that a corner of a face names, behind which texture and normal may be
+/// named, where there are `count` so far: from 1, or back from the last.
+fn corner(word: &str, count: usize) -> Result<u32, String> {
+    let typed = word.split('/').next().unwrap_or(word);
+    let refused = || format!("has {word:?} where a corner of a face is due");
+    let number: i64 = typed.parse().map_err(|_| refused())?;
+    let index = match number {
+        0 => return Err("names vertex 0, but they are counted from 1".to_owned()),
+        1.. => number - 1,
+        _ => number + count as i64,
+    };
+    match u32::try_from(index) {
+        Ok(index) if index < u32::MAX => Ok(index),
+        _ => Err(format!("names vertex {number}, but there are only {count}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_corner_is_counted_from_1_or_back_from_the_last() {
+        assert_eq!(corner("1", 4), Ok(0));
+        assert_eq!(corner("-1/2/3", 4), Ok(3));
+        assert_eq!(corner("9//1", 4), Ok(8), "one that may follow");
+        for wrong in ["0", "-5", "x", "", "/1", "1.5", "4294967296", "99999999999999999999"] {
+            assert!(corner(wrong, 4).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn faces_may_stand_before_their_vertices() {
+        let mut obj = Obj::default();
+        for (number, line) in ["f 1 2 3", "v 0 0 0", "v 1 0 0", "f 1 2 4"].iter().enumerate() {
+            assert!(obj.line(number + 1, line).is_ok());
+        }
+        assert_eq!(
+            obj.cut_early().unwrap_err(),
+            (1, "names vertex 3, but there are only 2".into())
+        );
+    }
 }

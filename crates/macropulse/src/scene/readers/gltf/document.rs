@@ -14,6 +14,41 @@ use crate::scene::error::Error;
 /// memory at most, however short its text.
 const MOST_VALUES: usize = 1 << 22;
 
+/// An extension by which places may be whole numbers.
+pub(super) const QUANTISED: &str = "KHR_mesh_quantization";
+
+/// Beginnings of the names of extensions that do not change where a surface is: they are about looks,
+/// light, or what is known of things.
+const HARMLESS: [&str; 10] = [
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_xmp",
+    "KHR_animation_pointer",
+    "EXT_mesh_features",
+    "EXT_structural_metadata",
+];
+
+/// Extensions by which there is more of a surface, or another one, than the file says without.
+const SHAPES: [&str; 4] = [
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+    "EXT_mesh_gpu_instancing",
+];
+
+/// Whether an extension adds to the shape what is not read here.
+pub(super) fn adds_shape(name: &str) -> bool {
+    SHAPES.contains(&name)
+}
+
+fn is_harmless(name: &str) -> bool {
+    name == QUANTISED || HARMLESS.iter().any(|begins| name.starts_with(begins))
+}
+
 /// JSON and binary part of a file: those of a `.glb`, or all of it and nothing.
 ///
 /// # Errors
@@ -39,6 +74,7 @@ pub(super) fn container(bytes: &[u8]) -> Result<[Bytes<'_>; 2], String> {
 /// # Errors
 /// If it is no glTF, needs an extension, is too large, or an index or a value in it is wrong.
 pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let values = text.iter().filter(|byte| matches!(byte, b'{' | b'[' | b',')).count();
     if values > MOST_VALUES {
         let problem = format!("describes more than {MOST_VALUES} values");
@@ -47,7 +83,7 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
     let root: Root = ::gltf::json::deserialize::from_slice(text)
         .map_err(|fault| damaged(format!("is no readable glTF ({fault})")))?;
-    if let Some(extension) = root.extensions_required.first() {
+    if let Some(extension) = root.extensions_required.iter().find(|name| !is_harmless(name)) {
         return Err(Error::mesh(
             path,
             format!("requires the glTF extension {extension}, which is not read here"),
@@ -72,7 +108,9 @@ fn check(root: &Root) -> Result<(), String> {
     root.validate(root, Place::new, &mut |place, fault| {
         let place = place();
         // A stride is checked against the elements it parts; some write 0 where there is none.
-        if problem.is_some() || fault == Fault::Missing || place.as_str().ends_with("byteStride") {
+        // Extensions have been looked at.
+        let is_looked_at = matches!(fault, Fault::Missing | Fault::Unsupported);
+        if problem.is_some() || is_looked_at || place.as_str().ends_with("byteStride") {
             return;
         }
         problem = Some(match fault {
