@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use macropulse::design::{Design, preset_text};
+use macropulse::opened::{self, LONGEST_TEXT};
 use macropulse::scene::Scene;
 
 use crate::fault::Fault;
@@ -14,9 +15,6 @@ pub const STREAM: &str = "-";
 
 /// What it is called in messages.
 const ORIGIN: &str = "standard input";
-
-/// Longer texts are no sensor and no scene, bytes.
-const LONGEST: u64 = 16 << 20;
 
 /// The sensor called `name`, with single values changed.
 ///
@@ -53,7 +51,7 @@ pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
 pub fn text(name: &str) -> Result<(String, String), Fault> {
     match name {
         STREAM => Ok((stdin()?.to_owned(), ORIGIN.to_owned())),
-        name => match std::fs::read_to_string(name) {
+        name => match opened::text(Path::new(name)) {
             Ok(text) => Ok((text, name.to_owned())),
             Err(error) => Err(Fault::unreadable(name, &error)),
         },
@@ -65,10 +63,10 @@ fn stdin() -> Result<&'static str, Fault> {
     static TEXT: OnceLock<Result<String, String>> = OnceLock::new();
     let read = TEXT.get_or_init(|| {
         let mut bytes = Vec::new();
-        let mut input = std::io::stdin().lock().take(LONGEST + 1);
+        let mut input = std::io::stdin().lock().take(LONGEST_TEXT + 1);
         input.read_to_end(&mut bytes).map_err(|error| format!("cannot be read: {error}"))?;
-        if bytes.len() as u64 > LONGEST {
-            return Err(format!("is longer than the {} MiB of a text", LONGEST >> 20));
+        if bytes.len() as u64 > LONGEST_TEXT {
+            return Err(format!("is longer than the {} MiB of a text", LONGEST_TEXT >> 20));
         }
         String::from_utf8(bytes).map_err(|_| "is not text".to_owned())
     });

@@ -41,6 +41,7 @@ pub mod random;
 pub mod units;
 pub mod names;
 pub mod told;
+pub mod opened;
 pub mod digest;
 pub mod processor;
 mod schema;

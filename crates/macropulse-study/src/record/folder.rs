@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use macropulse::formats::{Clouds, Names};
+use macropulse::opened;
 use macropulse::points::PointCloud;
 use serde_json::Value;
 
@@ -82,7 +83,7 @@ fn manifest(folder: &Path) -> Result<Option<Value>, Error> {
     if !path.exists() {
         return Ok(None);
     }
-    let text = fs::read_to_string(&path).map_err(|cause| unreadable(&path, cause))?;
+    let text = opened::text(&path).map_err(|cause| unreadable(&path, cause))?;
     let manifest = serde_json::from_str(&text);
     manifest.map(Some).map_err(|cause| Error::Manifest { path, cause })
 }

@@ -12,6 +12,7 @@ use super::plan::folder_of_jobs;
 use super::{Error, Plan, Point};
 use macropulse::digest::Digest;
 use macropulse::formats::{self, clear_unfinished, write_atomically};
+use macropulse::opened;
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::{RangeError, Score};
@@ -101,7 +102,7 @@ impl Job<'_> {
             let path = path.display();
             Error::Asked(format!("{path}: {why}; delete it, and it is measured again"))
         };
-        let text = fs::read_to_string(&path).map_err(|error| refused(&error.to_string()))?;
+        let text = opened::text(&path).map_err(|error| refused(&error.to_string()))?;
         let counted: Counted = serde_json::from_str(&text)
             .map_err(|error| refused(&format!("is not what was counted of a scan ({error})")))?;
         match counted.job == self.name() && counted.is_possible(self.point.shots) {
@@ -132,7 +133,7 @@ impl Plan {
     pub fn check_folder(&self, folder: &Path) -> Result<(), Error> {
         let place = folder.display();
         let remedy = "choose another folder";
-        match fs::read_to_string(folder.join(DESCRIPTION)) {
+        match opened::text(&folder.join(DESCRIPTION)) {
             Ok(text) if text == self.text() => Ok(()),
             Ok(text) => {
                 let other = serde_json::from_str(&text).unwrap_or(Value::Null);

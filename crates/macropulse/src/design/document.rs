@@ -9,7 +9,7 @@ use super::family::FAMILIES;
 use super::presets;
 use super::{Detector, Effect, Error, Pattern};
 use crate::names::{line_column, offset_of_key, toml_value};
-use crate::told;
+use crate::{opened, told};
 
 /// Where values come from that are changed on the command line.
 const SET: &str = "--set";
@@ -251,7 +251,7 @@ pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String,
     if !name_or_file.ends_with(".toml") && !path.exists() {
         return Err(Error::whole(name_or_file, presets::unknown(name_or_file)));
     }
-    let text = std::fs::read_to_string(&path)
+    let text = opened::text(&path)
         .map_err(|error| Error::whole(name_or_file, not_read(name_or_file, &error)))?;
     let next = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok((text, path.display().to_string(), next))

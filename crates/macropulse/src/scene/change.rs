@@ -8,6 +8,7 @@ use super::file::object_names;
 use super::{Error, Scene};
 use crate::environment;
 use crate::names::{nearest, toml_value};
+use crate::opened;
 
 /// Names of the three numbers of a position or size.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
@@ -31,7 +32,7 @@ impl Scene {
         let (text, base) = match Self::builtin(name_or_file) {
             Some(text) => (text.to_owned(), Path::new("")),
             None => {
-                let text = std::fs::read_to_string(path)
+                let text = opened::text(path)
                     .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
                 (text, path.parent().unwrap_or(Path::new("")))
             }

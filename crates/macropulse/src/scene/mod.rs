@@ -53,6 +53,7 @@ pub use trace::{SUB_MACROPULSES, Traced};
 use crate::digest::Digest;
 use crate::environment::Environment;
 use crate::kernels::{LANES, Packet};
+use crate::opened;
 use file::{Place, Source};
 use world::{PacketHits, World};
 
@@ -121,7 +122,7 @@ impl Scene {
     /// # Errors
     /// If the file or one of its meshes cannot be read or is wrong.
     pub fn from_file(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
+        let text = opened::text(path)
             .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
         let base = path.parent().unwrap_or(Path::new(""));
         Self::from_toml(&text, &path.display().to_string(), base)

@@ -11,6 +11,7 @@ use std::path::Path;
 
 use super::error::Error;
 use super::mesh::Mesh;
+use crate::opened;
 
 /// What to do about a material file that is named but not there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +21,12 @@ pub(super) enum WithoutMaterials {
     /// The surface would be guesswork.
     Refused,
 }
+
+/// Most bytes of a file with a mesh.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// Most vertices and faces of one together, where it says beforehand how many it has.
+const MOST_ELEMENTS: u64 = 1 << 26;
 
 const DAMAGED: &str = "the file is damaged or cut short: export it again";
 
@@ -56,7 +63,7 @@ fn extension(path: &Path) -> String {
 }
 
 fn open(path: &Path) -> Result<BufReader<File>, Error> {
-    match File::open(path) {
+    match opened::file(path, MOST_BYTES) {
         Ok(file) => Ok(BufReader::new(file)),
         Err(source) => Err(Error::Unreadable { path: path.to_owned(), source }),
     }

@@ -6,10 +6,10 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use ply_rs_bw::parser::Parser;
-use ply_rs_bw::ply::{DefaultElement, Property};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, Header, Property};
 
-use super::{DAMAGED, open};
+use super::{DAMAGED, MOST_ELEMENTS, open};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
 
@@ -20,20 +20,22 @@ pub(super) fn read(path: &Path) -> Result<Mesh, Error> {
 /// Reads the mesh from `file`, whose name in messages is `path`.
 pub(super) fn read_from(file: &mut impl BufRead, path: &Path) -> Result<Mesh, Error> {
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
-    let ply = Parser::<DefaultElement>::new()
-        .read_ply(file)
-        .map_err(|fault| damaged(format!("is no readable PLY ({fault})")))?;
+    let (parser, mut file) = (Parser::<DefaultElement>::new(), Reader::new(file));
+    let unreadable = |fault| damaged(format!("is no readable PLY ({fault})"));
+    let header = parser.read_header(&mut file).map_err(unreadable)?;
+    check(&header).map_err(damaged)?;
+    let payload = parser.read_payload(&mut file, &header).map_err(unreadable)?;
     let mut mesh = Mesh::default();
-    let names = ply.header.comments.iter().filter_map(|comment| comment.strip_prefix("material "));
+    let names = header.comments.iter().filter_map(|comment| comment.strip_prefix("material "));
     let materials: Vec<u16> = names.map(|name| mesh.material(name.trim())).collect();
-    for vertex in ply.payload.get("vertex").into_iter().flatten() {
+    for vertex in payload.get("vertex").into_iter().flatten() {
         let place = ["x", "y", "z"].map(|axis| vertex.get(axis).and_then(number));
         let [Some(x), Some(y), Some(z)] = place else {
             return Err(damaged("has a vertex without x, y or z".to_owned()));
         };
         mesh.vertices.push([x, y, z]);
     }
-    for face in ply.payload.get("face").into_iter().flatten() {
+    for face in payload.get("face").into_iter().flatten() {
         let corners = face.get("vertex_indices").or_else(|| face.get("vertex_index"));
         let Some(corners) = corners.and_then(Property::to_u32_list) else {
             return Err(damaged("has a face without a usable list vertex_indices".to_owned()));
@@ -46,6 +48,22 @@ pub(super) fn read_from(file: &mut impl BufRead, path: &Path) -> Result<Mesh, Er
         mesh.polygon(&corners, material);
     }
     Ok(mesh)
+}
+
+/// Refuses more elements than are read, and those that take no byte of the file each: of these a
+/// header of a few words may promise any number.
+fn check(header: &Header) -> Result<(), String> {
+    let mut elements = 0_u64;
+    for (name, element) in header.elements.iter().filter(|(_, element)| element.count > 0) {
+        if element.properties.is_empty() {
+            return Err(format!("has {} elements `{name}` without a property", element.count));
+        }
+        elements = elements.saturating_add(element.count as u64);
+    }
+    match elements > MOST_ELEMENTS {
+        true => Err(format!("says it has {elements} elements, more than {MOST_ELEMENTS}")),
+        false => Ok(()),
+    }
 }
 
 /// A coordinate, whatever type the header gave it.
