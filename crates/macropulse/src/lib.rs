@@ -35,6 +35,7 @@ pub mod formats;
 pub use macropulse_codec as codec;
 
 pub mod sim;
+pub mod memory;
 
 pub mod predict;
 pub mod random;

@@ -157,7 +157,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "formats",
-            may_name: &["names", "points", "told", "units"],
+            may_name: &["names", "opened", "points", "told", "units"],
             because: "files hold columns, no physics; of units they know the speed of light, by \
                       which some have a time in place of a range",
         },
@@ -176,6 +176,11 @@ const SIMULATOR: Layers = Layers {
                 "tdc",
             ],
             because: "the chain calls the stages and nothing else",
+        },
+        Rule {
+            module: "memory",
+            may_name: &["channel", "design", "emit", "environment", "scene", "units"],
+            because: "what a scan takes is estimated from what it is given, before it is begun",
         },
     ],
 };

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::memory::Estimate;
 use macropulse::scene::Changes;
 
 use crate::completions;
@@ -18,6 +19,7 @@ use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::kind::Kind;
+use crate::memory::MemoryLimit;
 use crate::options::{self, Common, Surroundings};
 use crate::text::{print, print_json};
 pub use formats::Formats;
@@ -70,6 +72,9 @@ pub struct Simulate {
 
     #[command(flatten)]
     changes: options::Changes,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 
     /// Receiver that decodes the macropulses: short for --set receiver.kind=…
     #[arg(long, value_name = "KIND")]
@@ -142,6 +147,12 @@ impl Simulate {
         scenario.truth |= self.truth;
         scenario.explain.clone_from(&self.explain);
         scenario.designs.iter().try_for_each(|design| explain::check(design, &self.explain))?;
+        for design in &scenario.designs {
+            let estimate = Estimate::in_scene(design, &scenario.scene).map_err(Fault::from)?;
+            let is_written = self.output.is_some();
+            let estimate = if is_written { estimate } else { estimate.unwritten() };
+            self.memory.allow(&format!("{} in {}", design.name, scenario.scene.name), &estimate)?;
+        }
         Ok(scenario)
     }
 

@@ -16,6 +16,7 @@ use crate::folder::refuse_no_folder;
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
+use crate::memory::MemoryLimit;
 use crate::options::{Changes, Common, Surroundings};
 use crate::progress::Progress;
 use crate::text::{NO_BREAK, counted, print};
@@ -56,6 +57,9 @@ pub struct Sweep {
 
     #[command(flatten)]
     surroundings: Surroundings,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 
     #[command(flatten)]
     changes: Changes,
@@ -152,6 +156,11 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     let plan = Plan::of(&options.request()?)?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;
+    let seed = options.seed;
+    for job in plan.jobs().filter(|job| job.seed == seed) {
+        let (sensor, scene) = (&job.point.sensor.name, &job.point.scene.name);
+        options.memory.allow(&format!("{sensor} in {scene}"), &job.memory()?)?;
+    }
     let interrupt = Interrupt::listen()?;
     plan.claim_folder(folder)?;
     let shard = options.shard.unwrap_or(Shard::WHOLE);

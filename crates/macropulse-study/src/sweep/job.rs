@@ -12,11 +12,12 @@ use super::plan::folder_of_jobs;
 use super::{Error, Plan, Point};
 use macropulse::digest::Digest;
 use macropulse::formats::{self, clear_unfinished, write_atomically};
+use macropulse::memory::Estimate;
 use macropulse::opened;
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::{RangeError, Score};
-use macropulse::sim::{Scans, Watch};
+use macropulse::sim::{self as simulated, Scans, Watch};
 use macropulse::told;
 
 /// The file that says which sweep a folder holds.
@@ -69,6 +70,15 @@ impl Job<'_> {
         }
         hash.bytes(&self.seed.to_le_bytes());
         hash.text()
+    }
+
+    /// The memory that it takes to measure.
+    ///
+    /// # Errors
+    /// None for the jobs of a [`Plan`], whose points have been checked.
+    pub fn memory(&self) -> Result<Estimate, Error> {
+        let estimate = Estimate::in_scene(&self.point.design()?, self.scene);
+        Ok(estimate.map_err(simulated::Error::from)?.unwritten())
     }
 
     /// Measures; `None` if the `watch` said stop before the end.

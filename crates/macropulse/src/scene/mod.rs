@@ -228,6 +228,12 @@ impl Scene {
         self.world.triangles()
     }
 
+    /// How many triangles are in memory, those of a mesh that stands in many places once, and how many
+    /// shapes and places of meshes.
+    pub fn kept(&self) -> (usize, usize) {
+        self.world.kept()
+    }
+
     /// Its materials as light of `wavelength` metres sees them.
     pub fn finishes(&self, wavelength: f64) -> Vec<Finish> {
         self.materials.iter().map(|material| material.at(wavelength)).collect()
