@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::check::check_lags;
 use super::threshold::least_marks;
 use super::{Error, Receiver, ReceiverKind, Reject, window};
 use crate::code::Codebook;
@@ -100,8 +101,9 @@ impl Receiver {
         (log, ticks): (&ShotLog, &Ticks),
         shot: usize,
     ) -> Result<Explanation, Error> {
-        let alone = ShotLog { owned: shot..shot + 1, ..log.clone() };
+        let alone = ShotLog { owned: shot..shot.saturating_add(1), ..log.clone() };
         let decided = self.decode(codebook, &alone, ticks)?;
+        check_lags(self)?;
         let everyone = ShotLog { owned: 0..log.len(), ..log.clone() };
         let all = self.decode(codebook, &everyone, ticks)?;
         let bench = Bench::new(self, (codebook, log), ticks, shot);
