@@ -1,5 +1,6 @@
 //! Sensors and scenes by their names: ready ones, files, and `-` for what stands on standard input.
 
+use std::ffi::OsStr;
 use std::io::Read;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -20,13 +21,13 @@ const ORIGIN: &str = "standard input";
 ///
 /// # Errors
 /// What is wrong with the name, the text or a change.
-pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault> {
-    match name {
-        STREAM => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
-        scene if Scene::builtin(scene).is_some() => Err(Fault::Wrong(format!(
+pub fn design(name: &OsStr, changes: &[(String, String)]) -> Result<Design, Fault> {
+    match name.to_str() {
+        Some(STREAM) => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
+        Some(scene) if Scene::builtin(scene).is_some() => Err(Fault::Wrong(format!(
             "{scene}: is a scene, where a sensor is wanted; `macropulse sensors` lists the ready ones"
         ))),
-        name => Ok(Design::open(name, changes)?),
+        _ => Ok(Design::open(name, changes)?),
     }
 }
 
@@ -34,13 +35,13 @@ pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault>
 ///
 /// # Errors
 /// What is wrong with the name, the text or a change.
-pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
-    match name {
-        STREAM => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
-        sensor if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
+pub fn scene(name: &OsStr, changes: &[(String, String)]) -> Result<Scene, Fault> {
+    match name.to_str() {
+        Some(STREAM) => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
+        Some(sensor) if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
             "{sensor}: is a sensor, where a scene is wanted; `macropulse scenes` lists the ready ones"
         ))),
-        name => Ok(Scene::open_changed(name, changes)?),
+        _ => Ok(Scene::open_changed(name, changes)?),
     }
 }
 
@@ -48,13 +49,14 @@ pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
 ///
 /// # Errors
 /// If it cannot be read.
-pub fn text(name: &str) -> Result<(String, String), Fault> {
-    match name {
-        STREAM => Ok((stdin()?.to_owned(), ORIGIN.to_owned())),
-        name => match opened::text(Path::new(name)) {
-            Ok(text) => Ok((text, name.to_owned())),
-            Err(error) => Err(Fault::unreadable(name, &error)),
-        },
+pub fn text(name: &OsStr) -> Result<(String, String), Fault> {
+    if name == STREAM {
+        return Ok((stdin()?.to_owned(), ORIGIN.to_owned()));
+    }
+    let called = name.display().to_string();
+    match opened::text(Path::new(name)) {
+        Ok(text) => Ok((text, called)),
+        Err(error) => Err(Fault::unreadable(&called, &error)),
     }
 }
 

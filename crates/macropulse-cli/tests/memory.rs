@@ -55,7 +55,8 @@ fn the_table_of_the_book() {
     let desk = Desk::new();
     println!("| sensor | scene | estimated, MB | taken, MB | ratio |\n|---|---|---|---|---|");
     let listed = desk.json("sensors --json");
-    let sensors = listed.as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap());
+    let sensors =
+        listed["sensors"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap());
     for sensor in sensors.filter(|sensor| *sensor != "kim-park-2016-physical") {
         for scene in ["wall", "street", "crossing"] {
             let (estimated, taken) = memory(&desk, sensor, scene);
@@ -82,7 +83,7 @@ fn what_takes_too_much_is_refused_before_it_is_begun() {
         ("check kim-park-2016-physical --memory-limit 2GB -j 2", ["-j 1", "--memory-limit"]),
         ("check street --memory-limit 1MB", ["street", "fewer triangles"]),
         (
-            "sweep vlp-16 wall --vary tdc.converters=8,16 -o out --memory-limit 15MB",
+            "sweep vlp-16 wall --vary tdc.converters=16,32 -o out --memory-limit 15MB",
             ["vlp-16 in wall", "fewer pixels"],
         ),
         ("check vlp-16 --memory-limit lots", ["--memory-limit", "as 2GB"]),

@@ -121,3 +121,48 @@ fn a_full_disk_and_a_folder_that_is_read_only_are_no_fault_of_the_user() {
     let ran = desk.run("simulate peregrine wall -o /proc/out --format pcd");
     assert!(ran.code != Some(0) && ran.err.contains("/proc/out"), "{}", ran.err);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_need_not_be_utf_8() {
+    use std::ffi::{OsStr, OsString};
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    let odd = |ending: &str| {
+        let mut name = OsStr::from_bytes(b"\xe9t\xff").to_os_string();
+        name.push(ending);
+        name
+    };
+    let put = |name: OsString, text: &str| fs::write(desk.path().join(name), text).unwrap();
+    let ran = |line: &[&OsStr]| {
+        let ran = desk.command("").args(line).output().unwrap();
+        let told = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert_eq!(ran.status.code(), Some(0), "{line:?}: {told}");
+    };
+    put(odd("-s.toml"), &desk.run("sensors peregrine").out);
+    put(odd("-w.toml"), &desk.run("scenes wall").out);
+    put(odd("-r.toml"), "version = 1\nsensor = \"peregrine\"\nscene = \"wall\"\n");
+    let of = OsStr::new;
+    let (sensor, scene, run) = (&odd("-s.toml"), &odd("-w.toml"), &odd("-r.toml"));
+    let (out, again) = (&odd("-out"), &odd("-again"));
+    ran(&[of("check"), sensor, scene, run]);
+    ran(&[of("encode"), sensor, of("--pixel"), of("0,1")]);
+    ran(&[of("budget"), sensor, of("-o"), &odd("-budget")]);
+    ran(&[of("simulate"), sensor, scene, of("-o"), out, of("--format"), of("pcd,ticks")]);
+    ran(&[of("simulate"), run, of("-o"), &odd("-run")]);
+    let within = |file: &str| {
+        let mut path = out.clone();
+        path.push("/");
+        path.push(file);
+        path
+    };
+    let (shots, ticks) = (within("shots-000000.mps"), within("ticks-000000.mpt"));
+    ran(&[of("decode"), of("--sensor"), sensor, &shots, &ticks, of("-o"), again]);
+    ran(&[of("convert"), &within("scan-000000.pcd"), of("-o"), &odd("-cloud.ply")]);
+    ran(&[of("view"), out, of("-o"), &odd("-page.html")]);
+    ran(&[of("view"), &odd("-cloud.ply")]);
+    for file in ["-cloud.ply", "-page.html", "-cloud.html", "-again/index.html", "-run/index.html"]
+    {
+        assert!(desk.path().join(odd(file)).exists(), "{file}");
+    }
+}

@@ -3,6 +3,8 @@
 mod scene;
 mod sensor;
 
+use std::ffi::{OsStr, OsString};
+
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::formats::versioned;
@@ -31,7 +33,7 @@ pub struct Check {
     /// Ready sensors or scenes, or TOML files, - for standard input
     #[arg(required = true, value_name = "NAME-or-FILE")]
     #[arg(add = ArgValueCompleter::new(completions::both))]
-    files: Vec<String>,
+    files: Vec<OsString>,
 
     #[command(flatten)]
     surroundings: Surroundings,
@@ -82,14 +84,16 @@ struct Report {
 }
 
 impl Report {
-    fn of(name: &str, changes: &scenes::Changes, memory: &MemoryLimit) -> Result<Self, Fault> {
+    fn of(name: &OsStr, changes: &scenes::Changes, memory: &MemoryLimit) -> Result<Self, Fault> {
         match Kind::of(name)? {
             Kind::Sensor => {
                 let environment = Surroundings::alone(changes)?;
                 sensor::report(&input::design(name, &changes.of_sensor)?, &environment, memory)
             }
             Kind::Scene => scene::report(&input::scene(name, &changes.of_scene)?, memory),
-            Kind::Scenario => scenario(name, &Scenario::open(name, changes)?, memory),
+            Kind::Scenario => {
+                scenario(&name.to_string_lossy(), &Scenario::open(name, changes)?, memory)
+            }
         }
     }
 }

@@ -6,6 +6,7 @@ pub mod scenario;
 mod summary;
 pub mod ticks;
 
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -50,22 +51,22 @@ pub struct Simulate {
     /// Ready sensor or TOML file, - for standard input; or, alone, a scenario file
     #[arg(value_name = "SENSOR", conflicts_with = "sensors", required_unless_present = "sensors")]
     #[arg(add = ArgValueCompleter::new(completions::sensors))]
-    sensor: Option<String>,
+    sensor: Option<OsString>,
 
     /// Ready scene or TOML file, - for standard input
     #[arg(value_name = "SCENE", conflicts_with_all = ["named_scene", "sensors"])]
     #[arg(add = ArgValueCompleter::new(completions::scenes))]
-    scene: Option<String>,
+    scene: Option<OsString>,
 
     /// Another way to name a sensor; repeatable, each of several gets a folder of its own
     #[arg(long = "sensor", value_name = "NAME-or-FILE", requires = "named_scene")]
     #[arg(add = ArgValueCompleter::new(completions::sensors))]
-    sensors: Vec<String>,
+    sensors: Vec<OsString>,
 
     /// Another way to name the scene
     #[arg(long = "scene", value_name = "NAME-or-FILE", id = "named_scene")]
     #[arg(add = ArgValueCompleter::new(completions::scenes))]
-    named_scene: Option<String>,
+    named_scene: Option<OsString>,
 
     #[command(flatten)]
     surroundings: Surroundings,
@@ -132,8 +133,8 @@ impl Simulate {
         let mut scenario = match (&self.sensor, scene) {
             (Some(alone), None) => open(alone, &changes)?,
             (sensor, scene) => {
-                let sensors: Vec<String> = sensor.iter().chain(&self.sensors).cloned().collect();
-                Scenario::of(&sensors, scene.map_or("", String::as_str), &changes)?
+                let sensors: Vec<OsString> = sensor.iter().chain(&self.sensors).cloned().collect();
+                Scenario::of(&sensors, scene.map_or(OsStr::new(""), OsString::as_os_str), &changes)?
             }
         };
         if let Some(formats) = &self.format {
@@ -194,14 +195,15 @@ pub fn run(options: &Simulate, common: &Common) -> Result<(), Fault> {
 }
 
 /// The scenario called `name`; a sensor or a scene in its place is a slip worth a hint.
-fn open(name: &str, changes: &Changes) -> Result<Scenario, Fault> {
+fn open(name: &OsStr, changes: &Changes) -> Result<Scenario, Fault> {
+    let called = name.display();
     match Kind::of(name)? {
         Kind::Scenario => Scenario::open(name, changes),
         Kind::Sensor => Err(Fault::Wrong(format!(
-            "{name}: is a sensor; name a scene behind it, as in `macropulse simulate {name} street`"
+            "{called}: is a sensor; name a scene behind it, as in `macropulse simulate {called} street`"
         ))),
         Kind::Scene => Err(Fault::Wrong(format!(
-            "{name}: is a scene; name a sensor before it, as in `macropulse simulate hdl-64e {name}`"
+            "{called}: is a scene; name a sensor before it, as in `macropulse simulate hdl-64e {called}`"
         ))),
     }
 }

@@ -138,7 +138,7 @@ impl Sweep {
             ));
         }
         if let [sensor] = &sensors[..] {
-            kind::in_order("sweep", sensor, &scene)?;
+            kind::in_order("sweep", sensor.as_ref(), scene.as_ref())?;
         }
         Ok(Request {
             sensors,

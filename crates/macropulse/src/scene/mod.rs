@@ -101,18 +101,21 @@ impl Scene {
     ///
     /// # Errors
     /// If it is neither, or the file is wrong; the message says what to do.
-    pub fn open(name_or_file: &str) -> Result<Self, Error> {
-        if let Some(text) = Self::builtin(name_or_file) {
-            return Self::from_toml(text, name_or_file, Path::new(""));
+    pub fn open(name_or_file: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = name_or_file.as_ref();
+        if let Some(name) = path.to_str()
+            && let Some(text) = Self::builtin(name)
+        {
+            return Self::from_toml(text, name, Path::new(""));
         }
-        let path = Path::new(name_or_file);
+        let name = path.display().to_string();
         // What looks like a path is meant as one.
         if path.is_file() || path.extension().is_some() || path.components().count() > 1 {
             return Self::from_file(path);
         }
         Err(Error::UnknownScene {
-            asked: name_or_file.to_owned(),
-            nearest: crate::names::nearest(name_or_file, builtin_names()).map(str::to_owned),
+            nearest: crate::names::nearest(&name, builtin_names()).map(str::to_owned),
+            asked: name,
             known: builtin_names().collect::<Vec<_>>().join(", "),
         })
     }
