@@ -1,7 +1,7 @@
 //! Why a shot was decided as it was.
 //!
 //! The verdict is the receiver's: the band is decoded again, by the same code, with that shot as the
-//! only one that is owned. What is shown beside it, how many marks are found at every lag and which
+//! last one that is owned, and what came of those before it is taken off. What is shown beside it, how many marks are found at every lag and which
 //! light other shots account for, is counted from the ticks in the plainest way, mark by mark.
 
 use std::ops::Range;
@@ -47,7 +47,7 @@ pub struct Explanation {
     pub peak: Option<(i64, u16)>,
     /// The best lag that is not at the peak, more than the width of a mark away from it.
     pub sidelobe: Option<(i64, u16)>,
-    /// What the receiver decided.
+    /// What the receiver together.
     pub verdict: Verdict,
     /// Other shots whose light is in this shot's time.
     pub others: Vec<OtherLight>,
@@ -101,8 +101,12 @@ impl Receiver {
         (log, ticks): (&ShotLog, &Ticks),
         shot: usize,
     ) -> Result<Explanation, Error> {
-        let alone = ShotLog { owned: shot..shot.saturating_add(1), ..log.clone() };
-        let decided = self.decode(codebook, &alone, ticks)?;
+        let first = log.owned.start.min(shot);
+        let to = |end: usize| {
+            let log = ShotLog { owned: first..end, ..log.clone() };
+            self.decode(codebook, &log, ticks)
+        };
+        let verdict = Verdict::of(shot, &to(shot)?, &to(shot.saturating_add(1))?);
         check_lags(self)?;
         let everyone = ShotLog { owned: 0..log.len(), ..log.clone() };
         let all = self.decode(codebook, &everyone, ticks)?;
@@ -135,7 +139,7 @@ impl Receiver {
             peak,
             found,
             left,
-            verdict: Verdict::of(&decided),
+            verdict,
             others,
             marks: bench.marks,
         })
@@ -143,18 +147,21 @@ impl Receiver {
 }
 
 impl Verdict {
-    fn of(decided: &super::Returns) -> Self {
+    /// That of `shot`, from what came of the shots `before` it and of those and it `together`.
+    fn of(shot: usize, before: &super::Returns, together: &super::Returns) -> Self {
         let accepted = |at: usize| Accepted {
-            tof: decided.tof[at],
-            peak: decided.peak[at],
-            marks: decided.marks[at],
-            margin: decided.margin[at],
-            photons: decided.photons[at],
+            tof: together.tof[at],
+            peak: together.peak[at],
+            marks: together.marks[at],
+            margin: together.margin[at],
+            photons: together.photons[at],
         };
-        let rejects = Reject::ALL.into_iter().zip(decided.rejects);
+        let rejects = together.rejects.iter().zip(before.rejects);
+        let rejects = rejects.map(|(together, before)| together.saturating_sub(before));
+        let own = together.shot.partition_point(|other| (*other as usize) < shot)..together.len();
         Self {
-            returns: (0..decided.len()).map(accepted).collect(),
-            rejects: rejects.filter(|(_, count)| *count > 0).collect(),
+            returns: own.map(accepted).collect(),
+            rejects: Reject::ALL.into_iter().zip(rejects).filter(|(_, count)| *count > 0).collect(),
         }
     }
 }

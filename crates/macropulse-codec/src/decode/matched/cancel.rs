@@ -60,8 +60,7 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Option<Cancelled> {
         seen: Timeline::default(),
         residual: Timeline::default(),
     };
-    let begin = canceller.owned - sent.length();
-    let mut place = ticks.partition_point(|tick| i64::from(*tick) < begin);
+    let mut place = begin(ticks, canceller.owned, sent.length());
     while place < ticks.len() && canceller.patience > 0 {
         place += match canceller.in_a_row(place) {
             0 => canceller.woven(place),
@@ -85,6 +84,18 @@ fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> u32 {
     let lags = (sent.gate().end - sent.gate().start) as f64;
     let rarity = libm::log(sent.receiver.false_alarm / lags);
     (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as u32
+}
+
+/// The tick to begin with: long enough before `owned` that macropulses which began even earlier end before
+/// it, and behind the longest gap there, as few lie over that.
+fn begin(ticks: &[u32], owned: i64, length: i64) -> usize {
+    let before = |end: i64| ticks.partition_point(|tick| i64::from(*tick) < end);
+    let (first, last) = (before(owned - 3 * length), before(owned - length));
+    let gap = |place: &usize| match (place.checked_sub(1), ticks.get(*place)) {
+        (Some(before), Some(tick)) => tick - ticks[before],
+        _ => 0,
+    };
+    (first..=last).max_by_key(gap).unwrap_or(first)
 }
 
 /// The first tick at which light of an owned shot may come.
@@ -227,6 +238,9 @@ impl Canceller<'_> {
                     if tick >= self.owned {
                         self.patience -= 1;
                         self.left.push(tick as u32);
+                    } else {
+                        // The next one is rarely more.
+                        last = last.max(tick + sent.bit_length());
                     }
                 }
             }
@@ -242,8 +256,10 @@ impl Canceller<'_> {
     /// tells when its light ends.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
         let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
-        for lags in self.nearest_first() {
-            for hidden in 0..FIRST {
+        // Of ticks that may be nobody's only what is likely is asked.
+        let (parts, most_hidden) = if tick < self.owned { (1, 1) } else { (2, FIRST) };
+        for lags in self.nearest_first().into_iter().take(parts) {
+            for hidden in 0..most_hidden {
                 let next = Some(self.next).filter(|next| *next < self.detections.len());
                 for shot in next.into_iter().chain(in_flight.clone()) {
                     // Nearly every shot is refused here.
