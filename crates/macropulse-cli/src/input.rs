@@ -70,7 +70,9 @@ fn stdin() -> Result<&'static str, Fault> {
         if bytes.len() as u64 > LONGEST_TEXT {
             return Err(format!("is longer than the {} MiB of a text", LONGEST_TEXT >> 20));
         }
-        String::from_utf8(bytes).map_err(|_| "is not text".to_owned())
+        let text = String::from_utf8(bytes).map_err(|_| "is not text".to_owned())?;
+        opened::check_values(&text)?;
+        Ok(text)
     });
     read.as_deref().map_err(|why| Fault::Wrong(format!("{ORIGIN}: {why}")))
 }

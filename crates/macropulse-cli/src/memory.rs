@@ -33,8 +33,16 @@ impl MemoryLimit {
     /// Refuses what is `estimated` for `what`, a sensor in a scene, with the threads there are, if it
     /// is more than allowed.
     pub fn allow(&self, what: &str, estimated: &Estimate) -> Result<(), Fault> {
+        self.allow_with(rayon::current_num_threads(), what, estimated)
+    }
+
+    /// The same of what is to be checked alone: refused is what not even one thread could do.
+    pub fn allow_alone(&self, what: &str, estimated: &Estimate) -> Result<(), Fault> {
+        self.allow_with(1, what, estimated)
+    }
+
+    fn allow_with(&self, threads: usize, what: &str, estimated: &Estimate) -> Result<(), Fault> {
         let Some((limit, whose)) = self.bytes(machine()) else { return Ok(()) };
-        let threads = rayon::current_num_threads();
         let needed = estimated.total(threads);
         if needed <= limit {
             return Ok(());

@@ -144,6 +144,15 @@ fn a_text_without_an_end() {
 }
 
 #[test]
+fn a_text_of_millions_of_values() {
+    let desk = Desk::new();
+    let copies = "{},".repeat(5_000_000);
+    desk.put("s.toml", &format!("version = 1\n[[object]]\ncar = {{}}\ncopies = [{copies}]\n"));
+    refused(&desk, "check s.toml", &["s.toml", "more than 2097152 values"]);
+    refused(&desk, "simulate vlp-16 s.toml -o out", &["s.toml", "more than 2097152 values"]);
+}
+
+#[test]
 fn more_elements_than_a_file_has_bytes() {
     let desk = Desk::new();
     let scene = |name: &str| SCENE.replace("MESH", name);

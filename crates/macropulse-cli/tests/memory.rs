@@ -80,7 +80,7 @@ fn what_takes_too_much_is_refused_before_it_is_begun() {
             &format!("simulate kim-park-2016-fixed wall -o out --memory-limit 1GB -j 1 {dark}"),
             ["with 1 thread", "less noise"],
         ),
-        ("check kim-park-2016-physical --memory-limit 2GB -j 2", ["-j 1", "--memory-limit"]),
+        ("check kim-park-2016-physical --memory-limit 1GB -j 2", ["with 1 thread", "less noise"]),
         ("check street --memory-limit 1MB", ["street", "fewer triangles"]),
         (
             "sweep vlp-16 wall --vary tdc.converters=16,32 -o out --memory-limit 15MB",

@@ -27,13 +27,13 @@ const PER_MARK: u64 = 4;
 const PER_PIXEL: u64 = 60;
 
 /// Of the same where it is written: as one list, and what a page or a format makes of that.
-const PER_WRITTEN: u64 = 150;
+const PER_WRITTEN: u64 = 130;
 
 /// Of a shot of a band: log, hits, pulse trains.
 const PER_SHOT: f64 = 400.0;
 
 /// Of the same where the mirror moves on during a macropulse, and the hits of its parts are kept.
-const PER_MOVING_SHOT: f64 = 7_000.0;
+const PER_MOVING_SHOT: f64 = 6_000.0;
 
 /// Of a mark that is detected: its time, and its tick.
 const PER_MARK_SEEN: f64 = 20.0;

@@ -10,6 +10,10 @@ use std::path::Path;
 /// Most bytes of a text that somebody typed: a sensor, a scene, a scenario.
 pub const LONGEST_TEXT: u64 = 16 << 20;
 
+/// Most lines, commas and opening brackets of such a text: of what stands between them a parser makes
+/// some hundred bytes each, however short it is.
+const MOST_VALUES: usize = 1 << 21;
+
 /// What comes out of a file, or of a pipe.
 pub type Stream = Chain<Cursor<Vec<u8>>, File>;
 
@@ -46,7 +50,21 @@ pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 pub fn text(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
     read_to_end(stream(path)?, LONGEST_TEXT, &mut bytes)?;
-    String::from_utf8(bytes).map_err(|_| io::ErrorKind::InvalidData.into())
+    let text = String::from_utf8(bytes).map_err(|_| io::ErrorKind::InvalidData)?;
+    check_values(&text).map_err(io::Error::other)?;
+    Ok(text)
+}
+
+/// Refuses a text of more values than are read.
+///
+/// # Errors
+/// The sentence that says so.
+pub fn check_values(text: &str) -> Result<(), String> {
+    let values = text.bytes().filter(|byte| matches!(byte, b'\n' | b',' | b'[' | b'{')).count();
+    match values > MOST_VALUES {
+        true => Err(format!("it has more than {MOST_VALUES} values, the most that are read here")),
+        false => Ok(()),
+    }
 }
 
 /// What comes out of the file at `path`, or of the pipe there if somebody writes to it.

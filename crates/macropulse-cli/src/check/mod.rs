@@ -103,7 +103,7 @@ fn scenario(name: &str, scenario: &Scenario, memory: &MemoryLimit) -> Result<Rep
     let mut most = Estimate::default();
     for design in &scenario.designs {
         let estimate = Estimate::in_scene(design, &scenario.scene)?;
-        memory.allow(&format!("{} in {}", design.name, scenario.scene.name), &estimate)?;
+        memory.allow_alone(&format!("{} in {}", design.name, scenario.scene.name), &estimate)?;
         if estimate.total(1) > most.total(1) {
             most = estimate;
         }

@@ -13,7 +13,7 @@ use crate::text::{Columns, grouped, short};
 /// What a scene is made of, and what was assumed in reading it.
 pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
     let estimate = Estimate { scene: of_scene(scene), ..Estimate::default() };
-    memory.allow(&scene.name, &estimate)?;
+    memory.allow_alone(&scene.name, &estimate)?;
     let objects: Vec<&str> = scene.objects.iter().map(|object| object.name.as_str()).collect();
     let materials: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
     let targets: Vec<&str> =

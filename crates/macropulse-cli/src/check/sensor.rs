@@ -22,7 +22,7 @@ pub fn report(
     memory: &MemoryLimit,
 ) -> Result<Report, Fault> {
     let estimate = Estimate::of(design, environment)?;
-    memory.allow(&design.name, &estimate)?;
+    memory.allow_alone(&design.name, &estimate)?;
     let derived = design.derived();
     let operating = Operating::of(design, environment)?;
     let mut text = format!("{}: a sensor\n{}\n", design.name, design.summary);
