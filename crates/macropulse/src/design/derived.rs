@@ -51,7 +51,7 @@ impl Derived {
         Self {
             pixel_period,
             channel_period,
-            shortest_dwell: design.scan.model().shortest_dwell(pixel_period),
+            shortest_dwell: design.scan.shortest_period(),
             gate,
             shots_in_flight: gate / pixel_period,
             chips: codebook.chips(),

@@ -117,7 +117,7 @@ fn phases(
     let marks: usize = weights.iter().map(|(marks, count)| marks * count).sum();
     let mean = marks as f64 / weights.values().sum::<usize>() as f64;
     let chip = s_from_fs(design.coding.chip_fs);
-    let seen = found.seen * (mean * chip / design.scan.channel_period()).min(1.0);
+    let seen = found.seen * (mean * chip / design.scan.shortest_period()).min(1.0);
     let farthest = (4.0 * sigma).ceil() as i32;
     let mut dark: BTreeMap<i32, f64> = BTreeMap::new();
     for first in 1 - width - farthest..=farthest {

@@ -114,7 +114,7 @@ impl<'a> Forecaster<'a> {
         for weight in sent.filter(|&weight| weight > 0) {
             *weights.entry(weight).or_insert(0) += 1;
         }
-        let channel_period = design.scan.channel_period();
+        let channel_period = design.scan.shortest_period();
         let mean_weight = codebook.mean_weight();
         let (light, background) = (1.0, 1.0);
         let is_matched = design.is_coded() && design.receiver.kind == ReceiverKind::Matched;

@@ -184,7 +184,7 @@ fn swept(design: &Design) -> f64 {
         return 0.0;
     };
     let derived = design.derived();
-    derived.macropulse / derived.pixel_period * pixel
+    derived.macropulse / derived.shortest_dwell * pixel
 }
 
 #[cfg(test)]

@@ -102,9 +102,10 @@ impl Mirror<'_> {
         let of = |shot: usize| directions.of(log.row[shot], log.column[shot]);
         let axis = of(shot);
         let in_line = |other: &usize| *other < log.len() && log.row[*other] == log.row[shot];
-        // The last pixel of a line moves on as it came.
-        let next = Some(shot + 1).filter(in_line);
-        let before = shot.checked_sub(1).filter(in_line);
+        // Beams side by side fire in turn. The last pixel of a line moves on as it came.
+        let beams = self.design.channels() as usize;
+        let next = Some(shot + beams).filter(in_line);
+        let before = shot.checked_sub(beams).filter(in_line);
         let Some(other) = next.or(before) else { return axis };
         let macropulse =
             i64::from(self.design.coding.codebook.chips()) * self.design.coding.chip_fs;

@@ -192,7 +192,7 @@ impl Check<'_> {
         let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
         let [across, down] = scan.model().cell();
         let pixel = solid_angle(across, down);
-        let pixel_period = scan.channel_period();
+        let pixel_period = scan.shortest_period();
         let follows = scan.model().follows();
         let co_scanned = |pixels: f64, solid_angle: f64| Field {
             solid_angle,

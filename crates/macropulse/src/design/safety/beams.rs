@@ -41,9 +41,9 @@ pub(crate) struct Lines {
     pub step: f64,
     /// Azimuth of the first column, rad, of a line that fires first.
     pub first: f64,
-    /// Whether lines are drawn one after another, evenly spaced and alike above and below the
-    /// horizon, rather than all at once.
-    pub one_by_one: bool,
+    /// Lines drawn one after another: all of them where there is one beam, and 1 where all are drawn at
+    /// once. More than one are evenly spaced, and alike above and below the horizon.
+    pub in_turn: u32,
 }
 
 /// A line of beams.
@@ -133,12 +133,12 @@ impl<'a> LineBeams<'a> {
             return aims;
         }
         // So many columns pass within the time, if that is shorter than a line takes to cross.
-        let line = self.scan.period() / self.lines_in_turn();
+        let line = self.scan.period() / f64::from(self.lines.in_turn);
         let widest = counted / line * f64::from(self.scan.columns) * self.lines.step / 2.0;
         for elevation in self.edges(reach) {
             let number = self.nearest(elevation);
             let elevation = self.lines.rows[number].elevation;
-            let rows = match self.lines.one_by_one {
+            let rows = match self.lines.in_turn as usize == self.lines.rows.len() {
                 true => number..number + 1,
                 false => self.rows_within(elevation, reach),
             };
@@ -192,9 +192,9 @@ impl<'a> LineBeams<'a> {
         libm::atan(share.reach() / self.distance)
     }
 
-    /// Lines drawn one after another in a scan.
-    fn lines_in_turn(&self) -> f64 {
-        if self.lines.one_by_one { f64::from(self.scan.rows) } else { 1.0 }
+    /// Whether it is a raster.
+    fn is_raster(&self) -> bool {
+        self.lines.in_turn > 1
     }
 
     /// Distance in the plane of the aperture, m, between its middle and a beam `off` in azimuth.
@@ -261,7 +261,7 @@ impl<'a> LineBeams<'a> {
     /// Elevations of interest to what crosses at once: of a raster the outermost row, the one an
     /// aperture's radius further in, and the middle; of a turning head every one.
     fn edges(&self, reach: f64) -> Vec<f64> {
-        match self.lines.rows.first().filter(|_| self.lines.one_by_one) {
+        match self.lines.rows.first().filter(|_| self.is_raster()) {
             Some(row) => {
                 let inside = (row.elevation - reach).max(0.0);
                 vec![row.elevation, inside, 0.0]
@@ -273,7 +273,7 @@ impl<'a> LineBeams<'a> {
     /// Elevations at which the middle of an aperture is tried: every row and between rows, thinned
     /// out where they are many. A raster is alike above and below the horizon.
     fn elevations(&self, reach: f64) -> Vec<f64> {
-        let raster = self.lines.one_by_one;
+        let raster = self.is_raster();
         let of_row = |row: &Line| row.elevation;
         let mut all: Vec<f64> = self.lines.rows.iter().map(of_row).collect();
         let between: Vec<f64> = all.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0).collect();

@@ -90,7 +90,7 @@ macro_rules! patterns {
 }
 
 patterns! {
-    /// One beam, line by line.
+    /// A beam that a mirror leads over the field line by line, or several side by side.
     Raster, raster, "raster";
     /// Fixed elevations on a turning head.
     Spinning, spinning, "spinning";
@@ -165,6 +165,12 @@ impl Scan {
     /// Mean time between shots of the same detector, s.
     pub fn channel_period(&self) -> f64 {
         self.period() / self.shots() as f64 * f64::from(self.channels())
+    }
+
+    /// Shortest time between shots of the same detector, s: less than the mean where a mirror turns back
+    /// between lines, or is fastest in the middle of them.
+    pub fn shortest_period(&self) -> f64 {
+        self.model().shortest_dwell(self.period() / self.shots() as f64)
     }
 
     /// Whether all shots of a scan are fired at one moment.

@@ -1,4 +1,5 @@
-//! One beam that a mirror leads over the field, line by line.
+//! Beams that a mirror leads over the field, line by line: one, or several side by side, each with a band of
+//! rows and a detector of its own.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -12,11 +13,14 @@ use crate::design::Error;
 use crate::design::limits::Check;
 use crate::design::safety::{Beams, Line, Lines};
 
-/// One beam, line by line.
+/// Line by line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// Its pixels: a line is a row.
+    /// Its pixels: a line of a beam is a row.
     pub grid: Grid,
+    /// Beams that fire at the same moments. The first draws the uppermost rows, as many as each of the
+    /// others, from the top down.
+    pub beams: u32,
     /// Motion of the fast axis.
     pub mirror: Mirror,
     /// Fraction of the line time in which shots are fired.
@@ -53,7 +57,7 @@ impl Mirror {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
-    /// Rows of pixels, which are lines of the beam.
+    /// Rows of pixels, which are lines of a beam.
     #[schemars(range(min = 1, max = 16384))]
     rows: u32,
     /// Pixels of a row.
@@ -65,6 +69,10 @@ pub(super) struct File {
     /// Full field from top to bottom, degrees.
     #[schemars(range(min = 0.001, max = 180))]
     vertical_deg: f64,
+    /// Beams side by side, which fire at the same moments: each draws as many rows, one below the other, and
+    /// has a detector and converters of its own.
+    #[schemars(range(min = 1, max = 1024))]
+    beams: u32,
     /// Motion of the fast axis.
     mirror: Mirror,
     /// Share of the time of a line in which shots are fired.
@@ -78,11 +86,33 @@ impl Typed for File {
         let grid = grid::Typed { rows, columns, horizontal_deg, vertical_deg };
         let grid = grid.check(check, "raster")?;
         let duty = check.within("scan.raster.duty", self.duty, 0.01, 1.0)?;
-        Ok(Pattern::Raster(Raster { grid, mirror, duty }))
+        let beams = check.count("scan.raster.beams", self.beams, 1, MOST_BEAMS)?;
+        if rows % beams != 0 {
+            return check.refuse(
+                "scan.raster.beams",
+                format!("{beams} beams do not share {rows} rows evenly: use a divisor of the rows"),
+            );
+        }
+        Ok(Pattern::Raster(Raster { grid, beams, mirror, duty }))
     }
 }
 
+/// Beams at most: more detectors than any receiver has one by one.
+const MOST_BEAMS: u32 = 1024;
+
 impl Raster {
+    /// Lines that each beam draws in a scan.
+    pub fn lines(&self) -> u32 {
+        self.grid.rows / self.beams
+    }
+
+    /// Line, place along the line, and beam of the shot `order` of a scan: the beams in turn, from the top
+    /// down, though they fire at the same moment.
+    fn place(&self, order: u64) -> [u64; 3] {
+        let (beams, columns) = (u64::from(self.beams), u64::from(self.grid.columns));
+        [order / (columns * beams), order / beams % columns, order % beams]
+    }
+
     /// Whether the line of this number is drawn from the right to the left.
     fn comes_back(&self, line: u64) -> bool {
         self.mirror == Mirror::Sinusoidal && line % 2 == 1
@@ -91,7 +121,10 @@ impl Raster {
 
 impl Model for Raster {
     fn summary(&self) -> String {
-        "one beam, mirror raster".to_owned()
+        match self.beams {
+            1 => "one beam, mirror raster".to_owned(),
+            beams => format!("{beams} beams, mirror raster"),
+        }
     }
 
     fn size(&self) -> [u32; 2] {
@@ -99,50 +132,53 @@ impl Model for Raster {
     }
 
     fn channels(&self) -> u32 {
-        1
+        self.beams
     }
 
-    fn channel_of(&self, _order: u64, _row: u16) -> u16 {
-        0
+    fn channel_of(&self, _order: u64, row: u16) -> u16 {
+        row / self.lines() as u16
     }
 
     fn pixel(&self, order: u64) -> (u16, u16) {
         let columns = u64::from(self.grid.columns);
-        let (line, across) = (order / columns, order % columns);
+        let [line, across, beam] = self.place(order);
         let column = if self.comes_back(line) { columns - 1 - across } else { across };
-        (line as u16, column as u16)
+        ((beam * u64::from(self.lines()) + line) as u16, column as u16)
     }
 
     fn order_of(&self, row: u16, column: u16) -> u64 {
-        let (line, columns) = (u64::from(row), u64::from(self.grid.columns));
-        let column = u64::from(column);
-        line * columns + if self.comes_back(line) { columns - 1 - column } else { column }
+        let (row, column) = (u64::from(row), u64::from(column));
+        let columns = u64::from(self.grid.columns);
+        let (beam, line) = (row / u64::from(self.lines()), row % u64::from(self.lines()));
+        let across = if self.comes_back(line) { columns - 1 - column } else { column };
+        (line * columns + across) * u64::from(self.beams) + beam
     }
 
     fn moment(&self, order: u64, period: f64) -> Moment {
-        if self.equal_steps() {
-            return Moment { shots: order, then: 0.0 };
+        let beams = u64::from(self.beams);
+        if self.mirror == Mirror::Uniform && self.duty == 1.0 {
+            return Moment { shots: order / beams * beams, then: 0.0 };
         }
-        let columns = u64::from(self.grid.columns);
-        let across = (order % columns) as f64 / columns as f64;
-        let line = period / f64::from(self.grid.rows);
-        let then = line * self.mirror.moment(self.duty, across);
-        Moment { shots: order / columns * columns, then }
+        let [line, across, _] = self.place(order);
+        let across = across as f64 / f64::from(self.grid.columns);
+        let then = period / f64::from(self.lines()) * self.mirror.moment(self.duty, across);
+        Moment { shots: line * self.line(), then }
     }
 
     fn equal_steps(&self) -> bool {
-        self.mirror == Mirror::Uniform && self.duty == 1.0
+        self.beams == 1 && self.mirror == Mirror::Uniform && self.duty == 1.0
     }
 
     fn line(&self) -> u64 {
-        self.grid.columns.into()
+        u64::from(self.grid.columns) * u64::from(self.beams)
     }
 
     fn draws_from_the_left(&self) -> bool {
-        self.mirror == Mirror::Uniform
+        self.beams == 1 && self.mirror == Mirror::Uniform
     }
 
     fn shortest_dwell(&self, pixel_period: f64) -> f64 {
+        let pixel_period = pixel_period * f64::from(self.beams);
         match self.mirror {
             Mirror::Uniform => pixel_period * self.duty,
             Mirror::Sinusoidal => {
@@ -175,7 +211,8 @@ impl Model for Raster {
     }
 
     fn shared_field(&self) -> Option<[f64; 2]> {
-        Some(self.grid.sides())
+        let [horizontal, vertical] = self.grid.sides();
+        Some([horizontal, vertical / f64::from(self.beams)])
     }
 
     fn follows(&self) -> bool {
@@ -186,6 +223,66 @@ impl Model for Raster {
         let step = self.grid.cell()[0];
         let first = (self.grid.horizontal - step) / 2.0;
         let rows = self.grid.elevations().map(|elevation| Line { elevation, first }).collect();
-        Beams::Lines(Lines { rows, step, first, one_by_one: true })
+        Beams::Lines(Lines { rows, step, first, in_turn: self.lines() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::design::Design;
+
+    fn sensor(set: &[(&str, &str)]) -> Result<Design, String> {
+        let set: Vec<_> = set.iter().map(|(key, value)| ((*key).into(), (*value).into())).collect();
+        Design::open("coded-practical", &set).map_err(|error| error.to_string())
+    }
+
+    /// Two lines of two beams with three columns, written out by hand.
+    #[test]
+    fn beams_side_by_side_draw_their_own_rows() {
+        let small = [
+            ("scan.raster.rows", "4"),
+            ("scan.raster.columns", "3"),
+            ("scan.raster.beams", "2"),
+            ("scan.raster.mirror", "sinusoidal"),
+            ("scan.raster.duty", "0.5"),
+        ];
+        let design = sensor(&small).unwrap();
+        let model = design.scan.model();
+        let pixels: Vec<(u16, u16)> = (0..12).map(|order| model.pixel(order)).collect();
+        let there = [(0, 0), (2, 0), (0, 1), (2, 1), (0, 2), (2, 2)];
+        let back = [(1, 2), (3, 2), (1, 1), (3, 1), (1, 0), (3, 0)];
+        assert_eq!(pixels, [there, back].concat());
+        for (order, &(row, column)) in pixels.iter().enumerate() {
+            assert_eq!(model.order_of(row, column), order as u64);
+            assert_eq!(u32::from(model.channel_of(order as u64, row)), u32::from(row) / 2);
+        }
+        let moment = |order| design.scan.moment(order) * 60.0;
+        assert_eq!(moment(0), moment(1));
+        // A resonant mirror in half of the time of its line: from a quarter of it on.
+        approx::assert_relative_eq!(moment(0), 0.125, max_relative = 1e-9);
+        approx::assert_relative_eq!(moment(7), 0.625, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn shots_of_a_beam_are_as_far_apart_as_its_duty_lets_them() {
+        let beams =
+            [("scan.raster.beams", "32"), ("scan.raster.duty", "0.36"), ("tdc.converters", "32")];
+        let design = sensor(&beams).unwrap();
+        // 15 lines of 848 columns, sixty times a second.
+        let apart = 0.36 / (60.0 * 15.0 * 848.0);
+        approx::assert_relative_eq!(design.scan.shortest_period(), apart, max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            design.scan.moment(32) - design.scan.moment(0),
+            apart,
+            max_relative = 1e-9
+        );
+        let mean = design.scan.channel_period();
+        approx::assert_relative_eq!(mean, apart / 0.36, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn rows_that_beams_cannot_share_are_refused() {
+        let error = sensor(&[("scan.raster.beams", "7")]).unwrap_err();
+        assert!(error.contains("7 beams do not share 480 rows evenly"), "{error}");
     }
 }
