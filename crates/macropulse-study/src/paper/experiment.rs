@@ -54,7 +54,7 @@ pub struct Trial {
 
 /// The scene with the car so far away, m.
 pub(super) fn scene(distance: u32) -> Result<Scene, Error> {
-    Ok(Scene::open(&format!("car-{distance}m"))?)
+    Ok(Scene::open(format!("car-{distance}m"))?)
 }
 
 /// Runs one trial and writes its cloud, pictures and manifest into `folder`.
