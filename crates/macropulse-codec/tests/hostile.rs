@@ -225,7 +225,7 @@ proptest! {
             _ => Family::orthogonal(length % 500, weight, Some(words)),
         };
         let (bits, width, polynomial, init, sync) = payload;
-        let payload = Payload::new(bits, Crc { width, polynomial, init, ..Crc::default() }, sync);
+        let payload = Payload::new(bits, Crc { width, polynomial, init }, sync);
         if let Ok(family) = family {
             let made = Codebook::new(family, payload.ok(), labels % 70, Keying::OnOff);
             prop_assert!(made.is_err() || made.unwrap().chips() <= 65_535);
