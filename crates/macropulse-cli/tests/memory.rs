@@ -75,7 +75,10 @@ fn what_takes_too_much_is_refused_before_it_is_begun() {
     let desk = Desk::new();
     let dark = "--set detector.photon-counting.dark_counts_hz=1e12";
     for (line, words) in [
-        ("simulate kim-park-2016-fixed wall -o out --memory-limit 160MB -j 8", ["as -j ", "allowed"]),
+        (
+            "simulate kim-park-2016-fixed wall -o out --memory-limit 160MB -j 8",
+            ["as -j ", "allowed"],
+        ),
         (
             &format!("simulate kim-park-2016-fixed wall -o out --memory-limit 1GB -j 1 {dark}"),
             ["with 1 thread", "less noise"],
