@@ -35,7 +35,7 @@ pub fn file(path: &Path, most: u64) -> io::Result<File> {
 /// All bytes of the file at `path`, `most` of them at most.
 ///
 /// # Errors
-/// As [`file`].
+/// As [`file()`].
 pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = file(path, most)?;
     let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
