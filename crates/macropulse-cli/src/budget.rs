@@ -1,5 +1,6 @@
 //! `macropulse budget`: will it work, how far, and what fails first?
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -26,7 +27,7 @@ use crate::{completions, input};
 pub struct Budget {
     /// Ready sensor or TOML file, - for standard input
     #[arg(value_name = "SENSOR", add = ArgValueCompleter::new(completions::sensors))]
-    sensor: String,
+    sensor: OsString,
 
     #[command(flatten)]
     surroundings: Surroundings,

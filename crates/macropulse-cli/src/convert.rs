@@ -1,6 +1,6 @@
 //! `macropulse convert`: point clouds from one format to another.
 
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -46,7 +46,7 @@ struct Target {
     formats: Vec<Format>,
     folder: PathBuf,
     /// The name of the one file; without it each input has files of its own name.
-    file: Option<String>,
+    file: Option<OsString>,
 }
 
 impl Convert {
@@ -93,7 +93,7 @@ impl Convert {
             _ => false,
         };
         let name = output.file_name().filter(|_| is_file);
-        let file = name.map(|name| name.to_string_lossy().into_owned());
+        let file = name.map(OsStr::to_owned);
         let parent = output.parent().filter(|parent| !parent.as_os_str().is_empty());
         let folder = if is_file { parent.unwrap_or(Path::new(".")) } else { output };
         Ok(Target { formats, folder: folder.to_owned(), file })
@@ -140,17 +140,18 @@ impl Target {
     }
 
     /// The name of a file.
-    fn name(&self, format: Format, input: &Path, scan: Option<u64>) -> String {
+    fn name(&self, format: Format, input: &Path, scan: Option<u64>) -> OsString {
         if let Some(file) = &self.file {
             return file.clone();
         }
         if format.is_of_run() {
-            return format.file_name(0);
+            return format.file_name(0).into();
         }
-        let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+        let mut name = input.file_stem().unwrap_or_default().to_owned();
         let scan = scan.map(|scan| format!("-{scan:06}")).unwrap_or_default();
         let kind = if format == Format::RangeNpy { "-range" } else { "" };
-        format!("{stem}{scan}{kind}.{}", format.extension())
+        name.push(format!("{scan}{kind}.{}", format.extension()));
+        name
     }
 }
 

@@ -1,10 +1,12 @@
 //! Sensors and scenes by their names: ready ones, files, and `-` for what stands on standard input.
 
+use std::ffi::OsStr;
 use std::io::Read;
 use std::path::Path;
 use std::sync::OnceLock;
 
 use macropulse::design::{Design, preset_text};
+use macropulse::opened::{self, LONGEST_TEXT};
 use macropulse::scene::Scene;
 
 use crate::fault::Fault;
@@ -15,20 +17,17 @@ pub const STREAM: &str = "-";
 /// What it is called in messages.
 const ORIGIN: &str = "standard input";
 
-/// Longer texts are no sensor and no scene, bytes.
-const LONGEST: u64 = 16 << 20;
-
 /// The sensor called `name`, with single values changed.
 ///
 /// # Errors
 /// What is wrong with the name, the text or a change.
-pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault> {
-    match name {
-        STREAM => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
-        scene if Scene::builtin(scene).is_some() => Err(Fault::Wrong(format!(
+pub fn design(name: &OsStr, changes: &[(String, String)]) -> Result<Design, Fault> {
+    match name.to_str() {
+        Some(STREAM) => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
+        Some(scene) if Scene::builtin(scene).is_some() => Err(Fault::Wrong(format!(
             "{scene}: is a scene, where a sensor is wanted; `macropulse sensors` lists the ready ones"
         ))),
-        name => Ok(Design::open(name, changes)?),
+        _ => Ok(Design::open(name, changes)?),
     }
 }
 
@@ -36,13 +35,13 @@ pub fn design(name: &str, changes: &[(String, String)]) -> Result<Design, Fault>
 ///
 /// # Errors
 /// What is wrong with the name, the text or a change.
-pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
-    match name {
-        STREAM => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
-        sensor if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
+pub fn scene(name: &OsStr, changes: &[(String, String)]) -> Result<Scene, Fault> {
+    match name.to_str() {
+        Some(STREAM) => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
+        Some(sensor) if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
             "{sensor}: is a sensor, where a scene is wanted; `macropulse scenes` lists the ready ones"
         ))),
-        name => Ok(Scene::open_changed(name, changes)?),
+        _ => Ok(Scene::open_changed(name, changes)?),
     }
 }
 
@@ -50,13 +49,14 @@ pub fn scene(name: &str, changes: &[(String, String)]) -> Result<Scene, Fault> {
 ///
 /// # Errors
 /// If it cannot be read.
-pub fn text(name: &str) -> Result<(String, String), Fault> {
-    match name {
-        STREAM => Ok((stdin()?.to_owned(), ORIGIN.to_owned())),
-        name => match std::fs::read_to_string(name) {
-            Ok(text) => Ok((text, name.to_owned())),
-            Err(error) => Err(Fault::unreadable(name, &error)),
-        },
+pub fn text(name: &OsStr) -> Result<(String, String), Fault> {
+    if name == STREAM {
+        return Ok((stdin()?.to_owned(), ORIGIN.to_owned()));
+    }
+    let called = name.display().to_string();
+    match opened::text(Path::new(name)) {
+        Ok(text) => Ok((text, called)),
+        Err(error) => Err(Fault::unreadable(&called, &error)),
     }
 }
 
@@ -65,12 +65,14 @@ fn stdin() -> Result<&'static str, Fault> {
     static TEXT: OnceLock<Result<String, String>> = OnceLock::new();
     let read = TEXT.get_or_init(|| {
         let mut bytes = Vec::new();
-        let mut input = std::io::stdin().lock().take(LONGEST + 1);
+        let mut input = std::io::stdin().lock().take(LONGEST_TEXT + 1);
         input.read_to_end(&mut bytes).map_err(|error| format!("cannot be read: {error}"))?;
-        if bytes.len() as u64 > LONGEST {
-            return Err(format!("is longer than the {} MiB of a text", LONGEST >> 20));
+        if bytes.len() as u64 > LONGEST_TEXT {
+            return Err(format!("is longer than the {} MiB of a text", LONGEST_TEXT >> 20));
         }
-        String::from_utf8(bytes).map_err(|_| "is not text".to_owned())
+        let text = String::from_utf8(bytes).map_err(|_| "is not text".to_owned())?;
+        opened::check_values(&text)?;
+        Ok(text)
     });
     read.as_deref().map_err(|why| Fault::Wrong(format!("{ORIGIN}: {why}")))
 }

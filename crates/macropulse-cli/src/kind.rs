@@ -1,5 +1,6 @@
 //! What a file is: its content tells, not its name.
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use macropulse::design::{preset_names, preset_text};
@@ -31,11 +32,11 @@ const OF_SCENARIOS: [&str; 4] = ["scene", "scans", "seed", "formats"];
 
 impl Kind {
     /// What the ready sensor or scene, or the file, called `name` is.
-    pub fn of(name: &str) -> Result<Self, Fault> {
-        if preset_text(name).is_some() {
+    pub fn of(name: &OsStr) -> Result<Self, Fault> {
+        if name.to_str().and_then(preset_text).is_some() {
             return Ok(Self::Sensor);
         }
-        if Scene::builtin(name).is_some() {
+        if name.to_str().and_then(Scene::builtin).is_some() {
             return Ok(Self::Scene);
         }
         let path = Path::new(name);
@@ -44,7 +45,7 @@ impl Kind {
             && path.extension().is_none()
             && path.components().count() == 1
         {
-            return Err(Fault::Wrong(unknown(name)));
+            return Err(Fault::Wrong(unknown(&name.to_string_lossy())));
         }
         let (text, name) = input::text(name)?;
         match text.parse::<Table>() {
@@ -82,11 +83,12 @@ impl Kind {
 }
 
 /// Refuses a scene and a sensor that are named the wrong way round for `command`.
-pub fn in_order(command: &str, sensor: &str, scene: &str) -> Result<(), Fault> {
-    let is = |name: &str, kind: Kind| Kind::of(name).is_ok_and(|found| found == kind);
+pub fn in_order(command: &str, sensor: &OsStr, scene: &OsStr) -> Result<(), Fault> {
+    let is = |name: &OsStr, kind: Kind| Kind::of(name).is_ok_and(|found| found == kind);
     if !(is(scene, Kind::Sensor) && is(sensor, Kind::Scene)) {
         return Ok(());
     }
+    let (sensor, scene) = (sensor.display(), scene.display());
     Err(Fault::Wrong(format!(
         "{sensor}: is a scene, and {scene} a sensor; the sensor comes first, as in \
          `macropulse {command} {scene} {sensor}`"

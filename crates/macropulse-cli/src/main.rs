@@ -15,6 +15,7 @@ mod input;
 mod interrupt;
 mod kind;
 mod man;
+mod memory;
 mod options;
 mod paper;
 mod progress;

@@ -32,7 +32,7 @@ pub fn run(options: &Sensors) -> Result<(), Fault> {
 }
 
 fn one(name: &str, as_json: bool) -> Result<(), Fault> {
-    let design = input::design(name, &[])?;
+    let design = input::design(name.as_ref(), &[])?;
     let toml = preset_text(name).map_or(design.text.as_str(), to_start_from);
     if as_json {
         let (name, summary) = (&design.name, &design.summary);

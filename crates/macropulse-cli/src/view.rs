@@ -10,7 +10,7 @@ use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
 
-use crate::fault::Fault;
+use crate::fault::{Fault, note};
 use crate::options::Common;
 use crate::text::print;
 
@@ -51,7 +51,7 @@ pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
     refuse_name(path)?;
     let (page, output) = if path.is_dir() {
         let output = options.output.clone().unwrap_or_else(|| path.join(PAGE));
-        (of_folder(path, &output)?, output)
+        (of_folder((path, &output), common)?, output)
     } else {
         let output = options.output.clone().unwrap_or_else(|| path.with_extension("html"));
         (of_file(path, &output)?, output)
@@ -97,8 +97,16 @@ fn of_file(path: &Path, output: &Path) -> Result<Explorer, Fault> {
     Ok(page)
 }
 
-fn of_folder(folder: &Path, output: &Path) -> Result<Explorer, Fault> {
+fn of_folder((folder, output): (&Path, &Path), common: &Common) -> Result<Explorer, Fault> {
     let left = Left::of(folder)?;
+    if left.is_unfinished {
+        let folder = folder.display();
+        let told = format!(
+            "{folder}: the run that writes into it is not over, or was killed: what is shown may be of \
+             several runs"
+        );
+        note(&told, common);
+    }
     let clouds = left.clouds();
     if clouds.is_empty() {
         return Err(record::Error::NoCloud { folder: folder.to_owned() }.into());

@@ -28,6 +28,11 @@ pub struct Cut {
     pub history_fs: i64,
 }
 
+/// `time` in whole `parts`, rounded down; a part lasts 1 fs at least.
+fn quotient(time: i64, part: i64) -> i64 {
+    time.div_euclid(part.max(1))
+}
+
 impl Cut {
     /// When shots are fired that belong to the log of owned ones, the first of which is fired at
     /// `first` and the last at `last`.
@@ -37,19 +42,20 @@ impl Cut {
 
     /// The absolute ticks that belong to owned shots fired from `first` to `last`.
     pub fn ticks(&self, first: i64, last: i64) -> Range<i64> {
-        self.opens(first)..self.closes(last).div_euclid(self.tick_fs) + 1
+        let closes = quotient(self.closes(last), self.tick_fs);
+        self.opens(first)..closes.saturating_add(1)
     }
 
     /// The first absolute tick that belongs to owned shots of which the first is fired at `first`.
     pub fn opens(&self, first: i64) -> i64 {
-        first.saturating_sub(self.lead_fs).div_euclid(self.tick_fs)
+        quotient(first.saturating_sub(self.lead_fs), self.tick_fs)
     }
 
     /// The absolute tick that ticks are counted from in a log whose first shot, owned or not, is
     /// fired at `first`: early enough for what jitter puts before that.
     pub fn epoch(&self, first: i64) -> i64 {
-        let clocks = first.saturating_sub(self.jitter_fs).div_euclid(self.clock_fs);
-        clocks * (self.clock_fs / self.tick_fs)
+        let clocks = quotient(first.saturating_sub(self.jitter_fs), self.clock_fs);
+        clocks.saturating_mul(quotient(self.clock_fs, self.tick_fs))
     }
 
     /// The part of the log of a band that its receiver is given: without the shots that were fired before
@@ -59,6 +65,13 @@ impl Cut {
         let Some(first) = log.fired_at_fs.get(log.owned.start) else { return log.clone() };
         let opens_fs = self.opens(*first).saturating_mul(self.tick_fs);
         log.part(log.fired_at_fs.partition_point(|fired| *fired < opens_fs)..log.len())
+    }
+
+    /// Whether a stream can be cut so: its ticks and clock last some time, and nothing ends before it
+    /// begins.
+    pub(crate) fn is_possible(&self) -> bool {
+        let spans = [self.jitter_fs, self.listening_fs, self.lead_fs, self.history_fs];
+        self.tick_fs > 0 && self.clock_fs >= self.tick_fs && spans.iter().all(|span| *span >= 0)
     }
 
     fn closes(&self, last: i64) -> i64 {

@@ -50,14 +50,17 @@ impl ShotLog {
     }
 
     /// The `shots` of the log, counted in it, as a log of their own; as far as they are there. Owned are
-    /// those of them that were.
+    /// those of them that were. Columns that are too short stay so.
     pub fn part(&self, shots: Range<usize>) -> Self {
         let end = shots.end.min(self.len());
         let shots = shots.start.min(end)..end;
-        let column = |column: &[u16]| column[shots.clone()].to_vec();
+        let column = |column: &[u16]| {
+            let end = shots.end.min(column.len());
+            column[shots.start.min(end)..end].to_vec()
+        };
         let place = |shot: usize| shot.clamp(shots.start, shots.end) - shots.start;
         Self {
-            first: self.first + shots.start as u64,
+            first: self.first.saturating_add(shots.start as u64),
             fired_at_fs: self.fired_at_fs[shots.clone()].to_vec(),
             row: column(&self.row),
             column: column(&self.column),
@@ -68,15 +71,20 @@ impl ShotLog {
         }
     }
 
-    /// The log of each channel by itself, and which of the shots here are in it, ascending.
+    /// The log of each channel by itself, and which of the shots here are in it, ascending. A log whose
+    /// columns differ in length is not parted.
     pub fn each_channel(&self) -> Vec<(Vec<usize>, Self)> {
         let mut shots: Vec<usize> = (0..self.len()).collect();
+        let columns = [&self.row, &self.column, &self.label, &self.word, &self.channel];
+        if columns.iter().any(|column| column.len() != self.len()) {
+            return vec![(shots, self.clone())];
+        }
         shots.sort_by_key(|shot| self.channel[*shot]);
         let of_channel = |shots: &[usize]| {
             let column = |column: &[u16]| shots.iter().map(|shot| column[*shot]).collect();
             let before = |shot: usize| shots.partition_point(|other| *other < shot);
             Self {
-                first: self.first + shots[0] as u64,
+                first: self.first.saturating_add(shots[0] as u64),
                 fired_at_fs: shots.iter().map(|shot| self.fired_at_fs[*shot]).collect(),
                 row: column(&self.row),
                 column: column(&self.column),

@@ -71,7 +71,7 @@ impl Ticks {
     /// The ticks as a stream: in the order of time, those of one moment in the order of channels.
     pub fn stream(&self) -> Vec<Tick> {
         let one = |at: usize| Tick {
-            tick: self.epoch + i64::from(self.tick[at]),
+            tick: self.epoch.saturating_add(i64::from(self.tick[at])),
             channel: self.channel.get(at).copied().unwrap_or(0),
             amplitude: self.amplitude.get(at).copied().unwrap_or(0.0),
         };
@@ -93,7 +93,7 @@ impl Ticks {
             self.tick.drain(..kept.start);
             if !self.amplitude.is_empty() {
                 self.amplitude.truncate(amplitudes.end);
-                self.amplitude.drain(..amplitudes.start);
+                self.amplitude.drain(..amplitudes.start.min(self.amplitude.len()));
             }
             return;
         }

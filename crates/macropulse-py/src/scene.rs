@@ -1,7 +1,6 @@
 //! Scenes.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -105,7 +104,7 @@ impl Scene {
     ///     path: A TOML file; meshes are looked for in its folder.
     #[classmethod]
     fn open(_class: &Bound<'_, PyType>, path: PathBuf, py: Python<'_>) -> PyResult<Self> {
-        let text = fs::read_to_string(&path).map_err(|why| of_file(&path, &why))?;
+        let text = macropulse::opened::text(&path).map_err(|why| of_file(&path, &why))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let (origin, base) = (path.display().to_string(), folder.clone());
         Self::made(py, folder, move || simulated::Scene::from_toml(&text, &origin, &base))

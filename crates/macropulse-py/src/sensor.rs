@@ -84,7 +84,7 @@ impl Sensor {
         py: Python<'_>,
     ) -> PyResult<Self> {
         let changes = self::changes(changes, false)?;
-        let text = fs::read_to_string(&path).map_err(|why| of_file(&path, &why))?;
+        let text = macropulse::opened::text(&path).map_err(|why| of_file(&path, &why))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let origin = path.display().to_string();
         Self::made(py, move || Design::from_toml(&text, &origin, &folder, &changes))
@@ -296,11 +296,12 @@ pub fn check_readable(name: &str) -> PyResult<()> {
     if !looks_like_one && !path.exists() {
         return Ok(());
     }
-    fs::File::open(path)
-        .and_then(|file| file.metadata())
-        .and_then(|found| match found.is_dir() {
-            true => Err(std::io::Error::from_raw_os_error(IS_A_FOLDER)),
-            false => Ok(()),
+    fs::metadata(path)
+        .and_then(|found| match () {
+            () if found.is_dir() => Err(std::io::Error::from_raw_os_error(IS_A_FOLDER)),
+            () if found.is_file() => fs::File::open(path).map(|_| ()),
+            // To open a pipe is to wait for whoever writes to it.
+            () => Ok(()),
         })
         .map_err(|why| of_file(path, &why))
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use macropulse::channel::Operating;
 use macropulse::design::Design;
 use macropulse::emit::most_scans;
+use macropulse::formats::State;
 use macropulse::scene::Scene as Simulated;
 use macropulse::score::Score;
 use macropulse::sim::{self, Tally, Watch};
@@ -70,6 +71,7 @@ impl Stage {
     fn manifest(&self, number: u64, score: &Score, tally: &Tally) -> Value {
         let warnings = [&self.design.warnings[..], &self.scene.warnings].concat();
         let run = Run {
+            state: State::Finished,
             design: &self.design,
             scene: &self.scene,
             seed: self.seed,

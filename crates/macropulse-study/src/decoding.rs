@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::fs::File;
 use std::io::{self, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -12,6 +11,7 @@ use macropulse::codec::files::{self, Digest, ShotReader, Stream, TickReader, Wha
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit;
+use macropulse::opened;
 use macropulse::points::{Piece, PointCloud, Scale, Truth, Viewpoint};
 use rayon::prelude::*;
 
@@ -93,12 +93,8 @@ impl Input {
     /// [`Error::Unreadable`] if it is no file that can be opened.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let opened = File::open(path).and_then(|file| match file.metadata()?.is_dir() {
-            true => Err(io::ErrorKind::IsADirectory.into()),
-            false => Ok(file),
-        });
-        match opened {
-            Ok(file) => Ok(Self { name, bytes: Box::new(file), is_live: false }),
+        match opened::stream(path) {
+            Ok(stream) => Ok(Self { name, bytes: Box::new(stream), is_live: false }),
             Err(cause) => Err(Error::Unreadable { name, cause }),
         }
     }

@@ -90,7 +90,7 @@ fn samples_on_car(design: &Design, scene: &Scene) -> u64 {
 #[test]
 fn samples_on_the_car_are_those_that_its_silhouette_predicts() {
     for distance in DISTANCES {
-        let scene = Scene::open(&format!("car-{distance}m")).unwrap();
+        let scene = Scene::open(format!("car-{distance}m")).unwrap();
         for sensor in SENSORS {
             let design = open(sensor, &[]);
             let (samples, predicted) = (samples_on_car(&design, &scene), predict(&design, &scene));
@@ -108,7 +108,7 @@ fn samples_on_the_car_are_those_that_its_silhouette_predicts() {
 #[test]
 fn ten_and_twenty_times_as_many_samples_fall_on_the_car() {
     for distance in [30, 50, 70] {
-        let scene = Scene::open(&format!("car-{distance}m")).unwrap();
+        let scene = Scene::open(format!("car-{distance}m")).unwrap();
         let [ours, hdl, peregrine] =
             SENSORS.map(|sensor| samples_on_car(&open(sensor, &[]), &scene) as f64);
         assert!((8.5..12.5).contains(&(ours / hdl)), "{distance} m: {}", ours / hdl);

@@ -57,7 +57,7 @@ fn ten_and_twenty_times_as_many_points_follow_from_the_pitches() {
 /// The lowest sample on the car, in metres above the ground.
 fn lowest_on_car(distance: u32) -> f64 {
     let design = Design::open("peregrine", &[]).unwrap();
-    let scene = Scene::open(&format!("car-{distance}m")).unwrap();
+    let scene = Scene::open(format!("car-{distance}m")).unwrap();
     let cloud = sim::scan(&design, &scene, 1, 0).unwrap().cloud();
     let image = cloud.image(cloud.pick);
     let heights = (0..image.len()).filter_map(|pixel| {

@@ -35,12 +35,14 @@ pub mod formats;
 pub use macropulse_codec as codec;
 
 pub mod sim;
+pub mod memory;
 
 pub mod predict;
 pub mod random;
 pub mod units;
 pub mod names;
 pub mod told;
+pub mod opened;
 pub mod digest;
 pub mod processor;
 mod schema;

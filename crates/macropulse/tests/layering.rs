@@ -73,6 +73,11 @@ const SIMULATOR: Layers = Layers {
             because: "the words of parsers are put into ours whatever is parsed",
         },
         Rule {
+            module: "opened",
+            may_name: &[],
+            because: "what may be read is decided before anyone knows what it holds",
+        },
+        Rule {
             module: "schema",
             may_name: &["told"],
             because: "what a file may say follows from its types, of which it knows none",
@@ -94,7 +99,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "design",
-            may_name: &["digest", "environment", "names", "schema", "told", "units"],
+            may_name: &["digest", "environment", "names", "opened", "schema", "told", "units"],
             because: "a design is checked data: it imports no stage",
         },
         Rule {
@@ -111,6 +116,7 @@ const SIMULATOR: Layers = Layers {
                 "environment",
                 "kernels",
                 "names",
+                "opened",
                 "schema",
                 "told",
                 "units",
@@ -151,7 +157,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "formats",
-            may_name: &["names", "points", "told", "units"],
+            may_name: &["names", "opened", "points", "told", "units"],
             because: "files hold columns, no physics; of units they know the speed of light, by \
                       which some have a time in place of a range",
         },
@@ -170,6 +176,11 @@ const SIMULATOR: Layers = Layers {
                 "tdc",
             ],
             because: "the chain calls the stages and nothing else",
+        },
+        Rule {
+            module: "memory",
+            may_name: &["channel", "design", "emit", "environment", "scene", "units"],
+            because: "what a scan takes is estimated from what it is given, before it is begun",
         },
     ],
 };

@@ -22,7 +22,7 @@ fn file(name: &str) -> PathBuf {
 fn sensor(name: &str, set: &[(&str, &str)]) -> Design {
     let owned = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
     let set: Vec<_> = set.iter().map(owned).collect();
-    Design::open(&file(name).display().to_string(), &set).unwrap()
+    Design::open(file(name), &set).unwrap()
 }
 
 /// A hollow sphere about the sensor: every shot meets it square on.

@@ -3,9 +3,12 @@
 mod scene;
 mod sensor;
 
+use std::ffi::{OsStr, OsString};
+
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::formats::versioned;
+use macropulse::memory::Estimate;
 use macropulse::scene as scenes;
 use macropulse_study::record::surroundings;
 use serde_json::{Value, json};
@@ -14,6 +17,7 @@ use crate::completions;
 use crate::fault::Fault;
 use crate::input;
 use crate::kind::Kind;
+use crate::memory::{self, MemoryLimit, told};
 use crate::options::{Changes, Common, Outside, Surroundings};
 use crate::simulate::scenario::Scenario;
 use crate::text::{Columns, counted, print, print_json};
@@ -29,7 +33,7 @@ pub struct Check {
     /// Ready sensors or scenes, or TOML files, - for standard input
     #[arg(required = true, value_name = "NAME-or-FILE")]
     #[arg(add = ArgValueCompleter::new(completions::both))]
-    files: Vec<String>,
+    files: Vec<OsString>,
 
     #[command(flatten)]
     surroundings: Surroundings,
@@ -39,6 +43,9 @@ pub struct Check {
 
     #[command(flatten)]
     outside: Outside,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 
     /// Print as JSON: an object, or an array of them for several files
     #[arg(long)]
@@ -50,7 +57,7 @@ pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
     let mut reports = Vec::new();
     let mut wrong = false;
     for file in &options.files {
-        match Report::of(file, &changes, &options.outside) {
+        match Report::of(file, &changes, options) {
             Ok(report) => reports.push(report),
             Err(fault) => {
                 fault.report();
@@ -80,23 +87,34 @@ struct Report {
 }
 
 impl Report {
-    fn of(name: &str, changes: &scenes::Changes, outside: &Outside) -> Result<Self, Fault> {
+    fn of(name: &OsStr, changes: &scenes::Changes, options: &Check) -> Result<Self, Fault> {
+        let memory = &options.memory;
         // A sensor beside the scenes has no use for it, and is checked all the same.
         let mut of_scenes = changes.clone();
-        of_scenes.of_scene.extend(outside.changes());
+        of_scenes.of_scene.extend(options.outside.changes());
         match Kind::of(name)? {
             Kind::Sensor => {
                 let environment = Surroundings::alone(changes)?;
-                sensor::report(&input::design(name, &changes.of_sensor)?, &environment)
+                sensor::report(&input::design(name, &changes.of_sensor)?, &environment, memory)
             }
-            Kind::Scene => Ok(scene::report(&input::scene(name, &of_scenes.of_scene)?)),
-            Kind::Scenario => Ok(scenario(name, &Scenario::open(name, &of_scenes)?)),
+            Kind::Scene => scene::report(&input::scene(name, &of_scenes.of_scene)?, memory),
+            Kind::Scenario => {
+                scenario(&name.to_string_lossy(), &Scenario::open(name, &of_scenes)?, memory)
+            }
         }
     }
 }
 
 /// A scenario with what it names, in short.
-fn scenario(name: &str, scenario: &Scenario) -> Report {
+fn scenario(name: &str, scenario: &Scenario, memory: &MemoryLimit) -> Result<Report, Fault> {
+    let mut most = Estimate::default();
+    for design in &scenario.designs {
+        let estimate = Estimate::in_scene(design, &scenario.scene)?;
+        memory.allow_alone(&format!("{} in {}", design.name, scenario.scene.name), &estimate)?;
+        if estimate.total(1) > most.total(1) {
+            most = estimate;
+        }
+    }
     let sensors: Vec<&str> = scenario.designs.iter().map(|design| design.name.as_str()).collect();
     let formats: Vec<&str> = scenario.formats.iter().map(|format| format.name()).collect();
     let mut columns = Columns::default();
@@ -109,6 +127,7 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
     columns.push("seed", scenario.seed.to_string());
     columns
         .push("formats", if formats.is_empty() { "none".to_owned() } else { formats.join(", ") });
+    columns.push("memory", estimated(&most));
     columns.push("truth", if scenario.truth { "written" } else { "not written" });
     let warnings: Vec<String> = scenario
         .designs
@@ -118,7 +137,7 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
         .collect();
     columns.push_list("warnings", warnings.iter().cloned());
     columns.push_list("assumed", scenario.scene.notes.iter().cloned());
-    Report {
+    Ok(Report {
         text: format!("{name}: a scenario\n\n{}", columns.text()),
         json: json!({
             "kind": "scenario",
@@ -132,6 +151,14 @@ fn scenario(name: &str, scenario: &Scenario) -> Report {
             "truth": scenario.truth,
             "warnings": warnings,
             "assumed": scenario.scene.notes,
+            "memory": memory::json(&most),
         }),
-    }
+    })
+}
+
+/// What a run is estimated to take, for people.
+fn estimated(estimate: &Estimate) -> String {
+    let threads = rayon::current_num_threads() as u64;
+    let (all, each) = (told(estimate.total(threads as usize)), told(estimate.band));
+    format!("about {all} with {}, {each} for each", counted(threads, "thread"))
 }

@@ -1,20 +1,26 @@
 //! The report on a scene.
 
+use macropulse::memory::{Estimate, of_scene};
 use macropulse::scene::{Interferer, Moving, Pose, Scene};
 use macropulse_study::record::surroundings;
 use serde_json::{Map, Value, json};
 
 use super::Report;
+use crate::fault::Fault;
+use crate::memory::{self, MemoryLimit, told as told_memory};
 use crate::text::{Columns, grouped, short};
 
 /// What a scene is made of, and what was assumed in reading it.
-pub fn report(scene: &Scene) -> Report {
+pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
+    let estimate = Estimate { scene: of_scene(scene), ..Estimate::default() };
+    memory.allow_alone(&scene.name, &estimate)?;
     let objects: Vec<&str> = scene.objects.iter().map(|object| object.name.as_str()).collect();
     let materials: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
     let targets: Vec<&str> =
         scene.objects.iter().filter(|o| o.is_target).map(|o| o.name.as_str()).collect();
     let mut columns = Columns::default();
     columns.push("triangles", grouped(scene.triangles() as u64));
+    columns.push("memory", format!("about {}", told_memory(estimate.scene)));
     columns.push("objects", objects.join(", "));
     columns
         .push("targets", if targets.is_empty() { "none".to_owned() } else { targets.join(", ") });
@@ -35,7 +41,7 @@ pub fn report(scene: &Scene) -> Report {
         if scene.notes.is_empty() { vec!["nothing".into()] } else { notes.collect() },
     );
     columns.push_list("warnings", scene.warnings.iter().cloned());
-    Report {
+    Ok(Report {
         text: format!("{}: a scene\n\n{}", scene.name, columns.text()),
         json: json!({
             "kind": "scene",
@@ -60,8 +66,9 @@ pub fn report(scene: &Scene) -> Report {
             "digest": scene.digest(),
             "assumed": scene.notes,
             "warnings": scene.warnings,
+            "memory": memory::json(&estimate),
         }),
-    }
+    })
 }
 
 fn stands(pose: &Pose) -> String {

@@ -5,16 +5,24 @@ use std::collections::BTreeMap;
 use macropulse::channel::Operating;
 use macropulse::design::{Derived, Design};
 use macropulse::environment::Environment;
+use macropulse::memory::Estimate;
 use macropulse_study::record::{defaults, surroundings};
 use serde_json::{Map, Value, json};
 
-use super::Report;
+use super::{Report, estimated};
 use crate::fault::Fault;
+use crate::memory::{self, MemoryLimit};
 use crate::text::{Columns, counted, grouped, section, short};
 
 /// What follows from a sensor and, for its light, from an environment; and what it takes for
 /// granted.
-pub fn report(design: &Design, environment: &Environment) -> Result<Report, Fault> {
+pub fn report(
+    design: &Design,
+    environment: &Environment,
+    memory: &MemoryLimit,
+) -> Result<Report, Fault> {
+    let estimate = Estimate::of(design, environment)?;
+    memory.allow_alone(&design.name, &estimate)?;
     let derived = design.derived();
     let operating = Operating::of(design, environment)?;
     let mut text = format!("{}: a sensor\n{}\n", design.name, design.summary);
@@ -22,7 +30,7 @@ pub fn report(design: &Design, environment: &Environment) -> Result<Report, Faul
     text += &section("Range", &ranges(design, &derived));
     text += &section("Light", &light(design, &derived));
     let conditions = format!("In {} ({})", environment.name, environment.conditions());
-    text += &section(&conditions, &at_work(design, &operating));
+    text += &section(&conditions, &at_work(design, (&operating, &estimate)));
     let mut idealised = Columns::default();
     for effect in &design.idealised {
         idealised.push(effect.name(), effect.assumption());
@@ -41,11 +49,12 @@ pub fn report(design: &Design, environment: &Environment) -> Result<Report, Faul
     json["sunlight_hz"] = operating.background.into();
     json["false_rate_hz"] = operating.false_rate.into();
     json["transmission"] = operating.link.transmission(design.scan.rated_range).into();
+    json["memory"] = memory::json(&estimate);
     Ok(Report { text, json })
 }
 
 /// What sun and air do to it.
-fn at_work(design: &Design, operating: &Operating) -> Columns {
+fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> Columns {
     let mut columns = Columns::default();
     let detector = design.detector.model();
     let rated = design.scan.rated_range;
@@ -69,6 +78,7 @@ fn at_work(design: &Design, operating: &Operating) -> Columns {
     }
     let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
     columns.push("false detections", events);
+    columns.push("memory of a run", format!("{}, and that of the scene", estimated(estimate)));
     columns
 }
 

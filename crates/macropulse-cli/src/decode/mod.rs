@@ -4,6 +4,7 @@ mod input;
 mod run;
 mod summary;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -43,7 +44,7 @@ pub struct Decode {
 
     /// Ready sensor or TOML file, as the shots were fired by
     #[arg(long, value_name = "NAME-or-FILE", add = ArgValueCompleter::new(completions::sensors))]
-    sensor: String,
+    sensor: OsString,
 
     #[command(flatten)]
     surroundings: Surroundings,

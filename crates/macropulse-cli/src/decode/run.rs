@@ -8,7 +8,7 @@ use macropulse::channel::Operating;
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::environment::Environment;
-use macropulse::formats::{write_csv_lines, write_manifest};
+use macropulse::formats::{State, write_csv_lines, write_manifest};
 use macropulse::points::{PointCloud, Scale};
 use macropulse_study::decoding::{Band, Decoding};
 use macropulse_study::record::{self, Decoded, PAGE, Page};
@@ -44,6 +44,7 @@ pub struct Setting<'a> {
 pub struct Run<'a> {
     pub setting: Setting<'a>,
     pub inputs: [String; 2],
+    pub state: State,
     pub scans: u64,
     pub shots: u64,
     pub ticks: u64,
@@ -67,6 +68,7 @@ impl<'a> Run<'a> {
         Self {
             setting,
             inputs,
+            state: State::Running,
             scans: 0,
             shots: 0,
             ticks: 0,
@@ -115,6 +117,9 @@ impl<'a> Run<'a> {
                 page.add(&cloud);
                 self.files.extend(interrupt.undisturbed(|| {
                     folder.make_once()?;
+                    if self.scans == 1 {
+                        self.announce(folder)?;
+                    }
                     let files = recorded.add(&cloud)?;
                     folder.keep();
                     Ok::<_, Fault>(files)
@@ -126,6 +131,10 @@ impl<'a> Run<'a> {
         }
         progress.finish();
         self.elapsed = began.elapsed().as_secs_f64();
+        self.state = match interrupt.is_raised() {
+            true => State::Stopped,
+            false => State::Finished,
+        };
         self.find_warnings(&sink, common);
         if let (Sink::Folder(folder, _), 1..) = (&sink, self.scans) {
             self.folder = folder.path().display().to_string();
@@ -137,6 +146,17 @@ impl<'a> Run<'a> {
             })?;
         }
         Ok(self)
+    }
+
+    /// Writes the manifest of a run that has no file yet, in place of that of an older one.
+    fn announce(&self, folder: &Folder) -> Result<(), Fault> {
+        let mut manifest = self.manifest();
+        if let (Some(older), Some(said)) =
+            (folder.warning_of_older(&[]), manifest["warnings"].as_array_mut())
+        {
+            said.push(older.into());
+        }
+        Ok(write_manifest(&format!("{manifest:#}\n"), folder.path())?)
     }
 
     /// Counts a band, explains what is asked for of it, and prints its points where they are to be.
@@ -208,6 +228,7 @@ impl<'a> Run<'a> {
             design: self.setting.design,
             environment: self.setting.environment,
             inputs: [shots, ticks],
+            state: self.state,
             scans: self.scans,
             shots: self.shots,
             ticks: self.ticks,

@@ -3,6 +3,7 @@
 
 mod scan;
 
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -32,11 +33,11 @@ pub struct Encode {
     /// Ready sensor or TOML file, - for standard input
     #[arg(value_name = "SENSOR", conflicts_with = "named", required_unless_present = "named")]
     #[arg(add = ArgValueCompleter::new(completions::sensors))]
-    sensor: Option<String>,
+    sensor: Option<OsString>,
 
     /// Another way to name the sensor
     #[arg(long = "sensor", value_name = "NAME-or-FILE")]
-    named: Option<String>,
+    named: Option<OsString>,
 
     #[command(flatten)]
     changes: Changes,
@@ -76,7 +77,11 @@ fn pixel(typed: &str) -> Result<(u32, u32), String> {
 }
 
 pub fn run(options: &Encode, common: &Common) -> Result<(), Fault> {
-    let sensor = options.sensor.as_ref().or(options.named.as_ref()).map_or("", String::as_str);
+    let sensor = options
+        .sensor
+        .as_ref()
+        .or(options.named.as_ref())
+        .map_or(OsStr::new(""), OsString::as_os_str);
     let design = input::design(sensor, &options.changes.of_sensor()?)?;
     if let Some(output) = &options.output {
         let form = options.format.unwrap_or(Form::Binary);

@@ -6,10 +6,12 @@ pub mod scenario;
 mod summary;
 pub mod ticks;
 
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::memory::Estimate;
 use macropulse::scene::Changes;
 
 use crate::completions;
@@ -18,6 +20,7 @@ use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::kind::Kind;
+use crate::memory::MemoryLimit;
 use crate::options::{self, Common, Surroundings};
 use crate::text::{print, print_json};
 pub use formats::Formats;
@@ -48,22 +51,22 @@ pub struct Simulate {
     /// Ready sensor or TOML file, - for standard input; or, alone, a scenario file
     #[arg(value_name = "SENSOR", conflicts_with = "sensors", required_unless_present = "sensors")]
     #[arg(add = ArgValueCompleter::new(completions::sensors))]
-    sensor: Option<String>,
+    sensor: Option<OsString>,
 
     /// Ready scene or TOML file, - for standard input
     #[arg(value_name = "SCENE", conflicts_with_all = ["named_scene", "sensors"])]
     #[arg(add = ArgValueCompleter::new(completions::scenes))]
-    scene: Option<String>,
+    scene: Option<OsString>,
 
     /// Another way to name a sensor; repeatable, each of several gets a folder of its own
     #[arg(long = "sensor", value_name = "NAME-or-FILE", requires = "named_scene")]
     #[arg(add = ArgValueCompleter::new(completions::sensors))]
-    sensors: Vec<String>,
+    sensors: Vec<OsString>,
 
     /// Another way to name the scene
     #[arg(long = "scene", value_name = "NAME-or-FILE", id = "named_scene")]
     #[arg(add = ArgValueCompleter::new(completions::scenes))]
-    named_scene: Option<String>,
+    named_scene: Option<OsString>,
 
     #[command(flatten)]
     surroundings: Surroundings,
@@ -73,6 +76,9 @@ pub struct Simulate {
 
     #[command(flatten)]
     outside: options::Outside,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 
     /// Receiver that decodes the macropulses: short for --set receiver.kind=…
     #[arg(long, value_name = "KIND")]
@@ -131,8 +137,8 @@ impl Simulate {
         let mut scenario = match (&self.sensor, scene) {
             (Some(alone), None) => open(alone, &changes)?,
             (sensor, scene) => {
-                let sensors: Vec<String> = sensor.iter().chain(&self.sensors).cloned().collect();
-                Scenario::of(&sensors, scene.map_or("", String::as_str), &changes)?
+                let sensors: Vec<OsString> = sensor.iter().chain(&self.sensors).cloned().collect();
+                Scenario::of(&sensors, scene.map_or(OsStr::new(""), OsString::as_os_str), &changes)?
             }
         };
         if let Some(formats) = &self.format {
@@ -146,6 +152,12 @@ impl Simulate {
         scenario.truth |= self.truth;
         scenario.explain.clone_from(&self.explain);
         scenario.designs.iter().try_for_each(|design| explain::check(design, &self.explain))?;
+        for design in &scenario.designs {
+            let estimate = Estimate::in_scene(design, &scenario.scene).map_err(Fault::from)?;
+            let is_written = self.output.is_some();
+            let estimate = if is_written { estimate } else { estimate.unwritten() };
+            self.memory.allow(&format!("{} in {}", design.name, scenario.scene.name), &estimate)?;
+        }
         Ok(scenario)
     }
 
@@ -187,14 +199,15 @@ pub fn run(options: &Simulate, common: &Common) -> Result<(), Fault> {
 }
 
 /// The scenario called `name`; a sensor or a scene in its place is a slip worth a hint.
-fn open(name: &str, changes: &Changes) -> Result<Scenario, Fault> {
+fn open(name: &OsStr, changes: &Changes) -> Result<Scenario, Fault> {
+    let called = name.display();
     match Kind::of(name)? {
         Kind::Scenario => Scenario::open(name, changes),
         Kind::Sensor => Err(Fault::Wrong(format!(
-            "{name}: is a sensor; name a scene behind it, as in `macropulse simulate {name} street`"
+            "{called}: is a sensor; name a scene behind it, as in `macropulse simulate {called} street`"
         ))),
         Kind::Scene => Err(Fault::Wrong(format!(
-            "{name}: is a scene; name a sensor before it, as in `macropulse simulate hdl-64e {name}`"
+            "{called}: is a scene; name a sensor before it, as in `macropulse simulate hdl-64e {called}`"
         ))),
     }
 }

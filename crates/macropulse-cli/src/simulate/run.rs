@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
-use macropulse::formats::{Format, Manifest};
+use macropulse::formats::{Format, Manifest, State};
 use macropulse::points::Truth;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
@@ -26,6 +26,7 @@ pub struct Run<'a> {
     pub design: &'a Design,
     pub scene: &'a Scene,
     pub seed: u64,
+    pub state: State,
     /// Scans done; fewer than wanted after Ctrl-C.
     pub scans: u64,
     pub score: Score,
@@ -88,8 +89,11 @@ impl<'a> Run<'a> {
                     cloud.truth = Truth::default();
                 }
                 let files = interrupt.undisturbed(|| {
-                    if run.scans == 0 && scenario.ticks.is_none() {
-                        folder.make()?;
+                    if run.scans == 0 {
+                        if scenario.ticks.is_none() {
+                            folder.make()?;
+                        }
+                        run.announce(folder)?;
                     }
                     let ticks = ticks.map(TickFiles::finish).transpose()?.unwrap_or_default();
                     let files = recorded.add(&cloud)?;
@@ -110,6 +114,10 @@ impl<'a> Run<'a> {
             run.explain(&scans, &scenario.explain, folder.as_ref())?;
         }
         progress.finish();
+        run.state = match run.scans < scenario.scans {
+            true => State::Stopped,
+            false => State::Finished,
+        };
         run.find_warnings(scenario, folder.as_ref(), common);
         if let (Some(folder), 1..) = (&folder, run.scans) {
             run.folder = folder.path().display().to_string();
@@ -151,11 +159,20 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Writes the manifest of a run that has no file yet, in place of that of an older one, whose files
+    /// this one is about to replace; those that stay, it names.
+    fn announce(&self, folder: &Folder) -> Result<(), Fault> {
+        let mut manifest = self.manifest();
+        manifest.warnings.extend(folder.warning_of_older(&[]));
+        Ok(manifest.write(folder.path())?)
+    }
+
     fn new(design: &'a Design, scenario: &'a Scenario) -> Self {
         Self {
             design,
             scene: &scenario.scene,
             seed: scenario.seed,
+            state: State::Running,
             scans: 0,
             score: Score::default(),
             tally: Tally::default(),
@@ -215,6 +232,7 @@ impl<'a> Run<'a> {
     /// What is needed to repeat the run and to judge it.
     pub fn manifest(&self) -> Manifest {
         record::manifest(&record::Run {
+            state: self.state,
             design: self.design,
             scene: self.scene,
             seed: self.seed,

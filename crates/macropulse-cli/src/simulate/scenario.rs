@@ -1,7 +1,8 @@
 //! What is to be simulated: a scenario file, or what the options say in its place.
 
+use std::ffi::{OsStr, OsString};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use macropulse::channel::Operating;
 use macropulse::codec::files::Form;
@@ -57,8 +58,13 @@ struct ScenarioFile {
 
 impl Scenario {
     /// One scan of the sensors in the scene, each a ready one or a file.
-    pub fn of(sensors: &[String], scene: &str, changes: &Changes) -> Result<Self, Fault> {
-        if sensors.iter().map(String::as_str).chain([scene]).filter(|name| *name == STREAM).count()
+    pub fn of(sensors: &[OsString], scene: &OsStr, changes: &Changes) -> Result<Self, Fault> {
+        if sensors
+            .iter()
+            .map(OsString::as_os_str)
+            .chain([scene])
+            .filter(|name| *name == STREAM)
+            .count()
             > 1
         {
             return Err(Fault::Wrong(
@@ -87,7 +93,7 @@ impl Scenario {
     }
 
     /// The scenario in the file called `name`; names of files count from its folder.
-    pub fn open(name: &str, changes: &Changes) -> Result<Self, Fault> {
+    pub fn open(name: &OsStr, changes: &Changes) -> Result<Self, Fault> {
         let (text, origin) = input::text(name)?;
         let source = Source { text: &text, origin: &origin };
         let file: ScenarioFile =
@@ -108,14 +114,14 @@ impl Scenario {
         for sensor in named {
             let name = sensor.get_ref();
             let ready = preset_text(name).is_some() || !looks_like_a_path(name);
-            let place = if ready { name.clone() } else { beside(folder, name) };
+            let place = if ready { PathBuf::from(name) } else { folder.join(name) };
             let design = Design::open(&place, &changes.of_sensor)
                 .map_err(|error| source.fault(sensor.span(), &error.to_string()))?;
             designs.push(design);
         }
         let name = file.scene.get_ref();
         let ready = Scene::builtin(name).is_some() || !looks_like_a_path(name);
-        let place = if ready { name.clone() } else { beside(folder, name) };
+        let place = if ready { PathBuf::from(name) } else { folder.join(name) };
         let scene = Scene::open_changed(&place, &changes.of_scene)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
         check_operating(&designs, &scene)?;
@@ -185,10 +191,6 @@ fn looks_like_a_path(name: &str) -> bool {
     path.extension().is_some() || path.components().count() > 1
 }
 
-fn beside(folder: &Path, name: &str) -> String {
-    folder.join(name).display().to_string()
-}
-
 /// The text of a file and its name: turns spans into places.
 struct Source<'a> {
     text: &'a str,
@@ -220,7 +222,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
-        match Scenario::open(&path.display().to_string(), &Changes::default()) {
+        match Scenario::open(path.as_os_str(), &Changes::default()) {
             Err(Fault::Wrong(sentence)) => sentence.rsplit_once("s.toml").unwrap().1.to_owned(),
             _ => "accepted".to_owned(),
         }

@@ -17,6 +17,7 @@ use crate::folder::refuse_no_folder;
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
+use crate::memory::MemoryLimit;
 use crate::options::{Changes, Common, Outside, Surroundings};
 use crate::progress::Progress;
 use crate::text::{NO_BREAK, counted, print};
@@ -57,6 +58,9 @@ pub struct Sweep {
 
     #[command(flatten)]
     surroundings: Surroundings,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 
     #[command(flatten)]
     changes: Changes,
@@ -138,7 +142,7 @@ impl Sweep {
             ));
         }
         if let [sensor] = &sensors[..] {
-            kind::in_order("sweep", sensor, &scene)?;
+            kind::in_order("sweep", sensor.as_ref(), scene.as_ref())?;
         }
         let mut set = self.changes.all(&self.surroundings)?;
         let outside = self.outside.changes().into_iter();
@@ -159,6 +163,11 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     let plan = Plan::of(&options.request()?)?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;
+    let seed = options.seed;
+    for job in plan.jobs().filter(|job| job.seed == seed) {
+        let (sensor, scene) = (&job.point.sensor.name, &job.point.scene.name);
+        options.memory.allow(&format!("{sensor} in {scene}"), &job.memory()?)?;
+    }
     let interrupt = Interrupt::listen()?;
     plan.claim_folder(folder)?;
     let shard = options.shard.unwrap_or(Shard::WHOLE);

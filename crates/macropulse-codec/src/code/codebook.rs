@@ -4,7 +4,7 @@ use super::correlation::aperiodic;
 use super::{CodeWord, Error, Family, Payload};
 
 /// Most marks a codebook may hold: half a gigabyte of them.
-const MOST_MARKS: u64 = 1 << 28;
+pub(super) const MOST_MARKS: u64 = 1 << 28;
 
 /// What a 0 bit is sent as; a 1 bit is the code word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -22,7 +22,7 @@ pub fn periodic(a: &CodeWord, b: &CodeWord) -> Vec<u16> {
         for &to in &b.marks {
             let lag = i32::from(to) - i32::from(from);
             let lag = if lag < 0 { lag + length as i32 } else { lag };
-            coincidences[lag as usize] += 1;
+            count(&mut coincidences, i64::from(lag));
         }
     }
     coincidences
@@ -50,10 +50,18 @@ pub fn aperiodic(a: &CodeWord, b: &CodeWord) -> Aperiodic {
     for &from in &a.marks {
         for &to in &b.marks {
             let lag = i32::from(to) - i32::from(from);
-            coincidences[(lag + length - 1) as usize] += 1;
+            count(&mut coincidences, i64::from(lag) + i64::from(length) - 1);
         }
     }
     Aperiodic { length, coincidences }
+}
+
+/// Counts a coincidence at `place`; marks beyond the end of their word have none.
+fn count(coincidences: &mut [u16], place: i64) {
+    let place = usize::try_from(place).ok().and_then(|place| coincidences.get_mut(place));
+    if let Some(coincidences) = place {
+        *coincidences = coincidences.saturating_add(1);
+    }
 }
 
 /// An aperiodic correlation, over lags of either sign.

@@ -73,6 +73,16 @@ fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
     }
 }
 
+/// Refuses a range gate whose lags cannot all be told one by one: a receiver that takes the first ticks
+/// as they come needs no memory for them, and its explanation does.
+pub(super) fn check_lags(receiver: &Receiver) -> Result<(), Error> {
+    let (what, ticks) = ("a time of flight that is explained", u64::from(receiver.gate_ticks.1));
+    match ticks > FARTHEST {
+        true => Err(Error::TooLong { what, ticks, possible: FARTHEST }),
+        false => Ok(()),
+    }
+}
+
 /// Length of a macropulse, in ticks.
 fn length(receiver: &Receiver, codebook: &Codebook) -> u64 {
     u64::from(codebook.chips()) * u64::from(receiver.ticks_per_chip)

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::check::check_lags;
 use super::threshold::least_marks;
 use super::{Error, Receiver, ReceiverKind, Reject, window};
 use crate::code::Codebook;
@@ -105,7 +106,8 @@ impl Receiver {
             let log = ShotLog { owned: first..end, ..log.clone() };
             self.decode(codebook, &log, ticks)
         };
-        let verdict = Verdict::of(shot, &to(shot)?, &to(shot + 1)?);
+        let verdict = Verdict::of(shot, &to(shot)?, &to(shot.saturating_add(1))?);
+        check_lags(self)?;
         let everyone = ShotLog { owned: 0..log.len(), ..log.clone() };
         let all = self.decode(codebook, &everyone, ticks)?;
         let bench = Bench::new(self, (codebook, log), ticks, shot);

@@ -63,8 +63,14 @@ impl<S: Read, T: Read> Stream<S, T> {
         &mut self,
         until: impl Fn(u64) -> u64,
     ) -> Result<Option<(ShotLog, Ticks)>, Error> {
+        if !self.cut.is_possible() {
+            return self.shots.refuse(
+                "cannot be cut into bands: ticks and clock must last 1 fs or more, and no span may be \
+                 negative",
+            );
+        }
         let first = self.left.start;
-        let wanted = first..until(first).clamp(first, self.left.end);
+        let wanted = first..until(first).min(self.left.end).max(first);
         while self.end_at_hand() < wanted.end && self.read_shot()? {}
         let owned = wanted.start..wanted.end.min(self.end_at_hand());
         if owned.is_empty() {
@@ -84,7 +90,7 @@ impl<S: Read, T: Read> Stream<S, T> {
         let log = self.log(self.at_hand.partition_point(is_guard), owned);
         let span = self.cut.ticks(begins, ends);
         let epoch = self.cut.epoch(log.fired_at_fs[0]);
-        if span.end - epoch > i64::from(u32::MAX) {
+        if span.end.saturating_sub(epoch) > i64::from(u32::MAX) {
             return self.shots.refuse(format!(
                 "shots {} to {} are fired too far apart to be decoded together; is it the sensor \
                  that they were recorded with, with the same changes?",
@@ -97,7 +103,7 @@ impl<S: Read, T: Read> Stream<S, T> {
 
     /// The id behind the last shot at hand.
     fn end_at_hand(&self) -> u64 {
-        self.first + self.at_hand.len() as u64
+        self.first.saturating_add(self.at_hand.len() as u64)
     }
 
     fn shot(&self, id: u64) -> &Shot {

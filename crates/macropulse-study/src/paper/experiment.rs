@@ -7,7 +7,7 @@ use super::Error;
 use super::geometry::{self, Prediction};
 use crate::record;
 use macropulse::design::Design;
-use macropulse::formats::{Format, clear_unfinished};
+use macropulse::formats::{Format, State, clear_unfinished};
 use macropulse::points::{Outcome, PointCloud};
 use macropulse::scene::{Ray, Scene};
 use macropulse::score::Score;
@@ -54,7 +54,7 @@ pub struct Trial {
 
 /// The scene with the car so far away, m.
 pub(super) fn scene(distance: u32) -> Result<Scene, Error> {
-    Ok(Scene::open(&format!("car-{distance}m"))?)
+    Ok(Scene::open(format!("car-{distance}m"))?)
 }
 
 /// Runs one trial and writes its cloud, pictures and manifest into `folder`.
@@ -86,6 +86,7 @@ pub(super) fn trial(
     let warnings: Vec<String> =
         scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
     let run = record::Run {
+        state: State::Finished,
         design,
         scene: &scene,
         seed,

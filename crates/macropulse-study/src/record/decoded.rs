@@ -3,7 +3,7 @@
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::environment::Environment;
-use macropulse::formats::{Entries, versioned};
+use macropulse::formats::{Entries, State, versioned};
 use serde_json::{Value, json};
 
 use super::{defaults, named, surroundings};
@@ -17,6 +17,8 @@ pub struct Decoded<'a> {
     pub environment: &'a Environment,
     /// What the shots and the ticks were read from.
     pub inputs: [&'a str; 2],
+    /// How far the run has come.
+    pub state: State,
     /// Scans of which a shot was decoded.
     pub scans: u64,
     /// Shots whose returns are wanted.
@@ -44,6 +46,7 @@ impl Decoded<'_> {
         }
         let [shots, ticks] = self.inputs;
         versioned(json!({
+            "state": self.state,
             "version": env!("CARGO_PKG_VERSION"),
             "sensor": named(self.design),
             "environment": surroundings(self.environment),
@@ -75,6 +78,7 @@ mod tests {
             design: &design,
             environment: &environment,
             inputs: ["a.mps", "stdin"],
+            state: State::Finished,
             scans: 1,
             shots: 7,
             ticks: 30,

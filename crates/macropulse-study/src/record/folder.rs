@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use macropulse::formats::{Clouds, Names};
+use macropulse::opened;
 use macropulse::points::PointCloud;
 use serde_json::Value;
 
@@ -19,8 +20,10 @@ const OF_CLOUDS: usize = 6;
 /// A folder that a run has left, or any other with clouds.
 #[derive(Debug, Clone)]
 pub struct Left {
-    /// Its manifest, if it has one.
+    /// Its manifest, if it has one and the run came to its end.
     pub manifest: Option<Value>,
+    /// Whether its manifest says that a run is still under way, or was killed.
+    pub is_unfinished: bool,
     /// Names of its files: those of the manifest, or else all that may hold clouds.
     pub files: Vec<String>,
 }
@@ -31,12 +34,15 @@ impl Left {
     /// # Errors
     /// [`Error::Unreadable`] if it cannot be listed, [`Error::Manifest`] if its manifest is none.
     pub fn of(folder: &Path) -> Result<Self, Error> {
+        let is_running = |manifest: &Value| manifest["state"] == "running";
         let manifest = manifest(folder)?;
+        let is_unfinished = manifest.as_ref().is_some_and(is_running);
+        let manifest = manifest.filter(|manifest| !is_running(manifest));
         let files = match &manifest {
             Some(manifest) => named(&manifest["files"]),
             None => listed(folder)?,
         };
-        Ok(Self { manifest, files })
+        Ok(Self { manifest, is_unfinished, files })
     }
 
     /// Names of the files with its clouds. Of several files of one cloud, which differ in their
@@ -82,7 +88,7 @@ fn manifest(folder: &Path) -> Result<Option<Value>, Error> {
     if !path.exists() {
         return Ok(None);
     }
-    let text = fs::read_to_string(&path).map_err(|cause| unreadable(&path, cause))?;
+    let text = opened::text(&path).map_err(|cause| unreadable(&path, cause))?;
     let manifest = serde_json::from_str(&text);
     manifest.map(Some).map_err(|cause| Error::Manifest { path, cause })
 }
@@ -158,7 +164,7 @@ mod tests {
 
     fn clouds(files: &[&str]) -> Vec<String> {
         let files = files.iter().map(|file| (*file).to_owned()).collect();
-        Left { manifest: None, files }.clouds().into_iter().cloned().collect()
+        Left { manifest: None, is_unfinished: false, files }.clouds().into_iter().cloned().collect()
     }
 
     #[test]

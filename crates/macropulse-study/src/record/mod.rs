@@ -14,7 +14,8 @@ use macropulse::design::Design;
 use macropulse::emit::scan_begins_fs;
 use macropulse::environment::Environment;
 use macropulse::formats::{
-    self, Begun, Entries, Format, Manifest, Named, Names, Recording, Surroundings, write_atomically,
+    self, Begun, Entries, Format, Manifest, Named, Names, Recording, State, Surroundings,
+    write_atomically,
 };
 use macropulse::names::toml_value;
 use macropulse::points::{Outcome, PointCloud, Truth};
@@ -145,7 +146,7 @@ fn colour_picture(cloud: &PointCloud, design: &Design) -> Result<Vec<u8>, crate:
     picture.png()
 }
 
-/// A run of one sensor in one scene, finished or broken off.
+/// A run of one sensor in one scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Run<'a> {
     /// The sensor.
@@ -154,6 +155,8 @@ pub struct Run<'a> {
     pub scene: &'a Scene,
     /// Seed of the random numbers.
     pub seed: u64,
+    /// How far it has come.
+    pub state: State,
     /// Scans that are complete.
     pub scans: u64,
     /// What was counted on the way.
@@ -174,6 +177,7 @@ pub struct Run<'a> {
 pub fn manifest(run: &Run) -> Manifest {
     let Run { design, scene, tally, score, .. } = *run;
     let mut manifest = Manifest {
+        state: run.state,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: run.seed,
         sensor: named(design),

@@ -19,7 +19,7 @@ pub fn is_explanation(file: &str) -> bool {
 
 /// The section of the pixel that the file at `path` explains; nothing if it holds no explanation.
 pub fn section(path: &Path) -> Option<Section> {
-    let text = std::fs::read_to_string(path).ok()?;
+    let text = macropulse::opened::text(path).ok()?;
     of(&serde_json::from_str(&text).ok()?)
 }
 

@@ -12,10 +12,12 @@ use super::plan::folder_of_jobs;
 use super::{Error, Plan, Point};
 use macropulse::digest::Digest;
 use macropulse::formats::{self, clear_unfinished, write_atomically};
+use macropulse::memory::Estimate;
+use macropulse::opened;
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::{RangeError, Score};
-use macropulse::sim::{Scans, Watch};
+use macropulse::sim::{self as simulated, Scans, Watch};
 use macropulse::told;
 
 /// The file that says which sweep a folder holds.
@@ -70,6 +72,15 @@ impl Job<'_> {
         hash.text()
     }
 
+    /// The memory that it takes to measure.
+    ///
+    /// # Errors
+    /// None for the jobs of a [`Plan`], whose points have been checked.
+    pub fn memory(&self) -> Result<Estimate, Error> {
+        let estimate = Estimate::in_scene(&self.point.design()?, self.scene);
+        Ok(estimate.map_err(simulated::Error::from)?.unwritten())
+    }
+
     /// Measures; `None` if the `watch` said stop before the end.
     ///
     /// # Errors
@@ -101,7 +112,7 @@ impl Job<'_> {
             let path = path.display();
             Error::Asked(format!("{path}: {why}; delete it, and it is measured again"))
         };
-        let text = fs::read_to_string(&path).map_err(|error| refused(&error.to_string()))?;
+        let text = opened::text(&path).map_err(|error| refused(&error.to_string()))?;
         let counted: Counted = serde_json::from_str(&text)
             .map_err(|error| refused(&format!("is not what was counted of a scan ({error})")))?;
         match counted.job == self.name() && counted.is_possible(self.point.shots) {
@@ -132,7 +143,7 @@ impl Plan {
     pub fn check_folder(&self, folder: &Path) -> Result<(), Error> {
         let place = folder.display();
         let remedy = "choose another folder";
-        match fs::read_to_string(folder.join(DESCRIPTION)) {
+        match opened::text(&folder.join(DESCRIPTION)) {
             Ok(text) if text == self.text() => Ok(()),
             Ok(text) => {
                 let other = serde_json::from_str(&text).unwrap_or(Value::Null);

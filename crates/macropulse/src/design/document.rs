@@ -9,7 +9,7 @@ use super::family::FAMILIES;
 use super::presets;
 use super::{Detector, Effect, Error, Pattern};
 use crate::names::{line_column, offset_of_key, toml_value};
-use crate::told;
+use crate::{opened, told};
 
 /// Where values come from that are changed on the command line.
 const SET: &str = "--set";
@@ -114,9 +114,10 @@ impl Chain {
             if documents.len() > LONGEST_CHAIN {
                 return Err(place(&documents, path).error("goes round in a circle"));
             }
-            let (text, origin, next_folder) = open(&parent, &folder).map_err(|error| {
-                place(&documents, path).error(format!("{parent}: {}", error.message))
-            })?;
+            let (text, origin, next_folder) =
+                open(Path::new(&parent), &folder).map_err(|error| {
+                    place(&documents, path).error(format!("{parent}: {}", error.message))
+                })?;
             folder = next_folder;
             documents.push(Document::parse(&text, &origin, &folder)?);
         }
@@ -243,16 +244,16 @@ impl Document {
 }
 
 /// Text, origin and folder of a sensor named in `extends` or on the command line.
-pub(super) fn open(name_or_file: &str, folder: &Path) -> Result<(String, String, PathBuf), Error> {
-    if let Some(text) = presets::text(name_or_file) {
-        return Ok((text.to_owned(), name_or_file.to_owned(), PathBuf::new()));
+pub(super) fn open(name_or_file: &Path, folder: &Path) -> Result<(String, String, PathBuf), Error> {
+    let name = name_or_file.display().to_string();
+    if let Some(text) = name_or_file.to_str().and_then(presets::text) {
+        return Ok((text.to_owned(), name, PathBuf::new()));
     }
     let path = folder.join(name_or_file);
-    if !name_or_file.ends_with(".toml") && !path.exists() {
-        return Err(Error::whole(name_or_file, presets::unknown(name_or_file)));
+    if !name.ends_with(".toml") && !path.exists() {
+        return Err(Error::whole(&name, presets::unknown(&name)));
     }
-    let text = std::fs::read_to_string(&path)
-        .map_err(|error| Error::whole(name_or_file, not_read(name_or_file, &error)))?;
+    let text = opened::text(&path).map_err(|error| Error::whole(&name, not_read(&name, &error)))?;
     let next = path.parent().map(Path::to_path_buf).unwrap_or_default();
     Ok((text, path.display().to_string(), next))
 }

@@ -91,8 +91,11 @@ impl Design {
     ///
     /// # Errors
     /// Says in one sentence what is wrong with the name or the file, and where.
-    pub fn open(name_or_file: &str, overrides: &[(String, String)]) -> Result<Self, Error> {
-        let (text, origin, folder) = document::open(name_or_file, Path::new(""))?;
+    pub fn open(
+        name_or_file: impl AsRef<Path>,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Error> {
+        let (text, origin, folder) = document::open(name_or_file.as_ref(), Path::new(""))?;
         Self::from_toml(&text, &origin, &folder, overrides)
     }
 

@@ -5,8 +5,12 @@ use super::mcap::Messages;
 use super::{
     Error, Format, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader, ply_reader,
 };
+use crate::opened;
 use crate::points::PointCloud;
 use std::path::Path;
+
+/// Most bytes of a file with one cloud, which is read at once.
+const MOST_BYTES: u64 = 8 << 30;
 
 /// The clouds of a file, one after the other: many of an MCAP file, one of any other.
 pub struct Clouds(Source);
@@ -37,7 +41,7 @@ impl Clouds {
         if let Format::Mcap(_) = format {
             return Ok(Self(Source::Many(Box::new(Messages::open(path)?))));
         }
-        let read = || std::fs::read(path).map_err(|cause| Error::read(path, cause));
+        let read = || opened::bytes(path, MOST_BYTES).map_err(|cause| Error::read(path, cause));
         let parsed = match format {
             Format::Pcd => pcd_reader::parse(&read()?),
             Format::Ply => ply_reader::parse(&read()?),
@@ -87,7 +91,7 @@ pub fn read_cloud(path: &Path) -> Result<PointCloud, Error> {
 /// # Errors
 /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is no such PCD file.
 pub fn read_pcd(path: &Path) -> Result<PointCloud, Error> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::read(path, cause))?;
+    let bytes = opened::bytes(path, MOST_BYTES).map_err(|cause| Error::read(path, cause))?;
     let parsed = pcd_reader::parse(&bytes);
     parsed.map(|(cloud, _)| cloud).map_err(|fault| Error::invalid(path, Format::Pcd, fault))
 }

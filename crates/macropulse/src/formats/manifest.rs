@@ -57,6 +57,19 @@ pub struct Surroundings {
     pub conditions: String,
 }
 
+/// How far a run has come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// Its files are being written, or it was killed meanwhile: which there are is not known.
+    Running,
+    /// All is done.
+    #[default]
+    Finished,
+    /// Stopped by whoever started it: what it names is whole, and the rest was not begun.
+    Stopped,
+}
+
 /// When a scan began, and where the sensor was then.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Begun {
@@ -79,6 +92,8 @@ pub struct Begun {
 pub struct Manifest {
     /// Version of these keys, [`SCHEMA_VERSION`].
     pub schema_version: u32,
+    /// How far the run has come.
+    pub state: State,
     /// Version of macropulse.
     pub version: String,
     /// Seed of the random numbers.
@@ -125,6 +140,7 @@ impl Default for Manifest {
     fn default() -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
+            state: State::default(),
             version: String::new(),
             seed: 0,
             sensor: Named::default(),

@@ -36,7 +36,7 @@ pub use csv::quoted;
 pub use error::Error;
 pub use format::Format;
 pub use manifest::{
-    Begun, Entries, Manifest, Named, SCHEMA_VERSION, Surroundings, versioned, write_manifest,
+    Begun, Entries, Manifest, Named, SCHEMA_VERSION, State, Surroundings, versioned, write_manifest,
 };
 pub use mcap::{Message, Profile};
 pub use png16::{RangeImage, read_range_png};

@@ -57,7 +57,7 @@ fn grey_from_range(range: f32) -> u16 {
 /// [`Error::Read`] if the file cannot be opened, [`Error::Invalid`] if it is not a 16-bit grey PNG
 /// that declares this scale.
 pub fn read_range_png(path: &Path) -> Result<RangeImage, Error> {
-    let file = std::fs::File::open(path).map_err(|cause| Error::read(path, cause))?;
+    let file = crate::opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
     decode(BufReader::new(file)).map_err(|fault| Error::invalid(path, Format::Png, fault))
 }
 

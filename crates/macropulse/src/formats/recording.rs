@@ -36,12 +36,12 @@ impl Recording {
     ///
     /// # Errors
     /// As [`write_cloud`]; files written before stay.
-    pub fn add_as(
+    pub fn add_as<N: AsRef<Path>>(
         &mut self,
         cloud: &PointCloud,
         names: &Names,
-        name: impl Fn(Format) -> String,
-    ) -> Result<Vec<(Format, String)>, Error> {
+        name: impl Fn(Format) -> N,
+    ) -> Result<Vec<(Format, N)>, Error> {
         attributes::check_even(cloud)?;
         let mut files = Vec::new();
         for &format in &self.formats {

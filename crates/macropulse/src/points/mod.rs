@@ -269,7 +269,7 @@ impl PointCloud {
     /// What is to be known of return `at`, as bits: [`FAINT`], [`AMBIGUOUS`],
     /// [`SATURATED`]; 0 for a sound one that tells how bright it is.
     pub fn flags(&self, at: usize) -> u8 {
-        let faint = 2 * self.peak[at] < self.marks[at];
+        let faint = 2 * u32::from(self.peak[at]) < u32::from(self.marks[at]);
         let ambiguous = self.margin[at] == 0;
         let saturated = self.saturated[at];
         let bits = [(faint, FAINT), (ambiguous, AMBIGUOUS), (saturated, SATURATED)];

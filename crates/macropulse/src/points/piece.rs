@@ -249,6 +249,19 @@ mod tests {
         Scale::of(design, &crate::channel::Operating::in_the_dark(design))
     }
 
+    #[test]
+    fn a_heavy_word_of_which_most_is_found_is_not_faint() {
+        let of = |peak: u16| PointCloud {
+            peak: vec![peak],
+            marks: vec![60_000],
+            margin: vec![1],
+            saturated: vec![false],
+            ..PointCloud::default()
+        };
+        assert_eq!(of(33_000).flags(0), 0);
+        assert_eq!(of(29_999).flags(0), crate::points::FAINT);
+    }
+
     /// One return of every owned shot, two of every second one.
     fn returns(log: &ShotLog) -> Returns {
         let mut returns = Returns::default();

@@ -8,6 +8,7 @@ use super::file::object_names;
 use super::{Error, Scene};
 use crate::environment;
 use crate::names::{nearest, toml_value};
+use crate::opened;
 
 /// Names of the three numbers of a position or size.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
@@ -19,24 +20,29 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::open`]; and if a key leads nowhere, or the scene refuses the value.
-    pub fn open_changed(name_or_file: &str, changes: &[(String, String)]) -> Result<Self, Error> {
+    pub fn open_changed(
+        name_or_file: impl AsRef<Path>,
+        changes: &[(String, String)],
+    ) -> Result<Self, Error> {
+        let path = name_or_file.as_ref();
         if changes.is_empty() {
-            return Self::open(name_or_file);
+            return Self::open(path);
         }
+        let builtin = path.to_str().and_then(Self::builtin);
         // What is no scene at all is said as it is without changes.
-        if Self::builtin(name_or_file).is_none() && !Path::new(name_or_file).is_file() {
-            return Self::open(name_or_file);
+        // A pipe is none to look at twice.
+        if builtin.is_none() && (!path.exists() || path.is_dir()) {
+            return Self::open(path);
         }
-        let path = Path::new(name_or_file);
-        let (text, base) = match Self::builtin(name_or_file) {
+        let (text, base) = match builtin {
             Some(text) => (text.to_owned(), Path::new("")),
             None => {
-                let text = std::fs::read_to_string(path)
+                let text = opened::text(path)
                     .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
                 (text, path.parent().unwrap_or(Path::new("")))
             }
         };
-        Self::from_toml_changed(&text, name_or_file, base, changes)
+        Self::from_toml_changed(&text, &path.display().to_string(), base, changes)
     }
 
     /// As [`Scene::from_toml`], with `changes` of single values as [`Scene::open_changed`] takes them.

@@ -1,6 +1,6 @@
 //! Other lidars in the scene: what they are and where they stand.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
@@ -101,7 +101,7 @@ pub(super) fn interferers(
 fn open(source: Source<'_>, base: &Path, typed: &InterfererTyped) -> Result<Design, Error> {
     let named = typed.sensor.get_ref();
     let ready = preset_text(named).is_some() || !named.ends_with(".toml");
-    let place = if ready { named.clone() } else { base.join(named).display().to_string() };
+    let place = if ready { PathBuf::from(named) } else { base.join(named) };
     let mut changes = Vec::new();
     flatten(&typed.set, "", &mut changes);
     Design::open(&place, &changes)

@@ -54,6 +54,7 @@ pub use trace::{SUB_MACROPULSES, Traced};
 use crate::digest::Digest;
 use crate::environment::Environment;
 use crate::kernels::{LANES, Packet};
+use crate::opened;
 use file::{Place, Source};
 use world::{PacketHits, World};
 
@@ -103,18 +104,21 @@ impl Scene {
     ///
     /// # Errors
     /// If it is neither, or the file is wrong; the message says what to do.
-    pub fn open(name_or_file: &str) -> Result<Self, Error> {
-        if let Some(text) = Self::builtin(name_or_file) {
-            return Self::from_toml(text, name_or_file, Path::new(""));
+    pub fn open(name_or_file: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = name_or_file.as_ref();
+        if let Some(name) = path.to_str()
+            && let Some(text) = Self::builtin(name)
+        {
+            return Self::from_toml(text, name, Path::new(""));
         }
-        let path = Path::new(name_or_file);
+        let name = path.display().to_string();
         // What looks like a path is meant as one.
         if path.is_file() || path.extension().is_some() || path.components().count() > 1 {
             return Self::from_file(path);
         }
         Err(Error::UnknownScene {
-            asked: name_or_file.to_owned(),
-            nearest: crate::names::nearest(name_or_file, builtin_names()).map(str::to_owned),
+            nearest: crate::names::nearest(&name, builtin_names()).map(str::to_owned),
+            asked: name,
             known: builtin_names().collect::<Vec<_>>().join(", "),
         })
     }
@@ -124,7 +128,7 @@ impl Scene {
     /// # Errors
     /// If the file or one of its meshes cannot be read or is wrong.
     pub fn from_file(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
+        let text = opened::text(path)
             .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
         let base = path.parent().unwrap_or(Path::new(""));
         Self::from_toml(&text, &path.display().to_string(), base)
@@ -228,6 +232,12 @@ impl Scene {
     /// Number of triangles; closed-form shapes have none.
     pub fn triangles(&self) -> usize {
         self.world.triangles()
+    }
+
+    /// How many triangles are in memory, those of a mesh that stands in many places once, and how many
+    /// shapes and places of meshes.
+    pub fn kept(&self) -> (usize, usize) {
+        self.world.kept()
     }
 
     /// Its materials as light of `wavelength` metres sees them.

@@ -53,6 +53,14 @@ impl Mover {
         Self { body: Body::Mesh { model, object }, motion, reach: reach * (1.0 + WIDER) + WIDE }
     }
 
+    /// The mesh, if it is one; several may share it.
+    pub(super) fn model(&self) -> Option<&Arc<Facets>> {
+        match &self.body {
+            Body::Shape(_) => None,
+            Body::Mesh { model, .. } => Some(model),
+        }
+    }
+
     /// Number of triangles that can be hit.
     pub(super) fn triangles(&self) -> usize {
         match &self.body {

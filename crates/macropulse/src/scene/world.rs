@@ -8,6 +8,8 @@
 //! What moves is kept apart and asked after all that, ray by ray; of equally far surfaces it comes
 //! last, in the order of the scene file.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3A};
 
 use super::closed_form::Solid;
@@ -107,6 +109,16 @@ impl World {
         };
         let moving = self.movers.iter().map(Mover::triangles).sum::<usize>();
         self.facets.len() + self.primitives.iter().map(of_primitive).sum::<usize>() + moving
+    }
+
+    /// Triangles in memory, those of copies once; and shapes, copies and movers.
+    pub(super) fn kept(&self) -> (usize, usize) {
+        let models: usize = self.models.iter().map(Facets::len).sum();
+        let mut moving: Vec<_> = self.movers.iter().filter_map(Mover::model).collect();
+        moving.sort_by_key(|model| Arc::as_ptr(model));
+        moving.dedup_by_key(|model| Arc::as_ptr(model));
+        let moving: usize = moving.iter().map(|model| model.len()).sum();
+        (self.facets.len() + models + moving, self.primitives.len() + self.movers.len())
     }
 
     /// Whether a ray on its way down takes longer than to put it in order: with the city of

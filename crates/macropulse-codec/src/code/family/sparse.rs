@@ -6,6 +6,7 @@
 
 use std::collections::BTreeSet;
 
+use super::super::codebook::MOST_MARKS;
 use super::super::{CodeWord, Error};
 use super::chance::Chance;
 
@@ -44,8 +45,9 @@ pub(super) fn checked(sparse: &Sparse) -> Result<(), Error> {
         let widest = (length - weight).checked_div(weight - 1).map_or(length, |more| more + 1);
         return Err(Error::Gap { gap, weight, length, widest });
     }
-    if !(1..=MOST_WORDS).contains(&words) {
-        return Err(Error::Words { words, possible: MOST_WORDS });
+    let possible = MOST_WORDS.min(MOST_MARKS as u32 / weight);
+    if !(1..=possible).contains(&words) {
+        return Err(Error::Words { words, possible });
     }
     Ok(())
 }

@@ -3,8 +3,6 @@
 //! The list goes on from scan to scan and begins anew at its end. With several lines these take
 //! turns: entry k is a shot of line k mod `lines`, each with a detector of its own.
 
-use std::fs::File as Disk;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -18,7 +16,7 @@ use crate::design::Error;
 use crate::design::limits::Check;
 use crate::design::safety::Beams;
 use crate::digest::Digest;
-use crate::told;
+use crate::{opened, told};
 
 /// Bytes of the largest table: 2²² entries of some 40.
 const MOST_BYTES: u64 = 1 << 28;
@@ -127,13 +125,7 @@ pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
     let unread = |error: std::io::Error| {
         format!("{}: cannot be read: {}", path.display(), told::unreadable(&error))
     };
-    let mut bytes = Vec::new();
-    let file = Disk::open(path).map_err(unread)?;
-    file.take(most + 1).read_to_end(&mut bytes).map_err(unread)?;
-    match bytes.len() as u64 > most {
-        true => Err(format!("{}: has more than {most} bytes", path.display())),
-        false => Ok(bytes),
-    }
+    opened::bytes(path, most).map_err(unread)
 }
 
 /// Columns of a table.

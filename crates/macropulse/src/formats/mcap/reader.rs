@@ -4,6 +4,7 @@
 use super::super::about::About;
 use super::super::{Error, Format};
 use super::{ABOUT, METADATA, Message, Profile, point_cloud2, ros2};
+use crate::opened;
 use crate::points::PointCloud;
 use ::mcap::McapError;
 use ::mcap::records::op;
@@ -48,7 +49,7 @@ impl Messages {
     /// # Errors
     /// If the file cannot be opened.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let file = File::open(path).map_err(|cause| Error::read(path, cause))?;
+        let file = opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
         let length = file.metadata().map_err(|cause| Error::read(path, cause))?.len();
         let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST) as usize;
         let options = LinearReaderOptions::default()

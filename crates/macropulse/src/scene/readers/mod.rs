@@ -13,6 +13,7 @@ use std::path::Path;
 
 use super::error::Error;
 use super::mesh::Mesh;
+use crate::opened;
 pub(super) use beside::Reach;
 
 /// What to do about a material file that is named but not there.
@@ -23,6 +24,9 @@ pub(super) enum WithoutMaterials {
     /// The surface would be guesswork.
     Refused,
 }
+
+/// Most bytes of a file with a mesh.
+const MOST_BYTES: u64 = 2 << 30;
 
 const DAMAGED: &str = "the file is damaged or cut short: export it again";
 
@@ -79,7 +83,7 @@ fn extension(path: &Path) -> String {
 }
 
 fn open(path: &Path) -> Result<BufReader<File>, Error> {
-    match File::open(path) {
+    match opened::file(path, MOST_BYTES) {
         Ok(file) => Ok(BufReader::new(file)),
         Err(source) => Err(Error::Unreadable { path: path.to_owned(), source }),
     }

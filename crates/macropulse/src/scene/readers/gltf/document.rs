@@ -91,7 +91,35 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
         ));
     }
     check(&root).map_err(damaged)?;
+    check_nodes(&root).map_err(damaged)?;
+    if root.buffers.len() > MOST_BUFFERS {
+        let problem = format!("has {} buffers, more than {MOST_BUFFERS}", root.buffers.len());
+        return Err(Error::mesh(path, problem, "export it with all data in one buffer"));
+    }
     Ok(Document::from_json_without_validation(root))
+}
+
+/// Most buffers of a document, each of which may be a file to open.
+const MOST_BUFFERS: usize = 4096;
+
+/// Refuses nodes with several parents: they would be there once for each way that leads to them, and
+/// the ways may double from level to level. What remains are trees, and cycles that no scene is
+/// above of.
+fn check_nodes(root: &Root) -> Result<(), String> {
+    let mut has_parent = vec![false; root.nodes.len()];
+    for (index, node) in root.nodes.iter().enumerate() {
+        for child in node.children.iter().flatten() {
+            let known = has_parent.get_mut(child.value());
+            if known.is_none_or(|known| std::mem::replace(known, true)) {
+                return Err(format!("names in node {index} a child that has another parent"));
+            }
+        }
+    }
+    let mut of_scenes = root.scenes.iter().flat_map(|scene| &scene.nodes);
+    match of_scenes.find(|node| has_parent.get(node.value()).copied().unwrap_or(true)) {
+        Some(node) => Err(format!("names in a scene node {}, which is a child", node.value())),
+        None => Ok(()),
+    }
 }
 
 /// Refuses indices that lead nowhere and values that mean nothing. What is only missing is left

@@ -1,0 +1,111 @@
+//! The memory that is estimated for a run, beside what the run takes; and the limit on it.
+#![cfg(target_os = "linux")]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod common;
+
+use std::process::Command;
+
+use common::Desk;
+
+/// An estimate is of use between these shares of what is taken.
+const NEAR: std::ops::RangeInclusive<f64> = 0.7..=1.5;
+
+/// Starts what its arguments say, and prints the most memory that it has had, KiB.
+const MEASURE: &str = "import resource, subprocess, sys
+ended = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+sys.exit(ended.returncode)";
+
+const THREADS: u32 = 2;
+
+/// What is estimated for a run of `sensor` in `scene` with two threads, and what it takes, bytes.
+fn memory(desk: &Desk, sensor: &str, scene: &str) -> (f64, f64) {
+    let text = format!("version = 1\nsensor = \"{sensor}\"\nscene = \"{scene}\"\n");
+    desk.put("s.toml", &text);
+    let said = desk.json(&format!("check s.toml --json -j {THREADS} --memory-limit 1TB"));
+    let estimated = said["memory"]["total_bytes"].as_f64().unwrap();
+    let mut command = Command::new("python3");
+    command.args(["-c", MEASURE, env!("CARGO_BIN_EXE_macropulse")]).current_dir(desk.path());
+    command.args(["simulate", sensor, scene, "-q", "-o", "out", "--memory-limit", "1TB"]);
+    let ran = command.args(["-j", &THREADS.to_string()]).output().unwrap();
+    assert!(ran.status.success(), "{sensor}: {}", String::from_utf8_lossy(&ran.stderr));
+    let taken: f64 = String::from_utf8(ran.stdout).unwrap().trim().parse().unwrap();
+    (estimated, taken * 1024.0)
+}
+
+#[test]
+fn an_estimate_is_near_what_a_run_takes() {
+    let desk = Desk::new();
+    for sensor in ["peregrine", "vlp-16", "hdl-64e", "rosette-mid-40", "kim-park-2016"] {
+        for scene in ["wall", "street"] {
+            let (estimated, taken) = memory(&desk, sensor, scene);
+            let (ratio, taken) = (estimated / taken, taken * 1e-6);
+            assert!(
+                NEAR.contains(&ratio),
+                "{sensor} in {scene}: {taken:.1} MB, {ratio:.2} estimated"
+            );
+        }
+    }
+}
+
+#[test]
+#[ignore = "takes minutes: prints the table of docs/hardening.md"]
+fn the_table_of_the_book() {
+    let desk = Desk::new();
+    println!("| sensor | scene | estimated, MB | taken, MB | ratio |\n|---|---|---|---|---|");
+    let listed = desk.json("sensors --json");
+    let sensors =
+        listed["sensors"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap());
+    for sensor in sensors.filter(|sensor| *sensor != "kim-park-2016-physical") {
+        for scene in ["wall", "street", "crossing"] {
+            let (estimated, taken) = memory(&desk, sensor, scene);
+            let ratio = estimated / taken;
+            println!(
+                "| `{sensor}` | `{scene}` | {:.0} | {:.0} | {ratio:.2} |",
+                estimated * 1e-6,
+                taken * 1e-6
+            );
+        }
+    }
+}
+
+#[test]
+fn what_takes_too_much_is_refused_before_it_is_begun() {
+    let desk = Desk::new();
+    let dark = "--set detector.photon-counting.dark_counts_hz=1e12";
+    for (line, words) in [
+        (
+            "simulate kim-park-2016-fixed wall -o out --memory-limit 160MB -j 8",
+            ["as -j ", "allowed"],
+        ),
+        (
+            &format!("simulate kim-park-2016-fixed wall -o out --memory-limit 1GB -j 1 {dark}"),
+            ["with 1 thread", "less noise"],
+        ),
+        ("check kim-park-2016-physical --memory-limit 1GB -j 2", ["with 1 thread", "less noise"]),
+        ("check street --memory-limit 1MB", ["street", "fewer triangles"]),
+        (
+            "sweep vlp-16 wall --vary tdc.converters=16,32 -o out --memory-limit 15MB",
+            ["vlp-16 in wall", "fewer pixels"],
+        ),
+        ("check vlp-16 --memory-limit lots", ["--memory-limit", "as 2GB"]),
+    ] {
+        desk.refused(line, &words);
+    }
+    let ran = desk.run("simulate peregrine wall --format none --memory-limit 100MB");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+}
+
+#[test]
+fn what_is_estimated_is_told() {
+    let desk = Desk::new();
+    let told = desk.run("check vlp-16 -j 3").out;
+    assert!(told.contains("memory of a run") && told.contains("with 3 threads"), "{told}");
+    let said = desk.json("check street --json");
+    assert_eq!(said["memory"]["total_bytes"], said["memory"]["scene_bytes"]);
+    let parts = desk.json("check vlp-16 --json -j 3")["memory"].clone();
+    let part = |name: &str| parts[name].as_u64().unwrap();
+    let sum = part("sensor_bytes") + part("scan_bytes") + 3 * part("band_bytes_per_thread");
+    assert_eq!(part("total_bytes"), sum);
+}

@@ -1,0 +1,168 @@
+//! What a run leaves in a folder, however it ends: whole files, and a manifest that describes no
+//! others than its own.
+#![cfg(unix)]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use common::Desk;
+use serde_json::Value;
+
+fn manifest(desk: &Desk) -> Value {
+    let text = fs::read_to_string(desk.path().join("out/manifest.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// Starts `line` and kills it when its fifth scan is there.
+fn killed(desk: &Desk, line: &str) {
+    let mut child = desk.command(line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let began = Instant::now();
+    while !desk.path().join("out/scan-000004.pcd").exists() {
+        assert!(began.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn a_killed_run_leaves_no_manifest_that_describes_an_older_one() {
+    let desk = Desk::new();
+    desk.run("simulate peregrine wall -o out --seed 1 --scans 2 --format pcd -q");
+    let first = manifest(&desk);
+    assert_eq!(first["state"], "finished");
+    assert_eq!(first["files"].as_array().unwrap().len(), 3);
+    killed(&desk, "simulate peregrine street -o out --seed 9 --scans 100000 --format pcd -q");
+    let left = manifest(&desk);
+    assert_eq!(left["state"], "running");
+    assert_eq!((&left["seed"], &left["scene"]["name"]), (&9.into(), &"street".into()));
+    assert_eq!(left["files"], Value::Array(Vec::new()));
+    assert!(left["warnings"].to_string().contains("of an older run (2 in all)"), "{left:#}");
+    // Every cloud that has its name is whole.
+    let clouds = desk.files().into_iter().filter(|file| file.ends_with(".pcd"));
+    for cloud in clouds {
+        let ran = desk.run(&format!("convert {cloud} -o whole.csv -q"));
+        assert_eq!(ran.code, Some(0), "{cloud}: {}", ran.err);
+    }
+    // Who looks at it is told.
+    let looked = desk.run("view out -o page.html");
+    assert_eq!(looked.code, Some(0), "{}", looked.err);
+    assert!(looked.err.contains("was killed"), "{}", looked.err);
+}
+
+#[test]
+fn the_next_run_clears_what_a_killed_one_has_left_and_names_its_clouds() {
+    let desk = Desk::new();
+    killed(&desk, "simulate peregrine street -o out --scans 100000 --format pcd -q");
+    desk.put("out/.macropulse-Ab12Cd.part", "half a cloud");
+    let ran = desk.run("simulate peregrine wall -o out --format pcd");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.err.contains("of an older run"), "{}", ran.err);
+    assert!(!desk.files().iter().any(|file| file.ends_with(".part")), "{:?}", desk.files());
+    let left = manifest(&desk);
+    assert_eq!(left["state"], "finished");
+    assert_eq!(left["scene"]["name"], "wall");
+    let files: Vec<&str> =
+        left["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert_eq!(files, ["scan-000000.pcd", "index.html"]);
+}
+
+#[test]
+fn a_run_that_is_stopped_says_so() {
+    let desk = Desk::new();
+    let line = "simulate peregrine street -o out --scans 100000 --format pcd -q";
+    let mut child = desk.command(line).stderr(Stdio::null()).spawn().unwrap();
+    let began = Instant::now();
+    while !desk.path().join("out/scan-000004.pcd").exists() {
+        assert!(began.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let signalled =
+        std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(signalled.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let left = manifest(&desk);
+    assert_eq!(left["state"], "stopped");
+    let named = left["files"].as_array().unwrap().len();
+    assert_eq!(named, left["counts"]["scans"].as_u64().unwrap() as usize + 1);
+    assert!(
+        left["files"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|file| { desk.path().join("out").join(file.as_str().unwrap()).exists() })
+    );
+}
+
+#[test]
+fn a_full_disk_and_a_folder_that_is_read_only_are_no_fault_of_the_user() {
+    let desk = Desk::new();
+    // A file may have 64 KiB here: a cloud is larger.
+    let script = format!(
+        "ulimit -f 64; trap '' XFSZ; exec {} simulate vlp-16 street -o out --format pcd",
+        env!("CARGO_BIN_EXE_macropulse")
+    );
+    let mut command = std::process::Command::new("bash");
+    let ran = command.args(["-c", &script]).current_dir(desk.path()).output().unwrap();
+    let told = String::from_utf8(ran.stderr).unwrap();
+    assert_eq!(ran.status.code(), Some(1), "{told}");
+    assert!(told.contains("scan-000000.pcd") && told.lines().count() == 1, "{told}");
+    assert!(desk.files().is_empty(), "{:?}", desk.files());
+    let full =
+        desk.command("sensors vlp-16").stdout(fs::File::create("/dev/full").unwrap()).output();
+    let full = full.unwrap();
+    assert_eq!(full.status.code(), Some(1));
+    assert!(String::from_utf8(full.stderr).unwrap().contains("the disk is full"));
+    // Nothing can be made in it, whoever asks.
+    let ran = desk.run("simulate peregrine wall -o /proc/out --format pcd");
+    assert!(ran.code != Some(0) && ran.err.contains("/proc/out"), "{}", ran.err);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn names_need_not_be_utf_8() {
+    use std::ffi::{OsStr, OsString};
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    let odd = |ending: &str| {
+        let mut name = OsStr::from_bytes(b"\xe9t\xff").to_os_string();
+        name.push(ending);
+        name
+    };
+    let put = |name: OsString, text: &str| fs::write(desk.path().join(name), text).unwrap();
+    let ran = |line: &[&OsStr]| {
+        let ran = desk.command("").args(line).output().unwrap();
+        let told = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert_eq!(ran.status.code(), Some(0), "{line:?}: {told}");
+    };
+    put(odd("-s.toml"), &desk.run("sensors peregrine").out);
+    put(odd("-w.toml"), &desk.run("scenes wall").out);
+    put(odd("-r.toml"), "version = 1\nsensor = \"peregrine\"\nscene = \"wall\"\n");
+    let of = OsStr::new;
+    let (sensor, scene, run) = (&odd("-s.toml"), &odd("-w.toml"), &odd("-r.toml"));
+    let (out, again) = (&odd("-out"), &odd("-again"));
+    ran(&[of("check"), sensor, scene, run]);
+    ran(&[of("encode"), sensor, of("--pixel"), of("0,1")]);
+    ran(&[of("budget"), sensor, of("-o"), &odd("-budget")]);
+    ran(&[of("simulate"), sensor, scene, of("-o"), out, of("--format"), of("pcd,ticks")]);
+    ran(&[of("simulate"), run, of("-o"), &odd("-run")]);
+    let within = |file: &str| {
+        let mut path = out.clone();
+        path.push("/");
+        path.push(file);
+        path
+    };
+    let (shots, ticks) = (within("shots-000000.mps"), within("ticks-000000.mpt"));
+    ran(&[of("decode"), of("--sensor"), sensor, &shots, &ticks, of("-o"), again]);
+    ran(&[of("convert"), &within("scan-000000.pcd"), of("-o"), &odd("-cloud.ply")]);
+    ran(&[of("view"), out, of("-o"), &odd("-page.html")]);
+    ran(&[of("view"), &odd("-cloud.ply")]);
+    for file in ["-cloud.ply", "-page.html", "-cloud.html", "-again/index.html", "-run/index.html"]
+    {
+        assert!(desk.path().join(odd(file)).exists(), "{file}");
+    }
+}

@@ -1,0 +1,310 @@
+//! What a program may hand over by mistake: public structs filled with anything. It is refused or put
+//! up with, never a panic, and never in much memory.
+
+#![allow(clippy::unwrap_used)]
+
+use macropulse_codec::code::correlation::{
+    CrossCorrelation, aperiodic, balanced, bipolar, periodic,
+};
+use macropulse_codec::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, Sparse};
+use macropulse_codec::decode::{Receiver, ReceiverKind};
+use macropulse_codec::files::{
+    Form, Limits, ShotHeader, ShotReader, ShotWriter, Stream, TickHeader, TickReader, TickWriter,
+};
+use macropulse_codec::{Cut, ShotLog, Tick, Ticks};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+const KINDS: [ReceiverKind; 5] = [
+    ReceiverKind::Literal,
+    ReceiverKind::Blind,
+    ReceiverKind::Matched,
+    ReceiverKind::Balanced,
+    ReceiverKind::Direct,
+];
+
+/// Address space that this program may have, bytes: what asks for more ends it.
+#[cfg(target_os = "linux")]
+fn in_little_memory() {
+    use rustix::process::{Resource, Rlimit, setrlimit};
+    let most = Some(3 << 30);
+    setrlimit(Resource::As, Rlimit { current: most, maximum: most }).unwrap();
+}
+
+#[cfg(not(target_os = "linux"))]
+fn in_little_memory() {}
+
+fn config(cases: u32) -> ProptestConfig {
+    in_little_memory();
+    ProptestConfig { rng_seed: RngSeed::Fixed(15), ..ProptestConfig::with_cases(cases) }
+}
+
+fn any_i64() -> impl Strategy<Value = i64> {
+    let ends = prop_oneof![Just(i64::MIN), Just(i64::MAX), Just(1_000_000_000_000_000_000)];
+    prop_oneof![-3..3_i64, -100_000..100_000_i64, ends, any::<i64>()]
+}
+
+fn any_u32() -> impl Strategy<Value = u32> {
+    prop_oneof![0..20_u32, 0..70_000_u32, Just(u32::MAX), any::<u32>()]
+}
+
+fn any_u64() -> impl Strategy<Value = u64> {
+    prop_oneof![0..20_u64, Just(u64::MAX), any::<u64>()]
+}
+
+fn column() -> impl Strategy<Value = Vec<u16>> {
+    proptest::collection::vec(any::<u16>(), 0..6)
+}
+
+prop_compose! {
+    /// A log of columns that know nothing of each other.
+    fn any_log()(
+        first in any_u64(),
+        fired_at_fs in proptest::collection::vec(any_i64(), 0..6),
+        columns in [column(), column(), column(), column(), column()],
+        owned in (any_u64(), any_u64()),
+    ) -> ShotLog {
+        let [row, column, label, word, channel] = columns;
+        let owned = owned.0 as usize..owned.1 as usize;
+        ShotLog { first, fired_at_fs, row, column, label, word, channel, owned }
+    }
+}
+
+prop_compose! {
+    fn any_ticks()(
+        epoch in any_i64(),
+        tick in proptest::collection::vec(any_u32(), 0..9),
+        channel in column(),
+        amplitude in proptest::collection::vec(any::<f32>(), 0..9),
+    ) -> Ticks {
+        Ticks { epoch, tick, channel, amplitude }
+    }
+}
+
+prop_compose! {
+    fn any_cut()(numbers in [any_i64(), any_i64(), any_i64(), any_i64(), any_i64(), any_i64()]) -> Cut {
+        let [tick_fs, clock_fs, jitter_fs, listening_fs, lead_fs, history_fs] = numbers;
+        Cut { tick_fs, clock_fs, jitter_fs, listening_fs, lead_fs, history_fs }
+    }
+}
+
+fn codebook() -> Codebook {
+    let payload = Payload::new(4, Crc::default(), false).unwrap();
+    Codebook::new(Family::prime(5).unwrap(), Some(payload), 16, Keying::OnOff).unwrap()
+}
+
+/// Three shots with light, and a receiver that finds them.
+fn sound() -> (Receiver, ShotLog, Ticks) {
+    let receiver = Receiver { gate_ticks: (0, 2000), light_ticks: 3000, ..Receiver::matched(1000) };
+    let mut log = ShotLog::of_one_channel(&[0, 500_000, 1_000_000], &[0, 1, 2]);
+    log.label = vec![5, 9, 12];
+    let book = codebook();
+    let of_shot = |shot: usize| {
+        let marks = book.marks(log.label[shot], log.word[shot]).to_vec();
+        marks.into_iter().map(move |mark| 500 * shot as u32 + 700 + u32::from(mark))
+    };
+    let mut tick: Vec<u32> = (0..3).flat_map(of_shot).collect();
+    tick.sort_unstable();
+    tick.dedup();
+    (receiver, log, Ticks { tick, ..Ticks::default() })
+}
+
+proptest! {
+    #![proptest_config(config(2000))]
+
+    #[test]
+    fn columns_that_know_nothing_of_each_other(
+        log in any_log(),
+        ticks in any_ticks(),
+        span in (any_i64(), any_i64()),
+        places in (any_u64(), any_u64()),
+        cut in any_cut(),
+    ) {
+        prop_assert!(log.part(places.0 as usize..places.1 as usize).len() <= log.len());
+        prop_assert!(log.each_channel().iter().all(|(shots, _)| shots.len() <= log.len()));
+        let stream = ticks.stream();
+        prop_assert_eq!(stream.len(), ticks.len());
+        for kind in [(false, false), (true, true)] {
+            prop_assert!(Ticks::of(&stream, span.0, kind).len() <= stream.len());
+        }
+        let mut kept = ticks.clone();
+        kept.keep(&(span.0..span.1));
+        prop_assert!(kept.len() <= ticks.len());
+        prop_assert!(cut.known(&log).len() <= log.len());
+        let (opens, closes) = (cut.opens(span.0), cut.ticks(span.0, span.1));
+        prop_assert_eq!(opens, closes.start);
+        let _ = (cut.epoch(span.0), cut.shots(span.0, span.1));
+        for kind in KINDS {
+            let receiver = Receiver { kind, ..sound().0 };
+            let decoded = receiver.decode(&codebook(), &log, &ticks);
+            let even = [&log.row, &log.column, &log.label, &log.word, &log.channel]
+                .iter()
+                .all(|column| column.len() == log.len());
+            prop_assert!(even || decoded.is_err());
+        }
+    }
+
+    #[test]
+    fn a_shot_is_explained_or_refused(
+        shot in any_u64(),
+        kind in 0..KINDS.len(),
+        gate in (any_u32(), any_u32()),
+        spoilt in 0..4_u8,
+        numbers in (any_u32(), any_i64(), any::<f64>(), any::<f64>()),
+    ) {
+        let (mut receiver, log, ticks) = sound();
+        receiver.kind = KINDS[kind];
+        match spoilt {
+            0 => receiver.gate_ticks = gate,
+            1 => (receiver.light_ticks, receiver.tick_fs) = (numbers.0, numbers.1),
+            2 => (receiver.jitter_ticks, receiver.false_alarm) = (numbers.2, numbers.3),
+            _ => receiver.ticks_per_chip = numbers.0,
+        }
+        let explained = receiver.explain(&codebook(), (&log, &ticks), shot as usize);
+        prop_assert!(shot < 3 || explained.is_err());
+    }
+
+    #[test]
+    fn a_stream_that_is_cut_anyhow_ends(
+        cut in any_cut(),
+        owned in proptest::option::of((any_u64(), any_u64())),
+        first in any_u64(),
+        times in proptest::collection::vec((any_i64(), any_i64()), 0..6),
+        until in any_u64(),
+        tick_fs in any_i64(),
+    ) {
+        let mut shots = Vec::new();
+        let owned = owned.map(|(from, until)| from..until);
+        let header = ShotHeader { first, owned, ..ShotHeader::default() };
+        let mut writer = ShotWriter::new(&mut shots, Form::Text, &header).unwrap();
+        for (fired_fs, _) in &times {
+            let shot = macropulse_codec::files::Shot { fired_fs: *fired_fs, ..Default::default() };
+            writer.write(&shot).unwrap();
+        }
+        let mut ticks = Vec::new();
+        let header =
+            TickHeader { tick_fs, several: false, measured: false, digest: None, count: None };
+        let mut writer = TickWriter::new(&mut ticks, Form::Text, &header).unwrap();
+        for (_, tick) in &times {
+            writer.write(&Tick { tick: *tick, ..Tick::default() }).unwrap();
+        }
+        let limits = Limits { rows: 1, columns: 1, labels: 1, words: 1, channels: 1 };
+        let shots = ShotReader::new(&shots[..], limits);
+        let ticks = TickReader::new(&ticks[..], tick_fs, 1);
+        if let (Ok(shots), Ok(ticks)) = (shots, ticks) {
+            let mut stream = Stream::new(cut, shots, ticks, false);
+            for _ in 0..10 {
+                match stream.next_band(|first| first.saturating_add(until)) {
+                    Ok(Some((log, ticks))) => prop_assert!(log.len() + ticks.len() <= 12),
+                    Ok(None) | Err(_) => break,
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(config(300))]
+
+    #[test]
+    fn a_code_is_made_or_refused(
+        numbers in [any_u32(), any_u32(), any_u32(), any_u32()],
+        payload in (any_u32(), any::<u8>(), any::<u8>(), any::<u8>(), any::<bool>()),
+        labels in any_u32(),
+        kind in 0..7_u8,
+    ) {
+        let [length, weight, words, gap] = numbers;
+        let family = match kind {
+            0 => Family::prime(length),
+            1 => Family::extended_prime(length),
+            2 => Family::quadratic_congruence(length),
+            3 => Family::sparse(Sparse { length, weight, words, gap, seed: 1 }),
+            4 => Family::m_sequence(length),
+            5 => Family::gold(length),
+            // The search of long orthogonal codes takes its time.
+            _ => Family::orthogonal(length % 500, weight, Some(words)),
+        };
+        let (bits, width, polynomial, init, sync) = payload;
+        let payload = Payload::new(bits, Crc { width, polynomial, init }, sync);
+        if let Ok(family) = family {
+            let made = Codebook::new(family, payload.ok(), labels % 70, Keying::OnOff);
+            prop_assert!(made.is_err() || made.unwrap().chips() <= 65_535);
+        }
+    }
+
+    #[test]
+    fn words_with_marks_beyond_their_end(
+        lengths in (0..40_u32, any_u32()),
+        marks in (column(), column()),
+    ) {
+        let word = |length: u32, marks: Vec<u16>| {
+            let mut word: CodeWord = Family::prime(3).unwrap().words().remove(1);
+            (word.length, word.marks) = (length % 100_000, marks);
+            word
+        };
+        let (a, b) = (word(lengths.0, marks.0), word(lengths.1, marks.1));
+        let length = a.length.max(b.length) as usize;
+        for found in [balanced(&a, &b).len(), bipolar(&a, &b).len(), periodic(&a, &b).len()] {
+            prop_assert_eq!(found, length);
+        }
+        prop_assert!(aperiodic(&a, &b).max() <= 36);
+        prop_assert!(a.complement().marks.len() <= a.length as usize);
+        prop_assert!(a.period() <= a.length.max(1));
+        let _ = CrossCorrelation::of(&[a, b]);
+    }
+}
+
+/// The heaviest words there are, each found whole, and what is counted of it as it is.
+#[test]
+fn counts_are_wide_enough_for_the_heaviest_code() {
+    in_little_memory();
+    for weight in [8192, 33_000, 60_000] {
+        let sparse = Sparse { length: 65_535, weight, words: 2, gap: 1, seed: 7 };
+        let book = Codebook::new(Family::sparse(sparse).unwrap(), None, 1, Keying::OnOff).unwrap();
+        let log = ShotLog::of_one_channel(&[0, 200_000_000], &[0, 1]);
+        for kind in [ReceiverKind::Literal, ReceiverKind::Matched, ReceiverKind::Balanced] {
+            for jitter_ticks in [0.0, 2.0] {
+                let receiver = Receiver {
+                    kind,
+                    gate_ticks: (0, 2000),
+                    light_ticks: 4000,
+                    jitter_ticks,
+                    bit_threshold: (weight / 2) as u16,
+                    ..Receiver::matched(1000)
+                };
+                let of_shot = |shot: usize| {
+                    let marks = book.marks(0, shot as u16).iter();
+                    marks.map(move |mark| 200_000 * shot as u32 + 700 + u32::from(*mark))
+                };
+                let tick: Vec<u32> = (0..2).flat_map(of_shot).collect();
+                let ticks = Ticks { tick, ..Ticks::default() };
+                let returns = receiver.decode(&book, &log, &ticks).unwrap();
+                let what = format!("{kind:?} of {weight} marks, jitter {jitter_ticks}");
+                if kind == ReceiverKind::Balanced && jitter_ticks > 0.0 {
+                    // Ticks that may be early or late light the dark chips of so dense a word, too.
+                    continue;
+                }
+                // So may another place of it look like its beginning, to who knows no shots.
+                if kind == ReceiverKind::Matched || jitter_ticks == 0.0 {
+                    assert_eq!(returns.shot, [0, 1], "{what}");
+                }
+                for at in 0..returns.len() {
+                    assert_eq!(u32::from(returns.marks[at]), weight, "{what}");
+                    assert!(
+                        u32::from(returns.peak[at]) * 10 >= 9 * weight,
+                        "{what}: {}",
+                        returns.peak[at]
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_family_of_more_marks_than_are_kept_is_refused_before_they_are_drawn() {
+    in_little_memory();
+    let sparse = Sparse { length: 65_535, weight: 60_000, words: 65_535, gap: 1, seed: 7 };
+    let told = Family::sparse(sparse).unwrap_err().to_string();
+    assert!(told.contains("65535 words is not possible; use 1 to 4473"), "{told}");
+}

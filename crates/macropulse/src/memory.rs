@@ -1,0 +1,128 @@
+//! The memory that a run takes, estimated before it is spent.
+//!
+//! What grows is counted: code words, triangles, pixels, and of a band, on each thread, its shots, its
+//! ticks and their events. Factors stand for what is kept of each at once; they are measured, and
+//! `docs/hardening.md` has the estimates beside the memory that runs have taken.
+
+use crate::channel::{Error, Operating};
+use crate::design::{Design, Effect};
+use crate::emit::bands;
+use crate::environment::Environment;
+use crate::scene::Scene;
+use crate::units::s_from_fs;
+
+/// The program itself, its threads and what they hold ready, bytes.
+const PROGRAM: u64 = 19_000_000;
+
+/// Of a triangle while it is loaded; 178 of them are what `tests/memory.rs` allows an STL file.
+const PER_TRIANGLE: u64 = 220;
+
+/// Of a shape, or of a copy of a mesh.
+const PER_COPY: u64 = 512;
+
+/// Of a mark of the codebook, with what the receiver makes of it.
+const PER_MARK: u64 = 4;
+
+/// Of a pixel of a scan, with its return and the truth.
+const PER_PIXEL: u64 = 60;
+
+/// Of the same where it is written: as one list, and what a page or a format makes of that.
+const PER_WRITTEN: u64 = 130;
+
+/// Of a shot of a band: log, hits, pulse trains.
+const PER_SHOT: f64 = 400.0;
+
+/// Of the same where the mirror moves on during a macropulse, and the hits of its parts are kept.
+const PER_MOVING_SHOT: f64 = 6_000.0;
+
+/// Of a mark that is detected: its time, and its tick.
+const PER_MARK_SEEN: f64 = 20.0;
+
+/// Of a detection event without light of lidars: its time, before and after it is merged with others,
+/// and its tick.
+const PER_NOISE: f64 = 40.0;
+
+/// The memory of a run, bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Estimate {
+    /// The program and the sensor: above all its codebook.
+    pub sensor: u64,
+    /// The surfaces of the scene.
+    pub scene: u64,
+    /// The points of a scan.
+    pub scan: u64,
+    /// What is made of them when they are written.
+    pub written: u64,
+    /// The bands under way, one on each thread: what one takes.
+    pub band: u64,
+}
+
+impl Estimate {
+    /// The memory of scans of `design` where the light is that of `environment`; without a scene.
+    ///
+    /// # Errors
+    /// As [`Operating::of`].
+    pub fn of(design: &Design, environment: &Environment) -> Result<Self, Error> {
+        let operating = Operating::of(design, environment)?;
+        let codebook = &design.coding.codebook;
+        let in_words: usize = codebook.weights().map(|(_, most)| most).sum();
+        let marks = in_words as u64 * codebook.words() as u64;
+        // Few shots meet a second surface, and hardly any a third one.
+        let second = u64::from(design.receiver.returns > 1);
+        let returns = design.shots_per_scan() * (2 + second) / 2;
+        Ok(Self {
+            sensor: PROGRAM + PER_MARK * marks,
+            scene: 0,
+            scan: returns * PER_PIXEL,
+            written: returns * PER_WRITTEN,
+            band: band(design, &operating),
+        })
+    }
+
+    /// The same in `scene`.
+    ///
+    /// # Errors
+    /// As [`Operating::in_scene`].
+    pub fn in_scene(design: &Design, scene: &Scene) -> Result<Self, Error> {
+        Operating::in_scene(design, scene)?;
+        Ok(Self { scene: of_scene(scene), ..Self::of(design, &scene.environment)? })
+    }
+
+    /// The same of a run that writes nothing.
+    pub fn unwritten(self) -> Self {
+        Self { written: 0, ..self }
+    }
+
+    /// All of it together, with so many `threads`.
+    pub fn total(&self, threads: usize) -> u64 {
+        let bands = self.band.saturating_mul(threads as u64);
+        let parts = [self.sensor, self.scene, self.scan, self.written, bands];
+        parts.into_iter().fold(0, u64::saturating_add)
+    }
+}
+
+/// The memory of the surfaces of a scene, bytes.
+pub fn of_scene(scene: &Scene) -> u64 {
+    let (triangles, copies) = scene.kept();
+    PER_TRIANGLE * triangles as u64 + PER_COPY * copies as u64
+}
+
+/// The memory that a band takes while it is computed.
+fn band(design: &Design, operating: &Operating) -> u64 {
+    // Not in the first scan: that has no shots before it.
+    let Some(band) = bands(design, 1).next() else { return 0 };
+    let cut = design.cut();
+    let (seen, _) = band.ticks(design);
+    let tick = s_from_fs(design.tdc.tick_fs);
+    let before = s_from_fs((cut.history_fs - cut.lead_fs).max(0));
+    let lasts = (seen.end - seen.start) as f64 * tick + before;
+    let shots = (lasts / design.derived().pixel_period).max(band.shots as f64);
+    let per_shot = match design.idealised.contains(&Effect::MirrorMotion) {
+        true => PER_SHOT,
+        false => PER_MOVING_SHOT,
+    };
+    let marks = shots * design.coding.codebook.mean_weight();
+    // A slot of the converters' time is lit or not: noise beyond that is not kept.
+    let noise = (operating.false_rate * lasts).min(lasts / tick) * f64::from(design.channels());
+    (shots * per_shot + marks * PER_MARK_SEEN + noise * PER_NOISE) as u64
+}
