@@ -256,7 +256,7 @@ impl Canceller<'_> {
     /// tells when its light ends.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
         let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
-        // Of ticks that may be nobody's only what is likely is asked.
+        // Of ticks that may belong to no known shot only what is likely is asked.
         let (parts, most_hidden) = if tick < self.owned { (1, 1) } else { (2, FIRST) };
         for lags in self.nearest_first().into_iter().take(parts) {
             for hidden in 0..most_hidden {

@@ -412,7 +412,7 @@ fn clear_light_is_cancelled_whatever_was_sent_before() {
     let sent = Sent::new(&receiver, (&sensor.book, &log), (ticks.epoch, Words::default()));
     let left = |ticks: &[u32]| cancel(&sent, ticks).map(|cancelled| cancelled.residual);
     assert_eq!(left(&ticks.tick), Some(vec![]));
-    // A tick more is left where owned light may be, and is nobody's before.
+    // A tick more is left where owned light may be, and passed by before.
     let (before, among) = (ticks.tick[0] + 1, sent.fired[15] as u32 + 17);
     for (more, expected) in [(before, vec![]), (among, vec![among])] {
         let mut ticks = ticks.tick.clone();
