@@ -116,6 +116,30 @@ fn ticks_come_in_order_where_a_dark_beginning_is_overtaken() {
     assert!(overtaken > 100, "{overtaken}");
 }
 
+/// With converters that are never dead, too, a mark in the tick of the last one of a macropulse before it
+/// is that tick, once.
+#[test]
+fn marks_of_one_tick_are_one_with_converters_that_are_never_dead() {
+    let bank = [("dead_time_ns", "0".to_string())];
+    let design = sensor("kim-park-2016-fixed", &COUNTING, &bank);
+    let log = Band { scan: 0, first: 828, shots: 2 }.shot_log(&design);
+    let echo = |shot, delay_fs| Echo { shot, delay_fs, photons: f64::INFINITY };
+    let at = |delays: [i64; 2]| {
+        let echoes = [0, 1].map(|shot| echo(shot, delays[shot]));
+        light_of_echoes(&design, &log, echoes)
+    };
+    let alone = at([0, 0]);
+    let apart = alone.arrivals_fs(1).next().unwrap() - alone.arrivals_fs(0).last().unwrap();
+    for late in [-2, -1, 0, 1, 2] {
+        // Steps of a tenth of a tick about that place.
+        let light = at([0, late * 33_000 - apart]);
+        let [marks, events] = both_ways(&design, &log, &light, 0).unwrap();
+        assert_eq!(marks, events, "{late}");
+        let both = light.arrivals_fs(0).count() + light.arrivals_fs(1).count();
+        assert!(late != 0 || events.ticks.tick.len() == both - 1, "{late}");
+    }
+}
+
 /// Whatever makes an event beside marks, or none of a mark, or moves one, is noticed.
 #[test]
 fn marks_are_not_all_there_is_where_anything_else_is() {

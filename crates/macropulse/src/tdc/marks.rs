@@ -22,17 +22,19 @@ pub(super) fn ticks(bank: &mut Bank, marks: Marks) -> (Ticks, usize, usize) {
     }
     let mut layout = Layout { words, ticks, rows: Default::default(), found: 0, merged: 0 };
     layout.ticks.clear();
+    // Converters that are never dead take several marks of one tick for one, too.
+    let dead = bank.dead.max(1);
     let mut at = 0;
     while at < macropulses.len() {
         let known = bank.peak / exact.busiest.max(1);
-        let (run, last) = layout.add_run(&macropulses[at..], (bank.dead, known > 0));
+        let (run, last) = layout.add_run(&macropulses[at..], (dead, known > 0));
         at += run;
         let Some(last) = last else { continue };
         // The last one of the run, and all that begin while its converters are busy.
         let from = layout.ticks.len() - words.count(&last);
         let mut together = 1;
         while let Some(next) = macropulses.get(at)
-            && layout.is_near(next, bank.dead)
+            && layout.is_near(next, dead)
         {
             layout.add_among(next, from);
             together += 1;

@@ -55,7 +55,8 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Option<Cancelled> {
         patience: if sent.width > 1 { 0 } else { PATIENCE.0 },
         oldest: 0,
         end: 0,
-        next: 0,
+        // None: where all shots have one word, light of any would pass for that of the first.
+        next: sent.fired.len(),
         owned: owned_light(sent),
         seen: Timeline::default(),
         residual: Timeline::default(),
