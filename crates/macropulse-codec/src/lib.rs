@@ -23,10 +23,12 @@ pub mod time;
 
 mod cut;
 mod kernels;
+mod samples;
 mod shot_log;
 mod ticks;
 
 pub use cut::Cut;
 pub use kernels::level;
+pub use samples::{Record, Samples};
 pub use shot_log::ShotLog;
 pub use ticks::{Tick, Ticks};

@@ -262,7 +262,7 @@ prop_compose! {
         let kind = KINDS[kind];
         Receiver {
             kind, effort, gate_ticks, light_ticks, ticks_per_chip, tick_fs, jitter_ticks, photons_apart: false,
-            false_alarm, bit_threshold, returns, pick,
+            false_alarm, bit_threshold, returns, pick, sampling: None,
         }
     }
 }

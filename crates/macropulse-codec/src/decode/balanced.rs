@@ -235,6 +235,7 @@ mod tests {
             bit_threshold: 1,
             returns: 1,
             pick: crate::decode::Pick::Strongest,
+            sampling: None,
         }
     }
 

@@ -412,6 +412,7 @@ mod tests {
             bit_threshold: 6,
             returns: 1,
             pick: crate::decode::Pick::Strongest,
+            sampling: None,
         };
         receiver.decode(&codebook(), log, ticks).unwrap()
     }

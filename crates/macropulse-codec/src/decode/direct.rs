@@ -77,6 +77,7 @@ mod tests {
             bit_threshold: 1,
             returns,
             pick,
+            sampling: None,
         };
         receiver.decode(&Codebook::single(), log, ticks).unwrap()
     }

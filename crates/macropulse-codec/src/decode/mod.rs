@@ -11,6 +11,7 @@ mod field;
 mod matched;
 mod pick;
 mod returns;
+mod sampled;
 mod threshold;
 mod timeline;
 mod timing;
@@ -19,13 +20,12 @@ pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
+pub use sampled::{STEPS_OF_TICK, Sampling};
 
 use serde::Deserialize;
 
-use crate::ShotLog;
-use crate::Ticks;
 use crate::code::Codebook;
-use crate::time;
+use crate::{Record, ShotLog, Ticks, time};
 use returns::Return;
 
 /// Which receiver decodes.
@@ -42,6 +42,9 @@ pub enum ReceiverKind {
     Balanced,
     /// One mark per shot, a detector of its own: the ticks in the range gate.
     Direct,
+    /// As `Matched`, of samples: the marks of a word are added up, and what was explained is taken
+    /// away.
+    Sampled,
 }
 
 /// How much the matched receiver does for faint light.
@@ -89,6 +92,8 @@ pub struct Receiver {
     pub returns: u8,
     /// Which surfaces are kept if a shot has met more of them.
     pub pick: Pick,
+    /// What it knows of the signal that is sampled; of the sampled receiver, and of no other.
+    pub sampling: Option<Sampling>,
 }
 
 /// The shots that are fired while light passes the gate so many times are decoded together: so many
@@ -110,7 +115,7 @@ impl ReceiverKind {
         match self {
             Self::Literal | Self::Blind | Self::Balanced => 1,
             Self::Matched => matched::MOST_RETURNS,
-            Self::Direct => MOST_RETURNS,
+            Self::Direct | Self::Sampled => MOST_RETURNS,
         }
     }
 }
@@ -132,6 +137,7 @@ impl Receiver {
             bit_threshold: 1,
             returns: 1,
             pick: Pick::Strongest,
+            sampling: None,
         }
     }
 
@@ -149,14 +155,19 @@ impl Receiver {
     /// If what is given cannot be decoded by any receiver: columns of unequal length, ticks or shots
     /// out of order, shots that are not in the codebook, times that are not counted, settings out of
     /// their limits. Light in which nothing is found is no error.
-    pub fn decode(
+    pub fn decode<'a>(
         &self,
         codebook: &Codebook,
         log: &ShotLog,
-        ticks: &Ticks,
+        record: impl Into<Record<'a>>,
     ) -> Result<Returns, Error> {
-        check::check(self, (codebook, log), ticks)?;
-        Ok(self.decode_checked(codebook, log, ticks))
+        match record.into() {
+            Record::Ticks(ticks) => {
+                check::check(self, (codebook, log), ticks)?;
+                Ok(self.decode_checked(codebook, log, ticks))
+            }
+            Record::Samples(samples) => Ok(sampled::decode(self, codebook, (log, samples))),
+        }
     }
 
     /// The returns, of what was checked.
@@ -169,6 +180,7 @@ impl Receiver {
         }
         match self.kind {
             ReceiverKind::Direct => direct::decode(self, log, ticks),
+            ReceiverKind::Sampled => self.nothing_of(log.owned.len()),
             ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
             ReceiverKind::Balanced => self.balance(codebook, log, ticks),
             ReceiverKind::Literal => {
@@ -335,6 +347,7 @@ mod tests {
             bit_threshold: 1,
             returns: 1,
             pick: Pick::Strongest,
+            sampling: None,
         };
         for first in [0, 7, -2498, 10_i64.pow(17) + 1] {
             let times = [0, 1, 2489, 2490, 2496, 2497, -1, -2497, 2497 * 2497, 1 << 51, 1 << 53];
