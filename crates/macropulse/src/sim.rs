@@ -19,7 +19,7 @@ use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
 use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
-use macropulse_codec::{ShotLog, Ticks};
+use macropulse_codec::{Samples, ShotLog, Ticks};
 
 pub use arrivals::{Arrival, Arrivals, Stretch};
 
@@ -213,9 +213,12 @@ impl<'a> Scans<'a> {
             {
                 let known = counted.1.peak_busy;
                 let measured = measure(&setup, memory, (band, known))?;
-                keep(&Record { band, log: &measured.log, ticks: &measured.ticks });
-                let (score, tally, ticks) = measured.judged(&setup.seen, scale, piece);
-                memory.take_back(ticks.tick);
+                let log = &measured.log;
+                keep(&Record { band, log, given: measured.given.borrowed() });
+                let (score, tally, given) = measured.judged(&setup.seen, scale, piece);
+                if let Given::Ticks(ticks) = given {
+                    memory.take_back(ticks.tick);
+                }
                 counted.0.add(&score);
                 counted.1.add(&tally);
                 (watch.done)(band.shots);
@@ -245,8 +248,23 @@ pub struct Record<'a> {
     pub band: &'a Band,
     /// Its shots, guard shots included.
     pub log: &'a ShotLog,
-    /// All ticks that belong to it ([`Band::ticks`]).
-    pub ticks: &'a Ticks,
+    /// All ticks, or samples, that belong to it ([`Band::ticks`]).
+    pub given: macropulse_codec::Record<'a>,
+}
+
+/// Owned, what a receiver is given of a band.
+enum Given {
+    Ticks(Ticks),
+    Samples(Samples),
+}
+
+impl Given {
+    fn borrowed(&self) -> macropulse_codec::Record<'_> {
+        match self {
+            Self::Ticks(ticks) => ticks.into(),
+            Self::Samples(samples) => samples.into(),
+        }
+    }
 }
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
@@ -254,21 +272,21 @@ struct Measured<'a> {
     log: ShotLog,
     hits: Hits,
     light: Light<'a>,
-    ticks: Ticks,
+    given: Given,
     returns: Returns,
     tally: Tally,
 }
 
 impl Measured<'_> {
-    /// Makes the returns of a band the points of `piece`, and counts; and the ticks back.
-    fn judged(mut self, seen: &Seen, scale: &Scale, piece: &mut Piece) -> (Score, Tally, Ticks) {
+    /// Makes the returns of a band the points of `piece`, and counts; and what was given back.
+    fn judged(mut self, seen: &Seen, scale: &Scale, piece: &mut Piece) -> (Score, Tally, Given) {
         let Seen { design, scene, .. } = *seen;
         let began = thread_seconds();
         piece.fill(design, scale, &self.log, &self.returns);
         let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
         score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
         self.tally.seconds[POINTS] += thread_seconds() - began;
-        (score, self.tally, self.ticks)
+        (score, self.tally, self.given)
     }
 }
 
@@ -300,15 +318,27 @@ fn measure<'a>(
     lap(&mut tally);
     let light = channel::light(&setup.seen, &log, &traced);
     lap(&mut tally);
-    let response = detectors.response(&log, &light, memory);
+    let given = match detectors.samples(&log, &light, &band.ticks(design).0) {
+        Some(samples) => {
+            lap(&mut tally);
+            tally.samples = samples.code.len() as u64;
+            Given::Samples(samples)
+        }
+        None => {
+            let response = detectors.response(&log, &light, memory);
+            lap(&mut tally);
+            let mut converted = tdc::ticks(design, response, known);
+            tally.ticks = converted.ticks.tick.len() as u64;
+            record::cut(setup, memory, (band, &log), &mut converted);
+            let Converted { ticks, peak_busy, lost, merged } = converted;
+            tally.detections = tally.ticks + merged + lost;
+            (tally.merged, tally.lost, tally.peak_busy) = (merged, lost, peak_busy);
+            Given::Ticks(ticks)
+        }
+    };
     lap(&mut tally);
-    let mut converted = tdc::ticks(design, response, known);
-    tally.ticks = converted.ticks.tick.len() as u64;
-    record::cut(setup, memory, (band, &log), &mut converted);
-    lap(&mut tally);
-    let Converted { ticks, peak_busy, lost, merged } = converted;
     let known = design.cut().known(&log);
-    let mut returns = design.receiver.decode(&design.coding.codebook, &known, &ticks)?;
+    let mut returns = design.receiver.decode(&design.coding.codebook, &known, given.borrowed())?;
     let unknown = (known.first - log.first) as u32;
     returns.shot.iter_mut().for_each(|shot| *shot += unknown);
     lap(&mut tally);
@@ -328,16 +358,12 @@ fn measure<'a>(
             _ => tally.interferer_shots += 1,
         }
     }
-    tally.detections = tally.ticks + merged + lost;
-    tally.merged = merged;
-    tally.lost = lost;
-    tally.peak_busy = peak_busy;
     tally.returns = returns.shot.len() as u64;
     for number in &returns.number {
         tally.by_number[usize::from(number - 1)] += 1;
     }
     tally.rejects = returns.rejects;
-    Ok(Measured { log, hits, light, ticks, returns, tally })
+    Ok(Measured { log, hits, light, given, returns, tally })
 }
 
 /// The last stage, after those of a band: its points and their score.
@@ -359,6 +385,8 @@ pub struct Tally {
     pub detections: u64,
     /// Ticks that reached the decoder.
     pub ticks: u64,
+    /// Samples that reached it.
+    pub samples: u64,
     /// Detection events that fell into the tick of another one.
     pub merged: u64,
     /// Detection events that found every converter busy.
@@ -389,6 +417,7 @@ impl Tally {
             (&mut self.interferer_shots, other.interferer_shots),
             (&mut self.detections, other.detections),
             (&mut self.ticks, other.ticks),
+            (&mut self.samples, other.samples),
             (&mut self.merged, other.merged),
             (&mut self.lost, other.lost),
             (&mut self.returns, other.returns),

@@ -125,7 +125,8 @@ impl<'a> TickFiles<'a> {
         // Behind the last band there is nothing that could have them.
         let is_last = record.band.first + record.band.shots == design.shots_per_scan();
         let end = if is_last { seen.end } else { own.end };
-        let mut stream = record.ticks.stream();
+        let macropulse::codec::Record::Ticks(ticks) = record.given else { return };
+        let mut stream = ticks.stream();
         stream.truncate(stream.partition_point(|tick| tick.tick < end));
         let mut bytes = Vec::new();
         let mut writer = TickWriter::behind(&mut bytes, form, &self.header);

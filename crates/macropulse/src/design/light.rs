@@ -63,10 +63,10 @@ pub struct Light {
 
 impl Light {
     /// The rms length, s, over which the photons of a micropulse are spread where `detector` sees
-    /// each by itself; `None` where they are taken to come at once, and for a linear detector, which
-    /// sees the pulse as a whole.
+    /// each by itself; `None` where they are taken to come at once, and for a detector behind an
+    /// amplifier, which sees the pulse as a whole.
     pub fn spread_at(&self, detector: &Detector) -> Option<f64> {
-        self.spread.filter(|_| !matches!(detector, Detector::Linear(_)))
+        self.spread.filter(|_| !matches!(detector, Detector::Linear(_) | Detector::Sampled(_)))
     }
 }
 

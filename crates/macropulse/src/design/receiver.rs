@@ -4,11 +4,11 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::band::TOO_FINE;
-use super::detector::DetectorFile;
+use super::detector::{DetectorFile, Sampled};
 use super::limits::Check;
 use super::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
-use macropulse_codec::decode::{Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind};
+use macropulse_codec::decode::{Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind, Sampling};
 
 /// `[receiver]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -18,7 +18,7 @@ pub(super) struct ReceiverFile {
     pub kind: ReceiverKindFile,
     /// How much the receiver `matched` does for faint light.
     effort: Effort,
-    /// False returns accepted per shot (matched, balanced).
+    /// False returns accepted per shot (matched, balanced, sampled).
     #[schemars(range(min = 1e-30, max = 0.5))]
     false_alarm: f64,
     /// Marks that make a bit a 1 (literal, blind).
@@ -33,6 +33,15 @@ pub(super) struct ReceiverFile {
     returns: u32,
     /// Which returns are kept of more, and which one of a pixel its image shows.
     pick: Option<Pick>,
+    /// Marks by which a return is decided at least, neither blanked nor clipped (sampled).
+    #[schemars(range(min = 1, max = 65535))]
+    least_marks: u32,
+    /// For how long after each mark that is sent no sample counts, ns (sampled).
+    #[schemars(range(min = 0, max = 1e6))]
+    blank_ns: f64,
+    /// For how long behind a clipped sample none counts, ns (sampled).
+    #[schemars(range(min = 0, max = 1e6))]
+    recovery_ns: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -49,6 +58,8 @@ pub(super) enum ReceiverKindFile {
     Balanced,
     /// For shots without a code: the ticks in the range gate.
     Direct,
+    /// As `matched`, of a sampled detector: adds up the samples of the marks of every shot in flight.
+    Sampled,
 }
 
 /// What a receiver is given beside its own section of the file.
@@ -61,18 +72,28 @@ pub(super) struct Inputs<'a> {
     pub timing: f64,
     /// As [`Receiver::photons_apart`].
     pub photons_apart: bool,
+    /// The detector, where it is sampled.
+    pub sampled: Option<&'a Sampled>,
 }
 
 impl Check<'_> {
     pub(super) fn receiver(&self, file: &ReceiverFile, inputs: &Inputs) -> Result<Receiver, Error> {
-        let &Inputs { detector, scan, tdc, coding, timing, photons_apart } = inputs;
+        let &Inputs { detector, scan, tdc, coding, timing, photons_apart, sampled } = inputs;
         let kind = match file.kind {
             ReceiverKindFile::Literal => ReceiverKind::Literal,
             ReceiverKindFile::Blind => ReceiverKind::Blind,
             ReceiverKindFile::Matched => ReceiverKind::Matched,
             ReceiverKindFile::Balanced => ReceiverKind::Balanced,
             ReceiverKindFile::Direct => ReceiverKind::Direct,
+            ReceiverKindFile::Sampled => ReceiverKind::Sampled,
         };
+        let samples = detector.only().is_some_and(|only| only.file.sample_ps().is_some());
+        if samples != (kind == ReceiverKind::Sampled) {
+            return self.refuse(
+                "receiver.kind",
+                "`sampled` is for [detector.sampled], the other receivers for other detectors",
+            );
+        }
         if (kind == ReceiverKind::Direct) == coding.label.is_some() {
             return self.refuse(
                 "receiver.kind",
@@ -107,7 +128,23 @@ impl Check<'_> {
             },
             returns,
             pick,
+            sampling: self.sampling(file, coding, sampled)?,
         })
+    }
+
+    /// What a receiver of samples knows of a `sampled` detector.
+    fn sampling(
+        &self,
+        file: &ReceiverFile,
+        coding: &Coding,
+        sampled: Option<&Sampled>,
+    ) -> Result<Option<Sampling>, Error> {
+        let Some(sampled) = sampled else { return Ok(None) };
+        let most = coding.codebook.lightest_word() as u32;
+        let least = self.count("receiver.least_marks", file.least_marks, 1, most)?;
+        let blank = self.within("receiver.blank_ns", file.blank_ns, 0.0, 1e6)? * 1e-9;
+        let recovery = self.within("receiver.recovery_ns", file.recovery_ns, 0.0, 1e6)? * 1e-9;
+        Ok(Some(sampled.sampling((blank, recovery), least as u16)))
     }
 
     /// How many returns a shot may have at most, and which are kept of more.
@@ -125,7 +162,7 @@ impl Check<'_> {
             ReceiverKind::Direct => {
                 one_event.map(|given| format!("detector.{} gives one event per shot", given.name))
             }
-            ReceiverKind::Matched => None,
+            ReceiverKind::Matched | ReceiverKind::Sampled => None,
             ReceiverKind::Literal => of_receiver("literal"),
             ReceiverKind::Blind => of_receiver("blind"),
             ReceiverKind::Balanced => of_receiver("balanced"),

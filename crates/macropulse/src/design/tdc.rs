@@ -16,7 +16,7 @@ pub(super) struct TdcFile {
     converters: u32,
     /// Length of a tick, ps: a whole number of femtoseconds.
     #[schemars(range(min = 0.001, max = 1e9))]
-    resolution_ps: f64,
+    resolution_ps: Option<f64>,
     /// Period of the coarse counter, ps: a whole number of ticks.
     #[schemars(range(min = 0.001, max = 1e9))]
     clock_ps: f64,
@@ -28,7 +28,7 @@ pub(super) struct TdcFile {
     dead_time_ns: f64,
 }
 
-/// The bank of time-to-digital converters.
+/// The bank of time-to-digital converters; of a sampled detector, which has none, its clock.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tdc {
     /// Converters in the bank (for all detectors together).
@@ -49,8 +49,18 @@ impl Tdc {
 }
 
 impl Check<'_> {
+    /// The time of a sampled detector, `sample_ps` from tick to tick, which has no converters of events.
+    pub(super) fn sampling_clock(&self, sample_ps: f64) -> Result<Tdc, Error> {
+        let tick_fs = self.whole_fs("detector.sampled.sample_ps", sample_ps)?;
+        Ok(Tdc { converters: 0, tick_fs, clock_fs: tick_fs, dead_fs: 0 })
+    }
+
     pub(super) fn tdc(&self, file: &TdcFile) -> Result<Tdc, Error> {
-        let tick_fs = self.whole_fs("tdc.resolution_ps", file.resolution_ps)?;
+        let Some(resolution) = file.resolution_ps else {
+            let message = "missing field `resolution_ps`";
+            return Err(self.chain.lacks("tdc.resolution_ps", message));
+        };
+        let tick_fs = self.whole_fs("tdc.resolution_ps", resolution)?;
         let clock_fs = self.whole_fs("tdc.clock_ps", file.clock_ps)?;
         let bits = self.count("tdc.bits", file.bits, 1, 16)?;
         if clock_fs % tick_fs != 0 {

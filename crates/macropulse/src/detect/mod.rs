@@ -5,6 +5,7 @@
 
 mod channel;
 mod clock;
+mod colour;
 mod first_photon;
 mod geiger;
 mod jitter;
@@ -12,16 +13,18 @@ mod linear;
 mod marks;
 mod noise;
 mod photon_counting;
+mod sampled;
 mod shape;
 mod single_stop;
 mod waveform;
 
 use std::borrow::Cow;
 use std::fmt;
+use std::ops::Range;
 
 pub use marks::{Marks, Response};
 
-use macropulse_codec::ShotLog;
+use macropulse_codec::{Samples, ShotLog};
 
 use channel::{Arrangement, Channel};
 use clock::Clock;
@@ -29,6 +32,7 @@ use geiger::Cells;
 use linear::Thresholding;
 use marks::ExactWords;
 use photon_counting::Counting;
+use sampled::Sampler;
 use shape::Shape;
 use waveform::Waveform;
 
@@ -57,7 +61,16 @@ pub struct Detectors<'a> {
     design: &'a Design,
     chance: Chance,
     shape: Option<Shape>,
-    kind: Box<dyn Kind>,
+    work: Work,
+}
+
+/// What a detector puts out.
+#[derive(Debug)]
+enum Work {
+    /// Detection events.
+    Events(Box<dyn Kind>),
+    /// Samples.
+    Samples(Box<Sampler>),
 }
 
 /// A kind of detector at work.
@@ -81,7 +94,7 @@ trait Kind: fmt::Debug + Send + Sync {
 impl<'a> Detectors<'a> {
     /// Whether its events have amplitudes.
     pub fn measure(&self) -> bool {
-        self.kind.measures()
+        matches!(&self.work, Work::Events(kind) if kind.measures())
     }
 
     /// The detectors of `design` where it is `operating`, with the random numbers of `chance`.
@@ -98,8 +111,12 @@ impl<'a> Detectors<'a> {
                 }
             }
             Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
+            Detector::Sampled(sampled) => {
+                let sampler = Box::new(Sampler::new(sampled, design, sunlight));
+                return Self { design, chance, shape: None, work: Work::Samples(sampler) };
+            }
         };
-        Self { design, chance, shape: Shape::of(design), kind }
+        Self { design, chance, shape: Shape::of(design), work: Work::Events(kind) }
     }
 
     /// What `light` makes while the sensor listens to the shots of `log`: marks alone where no
@@ -108,10 +125,11 @@ impl<'a> Detectors<'a> {
         if let Some(first) = log.fired_at_fs.first()
             && self.shape.is_none()
             && self.design.channels() == 1
+            && let Work::Events(kind) = &self.work
         {
             let clock = Clock::new(self.design, *first);
             memory.arrangement.fill(self.design, &clock, log, light);
-            if let Some((words, macropulses)) = self.kind.marks(memory.arrangement.order(), light) {
+            if let Some((words, macropulses)) = kind.marks(memory.arrangement.order(), light) {
                 let ticks = std::mem::take(&mut memory.times);
                 return Response::Marks(Marks { epoch: clock.epoch, words, macropulses, ticks });
             }
@@ -119,9 +137,23 @@ impl<'a> Detectors<'a> {
         Response::Events(self.detections(log, light, memory))
     }
 
-    /// The events that `light` makes while the sensor listens to the shots of `log`.
+    /// The samples that converters take of `light` in `span`, absolute ticks, while the shots of `log` are
+    /// fired; `None` of detectors that are not sampled.
+    pub fn samples(&self, log: &ShotLog, light: &Light, span: &Range<i64>) -> Option<Samples> {
+        match &self.work {
+            Work::Events(_) => None,
+            Work::Samples(sampler) => {
+                Some(sampler.samples((self.design, &self.chance), (log, light), span))
+            }
+        }
+    }
+
+    /// The events that `light` makes while the sensor listens to the shots of `log`; none of detectors that
+    /// are sampled.
     pub fn detections(&self, log: &ShotLog, light: &Light, memory: &mut Memory) -> Detections {
-        let Some(first) = log.fired_at_fs.first() else { return Detections::default() };
+        let (Some(first), Work::Events(kind)) = (log.fired_at_fs.first(), &self.work) else {
+            return Detections::default();
+        };
         let clock = Clock::new(self.design, *first);
         let light = match &self.shape {
             Some(shape) => Cow::Owned(shape.spread(light)),
@@ -138,7 +170,7 @@ impl<'a> Detectors<'a> {
         let several = self.design.channels() > 1;
         for channel in arrangement.channels(self.design, clock, log, &light) {
             let from = found.time.len();
-            self.kind.add(&channel, &self.chance, &mut found, memory);
+            kind.add(&channel, &self.chance, &mut found, memory);
             if several {
                 found.channel.resize(found.time.len(), channel.number);
                 channel.keep_what_is_listened_to(&mut found, from);

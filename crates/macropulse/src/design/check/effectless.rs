@@ -68,7 +68,9 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     }
     let kind = file.receiver.kind;
     let bitwise = matches!(kind, ReceiverKindFile::Literal | ReceiverKindFile::Blind);
-    let correlating = matches!(kind, ReceiverKindFile::Matched | ReceiverKindFile::Balanced);
+    let sampled = kind == ReceiverKindFile::Sampled;
+    let correlating =
+        sampled || matches!(kind, ReceiverKindFile::Matched | ReceiverKindFile::Balanced);
     add(
         !bitwise,
         &["receiver.bit_threshold"],
@@ -79,8 +81,12 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
         !correlating,
         &["receiver.false_alarm"],
         "receiver.kind",
-        "only `matched` and `balanced` derive their threshold from it",
+        "only `matched`, `balanced` and `sampled` derive their threshold from it",
     );
+    let of_samples = ["receiver.least_marks", "receiver.blank_ns", "receiver.recovery_ns"];
+    add(!sampled, &of_samples, "receiver.kind", "only `sampled` is given samples");
+    let tdc = ["tdc"];
+    add(sampled, &tdc, "receiver.kind", "a sampled detector has no converters of events");
     add(
         kind != ReceiverKindFile::Matched,
         &["receiver.effort"],

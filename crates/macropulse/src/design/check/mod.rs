@@ -132,10 +132,16 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     // Of a list that cannot be read nothing follows for the motion of the beam.
     let moves = effects.is_some() && !off(Effect::MirrorMotion);
     let scan = faults.keep(check.scan(&file.scan, moves));
-    let tdc = faults.keep(check.tdc(&file.tdc));
+    let sampled = file.detector.only().and_then(|only| only.file.sample_ps());
+    let tdc = faults.keep(match sampled {
+        Some(sample_ps) => check.sampling_clock(sample_ps),
+        None => check.tdc(&file.tdc),
+    });
     let coding = match (&scan, &tdc) {
         (Some(scan), Some(tdc)) => {
-            faults.keep(check.share(tdc, scan));
+            if sampled.is_none() {
+                faults.keep(check.share(tdc, scan));
+            }
             faults.keep(check.coding(file.code.as_ref(), scan, tdc))
         }
         _ => None,
@@ -179,6 +185,10 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
         coding: &coding,
         timing: libm::hypot(jitter, spread.unwrap_or(0.0)),
         photons_apart: spread.is_some(),
+        sampled: detector.as_ref().and_then(|detector| match detector {
+            Detector::Sampled(sampled) => Some(sampled),
+            _ => None,
+        }),
     };
     let receiver = faults.keep(check.receiver(&file.receiver, &inputs));
     if !faults.is_empty() {

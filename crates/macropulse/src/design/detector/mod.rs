@@ -10,9 +10,11 @@
 mod amplifier;
 mod check;
 mod comparator;
+mod front_end;
 mod geiger;
 mod linear;
 mod photon_counting;
+mod sampled;
 mod single_stop;
 mod table;
 
@@ -25,9 +27,11 @@ pub(in crate::design) use check::Efficiency;
 pub use comparator::{
     Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, Timing,
 };
+pub use front_end::FrontEnd;
 pub use geiger::Geiger;
 pub use linear::{Linear, LinearSetting};
 pub use photon_counting::PhotonCounting;
+pub use sampled::Sampled;
 pub use single_stop::{SingleStop, SingleStopSetting};
 pub(in crate::design) use table::{Before, SensitivityFile, Table};
 
@@ -89,6 +93,8 @@ kinds! {
     Geiger, geiger, "geiger";
     /// An amplified current that crosses a threshold.
     Linear, linear, "linear";
+    /// An amplified current that is sampled.
+    Sampled, sampled, "sampled";
     /// One event per shot \[KP16 Fig. 7\].
     SingleStop, single_stop, "single-stop";
 }
@@ -115,6 +121,11 @@ pub(in crate::design) trait Typed {
 
     /// Whether it puts out no more than one event per shot.
     fn is_single_stop(&self) -> bool;
+
+    /// From sample to sample, ps, of a kind that is sampled: its tick.
+    fn sample_ps(&self) -> Option<f64> {
+        None
+    }
 
     /// The detector in SI units.
     ///

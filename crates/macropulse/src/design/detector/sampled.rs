@@ -1,0 +1,281 @@
+//! A sampled detector: a photodiode with an amplifier and an analogue-to-digital converter (ADC).
+//!
+//! Nothing in it decides: what it hands over are codes, and whether a mark is there is the receiver's
+//! question. What stands here as the probability of a mark is that of one mark by itself.
+
+use macropulse_codec::decode::{STEPS_OF_TICK, Sampling};
+use macropulse_codec::statistics::normal_tail;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{
+    Awaited, Detector, FirstEvent, Follows, FrontEnd, Idle, Lit, Model, Noise, Sensitivity, Table,
+    Typed,
+};
+use crate::design::{Error, Light};
+use crate::units::{FS_PER_S, fs_from_s};
+
+/// Marks that stand alone are called found where they are so many deviations of the noise high.
+const FOUND: f64 = 5.0;
+
+/// Share of all codes that are above the level without light.
+const ABOVE: f64 = 0.9;
+
+/// A pulse is told to the receiver to so many of its rms lengths: there it is 4·10⁻⁶ of its height.
+const REACH: f64 = 5.0;
+
+/// `[detector.sampled]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    /// Detections per photon.
+    #[schemars(range(min = 1e-6, max = 1))]
+    efficiency: f64,
+    /// Gain of the photodiode: 1 where it multiplies nothing.
+    #[schemars(range(min = 1, max = 1e6))]
+    gain: f64,
+    /// Ratio of the ionisation rates of the photodiode, which its excess noise follows from.
+    #[schemars(range(min = 0, max = 1))]
+    ionisation_ratio: f64,
+    /// Electrical bandwidth at 3 dB, MHz.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    bandwidth_mhz: f64,
+    /// White noise at the input of the amplifier, pA/√Hz.
+    #[schemars(range(min = 0, max = 1e6))]
+    amplifier_pa_rthz: f64,
+    /// Noise of the amplifier's input voltage, nV/√Hz, which the capacitance turns into current.
+    #[schemars(range(min = 0, max = 1e6))]
+    voltage_noise_nv_rthz: f64,
+    /// Capacitance of the photodiode and the amplifier's input, pF.
+    #[schemars(range(min = 0, max = 1e6))]
+    capacitance_pf: f64,
+    /// Dark current that is multiplied, nA.
+    #[schemars(range(min = 0, max = 1e6))]
+    dark_current_na: f64,
+    /// Timing jitter of each mark, ps rms, beside what noise and photons make of it.
+    #[schemars(range(min = 0, max = 1e6))]
+    jitter_ps: f64,
+    /// How much weaker than what is sent the stray light of the sensor's own marks is at its detector, dB.
+    #[schemars(range(min = 0, max = 300))]
+    isolation_db: f64,
+    /// For how long behind a pulse that was clipped the amplifier stays at its limit, ns.
+    #[schemars(range(min = 0, max = 1e6))]
+    recovery_ns: f64,
+    /// From sample to sample, ps: a whole number of femtoseconds; the tick of this sensor.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    pub sample_ps: f64,
+    /// Bits of a code, the level without light at a tenth of the range.
+    #[schemars(range(min = 4, max = 15))]
+    bits: u32,
+    /// One step of a code, in the height of a mark of so many detected photons.
+    #[schemars(range(min = 1e-6, max = 1e12))]
+    step_photons: f64,
+}
+
+/// A photodiode with an amplifier and an analogue-to-digital converter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampled {
+    /// Mean photons detected per mark at the reference target.
+    pub sensitivity: Sensitivity,
+    /// What comes before the converter.
+    pub front_end: FrontEnd,
+    /// Standard deviation of the time of each mark, s.
+    pub jitter: f64,
+    /// Photons of each own mark that are detected as stray light.
+    pub stray: f64,
+    /// For how long behind a clipped pulse the signal stays at its limit, s.
+    pub recovery: f64,
+    /// From sample to sample, s.
+    pub sample: f64,
+    /// Lowest and highest code.
+    pub codes: (i16, i16),
+    /// A step of a code, in detected photons.
+    pub step: f64,
+}
+
+impl Typed for File {
+    fn efficiency(&self) -> Option<f64> {
+        Some(self.efficiency)
+    }
+
+    fn idle(&self) -> Idle {
+        Idle::NONE
+    }
+
+    fn follows(&self) -> Follows {
+        Follows { bandwidth: true, neighbouring_chips: true }
+    }
+
+    fn is_single_stop(&self) -> bool {
+        false
+    }
+
+    fn sample_ps(&self) -> Option<f64> {
+        Some(self.sample_ps)
+    }
+
+    fn check(&self, table: &Table) -> Result<Detector, Error> {
+        let Some(budget) = table.before.budget else {
+            return table.refuse(
+                "counts its noise in electrons, so the light must be counted as well: take \
+                 \"link-budget\" off the list `idealised`",
+            );
+        };
+        if table.before.light.spread.is_none() {
+            return table.refuse(
+                "samples the sum of all pulses, so none can be judged alone: take \"inter-chip\" off \
+                 the list `idealised`",
+            );
+        }
+        let within = |key, value, most| table.within(key, value, 0.0, most);
+        let front_end = FrontEnd {
+            gain: table.within("gain", self.gain, 1.0, 1e6)?,
+            ionisation: within("ionisation_ratio", self.ionisation_ratio, 1.0)?,
+            bandwidth: table.within("bandwidth_mhz", self.bandwidth_mhz, 1e-3, 1e9)? * 1e6,
+            current_noise: within("amplifier_pa_rthz", self.amplifier_pa_rthz, 1e6)? * 1e-12,
+            voltage_noise: within("voltage_noise_nv_rthz", self.voltage_noise_nv_rthz, 1e6)? * 1e-9,
+            capacitance: within("capacitance_pf", self.capacitance_pf, 1e6)? * 1e-12,
+            dark_current: within("dark_current_na", self.dark_current_na, 1e6)? * 1e-9,
+            pulse: table.before.light.pulse,
+        };
+        let sample = table.within("sample_ps", self.sample_ps, 1e-3, 1e9)? * 1e-12;
+        if sample > 1.5 * front_end.mark_rms() {
+            let message = format!(
+                "is {} ps, too long for a mark that is {:.0} ps long (rms) behind the amplifier: take \
+                 {:.0} ps at most, or less bandwidth",
+                self.sample_ps,
+                front_end.mark_rms() * 1e12,
+                1.5e12 * front_end.mark_rms()
+            );
+            return table.refuse_key("sample_ps", message);
+        }
+        let bits = table.count("bits", self.bits, 4, 15)?;
+        let codes = f64::from(1 << bits);
+        let isolation = within("isolation_db", self.isolation_db, 300.0)?;
+        let mark = budget.energy / table.before.coding.codebook.mean_weight();
+        let detected = mark / budget.photon_energy() * budget.efficiency;
+        Ok(Detector::Sampled(Sampled {
+            sensitivity: table.honest(budget),
+            front_end,
+            jitter: table.jitter(self.jitter_ps)?,
+            stray: detected * libm::pow(10.0, -isolation / 10.0),
+            recovery: within("recovery_ns", self.recovery_ns, 1e6)? * 1e-9,
+            sample,
+            codes: ((-(1.0 - ABOVE) * codes) as i16, (ABOVE * codes) as i16),
+            step: table.within("step_photons", self.step_photons, 1e-6, 1e12)?,
+        }))
+    }
+}
+
+impl Sampled {
+    /// rms noise without light of any lidar, in detected photons.
+    pub fn rms_noise(&self, background: f64) -> f64 {
+        self.front_end.covariance(0.0, background).sqrt()
+    }
+
+    /// What the receiver knows of it, which listens again `blank` seconds after a mark of its own and
+    /// `recovery` seconds behind a clipped sample, and decides by `least_marks` or more.
+    pub fn sampling(&self, (blank, recovery): (f64, f64), least_marks: u16) -> Sampling {
+        let ticks = |time: f64| libm::ceil(time / self.sample) as u32;
+        let rms = self.front_end.mark_rms() / self.sample * STEPS_OF_TICK as f64;
+        let half = libm::ceil(REACH * rms) as i32;
+        let height = |step: i32| libm::exp(-0.5 * (f64::from(step) / rms).powi(2)) / self.step;
+        Sampling {
+            pulse: (-half..=half).map(|step| height(step) as f32).collect(),
+            excess: self.front_end.excess(),
+            full_scale: self.codes.1,
+            blank_ticks: ticks(blank),
+            recovery_ticks: ticks(recovery),
+            least_marks,
+        }
+    }
+
+    /// Standard deviation, s, of the time of a mark of `photons`: the jitter of its own, the noise over
+    /// the slope, s·σ/n with the rms length s of the pulse, and the photons that came in its length,
+    /// s_p·√(F/n).
+    fn timing(&self, photons: f64, background: f64) -> f64 {
+        let by_noise = self.front_end.mark_rms() * self.rms_noise(background) / photons;
+        let length = self.front_end.pulse * crate::units::RMS_OF_FWHM;
+        let by_photons = length * (self.front_end.excess() / photons).sqrt();
+        libm::hypot(self.jitter, libm::hypot(by_noise, by_photons))
+    }
+}
+
+impl Model for Sampled {
+    fn sensitivity(&self) -> Sensitivity {
+        self.sensitivity
+    }
+
+    fn declared_background(&self) -> f64 {
+        0.0
+    }
+
+    /// Of a mark that is only just found by itself.
+    fn jitter(&self) -> f64 {
+        self.timing(FOUND * self.rms_noise(0.0).max(1.0), 0.0)
+    }
+
+    fn resolution(&self, _: &Light) -> f64 {
+        self.jitter()
+    }
+
+    fn response(&self) -> f64 {
+        self.front_end.mark_rms() / crate::units::RMS_OF_FWHM
+    }
+
+    fn memory_fs(&self) -> i64 {
+        0
+    }
+
+    fn refusal(&self, _: f64) -> Option<String> {
+        None
+    }
+
+    /// It makes no events.
+    fn false_rate(&self, _: f64) -> f64 {
+        0.0
+    }
+
+    fn noise(&self, background: f64) -> Option<Noise> {
+        let rms = self.rms_noise(background);
+        Some(Noise { rms, threshold: FOUND * rms, excess: self.front_end.excess() })
+    }
+
+    fn mark_pd(&self, lit: &Lit) -> f64 {
+        let rms = self.rms_noise(lit.background);
+        let spread = libm::hypot(rms, (self.front_end.excess() * lit.photons).sqrt());
+        normal_tail((FOUND * rms - lit.photons) / spread)
+    }
+
+    fn mark_jitter(&self, lit: &Lit) -> f64 {
+        self.timing(lit.photons.max(FOUND * self.rms_noise(lit.background)), lit.background)
+    }
+
+    fn mark_displacement(&self, _: &Lit, _: &Light) -> f64 {
+        0.0
+    }
+
+    fn ready_share(&self, _: f64) -> f64 {
+        1.0
+    }
+
+    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
+        FirstEvent::without_memory(awaited)
+    }
+
+    fn summary(&self) -> String {
+        let Sensitivity { photons, range, reflectance } = self.sensitivity;
+        format!(
+            "sampled every {} ps in {} steps of {} photons; noise {:.1} photons in the dark; \
+             {photons:.2} photons a mark from reflectance {reflectance} at {range} m",
+            fs_from_s(self.sample) as f64 / (FS_PER_S as f64 * 1e-12),
+            i32::from(self.codes.1) - i32::from(self.codes.0),
+            self.step,
+            self.rms_noise(0.0),
+        )
+    }
+
+    fn in_sunlight(&self) -> &'static str {
+        "which are noise to it"
+    }
+}

@@ -1,0 +1,241 @@
+//! A sampled detector: the sum of all light behind an amplifier, as codes.
+//!
+//! 1. Of each mark photons are drawn, Poisson, slice by slice of its pulse, and multiplied: the sum of k of
+//!    them by a gain of excess F is gamma-distributed with the mean k and the variance k·(F − 1).
+//! 2. Each slice becomes what the amplifier makes of a photon. All add up, whoever sent them, with the stray
+//!    light of the sensor's own marks.
+//! 3. Noise of the amplifier and of steady light is added, normal with the covariance that both have behind
+//!    the filter, and with the third cumulant that single photons give it.
+//! 4. The converter rounds to its steps and stops at its limits; behind a clipped pulse the signal stays at
+//!    the limit until the amplifier has recovered.
+//!
+//! Steady light has no level of its own: the amplifier lets no direct current through
+//! (docs/physics.md#sampled).
+
+use std::ops::Range;
+
+use macropulse_codec::{Samples, ShotLog};
+use rand_distr::{Distribution, Gamma, Poisson, StandardNormal};
+
+use super::channel::{Arrangement, Channel};
+use super::clock::Clock;
+use super::colour::Colour;
+use super::linear::{PLENTY, Together, gather};
+use super::noise::PART_BITS;
+use crate::channel::Light;
+use crate::design::Design;
+use crate::design::detector::Sampled;
+use crate::random::{Address, Chance, Stage, Stream};
+use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, s_from_fs};
+
+/// Light of one shot this share of the response apart, or nearer, is one pulse.
+const TOGETHER: f64 = 1.0 / 8.0;
+
+/// Slices of a pulse are this share of its rms length, and it is followed to three of them: a Gaussian in
+/// steps of σ/2 is as smooth as one without to 10⁻³⁰.
+const SLICE: f64 = 0.5;
+const SLICES: i32 = 6;
+
+/// What a photon becomes is followed to where it is less than this share of a step of the converter.
+const NEGLIGIBLE: f64 = 1.0 / 16.0;
+
+/// A sampled detector at work.
+#[derive(Debug)]
+pub(super) struct Sampler {
+    sampled: Sampled,
+    colour: Colour,
+    tick_fs: i64,
+    /// rms length of what a photon becomes, in ticks.
+    rms: f64,
+    /// Its height for a single one.
+    height: f64,
+    /// Share of the light in each slice of a pulse.
+    shares: Vec<f64>,
+    /// Ticks before those wanted that are worked out, too.
+    before: i64,
+}
+
+impl Sampler {
+    pub fn new(sampled: &Sampled, design: &Design, background: f64) -> Self {
+        let front_end = &sampled.front_end;
+        let tick_fs = design.tdc.tick_fs;
+        let in_ticks = |time: f64| time * FS_PER_S as f64 / tick_fs as f64;
+        let share = |slice: i32| libm::exp(-0.5 * (f64::from(slice) * SLICE).powi(2));
+        let total: f64 = (-SLICES..=SLICES).map(share).sum();
+        let colour = Colour::new(
+            |apart| front_end.covariance(apart as f64 * s_from_fs(tick_fs), background),
+            front_end.third_cumulant(background),
+        );
+        // A clipped pulse of before may still hold the amplifier.
+        let before = in_ticks(sampled.recovery + 16.0 * front_end.mark_rms());
+        Self {
+            sampled: *sampled,
+            colour,
+            tick_fs,
+            rms: in_ticks(front_end.photon_rms()),
+            height: front_end.photon_height(),
+            shares: (-SLICES..=SLICES).map(|slice| share(slice) / total).collect(),
+            before: before.ceil() as i64,
+        }
+    }
+
+    /// The samples of all channels in `span`, absolute ticks.
+    pub fn samples(
+        &self,
+        (design, chance): (&Design, &Chance),
+        (log, light): (&ShotLog, &Light),
+        span: &Range<i64>,
+    ) -> Samples {
+        let mut samples = Samples { epoch: span.start, ..Samples::default() };
+        let Some(first) = log.fired_at_fs.first() else { return samples };
+        let clock = Clock::new(design, *first);
+        let mut arrangement = Arrangement::default();
+        arrangement.fill(design, &clock, log, light);
+        let worked_out = span.start - self.before..span.end;
+        let mut signal = Signal::default();
+        for channel in arrangement.channels(design, clock, log, light) {
+            signal.begin(&worked_out);
+            self.add_light(&channel, chance, &mut signal);
+            self.add_stray(&channel, &mut signal);
+            self.add_stretches(&channel, chance, &mut signal);
+            let part = u32::from(channel.number) << PART_BITS;
+            self.colour.add((chance, part), signal.first, &mut signal.level);
+            samples.channel.push(channel.number);
+            self.convert(&signal.level, &mut samples.code);
+        }
+        samples
+    }
+
+    fn add_light(&self, channel: &Channel, chance: &Chance, signal: &mut Signal) {
+        let within_fs = fs_from_s(self.sampled.front_end.mark_rms() / RMS_OF_FWHM * TOGETHER);
+        for Together { train, later_fs, photons } in gather(channel, within_fs) {
+            let trains = &channel.light.trains;
+            let mut stream = chance.at(Stage::Photons, trains.address(train));
+            let transmitter = usize::from(trains.transmitter[train]);
+            let rms = channel.light.transmitters[transmitter].pulse * RMS_OF_FWHM;
+            let slice_fs = rms * SLICE * FS_PER_S as f64;
+            for mark_fs in channel.light.arrivals_fs(train) {
+                let late: f64 = StandardNormal.sample(&mut stream);
+                let at_fs = mark_fs + later_fs + fs_from_s(late * self.sampled.jitter);
+                for (slice, share) in (-SLICES..).zip(&self.shares) {
+                    let charge = self.multiplied(photons * share, &mut stream);
+                    let at_fs = at_fs + (f64::from(slice) * slice_fs) as i64;
+                    self.add_charge(signal, at_fs, charge);
+                }
+            }
+        }
+    }
+
+    /// Stray light of own marks: so much of it that its photons need not be drawn.
+    fn add_stray(&self, channel: &Channel, signal: &mut Signal) {
+        let codebook = &channel.design.coding.codebook;
+        let front_end = &self.sampled.front_end;
+        let (rms, height) = (front_end.mark_rms() / s_from_fs(self.tick_fs), self.sampled.stray);
+        for shot in channel.shots.iter().map(|shot| *shot as usize) {
+            let (label, word) = (channel.log.label[shot], channel.log.word[shot]);
+            for mark in codebook.marks(label, word) {
+                let at_fs =
+                    channel.log.fired_at_fs[shot] + i64::from(*mark) * channel.design.coding.chip_fs;
+                signal.add(self.in_ticks(at_fs), (height, rms), NEGLIGIBLE * self.sampled.step);
+            }
+        }
+    }
+
+    /// Steady light that lasts for a stretch of time, tick by tick.
+    fn add_stretches(&self, channel: &Channel, chance: &Chance, signal: &mut Signal) {
+        let background = &channel.light.background;
+        for (number, stretch) in channel.stretches {
+            let stretch = *stretch as usize;
+            let [from, until] = [background.from_fs[stretch], background.until_fs[stretch]]
+                .map(|fs| fs.div_euclid(self.tick_fs));
+            let photons = background.per_s[stretch] * s_from_fs(self.tick_fs);
+            let last = signal.first + signal.level.len() as i64;
+            for tick in from.max(signal.first)..until.min(last) {
+                let part = u32::from(*number) << PART_BITS;
+                let address = Address { stage: Stage::Stretch, index: tick as u64, part };
+                let charge = self.multiplied(photons, &mut chance.stream(address));
+                self.add_charge(signal, tick * self.tick_fs + self.tick_fs / 2, charge);
+            }
+        }
+    }
+
+    /// What multiplication makes of the photons that come where `photons` do on average.
+    fn multiplied(&self, photons: f64, stream: &mut Stream) -> f64 {
+        let Ok(poisson) = Poisson::new(photons.min(PLENTY)) else { return 0.0 };
+        let count: f64 = poisson.sample(stream);
+        let spread = self.sampled.front_end.excess() - 1.0;
+        if count <= 0.0 || spread <= 1e-9 {
+            return count;
+        }
+        Gamma::new(count / spread, spread).map_or(count, |gamma| gamma.sample(stream))
+    }
+
+    fn add_charge(&self, signal: &mut Signal, at_fs: i64, charge: f64) {
+        if charge > 0.0 {
+            let pulse = (charge * self.height, self.rms);
+            signal.add(self.in_ticks(at_fs), pulse, NEGLIGIBLE * self.sampled.step);
+        }
+    }
+
+    /// Absolute ticks, whole ones and the rest, at `time_fs`.
+    fn in_ticks(&self, time_fs: i64) -> (i64, f64) {
+        let tick = time_fs.div_euclid(self.tick_fs);
+        (tick, (time_fs - tick * self.tick_fs) as f64 / self.tick_fs as f64)
+    }
+
+    /// Appends the codes of a signal, without its beginning.
+    fn convert(&self, level: &[f32], codes: &mut Vec<i16>) {
+        let (lowest, highest) = self.sampled.codes;
+        let [low, high] = [lowest, highest].map(f32::from);
+        let steps = (1.0 / self.sampled.step) as f32;
+        let recovery = (self.sampled.recovery / s_from_fs(self.tick_fs)).ceil() as u32;
+        codes.reserve(level.len());
+        let mut held = 0;
+        for (place, level) in level.iter().enumerate() {
+            let code = libm::rintf((level * steps).clamp(low, high)) as i16;
+            let is_held = held > 0;
+            held = if code == highest { recovery } else { held.saturating_sub(1) };
+            if place as i64 >= self.before {
+                codes.push(if is_held { highest } else { code });
+            }
+        }
+    }
+}
+
+/// The signal of one channel in ticks, in detected photons.
+#[derive(Debug, Default)]
+struct Signal {
+    /// The absolute tick of the first one.
+    first: i64,
+    level: Vec<f32>,
+}
+
+impl Signal {
+    fn begin(&mut self, span: &Range<i64>) {
+        self.first = span.start;
+        self.level.clear();
+        self.level.resize((span.end - span.start).max(0) as usize, 0.0);
+    }
+
+    /// Adds a Gaussian of `height` and rms length `rms` ticks about `tick` and `part` of a tick, to where
+    /// it is `negligible`.
+    fn add(&mut self, (tick, part): (i64, f64), (height, rms): (f64, f64), negligible: f64) {
+        let over = (height / negligible).max(1.0);
+        let reach = ((2.0 * libm::log(over)).sqrt() * rms) as i64 + 1;
+        let (from, to) = (tick - reach - self.first, tick + reach + 1 - self.first);
+        let (from, to) = (from.max(0), to.min(self.level.len() as i64 - 1));
+        if from > to {
+            return;
+        }
+        let at = ((from + self.first - tick) as f64 - part) / rms;
+        // From tick to tick a Gaussian grows by a ratio that shrinks by a constant one.
+        let mut value = height * libm::exp(-at * at / 2.0);
+        let mut grows = libm::exp(-(at + 0.5 / rms) / rms);
+        let shrinks = libm::exp(-(rms * rms).recip());
+        for level in &mut self.level[from as usize..=to as usize] {
+            *level += value as f32;
+            value *= grows;
+            grows *= shrinks;
+        }
+    }
+}
