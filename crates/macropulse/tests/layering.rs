@@ -38,6 +38,11 @@ const CODEC: Layers = Layers {
         Rule { module: "shot_log", may_name: &[], because: "the log is columns" },
         Rule { module: "ticks", may_name: &[], because: "ticks are columns" },
         Rule {
+            module: "samples",
+            may_name: &["ticks"],
+            because: "samples are columns, and a record is those or ticks",
+        },
+        Rule {
             module: "cut",
             may_name: &["shot_log"],
             because: "shots and ticks are cut by times alone",
@@ -49,7 +54,7 @@ const CODEC: Layers = Layers {
         },
         Rule {
             module: "decode",
-            may_name: &["code", "kernels", "shot_log", "statistics", "ticks", "time"],
+            may_name: &["code", "kernels", "samples", "shot_log", "statistics", "ticks", "time"],
             because: "a receiver knows ticks and what was fired, as the hardware would",
         },
     ],

@@ -1,10 +1,9 @@
 //! What a receiver must be given; all else is refused before it is looked at.
 
-use super::{Error, MOST_RETURNS, Receiver, ReceiverKind};
-use crate::ShotLog;
-use crate::Ticks;
+use super::{Error, MOST_RETURNS, Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};
 use crate::code::Codebook;
 use crate::kernels::ascends;
+use crate::{Record, Samples, ShotLog, Ticks};
 
 /// Ticks of a macropulse that a correlating receiver can keep: 65535 chips of 256 ticks. The bits
 /// of a code word are kept several times, 2 MB each at this length.
@@ -20,17 +19,29 @@ const COUNTED: i128 = 1 << 32;
 /// Ticks that times may be beyond the light of a shot, by rounding and jitter.
 const SLACK: i128 = 1 << 13;
 
+/// Ticks of a pulse that is sampled, at most: its filter is half as long.
+const LONGEST_PULSE: usize = 1 << 10;
+
 /// Refuses what cannot be decoded. All ticks are read once; nothing else is as long as they are.
 pub(super) fn check(
     receiver: &Receiver,
     (codebook, log): (&Codebook, &ShotLog),
-    ticks: &Ticks,
+    record: Record,
 ) -> Result<(), Error> {
     settings(receiver, codebook)?;
-    columns(log, ticks)?;
-    in_order(log, ticks)?;
+    of_log(log)?;
+    match record {
+        Record::Ticks(_) if receiver.kind == ReceiverKind::Sampled => {
+            return Err(Error::Record { wants: "samples", given: "ticks" });
+        }
+        Record::Samples(_) if receiver.kind != ReceiverKind::Sampled => {
+            return Err(Error::Record { wants: "ticks", given: "samples" });
+        }
+        Record::Ticks(ticks) => of_ticks(ticks)?,
+        Record::Samples(samples) => of_samples(samples)?,
+    }
     in_codebook(log, codebook)?;
-    in_time(receiver, (codebook, log), ticks)
+    in_time(receiver, (codebook, log), record)
 }
 
 fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
@@ -61,6 +72,9 @@ fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
     if receiver.kind == ReceiverKind::Direct {
         return Ok(());
     }
+    if receiver.kind == ReceiverKind::Sampled {
+        sampling(receiver.sampling.as_ref())?;
+    }
     if codebook.zeros_are_lit() && receiver.kind != ReceiverKind::Balanced {
         return Err(Error::LitZeros);
     }
@@ -70,6 +84,41 @@ fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
         () if length > LONGEST => too_long("a macropulse", length, LONGEST),
         () if reach > FARTHEST => too_long("a time of flight, with a macropulse,", reach, FARTHEST),
         () => Ok(()),
+    }
+}
+
+/// Refuses what no signal can be like.
+fn sampling(sampling: Option<&Sampling>) -> Result<(), Error> {
+    let refuse = |setting: &'static str, value: String, possible: &'static str| {
+        Err(Error::Setting { setting, value, possible })
+    };
+    let Some(Sampling { pulse, excess, full_scale, least_marks, .. }) = sampling else {
+        return refuse("sampling", "missing".into(), "what is known of the signal that is sampled");
+    };
+    if pulse.len() % 2 == 0 || pulse.len() > LONGEST_PULSE * STEPS_OF_TICK {
+        let entries = format!("{} entries long", pulse.len());
+        return refuse("sampling.pulse", entries, "an odd number of entries up to 16383");
+    }
+    if let Some(value) = pulse.iter().find(|value| !value.is_finite() || value.abs() > 1e9) {
+        return refuse(
+            "sampling.pulse",
+            value.to_string(),
+            "codes of one photon, finite and small",
+        );
+    }
+    if pulse[pulse.len() / 2] < 1e-9 {
+        let middle = format!("{} in its middle", pulse[pulse.len() / 2]);
+        return refuse("sampling.pulse", middle, "a pulse that is there at the time of its mark");
+    }
+    if !(excess.is_finite() && (1.0..=1e9).contains(excess)) {
+        return refuse("sampling.excess", excess.to_string(), "1 (no excess noise) or more");
+    }
+    if *full_scale < 1 {
+        return refuse("sampling.full_scale", full_scale.to_string(), "1 to 32767");
+    }
+    match least_marks {
+        0 => refuse("sampling.least_marks", "0".into(), "1 or more"),
+        _ => Ok(()),
     }
 }
 
@@ -93,10 +142,9 @@ fn reach(receiver: &Receiver, codebook: &Codebook) -> u64 {
     u64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + length(receiver, codebook)
 }
 
-fn columns(log: &ShotLog, ticks: &Ticks) -> Result<(), Error> {
-    let (shots, events) = (log.len(), ticks.tick.len());
-    let uneven =
-        |column, length, wanted, of, or| Err(Error::Column { column, length, wanted, of, or });
+/// Refuses columns that are not as long as the one beside them, and shots out of order.
+fn of_log(log: &ShotLog) -> Result<(), Error> {
+    let shots = log.len();
     let of_log = [
         ("row", log.row.len()),
         ("column", log.column.len()),
@@ -105,24 +153,26 @@ fn columns(log: &ShotLog, ticks: &Ticks) -> Result<(), Error> {
         ("channel", log.channel.len()),
     ];
     if let Some((column, length)) = of_log.into_iter().find(|(_, length)| *length != shots) {
-        return uneven(column, length, shots, "shots", "");
-    }
-    let of_ticks = [("channel", ticks.channel.len()), ("amplitude", ticks.amplitude.len())];
-    let is_uneven = |(_, length): &(_, usize)| *length != events && *length != 0;
-    if let Some((column, length)) = of_ticks.into_iter().find(is_uneven) {
-        return uneven(column, length, events, "ticks", ", or none at all");
+        return Err(Error::Column { column, length, wanted: shots, of: "shots", or: "" });
     }
     let owned = &log.owned;
     if owned.start > owned.end || owned.end > shots {
         return Err(Error::Owned { start: owned.start, end: owned.end, shots });
     }
-    Ok(())
+    let fired = &log.fired_at_fs;
+    match fired.windows(2).position(|pair| pair[1] < pair[0]) {
+        Some(before) => Err(Error::ShotsDoNotAscend { shot: before + 1 }),
+        None => Ok(()),
+    }
 }
 
-fn in_order(log: &ShotLog, ticks: &Ticks) -> Result<(), Error> {
-    let fired = &log.fired_at_fs;
-    if let Some(before) = fired.windows(2).position(|pair| pair[1] < pair[0]) {
-        return Err(Error::ShotsDoNotAscend { shot: before + 1 });
+fn of_ticks(ticks: &Ticks) -> Result<(), Error> {
+    let events = ticks.tick.len();
+    let of_ticks = [("channel", ticks.channel.len()), ("amplitude", ticks.amplitude.len())];
+    let is_uneven = |(_, length): &(_, usize)| *length != events && *length != 0;
+    if let Some((column, length)) = of_ticks.into_iter().find(is_uneven) {
+        let (of, or) = ("ticks", ", or none at all");
+        return Err(Error::Column { column, length, wanted: events, of, or });
     }
     let channels = &ticks.channel;
     if let Some(before) = channels.windows(2).position(|pair| pair[1] < pair[0]) {
@@ -146,6 +196,19 @@ fn in_order(log: &ShotLog, ticks: &Ticks) -> Result<(), Error> {
     Ok(())
 }
 
+fn of_samples(samples: &Samples) -> Result<(), Error> {
+    let Samples { channel: channels, code, .. } = samples;
+    if let Some(before) = channels.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let (before, channel, place) = (channels[before], channels[before + 1], before + 1);
+        return Err(Error::SampledChannelsDoNotAscend { place, channel, before });
+    }
+    let (codes, channels) = (code.len(), channels.len());
+    match codes.checked_rem(channels).unwrap_or(codes) {
+        0 => Ok(()),
+        _ => Err(Error::UnevenSamples { codes, channels }),
+    }
+}
+
 fn in_codebook(log: &ShotLog, codebook: &Codebook) -> Result<(), Error> {
     let columns =
         [("label", &log.label, codebook.labels()), ("word", &log.word, codebook.words() as u32)];
@@ -164,8 +227,12 @@ fn in_codebook(log: &ShotLog, codebook: &Codebook) -> Result<(), Error> {
 fn in_time(
     receiver: &Receiver,
     (codebook, log): (&Codebook, &ShotLog),
-    ticks: &Ticks,
+    record: Record,
 ) -> Result<(), Error> {
+    let (epoch, is_dark) = match record {
+        Record::Ticks(ticks) => (ticks.epoch, ticks.tick.is_empty()),
+        Record::Samples(samples) => (samples.epoch, samples.is_empty()),
+    };
     let ends = [log.fired_at_fs.first(), log.fired_at_fs.last()];
     for (shot, fired_at_fs) in [0, log.len().wrapping_sub(1)].into_iter().zip(ends) {
         let Some(&fired_at_fs) = fired_at_fs else { continue };
@@ -176,10 +243,13 @@ fn in_time(
         if !is_counted(fired - light * tick_fs) || !is_counted(fired + light * tick_fs) {
             return Err(Error::Time { shot, fired_at_fs });
         }
-        let after = fired.div_euclid(tick_fs) - i128::from(ticks.epoch);
-        if !ticks.tick.is_empty() && !(-COUNTED..=COUNTED).contains(&after) {
+        let after = fired.div_euclid(tick_fs) - i128::from(epoch);
+        if !is_dark && !(-COUNTED..=COUNTED).contains(&after) {
             let ticks = i64::try_from(after).unwrap_or(if after < 0 { i64::MIN } else { i64::MAX });
-            return Err(Error::FarFromTicks { shot, ticks });
+            return Err(match record {
+                Record::Ticks(_) => Error::FarFromTicks { shot, ticks },
+                Record::Samples(_) => Error::FarFromSamples { shot, ticks },
+            });
         }
     }
     Ok(())

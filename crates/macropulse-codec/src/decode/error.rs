@@ -138,4 +138,50 @@ pub enum Error {
         /// When it was fired, in ticks from the epoch on.
         ticks: i64,
     },
+    /// A receiver of one kind of record was given another one.
+    #[error("this receiver decodes {wants}, and is given {given}: use a receiver of {given}")]
+    Record {
+        /// What it decodes.
+        wants: &'static str,
+        /// What it is given.
+        given: &'static str,
+    },
+    /// The channels of samples do not ascend.
+    #[error(
+        "channel number {place} of the samples is {channel}, after {before}: sort them by channel, \
+         and give each channel once"
+    )]
+    SampledChannelsDoNotAscend {
+        /// Place in the column.
+        place: usize,
+        /// The channel.
+        channel: u16,
+        /// The channel before it.
+        before: u16,
+    },
+    /// The channels do not have as many samples each.
+    #[error(
+        "{codes} samples are not as many of each of {channels} channels: give all channels samples \
+         of the same moments"
+    )]
+    UnevenSamples {
+        /// Samples of all channels.
+        codes: usize,
+        /// Number of channels.
+        channels: usize,
+    },
+    /// A shot was fired so long before or after the samples that none can be of it.
+    #[error(
+        "shot {shot} was fired {ticks} ticks after the first sample, further than the 4294967296 that \
+         are counted: decode shots that are so far apart one stretch of time after another"
+    )]
+    FarFromSamples {
+        /// Place in the log.
+        shot: usize,
+        /// When it was fired, in ticks from the first sample on.
+        ticks: i64,
+    },
+    /// What a receiver of samples decides is not explained.
+    #[error("only receivers of ticks are explained, not those of samples: look at the samples")]
+    SamplesAreNotExplained,
 }

@@ -94,13 +94,16 @@ impl Receiver {
     /// Why `shot` of `log` was decided as it was, out of all `ticks` of its band.
     ///
     /// # Errors
-    /// As [`Receiver::decode`].
+    /// As [`Receiver::decode`], and if this is a receiver of samples.
     pub fn explain(
         &self,
         codebook: &Codebook,
         (log, ticks): (&ShotLog, &Ticks),
         shot: usize,
     ) -> Result<Explanation, Error> {
+        if self.kind == ReceiverKind::Sampled {
+            return Err(Error::SamplesAreNotExplained);
+        }
         let first = log.owned.start.min(shot);
         let to = |end: usize| {
             let log = ShotLog { owned: first..end, ..log.clone() };

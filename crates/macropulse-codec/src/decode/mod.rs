@@ -1,4 +1,4 @@
-//! Ticks to returns: the receiver. It sees ticks and the shot log, never the scene.
+//! Ticks or samples to returns: the receiver. It sees these and the shot log, never the scene.
 
 mod balanced;
 mod beyond;
@@ -141,19 +141,19 @@ impl Receiver {
         }
     }
 
-    /// The returns of the owned shots of `log`, out of all the `ticks` of its band, ordered by
-    /// shot, those of one shot by range.
+    /// The returns of the owned shots of `log`, out of all the ticks or samples of its band, the
+    /// `record`, ordered by shot, those of one shot by range.
     ///
-    /// `ticks` must cover the whole time in which light of an owned shot can arrive. Guard shots
+    /// The record must cover the whole time in which light of an owned shot can arrive. Guard shots
     /// are decoded too, as their light overlaps, and dropped. Each channel is decoded by itself;
     /// labels and words must be in the `codebook`.
     ///
     /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
-    /// does not bring everything nearer.
+    /// does not bring everything nearer; a sample is of the time t·τ.
     ///
     /// # Errors
-    /// If what is given cannot be decoded by any receiver: columns of unequal length, ticks or shots
-    /// out of order, shots that are not in the codebook, times that are not counted, settings out of
+    /// If what is given cannot be decoded by any receiver: a record of another kind,
+    /// columns of unequal length, ticks or shots out of order, shots that are not in the codebook, times that are not counted, settings out of
     /// their limits. Light in which nothing is found is no error.
     pub fn decode<'a>(
         &self,
@@ -161,13 +161,15 @@ impl Receiver {
         log: &ShotLog,
         record: impl Into<Record<'a>>,
     ) -> Result<Returns, Error> {
-        match record.into() {
-            Record::Ticks(ticks) => {
-                check::check(self, (codebook, log), ticks)?;
-                Ok(self.decode_checked(codebook, log, ticks))
+        let record = record.into();
+        check::check(self, (codebook, log), record)?;
+        Ok(match (record, &self.sampling) {
+            (Record::Ticks(ticks), _) => self.decode_checked(codebook, log, ticks),
+            (Record::Samples(samples), Some(sampling)) if !samples.is_empty() => {
+                sampled::decode(self, codebook, (log, samples), sampling)
             }
-            Record::Samples(samples) => Ok(sampled::decode(self, codebook, (log, samples))),
-        }
+            (Record::Samples(_), _) => self.nothing_of(log.owned.len()),
+        })
     }
 
     /// The returns, of what was checked.

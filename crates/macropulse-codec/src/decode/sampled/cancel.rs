@@ -1,0 +1,238 @@
+//! What is left of the signal when the light that was found is taken away from it.
+
+use super::filter::Filtered;
+use super::pulse::Pulse;
+use super::search::Candidate;
+use super::time::{clipped, in_time};
+use super::{Band, Rule, Sampling};
+
+/// Share of a pulse that is uncertain beside the number of its photons: its shape, and when it came.
+const SHAPE: f32 = 0.04;
+
+/// What is uncertain by less than this share of the noise is as good as certain.
+const CERTAIN: f32 = 0.25;
+
+/// Share of what a candidate had at first that must be left for it to be light of its own.
+const LEFT: f32 = 0.5;
+
+/// Of how many standard deviations an uncertain mark may be weaker than it should be.
+const UNCERTAIN: f32 = 2.5;
+
+/// What share of the least certain mark an uncertain one should have at least.
+const SHOULD: f32 = 0.6;
+
+/// Marks are equal if they differ by no more than so many standard deviations of their difference …
+const EQUAL: f32 = 3.0;
+
+/// … and this share of their mean.
+const SPREAD: f32 = 0.08;
+
+/// Light that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    pub shot: usize,
+    /// Whole ticks after firing.
+    pub lag: i64,
+    /// How much later, in ticks.
+    pub late: f64,
+    /// Detected photons per mark.
+    pub photons: f32,
+    /// Marks that it was told by.
+    pub marks: u16,
+    /// Standard deviations above the threshold.
+    pub margin: u16,
+    pub is_clipped: bool,
+}
+
+impl Found {
+    /// Ticks after firing.
+    pub(super) fn at(&self) -> f64 {
+        self.lag as f64 + self.late
+    }
+}
+
+/// The signal, less the light that was found.
+pub(super) struct Residual<'a> {
+    codes: &'a [i16],
+    sampling: &'a Sampling,
+    pulse: &'a Pulse,
+    filtered: Filtered,
+    /// Places of the marks that count, and of those that are uncertain: room for one candidate.
+    certain: Vec<usize>,
+    uncertain: Vec<usize>,
+}
+
+/// The marks that count, together.
+#[derive(Debug, Clone, Copy)]
+struct Sum {
+    mean: f32,
+    least: f32,
+    most: f32,
+    /// Standard deviations of noise alone.
+    score: f32,
+}
+
+impl<'a> Residual<'a> {
+    pub(super) fn new(
+        (codes, sampling): (&'a [i16], &'a Sampling),
+        pulse: &'a Pulse,
+        filtered: Filtered,
+    ) -> Self {
+        let (certain, uncertain) = (Vec::new(), Vec::new());
+        Self { codes, sampling, pulse, filtered, certain, uncertain }
+    }
+
+    pub(super) fn filtered(&self) -> &Filtered {
+        &self.filtered
+    }
+
+    /// Whether the `candidate` is still there; if so, its light is taken away.
+    pub(super) fn test(
+        &mut self,
+        candidate: &Candidate,
+        (band, rule): (&Band, &Rule),
+    ) -> Option<Found> {
+        let shot = candidate.shot;
+        let marks: Vec<i64> = band.marks(shot).map(|mark| band.fired[shot] + mark).collect();
+        let lag = self.summit(&marks, candidate.lag);
+        let sum = self.sum(&marks, lag, rule)?;
+        let threshold = self.threshold((&sum, marks.len()), rule)?;
+        if sum.score < threshold || sum.least < LEFT * candidate.least {
+            return None;
+        }
+        let clipped = clipped(self.codes, self.sampling, self.pulse, &self.certain);
+        let late = match &clipped {
+            Some(clipped) => clipped.late,
+            None => {
+                let cap = rule.counting(marks.len()).cap(sum.least);
+                in_time(&self.filtered.signal, &self.certain, cap, self.pulse)
+            }
+        };
+        let found = Found {
+            shot,
+            lag,
+            late,
+            photons: sum.mean,
+            marks: self.certain.len() as u16,
+            margin: (sum.score - threshold) as u16,
+            is_clipped: clipped.is_some(),
+        };
+        let places = marks.iter().map(|mark| mark + lag);
+        match clipped {
+            Some(clipped) => self.close(places, late, clipped.photons.max(sum.mean)),
+            None => self.take_away(places, late, (sum.mean, rule.excess)),
+        }
+        Some(found)
+    }
+
+    /// The lag, of the one that was found and those beside it, at which the marks are highest together:
+    /// what was taken away since may have moved it.
+    fn summit(&mut self, marks: &[i64], lag: i64) -> i64 {
+        self.sort(marks, lag);
+        let filtered = &self.filtered.signal;
+        let height = |late: i64| -> f32 {
+            let at = |place: &usize| filtered.get((*place as i64 + late) as usize).copied();
+            self.certain.iter().map(|place| at(place).unwrap_or(0.0)).sum()
+        };
+        let here = height(0);
+        [-1, 1]
+            .into_iter()
+            .find(|late| height(*late) > here)
+            .map_or(lag, |late| (lag + late).max(0))
+    }
+
+    /// Finds the places of the marks that count and of those that are uncertain.
+    fn sort(&mut self, marks: &[i64], lag: i64) {
+        self.certain.clear();
+        self.uncertain.clear();
+        for mark in marks {
+            let Ok(place) = usize::try_from(mark + lag) else { continue };
+            match self.filtered.doubt.get(place) {
+                Some(doubt) if *doubt == 0.0 => self.certain.push(place),
+                Some(doubt) if doubt.is_finite() => self.uncertain.push(place),
+                _ => {}
+            }
+        }
+    }
+
+    /// The sum of the marks; `None` where too few tell anything, or some tell that there is no light.
+    fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
+        self.sort(marks, lag);
+        let count = self.certain.len();
+        if count == 0 || count < rule.fewest(marks.len()) {
+            return None;
+        }
+        let signal = &self.filtered.signal;
+        let heights = || self.certain.iter().map(|place| signal[*place]);
+        let least = heights().fold(f32::INFINITY, f32::min);
+        let most = heights().fold(f32::NEG_INFINITY, f32::max);
+        let is_dark = |place: &usize| {
+            let (doubt, sigma) = (self.filtered.doubt[*place], rule.sigma);
+            signal[*place] + UNCERTAIN * (doubt * doubt + sigma * sigma).sqrt() < SHOULD * least
+        };
+        if least < rule.least(marks.len()) || self.uncertain.iter().any(is_dark) {
+            return None;
+        }
+        let cap = rule.counting(marks.len()).cap(least);
+        let mean = heights().map(|height| height.min(cap)).sum::<f32>() / count as f32;
+        Some(Sum { mean, least, most, score: mean * (count as f32).sqrt() / rule.sigma })
+    }
+
+    /// What the score must reach; `None` where marks are missing and the others not equal.
+    fn threshold(&self, (sum, marks): (&Sum, usize), rule: &Rule) -> Option<f32> {
+        if self.certain.len() == marks {
+            return Some(rule.threshold);
+        }
+        // Of marks that are clipped, or nearly so, it is not known how strong they are.
+        let is_told = sum.most * self.pulse.highest() < 0.5 * f32::from(self.sampling.full_scale);
+        let differ =
+            EQUAL * std::f32::consts::SQRT_2 * rule.deviation(sum.mean) + SPREAD * sum.mean;
+        (!is_told || sum.most - sum.least <= differ).then_some(rule.threshold + super::MISSING)
+    }
+
+    /// Takes pulses of so many `photons` away, that came `late` behind the `places`.
+    fn take_away(
+        &mut self,
+        places: impl Iterator<Item = i64>,
+        late: f64,
+        (photons, excess): (f32, f32),
+    ) {
+        let span = self.pulse.span() as i64;
+        let answers: Vec<f32> =
+            (-span - 1..=span + 1).map(|tick| self.pulse.answer(tick as f64 - late)).collect();
+        let sigma = self.filtered.sigma;
+        for place in places {
+            for (tick, about) in (-span..=span).zip(answers.windows(3)) {
+                let Ok(at) = usize::try_from(place + tick) else { continue };
+                let Some(signal) = self.filtered.signal.get_mut(at) else { continue };
+                *signal -= photons * about[1];
+                let about = about.iter().map(|answer| answer.abs());
+                let nearly = SHAPE * photons * about.clone().fold(0.0, f32::max);
+                let counted = excess * photons * (answers[(tick + span + 1) as usize]).powi(2);
+                let doubt = counted + nearly * nearly;
+                if doubt > (CERTAIN * sigma).powi(2) {
+                    let before = self.filtered.doubt[at];
+                    self.filtered.doubt[at] = (before * before + doubt).sqrt();
+                }
+            }
+        }
+    }
+
+    /// Leaves out what stands about clipped pulses of so many `photons`: how they look is not known.
+    fn close(&mut self, places: impl Iterator<Item = i64>, late: f64, photons: f32) {
+        let span = self.pulse.span() as i64;
+        let sigma = self.filtered.sigma;
+        let is_lit = |tick: &i64| {
+            let answer = self.pulse.answer(*tick as f64 - late).abs();
+            answer * photons > CERTAIN * sigma
+        };
+        let first = (-span..=span).find(is_lit).unwrap_or(-span);
+        let last = (-span..=span).rev().find(is_lit).unwrap_or(span);
+        let length = self.filtered.doubt.len() as i64;
+        for place in places {
+            let from = (place + first).clamp(0, length) as usize;
+            let to = (place + last + 1).clamp(0, length) as usize;
+            self.filtered.doubt[from..to].fill(f32::INFINITY);
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The receiver of samples: it adds up what stands at the marks of a word.
+//!
+//! 1. The samples of a channel are filtered by a filter matched to the pulse of a mark, so that each mark
+//!    is a number of detected photons at one tick ([`filter`]). How strong the noise is, is estimated from
+//!    them. Ticks at which the sensor's own marks are fired, or that follow clipped samples, tell nothing.
+//! 2. Of each shot, at each lag: the mean of the marks that tell something, none of which counts much
+//!    more than the least one, so that a bright mark of another shot cannot carry a word alone. Where that
+//!    mean exceeds the threshold and both lags beside it, light may have come ([`search`]).
+//! 3. The strongest candidate is tested again, and if it holds, its pulses are taken away from the
+//!    signal; then the next one. What was taken away is uncertain, and marks there are judged by that
+//!    ([`cancel`]).
+//! 4. What was hidden is looked for again in what is left.
+//! 5. The range of a return is that of its marks together, that of clipped pulses that of their edges
+//!    ([`time`]).
+
+mod cancel;
+mod filter;
+mod pulse;
+mod search;
+mod time;
+
+use super::{Receiver, Reject, Return, Returns, Strength};
+use crate::code::Codebook;
+use crate::kernels::Counting;
+use crate::statistics::{normal_order, normal_quantile};
+use crate::{Samples, ShotLog};
+use cancel::{Found, Residual};
+use filter::Filtered;
+use pulse::Pulse;
+
+/// Steps of a tick in which [`Sampling::pulse`] is given.
+pub const STEPS_OF_TICK: usize = 16;
+
+/// What a receiver knows of the signal that is sampled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sampling {
+    /// What a mark of one detected photon adds to the codes, in steps of 1/[`STEPS_OF_TICK`] tick; the
+    /// entry in the middle, of an odd number, is at the time of the mark.
+    pub pulse: Vec<f32>,
+    /// Excess noise factor F of the multiplication: n photons vary by F·n.
+    pub excess: f64,
+    /// The highest code: a sample that has it is clipped.
+    pub full_scale: i16,
+    /// For how many ticks from a mark of its own that is fired on the channel is blind with stray light.
+    pub blank_ticks: u32,
+    /// For how many ticks behind a clipped sample the signal is not that of the light.
+    pub recovery_ticks: u32,
+    /// Marks of a word that must be neither blanked nor clipped otherwise, to decide by them.
+    pub least_marks: u16,
+}
+
+/// How often the shots are searched for: what light of others hid is found once that is taken away.
+const ROUNDS: usize = 2;
+
+/// The returns of the owned shots of `log`, of what was checked.
+pub(super) fn decode(
+    receiver: &Receiver,
+    codebook: &Codebook,
+    (log, samples): (&ShotLog, &Samples),
+    sampling: &Sampling,
+) -> Returns {
+    let mut all: Vec<Return> = Vec::new();
+    let mut returns = Returns::default();
+    let pulse = Pulse::new(sampling);
+    for (shots, log) in log.each_channel() {
+        let codes = log.channel.first().map_or(&[][..], |channel| samples.of(*channel));
+        let fired = receiver.fired_since(&log, samples.epoch);
+        let band = Band { receiver, codebook, log: &log, fired, lags: lags(receiver) };
+        let mut found = find(&band, codes, &pulse, sampling);
+        found.sort_by(|one, other| one.shot.cmp(&other.shot).then(one.at().total_cmp(&other.at())));
+        for shot in log.owned.clone() {
+            let from = found.partition_point(|one| one.shot < shot);
+            let to = found.partition_point(|one| one.shot <= shot);
+            let mut within: Vec<Found> =
+                found[from..to].iter().filter(|one| is_in_gate(receiver, one)).copied().collect();
+            if within.is_empty() {
+                returns.reject(if from < to { Reject::OutsideGate } else { Reject::NoPeak });
+            }
+            let strength = |one: &Found| Strength { peak: one.marks, light: one.photons };
+            receiver.pick.keep(receiver.returns.into(), &mut within, strength);
+            let tick = samples.epoch + band.fired[shot];
+            all.extend(within.iter().map(|one| Return {
+                shot: shots[shot],
+                tof: receiver.tof(log.fired_at_fs[shot], tick + one.lag, one.late),
+                peak: one.marks,
+                marks: band.marks(shot).count() as u16,
+                margin: one.margin,
+                photons: one.photons,
+                saturated: one.is_clipped,
+            }));
+        }
+    }
+    // Stable: the returns of a shot stay in their order.
+    all.sort_by_key(|one| one.shot);
+    all.into_iter().for_each(|one| returns.push(one));
+    returns
+}
+
+/// Lags that are looked at: the next one behind the last is needed to tell whether that is a peak.
+fn lags(receiver: &Receiver) -> i64 {
+    i64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + 2
+}
+
+fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
+    let (nearest, farthest) = receiver.gate_ticks;
+    (i64::from(nearest)..=i64::from(farthest)).contains(&found.lag)
+}
+
+/// All light of the shots of a `band` that is told from noise.
+fn find(band: &Band, codes: &[i16], pulse: &Pulse, sampling: &Sampling) -> Vec<Found> {
+    let filtered = Filtered::of(codes, pulse, band, sampling);
+    let rule = Rule::new(band, sampling, filtered.sigma);
+    let mut residual = Residual::new((codes, sampling), pulse, filtered);
+    let mut found = Vec::new();
+    for _ in 0..ROUNDS {
+        let candidates = search::candidates(band, residual.filtered(), &rule);
+        for candidate in candidates {
+            found.extend(residual.test(&candidate, (band, &rule)));
+        }
+    }
+    found
+}
+
+/// The shots that one channel listens to.
+struct Band<'a> {
+    receiver: &'a Receiver,
+    codebook: &'a Codebook,
+    log: &'a ShotLog,
+    /// When each shot was fired, in ticks from the first sample on.
+    fired: Vec<i64>,
+    /// Lags that are looked at, from 0 on.
+    lags: i64,
+}
+
+impl Band<'_> {
+    /// When the marks of `shot` leave, in ticks after it was fired.
+    fn marks(&self, shot: usize) -> impl Iterator<Item = i64> + Clone {
+        let chip = i64::from(self.receiver.ticks_per_chip);
+        let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]);
+        marks.iter().map(move |mark| i64::from(*mark) * chip)
+    }
+}
+
+/// How marks are told from noise.
+struct Rule {
+    /// Standard deviation of the noise, in detected photons.
+    sigma: f32,
+    /// Excess noise factor.
+    excess: f32,
+    /// How many standard deviations the sum of the marks must reach.
+    threshold: f32,
+    /// Marks that must count.
+    fewest: u16,
+    /// Mean of the least of n standard normal variables, for each weight of a word.
+    least_of: Vec<f32>,
+}
+
+/// A mark counts no more than the least one and so many standard deviations, beside what the least
+/// of so many marks is below their mean: 2.5 of three marks. One in eight words of three marks has a mark
+/// that is cut by noise alone.
+const ABOVE: f32 = 1.65;
+
+/// The least mark is so many standard deviations at most below where it is on average in a word that just
+/// reaches the threshold. One in thirty of these falls below.
+const BELOW: f32 = 1.1;
+
+/// How much more is asked of a word of which a mark is missing, in standard deviations of the sum.
+const MISSING: f32 = 0.5;
+
+impl Rule {
+    /// The threshold t is that of noise alone: Q(t) = false returns accepted per shot over the lags of the
+    /// gate.
+    ///
+    /// Sums at neighbouring lags have noise in common, but above a high threshold they hardly exceed it
+    /// together without one being the peak: their number bounds that of independent ones closely. That
+    /// marks are capped, and the least one must not be too weak, makes false returns still rarer.
+    fn new(band: &Band, sampling: &Sampling, sigma: f32) -> Self {
+        let (nearest, farthest) = band.receiver.gate_ticks;
+        let lags = f64::from(farthest - nearest) + 1.0;
+        let false_alarm = (band.receiver.false_alarm / lags).min(MOST_FALSE);
+        let least_of = |weight: usize| match weight {
+            0 => 0.0,
+            _ => normal_order(1.0, weight as f64).0 as f32,
+        };
+        Self {
+            sigma,
+            excess: sampling.excess as f32,
+            threshold: -normal_quantile(false_alarm) as f32,
+            fewest: sampling.least_marks.max(1),
+            least_of: (0..=band.codebook.max_weight()).map(least_of).collect(),
+        }
+    }
+
+    /// Marks that must count of a word of so many.
+    fn fewest(&self, marks: usize) -> usize {
+        usize::from(self.fewest).min(marks)
+    }
+
+    fn counting(&self, marks: usize) -> Counting {
+        Counting {
+            sigma: self.sigma,
+            excess: self.excess,
+            above: ABOVE - self.least_of[marks],
+            fewest: self.fewest(marks) as f32,
+        }
+    }
+
+    /// How strong the least of so many marks must be, in detected photons.
+    fn least(&self, marks: usize) -> f32 {
+        let mean = self.threshold / (marks as f32).sqrt();
+        (mean + self.least_of[marks] - BELOW) * self.sigma
+    }
+
+    /// Standard deviation of a mark of so many photons.
+    fn deviation(&self, photons: f32) -> f32 {
+        (self.sigma * self.sigma + self.excess * photons.max(0.0)).sqrt()
+    }
+}
+
+/// Share of lags at which noise exceeds the threshold at most, whatever is accepted.
+const MOST_FALSE: f64 = 0.01;

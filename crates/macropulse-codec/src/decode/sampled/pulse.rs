@@ -1,0 +1,206 @@
+//! The pulse of a mark: the filter matched to it, what that makes of it, and its edges where it is
+//! clipped.
+
+use super::{STEPS_OF_TICK, Sampling};
+
+/// What is less than this share of the highest is left out of the filter: all of it is 10⁻⁴ of the
+/// energy of a pulse as smooth as Gauss's.
+const LEFT_OUT: f32 = 0.01;
+
+/// Times at which the answer of the filter is looked at, in ticks to both sides of its highest.
+const ABOUT: usize = 1;
+
+/// The pulse of one detected photon.
+#[derive(Debug, Clone)]
+pub(super) struct Pulse {
+    /// As in [`Sampling::pulse`].
+    fine: Vec<f32>,
+    /// The filter: how much each sample counts, from `reach` before the mark to `reach` behind it. It makes
+    /// 1 of the pulse of one photon, at the time of its mark.
+    pub taps: Vec<f32>,
+    /// Half the length of the filter, in ticks.
+    pub reach: usize,
+    /// What the filter makes of the pulse, in steps of 1/[`STEPS_OF_TICK`] tick; the middle is at the time
+    /// of the mark.
+    answer: Vec<f32>,
+    /// How late the filtered pulse is if the vertex of the parabola through three samples of it is, ticks;
+    /// ascending.
+    vertices: Vec<(f64, f64)>,
+    /// Ticks before the pulse reaches a share of its highest, and behind it, of falling shares.
+    edges: [Vec<(f64, f64)>; 2],
+}
+
+impl Pulse {
+    pub(super) fn new(sampling: &Sampling) -> Self {
+        let fine = sampling.pulse.clone();
+        let middle = fine.len() / 2;
+        let whole = |at: i64| sampled(&fine, middle, at * STEPS_OF_TICK as i64);
+        let most = fine.iter().copied().fold(0.0, f32::max);
+        let ticks = (middle / STEPS_OF_TICK) as i64;
+        let counts = |at: &i64| whole(*at) >= LEFT_OUT * most || whole(-*at) >= LEFT_OUT * most;
+        let reach = (0..=ticks).rev().find(counts).unwrap_or(0);
+        let shape: Vec<f32> = (-reach..=reach).map(whole).collect();
+        let energy: f32 = shape.iter().map(|value| value * value).sum();
+        let taps: Vec<f32> = shape.iter().map(|value| value / energy).collect();
+        let span = (ticks + reach) * STEPS_OF_TICK as i64;
+        let answer_at = |late: i64| {
+            let steps = (-reach..=reach).map(|tick| late + tick * STEPS_OF_TICK as i64);
+            taps.iter().zip(steps).map(|(tap, step)| tap * sampled(&fine, middle, step)).sum()
+        };
+        let answer: Vec<f32> = (-span..=span).map(answer_at).collect();
+        let edges = edges(&fine);
+        let reach = reach as usize;
+        let mut pulse = Self { fine, taps, reach, answer, vertices: Vec::new(), edges };
+        pulse.vertices = pulse.vertices();
+        pulse
+    }
+
+    /// The highest of the pulse, in codes.
+    pub(super) fn highest(&self) -> f32 {
+        self.fine.iter().copied().fold(0.0, f32::max)
+    }
+
+    /// Ticks by which a mark may be apart from what is blind and still be told: where no more than a tenth
+    /// of the filtered pulse is missing.
+    pub(super) fn core(&self) -> usize {
+        let middle = self.reach;
+        let weight = |at: usize| self.taps[at] * self.taps[at];
+        let all: f32 = (0..self.taps.len()).map(weight).sum();
+        let missing = |apart: usize| -> f32 {
+            let before: f32 = (0..middle - apart).map(weight).sum();
+            let behind: f32 = (middle + apart + 1..self.taps.len()).map(weight).sum();
+            before.max(behind)
+        };
+        (0..self.reach).find(|apart| missing(*apart) < 0.1 * all).unwrap_or(self.reach)
+    }
+
+    /// Ticks from the time of a mark to what the filter makes of it, at most.
+    pub(super) fn span(&self) -> usize {
+        self.answer.len() / 2 / STEPS_OF_TICK
+    }
+
+    /// What the filter makes of one photon so many ticks from the time of its mark.
+    pub(super) fn answer(&self, ticks: f64) -> f32 {
+        let place = ticks * STEPS_OF_TICK as f64 + (self.answer.len() / 2) as f64;
+        let before = place.floor();
+        if before < 0.0 || before as usize + 1 >= self.answer.len() {
+            return 0.0;
+        }
+        let (at, share) = (before as usize, (place - before) as f32);
+        self.answer[at] + share * (self.answer[at + 1] - self.answer[at])
+    }
+
+    /// How late a filtered pulse is, in ticks from the middle one of three samples of it that ascend to it
+    /// and fall behind it, or nearly so.
+    ///
+    /// The vertex of the parabola through them is not at the time of the mark but for a parabola: of which
+    /// time it tells is read off the pulse itself.
+    pub(super) fn late(&self, samples: [f32; 3]) -> f64 {
+        let Some(vertex) = vertex(samples.map(f64::from)) else { return 0.0 };
+        interpolate(&self.vertices, vertex)
+    }
+
+    /// The vertices of the parabolas through samples of the filtered pulse, and how late it is.
+    fn vertices(&self) -> Vec<(f64, f64)> {
+        let middle = (self.answer.len() / 2) as i64;
+        let highest = (0..self.answer.len()).fold(0, |highest, at| {
+            if self.answer[at] > self.answer[highest] { at } else { highest }
+        });
+        let apart = (middle - highest as i64) as f64 / STEPS_OF_TICK as f64;
+        let steps = (ABOUT * STEPS_OF_TICK) as i64;
+        let about = (-steps..=steps).map(|step| apart + step as f64 / STEPS_OF_TICK as f64);
+        let mut ascending: Vec<(f64, f64)> = Vec::new();
+        for late in about {
+            let samples = [-1.0, 0.0, 1.0].map(|tick| f64::from(self.answer(tick - late)));
+            let Some(vertex) = vertex(samples).filter(|vertex| vertex.abs() <= 1.0) else {
+                continue;
+            };
+            if ascending.last().is_none_or(|(before, _)| vertex > *before) {
+                ascending.push((vertex, late));
+            }
+        }
+        ascending
+    }
+
+    /// When a clipped pulse came, and how many photons it had, from the last sample `before` it was clipped
+    /// and the first one `behind`, so many ticks `apart`: the time in ticks from the sample before.
+    ///
+    /// A pulse of n photons is at `before` as long before its highest as the pulse takes from the share
+    /// before/n to the highest, and correspondingly behind. Both together are the longer the more photons
+    /// there are: n is found by halving.
+    pub(super) fn clipped(&self, before: f32, behind: f32, apart: f64) -> (f64, f64) {
+        let highest = f64::from(self.highest());
+        let [before, behind] = [before, behind].map(|code| f64::from(code.max(1.0)) / highest);
+        let rise = |photons: f64| interpolate_falling(&self.edges[0], before / photons);
+        let fall = |photons: f64| interpolate_falling(&self.edges[1], behind / photons);
+        let (mut few, mut many) = (libm::log(before.max(behind)), libm::log(MOST_PHOTONS));
+        for _ in 0..HALVINGS {
+            let middle = (few + many) / 2.0;
+            let photons = libm::exp(middle);
+            match rise(photons) + fall(photons) < apart {
+                true => few = middle,
+                false => many = middle,
+            }
+        }
+        let photons = libm::exp((few + many) / 2.0);
+        (rise(photons), photons)
+    }
+}
+
+/// More photons than any mark has.
+const MOST_PHOTONS: f64 = 1e18;
+
+/// How often the number of photons is bounded by halves: to a ten-thousandth.
+const HALVINGS: usize = 20;
+
+/// The pulse so many steps from its middle; 0 beyond its ends.
+fn sampled(fine: &[f32], middle: usize, step: i64) -> f32 {
+    usize::try_from(middle as i64 + step).ok().and_then(|at| fine.get(at)).copied().unwrap_or(0.0)
+}
+
+/// Where the parabola through three samples, a tick apart, is highest; `None` where it is nowhere.
+fn vertex([before, here, behind]: [f64; 3]) -> Option<f64> {
+    let bent = before - 2.0 * here + behind;
+    (bent < 0.0).then(|| 0.5 * (before - behind) / bent)
+}
+
+/// How many ticks before and behind the middle the pulse is as high as a share of its highest: pairs of
+/// share and ticks, of ever lower shares, until it rises again or ends.
+fn edges(fine: &[f32]) -> [Vec<(f64, f64)>; 2] {
+    let middle = fine.len() / 2;
+    let highest = (0..fine.len()).fold(0, |most, at| if fine[at] > fine[most] { at } else { most });
+    let most = f64::from(fine[highest]);
+    let edge = |places: &mut dyn Iterator<Item = usize>, sign: f64| {
+        let mut falling: Vec<(f64, f64)> = Vec::new();
+        for at in places {
+            let share = f64::from(fine[at]) / most;
+            if share <= 0.0 || falling.last().is_some_and(|(last, _)| share >= *last) {
+                break;
+            }
+            falling.push((share, sign * (at as f64 - middle as f64) / STEPS_OF_TICK as f64));
+        }
+        falling
+    };
+    [edge(&mut (0..=highest).rev(), -1.0), edge(&mut (highest..fine.len()), 1.0)]
+}
+
+/// The second of the pairs at `x` of the first, which ascend; that of the last pair beyond it.
+fn interpolate(ascending: &[(f64, f64)], x: f64) -> f64 {
+    let after = ascending.partition_point(|(known, _)| *known < x);
+    let (Some(last), Some(next)) = (ascending.get(after.wrapping_sub(1)), ascending.get(after))
+    else {
+        return ascending.get(after).or(ascending.last()).map_or(0.0, |(_, value)| *value);
+    };
+    last.1 + (x - last.0) / (next.0 - last.0) * (next.1 - last.1)
+}
+
+/// The same of pairs of which the first fall, along their logarithms: so edges of pulses are nearly
+/// straight.
+fn interpolate_falling(falling: &[(f64, f64)], x: f64) -> f64 {
+    let after = falling.partition_point(|(known, _)| *known > x);
+    let (Some(last), Some(next)) = (falling.get(after.wrapping_sub(1)), falling.get(after)) else {
+        return falling.get(after).or(falling.last()).map_or(0.0, |(_, value)| *value);
+    };
+    let [x, from, to] = [x, last.0, next.0].map(libm::log);
+    last.1 + (x - from) / (to - from) * (next.1 - last.1)
+}

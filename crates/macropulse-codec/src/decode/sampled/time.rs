@@ -1,0 +1,61 @@
+//! When light came, to a fraction of a tick.
+
+use super::Sampling;
+use super::pulse::Pulse;
+
+/// How far from where a mark is found a clipped sample is of it, in ticks.
+const NEAR: usize = 3;
+
+/// How late the marks at the `certain` places are, in ticks, as their sum tells. A mark above the `cap` has
+/// light of others, too, and does not count.
+pub(super) fn in_time(signal: &[f32], certain: &[usize], cap: f32, pulse: &Pulse) -> f64 {
+    let mut about = [0.0; 3];
+    for place in certain.iter().filter(|place| signal[**place] <= cap) {
+        for (tick, sum) in about.iter_mut().enumerate() {
+            let at = (place + tick).checked_sub(1);
+            *sum += at.and_then(|at| signal.get(at)).copied().unwrap_or(0.0);
+        }
+    }
+    pulse.late(about)
+}
+
+/// What is known of pulses of which samples are clipped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Clipped {
+    /// How late they came, in ticks.
+    pub late: f64,
+    /// Photons of one of them, about.
+    pub photons: f32,
+}
+
+/// The time of the marks at the `certain` places if samples there are clipped, from their edges; the
+/// median of the marks. `None` where none is clipped.
+pub(super) fn clipped(
+    codes: &[i16],
+    sampling: &Sampling,
+    pulse: &Pulse,
+    certain: &[usize],
+) -> Option<Clipped> {
+    let is_clipped = |at: &usize| codes[*at] >= sampling.full_scale;
+    let mut told: Vec<(f64, f64)> = Vec::new();
+    for &place in certain {
+        let about = (0..=NEAR).flat_map(|apart| [place.saturating_sub(apart), place + apart]);
+        let Some(at) = about.filter(|at| *at < codes.len()).find(is_clipped) else { continue };
+        let before = (0..at).rev().find(|at| !is_clipped(at));
+        let behind = (at..codes.len()).find(|at| !is_clipped(at));
+        let (Some(before), Some(behind)) = (before, behind) else { continue };
+        let edges = [codes[before], codes[behind]].map(f32::from);
+        let (late, photons) = pulse.clipped(edges[0], edges[1], (behind - before) as f64);
+        told.push((before as f64 - place as f64 + late, photons));
+    }
+    told.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let middle = told.len().checked_sub(1)? / 2;
+    let (late, photons) = match told.len() % 2 {
+        1 => told[middle],
+        _ => {
+            let (one, other) = (told[middle], told[middle + 1]);
+            ((one.0 + other.0) / 2.0, (one.1 + other.1) / 2.0)
+        }
+    };
+    Some(Clipped { late, photons: photons as f32 })
+}
