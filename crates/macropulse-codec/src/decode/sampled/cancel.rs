@@ -4,7 +4,7 @@ use super::filter::Filtered;
 use super::pulse::Pulse;
 use super::search::Candidate;
 use super::time::{clipped, in_time};
-use super::{Band, Rule, Sampling};
+use super::{Band, Rule, Sampling, Sum};
 
 /// Share of a pulse that is uncertain beside the number of its photons: its shape, and when it came.
 const SHAPE: f32 = 0.04;
@@ -60,16 +60,8 @@ pub(super) struct Residual<'a> {
     /// Places of the marks that count, and of those that are uncertain: room for one candidate.
     certain: Vec<usize>,
     uncertain: Vec<usize>,
-}
-
-/// The marks that count, together.
-#[derive(Debug, Clone, Copy)]
-struct Sum {
-    mean: f32,
-    least: f32,
-    most: f32,
-    /// Standard deviations of noise alone.
-    score: f32,
+    /// The signal at those that count.
+    heights: Vec<f32>,
 }
 
 impl<'a> Residual<'a> {
@@ -78,8 +70,8 @@ impl<'a> Residual<'a> {
         pulse: &'a Pulse,
         filtered: Filtered,
     ) -> Self {
-        let (certain, uncertain) = (Vec::new(), Vec::new());
-        Self { codes, sampling, pulse, filtered, certain, uncertain }
+        let (certain, uncertain, heights) = (Vec::new(), Vec::new(), Vec::new());
+        Self { codes, sampling, pulse, filtered, certain, uncertain, heights }
     }
 
     pub(super) fn filtered(&self) -> &Filtered {
@@ -104,7 +96,7 @@ impl<'a> Residual<'a> {
         let late = match &clipped {
             Some(clipped) => clipped.late,
             None => {
-                let cap = rule.counting(marks.len()).cap(sum.least);
+                let cap = rule.cap(sum.least, marks.len());
                 in_time(&self.filtered.signal, &self.certain, cap, self.pulse)
             }
         };
@@ -159,23 +151,19 @@ impl<'a> Residual<'a> {
     fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
         self.sort(marks, lag);
         let count = self.certain.len();
-        if count == 0 || count < rule.fewest(marks.len()) {
+        if count < rule.fewest(marks.len()) {
             return None;
         }
         let signal = &self.filtered.signal;
-        let heights = || self.certain.iter().map(|place| signal[*place]);
-        let least = heights().fold(f32::INFINITY, f32::min);
-        let most = heights().fold(f32::NEG_INFINITY, f32::max);
+        self.heights.clear();
+        self.heights.extend(self.certain.iter().map(|place| signal[*place]));
+        let sum = rule.sum(&self.heights, marks.len())?;
         let is_dark = |place: &usize| {
             let (doubt, sigma) = (self.filtered.doubt[*place], rule.sigma);
-            signal[*place] + UNCERTAIN * (doubt * doubt + sigma * sigma).sqrt() < SHOULD * least
+            signal[*place] + UNCERTAIN * (doubt * doubt + sigma * sigma).sqrt() < SHOULD * sum.least
         };
-        if least < rule.least(marks.len()) || self.uncertain.iter().any(is_dark) {
-            return None;
-        }
-        let cap = rule.counting(marks.len()).cap(least);
-        let mean = heights().map(|height| height.min(cap)).sum::<f32>() / count as f32;
-        Some(Sum { mean, least, most, score: mean * (count as f32).sqrt() / rule.sigma })
+        let is_told = sum.least >= rule.least(marks.len());
+        (is_told && !self.uncertain.iter().any(is_dark)).then_some(sum)
     }
 
     /// What the score must reach; `None` where marks are missing and the others not equal.

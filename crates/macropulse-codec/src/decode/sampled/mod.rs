@@ -21,7 +21,6 @@ mod time;
 
 use super::{Receiver, Reject, Return, Returns, Strength};
 use crate::code::Codebook;
-use crate::kernels::Counting;
 use crate::statistics::{normal_order, normal_quantile};
 use crate::{Samples, ShotLog};
 use cancel::{Found, Residual};
@@ -155,6 +154,17 @@ struct Rule {
     least_of: Vec<f32>,
 }
 
+/// The marks of a word at one lag, together.
+#[derive(Debug, Clone, Copy)]
+struct Sum {
+    /// Their mean, none being more than the cap.
+    mean: f32,
+    least: f32,
+    most: f32,
+    /// Standard deviations of noise alone that the sum is above 0.
+    score: f32,
+}
+
 /// A mark counts no more than the least one and so many standard deviations, beside what the least
 /// of so many marks is below their mean: 2.5 of three marks. One in eight words of three marks has a mark
 /// that is cut by noise alone.
@@ -196,13 +206,19 @@ impl Rule {
         usize::from(self.fewest).min(marks)
     }
 
-    fn counting(&self, marks: usize) -> Counting {
-        Counting {
-            sigma: self.sigma,
-            excess: self.excess,
-            above: ABOVE - self.least_of[marks],
-            fewest: self.fewest(marks) as f32,
-        }
+    /// How much one of so many marks counts at most where the `least` is so strong.
+    fn cap(&self, least: f32, marks: usize) -> f32 {
+        least + (ABOVE - self.least_of[marks]) * self.deviation(least)
+    }
+
+    /// The marks that count, of which there are `heights`, out of so many `marks`, together; `None` of
+    /// none.
+    fn sum(&self, heights: &[f32], marks: usize) -> Option<Sum> {
+        let least = heights.iter().copied().reduce(f32::min)?;
+        let most = heights.iter().copied().fold(least, f32::max);
+        let (cap, count) = (self.cap(least, marks), heights.len() as f32);
+        let mean = heights.iter().map(|height| height.min(cap)).sum::<f32>() / count;
+        Some(Sum { mean, least, most, score: mean * count.sqrt() / self.sigma })
     }
 
     /// How strong the least of so many marks must be, in detected photons.

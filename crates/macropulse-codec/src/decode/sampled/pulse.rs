@@ -26,7 +26,8 @@ pub(super) struct Pulse {
     /// How late the filtered pulse is if the vertex of the parabola through three samples of it is, ticks;
     /// ascending.
     vertices: Vec<(f64, f64)>,
-    /// Ticks before the pulse reaches a share of its highest, and behind it, of falling shares.
+    /// Ticks before its time at which the pulse is at a share of its highest, and behind it, by −ln of the
+    /// share, ascending: by that, edges of pulses are nearly straight.
     edges: [Vec<(f64, f64)>; 2],
 }
 
@@ -122,35 +123,43 @@ impl Pulse {
         ascending
     }
 
-    /// When a clipped pulse came, and how many photons it had, from the last sample `before` it was clipped
-    /// and the first one `behind`, so many ticks `apart`: the time in ticks from the sample before.
+    /// When a pulse came that `rises` through a code at a tick and `falls` through another one at a later
+    /// tick, and how many photons it had.
     ///
-    /// A pulse of n photons is at `before` as long before its highest as the pulse takes from the share
-    /// before/n to the highest, and correspondingly behind. Both together are the longer the more photons
-    /// there are: n is found by halving.
-    pub(super) fn clipped(&self, before: f32, behind: f32, apart: f64) -> (f64, f64) {
+    /// A pulse of n photons is at a code c as long before its time as the pulse of one photon is at c/n, and
+    /// correspondingly behind. Both together are the longer the more photons there are: n is found by
+    /// halving.
+    pub(super) fn between(&self, rises: Crossing, falls: Crossing) -> (f64, f64) {
         let highest = f64::from(self.highest());
-        let [before, behind] = [before, behind].map(|code| f64::from(code.max(1.0)) / highest);
-        let rise = |photons: f64| interpolate_falling(&self.edges[0], before / photons);
-        let fall = |photons: f64| interpolate_falling(&self.edges[1], behind / photons);
-        let (mut few, mut many) = (libm::log(before.max(behind)), libm::log(MOST_PHOTONS));
+        let [rising, falling] =
+            [rises, falls].map(|edge| libm::log(f64::from(edge.code.max(1.0)) / highest));
+        let rise = |photons: f64| interpolate(&self.edges[0], photons - rising);
+        let fall = |photons: f64| interpolate(&self.edges[1], photons - falling);
+        // Logarithms of the number of photons.
+        let (mut few, mut many) = (rising.max(falling), MOST_PHOTONS);
         for _ in 0..HALVINGS {
             let middle = (few + many) / 2.0;
-            let photons = libm::exp(middle);
-            match rise(photons) + fall(photons) < apart {
+            match rise(middle) + fall(middle) < falls.tick - rises.tick {
                 true => few = middle,
                 false => many = middle,
             }
         }
-        let photons = libm::exp((few + many) / 2.0);
-        (rise(photons), photons)
+        let photons = (few + many) / 2.0;
+        (rises.tick + rise(photons), libm::exp(photons))
     }
 }
 
-/// More photons than any mark has.
-const MOST_PHOTONS: f64 = 1e18;
+/// Where a pulse goes through a code.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Crossing {
+    pub code: f32,
+    pub tick: f64,
+}
 
-/// How often the number of photons is bounded by halves: to a ten-thousandth.
+/// Logarithm of more photons than any mark has.
+const MOST_PHOTONS: f64 = 41.0;
+
+/// How often the logarithm of the number of photons is bounded by halves: to a ten-thousandth.
 const HALVINGS: usize = 20;
 
 /// The pulse so many steps from its middle; 0 beyond its ends.
@@ -164,22 +173,23 @@ fn vertex([before, here, behind]: [f64; 3]) -> Option<f64> {
     (bent < 0.0).then(|| 0.5 * (before - behind) / bent)
 }
 
-/// How many ticks before and behind the middle the pulse is as high as a share of its highest: pairs of
-/// share and ticks, of ever lower shares, until it rises again or ends.
+/// How many ticks before and behind the middle the pulse is at a share of its highest: pairs of −ln of
+/// the share, ascending, and ticks, until it rises again or ends.
 fn edges(fine: &[f32]) -> [Vec<(f64, f64)>; 2] {
     let middle = fine.len() / 2;
     let highest = (0..fine.len()).fold(0, |most, at| if fine[at] > fine[most] { at } else { most });
     let most = f64::from(fine[highest]);
     let edge = |places: &mut dyn Iterator<Item = usize>, sign: f64| {
-        let mut falling: Vec<(f64, f64)> = Vec::new();
+        let mut ascending: Vec<(f64, f64)> = Vec::new();
         for at in places {
             let share = f64::from(fine[at]) / most;
-            if share <= 0.0 || falling.last().is_some_and(|(last, _)| share >= *last) {
+            let fallen = -libm::log(share);
+            if share <= 0.0 || ascending.last().is_some_and(|(last, _)| fallen <= *last) {
                 break;
             }
-            falling.push((share, sign * (at as f64 - middle as f64) / STEPS_OF_TICK as f64));
+            ascending.push((fallen, sign * (at as f64 - middle as f64) / STEPS_OF_TICK as f64));
         }
-        falling
+        ascending
     };
     [edge(&mut (0..=highest).rev(), -1.0), edge(&mut (highest..fine.len()), 1.0)]
 }
@@ -192,15 +202,4 @@ fn interpolate(ascending: &[(f64, f64)], x: f64) -> f64 {
         return ascending.get(after).or(ascending.last()).map_or(0.0, |(_, value)| *value);
     };
     last.1 + (x - last.0) / (next.0 - last.0) * (next.1 - last.1)
-}
-
-/// The same of pairs of which the first fall, along their logarithms: so edges of pulses are nearly
-/// straight.
-fn interpolate_falling(falling: &[(f64, f64)], x: f64) -> f64 {
-    let after = falling.partition_point(|(known, _)| *known > x);
-    let (Some(last), Some(next)) = (falling.get(after.wrapping_sub(1)), falling.get(after)) else {
-        return falling.get(after).or(falling.last()).map_or(0.0, |(_, value)| *value);
-    };
-    let [x, from, to] = [x, last.0, next.0].map(libm::log);
-    last.1 + (x - from) / (to - from) * (next.1 - last.1)
 }

@@ -1,10 +1,13 @@
 //! When light came, to a fraction of a tick.
 
 use super::Sampling;
-use super::pulse::Pulse;
+use super::pulse::{Crossing, Pulse};
 
 /// How far from where a mark is found a clipped sample is of it, in ticks.
 const NEAR: usize = 3;
+
+/// Share of full scale from which on a sample beside clipped ones tells where the edge of the pulse is.
+const TOLD: f32 = 0.02;
 
 /// How late the marks at the `certain` places are, in ticks, as their sum tells. A mark above the `cap` has
 /// light of others, too, and does not count.
@@ -44,9 +47,10 @@ pub(super) fn clipped(
         let before = (0..at).rev().find(|at| !is_clipped(at));
         let behind = (at..codes.len()).find(|at| !is_clipped(at));
         let (Some(before), Some(behind)) = (before, behind) else { continue };
-        let edges = [codes[before], codes[behind]].map(f32::from);
-        let (late, photons) = pulse.clipped(edges[0], edges[1], (behind - before) as f64);
-        told.push((before as f64 - place as f64 + late, photons));
+        let rises = crossing(codes, sampling, (before, 0.5));
+        let falls = crossing(codes, sampling, (behind, -0.5));
+        let (tick, photons) = pulse.between(rises, falls);
+        told.push((tick - place as f64, photons));
     }
     told.sort_by(|one, other| one.0.total_cmp(&other.0));
     let middle = told.len().checked_sub(1)? / 2;
@@ -58,4 +62,14 @@ pub(super) fn clipped(
         }
     };
     Some(Clipped { late, photons: photons as f32 })
+}
+
+/// Where a pulse is at a code, from the sample `at` beside clipped ones: where that sample is, or, if it is
+/// too dark to tell, at full scale, by half a tick `inwards`.
+fn crossing(codes: &[i16], sampling: &Sampling, (at, inwards): (usize, f64)) -> Crossing {
+    let (code, full) = (f32::from(codes[at]), f32::from(sampling.full_scale));
+    match code >= TOLD * full {
+        true => Crossing { code, tick: at as f64 },
+        false => Crossing { code: full, tick: at as f64 + inwards },
+    }
 }
