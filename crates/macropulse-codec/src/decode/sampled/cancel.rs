@@ -96,8 +96,9 @@ impl<'a> Residual<'a> {
         let late = match &clipped {
             Some(clipped) => clipped.late,
             None => {
-                let cap = rule.cap(sum.least, marks.len());
-                in_time(&self.filtered.signal, &self.certain, cap, self.pulse)
+                // Where a mark is cut is too low here: noise alone exceeds it, and so would be late or early.
+                let bright = 2.0 * rule.cap(sum.least, marks.len()) - sum.least;
+                in_time(&self.filtered.signal, &self.certain, bright, self.pulse)
             }
         };
         let found = Found {

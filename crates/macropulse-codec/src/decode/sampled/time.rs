@@ -9,11 +9,11 @@ const NEAR: usize = 3;
 /// Share of full scale from which on a sample beside clipped ones tells where the edge of the pulse is.
 const TOLD: f32 = 0.02;
 
-/// How late the marks at the `certain` places are, in ticks, as their sum tells. A mark above the `cap` has
-/// light of others, too, and does not count.
-pub(super) fn in_time(signal: &[f32], certain: &[usize], cap: f32, pulse: &Pulse) -> f64 {
+/// How late the marks at the `certain` places are, in ticks, as their sum tells. A mark that is
+/// `bright`er has light of others, too, and does not count.
+pub(super) fn in_time(signal: &[f32], certain: &[usize], bright: f32, pulse: &Pulse) -> f64 {
     let mut about = [0.0; 3];
-    for place in certain.iter().filter(|place| signal[**place] <= cap) {
+    for place in certain.iter().filter(|place| signal[**place] <= bright) {
         for (tick, sum) in about.iter_mut().enumerate() {
             let at = (place + tick).checked_sub(1);
             *sum += at.and_then(|at| signal.get(at)).copied().unwrap_or(0.0);
