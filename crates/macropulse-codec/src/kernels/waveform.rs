@@ -1,5 +1,7 @@
 //! Loops over samples: the matched filter, and the least mark of a word at each lag.
 
+use std::ops::Range;
+
 use crate::on_every_level;
 
 /// Lags that are looked at together, so that what is known of them stays close to the processor.
@@ -9,19 +11,49 @@ pub(crate) const LAGS: usize = 512;
 const BLOCK: usize = 1024;
 
 /// Lags that are passed by together where none stands out.
-const PASSED: usize = 32;
+const PASSED: usize = 64;
+
+/// Lags that are looked at in one go.
+const LANES: usize = 16;
+
+/// Filters `codes` with `taps`, of an odd number: entry n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\],
+/// r being half of their number, with 0 for codes beyond the ends and in the `dark` ranges, which ascend
+/// and do not overlap.
+pub(crate) fn filter(codes: &[i16], taps: &[f32], dark: &[Range<usize>], filtered: &mut [f32]) {
+    let reach = taps.len() / 2;
+    let mut samples = vec![0.0; BLOCK + 2 * reach];
+    for (block, sums) in filtered.chunks_mut(BLOCK).enumerate() {
+        // The samples of the block begin with this code, which may be before the first.
+        let begin = block * BLOCK;
+        let from = begin.saturating_sub(reach);
+        let until = (begin + sums.len() + reach).min(codes.len()).max(from);
+        samples.fill(0.0);
+        let place = |at: usize| at + reach - begin;
+        convert(&codes[from..until], &mut samples[place(from)..place(until)]);
+        let first = dark.partition_point(|dark| dark.end <= from);
+        for dark in dark[first..].iter().take_while(|dark| dark.start < until) {
+            samples[place(dark.start.max(from))..place(dark.end.min(until))].fill(0.0);
+        }
+        convolve(&samples, taps, sums);
+    }
+}
 
 on_every_level! {
-    /// Filters `samples`, of which there are `taps.len() − 1` more: entry n of `filtered` becomes
-    /// Σ taps\[k\]·samples\[n + k\].
-    pub(crate) fn filter(samples: &[f32], taps: &[f32], filtered: &mut [f32]) {
-        for (block, sums) in filtered.chunks_mut(BLOCK).enumerate() {
-            sums.fill(0.0);
-            for (place, tap) in (block * BLOCK..).zip(taps) {
-                let samples = &samples[place..][..sums.len()];
-                for (sum, sample) in sums.iter_mut().zip(samples) {
-                    *sum += tap * sample;
-                }
+    fn convert(codes: &[i16], samples: &mut [f32]) {
+        for (sample, code) in samples.iter_mut().zip(codes) {
+            *sample = f32::from(*code);
+        }
+    }
+}
+
+on_every_level! {
+    /// Entry n of `sums` becomes Σ taps\[k\]·samples\[n + k\].
+    fn convolve(samples: &[f32], taps: &[f32], sums: &mut [f32]) {
+        sums.fill(0.0);
+        for (place, tap) in taps.iter().enumerate() {
+            let samples = &samples[place..][..sums.len()];
+            for (sum, sample) in sums.iter_mut().zip(samples) {
+                *sum += tap * sample;
             }
         }
     }
@@ -40,20 +72,19 @@ on_every_level! {
     /// Adds to `found` where `least` is `bound` or more, and not infinite; ascending.
     pub(crate) fn standing_out(least: &[f32], bound: f32, found: &mut Vec<usize>) {
         let stands_out = |least: &f32| (*least >= bound) & (*least < f32::INFINITY);
-        let mut blocks = least.chunks_exact(PASSED);
-        for (block, least) in blocks.by_ref().enumerate() {
-            let mut some = [0_u32; PASSED];
-            for (some, least) in some.iter_mut().zip(least) {
-                *some = u32::from(stands_out(least));
+        for (block, least) in least.chunks(PASSED).enumerate() {
+            let mut some = [0_u32; LANES];
+            let mut lanes = least.chunks_exact(LANES);
+            for least in lanes.by_ref() {
+                for (some, least) in some.iter_mut().zip(least) {
+                    *some |= u32::from(stands_out(least));
+                }
             }
-            if some.iter().sum::<u32>() > 0 {
-                let places = (0..PASSED).filter(|at| some[*at] > 0);
+            if some != [0; LANES] || lanes.remainder().iter().any(stands_out) {
+                let places = (0..least.len()).filter(|at| stands_out(&least[*at]));
                 found.extend(places.map(|at| block * PASSED + at));
             }
         }
-        let last = blocks.remainder();
-        let places = (0..last.len()).filter(|at| stands_out(&last[*at]));
-        found.extend(places.map(|at| least.len() - last.len() + at));
     }
 }
 
@@ -71,16 +102,32 @@ mod tests {
     proptest! {
         #[test]
         fn every_level_filters_alike(
-            samples in proptest::collection::vec(-2048.0..2048.0_f32, 1100..1300),
-            taps in proptest::collection::vec(-1.0..1.0_f32, 1..12),
+            codes in proptest::collection::vec(any::<i16>(), 0..2300),
+            taps in proptest::collection::vec(-1.0..1.0_f32, 1..8),
+            dark in (0..2500_usize, 0..300_usize, 0..300_usize, 0..300_usize),
         ) {
-            let count = samples.len() + 1 - taps.len();
-            let expected: Vec<f32> = (0..count)
-                .map(|n| taps.iter().zip(&samples[n..]).fold(0.0, |sum, (tap, s)| sum + tap * s))
-                .collect();
+            let taps: Vec<f32> = taps.iter().chain(&taps[1..]).copied().collect();
+            let reach = taps.len() / 2;
+            let first = dark.0.min(codes.len());
+            let dark = [dark.1, dark.2, dark.3].iter().scan(first, |end, length| {
+                let begin = *end;
+                *end = (begin + length).min(codes.len());
+                Some(begin..*end)
+            });
+            let dark: Vec<Range<usize>> = dark.step_by(2).collect();
+            let sample = |at: usize| match at.checked_sub(reach) {
+                Some(at) if at < codes.len() && !dark.iter().any(|dark| dark.contains(&at)) => {
+                    f32::from(codes[at])
+                }
+                _ => 0.0,
+            };
+            let sum = |n: usize| {
+                (0..taps.len()).fold(0.0, |sum, k| sum + taps[k] * sample(n + k))
+            };
+            let expected: Vec<f32> = (0..codes.len()).map(sum).collect();
             for (level, found) in at_each_level(|| {
-                let mut filtered = vec![1.0; count];
-                filter(&samples, &taps, &mut filtered);
+                let mut filtered = vec![1.0; codes.len()];
+                filter(&codes, &taps, &dark, &mut filtered);
                 filtered
             }) {
                 prop_assert_eq!(&found, &expected, "{:?}", level);

@@ -30,54 +30,69 @@ impl Filtered {
     /// behind clipped ones; they are taken for dark ones. A tick tells nothing if the middle of the pulse
     /// that would come there is blind.
     pub(super) fn of(codes: &[i16], pulse: &Pulse, band: &Band, sampling: &Sampling) -> Self {
-        let reach = pulse.reach;
-        let mut samples = vec![0.0; codes.len() + 2 * reach];
-        for (sample, code) in samples[reach..].iter_mut().zip(codes) {
-            *sample = f32::from(*code);
-        }
         let mut doubt = vec![0.0; codes.len()];
         let core = pulse.core() as i64;
-        let within = |at: i64| at.clamp(0, codes.len() as i64) as usize;
-        let mut blind = |doubt: &mut [f32], blind: Range<i64>| {
-            samples[reach + within(blind.start)..reach + within(blind.end)].fill(0.0);
-            doubt[within(blind.start - core)..within(blind.end + core)].fill(f32::INFINITY);
+        let leaves = own_marks(band, core, sampling.blank_ticks);
+        let within = |range: &Range<i64>, more: i64| {
+            let within = |at: i64| at.clamp(0, codes.len() as i64) as usize;
+            within(range.start - more)..within(range.end + more)
         };
-        if sampling.blank_ticks > 0 {
-            for shot in 0..band.fired.len() {
-                for mark in band.marks(shot) {
-                    let fired = band.fired[shot] + mark;
-                    blind(&mut doubt, fired - core..fired + i64::from(sampling.blank_ticks));
-                }
-            }
-        }
-        if sampling.recovery_ticks > 0 {
-            // What stray light clips is over when the channel is blind no more.
-            let is_light = |clipped: &Range<usize>| doubt[clipped.end - 1] == 0.0;
-            let clipped: Vec<Range<usize>> =
-                runs(codes, sampling.full_scale).filter(is_light).collect();
-            for clipped in clipped {
-                // The sample behind still tells when the pulse fell.
-                let end = clipped.end as i64;
-                blind(&mut doubt, end + 1 + core..end + i64::from(sampling.recovery_ticks));
-            }
-        }
+        // What stray light clips is over when the channel is blind no more.
+        let is_stray = |clipped: &Range<i64>| {
+            let after = leaves.partition_point(|blind| blind.start < clipped.end);
+            after > 0 && leaves[after - 1].end >= clipped.end
+        };
+        let light = runs(codes, sampling.full_scale).filter(|clipped| !is_stray(clipped));
+        // The sample behind still tells when the pulse fell.
+        let recovery = i64::from(sampling.recovery_ticks);
+        let recovers = merged(light.map(|clipped| clipped.end + 1 + core..clipped.end + recovery));
+        let mut blind = [leaves, recovers].concat();
+        blind.sort_unstable_by_key(|blind| blind.start);
+        let blind = merged(blind.into_iter());
+        blind.iter().for_each(|blind| doubt[within(blind, core)].fill(f32::INFINITY));
+        let dark: Vec<Range<usize>> = blind.iter().map(|blind| within(blind, 0)).collect();
         let mut signal = vec![0.0; codes.len()];
-        filter(&samples, &pulse.taps, &mut signal);
+        filter(codes, &pulse.taps, &dark, &mut signal);
         let rounding = pulse.taps.iter().map(|tap| tap * tap).sum::<f32>() / 12.0;
-        let (level, sigma) = noise(&signal, &doubt, reach);
+        let (level, sigma) = noise(&signal, &doubt, pulse.reach);
         signal.iter_mut().for_each(|signal| *signal -= level);
         Self { signal, doubt, sigma: sigma.max(rounding.sqrt()) }
     }
 }
 
+/// When the channel is blind with its own marks, which rise `before` they leave, for `blank` ticks;
+/// ascending.
+fn own_marks(band: &Band, before: i64, blank: u32) -> Vec<Range<i64>> {
+    if blank == 0 {
+        return Vec::new();
+    }
+    let all = 0..band.fired.len();
+    let leave = |shot| band.marks(shot).map(move |mark| band.fired[shot] + mark);
+    let mut marks: Vec<i64> = all.flat_map(leave).collect();
+    marks.sort_unstable();
+    merged(marks.iter().map(|mark| mark - before..mark + i64::from(blank)))
+}
+
+/// The `ranges`, which begin one after the other, those that overlap as one, and no empty ones.
+fn merged(ranges: impl Iterator<Item = Range<i64>>) -> Vec<Range<i64>> {
+    let mut merged: Vec<Range<i64>> = Vec::new();
+    for range in ranges.filter(|range| !range.is_empty()) {
+        match merged.last_mut() {
+            Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
+            _ => merged.push(range),
+        }
+    }
+    merged
+}
+
 /// Runs of clipped samples, ascending.
-fn runs(codes: &[i16], full_scale: i16) -> impl Iterator<Item = Range<usize>> {
+fn runs(codes: &[i16], full_scale: i16) -> impl Iterator<Item = Range<i64>> {
     let mut at = 0;
     std::iter::from_fn(move || {
         let start = at + codes[at..].iter().position(|code| *code >= full_scale)?;
         let length = codes[start..].iter().position(|code| *code < full_scale);
         at = length.map_or(codes.len(), |length| start + length);
-        Some(start..at)
+        Some(start as i64..at as i64)
     })
 }
 

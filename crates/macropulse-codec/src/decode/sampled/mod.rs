@@ -9,7 +9,8 @@
 //! 3. The strongest candidate is tested again, and if it holds, its pulses are taken away from the
 //!    signal; then the next one. What was taken away is uncertain, and marks there are judged by that
 //!    ([`cancel`]).
-//! 4. What was hidden is looked for again in what is left.
+//! 4. Of shots of which fewer returns were found than are wanted, light that was hidden is looked for in
+//!    what is left.
 //! 5. The range of a return is that of its marks together, that of clipped pulses that of their edges
 //!    ([`time`]).
 
@@ -48,7 +49,8 @@ pub struct Sampling {
     pub least_marks: u16,
 }
 
-/// How often the shots are searched for: what light of others hid is found once that is taken away.
+/// How often is searched: what light of others hid is found once that is taken away. From the second time
+/// on only for shots of which more returns are wanted than were found.
 const ROUNDS: usize = 2;
 
 /// The returns of the owned shots of `log`, of what was checked.
@@ -107,14 +109,20 @@ fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
 
 /// All light of the shots of a `band` that is told from noise.
 fn find(band: &Band, codes: &[i16], pulse: &Pulse, sampling: &Sampling) -> Vec<Found> {
+    let receiver = band.receiver;
     let filtered = Filtered::of(codes, pulse, band, sampling);
     let rule = Rule::new(band, sampling, filtered.sigma);
     let mut residual = Residual::new((codes, sampling), pulse, filtered);
-    let mut found = Vec::new();
+    let mut found: Vec<Found> = Vec::new();
+    let mut wanted = vec![receiver.returns; band.fired.len()];
+    let mut open = Vec::new();
     for _ in 0..ROUNDS {
-        let candidates = search::candidates(band, residual.filtered(), &rule);
+        let candidates = search::candidates((band, &rule), residual.filtered(), &wanted, &mut open);
         for candidate in candidates {
-            found.extend(residual.test(&candidate, (band, &rule)));
+            let Some(one) = residual.test(&candidate, (band, &rule)) else { continue };
+            let left = &mut wanted[one.shot];
+            *left = left.saturating_sub(u8::from(is_in_gate(receiver, &one)));
+            found.push(one);
         }
     }
     found

@@ -18,14 +18,21 @@ pub(super) struct Candidate {
     pub rank: f32,
 }
 
-/// All candidates of the `band`, the strongest first.
-pub(super) fn candidates(band: &Band, filtered: &Filtered, rule: &Rule) -> Vec<Candidate> {
+/// All candidates of those shots of the `band` of which returns are `wanted`, the strongest first. `open` is
+/// room for the signal.
+pub(super) fn candidates(
+    (band, rule): (&Band, &Rule),
+    filtered: &Filtered,
+    wanted: &[u8],
+    open: &mut Vec<f32>,
+) -> Vec<Candidate> {
     let told = filtered.signal.iter().zip(&filtered.doubt);
-    let open = told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY });
+    open.clear();
+    open.extend(told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY }));
     let mut search = Search {
         band,
         rule,
-        open: open.collect(),
+        open,
         least: Vec::with_capacity(LAGS),
         beyond: Vec::with_capacity(LAGS),
         standing_out: Vec::new(),
@@ -33,7 +40,7 @@ pub(super) fn candidates(band: &Band, filtered: &Filtered, rule: &Rule) -> Vec<C
         heights: Vec::new(),
     };
     let mut all = Vec::new();
-    for shot in 0..band.fired.len() {
+    for shot in (0..band.fired.len()).filter(|shot| wanted[*shot] > 0) {
         search.candidates_of(shot, &mut all);
     }
     all.sort_by(|one: &Candidate, other| {
@@ -48,7 +55,7 @@ struct Search<'a> {
     band: &'a Band<'a>,
     rule: &'a Rule,
     /// The signal, infinite where it tells nothing.
-    open: Vec<f32>,
+    open: &'a [f32],
     /// The least mark at each lag of a block.
     least: Vec<f32>,
     /// The signal at a mark at these lags, if not all of them are in the record.
