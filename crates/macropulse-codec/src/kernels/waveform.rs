@@ -109,7 +109,8 @@ mod tests {
             let taps: Vec<f32> = taps.iter().chain(&taps[1..]).copied().collect();
             let reach = taps.len() / 2;
             let first = dark.0.min(codes.len());
-            let dark = [dark.1, dark.2, dark.3].iter().scan(first, |end, length| {
+            let lengths = [dark.1, dark.2, dark.3];
+            let dark = lengths.iter().scan(first, |end, length| {
                 let begin = *end;
                 *end = (begin + length).min(codes.len());
                 Some(begin..*end)

@@ -134,3 +134,57 @@ fn noise(signal: &[f32], doubt: &[f32], beside: usize) -> (f32, f32) {
 
 /// The share of a normal variable that is more than a standard deviation below its mean.
 const ONE_BELOW: f64 = 0.158_655_253_931_457_05;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Noise of level 3 and deviation 36; so many of 100 stretches of ten ticks have light on them.
+    fn noisy(lit: usize) -> Vec<f32> {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut noise = || -> f32 { StandardNormal.sample(&mut rng) };
+        let light = |at: usize| if at % 1000 < 10 * lit { 900.0 } else { 0.0 };
+        (0..200_000).map(|at| 3.0 + 36.0 * noise() + light(at)).collect()
+    }
+
+    /// From N = 50 000 ticks, every fourth: 1.25/√N and 1.49/√N of σ, three times each. Where a tenth is
+    /// lit, what is beside the light is left out, too.
+    #[test]
+    fn light_does_not_raise_the_noise() {
+        for lit in [0, 2, 10] {
+            let signal = noisy(lit);
+            let (level, sigma) = noise(&signal, &vec![0.0; signal.len()], 3);
+            assert!((level - 3.0).abs() < 36.0 * 0.017, "{lit} %: level {level}");
+            assert!((sigma / 36.0 - 1.0).abs() < 0.02, "{lit} %: deviation {sigma}");
+        }
+        // Negative control: without the second look, level and deviation of the last are too high.
+        let mut all = noisy(10);
+        all.sort_by(f32::total_cmp);
+        let (median, low) = (all[100_000], all[31_731]);
+        assert!(median > 3.0 + 36.0 * 0.1 && median - low > 36.0 * 1.05);
+    }
+
+    #[test]
+    fn of_no_samples_or_equal_ones_there_is_no_noise() {
+        assert_eq!(noise(&[], &[], 3), (0.0, 0.0));
+        assert_eq!(noise(&[4.0], &[0.0], 3), (4.0, 0.0));
+        assert_eq!(noise(&[4.0; 9], &[f32::INFINITY; 9], 3), (0.0, 0.0));
+        assert_eq!(noise(&[4.0; 9], &[0.0; 9], 3), (4.0, 0.0));
+    }
+
+    #[test]
+    fn clipped_samples_are_told_as_runs() {
+        let told: Vec<Range<i64>> = runs(&[9, 0, 9, 10, 0, 0, 9], 9).collect();
+        assert_eq!(told, [0..1, 2..4, 6..7]);
+        assert_eq!(runs(&[1, 2], 3).count(), 0);
+    }
+
+    #[test]
+    fn ranges_that_touch_become_one() {
+        let ranges = [0..2, 1..3, 3..4, 9..9, 6..8, 6..7];
+        assert_eq!(merged(ranges.into_iter()), [0..4, 6..8]);
+    }
+}

@@ -203,3 +203,77 @@ fn interpolate(ascending: &[(f64, f64)], x: f64) -> f64 {
     };
     last.1 + (x - last.0) / (next.0 - last.0) * (next.1 - last.1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pulse of 10 codes a photon, of deviation 1 tick, that falls off more slowly behind.
+    fn pulse() -> Pulse {
+        let at = |step: i32| {
+            let ticks = f64::from(step) / 16.0;
+            let deviation: f64 = if ticks > 0.0 { 1.2 } else { 1.0 };
+            (10.0 * (-(ticks / deviation).powi(2) / 2.0).exp()) as f32
+        };
+        Pulse::new(&Sampling {
+            pulse: (-160..=160).map(at).collect(),
+            excess: 1.0,
+            full_scale: 100,
+            blank_ticks: 0,
+            recovery_ticks: 0,
+            least_marks: 1,
+        })
+    }
+
+    #[test]
+    fn the_filter_makes_one_of_one_photon() {
+        let pulse = pulse();
+        // exp(−3²/2) = 1.1 % before, exp(−(3/1.2)²/2) = 4.4 % behind.
+        assert_eq!((pulse.reach, pulse.taps.len(), pulse.core()), (3, 7, 1));
+        approx::assert_relative_eq!(pulse.answer(0.0), 1.0, max_relative = 1e-6);
+        assert!(pulse.answer(1.0) < 0.9 && pulse.answer(-30.0) == 0.0 && pulse.answer(1e9) == 0.0);
+    }
+
+    #[test]
+    fn how_late_a_pulse_is_follows_from_three_samples() {
+        let pulse = pulse();
+        for late in [-0.5, -0.21, 0.0, 0.3, 0.5] {
+            let samples = [-1.0, 0.0, 1.0].map(|tick| 500.0 * pulse.answer(tick - late));
+            assert!((pulse.late(samples) - late).abs() < 2e-3, "{late}: {}", pulse.late(samples));
+        }
+        assert_eq!(pulse.late([1.0, 1.0, 1.0]), 0.0);
+        assert_eq!(pulse.late([f32::INFINITY; 3]), 0.0);
+    }
+
+    /// Samples of the pulse at every phase, clipped at 100 codes: both its edges tell the time and how many
+    /// photons there were, whatever the codes are in which they are told.
+    #[test]
+    fn how_late_a_clipped_pulse_is_follows_from_its_edges() {
+        let pulse = pulse();
+        for (photons, phase) in [(15.0, 0.0), (100.0, 0.4), (1e4, 0.71), (1e6, 0.99)] {
+            let middle = (pulse.fine.len() / 2) as f64;
+            let at = |ticks: f64| {
+                let step = middle + (ticks - phase) * 16.0;
+                let (before, share) = (step.floor(), (step - step.floor()) as f32);
+                let value = |step: f64| pulse.fine.get(step as usize).copied().unwrap_or(0.0);
+                photons as f32 * ((1.0 - share) * value(before) + share * value(before + 1.0))
+            };
+            let clipped: Vec<i32> = (-9..=9).filter(|tick| at(f64::from(*tick)) >= 100.0).collect();
+            let beside = [clipped[0] - 1, clipped[clipped.len() - 1] + 1].map(f64::from);
+            let [rises, falls] = beside.map(|tick| Crossing { code: at(tick), tick });
+            let (late, told) = pulse.between(rises, falls);
+            assert!((late - phase).abs() < 0.02, "{photons}: {late} for {phase}");
+            assert!((told / photons).ln().abs() < 0.1, "{told} for {photons}");
+        }
+    }
+
+    #[test]
+    fn between_pairs_it_is_interpolated_and_beyond_them_held() {
+        let pairs = [(0.0, 1.0), (2.0, 5.0)];
+        assert_eq!(
+            [-1.0, 0.0, 0.5, 2.0, 9.0].map(|x| interpolate(&pairs, x)),
+            [1.0, 1.0, 2.0, 5.0, 5.0]
+        );
+        assert_eq!(interpolate(&[], 1.0), 0.0);
+    }
+}
