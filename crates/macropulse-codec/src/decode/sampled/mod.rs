@@ -162,13 +162,27 @@ struct Rule {
     least_of: Vec<f32>,
 }
 
+/// A mark that counts.
+#[derive(Debug, Clone, Copy)]
+struct Mark {
+    /// In the samples.
+    place: usize,
+    /// The signal there.
+    height: f32,
+    /// Standard deviation of what was taken away there.
+    doubt: f32,
+}
+
 /// The marks of a word at one lag, together.
 #[derive(Debug, Clone, Copy)]
 struct Sum {
     /// Their mean, none being more than the cap.
     mean: f32,
+    /// The least of those that are certain.
     least: f32,
     most: f32,
+    /// How far the marks are apart.
+    spread: f32,
     /// Standard deviations of noise alone that the sum is above 0.
     score: f32,
 }
@@ -219,14 +233,25 @@ impl Rule {
         least + (ABOVE - self.least_of[marks]) * self.deviation(least)
     }
 
-    /// The marks that count, of which there are `heights`, out of so many `marks`, together; `None` of
-    /// none.
-    fn sum(&self, heights: &[f32], marks: usize) -> Option<Sum> {
-        let least = heights.iter().copied().reduce(f32::min)?;
-        let most = heights.iter().copied().fold(least, f32::max);
-        let (cap, count) = (self.cap(least, marks), heights.len() as f32);
-        let mean = heights.iter().map(|height| height.min(cap)).sum::<f32>() / count;
-        Some(Sum { mean, least, most, score: mean * count.sqrt() / self.sigma })
+    /// The marks that count, out of so many `marks`, together; `None` of none.
+    ///
+    /// Each is weighed by the inverse of its variance. How much one counts at most follows from the least
+    /// of those that are certain, if any is.
+    fn sum(&self, counted: &[Mark], marks: usize) -> Option<Sum> {
+        let heights = counted.iter().map(|mark| mark.height);
+        let (lowest, most) = (heights.clone().reduce(f32::min)?, heights.reduce(f32::max)?);
+        let certain = counted.iter().filter(|mark| mark.doubt == 0.0).map(|mark| mark.height);
+        let least = certain.reduce(f32::min).unwrap_or(lowest);
+        let cap = self.cap(least, marks);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for mark in counted {
+            let share = mark.doubt / self.sigma;
+            let weight = 1.0 / (1.0 + share * share);
+            sum += weight * mark.height.min(cap);
+            weights += weight;
+        }
+        let (mean, score) = (sum / weights, sum / (weights.sqrt() * self.sigma));
+        Some(Sum { mean, least, spread: most - lowest, most, score })
     }
 
     /// How strong the least of so many marks must be, in detected photons.

@@ -1,7 +1,7 @@
 //! What may be a return: lags at which the marks of a word stand out together.
 
 use super::filter::Filtered;
-use super::{Band, Rule};
+use super::{Band, Mark, Rule, Sum};
 use crate::kernels::{LAGS, lower, standing_out};
 
 /// Candidates of a shot at most, the strongest.
@@ -37,7 +37,7 @@ pub(super) fn candidates(
         beyond: Vec::with_capacity(LAGS),
         standing_out: Vec::new(),
         marks: Vec::new(),
-        heights: Vec::new(),
+        counted: Vec::new(),
     };
     let mut all = Vec::new();
     for shot in (0..band.fired.len()).filter(|shot| wanted[*shot] > 0) {
@@ -64,8 +64,8 @@ struct Search<'a> {
     standing_out: Vec<usize>,
     /// When the marks of the shot leave, in ticks from the first sample on.
     marks: Vec<i64>,
-    /// The signal at the marks that count: room for one lag.
-    heights: Vec<f32>,
+    /// The marks that count: room for one lag.
+    counted: Vec<Mark>,
 }
 
 impl Search<'_> {
@@ -111,25 +111,28 @@ impl Search<'_> {
 
     /// That at `lag`, if the score there reaches the threshold and those beside it are no higher.
     fn candidate(&mut self, shot: usize, lag: i64) -> Option<Candidate> {
-        let score = self.score(lag).filter(|score| *score >= self.rule.threshold)?;
-        let (least, count) = (self.heights.iter().copied().reduce(f32::min)?, self.heights.len());
-        let is_peak = self.score(lag - 1).is_none_or(|before| before <= score)
-            && self.score(lag + 1).is_none_or(|behind| behind < score);
-        let rank = least * if count == self.marks.len() { 1.0 } else { 0.5 };
-        is_peak.then_some(Candidate { shot, lag, least, rank })
+        let sum = self.sum(lag).filter(|sum| sum.score >= self.rule.threshold)?;
+        let is_whole = self.counted.len() == self.marks.len();
+        let is_peak = self.sum(lag - 1).is_none_or(|before| before.score <= sum.score)
+            && self.sum(lag + 1).is_none_or(|behind| behind.score < sum.score);
+        let rank = sum.least * if is_whole { 1.0 } else { 0.5 };
+        is_peak.then_some(Candidate { shot, lag, least: sum.least, rank })
     }
 
-    /// The score at `lag`, if enough marks count; these are then known.
-    fn score(&mut self, lag: i64) -> Option<f32> {
-        self.heights.clear();
-        let open = |mark: &i64| usize::try_from(mark + lag).ok().and_then(|at| self.open.get(at));
-        let heights = self.marks.iter().filter_map(open).copied();
-        self.heights.extend(heights.filter(|height| *height < f32::INFINITY));
-        let is_enough = self.heights.len() >= self.rule.fewest(self.marks.len());
-        is_enough
-            .then(|| self.rule.sum(&self.heights, self.marks.len()))
-            .flatten()
-            .map(|sum| sum.score)
+    /// The marks at `lag` together, if enough of them count.
+    fn sum(&mut self, lag: i64) -> Option<Sum> {
+        self.counted.clear();
+        for mark in &self.marks {
+            let Ok(place) = usize::try_from(mark + lag) else { continue };
+            match self.open.get(place) {
+                Some(&height) if height < f32::INFINITY => {
+                    self.counted.push(Mark { place, height, doubt: 0.0 });
+                }
+                _ => {}
+            }
+        }
+        let is_enough = self.counted.len() >= self.rule.fewest(self.marks.len());
+        is_enough.then(|| self.rule.sum(&self.counted, self.marks.len())).flatten()
     }
 }
 

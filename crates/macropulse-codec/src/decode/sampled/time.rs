@@ -1,7 +1,8 @@
 //! When light came, to a fraction of a tick.
 
-use super::Sampling;
+use super::filter::Filtered;
 use super::pulse::{Crossing, Pulse};
+use super::{Mark, Sampling};
 
 /// How far from where a mark is found a clipped sample is of it, in ticks.
 const NEAR: usize = 3;
@@ -9,14 +10,20 @@ const NEAR: usize = 3;
 /// Share of full scale from which on a sample beside clipped ones tells where the edge of the pulse is.
 const TOLD: f32 = 0.02;
 
-/// How late the marks at the `certain` places are, in ticks, as their sum tells. A mark that is
-/// `bright`er has light of others, too, and does not count.
-pub(super) fn in_time(signal: &[f32], certain: &[usize], bright: f32, pulse: &Pulse) -> f64 {
+/// How late the marks that count are, in ticks, as their sum tells, each weighed by how certain it is. A
+/// mark that is `bright`er has light of others, too, and does not count.
+pub(super) fn in_time(
+    (filtered, bright): (&Filtered, f32),
+    counted: &[Mark],
+    pulse: &Pulse,
+) -> f64 {
     let mut about = [0.0; 3];
-    for place in certain.iter().filter(|place| signal[**place] <= bright) {
+    for mark in counted.iter().filter(|mark| mark.height <= bright) {
+        let weight = 1.0 / (1.0 + (mark.doubt / filtered.sigma).powi(2));
         for (tick, sum) in about.iter_mut().enumerate() {
-            let at = (place + tick).checked_sub(1);
-            *sum += at.and_then(|at| signal.get(at)).copied().unwrap_or(0.0);
+            let at = (mark.place + tick).checked_sub(1);
+            let signal = at.and_then(|at| filtered.signal.get(at)).copied();
+            *sum += weight * signal.unwrap_or(0.0);
         }
     }
     pulse.late(about)
@@ -31,17 +38,17 @@ pub(super) struct Clipped {
     pub photons: f32,
 }
 
-/// The time of the marks at the `certain` places if samples there are clipped, from their edges; the
+/// The time of the marks that count if samples there are clipped, from their edges; the
 /// median of the marks. `None` where none is clipped.
 pub(super) fn clipped(
     codes: &[i16],
     sampling: &Sampling,
     pulse: &Pulse,
-    certain: &[usize],
+    counted: &[Mark],
 ) -> Option<Clipped> {
     let is_clipped = |at: &usize| codes[*at] >= sampling.full_scale;
     let mut told: Vec<(f64, f64)> = Vec::new();
-    for &place in certain {
+    for &Mark { place, .. } in counted {
         let about = (0..=NEAR).flat_map(|apart| [place.saturating_sub(apart), place + apart]);
         let Some(at) = about.filter(|at| *at < codes.len()).find(is_clipped) else { continue };
         let before = (0..at).rev().find(|at| !is_clipped(at));
