@@ -102,19 +102,24 @@ impl<'a> Residual<'a> {
                 in_time((&self.filtered, bright), &self.counted, self.pulse)
             }
         };
+        // A pulse is higher between two ticks than it is at either.
+        let photons = match &clipped {
+            Some(_) => sum.mean,
+            None => sum.mean / self.pulse.answer(-late).clamp(0.5, 1.0),
+        };
         let found = Found {
             shot,
             lag,
             late,
-            photons: sum.mean,
+            photons,
             marks: self.counted.len() as u16,
             margin: (sum.score - threshold) as u16,
             is_clipped: clipped.is_some(),
         };
         let places = marks.iter().map(|mark| mark + lag);
         match clipped {
-            Some(clipped) => self.close(places, late, clipped.photons.max(sum.mean)),
-            None => self.take_away(places, late, (sum.mean, rule.excess)),
+            Some(clipped) => self.close(places, late, clipped.photons.max(photons)),
+            None => self.take_away(places, late, (photons, rule.excess)),
         }
         Some(found)
     }
