@@ -235,6 +235,54 @@ fn marks_that_are_blanked_do_not_count() {
     assert!(decode(&strict, &channel).is_empty());
 }
 
+/// Own stray light: whatever the samples are while the channel is blind, and however it rises.
+#[test]
+fn own_light_is_not_taken_for_that_of_others() {
+    let channel = wall(FAINT, 200, 15);
+    let blind = Sampling { blank_ticks: 15, ..sampling() };
+    let receiver = Receiver { sampling: Some(blind), ..receiver() };
+    let clean = channel.samples();
+    let mut lit = clean.clone();
+    let book = codebook();
+    for shot in 0..channel.log.len() {
+        for mark in book.marks(0, channel.log.word[shot]) {
+            let leaves = shot * PERIOD as usize + usize::from(*mark);
+            // 2.5 million photons, 50 dB down: 4·10⁻⁴, 1.7 %, 27 %, … of their highest.
+            for (tick, code) in [(5, 0), (4, 8), (3, 1100), (2, FULL_SCALE), (1, FULL_SCALE)] {
+                let Some(at) = leaves.checked_sub(tick) else { continue };
+                lit.code[at] = lit.code[at].saturating_add(code).min(FULL_SCALE);
+            }
+            lit.code[leaves..leaves + 9].fill(FULL_SCALE);
+            lit.code[leaves + 9..leaves + 15].fill(-200);
+        }
+    }
+    let [without, with] =
+        [&clean, &lit].map(|samples| receiver.decode(&book, &channel.log, samples).unwrap());
+    let (_, wrong) = errors(&with, &channel);
+    assert_eq!(wrong, 0);
+    assert!(with.len() + 4 >= without.len(), "{} of {}", with.len(), without.len());
+    // Negative control: who does not know of it takes it for light.
+    let sampling = Sampling { blank_ticks: 0, ..receiver.sampling.clone().unwrap() };
+    let deceived = Receiver { gate_ticks: (0, 2502), sampling: Some(sampling), ..receiver };
+    let returns = deceived.decode(&book, &channel.log, &lit).unwrap();
+    assert!(errors(&returns, &channel).1 > 100, "{}", errors(&returns, &channel).1);
+}
+
+/// One mark a shot is a word, too.
+#[test]
+fn a_word_may_be_one_mark() {
+    let mut channel = wall(3.0 * FAINT, 50, 16);
+    let book = macropulse_codec::code::Codebook::single();
+    channel.log.word = vec![0; 50];
+    // Of the three marks that are made the first is that of a word of one, and the others come behind the
+    // gate.
+    channel.echoes.truncate(1);
+    let returns = receiver().decode(&book, &channel.log, &channel.samples()).unwrap();
+    assert_eq!((returns.shot[0], returns.peak[0], returns.marks[0]), (0, 1, 1));
+    let ticks = returns.tof[0] * 1e15 / TICK_FS as f64;
+    assert!((ticks - channel.echoes[0].ticks).abs() < 0.5, "{ticks}");
+}
+
 /// Channels do not see each other, and times are counted from anywhere.
 #[test]
 fn each_channel_is_decoded_by_itself_at_any_time() {

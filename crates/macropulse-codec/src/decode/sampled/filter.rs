@@ -26,13 +26,13 @@ pub(super) struct Filtered {
 impl Filtered {
     /// Filters `codes`, the samples of the `band`.
     ///
-    /// Samples are blind from where a mark of the channel's own begins to rise until it is over, and
-    /// behind clipped ones; they are taken for dark ones. A tick tells nothing if the middle of the pulse
+    /// Samples are blind from where a mark of the channel's own rises until it is over, and behind clipped
+    /// ones; they are taken for dark ones. A tick tells nothing if the middle of the pulse
     /// that would come there is blind.
     pub(super) fn of(codes: &[i16], pulse: &Pulse, band: &Band, sampling: &Sampling) -> Self {
         let mut doubt = vec![0.0; codes.len()];
         let core = pulse.core() as i64;
-        let leaves = own_marks(band, core, sampling.blank_ticks);
+        let leaves = own_marks(codes, (pulse, core), band, sampling.blank_ticks);
         let within = |range: &Range<i64>, more: i64| {
             let within = |at: i64| at.clamp(0, codes.len() as i64) as usize;
             within(range.start - more)..within(range.end + more)
@@ -60,17 +60,47 @@ impl Filtered {
     }
 }
 
-/// When the channel is blind with its own marks, which rise `before` they leave, for `blank` ticks;
-/// ascending.
-fn own_marks(band: &Band, before: i64, blank: u32) -> Vec<Range<i64>> {
+/// When the channel is blind with its own marks: from `core` ticks before they leave, or earlier where
+/// their light already shows, for `blank` ticks; ascending.
+fn own_marks(
+    codes: &[i16],
+    (pulse, core): (&Pulse, i64),
+    band: &Band,
+    blank: u32,
+) -> Vec<Range<i64>> {
     if blank == 0 {
         return Vec::new();
     }
+    let bound = above_noise(codes);
+    let is_lit = |at: i64| {
+        let code = usize::try_from(at).ok().and_then(|at| codes.get(at));
+        code.is_some_and(|code| f32::from(*code) > bound)
+    };
+    let rises = |mark: i64| {
+        let middle = mark - core;
+        let earliest = middle - pulse.reach as i64;
+        match (earliest..middle).rev().take_while(|at| is_lit(*at)).last() {
+            // What is left before the first sample that stands out is less than noise in the next one.
+            Some(first) => first - 1,
+            None => middle,
+        }
+    };
     let all = 0..band.fired.len();
     let leave = |shot| band.marks(shot).map(move |mark| band.fired[shot] + mark);
     let mut marks: Vec<i64> = all.flat_map(leave).collect();
     marks.sort_unstable();
-    merged(marks.iter().map(|mark| mark - before..mark + i64::from(blank)))
+    let mut blind: Vec<Range<i64>> =
+        marks.iter().map(|mark| rises(*mark)..mark + i64::from(blank)).collect();
+    blind.sort_unstable_by_key(|blind| blind.start);
+    merged(blind.into_iter())
+}
+
+/// A code that noise hardly exceeds.
+fn above_noise(codes: &[i16]) -> f32 {
+    let step = codes.len().div_ceil(PICKED).max(1);
+    let mut picked: Vec<f32> = codes.iter().step_by(step).map(|code| f32::from(*code)).collect();
+    let (level, sigma) = quantiles(&mut picked);
+    level + LIGHT * sigma.max(1.0)
 }
 
 /// The `ranges`, which begin one after the other, those that overlap as one, and no empty ones.
@@ -108,19 +138,7 @@ fn noise(signal: &[f32], doubt: &[f32], beside: usize) -> (f32, f32) {
     let open = (0..signal.len()).step_by(step).filter(|at| doubt[*at] == 0.0);
     let places: Vec<usize> = open.collect();
     let estimate = |places: &[usize]| {
-        let mut values: Vec<f32> = places.iter().map(|at| signal[*at]).collect();
-        if values.is_empty() {
-            return (0.0, 0.0);
-        }
-        let middle = values.len() / 2;
-        let (below, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
-        let median = *median;
-        if below.is_empty() {
-            return (median, 0.0);
-        }
-        let place = (ONE_BELOW * places.len() as f64) as usize;
-        let (_, low, _) = below.select_nth_unstable_by(place.min(middle - 1), f32::total_cmp);
-        (median, median - *low)
+        quantiles(&mut places.iter().map(|at| signal[*at]).collect::<Vec<f32>>())
     };
     let (level, sigma) = estimate(&places);
     let is_dark = |at: &usize| {
@@ -130,6 +148,21 @@ fn noise(signal: &[f32], doubt: &[f32], beside: usize) -> (f32, f32) {
     let dark: Vec<usize> = places.iter().copied().filter(is_dark).collect();
     // Where there is hardly a dark tick, the first look has to do.
     if dark.len() * 4 < places.len() { (level, sigma) } else { estimate(&dark) }
+}
+
+/// The median of `values`, and how far the 15.87 % quantile is below it; 0 of none.
+fn quantiles(values: &mut [f32]) -> (f32, f32) {
+    if values.is_empty() {
+        return (0.0, 0.0);
+    }
+    let (middle, place) = (values.len() / 2, (ONE_BELOW * values.len() as f64) as usize);
+    let (below, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
+    let median = *median;
+    if below.is_empty() {
+        return (median, 0.0);
+    }
+    let (_, low, _) = below.select_nth_unstable_by(place.min(middle - 1), f32::total_cmp);
+    (median, median - *low)
 }
 
 /// The share of a normal variable that is more than a standard deviation below its mean.

@@ -41,7 +41,8 @@ pub struct Sampling {
     pub excess: f64,
     /// The highest code: a sample that has it is clipped.
     pub full_scale: i16,
-    /// For how many ticks from a mark of its own that is fired on the channel is blind with stray light.
+    /// For how many ticks from a mark of its own that is fired on the channel is blind with stray light; 0
+    /// where there is none. When that begins to rise, the samples tell.
     pub blank_ticks: u32,
     /// For how many ticks behind a clipped sample the signal is not that of the light.
     pub recovery_ticks: u32,
@@ -102,9 +103,10 @@ fn lags(receiver: &Receiver) -> i64 {
     i64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + 2
 }
 
+/// Whether the whole tick next to where light was found is in the gate.
 fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
     let (nearest, farthest) = receiver.gate_ticks;
-    (i64::from(nearest)..=i64::from(farthest)).contains(&found.lag)
+    (i64::from(nearest)..=i64::from(farthest)).contains(&(found.at().round() as i64))
 }
 
 /// All light of the shots of a `band` that is told from noise.
