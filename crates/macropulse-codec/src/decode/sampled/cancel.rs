@@ -199,17 +199,18 @@ impl<'a> Residual<'a> {
         let span = self.pulse.span() as i64;
         let answers: Vec<f32> =
             (-span - 1..=span + 1).map(|tick| self.pulse.answer(tick as f64 - late)).collect();
-        let sigma = self.filtered.sigma;
+        let least = CERTAIN * CERTAIN * self.filtered.sigma * self.filtered.sigma;
         for place in places {
             for (tick, about) in (-span..=span).zip(answers.windows(3)) {
                 let Ok(at) = usize::try_from(place + tick) else { continue };
                 let Some(signal) = self.filtered.signal.get_mut(at) else { continue };
-                *signal -= photons * about[1];
+                let answer = about[1];
+                *signal -= photons * answer;
                 let about = about.iter().map(|answer| answer.abs());
-                let nearly = SHAPE * photons * about.clone().fold(0.0, f32::max);
-                let counted = excess * photons * (answers[(tick + span + 1) as usize]).powi(2);
+                let nearly = SHAPE * photons * about.fold(0.0, f32::max);
+                let counted = excess * photons * answer * answer;
                 let doubt = counted + nearly * nearly;
-                if doubt > (CERTAIN * sigma).powi(2) {
+                if doubt > least {
                     let before = self.filtered.doubt[at];
                     self.filtered.doubt[at] = (before * before + doubt).sqrt();
                 }

@@ -46,7 +46,8 @@ pub struct Sampling {
     pub blank_ticks: u32,
     /// For how many ticks behind a clipped sample the signal is not that of the light.
     pub recovery_ticks: u32,
-    /// Marks of a word that must be neither blanked nor clipped otherwise, to decide by them.
+    /// Marks of a word that must tell something, neither blanked nor hidden by brighter light, to decide by
+    /// them; of a word of fewer marks all.
     pub least_marks: u16,
 }
 
@@ -175,6 +176,14 @@ struct Mark {
     doubt: f32,
 }
 
+impl Mark {
+    /// By how much it is weighed beside one that is certain: by the inverse of its variance.
+    fn weight(&self, sigma: f32) -> f32 {
+        let share = self.doubt / sigma;
+        1.0 / (1.0 + share * share)
+    }
+}
+
 /// The marks of a word at one lag, together.
 #[derive(Debug, Clone, Copy)]
 struct Sum {
@@ -247,8 +256,7 @@ impl Rule {
         let cap = self.cap(least, marks);
         let (mut sum, mut weights) = (0.0, 0.0);
         for mark in counted {
-            let share = mark.doubt / self.sigma;
-            let weight = 1.0 / (1.0 + share * share);
+            let weight = mark.weight(self.sigma);
             sum += weight * mark.height.min(cap);
             weights += weight;
         }

@@ -19,7 +19,7 @@ pub(super) fn in_time(
 ) -> f64 {
     let mut about = [0.0; 3];
     for mark in counted.iter().filter(|mark| mark.height <= bright) {
-        let weight = 1.0 / (1.0 + (mark.doubt / filtered.sigma).powi(2));
+        let weight = mark.weight(filtered.sigma);
         for (tick, sum) in about.iter_mut().enumerate() {
             let at = (mark.place + tick).checked_sub(1);
             let signal = at.and_then(|at| filtered.signal.get(at)).copied();
