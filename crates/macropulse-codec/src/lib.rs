@@ -1,15 +1,15 @@
 //! The codec of Macropulse: what both ends of a pulse-coded lidar link speak, and the receivers.
 //!
 //! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word laid out on
-//! chips. A receiver is given the **ticks** at which its converters saw light and the **shot
-//! log** of what was sent when, and finds the delay of every shot. Nothing here knows a scene,
-//! light, a file system or a thread pool.
+//! chips. A receiver is given the **ticks** at which its converters saw light, or the **samples** of
+//! the signal, and the **shot log** of what was sent when, and finds the delay of every shot. Nothing
+//! here knows a scene, light, a file system or a thread pool.
 //!
 //! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
-//! * [`ShotLog`] and [`Ticks`]: what a receiver is given, as columns; [`Cut`]: how they are cut out
-//!   of a stream.
+//! * [`ShotLog`], and [`Ticks`] or [`Samples`]: what a receiver is given, as columns; [`Cut`]: how
+//!   they are cut out of a stream.
 //! * [`files`]: shot logs and ticks as text and as bytes.
-//! * [`decode`]: the receivers, from ticks to returns.
+//! * [`decode`]: the receivers, from ticks or samples to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
 //! * [`level`]: which instructions the wide loops use.
 

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse_codec::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse_codec::decode::{Effort, Error, Pick, Receiver, ReceiverKind};
-use macropulse_codec::{ShotLog, Ticks};
+use macropulse_codec::decode::{Effort, Error, Pick, Receiver, ReceiverKind, Reject, Sampling};
+use macropulse_codec::{Samples, ShotLog, Ticks};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -193,6 +193,100 @@ fn settings_outside_their_limits_are_refused() {
         let error = refused(|receiver, _, _| spoil(receiver));
         assert!(matches!(error, Error::TooLong { .. }), "{error:?}");
         assert_says(&error, &["use longer ticks"]);
+    }
+}
+
+/// A receiver of samples, and samples of the three shots: a mark is one tick of 100 codes.
+fn sampled() -> (Receiver, Samples) {
+    let sampling = Sampling {
+        pulse: vec![10.0; 17],
+        excess: 1.0,
+        full_scale: 2000,
+        blank_ticks: 0,
+        recovery_ticks: 0,
+        least_marks: 2,
+    };
+    let kind = ReceiverKind::Sampled;
+    let mut code: Vec<i16> = (0..5000).map(|at| at * 3 % 5 - 2).collect();
+    ticks().tick.iter().for_each(|tick| code[*tick as usize] += 100);
+    let samples = Samples { epoch: 0, channel: vec![0], code };
+    (Receiver { kind, sampling: Some(sampling), ..receiver() }, samples)
+}
+
+/// What the receiver of samples says when one thing is wrong.
+fn refused_sampled(spoil: impl Fn(&mut Receiver, &mut ShotLog, &mut Samples)) -> Error {
+    let ((mut receiver, mut samples), mut log) = (sampled(), log());
+    assert_eq!(receiver.decode(&codebook(), &log, &samples).unwrap().shot, [0, 1, 2]);
+    spoil(&mut receiver, &mut log, &mut samples);
+    receiver.decode(&codebook(), &log, &samples).unwrap_err()
+}
+
+#[test]
+fn a_record_of_another_kind_is_refused() {
+    let error = refused_sampled(|receiver, _, _| receiver.kind = ReceiverKind::Matched);
+    assert_eq!(error, Error::Record { wants: "ticks", given: "samples" });
+    assert_says(&error, &["decodes ticks", "use a receiver of samples"]);
+    let receiver = sampled().0;
+    let error = receiver.decode(&codebook(), &log(), &ticks()).unwrap_err();
+    assert_eq!(error, Error::Record { wants: "samples", given: "ticks" });
+    let error = receiver.explain(&codebook(), (&log(), &ticks()), 0).unwrap_err();
+    assert_says(&error, &["only receivers of ticks are explained"]);
+}
+
+#[test]
+fn samples_that_fit_no_channel_are_refused() {
+    let error = refused_sampled(|_, _, samples| samples.channel = vec![0, 1, 2]);
+    assert_eq!(error, Error::UnevenSamples { codes: 5000, channels: 3 });
+    assert_says(&error, &["5000 samples", "3 channels"]);
+    let error = refused_sampled(|_, _, samples| samples.channel.clear());
+    assert_eq!(error, Error::UnevenSamples { codes: 5000, channels: 0 });
+    let error = refused_sampled(|_, _, samples| samples.channel = vec![4, 4]);
+    assert_eq!(error, Error::SampledChannelsDoNotAscend { place: 1, channel: 4, before: 4 });
+    assert_says(&error, &["sort them by channel"]);
+    let error = refused_sampled(|_, log, _| log.fired_at_fs[2] = 1_000_000_000_000_000_000);
+    assert_eq!(error, Error::FarFromSamples { shot: 2, ticks: 1_000_000_000_000_000 });
+    assert_says(&error, &["shot 2", "one stretch of time after another"]);
+    let error = refused_sampled(|_, _, samples| samples.epoch = i64::MAX);
+    assert!(matches!(error, Error::FarFromSamples { shot: 0, .. }), "{error:?}");
+}
+
+#[test]
+fn signals_that_cannot_be_are_refused() {
+    type Spoil = fn(&mut Sampling);
+    let spoils: [(&str, Spoil); 12] = [
+        ("sampling.pulse", |sampling| sampling.pulse.clear()),
+        ("sampling.pulse", |sampling| sampling.pulse.push(1.0)),
+        ("sampling.pulse", |sampling| sampling.pulse = vec![1.0; (1 << 14) + 1]),
+        ("sampling.pulse", |sampling| sampling.pulse[3] = f32::NAN),
+        ("sampling.pulse", |sampling| sampling.pulse[8] = 0.0),
+        ("sampling.pulse", |sampling| sampling.pulse[8] = -1.0),
+        ("sampling.excess", |sampling| sampling.excess = 0.9),
+        ("sampling.excess", |sampling| sampling.excess = f64::NAN),
+        ("sampling.excess", |sampling| sampling.excess = f64::INFINITY),
+        ("sampling.full_scale", |sampling| sampling.full_scale = 0),
+        ("sampling.full_scale", |sampling| sampling.full_scale = -7),
+        ("sampling.least_marks", |sampling| sampling.least_marks = 0),
+    ];
+    for (name, spoil) in spoils {
+        let error = refused_sampled(|receiver, _, _| {
+            receiver.sampling.iter_mut().for_each(spoil);
+        });
+        assert!(matches!(error, Error::Setting { setting, .. } if setting == name), "{error:?}");
+        assert_says(&error, &[name, "use "]);
+    }
+    let error = refused_sampled(|receiver, _, _| receiver.sampling = None);
+    assert_says(&error, &["`sampling`", "missing"]);
+}
+
+#[test]
+fn without_samples_it_is_dark() {
+    let ((receiver, mut samples), log) = (sampled(), log());
+    samples.channel = vec![1];
+    let elsewhere = receiver.decode(&codebook(), &log, &samples).unwrap();
+    let none = receiver.decode(&codebook(), &log, &Samples::default()).unwrap();
+    for returns in [elsewhere, none] {
+        assert!(returns.is_empty());
+        assert_eq!(returns.rejected(Reject::NoPeak), 3);
     }
 }
 

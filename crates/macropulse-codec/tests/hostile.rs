@@ -7,11 +7,11 @@ use macropulse_codec::code::correlation::{
     CrossCorrelation, aperiodic, balanced, bipolar, periodic,
 };
 use macropulse_codec::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, Sparse};
-use macropulse_codec::decode::{Receiver, ReceiverKind};
+use macropulse_codec::decode::{Receiver, ReceiverKind, Sampling};
 use macropulse_codec::files::{
     Form, Limits, ShotHeader, ShotReader, ShotWriter, Stream, TickHeader, TickReader, TickWriter,
 };
-use macropulse_codec::{Cut, ShotLog, Tick, Ticks};
+use macropulse_codec::{Cut, Samples, ShotLog, Tick, Ticks};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -78,6 +78,38 @@ prop_compose! {
         amplitude in proptest::collection::vec(any::<f32>(), 0..9),
     ) -> Ticks {
         Ticks { epoch, tick, channel, amplitude }
+    }
+}
+
+fn any_f32() -> impl Strategy<Value = f32> {
+    prop_oneof![Just(0.0), Just(1.0), -3.0..3.0_f32, Just(f32::INFINITY), any::<f32>()]
+}
+
+prop_compose! {
+    fn any_sampling()(
+        pulse in proptest::collection::vec(any_f32(), 0..40),
+        sane in proptest::collection::vec(0.5..3.0_f32, 1..40),
+        is_sane in 0..4_u8,
+        excess in prop_oneof![Just(1.0), 0.0..9.0_f64, any::<f64>()],
+        full_scale in any::<i16>(),
+        numbers in [any_u32(), any_u32()],
+        least_marks in any::<u16>(),
+    ) -> Sampling {
+        let pulse = if is_sane > 0 { sane } else { pulse };
+        let [blank_ticks, recovery_ticks] = numbers;
+        Sampling { pulse, excess, full_scale, blank_ticks, recovery_ticks, least_marks }
+    }
+}
+
+prop_compose! {
+    fn any_samples()(
+        epoch in any_i64(),
+        channel in proptest::collection::vec(any::<u16>(), 0..3),
+        code in proptest::collection::vec(any::<i16>(), 0..90),
+        care in 0..4_u8,
+    ) -> Samples {
+        let channel = if care > 0 { vec![channel.first().copied().unwrap_or(0)] } else { channel };
+        Samples { epoch, channel, code }
     }
 }
 
@@ -162,6 +194,35 @@ proptest! {
         }
         let explained = receiver.explain(&codebook(), (&log, &ticks), shot as usize);
         prop_assert!(shot < 3 || explained.is_err());
+    }
+
+    #[test]
+    fn samples_are_decoded_or_refused(
+        (any, samples, sampling) in (any_log(), any_samples(), any_sampling()),
+        care in 0..4_u8,
+        epoch in -100..1000_i64,
+        (gate, alarm) in ((any_u32(), any_u32()), 1e-9..1e3_f64),
+    ) {
+        let (receiver, mut log, ticks) = sound();
+        let kind = ReceiverKind::Sampled;
+        let mut receiver = Receiver { kind, sampling: Some(sampling), ..receiver };
+        let mut samples = samples;
+        log.channel = vec![samples.channel.first().copied().unwrap_or(0); 3];
+        match care {
+            0 => log = any,
+            1 => receiver.gate_ticks = gate,
+            2 => (samples.epoch, receiver.false_alarm) = (epoch, alarm),
+            _ => samples.epoch = epoch,
+        }
+        let decoded = receiver.decode(&codebook(), &log, &samples);
+        if let Ok(returns) = decoded {
+            prop_assert!(returns.tof.iter().all(|tof| tof.is_finite()));
+            prop_assert!(returns.photons.iter().all(|photons| photons.is_finite()));
+        }
+        prop_assert!(receiver.decode(&codebook(), &log, &ticks).is_err());
+        prop_assert!(receiver.explain(&codebook(), (&log, &ticks), 0).is_err());
+        receiver.kind = ReceiverKind::Matched;
+        prop_assert!(receiver.decode(&codebook(), &log, &samples).is_err());
     }
 
     #[test]

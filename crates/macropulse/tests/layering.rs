@@ -55,7 +55,7 @@ const CODEC: Layers = Layers {
         Rule {
             module: "decode",
             may_name: &["code", "kernels", "samples", "shot_log", "statistics", "ticks", "time"],
-            because: "a receiver knows ticks and what was fired, as the hardware would",
+            because: "a receiver knows its record and what was fired, as the hardware would",
         },
     ],
 };
@@ -378,6 +378,7 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
     let home = |name: &str| match name {
         "ShotLog" => "shot_log".to_owned(),
         "Tick" | "Ticks" => "ticks".to_owned(),
+        "Record" | "Samples" => "samples".to_owned(),
         "Cut" => "cut".to_owned(),
         _ => name.to_owned(),
     };

@@ -70,7 +70,7 @@ pub struct Receiver {
     /// Nearest and farthest round trip accepted, in ticks.
     pub gate_ticks: (u32, u32),
     /// Farthest round trip from which light of the shots may come although it is not accepted, in
-    /// ticks: the matched receiver finds and cancels light up to there.
+    /// ticks: the matched and the sampled receiver find and cancel light up to there.
     pub light_ticks: u32,
     /// TDC ticks per chip.
     pub ticks_per_chip: u32,
@@ -82,8 +82,8 @@ pub struct Receiver {
     /// Whether each photon of a mark makes an event at a time of its own, and not the mark one: then
     /// one of many comes nearly always where the mark is looked for.
     pub photons_apart: bool,
-    /// False returns accepted per shot; the matched and the balanced receiver derive their
-    /// threshold from it.
+    /// False returns accepted per shot; the matched, the balanced and the sampled receiver derive
+    /// their threshold from it.
     pub false_alarm: f64,
     /// Marks of a code word that make a 1 bit, for the literal and the blind receiver.
     pub bit_threshold: u16,

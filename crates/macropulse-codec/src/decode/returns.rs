@@ -47,12 +47,14 @@ pub struct Returns {
     pub peak: Vec<u16>,
     /// Marks the macropulse has.
     pub marks: Vec<u16>,
-    /// Peak minus the best other lag the receiver looked at.
+    /// Peak minus the best other lag the receiver looked at; of samples, how many standard deviations of
+    /// the noise the sum of the marks is above the threshold.
     pub margin: Vec<u16>,
     /// Energy as the receiver can tell it, in detected photons per mark: measured, or by the count of
     /// the marks found as of a detector that every photon fires.
     pub photons: Vec<f32>,
-    /// Whether `photons` is a lower bound: no mark was missed, and no amplitude measured.
+    /// Whether `photons` is a lower bound: no mark was missed, and no amplitude measured, or samples were
+    /// clipped.
     pub saturated: Vec<bool>,
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],

@@ -28,4 +28,4 @@ pub(crate) use correlate::{Counts, NARROW, WIDE, and, is_dark, or, read};
 pub(crate) use lay::{count_each, lay};
 pub(crate) use marks::{WordTicks, begin_with, places_of};
 pub(crate) use pattern::{Pattern, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, put_out};
-pub(crate) use waveform::{Counting, LAGS, Lags, filter};
+pub(crate) use waveform::{LAGS, filter, lower, standing_out};

@@ -1,146 +1,90 @@
-//! Loops over samples: the matched filter, and the marks of a word added up at each lag.
+//! Loops over samples: the matched filter, and the least mark of a word at each lag.
+
+use std::ops::Range;
 
 use crate::on_every_level;
 
 /// Lags that are looked at together, so that what is known of them stays close to the processor.
 pub(crate) const LAGS: usize = 512;
 
-/// What is known of up to [`LAGS`] lags of a shot, one after another.
-pub(crate) struct Lags {
-    /// The least of the marks that count; infinite where none does.
-    pub least: [f32; LAGS],
-    /// How much a mark counts at most.
-    cap: [f32; LAGS],
-    /// Marks that count.
-    pub count: [f32; LAGS],
-    /// Their sum, none above the cap.
-    sum: [f32; LAGS],
-    /// The sum over its standard deviation where there is noise alone.
-    pub score: [f32; LAGS],
-}
-
-impl Default for Lags {
-    fn default() -> Self {
-        let none = [0.0; LAGS];
-        Self { least: none, cap: none, count: none, sum: none, score: none }
-    }
-}
-
-/// How marks are capped and counted.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Counting {
-    /// Standard deviation of the noise.
-    pub sigma: f32,
-    /// What n photons vary by, over n.
-    pub excess: f32,
-    /// Of how many of its own standard deviations a mark may exceed the least one.
-    pub above: f32,
-    /// Marks that must count.
-    pub fewest: f32,
-}
-
-impl Counting {
-    /// How much a mark counts at most where the `least` is so much.
-    #[inline(always)]
-    pub(crate) fn cap(&self, least: f32) -> f32 {
-        let light = if least > 0.0 { least } else { 0.0 };
-        least + self.above * (self.sigma * self.sigma + self.excess * light).sqrt()
-    }
-}
-
 /// Samples that are filtered together.
 const BLOCK: usize = 1024;
 
+/// Lags that are passed by together where none stands out.
+const PASSED: usize = 64;
+
+/// Lags that are looked at in one go.
+const LANES: usize = 16;
+
+/// Filters `codes` with `taps`, of an odd number: entry n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\],
+/// r being half of their number, with 0 for codes beyond the ends and in the `dark` ranges, which ascend
+/// and do not overlap.
+pub(crate) fn filter(codes: &[i16], taps: &[f32], dark: &[Range<usize>], filtered: &mut [f32]) {
+    let reach = taps.len() / 2;
+    let mut samples = vec![0.0; BLOCK + 2 * reach];
+    for (block, sums) in filtered.chunks_mut(BLOCK).enumerate() {
+        // The samples of the block begin with this code, which may be before the first.
+        let begin = block * BLOCK;
+        let from = begin.saturating_sub(reach);
+        let until = (begin + sums.len() + reach).min(codes.len()).max(from);
+        samples.fill(0.0);
+        let place = |at: usize| at + reach - begin;
+        convert(&codes[from..until], &mut samples[place(from)..place(until)]);
+        let first = dark.partition_point(|dark| dark.end <= from);
+        for dark in dark[first..].iter().take_while(|dark| dark.start < until) {
+            samples[place(dark.start.max(from))..place(dark.end.min(until))].fill(0.0);
+        }
+        convolve(&samples, taps, sums);
+    }
+}
+
 on_every_level! {
-    /// Filters `samples`, of which there are `taps.len() − 1` more: entry n of `filtered` becomes
-    /// Σ taps\[k\]·samples\[n + k\].
-    pub(crate) fn filter(samples: &[f32], taps: &[f32], filtered: &mut [f32]) {
-        for (block, sums) in filtered.chunks_mut(BLOCK).enumerate() {
-            sums.fill(0.0);
-            for (place, tap) in (block * BLOCK..).zip(taps) {
-                let samples = &samples[place..][..sums.len()];
-                for (sum, sample) in sums.iter_mut().zip(samples) {
-                    *sum += tap * sample;
-                }
+    fn convert(codes: &[i16], samples: &mut [f32]) {
+        for (sample, code) in samples.iter_mut().zip(codes) {
+            *sample = f32::from(*code);
+        }
+    }
+}
+
+on_every_level! {
+    /// Entry n of `sums` becomes Σ taps\[k\]·samples\[n + k\].
+    fn convolve(samples: &[f32], taps: &[f32], sums: &mut [f32]) {
+        sums.fill(0.0);
+        for (place, tap) in taps.iter().enumerate() {
+            let samples = &samples[place..][..sums.len()];
+            for (sum, sample) in sums.iter_mut().zip(samples) {
+                *sum += tap * sample;
             }
         }
     }
 }
 
 on_every_level! {
-    /// Begins `count` lags.
-    fn begin(lags: &mut Lags, count: usize) {
-        lags.least[..count].fill(f32::INFINITY);
-        lags.sum[..count].fill(0.0);
-        lags.count[..count].fill(0.0);
-    }
-}
-
-on_every_level! {
-    /// Looks for the least mark; `mark` is the signal at one of them, infinite where it does not count.
-    fn find_least(lags: &mut Lags, mark: &[f32]) {
-        let count = mark.len().min(LAGS);
-        for (least, mark) in lags.least[..count].iter_mut().zip(mark) {
+    /// Lowers each entry of `least` to that of `mark` where it is above.
+    pub(crate) fn lower(least: &mut [f32], mark: &[f32]) {
+        for (least, mark) in least.iter_mut().zip(mark) {
             *least = if *mark < *least { *mark } else { *least };
         }
     }
 }
 
 on_every_level! {
-    /// Caps the marks of `count` lags.
-    fn cap(lags: &mut Lags, count: usize, how: &Counting) {
-        for (cap, least) in lags.cap[..count].iter_mut().zip(&lags.least) {
-            *cap = how.cap(*least);
-        }
-    }
-}
-
-on_every_level! {
-    /// Adds a mark.
-    fn add(lags: &mut Lags, mark: &[f32]) {
-        let length = mark.len().min(LAGS);
-        let so_far = lags.sum[..length].iter_mut().zip(&mut lags.count[..length]);
-        for (((sum, count), cap), mark) in so_far.zip(&lags.cap[..length]).zip(mark) {
-            let counts = *mark < f32::INFINITY;
-            let capped = if *mark < *cap { *mark } else { *cap };
-            *sum += if counts { capped } else { 0.0 };
-            *count += if counts { 1.0 } else { 0.0 };
-        }
-    }
-}
-
-on_every_level! {
-    /// Scores `count` lags, and tells the highest score.
-    fn score(lags: &mut Lags, count: usize, how: &Counting) -> f32 {
-        let per_sigma = 1.0 / how.sigma;
-        let counted = lags.sum[..count].iter().zip(&lags.count[..count]);
-        for (score, (sum, count)) in lags.score[..count].iter_mut().zip(counted) {
-            let scored = sum / count.sqrt() * per_sigma;
-            *score = if *count >= how.fewest { scored } else { f32::NEG_INFINITY };
-        }
-        let mut highest = [f32::NEG_INFINITY; 16];
-        for scores in lags.score[..count].chunks(16) {
-            for (highest, score) in highest.iter_mut().zip(scores) {
-                *highest = if *score > *highest { *score } else { *highest };
+    /// Adds to `found` where `least` is `bound` or more, and not infinite; ascending.
+    pub(crate) fn standing_out(least: &[f32], bound: f32, found: &mut Vec<usize>) {
+        let stands_out = |least: &f32| (*least >= bound) & (*least < f32::INFINITY);
+        for (block, least) in least.chunks(PASSED).enumerate() {
+            let mut some = [0_u32; LANES];
+            let mut lanes = least.chunks_exact(LANES);
+            for least in lanes.by_ref() {
+                for (some, least) in some.iter_mut().zip(least) {
+                    *some |= u32::from(stands_out(least));
+                }
+            }
+            if some != [0; LANES] || lanes.remainder().iter().any(stands_out) {
+                let places = (0..least.len()).filter(|at| stands_out(&least[*at]));
+                found.extend(places.map(|at| block * PASSED + at));
             }
         }
-        highest.into_iter().fold(f32::NEG_INFINITY, f32::max)
-    }
-}
-
-impl Lags {
-    /// Scores `count` lags, up to [`LAGS`], from the signal at each of the `marks`; the highest score.
-    /// `signal` tells the signal at a mark, one entry for each lag, infinite where it does not count.
-    pub(crate) fn score_all<'a>(
-        &mut self,
-        (count, how): (usize, &Counting),
-        marks: impl Iterator<Item = &'a [f32]> + Clone,
-    ) -> f32 {
-        begin(self, count);
-        marks.clone().for_each(|mark| find_least(self, mark));
-        cap(self, count, how);
-        marks.for_each(|mark| add(self, mark));
-        score(self, count, how)
     }
 }
 
@@ -158,16 +102,33 @@ mod tests {
     proptest! {
         #[test]
         fn every_level_filters_alike(
-            samples in proptest::collection::vec(-2048.0..2048.0_f32, 1100..1300),
-            taps in proptest::collection::vec(-1.0..1.0_f32, 1..12),
+            codes in proptest::collection::vec(any::<i16>(), 0..2300),
+            taps in proptest::collection::vec(-1.0..1.0_f32, 1..8),
+            dark in (0..2500_usize, 0..300_usize, 0..300_usize, 0..300_usize),
         ) {
-            let count = samples.len() + 1 - taps.len();
-            let expected: Vec<f32> = (0..count)
-                .map(|n| taps.iter().zip(&samples[n..]).fold(0.0, |sum, (tap, s)| sum + tap * s))
-                .collect();
+            let taps: Vec<f32> = taps.iter().chain(&taps[1..]).copied().collect();
+            let reach = taps.len() / 2;
+            let first = dark.0.min(codes.len());
+            let lengths = [dark.1, dark.2, dark.3];
+            let dark = lengths.iter().scan(first, |end, length| {
+                let begin = *end;
+                *end = (begin + length).min(codes.len());
+                Some(begin..*end)
+            });
+            let dark: Vec<Range<usize>> = dark.step_by(2).collect();
+            let sample = |at: usize| match at.checked_sub(reach) {
+                Some(at) if at < codes.len() && !dark.iter().any(|dark| dark.contains(&at)) => {
+                    f32::from(codes[at])
+                }
+                _ => 0.0,
+            };
+            let sum = |n: usize| {
+                (0..taps.len()).fold(0.0, |sum, k| sum + taps[k] * sample(n + k))
+            };
+            let expected: Vec<f32> = (0..codes.len()).map(sum).collect();
             for (level, found) in at_each_level(|| {
-                let mut filtered = vec![1.0; count];
-                filter(&samples, &taps, &mut filtered);
+                let mut filtered = vec![1.0; codes.len()];
+                filter(&codes, &taps, &dark, &mut filtered);
                 filtered
             }) {
                 prop_assert_eq!(&found, &expected, "{:?}", level);
@@ -175,27 +136,22 @@ mod tests {
         }
 
         #[test]
-        fn every_level_scores_alike(marks in [signal(), signal(), signal()], count in 1..=LAGS) {
-            let how = Counting { sigma: 36.0, excess: 5.5, above: 2.5, fewest: 2.0 };
-            let mut expected = Vec::new();
-            for lag in 0..count {
-                let own: Vec<f32> =
-                    marks.iter().map(|mark| mark[lag]).filter(|mark| mark.is_finite()).collect();
-                let least = own.iter().copied().fold(f32::INFINITY, f32::min);
-                let sum = own.iter().map(|mark| mark.min(how.cap(least))).sum::<f32>();
-                let few = own.len() < 2;
-                let root = (own.len() as f32).sqrt();
-                expected.push(if few { f32::NEG_INFINITY } else { sum / root * (1.0 / 36.0) });
-            }
-            for (level, (scores, highest)) in at_each_level(|| {
-                let mut lags = Lags::default();
-                let highest =
-                    lags.score_all((count, &how), marks.iter().map(|mark| &mark[..count]));
-                (lags.score[..count].to_vec(), highest)
+        fn every_level_finds_where_all_marks_stand_out(
+            marks in [signal(), signal(), signal()],
+            count in 1..=LAGS,
+            bound in -30.0..100.0_f32,
+        ) {
+            let least = |lag: usize| marks.iter().map(|mark| mark[lag]).fold(f32::INFINITY, f32::min);
+            let expected: Vec<usize> = (0..count)
+                .filter(|lag| least(*lag) >= bound && least(*lag).is_finite())
+                .collect();
+            for (level, found) in at_each_level(|| {
+                let (mut least, mut found) = (vec![f32::INFINITY; count], Vec::new());
+                marks.iter().for_each(|mark| lower(&mut least, &mark[..count]));
+                standing_out(&least, bound, &mut found);
+                found
             }) {
-                prop_assert_eq!(&scores, &expected, "{:?}", level);
-                let most = expected.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-                prop_assert_eq!(highest, most, "{:?}", level);
+                prop_assert_eq!(&found, &expected, "{:?}", level);
             }
         }
     }

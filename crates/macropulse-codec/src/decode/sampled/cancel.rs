@@ -4,13 +4,16 @@ use super::filter::Filtered;
 use super::pulse::Pulse;
 use super::search::Candidate;
 use super::time::{clipped, in_time};
-use super::{Band, Rule, Sampling};
+use super::{Band, Mark, Rule, Sampling, Sum};
 
 /// Share of a pulse that is uncertain beside the number of its photons: its shape, and when it came.
 const SHAPE: f32 = 0.04;
 
 /// What is uncertain by less than this share of the noise is as good as certain.
 const CERTAIN: f32 = 0.25;
+
+/// A mark that is uncertain counts if it is so many standard deviations above what may be left of others.
+const TOLD: f32 = 4.0;
 
 /// Share of what a candidate had at first that must be left for it to be light of its own.
 const LEFT: f32 = 0.5;
@@ -57,19 +60,9 @@ pub(super) struct Residual<'a> {
     sampling: &'a Sampling,
     pulse: &'a Pulse,
     filtered: Filtered,
-    /// Places of the marks that count, and of those that are uncertain: room for one candidate.
-    certain: Vec<usize>,
-    uncertain: Vec<usize>,
-}
-
-/// The marks that count, together.
-#[derive(Debug, Clone, Copy)]
-struct Sum {
-    mean: f32,
-    least: f32,
-    most: f32,
-    /// Standard deviations of noise alone.
-    score: f32,
+    /// The marks that count, and those that are too uncertain to: room for one candidate.
+    counted: Vec<Mark>,
+    uncertain: Vec<Mark>,
 }
 
 impl<'a> Residual<'a> {
@@ -78,8 +71,8 @@ impl<'a> Residual<'a> {
         pulse: &'a Pulse,
         filtered: Filtered,
     ) -> Self {
-        let (certain, uncertain) = (Vec::new(), Vec::new());
-        Self { codes, sampling, pulse, filtered, certain, uncertain }
+        let (counted, uncertain) = (Vec::new(), Vec::new());
+        Self { codes, sampling, pulse, filtered, counted, uncertain }
     }
 
     pub(super) fn filtered(&self) -> &Filtered {
@@ -100,27 +93,33 @@ impl<'a> Residual<'a> {
         if sum.score < threshold || sum.least < LEFT * candidate.least {
             return None;
         }
-        let clipped = clipped(self.codes, self.sampling, self.pulse, &self.certain);
+        let clipped = clipped(self.codes, self.sampling, self.pulse, &self.counted);
         let late = match &clipped {
             Some(clipped) => clipped.late,
             None => {
-                let cap = rule.counting(marks.len()).cap(sum.least);
-                in_time(&self.filtered.signal, &self.certain, cap, self.pulse)
+                // Where a mark is cut is too low here: noise alone exceeds it, and so would be late or early.
+                let bright = 2.0 * rule.cap(sum.least, marks.len()) - sum.least;
+                in_time((&self.filtered, bright), &self.counted, self.pulse)
             }
+        };
+        // A pulse is higher between two ticks than it is at either.
+        let photons = match &clipped {
+            Some(_) => sum.mean,
+            None => sum.mean / self.pulse.answer(-late).clamp(0.5, 1.0),
         };
         let found = Found {
             shot,
             lag,
             late,
-            photons: sum.mean,
-            marks: self.certain.len() as u16,
+            photons,
+            marks: self.counted.len() as u16,
             margin: (sum.score - threshold) as u16,
             is_clipped: clipped.is_some(),
         };
         let places = marks.iter().map(|mark| mark + lag);
         match clipped {
-            Some(clipped) => self.close(places, late, clipped.photons.max(sum.mean)),
-            None => self.take_away(places, late, (sum.mean, rule.excess)),
+            Some(clipped) => self.close(places, late, clipped.photons.max(photons)),
+            None => self.take_away(places, late, (photons, rule.excess)),
         }
         Some(found)
     }
@@ -129,10 +128,10 @@ impl<'a> Residual<'a> {
     /// what was taken away since may have moved it.
     fn summit(&mut self, marks: &[i64], lag: i64) -> i64 {
         self.sort(marks, lag);
-        let filtered = &self.filtered.signal;
+        let signal = &self.filtered.signal;
         let height = |late: i64| -> f32 {
-            let at = |place: &usize| filtered.get((*place as i64 + late) as usize).copied();
-            self.certain.iter().map(|place| at(place).unwrap_or(0.0)).sum()
+            let at = |mark: &Mark| signal.get((mark.place as i64 + late) as usize).copied();
+            self.counted.iter().map(|mark| at(mark).unwrap_or(0.0)).sum()
         };
         let here = height(0);
         [-1, 1]
@@ -141,16 +140,24 @@ impl<'a> Residual<'a> {
             .map_or(lag, |late| (lag + late).max(0))
     }
 
-    /// Finds the places of the marks that count and of those that are uncertain.
+    /// Finds the marks that count and those that are too uncertain to: where what is left is not so much
+    /// more than what may be left of other light.
     fn sort(&mut self, marks: &[i64], lag: i64) {
-        self.certain.clear();
+        self.counted.clear();
         self.uncertain.clear();
+        let Filtered { signal, doubt, sigma } = &self.filtered;
         for mark in marks {
             let Ok(place) = usize::try_from(mark + lag) else { continue };
-            match self.filtered.doubt.get(place) {
-                Some(doubt) if *doubt == 0.0 => self.certain.push(place),
-                Some(doubt) if doubt.is_finite() => self.uncertain.push(place),
-                _ => {}
+            let (Some(&height), Some(&doubt)) = (signal.get(place), doubt.get(place)) else {
+                continue;
+            };
+            let mark = Mark { place, height, doubt };
+            match () {
+                () if doubt == 0.0 || height > TOLD * deviation(doubt, *sigma) => {
+                    self.counted.push(mark)
+                }
+                () if doubt.is_finite() => self.uncertain.push(mark),
+                () => {}
             }
         }
     }
@@ -158,36 +165,28 @@ impl<'a> Residual<'a> {
     /// The sum of the marks; `None` where too few tell anything, or some tell that there is no light.
     fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
         self.sort(marks, lag);
-        let count = self.certain.len();
-        if count == 0 || count < rule.fewest(marks.len()) {
+        if self.counted.len() < rule.fewest(marks.len()) {
             return None;
         }
-        let signal = &self.filtered.signal;
-        let heights = || self.certain.iter().map(|place| signal[*place]);
-        let least = heights().fold(f32::INFINITY, f32::min);
-        let most = heights().fold(f32::NEG_INFINITY, f32::max);
-        let is_dark = |place: &usize| {
-            let (doubt, sigma) = (self.filtered.doubt[*place], rule.sigma);
-            signal[*place] + UNCERTAIN * (doubt * doubt + sigma * sigma).sqrt() < SHOULD * least
+        let sum = rule.sum(&self.counted, marks.len())?;
+        let is_dark = |mark: &Mark| {
+            mark.height + UNCERTAIN * deviation(mark.doubt, rule.sigma) < SHOULD * sum.least
         };
-        if least < rule.least(marks.len()) || self.uncertain.iter().any(is_dark) {
-            return None;
-        }
-        let cap = rule.counting(marks.len()).cap(least);
-        let mean = heights().map(|height| height.min(cap)).sum::<f32>() / count as f32;
-        Some(Sum { mean, least, most, score: mean * (count as f32).sqrt() / rule.sigma })
+        let is_told = sum.least >= rule.least(marks.len());
+        (is_told && !self.uncertain.iter().any(is_dark)).then_some(sum)
     }
 
     /// What the score must reach; `None` where marks are missing and the others not equal.
     fn threshold(&self, (sum, marks): (&Sum, usize), rule: &Rule) -> Option<f32> {
-        if self.certain.len() == marks {
+        if self.counted.len() == marks {
             return Some(rule.threshold);
         }
         // Of marks that are clipped, or nearly so, it is not known how strong they are.
         let is_told = sum.most * self.pulse.highest() < 0.5 * f32::from(self.sampling.full_scale);
-        let differ =
-            EQUAL * std::f32::consts::SQRT_2 * rule.deviation(sum.mean) + SPREAD * sum.mean;
-        (!is_told || sum.most - sum.least <= differ).then_some(rule.threshold + super::MISSING)
+        let doubt = self.counted.iter().map(|mark| mark.doubt).fold(0.0, f32::max);
+        let both = std::f32::consts::SQRT_2 * rule.deviation(sum.mean);
+        let differ = EQUAL * deviation(doubt, both) + SPREAD * sum.mean;
+        (!is_told || sum.spread <= differ).then_some(rule.threshold + super::MISSING)
     }
 
     /// Takes pulses of so many `photons` away, that came `late` behind the `places`.
@@ -200,17 +199,18 @@ impl<'a> Residual<'a> {
         let span = self.pulse.span() as i64;
         let answers: Vec<f32> =
             (-span - 1..=span + 1).map(|tick| self.pulse.answer(tick as f64 - late)).collect();
-        let sigma = self.filtered.sigma;
+        let least = CERTAIN * CERTAIN * self.filtered.sigma * self.filtered.sigma;
         for place in places {
             for (tick, about) in (-span..=span).zip(answers.windows(3)) {
                 let Ok(at) = usize::try_from(place + tick) else { continue };
                 let Some(signal) = self.filtered.signal.get_mut(at) else { continue };
-                *signal -= photons * about[1];
+                let answer = about[1];
+                *signal -= photons * answer;
                 let about = about.iter().map(|answer| answer.abs());
-                let nearly = SHAPE * photons * about.clone().fold(0.0, f32::max);
-                let counted = excess * photons * (answers[(tick + span + 1) as usize]).powi(2);
+                let nearly = SHAPE * photons * about.fold(0.0, f32::max);
+                let counted = excess * photons * answer * answer;
                 let doubt = counted + nearly * nearly;
-                if doubt > (CERTAIN * sigma).powi(2) {
+                if doubt > least {
                     let before = self.filtered.doubt[at];
                     self.filtered.doubt[at] = (before * before + doubt).sqrt();
                 }
@@ -235,4 +235,9 @@ impl<'a> Residual<'a> {
             self.filtered.doubt[from..to].fill(f32::INFINITY);
         }
     }
+}
+
+/// Standard deviation of what varies by two independent ones.
+fn deviation(one: f32, other: f32) -> f32 {
+    (one * one + other * other).sqrt()
 }

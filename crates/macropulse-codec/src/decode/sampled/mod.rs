@@ -9,7 +9,8 @@
 //! 3. The strongest candidate is tested again, and if it holds, its pulses are taken away from the
 //!    signal; then the next one. What was taken away is uncertain, and marks there are judged by that
 //!    ([`cancel`]).
-//! 4. What was hidden is looked for again in what is left.
+//! 4. Of shots of which fewer returns were found than are wanted, light that was hidden is looked for in
+//!    what is left.
 //! 5. The range of a return is that of its marks together, that of clipped pulses that of their edges
 //!    ([`time`]).
 
@@ -21,7 +22,6 @@ mod time;
 
 use super::{Receiver, Reject, Return, Returns, Strength};
 use crate::code::Codebook;
-use crate::kernels::Counting;
 use crate::statistics::{normal_order, normal_quantile};
 use crate::{Samples, ShotLog};
 use cancel::{Found, Residual};
@@ -41,15 +41,18 @@ pub struct Sampling {
     pub excess: f64,
     /// The highest code: a sample that has it is clipped.
     pub full_scale: i16,
-    /// For how many ticks from a mark of its own that is fired on the channel is blind with stray light.
+    /// For how many ticks from a mark of its own that is fired on the channel is blind with stray light; 0
+    /// where there is none. When that begins to rise, the samples tell.
     pub blank_ticks: u32,
     /// For how many ticks behind a clipped sample the signal is not that of the light.
     pub recovery_ticks: u32,
-    /// Marks of a word that must be neither blanked nor clipped otherwise, to decide by them.
+    /// Marks of a word that must tell something, neither blanked nor hidden by brighter light, to decide by
+    /// them; of a word of fewer marks all.
     pub least_marks: u16,
 }
 
-/// How often the shots are searched for: what light of others hid is found once that is taken away.
+/// How often is searched: what light of others hid is found once that is taken away. From the second time
+/// on only for shots of which more returns are wanted than were found.
 const ROUNDS: usize = 2;
 
 /// The returns of the owned shots of `log`, of what was checked.
@@ -101,21 +104,28 @@ fn lags(receiver: &Receiver) -> i64 {
     i64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + 2
 }
 
+/// Whether the whole tick next to where light was found is in the gate.
 fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
     let (nearest, farthest) = receiver.gate_ticks;
-    (i64::from(nearest)..=i64::from(farthest)).contains(&found.lag)
+    (i64::from(nearest)..=i64::from(farthest)).contains(&(found.at().round() as i64))
 }
 
 /// All light of the shots of a `band` that is told from noise.
 fn find(band: &Band, codes: &[i16], pulse: &Pulse, sampling: &Sampling) -> Vec<Found> {
+    let receiver = band.receiver;
     let filtered = Filtered::of(codes, pulse, band, sampling);
     let rule = Rule::new(band, sampling, filtered.sigma);
     let mut residual = Residual::new((codes, sampling), pulse, filtered);
-    let mut found = Vec::new();
+    let mut found: Vec<Found> = Vec::new();
+    let mut wanted = vec![receiver.returns; band.fired.len()];
+    let mut open = Vec::new();
     for _ in 0..ROUNDS {
-        let candidates = search::candidates(band, residual.filtered(), &rule);
+        let candidates = search::candidates((band, &rule), residual.filtered(), &wanted, &mut open);
         for candidate in candidates {
-            found.extend(residual.test(&candidate, (band, &rule)));
+            let Some(one) = residual.test(&candidate, (band, &rule)) else { continue };
+            let left = &mut wanted[one.shot];
+            *left = left.saturating_sub(u8::from(is_in_gate(receiver, &one)));
+            found.push(one);
         }
     }
     found
@@ -153,6 +163,39 @@ struct Rule {
     fewest: u16,
     /// Mean of the least of n standard normal variables, for each weight of a word.
     least_of: Vec<f32>,
+}
+
+/// A mark that counts.
+#[derive(Debug, Clone, Copy)]
+struct Mark {
+    /// In the samples.
+    place: usize,
+    /// The signal there.
+    height: f32,
+    /// Standard deviation of what was taken away there.
+    doubt: f32,
+}
+
+impl Mark {
+    /// By how much it is weighed beside one that is certain: by the inverse of its variance.
+    fn weight(&self, sigma: f32) -> f32 {
+        let share = self.doubt / sigma;
+        1.0 / (1.0 + share * share)
+    }
+}
+
+/// The marks of a word at one lag, together.
+#[derive(Debug, Clone, Copy)]
+struct Sum {
+    /// Their mean, none being more than the cap.
+    mean: f32,
+    /// The least of those that are certain.
+    least: f32,
+    most: f32,
+    /// How far the marks are apart.
+    spread: f32,
+    /// Standard deviations of noise alone that the sum is above 0.
+    score: f32,
 }
 
 /// A mark counts no more than the least one and so many standard deviations, beside what the least
@@ -196,13 +239,29 @@ impl Rule {
         usize::from(self.fewest).min(marks)
     }
 
-    fn counting(&self, marks: usize) -> Counting {
-        Counting {
-            sigma: self.sigma,
-            excess: self.excess,
-            above: ABOVE - self.least_of[marks],
-            fewest: self.fewest(marks) as f32,
+    /// How much one of so many marks counts at most where the `least` is so strong.
+    fn cap(&self, least: f32, marks: usize) -> f32 {
+        least + (ABOVE - self.least_of[marks]) * self.deviation(least)
+    }
+
+    /// The marks that count, out of so many `marks`, together; `None` of none.
+    ///
+    /// Each is weighed by the inverse of its variance. How much one counts at most follows from the least
+    /// of those that are certain, if any is.
+    fn sum(&self, counted: &[Mark], marks: usize) -> Option<Sum> {
+        let heights = counted.iter().map(|mark| mark.height);
+        let (lowest, most) = (heights.clone().reduce(f32::min)?, heights.reduce(f32::max)?);
+        let certain = counted.iter().filter(|mark| mark.doubt == 0.0).map(|mark| mark.height);
+        let least = certain.reduce(f32::min).unwrap_or(lowest);
+        let cap = self.cap(least, marks);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for mark in counted {
+            let weight = mark.weight(self.sigma);
+            sum += weight * mark.height.min(cap);
+            weights += weight;
         }
+        let (mean, score) = (sum / weights, sum / (weights.sqrt() * self.sigma));
+        Some(Sum { mean, least, spread: most - lowest, most, score })
     }
 
     /// How strong the least of so many marks must be, in detected photons.

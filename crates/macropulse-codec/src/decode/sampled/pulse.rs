@@ -26,7 +26,8 @@ pub(super) struct Pulse {
     /// How late the filtered pulse is if the vertex of the parabola through three samples of it is, ticks;
     /// ascending.
     vertices: Vec<(f64, f64)>,
-    /// Ticks before the pulse reaches a share of its highest, and behind it, of falling shares.
+    /// Ticks before its time at which the pulse is at a share of its highest, and behind it, by −ln of the
+    /// share, ascending: by that, edges of pulses are nearly straight.
     edges: [Vec<(f64, f64)>; 2],
 }
 
@@ -122,35 +123,43 @@ impl Pulse {
         ascending
     }
 
-    /// When a clipped pulse came, and how many photons it had, from the last sample `before` it was clipped
-    /// and the first one `behind`, so many ticks `apart`: the time in ticks from the sample before.
+    /// When a pulse came that `rises` through a code at a tick and `falls` through another one at a later
+    /// tick, and how many photons it had.
     ///
-    /// A pulse of n photons is at `before` as long before its highest as the pulse takes from the share
-    /// before/n to the highest, and correspondingly behind. Both together are the longer the more photons
-    /// there are: n is found by halving.
-    pub(super) fn clipped(&self, before: f32, behind: f32, apart: f64) -> (f64, f64) {
+    /// A pulse of n photons is at a code c as long before its time as the pulse of one photon is at c/n, and
+    /// correspondingly behind. Both together are the longer the more photons there are: n is found by
+    /// halving.
+    pub(super) fn between(&self, rises: Crossing, falls: Crossing) -> (f64, f64) {
         let highest = f64::from(self.highest());
-        let [before, behind] = [before, behind].map(|code| f64::from(code.max(1.0)) / highest);
-        let rise = |photons: f64| interpolate_falling(&self.edges[0], before / photons);
-        let fall = |photons: f64| interpolate_falling(&self.edges[1], behind / photons);
-        let (mut few, mut many) = (libm::log(before.max(behind)), libm::log(MOST_PHOTONS));
+        let [rising, falling] =
+            [rises, falls].map(|edge| libm::log(f64::from(edge.code.max(1.0)) / highest));
+        let rise = |photons: f64| interpolate(&self.edges[0], photons - rising);
+        let fall = |photons: f64| interpolate(&self.edges[1], photons - falling);
+        // Logarithms of the number of photons.
+        let (mut few, mut many) = (rising.max(falling), MOST_PHOTONS);
         for _ in 0..HALVINGS {
             let middle = (few + many) / 2.0;
-            let photons = libm::exp(middle);
-            match rise(photons) + fall(photons) < apart {
+            match rise(middle) + fall(middle) < falls.tick - rises.tick {
                 true => few = middle,
                 false => many = middle,
             }
         }
-        let photons = libm::exp((few + many) / 2.0);
-        (rise(photons), photons)
+        let photons = (few + many) / 2.0;
+        (rises.tick + rise(photons), libm::exp(photons))
     }
 }
 
-/// More photons than any mark has.
-const MOST_PHOTONS: f64 = 1e18;
+/// Where a pulse goes through a code.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Crossing {
+    pub code: f32,
+    pub tick: f64,
+}
 
-/// How often the number of photons is bounded by halves: to a ten-thousandth.
+/// Logarithm of more photons than any mark has.
+const MOST_PHOTONS: f64 = 41.0;
+
+/// How often the logarithm of the number of photons is bounded by halves: to a ten-thousandth.
 const HALVINGS: usize = 20;
 
 /// The pulse so many steps from its middle; 0 beyond its ends.
@@ -164,22 +173,23 @@ fn vertex([before, here, behind]: [f64; 3]) -> Option<f64> {
     (bent < 0.0).then(|| 0.5 * (before - behind) / bent)
 }
 
-/// How many ticks before and behind the middle the pulse is as high as a share of its highest: pairs of
-/// share and ticks, of ever lower shares, until it rises again or ends.
+/// How many ticks before and behind the middle the pulse is at a share of its highest: pairs of −ln of
+/// the share, ascending, and ticks, until it rises again or ends.
 fn edges(fine: &[f32]) -> [Vec<(f64, f64)>; 2] {
     let middle = fine.len() / 2;
     let highest = (0..fine.len()).fold(0, |most, at| if fine[at] > fine[most] { at } else { most });
     let most = f64::from(fine[highest]);
     let edge = |places: &mut dyn Iterator<Item = usize>, sign: f64| {
-        let mut falling: Vec<(f64, f64)> = Vec::new();
+        let mut ascending: Vec<(f64, f64)> = Vec::new();
         for at in places {
             let share = f64::from(fine[at]) / most;
-            if share <= 0.0 || falling.last().is_some_and(|(last, _)| share >= *last) {
+            let fallen = -libm::log(share);
+            if share <= 0.0 || ascending.last().is_some_and(|(last, _)| fallen <= *last) {
                 break;
             }
-            falling.push((share, sign * (at as f64 - middle as f64) / STEPS_OF_TICK as f64));
+            ascending.push((fallen, sign * (at as f64 - middle as f64) / STEPS_OF_TICK as f64));
         }
-        falling
+        ascending
     };
     [edge(&mut (0..=highest).rev(), -1.0), edge(&mut (highest..fine.len()), 1.0)]
 }
@@ -194,13 +204,76 @@ fn interpolate(ascending: &[(f64, f64)], x: f64) -> f64 {
     last.1 + (x - last.0) / (next.0 - last.0) * (next.1 - last.1)
 }
 
-/// The same of pairs of which the first fall, along their logarithms: so edges of pulses are nearly
-/// straight.
-fn interpolate_falling(falling: &[(f64, f64)], x: f64) -> f64 {
-    let after = falling.partition_point(|(known, _)| *known > x);
-    let (Some(last), Some(next)) = (falling.get(after.wrapping_sub(1)), falling.get(after)) else {
-        return falling.get(after).or(falling.last()).map_or(0.0, |(_, value)| *value);
-    };
-    let [x, from, to] = [x, last.0, next.0].map(libm::log);
-    last.1 + (x - from) / (to - from) * (next.1 - last.1)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pulse of 10 codes a photon, of deviation 1 tick, that falls off more slowly behind.
+    fn pulse() -> Pulse {
+        let at = |step: i32| {
+            let ticks = f64::from(step) / 16.0;
+            let deviation: f64 = if ticks > 0.0 { 1.2 } else { 1.0 };
+            (10.0 * (-(ticks / deviation).powi(2) / 2.0).exp()) as f32
+        };
+        Pulse::new(&Sampling {
+            pulse: (-160..=160).map(at).collect(),
+            excess: 1.0,
+            full_scale: 100,
+            blank_ticks: 0,
+            recovery_ticks: 0,
+            least_marks: 1,
+        })
+    }
+
+    #[test]
+    fn the_filter_makes_one_of_one_photon() {
+        let pulse = pulse();
+        // exp(−3²/2) = 1.1 % before, exp(−(3/1.2)²/2) = 4.4 % behind.
+        assert_eq!((pulse.reach, pulse.taps.len(), pulse.core()), (3, 7, 1));
+        approx::assert_relative_eq!(pulse.answer(0.0), 1.0, max_relative = 1e-6);
+        assert!(pulse.answer(1.0) < 0.9 && pulse.answer(-30.0) == 0.0 && pulse.answer(1e9) == 0.0);
+    }
+
+    #[test]
+    fn how_late_a_pulse_is_follows_from_three_samples() {
+        let pulse = pulse();
+        for late in [-0.5, -0.21, 0.0, 0.3, 0.5] {
+            let samples = [-1.0, 0.0, 1.0].map(|tick| 500.0 * pulse.answer(tick - late));
+            assert!((pulse.late(samples) - late).abs() < 2e-3, "{late}: {}", pulse.late(samples));
+        }
+        assert_eq!(pulse.late([1.0, 1.0, 1.0]), 0.0);
+        assert_eq!(pulse.late([f32::INFINITY; 3]), 0.0);
+    }
+
+    /// Samples of the pulse at every phase, clipped at 100 codes: both its edges tell the time and how many
+    /// photons there were, whatever the codes are in which they are told.
+    #[test]
+    fn how_late_a_clipped_pulse_is_follows_from_its_edges() {
+        let pulse = pulse();
+        for (photons, phase) in [(15.0, 0.0), (100.0, 0.4), (1e4, 0.71), (1e6, 0.99)] {
+            let middle = (pulse.fine.len() / 2) as f64;
+            let at = |ticks: f64| {
+                let step = middle + (ticks - phase) * 16.0;
+                let (before, share) = (step.floor(), (step - step.floor()) as f32);
+                let value = |step: f64| pulse.fine.get(step as usize).copied().unwrap_or(0.0);
+                photons as f32 * ((1.0 - share) * value(before) + share * value(before + 1.0))
+            };
+            let clipped: Vec<i32> = (-9..=9).filter(|tick| at(f64::from(*tick)) >= 100.0).collect();
+            let beside = [clipped[0] - 1, clipped[clipped.len() - 1] + 1].map(f64::from);
+            let [rises, falls] = beside.map(|tick| Crossing { code: at(tick), tick });
+            let (late, told) = pulse.between(rises, falls);
+            assert!((late - phase).abs() < 0.02, "{photons}: {late} for {phase}");
+            assert!((told / photons).ln().abs() < 0.1, "{told} for {photons}");
+        }
+    }
+
+    #[test]
+    fn between_pairs_it_is_interpolated_and_beyond_them_held() {
+        let pairs = [(0.0, 1.0), (2.0, 5.0)];
+        assert_eq!(
+            [-1.0, 0.0, 0.5, 2.0, 9.0].map(|x| interpolate(&pairs, x)),
+            [1.0, 1.0, 2.0, 5.0, 5.0]
+        );
+        assert_eq!(interpolate(&[], 1.0), 0.0);
+    }
 }

@@ -1,8 +1,8 @@
 //! What may be a return: lags at which the marks of a word stand out together.
 
 use super::filter::Filtered;
-use super::{Band, Rule};
-use crate::kernels::{LAGS, Lags};
+use super::{Band, Mark, Rule, Sum};
+use crate::kernels::{LAGS, lower, standing_out};
 
 /// Candidates of a shot at most, the strongest.
 const MOST: usize = 16;
@@ -18,26 +18,122 @@ pub(super) struct Candidate {
     pub rank: f32,
 }
 
-/// All candidates of the `band`, the strongest first.
-pub(super) fn candidates(band: &Band, filtered: &Filtered, rule: &Rule) -> Vec<Candidate> {
-    let open: Vec<f32> = filtered
-        .signal
-        .iter()
-        .zip(&filtered.doubt)
-        .map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY })
-        .collect();
-    let mut bench = Bench { open, lags: Box::default(), beyond: Vec::new() };
+/// All candidates of those shots of the `band` of which returns are `wanted`, the strongest first. `open` is
+/// room for the signal.
+pub(super) fn candidates(
+    (band, rule): (&Band, &Rule),
+    filtered: &Filtered,
+    wanted: &[u8],
+    open: &mut Vec<f32>,
+) -> Vec<Candidate> {
+    let told = filtered.signal.iter().zip(&filtered.doubt);
+    open.clear();
+    open.extend(told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY }));
+    let mut search = Search {
+        band,
+        rule,
+        open,
+        least: Vec::with_capacity(LAGS),
+        beyond: Vec::with_capacity(LAGS),
+        standing_out: Vec::new(),
+        marks: Vec::new(),
+        counted: Vec::new(),
+    };
     let mut all = Vec::new();
-    for shot in 0..band.fired.len() {
-        let first = all.len();
-        bench.candidates_of(shot, (band, rule), &mut all);
-        keep_strongest(&mut all, first);
+    for shot in (0..band.fired.len()).filter(|shot| wanted[*shot] > 0) {
+        search.candidates_of(shot, &mut all);
     }
-    all.sort_by(|one, other| {
+    all.sort_by(|one: &Candidate, other| {
         let places = (one.shot, one.lag).cmp(&(other.shot, other.lag));
         other.rank.total_cmp(&one.rank).then(places)
     });
     all
+}
+
+/// What the search for one shot after another needs.
+struct Search<'a> {
+    band: &'a Band<'a>,
+    rule: &'a Rule,
+    /// The signal, infinite where it tells nothing.
+    open: &'a [f32],
+    /// The least mark at each lag of a block.
+    least: Vec<f32>,
+    /// The signal at a mark at these lags, if not all of them are in the record.
+    beyond: Vec<f32>,
+    /// Places in a block at which the least mark is strong enough.
+    standing_out: Vec<usize>,
+    /// When the marks of the shot leave, in ticks from the first sample on.
+    marks: Vec<i64>,
+    /// The marks that count: room for one lag.
+    counted: Vec<Mark>,
+}
+
+impl Search<'_> {
+    fn candidates_of(&mut self, shot: usize, all: &mut Vec<Candidate>) {
+        let fired = self.band.fired[shot];
+        self.marks.clear();
+        self.marks.extend(self.band.marks(shot).map(|mark| fired + mark));
+        let (Some(&first), Some(&last)) = (self.marks.first(), self.marks.last()) else { return };
+        // Lags of which a mark is in the record.
+        let from = (-last).max(0);
+        let until = (self.open.len() as i64 - first).min(self.band.lags);
+        let before = all.len();
+        for begin in (from..until).step_by(LAGS) {
+            self.find_standing_out(begin, (until - begin).min(LAGS as i64) as usize);
+            for at in 0..self.standing_out.len() {
+                let lag = begin + self.standing_out[at] as i64;
+                all.extend(self.candidate(shot, lag));
+            }
+            keep_strongest(all, before);
+        }
+    }
+
+    /// Finds where the least mark is strong enough, of `count` lags from `begin` on.
+    fn find_standing_out(&mut self, begin: i64, count: usize) {
+        let length = self.open.len() as i64;
+        self.least.clear();
+        self.least.resize(count, f32::INFINITY);
+        for mark in &self.marks {
+            let from = mark + begin;
+            if from >= 0 && from + count as i64 <= length {
+                lower(&mut self.least, &self.open[from as usize..][..count]);
+                continue;
+            }
+            let open = |at: i64| usize::try_from(at).ok().and_then(|at| self.open.get(at)).copied();
+            let signal = (from..from + count as i64).map(|at| open(at).unwrap_or(f32::INFINITY));
+            self.beyond.clear();
+            self.beyond.extend(signal);
+            lower(&mut self.least, &self.beyond);
+        }
+        self.standing_out.clear();
+        standing_out(&self.least, self.rule.least(self.marks.len()), &mut self.standing_out);
+    }
+
+    /// That at `lag`, if the score there reaches the threshold and those beside it are no higher.
+    fn candidate(&mut self, shot: usize, lag: i64) -> Option<Candidate> {
+        let sum = self.sum(lag).filter(|sum| sum.score >= self.rule.threshold)?;
+        let is_whole = self.counted.len() == self.marks.len();
+        let is_peak = self.sum(lag - 1).is_none_or(|before| before.score <= sum.score)
+            && self.sum(lag + 1).is_none_or(|behind| behind.score < sum.score);
+        let rank = sum.least * if is_whole { 1.0 } else { 0.5 };
+        is_peak.then_some(Candidate { shot, lag, least: sum.least, rank })
+    }
+
+    /// The marks at `lag` together, if enough of them count.
+    fn sum(&mut self, lag: i64) -> Option<Sum> {
+        self.counted.clear();
+        for mark in &self.marks {
+            let Ok(place) = usize::try_from(mark + lag) else { continue };
+            match self.open.get(place) {
+                Some(&height) if height < f32::INFINITY => {
+                    self.counted.push(Mark { place, height, doubt: 0.0 });
+                }
+                _ => {}
+            }
+        }
+        let is_enough = self.counted.len() >= self.rule.fewest(self.marks.len());
+        is_enough.then(|| self.rule.sum(&self.counted, self.marks.len())).flatten()
+    }
 }
 
 /// Keeps the strongest of those from place `first` on.
@@ -46,79 +142,5 @@ fn keep_strongest(all: &mut Vec<Candidate>, first: usize) {
         all[first..]
             .sort_by(|one, other| other.rank.total_cmp(&one.rank).then(one.lag.cmp(&other.lag)));
         all.truncate(first + MOST);
-    }
-}
-
-struct Bench {
-    /// The signal, infinite where it tells nothing.
-    open: Vec<f32>,
-    lags: Box<Lags>,
-    /// The signal at the marks that are not in the record with all lags, one behind the other.
-    beyond: Vec<f32>,
-}
-
-impl Bench {
-    fn candidates_of(
-        &mut self,
-        shot: usize,
-        (band, rule): (&Band, &Rule),
-        all: &mut Vec<Candidate>,
-    ) {
-        let marks: Vec<i64> = band.marks(shot).collect();
-        let (Some(first), Some(last)) = (marks.first(), marks.last()) else { return };
-        let fired = band.fired[shot];
-        let counting = rule.counting(marks.len());
-        let least = rule.least(marks.len());
-        let before = all.len();
-        // Lags of which a mark is in the record.
-        let from = (-fired - last).max(0);
-        let until = (self.open.len() as i64 - fired - first).min(band.lags);
-        // Each block begins with the last lag but one of the block before it: all but the first and the
-        // last lag of a block have a lag to both sides.
-        let mut begin = from;
-        while begin + 2 < until {
-            let count = (until - begin).min(LAGS as i64) as usize;
-            let highest = self.score((fired + begin, count), &marks, &counting);
-            if highest >= rule.threshold {
-                let lags = &self.lags;
-                for at in 1..count - 1 {
-                    let score = lags.score[at];
-                    let is_top = score >= lags.score[at - 1] && score > lags.score[at + 1];
-                    if !(is_top && score >= rule.threshold && lags.least[at] >= least) {
-                        continue;
-                    }
-                    let is_whole = lags.count[at] == marks.len() as f32;
-                    let rank = lags.least[at] * if is_whole { 1.0 } else { 0.5 };
-                    let lag = begin + at as i64;
-                    all.push(Candidate { shot, lag, least: lags.least[at], rank });
-                }
-                keep_strongest(all, before);
-            }
-            begin += count as i64 - 2;
-        }
-    }
-
-    /// Scores `count` lags from the tick `begin` on, at which the first mark would be with a lag of 0; the
-    /// highest score.
-    fn score(
-        &mut self,
-        (begin, count): (i64, usize),
-        marks: &[i64],
-        counting: &crate::kernels::Counting,
-    ) -> f32 {
-        let length = self.open.len() as i64;
-        let is_within = |mark: &i64| begin + mark >= 0 && begin + mark + count as i64 <= length;
-        self.beyond.clear();
-        for mark in marks.iter().filter(|mark| !is_within(mark)) {
-            let at = |lag: usize| usize::try_from(begin + mark + lag as i64).ok();
-            let signal = |lag: usize| at(lag).and_then(|at| self.open.get(at));
-            self.beyond.extend((0..count).map(|lag| signal(lag).copied().unwrap_or(f32::INFINITY)));
-        }
-        let within = marks.iter().filter(|mark| is_within(mark)).map(|mark| {
-            let at = (begin + mark) as usize;
-            &self.open[at..at + count]
-        });
-        let all = within.chain(self.beyond.chunks(count));
-        self.lags.score_all((count, counting), all)
     }
 }

@@ -1,19 +1,29 @@
 //! When light came, to a fraction of a tick.
 
-use super::Sampling;
-use super::pulse::Pulse;
+use super::filter::Filtered;
+use super::pulse::{Crossing, Pulse};
+use super::{Mark, Sampling};
 
 /// How far from where a mark is found a clipped sample is of it, in ticks.
 const NEAR: usize = 3;
 
-/// How late the marks at the `certain` places are, in ticks, as their sum tells. A mark above the `cap` has
-/// light of others, too, and does not count.
-pub(super) fn in_time(signal: &[f32], certain: &[usize], cap: f32, pulse: &Pulse) -> f64 {
+/// Share of full scale from which on a sample beside clipped ones tells where the edge of the pulse is.
+const TOLD: f32 = 0.02;
+
+/// How late the marks that count are, in ticks, as their sum tells, each weighed by how certain it is. A
+/// mark that is `bright`er has light of others, too, and does not count.
+pub(super) fn in_time(
+    (filtered, bright): (&Filtered, f32),
+    counted: &[Mark],
+    pulse: &Pulse,
+) -> f64 {
     let mut about = [0.0; 3];
-    for place in certain.iter().filter(|place| signal[**place] <= cap) {
+    for mark in counted.iter().filter(|mark| mark.height <= bright) {
+        let weight = mark.weight(filtered.sigma);
         for (tick, sum) in about.iter_mut().enumerate() {
-            let at = (place + tick).checked_sub(1);
-            *sum += at.and_then(|at| signal.get(at)).copied().unwrap_or(0.0);
+            let at = (mark.place + tick).checked_sub(1);
+            let signal = at.and_then(|at| filtered.signal.get(at)).copied();
+            *sum += weight * signal.unwrap_or(0.0);
         }
     }
     pulse.late(about)
@@ -28,25 +38,26 @@ pub(super) struct Clipped {
     pub photons: f32,
 }
 
-/// The time of the marks at the `certain` places if samples there are clipped, from their edges; the
+/// The time of the marks that count if samples there are clipped, from their edges; the
 /// median of the marks. `None` where none is clipped.
 pub(super) fn clipped(
     codes: &[i16],
     sampling: &Sampling,
     pulse: &Pulse,
-    certain: &[usize],
+    counted: &[Mark],
 ) -> Option<Clipped> {
     let is_clipped = |at: &usize| codes[*at] >= sampling.full_scale;
     let mut told: Vec<(f64, f64)> = Vec::new();
-    for &place in certain {
+    for &Mark { place, .. } in counted {
         let about = (0..=NEAR).flat_map(|apart| [place.saturating_sub(apart), place + apart]);
         let Some(at) = about.filter(|at| *at < codes.len()).find(is_clipped) else { continue };
         let before = (0..at).rev().find(|at| !is_clipped(at));
         let behind = (at..codes.len()).find(|at| !is_clipped(at));
         let (Some(before), Some(behind)) = (before, behind) else { continue };
-        let edges = [codes[before], codes[behind]].map(f32::from);
-        let (late, photons) = pulse.clipped(edges[0], edges[1], (behind - before) as f64);
-        told.push((before as f64 - place as f64 + late, photons));
+        let rises = crossing(codes, sampling, (before, 0.5));
+        let falls = crossing(codes, sampling, (behind, -0.5));
+        let (tick, photons) = pulse.between(rises, falls);
+        told.push((tick - place as f64, photons));
     }
     told.sort_by(|one, other| one.0.total_cmp(&other.0));
     let middle = told.len().checked_sub(1)? / 2;
@@ -58,4 +69,14 @@ pub(super) fn clipped(
         }
     };
     Some(Clipped { late, photons: photons as f32 })
+}
+
+/// Where a pulse is at a code, from the sample `at` beside clipped ones: where that sample is, or, if it is
+/// too dark to tell, at full scale, by half a tick `inwards`.
+fn crossing(codes: &[i16], sampling: &Sampling, (at, inwards): (usize, f64)) -> Crossing {
+    let (code, full) = (f32::from(codes[at]), f32::from(sampling.full_scale));
+    match code >= TOLD * full {
+        true => Crossing { code, tick: at as f64 },
+        false => Crossing { code: full, tick: at as f64 + inwards },
+    }
 }
