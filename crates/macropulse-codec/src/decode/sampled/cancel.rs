@@ -15,15 +15,6 @@ const CERTAIN: f32 = 0.25;
 /// A mark that is uncertain counts if it is so many standard deviations above what may be left of others.
 const TOLD: f32 = 4.0;
 
-/// Share of what a candidate had at first that must be left for it to be light of its own.
-const LEFT: f32 = 0.5;
-
-/// Of how many standard deviations an uncertain mark may be weaker than it should be.
-const UNCERTAIN: f32 = 2.5;
-
-/// What share of the least certain mark an uncertain one should have at least.
-const SHOULD: f32 = 0.6;
-
 /// Marks are equal if they differ by no more than so many standard deviations of their difference …
 const EQUAL: f32 = 3.0;
 
@@ -60,9 +51,8 @@ pub(super) struct Residual<'a> {
     sampling: &'a Sampling,
     pulse: &'a Pulse,
     filtered: Filtered,
-    /// The marks that count, and those that are too uncertain to: room for one candidate.
+    /// The marks that count: room for one candidate.
     counted: Vec<Mark>,
-    uncertain: Vec<Mark>,
 }
 
 impl<'a> Residual<'a> {
@@ -71,12 +61,7 @@ impl<'a> Residual<'a> {
         pulse: &'a Pulse,
         filtered: Filtered,
     ) -> Self {
-        let (counted, uncertain) = (Vec::new(), Vec::new());
-        Self { codes, sampling, pulse, filtered, counted, uncertain }
-    }
-
-    pub(super) fn filtered(&self) -> &Filtered {
-        &self.filtered
+        Self { codes, sampling, pulse, filtered, counted: Vec::new() }
     }
 
     /// Whether the `candidate` is still there; if so, its light is taken away.
@@ -90,17 +75,13 @@ impl<'a> Residual<'a> {
         let lag = self.summit(&marks, candidate.lag);
         let sum = self.sum(&marks, lag, rule)?;
         let threshold = self.threshold((&sum, marks.len()), rule)?;
-        if sum.score < threshold || sum.least < LEFT * candidate.least {
+        if sum.score < threshold {
             return None;
         }
         let clipped = clipped(self.codes, self.sampling, self.pulse, &self.counted);
         let late = match &clipped {
             Some(clipped) => clipped.late,
-            None => {
-                // Where a mark is cut is too low here: noise alone exceeds it, and so would be late or early.
-                let bright = 2.0 * rule.cap(sum.least, marks.len()) - sum.least;
-                in_time((&self.filtered, bright), &self.counted, self.pulse)
-            }
+            None => in_time(&self.filtered, &self.counted, self.pulse),
         };
         // A pulse is higher between two ticks than it is at either.
         let photons = match &clipped {
@@ -140,40 +121,27 @@ impl<'a> Residual<'a> {
             .map_or(lag, |late| (lag + late).max(0))
     }
 
-    /// Finds the marks that count and those that are too uncertain to: where what is left is not so much
+    /// Finds the marks that count: those where nothing was taken away, and those where what is left is much
     /// more than what may be left of other light.
     fn sort(&mut self, marks: &[i64], lag: i64) {
         self.counted.clear();
-        self.uncertain.clear();
         let Filtered { signal, doubt, sigma } = &self.filtered;
         for mark in marks {
             let Ok(place) = usize::try_from(mark + lag) else { continue };
             let (Some(&height), Some(&doubt)) = (signal.get(place), doubt.get(place)) else {
                 continue;
             };
-            let mark = Mark { place, height, doubt };
-            match () {
-                () if doubt == 0.0 || height > TOLD * deviation(doubt, *sigma) => {
-                    self.counted.push(mark)
-                }
-                () if doubt.is_finite() => self.uncertain.push(mark),
-                () => {}
+            if doubt == 0.0 || height > TOLD * deviation(doubt, *sigma) {
+                self.counted.push(Mark { place, height, doubt });
             }
         }
     }
 
-    /// The sum of the marks; `None` where too few tell anything, or some tell that there is no light.
+    /// The sum of the marks at `lag`; `None` where too few tell anything.
     fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
         self.sort(marks, lag);
-        if self.counted.len() < rule.fewest(marks.len()) {
-            return None;
-        }
-        let sum = rule.sum(&self.counted, marks.len())?;
-        let is_dark = |mark: &Mark| {
-            mark.height + UNCERTAIN * deviation(mark.doubt, rule.sigma) < SHOULD * sum.least
-        };
-        let is_told = sum.least >= rule.least(marks.len());
-        (is_told && !self.uncertain.iter().any(is_dark)).then_some(sum)
+        let is_enough = self.counted.len() >= rule.fewest(marks.len());
+        is_enough.then(|| rule.sum(&self.counted, marks.len())).flatten()
     }
 
     /// What the score must reach; `None` where marks are missing and the others not equal.

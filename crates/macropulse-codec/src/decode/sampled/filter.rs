@@ -215,6 +215,36 @@ mod tests {
         assert_eq!(runs(&[1, 2], 3).count(), 0);
     }
 
+    /// One mark at tick 50, whose light shows from tick 47 on, and one at tick 80, before which it is dark.
+    #[test]
+    fn the_channel_is_blind_from_where_its_own_light_shows() {
+        let mut codes: Vec<i16> = (0..100).map(|at| at * 3 % 5 - 2).collect();
+        (codes[47], codes[48], codes[49]) = (40, 900, 2000);
+        let sampling = Sampling {
+            pulse: (-160..=160)
+                .map(|step| libm::expf(-(step as f32 / 16.0) * (step as f32 / 16.0) / 2.0))
+                .collect(),
+            excess: 1.0,
+            full_scale: 2000,
+            blank_ticks: 15,
+            recovery_ticks: 0,
+            least_marks: 1,
+        };
+        let pulse = Pulse::new(&sampling);
+        let log = crate::ShotLog::of_one_channel(&[50, 80], &[0, 0]);
+        let receiver = crate::decode::Receiver::matched(1);
+        let codebook = crate::code::Codebook::single();
+        let (fired, lags) = (vec![50, 80], 100);
+        let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
+        assert_eq!(own_marks(&codes, (&pulse, 1), &band, 15), [46..65, 79..95]);
+        assert!(own_marks(&codes, (&pulse, 1), &band, 0).is_empty());
+        // A tick tells nothing if the sample beside it is blind.
+        let filtered = Filtered::of(&codes, &pulse, &band, &sampling);
+        let open: Vec<usize> = (0..100).filter(|at| filtered.doubt[*at] == 0.0).collect();
+        let expected: Vec<usize> = (0..45).chain(66..78).chain(96..100).collect();
+        assert_eq!(open, expected);
+    }
+
     #[test]
     fn ranges_that_touch_become_one() {
         let ranges = [0..2, 1..3, 3..4, 9..9, 6..8, 6..7];
