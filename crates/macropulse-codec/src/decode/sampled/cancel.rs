@@ -209,3 +209,100 @@ impl<'a> Residual<'a> {
 fn deviation(one: f32, other: f32) -> f32 {
     (one * one + other * other).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::STEPS_OF_TICK;
+    use super::*;
+    use crate::code::{Codebook, Family, Keying, Separated};
+    use crate::decode::Receiver;
+    use crate::{ShotLog, decode::ReceiverKind};
+
+    /// Noise, in photons, none of which is in the signal.
+    const SIGMA: f32 = 36.0;
+
+    fn sampling() -> Sampling {
+        let steps = 4 * STEPS_OF_TICK as i32;
+        let at = |step: i32| {
+            let ticks = step as f32 / STEPS_OF_TICK as f32;
+            libm::expf(-ticks * ticks / 2.0) / 10.0
+        };
+        Sampling {
+            pulse: (-steps..=steps).map(at).collect(),
+            excess: 5.56,
+            full_scale: 1000,
+            blank_ticks: 0,
+            recovery_ticks: 0,
+            least_marks: 2,
+        }
+    }
+
+    /// What becomes of a shot whose three marks are so strong at a lag of 100, of which those that are
+    /// `blind` tell nothing; and how much is left at the first.
+    fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, f32) {
+        let words = Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, seed: 1 };
+        let family = Family::separated(words).unwrap();
+        let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
+        let (sampling, log) = (sampling(), ShotLog::of_one_channel(&[0], &[0]));
+        let pulse = Pulse::new(&sampling);
+        let kind = ReceiverKind::Sampled;
+        let receiver = Receiver { kind, false_alarm: 1e-5, ..Receiver::matched(1) };
+        let (fired, lags) = (vec![0], 200);
+        let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
+        let (mut signal, mut doubt) = (vec![0.0; 300], vec![0.0; 300]);
+        for ((mark, height), blind) in band.marks(0).zip(heights).zip(blind) {
+            for tick in -8..=8 {
+                signal[(100 + mark + tick) as usize] += height * pulse.answer(tick as f64);
+            }
+            if blind {
+                doubt[(100 + mark) as usize] = f32::INFINITY;
+            }
+        }
+        let rule = Rule::new(&band, &sampling, SIGMA);
+        let codes = vec![0; 300];
+        let filtered = Filtered { signal, doubt, sigma: SIGMA };
+        let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
+        let candidate = Candidate { shot: 0, lag: 100, rank: 1.0 };
+        let found = residual.test(&candidate, (&band, &rule));
+        (found, residual.filtered.signal[100 + band.marks(0).next().unwrap() as usize])
+    }
+
+    /// How strong a mark of `count` equal ones is whose sum is so many standard deviations.
+    fn height(score: f32, count: f32) -> f32 {
+        score * SIGMA / count.sqrt()
+    }
+
+    /// 10⁻⁵ false returns in 100 001 lags: 10⁻¹⁰ each, of which the normal bound is 6.36 σ.
+    #[test]
+    fn more_is_asked_of_words_of_which_a_mark_is_missing() {
+        let all = [false; 3];
+        let one = [true, false, false];
+        let with = |score, count, blind| tested([height(score, count); 3], blind).0;
+        assert!(with(6.33, 3.0, all).is_none() && with(6.39, 3.0, all).is_some());
+        assert!(with(6.83, 2.0, one).is_none() && with(6.89, 2.0, one).is_some());
+        assert!(with(100.0, 1.0, [true, true, false]).is_none());
+        let margin = with(9.4, 3.0, all).unwrap().margin;
+        assert_eq!((margin, with(9.4, 2.0, one).unwrap().margin), (3, 2));
+    }
+
+    #[test]
+    fn two_marks_must_be_equal() {
+        let one = [true, false, false];
+        assert!(tested([0.0, 900.0, 1000.0], one).0.is_some());
+        assert!(tested([0.0, 600.0, 1400.0], one).0.is_none());
+        // Three need not: a bright one has light of others.
+        let found = tested([600.0, 600.0, 9000.0], [false; 3]).0.unwrap();
+        assert!((600.0..700.0).contains(&found.photons), "{}", found.photons);
+    }
+
+    #[test]
+    fn what_is_found_is_taken_away() {
+        let (found, left) = tested([1000.0; 3], [false; 3]);
+        let found = found.unwrap();
+        assert_eq!((found.lag, found.marks, found.is_clipped), (100, 3, false));
+        assert!(found.late.abs() < 1e-3 && (found.photons - 1000.0).abs() < 1.0, "{found:?}");
+        assert!(left.abs() < 1.0, "{left}");
+        let (found, left) = tested([100.0; 3], [false; 3]);
+        assert!(found.is_none() && (left - 100.0).abs() < 1e-3, "{left}");
+    }
+}
