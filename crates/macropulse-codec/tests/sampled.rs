@@ -80,27 +80,29 @@ fn a_faint_wall_is_found_at_its_range() {
     assert!((6.5..9.0).contains(&margin), "{margin}");
 }
 
-/// At 200 places in a tick each, N = 200: the mean is right to rms/√200.
+/// At 200 places in a tick each, N = 200: the mean is right to rms/√200. The bounds on the root of the
+/// mean square are 1.3 times what was found with other seeds.
 #[test]
 fn range_has_no_bias_whatever_the_strength() {
     let highest = f64::from(sampling().pulse.iter().copied().fold(0.0, f32::max));
     let clips = f64::from(FULL_SCALE) / highest;
-    for (photons, bound) in [
-        (FAINT, 0.03),
-        (1000.0, 0.02),
-        (0.3 * clips, 0.02),
-        (0.9 * clips, 0.02),
-        (1.5 * clips, 0.05),
-        (5.0 * clips, 0.1),
-        (30.0 * clips, 0.2),
-        (100.0 * clips, 0.2),
+    for (photons, bias, spread) in [
+        (FAINT, 0.03, 0.15),
+        (1000.0, 0.02, 0.065),
+        (0.3 * clips, 0.01, 0.02),
+        (0.9 * clips, 0.01, 0.015),
+        (1.5 * clips, 0.01, 0.015),
+        (5.0 * clips, 0.01, 0.015),
+        (30.0 * clips, 0.01, 0.015),
+        (100.0 * clips, 0.02, 0.05),
+        (1e4 * clips, 0.2, 0.2),
     ] {
         let channel = wall(photons, 200, 2);
         let returns = decode(&receiver(), &channel);
         let (errors, wrong) = errors(&returns, &channel);
         assert!(errors.len() >= 198 && wrong == 0, "{} of 200, {wrong} wrong", errors.len());
-        assert!(mean(&errors).abs() < bound, "{photons}: {}", mean(&errors));
-        assert!(rms(&errors) < 0.35, "{photons}: {}", rms(&errors));
+        assert!(mean(&errors).abs() < bias, "{photons}: {}", mean(&errors));
+        assert!(rms(&errors) < spread, "{photons}: {}", rms(&errors));
         let clipped = returns.saturated.iter().filter(|clipped| **clipped).count();
         assert!(if photons > 1.2 * clips { clipped >= 198 } else { clipped == 0 }, "{photons}");
     }
@@ -180,24 +182,39 @@ fn a_mixed_scene_has_no_wrong_ranges() {
     assert_eq!(of_shots + rejects as usize, shots - 8);
 }
 
-/// Marks of a bright echo fall on two of a faint one's: it is found by what is left.
+/// A mark of a bright echo falls beside one of another echo: that is found by what is left, and the mark
+/// counts where it stands out from what may be left of the bright one.
 #[test]
 fn what_bright_light_hides_is_found_in_what_is_left() {
     let book = codebook();
-    let (bright, faint) = (book.marks(0, 0), book.marks(0, 1));
-    for (of_bright, of_faint) in [(0, 0), (1, 2), (2, 1)] {
-        let mut channel = Channel::of(&[(0.0, 0.0); 4], 7);
-        let apart = f64::from(bright[of_bright]) - f64::from(faint[of_faint]) - PERIOD as f64;
-        let far = 2000.0 + apart;
-        channel.echoes = vec![
-            Echo { shot: 0, ticks: 2000.3, photons: 20_000.0 },
-            Echo { shot: 1, ticks: far + 2.5, photons: 2.0 * FAINT },
-        ];
-        let returns = decode(&receiver(), &channel);
-        assert_eq!(returns.shot, [0, 1], "{of_bright} on {of_faint}");
-        let (errors, wrong) = errors(&returns, &channel);
-        assert!(wrong == 0 && rms(&errors) < 0.5, "{errors:?}");
-        assert_eq!(returns.peak, [3, 2]);
+    let (bright, other) = (book.marks(0, 0), book.marks(0, 1));
+    for (photons, beside, light, marks) in [
+        (20_000.0, 2.5, 2.0 * FAINT, [3, 2]),
+        (20_000.0, 2.5, 10_000.0, [3, 3]),
+        // Clipped: what stands before it is not known, and what comes behind it is blind.
+        (300_000.0, -4.5, 2.0 * FAINT, [3, 2]),
+        (300_000.0, 6.5, 2.0 * FAINT, [3, 2]),
+    ] {
+        for (of_bright, of_other) in [(0, 0), (1, 2), (2, 1)] {
+            let mut channel = Channel::of(&[(0.0, 0.0); 4], 7);
+            let apart = f64::from(bright[of_bright]) - f64::from(other[of_other]);
+            let far = 2000.0 - PERIOD as f64 + apart + beside;
+            channel.echoes = vec![
+                Echo { shot: 0, ticks: 2000.3, photons },
+                Echo { shot: 1, ticks: far, photons: light },
+            ];
+            // Nor may another mark of the same echo be blind.
+            let sampling = Sampling { recovery_ticks: 10, ..sampling() };
+            let returns = decode(&Receiver { sampling: Some(sampling), ..receiver() }, &channel);
+            let what = format!("{light} {beside} ticks beside {photons}");
+            assert_eq!(
+                (returns.shot.as_slice(), returns.peak.as_slice()),
+                (&[0, 1][..], &marks[..]),
+                "{what}"
+            );
+            let (errors, wrong) = errors(&returns, &channel);
+            assert!(wrong == 0 && rms(&errors) < 0.3, "{what}: {errors:?}");
+        }
     }
 }
 
@@ -247,8 +264,8 @@ fn own_light_is_not_taken_for_that_of_others() {
     for shot in 0..channel.log.len() {
         for mark in book.marks(0, channel.log.word[shot]) {
             let leaves = shot * PERIOD as usize + usize::from(*mark);
-            // 2.5 million photons, 50 dB down: 4·10⁻⁴, 1.7 %, 27 %, … of their highest.
-            for (tick, code) in [(5, 0), (4, 8), (3, 1100), (2, FULL_SCALE), (1, FULL_SCALE)] {
+            // 2.5 million photons, 50 dB down: 2·10⁻⁴, 1 %, 14 %, … of their highest.
+            for (tick, code) in [(4, 35), (3, 1800), (2, FULL_SCALE), (1, FULL_SCALE)] {
                 let Some(at) = leaves.checked_sub(tick) else { continue };
                 lit.code[at] = lit.code[at].saturating_add(code).min(FULL_SCALE);
             }

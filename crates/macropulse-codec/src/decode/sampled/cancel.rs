@@ -15,15 +15,6 @@ const CERTAIN: f32 = 0.25;
 /// A mark that is uncertain counts if it is so many standard deviations above what may be left of others.
 const TOLD: f32 = 4.0;
 
-/// Share of what a candidate had at first that must be left for it to be light of its own.
-const LEFT: f32 = 0.5;
-
-/// Of how many standard deviations an uncertain mark may be weaker than it should be.
-const UNCERTAIN: f32 = 2.5;
-
-/// What share of the least certain mark an uncertain one should have at least.
-const SHOULD: f32 = 0.6;
-
 /// Marks are equal if they differ by no more than so many standard deviations of their difference …
 const EQUAL: f32 = 3.0;
 
@@ -60,9 +51,8 @@ pub(super) struct Residual<'a> {
     sampling: &'a Sampling,
     pulse: &'a Pulse,
     filtered: Filtered,
-    /// The marks that count, and those that are too uncertain to: room for one candidate.
+    /// The marks that count: room for one candidate.
     counted: Vec<Mark>,
-    uncertain: Vec<Mark>,
 }
 
 impl<'a> Residual<'a> {
@@ -71,12 +61,7 @@ impl<'a> Residual<'a> {
         pulse: &'a Pulse,
         filtered: Filtered,
     ) -> Self {
-        let (counted, uncertain) = (Vec::new(), Vec::new());
-        Self { codes, sampling, pulse, filtered, counted, uncertain }
-    }
-
-    pub(super) fn filtered(&self) -> &Filtered {
-        &self.filtered
+        Self { codes, sampling, pulse, filtered, counted: Vec::new() }
     }
 
     /// Whether the `candidate` is still there; if so, its light is taken away.
@@ -90,17 +75,13 @@ impl<'a> Residual<'a> {
         let lag = self.summit(&marks, candidate.lag);
         let sum = self.sum(&marks, lag, rule)?;
         let threshold = self.threshold((&sum, marks.len()), rule)?;
-        if sum.score < threshold || sum.least < LEFT * candidate.least {
+        if sum.score < threshold {
             return None;
         }
         let clipped = clipped(self.codes, self.sampling, self.pulse, &self.counted);
         let late = match &clipped {
             Some(clipped) => clipped.late,
-            None => {
-                // Where a mark is cut is too low here: noise alone exceeds it, and so would be late or early.
-                let bright = 2.0 * rule.cap(sum.least, marks.len()) - sum.least;
-                in_time((&self.filtered, bright), &self.counted, self.pulse)
-            }
+            None => in_time(&self.filtered, &self.counted, self.pulse),
         };
         // A pulse is higher between two ticks than it is at either.
         let photons = match &clipped {
@@ -140,40 +121,27 @@ impl<'a> Residual<'a> {
             .map_or(lag, |late| (lag + late).max(0))
     }
 
-    /// Finds the marks that count and those that are too uncertain to: where what is left is not so much
+    /// Finds the marks that count: those where nothing was taken away, and those where what is left is much
     /// more than what may be left of other light.
     fn sort(&mut self, marks: &[i64], lag: i64) {
         self.counted.clear();
-        self.uncertain.clear();
         let Filtered { signal, doubt, sigma } = &self.filtered;
         for mark in marks {
             let Ok(place) = usize::try_from(mark + lag) else { continue };
             let (Some(&height), Some(&doubt)) = (signal.get(place), doubt.get(place)) else {
                 continue;
             };
-            let mark = Mark { place, height, doubt };
-            match () {
-                () if doubt == 0.0 || height > TOLD * deviation(doubt, *sigma) => {
-                    self.counted.push(mark)
-                }
-                () if doubt.is_finite() => self.uncertain.push(mark),
-                () => {}
+            if doubt == 0.0 || height > TOLD * deviation(doubt, *sigma) {
+                self.counted.push(Mark { place, height, doubt });
             }
         }
     }
 
-    /// The sum of the marks; `None` where too few tell anything, or some tell that there is no light.
+    /// The sum of the marks at `lag`; `None` where too few tell anything.
     fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
         self.sort(marks, lag);
-        if self.counted.len() < rule.fewest(marks.len()) {
-            return None;
-        }
-        let sum = rule.sum(&self.counted, marks.len())?;
-        let is_dark = |mark: &Mark| {
-            mark.height + UNCERTAIN * deviation(mark.doubt, rule.sigma) < SHOULD * sum.least
-        };
-        let is_told = sum.least >= rule.least(marks.len());
-        (is_told && !self.uncertain.iter().any(is_dark)).then_some(sum)
+        let is_enough = self.counted.len() >= rule.fewest(marks.len());
+        is_enough.then(|| rule.sum(&self.counted, marks.len())).flatten()
     }
 
     /// What the score must reach; `None` where marks are missing and the others not equal.
@@ -240,4 +208,101 @@ impl<'a> Residual<'a> {
 /// Standard deviation of what varies by two independent ones.
 fn deviation(one: f32, other: f32) -> f32 {
     (one * one + other * other).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::STEPS_OF_TICK;
+    use super::*;
+    use crate::code::{Codebook, Family, Keying, Separated};
+    use crate::decode::Receiver;
+    use crate::{ShotLog, decode::ReceiverKind};
+
+    /// Noise, in photons, none of which is in the signal.
+    const SIGMA: f32 = 36.0;
+
+    fn sampling() -> Sampling {
+        let steps = 4 * STEPS_OF_TICK as i32;
+        let at = |step: i32| {
+            let ticks = step as f32 / STEPS_OF_TICK as f32;
+            libm::expf(-ticks * ticks / 2.0) / 10.0
+        };
+        Sampling {
+            pulse: (-steps..=steps).map(at).collect(),
+            excess: 5.56,
+            full_scale: 1000,
+            blank_ticks: 0,
+            recovery_ticks: 0,
+            least_marks: 2,
+        }
+    }
+
+    /// What becomes of a shot whose three marks are so strong at a lag of 100, of which those that are
+    /// `blind` tell nothing; and how much is left at the first.
+    fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, f32) {
+        let words = Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, seed: 1 };
+        let family = Family::separated(words).unwrap();
+        let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
+        let (sampling, log) = (sampling(), ShotLog::of_one_channel(&[0], &[0]));
+        let pulse = Pulse::new(&sampling);
+        let kind = ReceiverKind::Sampled;
+        let receiver = Receiver { kind, false_alarm: 1e-5, ..Receiver::matched(1) };
+        let (fired, lags) = (vec![0], 200);
+        let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
+        let (mut signal, mut doubt) = (vec![0.0; 300], vec![0.0; 300]);
+        for ((mark, height), blind) in band.marks(0).zip(heights).zip(blind) {
+            for tick in -8..=8 {
+                signal[(100 + mark + tick) as usize] += height * pulse.answer(tick as f64);
+            }
+            if blind {
+                doubt[(100 + mark) as usize] = f32::INFINITY;
+            }
+        }
+        let rule = Rule::new(&band, &sampling, SIGMA);
+        let codes = vec![0; 300];
+        let filtered = Filtered { signal, doubt, sigma: SIGMA };
+        let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
+        let candidate = Candidate { shot: 0, lag: 100, rank: 1.0 };
+        let found = residual.test(&candidate, (&band, &rule));
+        (found, residual.filtered.signal[100 + band.marks(0).next().unwrap() as usize])
+    }
+
+    /// How strong a mark of `count` equal ones is whose sum is so many standard deviations.
+    fn height(score: f32, count: f32) -> f32 {
+        score * SIGMA / count.sqrt()
+    }
+
+    /// 10⁻⁵ false returns in 100 001 lags: 10⁻¹⁰ each, of which the normal bound is 6.36 σ.
+    #[test]
+    fn more_is_asked_of_words_of_which_a_mark_is_missing() {
+        let all = [false; 3];
+        let one = [true, false, false];
+        let with = |score, count, blind| tested([height(score, count); 3], blind).0;
+        assert!(with(6.33, 3.0, all).is_none() && with(6.39, 3.0, all).is_some());
+        assert!(with(6.83, 2.0, one).is_none() && with(6.89, 2.0, one).is_some());
+        assert!(with(100.0, 1.0, [true, true, false]).is_none());
+        let margin = with(9.4, 3.0, all).unwrap().margin;
+        assert_eq!((margin, with(9.4, 2.0, one).unwrap().margin), (3, 2));
+    }
+
+    #[test]
+    fn two_marks_must_be_equal() {
+        let one = [true, false, false];
+        assert!(tested([0.0, 900.0, 1000.0], one).0.is_some());
+        assert!(tested([0.0, 600.0, 1400.0], one).0.is_none());
+        // Three need not: a bright one has light of others.
+        let found = tested([600.0, 600.0, 9000.0], [false; 3]).0.unwrap();
+        assert!((600.0..700.0).contains(&found.photons), "{}", found.photons);
+    }
+
+    #[test]
+    fn what_is_found_is_taken_away() {
+        let (found, left) = tested([1000.0; 3], [false; 3]);
+        let found = found.unwrap();
+        assert_eq!((found.lag, found.marks, found.is_clipped), (100, 3, false));
+        assert!(found.late.abs() < 1e-3 && (found.photons - 1000.0).abs() < 1.0, "{found:?}");
+        assert!(left.abs() < 1.0, "{left}");
+        let (found, left) = tested([100.0; 3], [false; 3]);
+        assert!(found.is_none() && (left - 100.0).abs() < 1e-3, "{left}");
+    }
 }

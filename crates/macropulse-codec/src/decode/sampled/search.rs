@@ -12,27 +12,19 @@ const MOST: usize = 16;
 pub(super) struct Candidate {
     pub shot: usize,
     pub lag: i64,
-    /// The least of its marks that count.
-    pub least: f32,
     /// By what candidates are ordered: light that is there for certain comes first.
     pub rank: f32,
 }
 
-/// All candidates of those shots of the `band` of which returns are `wanted`, the strongest first. `open` is
-/// room for the signal.
-pub(super) fn candidates(
-    (band, rule): (&Band, &Rule),
-    filtered: &Filtered,
-    wanted: &[u8],
-    open: &mut Vec<f32>,
-) -> Vec<Candidate> {
+/// All candidates of the `band`, the strongest first.
+pub(super) fn candidates((band, rule): (&Band, &Rule), filtered: &Filtered) -> Vec<Candidate> {
     let told = filtered.signal.iter().zip(&filtered.doubt);
-    open.clear();
-    open.extend(told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY }));
+    let open = told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY });
     let mut search = Search {
         band,
         rule,
-        open,
+        open: open.collect(),
+        floor: (0..rule.least_of.len()).map(|marks| rule.least(marks)).collect(),
         least: Vec::with_capacity(LAGS),
         beyond: Vec::with_capacity(LAGS),
         standing_out: Vec::new(),
@@ -40,7 +32,7 @@ pub(super) fn candidates(
         counted: Vec::new(),
     };
     let mut all = Vec::new();
-    for shot in (0..band.fired.len()).filter(|shot| wanted[*shot] > 0) {
+    for shot in 0..band.fired.len() {
         search.candidates_of(shot, &mut all);
     }
     all.sort_by(|one: &Candidate, other| {
@@ -55,7 +47,9 @@ struct Search<'a> {
     band: &'a Band<'a>,
     rule: &'a Rule,
     /// The signal, infinite where it tells nothing.
-    open: &'a [f32],
+    open: Vec<f32>,
+    /// How strong the least mark must be, for each weight of a word.
+    floor: Vec<f32>,
     /// The least mark at each lag of a block.
     least: Vec<f32>,
     /// The signal at a mark at these lags, if not all of them are in the record.
@@ -106,7 +100,7 @@ impl Search<'_> {
             lower(&mut self.least, &self.beyond);
         }
         self.standing_out.clear();
-        standing_out(&self.least, self.rule.least(self.marks.len()), &mut self.standing_out);
+        standing_out(&self.least, self.floor[self.marks.len()], &mut self.standing_out);
     }
 
     /// That at `lag`, if the score there reaches the threshold and those beside it are no higher.
@@ -116,7 +110,7 @@ impl Search<'_> {
         let is_peak = self.sum(lag - 1).is_none_or(|before| before.score <= sum.score)
             && self.sum(lag + 1).is_none_or(|behind| behind.score < sum.score);
         let rank = sum.least * if is_whole { 1.0 } else { 0.5 };
-        is_peak.then_some(Candidate { shot, lag, least: sum.least, rank })
+        is_peak.then_some(Candidate { shot, lag, rank })
     }
 
     /// The marks at `lag` together, if enough of them count.

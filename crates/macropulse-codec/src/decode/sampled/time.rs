@@ -10,20 +10,14 @@ const NEAR: usize = 3;
 /// Share of full scale from which on a sample beside clipped ones tells where the edge of the pulse is.
 const TOLD: f32 = 0.02;
 
-/// How late the marks that count are, in ticks, as their sum tells, each weighed by how certain it is. A
-/// mark that is `bright`er has light of others, too, and does not count.
-pub(super) fn in_time(
-    (filtered, bright): (&Filtered, f32),
-    counted: &[Mark],
-    pulse: &Pulse,
-) -> f64 {
+/// How late the marks that count are, in ticks, as their sum tells, each weighed by how certain it is.
+pub(super) fn in_time(filtered: &Filtered, counted: &[Mark], pulse: &Pulse) -> f64 {
     let mut about = [0.0; 3];
-    for mark in counted.iter().filter(|mark| mark.height <= bright) {
-        let weight = mark.weight(filtered.sigma);
+    for mark in counted {
         for (tick, sum) in about.iter_mut().enumerate() {
             let at = (mark.place + tick).checked_sub(1);
             let signal = at.and_then(|at| filtered.signal.get(at)).copied();
-            *sum += weight * signal.unwrap_or(0.0);
+            *sum += mark.weight(filtered.sigma) * signal.unwrap_or(0.0);
         }
     }
     pulse.late(about)
