@@ -203,6 +203,7 @@ fn sampled() -> (Receiver, Samples) {
         excess: 1.0,
         full_scale: 2000,
         blank_ticks: 0,
+        held_ticks: 0,
         recovery_ticks: 0,
         least_marks: 2,
     };

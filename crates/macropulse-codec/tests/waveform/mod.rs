@@ -133,6 +133,7 @@ pub fn sampling() -> Sampling {
         excess: EXCESS,
         full_scale: FULL_SCALE,
         blank_ticks: 0,
+        held_ticks: 0,
         recovery_ticks: 25,
         least_marks: 2,
     }

@@ -188,7 +188,7 @@ impl Sampler {
         let (lowest, highest) = self.sampled.codes;
         let [low, high] = [lowest, highest].map(f32::from);
         let steps = (1.0 / self.sampled.step) as f32;
-        let recovery = (self.sampled.recovery / s_from_fs(self.tick_fs)).ceil() as u32;
+        let recovery = self.sampled.held_ticks();
         codes.reserve(level.len());
         let mut held = 0;
         for (place, level) in level.iter().enumerate() {

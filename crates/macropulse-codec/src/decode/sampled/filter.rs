@@ -228,6 +228,7 @@ mod tests {
             excess: 1.0,
             full_scale: 2000,
             blank_ticks: 15,
+            held_ticks: 0,
             recovery_ticks: 0,
             least_marks: 1,
         };

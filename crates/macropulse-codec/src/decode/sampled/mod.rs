@@ -44,6 +44,8 @@ pub struct Sampling {
     /// For how many ticks from a mark of its own that is fired on the channel is blind with stray light; 0
     /// where there is none. When that begins to rise, the samples tell.
     pub blank_ticks: u32,
+    /// For how many ticks behind a clipped pulse the amplifier stays at its limit.
+    pub held_ticks: u32,
     /// For how many ticks behind a clipped sample the signal is not that of the light.
     pub recovery_ticks: u32,
     /// Marks of a word that must tell something, neither blanked nor hidden by brighter light, to decide by

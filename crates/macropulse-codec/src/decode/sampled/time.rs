@@ -49,7 +49,14 @@ pub(super) fn clipped(
         let behind = (at..codes.len()).find(|at| !is_clipped(at));
         let (Some(before), Some(behind)) = (before, behind) else { continue };
         let rises = crossing(codes, sampling, (before, 0.5));
-        let falls = crossing(codes, sampling, (behind, -0.5));
+        let falls = match sampling.held_ticks {
+            0 => crossing(codes, sampling, (behind, -0.5)),
+            // What follows is no edge: the pulse fell below full scale so much earlier.
+            held => Crossing {
+                code: f32::from(sampling.full_scale),
+                tick: behind as f64 - f64::from(held) - 0.5,
+            },
+        };
         let (tick, photons) = pulse.between(rises, falls);
         told.push((tick - place as f64, photons));
     }

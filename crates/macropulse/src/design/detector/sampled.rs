@@ -173,10 +173,19 @@ impl Sampled {
         self.front_end.covariance(0.0, background).sqrt()
     }
 
+    /// Whole ticks of `time` seconds, rounded up.
+    fn ticks(&self, time: f64) -> u32 {
+        libm::ceil(time / self.sample * (1.0 - 1e-12)) as u32
+    }
+
+    /// For how many ticks behind a clipped pulse the signal stays at its limit.
+    pub fn held_ticks(&self) -> u32 {
+        self.ticks(self.recovery)
+    }
+
     /// What the receiver knows of it, which listens again `blank` seconds after a mark of its own and
     /// `recovery` seconds behind a clipped sample, and decides by `least_marks` or more.
     pub fn sampling(&self, (blank, recovery): (f64, f64), least_marks: u16) -> Sampling {
-        let ticks = |time: f64| libm::ceil(time / self.sample) as u32;
         let rms = self.front_end.mark_rms() / self.sample * STEPS_OF_TICK as f64;
         let half = libm::ceil(REACH * rms) as i32;
         let height = |step: i32| libm::exp(-0.5 * (f64::from(step) / rms).powi(2)) / self.step;
@@ -184,8 +193,9 @@ impl Sampled {
             pulse: (-half..=half).map(|step| height(step) as f32).collect(),
             excess: self.front_end.excess(),
             full_scale: self.codes.1,
-            blank_ticks: ticks(blank),
-            recovery_ticks: ticks(recovery),
+            blank_ticks: self.ticks(blank),
+            held_ticks: self.held_ticks(),
+            recovery_ticks: self.ticks(recovery),
             least_marks,
         }
     }
