@@ -239,8 +239,8 @@ mod tests {
     }
 
     /// What becomes of a shot whose three marks are so strong at a lag of 100, of which those that are
-    /// `blind` tell nothing; and how much is left at the first.
-    fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, f32) {
+    /// `blind` tell nothing; and what is left at the first, with how uncertain that is.
+    fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, (f32, f32)) {
         let words = Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, seed: 1 };
         let family = Family::separated(words).unwrap();
         let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
@@ -250,22 +250,25 @@ mod tests {
         let receiver = Receiver { kind, false_alarm: 1e-5, ..Receiver::matched(1) };
         let (fired, lags) = (vec![0], 200);
         let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
-        let (mut signal, mut doubt) = (vec![0.0; 300], vec![0.0; 300]);
+        let (mut signal, mut doubt, mut codes) = (vec![0.0; 300], vec![0.0; 300], vec![0; 300]);
         for ((mark, height), blind) in band.marks(0).zip(heights).zip(blind) {
             for tick in -8..=8 {
-                signal[(100 + mark + tick) as usize] += height * pulse.answer(tick as f64);
+                let at = (100 + mark + tick) as usize;
+                signal[at] += height * pulse.answer(tick as f64);
+                let code = height * libm::expf(-(tick * tick) as f32 / 2.0) / 10.0;
+                codes[at] = codes[at].max(code.min(1000.0) as i16);
             }
             if blind {
                 doubt[(100 + mark) as usize] = f32::INFINITY;
             }
         }
         let rule = Rule::new(&band, &sampling, SIGMA);
-        let codes = vec![0; 300];
         let filtered = Filtered { signal, doubt, sigma: SIGMA };
         let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
         let candidate = Candidate { shot: 0, lag: 100, rank: 1.0 };
         let found = residual.test(&candidate, (&band, &rule));
-        (found, residual.filtered.signal[100 + band.marks(0).next().unwrap() as usize])
+        let first = 100 + band.marks(0).next().unwrap() as usize;
+        (found, (residual.filtered.signal[first], residual.filtered.doubt[first]))
     }
 
     /// How strong a mark of `count` equal ones is whose sum is so many standard deviations.
@@ -298,12 +301,16 @@ mod tests {
 
     #[test]
     fn what_is_found_is_taken_away() {
-        let (found, left) = tested([1000.0; 3], [false; 3]);
+        let (found, (left, doubt)) = tested([1000.0; 3], [false; 3]);
         let found = found.unwrap();
         assert_eq!((found.lag, found.marks, found.is_clipped), (100, 3, false));
         assert!(found.late.abs() < 1e-3 && (found.photons - 1000.0).abs() < 1.0, "{found:?}");
-        assert!(left.abs() < 1.0, "{left}");
-        let (found, left) = tested([100.0; 3], [false; 3]);
-        assert!(found.is_none() && (left - 100.0).abs() < 1e-3, "{left}");
+        // √(F·1000 + (4 %·1000)²).
+        assert!(left.abs() < 1.0 && (doubt - 84.6).abs() < 0.1, "{left} ± {doubt}");
+        let (found, (left, doubt)) = tested([100.0; 3], [false; 3]);
+        assert!(found.is_none() && (left - 100.0).abs() < 1e-3 && doubt == 0.0, "{left} ± {doubt}");
+        // What is left of clipped pulses tells nothing.
+        let (found, (_, doubt)) = tested([1e5; 3], [false; 3]);
+        assert!(found.unwrap().is_clipped && doubt == f32::INFINITY);
     }
 }

@@ -81,3 +81,60 @@ fn crossing(codes: &[i16], sampling: &Sampling, (at, inwards): (usize, f64)) -> 
         false => Crossing { code: full, tick: at as f64 + inwards },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::STEPS_OF_TICK;
+    use super::*;
+
+    /// A pulse of a tenth of a code a photon, of deviation 1 tick, clipped at 1000 codes.
+    fn sampling() -> Sampling {
+        let steps = 8 * STEPS_OF_TICK as i32;
+        let pulse = (-steps..=steps).map(|step| shape(step as f32 / STEPS_OF_TICK as f32));
+        Sampling {
+            pulse: pulse.collect(),
+            excess: 1.0,
+            full_scale: 1000,
+            blank_ticks: 0,
+            recovery_ticks: 0,
+            least_marks: 1,
+        }
+    }
+
+    fn shape(ticks: f32) -> f32 {
+        libm::expf(-ticks * ticks / 2.0) / 10.0
+    }
+
+    /// The time told of pulses of 10⁶ photons at tick 20 and so much, after which the signal swings through.
+    fn told(phase: f32, swings_to: Option<i16>) -> Option<Clipped> {
+        let sampling = sampling();
+        let code = |tick: usize| (1e6 * shape(tick as f32 - 20.0 - phase)).min(1000.0) as i16;
+        let mut codes: Vec<i16> = (0..40).map(code).collect();
+        let behind = codes.iter().rposition(|code| *code == 1000).unwrap() + 1;
+        codes[behind] = swings_to.unwrap_or(codes[behind]);
+        let mark = Mark { place: 20, height: 1e5, doubt: 0.0 };
+        clipped(&codes, &sampling, &Pulse::new(&sampling), &[mark])
+    }
+
+    /// At sixteen phases: to a hundredth of a tick by both edges, to a third by one and the last clipped
+    /// sample.
+    #[test]
+    fn clipped_pulses_are_timed_though_the_signal_swings_through() {
+        for step in 0..16 {
+            let phase = step as f32 / 16.0;
+            for (swings_to, within) in [(None, 0.01), (Some(-200), 0.3), (Some(0), 0.3)] {
+                let late = told(phase, swings_to).unwrap().late;
+                assert!((late - f64::from(phase)).abs() < within, "{late} for {phase}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_clipped_or_never_ends_is_not_timed_by_edges() {
+        let (sampling, mark) = (sampling(), Mark { place: 2, height: 1e5, doubt: 0.0 });
+        let pulse = Pulse::new(&sampling);
+        assert!(clipped(&[9, 99, 999, 99, 9], &sampling, &pulse, &[mark]).is_none());
+        assert!(clipped(&[1000; 5], &sampling, &pulse, &[mark]).is_none());
+        assert!(clipped(&[], &sampling, &pulse, &[]).is_none());
+    }
+}
