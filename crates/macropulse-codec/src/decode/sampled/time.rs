@@ -96,6 +96,7 @@ mod tests {
             excess: 1.0,
             full_scale: 1000,
             blank_ticks: 0,
+            held_ticks: 0,
             recovery_ticks: 0,
             least_marks: 1,
         }
