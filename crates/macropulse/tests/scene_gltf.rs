@@ -244,7 +244,7 @@ fn forged(folder: &Path) {
         ("5123,\"count\":12", "5126,\"count\":12", "not unsigned integers"),
         (r#""bufferView":1,"byteOffset":0,"#, "", "an accessor without a buffer"),
         // Nodes that contain each other, and surfaces without end.
-        (r#""children":[1]"#, r#""children":[0]"#, "node 0 with more than one parent"),
+        (r#""children":[1]"#, r#""children":[0]"#, "node 0, which is a child"),
         (
             "\"attributes\":{\"POSITION\":0},\"mode\":6",
             "\"attributes\":{},\"mode\":6",

@@ -30,6 +30,7 @@ pages! {
     codes: "docs/codes.md",
     formats: "docs/formats.md",
     glossary: "docs/glossary.md",
+    hardening: "docs/hardening.md",
     paper: "docs/paper.md",
     performance: "docs/performance.md",
     physics: "docs/physics.md",

@@ -177,7 +177,8 @@ impl Band<'_> {
     /// shot with as many marks as usual, half of them, and twice what chance gives, this is not asked.
     ///
     /// c is that of the places beside its own marks, or of all if that is more: of few marks of another
-    /// return, all that are found may be among its own.
+    /// return, all that are found may be among its own. Light from beyond the gate is only supposed, by just
+    /// those marks: there those beside tell alone.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let weight = sent.weight(shot);
@@ -203,6 +204,7 @@ impl Band<'_> {
         let fuller =
             fuller.filter(|found| !is_itself(found) && self.claims(*found, (shot, detection)));
         let beyond = self.light_from_beyond(shot, light.start, detection.count);
+        let is_supposed = !beyond.is_empty();
         for (other, theirs) in fuller.chain(beyond) {
             is_claimed = true;
             let bits = sent.bits(other);
@@ -239,8 +241,11 @@ impl Band<'_> {
         let share = |lit: u32, all: u32| f64::from(lit) / f64::from(all.max(1));
         let [[all, lit, free], [all_claimed, lit_claimed, taken], [all_shared, lit_shared, _]] =
             places;
-        let claimed = share(lit_claimed, all_claimed)
-            .max(share(lit_claimed + lit_shared, all_claimed + all_shared));
+        let beside = share(lit_claimed, all_claimed);
+        let claimed = match is_supposed {
+            true => beside,
+            false => beside.max(share(lit_claimed + lit_shared, all_claimed + all_shared)),
+        };
         let by_chance = f64::from(free) * share(lit, all) + f64::from(taken) * claimed;
         let gate = self.density_in_gate(shot, detection.count);
         let density = gate.max(by_chance / f64::from(weight)).min(1.0);
