@@ -351,6 +351,23 @@ fn png_is_16_bit_grey_with_its_scale_inside() {
     assert!(text.text.starts_with("metres = value / 256; 0 = no return"));
 }
 
+/// A file of some bytes that promises more pixels than any sensor has.
+#[test]
+fn a_png_of_too_many_pixels_is_refused_unread() {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 1 << 16, 1 << 24);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let scale = "metres = value / 256; 0 = no return; 65535 = 255.99 m or farther";
+    encoder.add_text_chunk("Range scale".into(), scale.into()).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_chunk(png::chunk::IDAT, &[]).unwrap();
+    drop(writer);
+    let folder = tempfile::tempdir().unwrap();
+    let sentence = refusal(&folder.path().join("a.png"), &bytes, read_range_png);
+    assert!(sentence.contains("65536 x 16777216 pixels are more than 33554432"), "{sentence}");
+}
+
 #[test]
 fn the_same_cloud_is_the_same_bytes() {
     for &format in Format::ALL {
