@@ -1,7 +1,7 @@
 //! Each target is given its corpus, and what the mutator makes of it: a short run of the fuzzers on
 //! any machine. `MACROPULSE_FUZZ_CASES` sets the number of inputs made for each target, and
 //! `MACROPULSE_FUZZ_SEED` others than those of every day.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
