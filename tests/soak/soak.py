@@ -65,7 +65,7 @@ def report(name, lines, is_kept):
     print(section)
     if not is_kept:
         return
-    begin, end = f"<!-- made by tests/soak/{name} -->", f"<!-- end of tests/soak/{name} -->"
+    begin, end = f"<!-- tests/soak/{name} -->", f"<!-- no figures: made by tests/soak/{name} -->"
     text = REPORT.read_text()
     if begin not in text:
         sys.exit(f"{REPORT} has no place for {name}")
