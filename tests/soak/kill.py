@@ -9,6 +9,7 @@ import json
 import random
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -80,6 +81,8 @@ def main():
             after = soak.files(place / "out")
             wrong += soak.differing(after, files) + [file for file in files if file not in after]
             wrong += [str(path) for path in (place / "out").rglob(".macropulse-*.part")]
+            if turn % 100 == 99:
+                print(f"{turn + 1} kills", file=sys.stderr, flush=True)
             if code or wrong:
                 print(f"{name}: kill {turn}: {told.strip()} {wrong}", flush=True)
                 count["wrong"] += 1
