@@ -95,8 +95,15 @@ fn tell(sentence: &str, colour: AnsiColor) {
     anstream::eprintln!("{name}macropulse:{name:#}{rest}");
 }
 
+/// What is repeated of a name or a file may have lines, and signs that a terminal would obey.
 fn one_line(text: &str) -> String {
-    text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+    let harmless = |sign: char| match sign {
+        '\t' => ' ',
+        sign if sign.is_control() => char::REPLACEMENT_CHARACTER,
+        sign => sign,
+    };
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join(" ").chars().map(harmless).collect()
 }
 
 /// What clap could not make sense of, as one sentence; help and version are no faults.
@@ -330,6 +337,11 @@ mod tests {
             "unexpected argument '--sead' found; a similar argument exists: '--seed'; \
              see `macropulse simulate --help`"
         );
+    }
+
+    #[test]
+    fn a_terminal_is_told_nothing_to_obey() {
+        assert_eq!(one_line(" a\u{1b}[31mb\u{7}\tc\n\n d"), "a\u{fffd}[31mb\u{fffd} c d");
     }
 
     #[test]

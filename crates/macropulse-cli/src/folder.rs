@@ -17,8 +17,8 @@ const OF_FILES: [&str; 7] = ["html", "json", "toml", "svg", "txt", "mps", "mpt"]
 /// A folder for results. Until it is kept, what we made of it goes away again.
 pub struct Folder {
     path: PathBuf,
-    /// The topmost folder that was not there before.
-    made: Option<PathBuf>,
+    /// The folders that were not there before, the topmost first; it may be the last of them.
+    made: Vec<PathBuf>,
     kept: bool,
     /// Whether no other run may write into it meanwhile, and what holds that.
     is_of_one: bool,
@@ -31,13 +31,18 @@ impl Folder {
     pub fn claim(path: &Path) -> Result<Self, Fault> {
         refuse_no_folder(path)?;
         let path = path.to_owned();
-        let mut folder = Self { path, made: None, kept: false, is_of_one: false, lock: None };
-        folder.make()?;
-        let proof = folder.path.join(".macropulse-proof");
+        let folder = Self { path, made: vec![], kept: false, is_of_one: false, lock: None };
+        let ancestors = folder.path.ancestors();
+        let there = ancestors.map(or_here).find(|folder| folder.exists());
+        let proof = format!(".macropulse-proof-{}", std::process::id());
+        let proof = there.unwrap_or(Path::new(".")).join(proof);
         fs::write(&proof, "")
             .and_then(|()| fs::remove_file(&proof))
+            .and_then(|()| match fs::metadata(&folder.path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+                _ => Ok(()),
+            })
             .map_err(|error| folder.not_writable(&error))?;
-        folder.clear();
         clear_unfinished(&folder.path);
         Ok(folder)
     }
@@ -53,8 +58,16 @@ impl Folder {
     /// Makes the folder.
     pub fn make(&mut self) -> Result<(), Fault> {
         let ancestors = self.path.ancestors().filter(|folder| !folder.as_os_str().is_empty());
-        let missing = ancestors.take_while(|folder| !folder.exists()).last();
-        self.made = missing.map(Path::to_path_buf);
+        let missing: Vec<PathBuf> =
+            ancestors.take_while(|folder| !folder.exists()).map(Path::to_path_buf).collect();
+        for folder in missing.into_iter().rev() {
+            match fs::create_dir(&folder) {
+                Ok(()) => self.made.push(folder),
+                // Another run was faster, and it is that one's.
+                Err(_) if folder.is_dir() => {}
+                Err(error) => return Err(self.not_writable(&error)),
+            }
+        }
         fs::create_dir_all(&self.path).map_err(|error| self.not_writable(&error))?;
         self.lock()
     }
@@ -69,7 +82,7 @@ impl Folder {
         match opened.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 // It is the other one's, whoever made it.
-                self.made = None;
+                self.made.clear();
                 Err(Fault::Wrong(format!(
                     "another run is writing into the folder {}; give this one a folder of its own \
                      with -o",
@@ -86,7 +99,7 @@ impl Folder {
 
     /// Makes the folder, if that was not done before.
     pub fn make_once(&mut self) -> Result<(), Fault> {
-        if self.kept || self.made.is_some() { Ok(()) } else { self.make() }
+        if self.kept || !self.made.is_empty() { Ok(()) } else { self.make() }
     }
 
     /// From now on the folder stays, whatever happens.
@@ -122,10 +135,15 @@ impl Folder {
         })
     }
 
+    /// Takes away what was not there before: what is in the folder only where it is for one run and
+    /// so no other's, and of the folders those that are empty.
     fn clear(&mut self) {
-        if let Some(made) = self.made.take() {
-            // It was not there before us. If it cannot go, it stays.
-            let _ = fs::remove_dir_all(made);
+        // If something cannot go, it stays.
+        if self.lock.is_some() && self.made.last() == Some(&self.path) {
+            let _ = fs::remove_dir_all(&self.path);
+        }
+        for folder in self.made.drain(..).rev() {
+            let _ = fs::remove_dir(folder);
         }
     }
 
@@ -143,6 +161,11 @@ impl Drop for Folder {
             self.clear();
         }
     }
+}
+
+/// The folder that a path names, of which an empty one is where we are.
+fn or_here(path: &Path) -> &Path {
+    if path.as_os_str().is_empty() { Path::new(".") } else { path }
 }
 
 /// Refuses what is no place of a folder: standard output, and the name of a file that is not there.
@@ -190,6 +213,24 @@ mod tests {
         folder.keep();
         drop(folder);
         assert!(wanted.is_dir());
+    }
+
+    #[test]
+    fn what_another_run_puts_beside_it_stays() {
+        let there = tempfile::tempdir().unwrap();
+        let mut alone = Folder::claim_alone(&there.path().join("a/b")).unwrap();
+        alone.make().unwrap();
+        fs::write(there.path().join("a/b/half"), "").unwrap();
+        fs::write(there.path().join("a/others"), "").unwrap();
+        drop(alone);
+        assert!(there.path().join("a/others").exists());
+        assert!(!there.path().join("a/b").exists());
+        // Files of several conversions may go into one folder at once.
+        let mut shared = Folder::claim(&there.path().join("c/d")).unwrap();
+        shared.make().unwrap();
+        fs::write(there.path().join("c/d/others"), "").unwrap();
+        drop(shared);
+        assert!(there.path().join("c/d/others").exists());
     }
 
     #[test]

@@ -118,8 +118,10 @@ fn run(options: &Options) -> Result<(), Fault> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use macropulse_fuzz::mutate::Mutator;
 
     #[test]
     fn the_options_do_not_contradict_each_other() {
@@ -132,5 +134,41 @@ mod tests {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(help.contains("  macropulse "), "{}", command.get_name());
         }
+    }
+
+    /// The examples of the help, changed anyhow: each is understood, or refused in a sentence.
+    /// `MACROPULSE_FUZZ_CASES` sets how many.
+    #[test]
+    fn any_line_is_understood_or_refused() {
+        let help = |command: &clap::Command| {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            help.lines()
+                .filter_map(|line| line.strip_prefix("  macropulse "))
+                .map(|line| line.as_bytes().to_vec())
+                .collect::<Vec<_>>()
+        };
+        let examples: Vec<Vec<u8>> = Options::command().get_subcommands().flat_map(help).collect();
+        assert!(examples.len() > 15, "{} examples", examples.len());
+        let cases = std::env::var("MACROPULSE_FUZZ_CASES");
+        let cases: u32 = cases.map_or(600, |typed| typed.parse().unwrap());
+        let mut mutator = Mutator::new(15);
+        let (mut understood, mut refused) = (0, 0);
+        for _ in 0..cases {
+            let line = mutator.next(&examples, 200);
+            let line = String::from_utf8_lossy(&line);
+            let words = std::iter::once("macropulse").chain(line.split_whitespace());
+            let command =
+                Options::command().mut_subcommands(|one| one.allow_negative_numbers(true));
+            match command.try_get_matches_from(words).and_then(|m| Options::from_arg_matches(&m)) {
+                Ok(_) => understood += 1,
+                Err(help) if !help.use_stderr() => understood += 1,
+                Err(wrong) => {
+                    let told = fault::usage(&wrong);
+                    assert!(matches!(told, Err(Fault::Wrong(_) | Fault::Told)), "{line}");
+                    refused += 1;
+                }
+            }
+        }
+        assert!(understood > cases / 20 && refused > cases / 20, "{understood} of {cases}");
     }
 }

@@ -1,13 +1,13 @@
 //! Files opened to be read: what may be opened, and how large it may be.
 //!
-//! A name that somebody typed may lead to anything. A device gives bytes without an end, and a pipe
-//! that nobody writes to gives none for ever; both are refused in words, before anything is read.
+//! A name that is typed may lead to anything. A device gives bytes without an end, and a pipe to
+//! which nothing writes gives none for ever; both are refused in words, before anything is read.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Chain, Cursor, Read};
 use std::path::Path;
 
-/// Most bytes of a text that somebody typed: a sensor, a scene, a scenario.
+/// Most bytes of a text that a person types: a sensor, a scene, a scenario.
 pub const LONGEST_TEXT: u64 = 16 << 20;
 
 /// Most lines, commas and opening brackets of such a text: of what stands between them a parser makes
@@ -67,10 +67,10 @@ pub fn check_values(text: &str) -> Result<(), String> {
     }
 }
 
-/// What comes out of the file at `path`, or of the pipe there if somebody writes to it.
+/// What comes out of the file at `path`, or of the pipe there if a program writes to it.
 ///
 /// # Errors
-/// What the system says; or, in a sentence, that it is a device, or a pipe that nobody writes to.
+/// What the system says; or, in a sentence, that it is a device, or a pipe to which nothing writes.
 pub fn stream(path: &Path) -> io::Result<Stream> {
     let (file, about) = opened(path)?;
     let first = if about.is_file() { Vec::new() } else { pipe::awaited(&file)? };
@@ -92,7 +92,7 @@ fn read_to_end(from: impl Read, most: u64, bytes: &mut Vec<u8>) -> io::Result<()
     if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(()) }
 }
 
-/// A file or a pipe, opened without waiting for whoever writes to it.
+/// A file or a pipe, opened without waiting for what writes to it.
 fn opened(path: &Path) -> io::Result<(File, Metadata)> {
     // A device is not even opened: that alone may set something going.
     check(&std::fs::metadata(path)?)?;
@@ -124,7 +124,7 @@ mod pipe {
 
     use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 
-    /// How long somebody may take to begin writing to a pipe.
+    /// How long a program may take to begin writing to a pipe.
     const PATIENCE: Duration = Duration::from_millis(600);
 
     pub(super) fn is(about: &Metadata) -> bool {
@@ -135,20 +135,20 @@ mod pipe {
         options.custom_flags(OFlags::NONBLOCK.bits().cast_signed());
     }
 
-    /// Waits until somebody has the pipe open to write, and gives what was read of it to see that.
-    /// From then on reading waits for what they write, however long.
+    /// Waits until a program has the pipe open to write, and gives what was read of it to see that.
+    /// From then on reading waits for what it writes, however long.
     pub(super) fn awaited(mut pipe: &File) -> io::Result<Vec<u8>> {
         let began = Instant::now();
         let mut first = [0];
         let first = loop {
             match pipe.read(&mut first) {
-                // Nobody has it open: neither yet, nor any more.
+                // No program has it open: not yet, or no longer.
                 Ok(0) if began.elapsed() < PATIENCE => {
                     std::thread::sleep(Duration::from_millis(5));
                 }
                 Ok(0) => {
                     return Err(io::Error::other(
-                        "it is a pipe, and nobody writes to it: start first what does, or name a file",
+                        "it is a pipe, and nothing writes to it: first start what does, or name a file",
                     ));
                 }
                 Ok(_) => break first.to_vec(),
@@ -213,7 +213,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_is_read_once_somebody_writes_to_it() {
+    fn a_pipe_is_read_once_a_program_writes_to_it() {
         use std::io::Write;
         use std::time::{Duration, Instant};
         let folder = tempfile::tempdir().unwrap();
@@ -221,13 +221,13 @@ mod tests {
         let mode = rustix::fs::Mode::from_raw_mode(0o600);
         rustix::fs::mkfifoat(rustix::fs::CWD, &path, mode).unwrap();
         let began = Instant::now();
-        assert!(text(&path).unwrap_err().to_string().contains("nobody writes to it"));
+        assert!(text(&path).unwrap_err().to_string().contains("nothing writes to it"));
         assert!(began.elapsed() < Duration::from_secs(2));
         let to = path.clone();
         let writer = std::thread::spawn(move || {
             std::thread::sleep(Duration::from_millis(100));
             let mut pipe = OpenOptions::new().write(true).open(to).unwrap();
-            // They may take their time once they have begun.
+            // It may take its time once it has begun.
             std::thread::sleep(Duration::from_millis(1500));
             pipe.write_all(b"late, ").unwrap();
             std::thread::sleep(Duration::from_millis(50));

@@ -159,3 +159,22 @@ fn marks_are_not_all_there_is_where_anything_else_is() {
     let complement = sensor("bipolar-gold", &[], &[]);
     assert!(photons(&complement, f64::INFINITY).is_none());
 }
+
+/// The echoes of a shot are told apart by a number of 16 bits, and its light by one for each slice of a
+/// micropulse: echoes beyond that are detected all the same.
+#[test]
+fn a_shot_may_have_echoes_without_number() {
+    // Its micropulses are followed in 13 slices, so that 5042 echoes are too many to be told apart.
+    let smooth = "['detector-bandwidth', 'mirror-motion']".to_owned();
+    let design =
+        Design::open("kim-park-2016-physical", &[("idealised".to_owned(), smooth)]).unwrap();
+    let log = Band { scan: 0, first: 828, shots: 2 }.shot_log(&design);
+    let echo = |delay_fs| Echo { shot: 1, delay_fs, photons: 0.1 };
+    let light = light_of_echoes(&design, &log, (0..70_000).map(echo));
+    assert_eq!(light.trains.len(), 70_000);
+    let light = light_of_echoes(&design, &log, (0..5043).map(echo));
+    let operating = Operating::of(&design, &Environment::vacuum_dark()).unwrap();
+    let detectors = Detectors::new(&design, &operating, Chance::new(1));
+    let seen = detectors.detections(&log, &light, &mut Memory::default());
+    assert!(seen.time.len() > 100);
+}

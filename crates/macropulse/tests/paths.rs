@@ -50,6 +50,13 @@ fn apart(one: [f64; 3], other: [f64; 3]) -> f64 {
     (0..3).map(|axis| (one[axis] - other[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
+#[test]
+fn a_header_of_two_lines_is_told_in_one() {
+    let told = sensor("\"azimuth\n1.5\",elevation\n1,2\n", "").unwrap_err();
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(told.contains("`azimuth\\n1.5`: 1 is no unit of angles"), "{told}");
+}
+
 /// Each scan takes the next 500 of 1234 entries, and begins anew behind the last.
 #[test]
 fn a_table_goes_on_from_scan_to_scan() {

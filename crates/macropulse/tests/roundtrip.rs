@@ -351,6 +351,35 @@ fn png_is_16_bit_grey_with_its_scale_inside() {
     assert!(text.text.starts_with("metres = value / 256; 0 = no return"));
 }
 
+/// Names in a file are repeated in what is said of it, in one line.
+#[test]
+fn a_name_of_two_lines_is_told_in_one() {
+    let (_folder, npy) = write(Format::Npy, &cloud(false));
+    let bytes = fs::read(&npy).unwrap();
+    let (plain, odd) = (b"('range', '<f4')", b"('ran\ne', '>f4')");
+    let at = bytes.windows(plain.len()).position(|part| part == plain).unwrap();
+    let bytes = [&bytes[..at], odd, &bytes[at + plain.len()..]].concat();
+    let sentence = refusal(&npy, &bytes, read_cloud);
+    assert!(sentence.contains("`ran e`") && sentence.lines().count() == 1, "{sentence}");
+}
+
+/// A file of some bytes that promises more pixels than any sensor has.
+#[test]
+fn a_png_of_too_many_pixels_is_refused_unread() {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 1 << 16, 1 << 24);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let scale = "metres = value / 256; 0 = no return; 65535 = 255.99 m or farther";
+    encoder.add_text_chunk("Range scale".into(), scale.into()).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_chunk(png::chunk::IDAT, &[]).unwrap();
+    drop(writer);
+    let folder = tempfile::tempdir().unwrap();
+    let sentence = refusal(&folder.path().join("a.png"), &bytes, read_range_png);
+    assert!(sentence.contains("65536 x 16777216 pixels are more than 33554432"), "{sentence}");
+}
+
 #[test]
 fn the_same_cloud_is_the_same_bytes() {
     for &format in Format::ALL {

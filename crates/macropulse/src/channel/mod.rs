@@ -167,15 +167,18 @@ pub struct Echo {
 
 /// The light of `echoes` of the shots of `log`, ordered by shot: for studies of detectors and
 /// receivers without a scene.
+///
+/// Echoes of one shot are drawn independently of each other, up to 65 536 of them, and 5041 where
+/// micropulses are followed in slices; those beyond may repeat what was drawn for the first.
 pub fn light_of_echoes<'a>(
     design: &'a Design,
     log: &ShotLog,
     echoes: impl IntoIterator<Item = Echo>,
 ) -> Light<'a> {
     let mut light = Light { transmitters: vec![Transmitter::of(design, 1.0)], ..Light::default() };
-    let (mut way, mut before) = (0, usize::MAX);
+    let (mut way, mut before) = (0_u16, usize::MAX);
     for Echo { shot, delay_fs, photons } in echoes {
-        way = if shot == before { way + 1 } else { 0 };
+        way = if shot == before { way.wrapping_add(1) } else { 0 };
         before = shot;
         light.trains.push(echo(log, shot, delay_fs, PulseTrain { photons, way, ..WHOLE }));
     }

@@ -38,6 +38,7 @@ impl Shape {
     /// Light with every pulse train of the sensor's own as those of its slices, which are detected
     /// independently of each other: photons are.
     pub fn spread<'a>(&self, light: &Light<'a>) -> Light<'a> {
+        let slices = self.slices.len() as u16;
         let mut spread = Light { trains: PulseTrains::default(), ..light.clone() };
         for index in 0..light.trains.len() {
             let train = light.trains.at(index);
@@ -49,7 +50,8 @@ impl Shape {
                 spread.trains.push(PulseTrain {
                     arrives_fs: train.arrives_fs + late_fs,
                     photons: train.photons * share,
-                    way: train.way * self.slices.len() as u16 + slice,
+                    // What a scene sends back stays below 2000; a study may have more.
+                    way: train.way.wrapping_mul(slices).wrapping_add(slice),
                     ..train
                 });
             }

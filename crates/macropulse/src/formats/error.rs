@@ -87,8 +87,10 @@ impl Error {
         Self::Read { path: path.to_owned(), cause }
     }
 
+    /// What is wrong in one line, whatever a name in the file holds.
     pub(super) fn invalid(path: &Path, format: Format, fault: impl Into<String>) -> Self {
-        Self::Invalid { path: path.to_owned(), format: format.name(), fault: fault.into() }
+        let fault = fault.into().replace(char::is_control, " ");
+        Self::Invalid { path: path.to_owned(), format: format.name(), fault }
     }
 
     pub(super) fn unreadable(path: &Path) -> Self {

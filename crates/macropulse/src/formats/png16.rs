@@ -12,6 +12,12 @@ const VALUES_PER_METRE: f32 = 256.0;
 const KEYWORD: &str = "Range scale";
 const DECLARATION: &str = "metres = value / 256; 0 = no return; 65535 = 255.99 m or farther";
 
+/// Most pixels of an image that is read: those of a sensor.
+const MOST_PIXELS: u64 = 1 << 25;
+
+/// Most bytes of its file: it may be compressed badly, and have text beside.
+const MOST_BYTES: u64 = 4 * MOST_PIXELS;
+
 /// A range image read back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeImage {
@@ -57,7 +63,7 @@ fn grey_from_range(range: f32) -> u16 {
 /// [`Error::Read`] if the file cannot be opened, [`Error::Invalid`] if it is not a 16-bit grey PNG
 /// that declares this scale.
 pub fn read_range_png(path: &Path) -> Result<RangeImage, Error> {
-    let file = crate::opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
+    let file = crate::opened::file(path, MOST_BYTES).map_err(|cause| Error::read(path, cause))?;
     decode(BufReader::new(file)).map_err(|fault| Error::invalid(path, Format::Png, fault))
 }
 
@@ -69,6 +75,10 @@ fn decode(file: impl io::BufRead + io::Seek) -> Result<RangeImage, String> {
     let texts = &reader.info().uncompressed_latin1_text;
     if !texts.iter().any(|chunk| chunk.keyword == KEYWORD && chunk.text == DECLARATION) {
         return Err(format!("it does not declare the scale `{DECLARATION}`"));
+    }
+    let (width, height) = reader.info().size();
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        return Err(format!("{width} x {height} pixels are more than {MOST_PIXELS}"));
     }
     let size = reader.output_buffer_size().ok_or("it is too large")?;
     let mut grey = vec![0; size];

@@ -146,10 +146,12 @@ fn column(header: &str) -> Result<Column, String> {
     let lower = header.trim().trim_start_matches('\u{feff}').to_ascii_lowercase();
     let mut words = lower.split(|letter: char| !letter.is_alphanumeric()).filter(|w| !w.is_empty());
     let (name, unit) = (words.next().unwrap_or_default(), words.next());
+    // In quotes it may have lines.
+    let shown = header.escape_debug();
     let angle = || match unit {
         None | Some("deg" | "degree" | "degrees") => Ok(1_f64.to_radians()),
         Some("rad" | "radian" | "radians") => Ok(1.0),
-        Some(other) => Err(format!("`{header}`: {other} is no unit of angles: write deg or rad")),
+        Some(other) => Err(format!("`{shown}`: {other} is no unit of angles: write deg or rad")),
     };
     Ok(match name {
         "time" | "t" | "timestamp" => Column::Time(match unit {
@@ -159,7 +161,7 @@ fn column(header: &str) -> Result<Column, String> {
             Some("ns") => 1e-9,
             Some(other) => {
                 return Err(format!(
-                    "`{header}`: {other} is no unit of time: write s, ms, us or ns"
+                    "`{shown}`: {other} is no unit of time: write s, ms, us or ns"
                 ));
             }
         }),

@@ -1,0 +1,73 @@
+"""What the scripts of this folder share: the program they try, and where their results go."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+REPORT = ROOT / "docs" / "hardening.md"
+
+# A scan of a few kilobytes, made in some ten milliseconds.
+SMALL = ["--set", "scan.raster.rows=8", "--set", "scan.raster.columns=24"]
+SENSOR = "kim-park-2016-fixed"
+
+
+def program():
+    """The program under test: MACROPULSE, or the one that cargo has built."""
+    named = os.environ.get("MACROPULSE")
+    built = [ROOT / "target" / profile / "macropulse" for profile in ("release", "debug")]
+    for path in [Path(named)] if named else built:
+        if path.is_file():
+            return str(path.resolve())
+    sys.exit("no program: cargo build -p macropulse-cli --release, or name one in MACROPULSE")
+
+
+def files(folder):
+    """All files below a folder, each with its bytes, but hidden ones."""
+    found = {}
+    for path in sorted(Path(folder).rglob("*")):
+        if path.is_file() and not path.name.startswith("."):
+            found[str(path.relative_to(folder))] = path.read_bytes()
+    return found
+
+
+def without_times(name, data):
+    """The bytes of a file without what differs between runs: the times that they took, and what
+    was found in their folder."""
+    if not name.endswith(".json"):
+        return data
+    text = data.decode()
+    for key in ("times_s", "warnings"):
+        text = re.sub(rf'"{key}": (\{{[^}}]*\}}|\[[^\]]*\])', f'"{key}": 0', text)
+    return text.encode()
+
+
+def differing(found, whole):
+    """Names of files in `found` that are not, or not the same, in `whole`."""
+    same = lambda name: name in whole and (
+        without_times(name, found[name]) == without_times(name, whole[name])
+    )
+    return [name for name in found if not same(name)]
+
+
+def run(words, **options):
+    """Runs the program to its end; what it says if it fails."""
+    done = subprocess.run([program(), *words], capture_output=True, text=True, **options)
+    return done.returncode, done.stderr
+
+
+def report(name, lines, is_kept):
+    """Prints a section, and with `is_kept` puts it in place of the last one of that name in
+    docs/hardening.md."""
+    section = "\n".join(lines).strip()
+    print(section)
+    if not is_kept:
+        return
+    begin, end = f"<!-- tests/soak/{name} -->", f"<!-- no figures: made by tests/soak/{name} -->"
+    text = REPORT.read_text()
+    if begin not in text:
+        sys.exit(f"{REPORT} has no place for {name}")
+    before, rest = text.split(begin, 1)
+    REPORT.write_text(f"{before}{begin}\n\n{section}\n\n{end}{rest.split(end, 1)[1]}")
