@@ -257,7 +257,15 @@ fn sane_sampling() -> impl Strategy<Value = Sampling> {
         let mirrored = half.iter().rev().chain(&half[1..]).copied();
         let (blank_ticks, recovery_ticks, least_marks) = numbers;
         let pulse = mirrored.collect();
-        Sampling { pulse, excess, full_scale, blank_ticks, held_ticks: 0, recovery_ticks, least_marks }
+        Sampling {
+            pulse,
+            excess,
+            full_scale,
+            blank_ticks,
+            held_ticks: 0,
+            recovery_ticks,
+            least_marks,
+        }
     })
 }
 

@@ -110,6 +110,9 @@ pub fn record(
     let scene = Arc::clone(&Scene::of(scene)?.get().scene);
     Operating::of(&design, &scene.environment).or_raise()?;
     check_scan(&design, scan)?;
+    if design.receiver.sampling.is_some() {
+        return Err(wrong("sensor: is sampled and has no ticks to record"));
+    }
     let mut left: Vec<Band> = bands(&design, scan).collect();
     left.reverse();
     Ok(Records { design, scene, seed, left: Mutex::new(left) })

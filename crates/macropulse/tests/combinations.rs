@@ -109,15 +109,19 @@ fn written(scanned: &str, seen: &str, shots: &str, light: &str, idealised: &[&st
         _ => "",
     };
     let receiver = match shots {
+        _ if seen == "sampled" => "kind = \"sampled\"\nfalse_alarm = 1e-3\nblank_ns = 0.5\n",
         "coded" => "kind = \"matched\"\nfalse_alarm = 1e-3\n",
         _ => "kind = \"direct\"\n",
+    };
+    let tdc = match seen {
+        "sampled" => "",
+        _ => "[tdc]\nconverters = 64\nresolution_ps = 100.0\n",
     };
     let energy = if light == "budget" { "energy = { shot_nj = 100.0 }\n" } else { "" };
     format!(
         "version = 1\nname = \"mine\"\nidealised = {idealised:?}\nscan.scans_per_s = 10.0\n\
          scan.max_range_m = 30.0\n{}\n[light]\nwavelength_nm = 1550.0\npulse_ps = 200.0\n{energy}\
-         {optics}{code}{}[tdc]\nconverters = 64\nresolution_ps = 100.0\n[receiver]\n\
-         {receiver}",
+         {optics}{code}{}{tdc}[receiver]\n{receiver}",
         pattern(scanned),
         detector(seen, light),
     )
@@ -174,6 +178,11 @@ fn every_combination_is_what_the_table_says() {
             let scan = sim::scan_part(&design, &scene, 1, &band).unwrap();
             let found = scan.score.right_fraction();
             assert!(found > 0.8, "{which}: {found}");
+            if row[0] == "sampled" {
+                // Its decisions have no closed form here, which is said.
+                assert!(Forecaster::new(&design, &Environment::default()).is_err());
+                continue;
+            }
             let day = Environment::named("clear-day").unwrap();
             let forecast = Forecaster::new(&design, &day).unwrap().forecast(1.0, 10.0);
             assert!((0.8..=1.0).contains(&forecast.pd), "{which}: {}", forecast.pd);
@@ -189,7 +198,7 @@ fn every_combination_is_what_the_table_says() {
 #[test]
 fn the_forecast_holds_for_every_combination() {
     let day = Environment::named("clear-day").unwrap();
-    for row in table() {
+    for row in table().into_iter().filter(|row| row[0] != "sampled") {
         // The reflectance and the share seen of the first pattern.
         let (mut paint, mut of_raster) = (None, None);
         for (scanned, _) in PATTERNS.iter().zip(&row[3..]).filter(|(_, cell)| **cell == "yes") {

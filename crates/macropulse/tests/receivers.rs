@@ -210,12 +210,16 @@ fn a_log_without_shots_and_ticks_without_ticks_give_nothing() {
         let sensor = Sensor::printed(kind);
         let nothing = sensor
             .receiver
-            .decode(&sensor.codebook, &Default::default(), &Default::default())
+            .decode(&sensor.codebook, &Default::default(), &macropulse::codec::Ticks::default())
             .unwrap();
         assert_eq!(nothing, Default::default());
         let log = sensor.log(0..1);
         assert!(
-            sensor.receiver.decode(&sensor.codebook, &log, &Default::default()).unwrap().is_empty()
+            sensor
+                .receiver
+                .decode(&sensor.codebook, &log, &macropulse::codec::Ticks::default())
+                .unwrap()
+                .is_empty()
         );
         let ticks = sensor.ticks(&log, slope, CLEAR);
         let nothing =

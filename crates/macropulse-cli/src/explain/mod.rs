@@ -32,6 +32,12 @@ pub fn check(design: &Design, pixels: &[Pixel]) -> Result<(), Fault> {
     let (rows, columns) = (design.scan.rows, design.scan.columns);
     let is_outside =
         |(row, column): &&Pixel| u32::from(*row) >= rows || u32::from(*column) >= columns;
+    if !pixels.is_empty() && design.receiver.sampling.is_some() {
+        return Err(Fault::Wrong(format!(
+            "--explain: {} is sampled, and explained are decisions by ticks alone: leave it out",
+            design.name
+        )));
+    }
     match pixels.iter().find(is_outside) {
         None => Ok(()),
         Some((row, column)) => Err(Fault::Wrong(format!(

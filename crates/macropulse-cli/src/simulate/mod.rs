@@ -145,6 +145,16 @@ impl Simulate {
             scenario.formats.clone_from(&formats.0);
             scenario.ticks = formats.1;
         }
+        let sampled = |design: &&macropulse::design::Design| design.receiver.sampling.is_some();
+        if let Some(design) =
+            scenario.designs.iter().find(sampled).filter(|_| scenario.ticks.is_some())
+        {
+            return Err(Fault::Wrong(format!(
+                "--format: {} is sampled and has no ticks, and samples are not written: leave `ticks` \
+                 out",
+                design.name
+            )));
+        }
         scenario.scans = self.scans.unwrap_or(scenario.scans);
         scenario::check_scans(scenario.scans, &scenario.designs)
             .map_err(|sentence| Fault::Wrong(format!("--scans: {sentence}")))?;

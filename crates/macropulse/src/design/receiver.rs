@@ -10,6 +10,10 @@ use super::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::decode::{Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind, Sampling};
 
+/// Marks by which a receiver of samples decides at least if its file does not say: one alone may be that of
+/// any shot.
+const LEAST_MARKS: u32 = 2;
+
 /// `[receiver]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -33,9 +37,10 @@ pub(super) struct ReceiverFile {
     returns: u32,
     /// Which returns are kept of more, and which one of a pixel its image shows.
     pick: Option<Pick>,
-    /// Marks by which a return is decided at least, neither blanked nor clipped (sampled).
+    /// Marks by which a return is decided at least, none of them blanked (sampled): 2 if it is not given,
+    /// or as many as there are.
     #[schemars(range(min = 1, max = 65535))]
-    least_marks: u32,
+    least_marks: Option<u32>,
     /// For how long after each mark that is sent no sample counts, ns (sampled).
     #[schemars(range(min = 0, max = 1e6))]
     blank_ns: f64,
@@ -94,7 +99,8 @@ impl Check<'_> {
                 "`sampled` is for [detector.sampled], the other receivers for other detectors",
             );
         }
-        if (kind == ReceiverKind::Direct) == coding.label.is_some() {
+        let is_coded = coding.label.is_some();
+        if !samples && (kind == ReceiverKind::Direct) == is_coded {
             return self.refuse(
                 "receiver.kind",
                 "`direct` is for shots without [code], the other receivers for shots with it",
@@ -141,7 +147,10 @@ impl Check<'_> {
     ) -> Result<Option<Sampling>, Error> {
         let Some(sampled) = sampled else { return Ok(None) };
         let most = coding.codebook.lightest_word() as u32;
-        let least = self.count("receiver.least_marks", file.least_marks, 1, most)?;
+        let least = match file.least_marks {
+            Some(typed) => self.count("receiver.least_marks", typed, 1, most)?,
+            None => LEAST_MARKS.min(most),
+        };
         let blank = self.within("receiver.blank_ns", file.blank_ns, 0.0, 1e6)? * 1e-9;
         let recovery = self.within("receiver.recovery_ns", file.recovery_ns, 0.0, 1e6)? * 1e-9;
         Ok(Some(sampled.sampling((blank, recovery), least as u16)))

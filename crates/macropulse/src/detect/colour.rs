@@ -70,7 +70,8 @@ impl Colour {
                 let address = Address { stage: Stage::Amplifier, index: index as u64, part };
                 let numbers = chance.draw(address, GROUP, &mut numbers);
                 let (low, high) = numbers.split_at(BLOCK);
-                let set = low.iter().zip(high).map(|(low, high)| low.count_ones() + high.count_ones());
+                let set =
+                    low.iter().zip(high).map(|(low, high)| low.count_ones() + high.count_ones());
                 white.extend(set.take(BLOCK).map(|set| {
                     let normal = (set as f32 - 32.0) / 4.0;
                     linear * normal + quadratic * (normal * normal - 1.0)

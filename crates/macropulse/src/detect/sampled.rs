@@ -134,8 +134,8 @@ impl Sampler {
         for shot in channel.shots.iter().map(|shot| *shot as usize) {
             let (label, word) = (channel.log.label[shot], channel.log.word[shot]);
             for mark in codebook.marks(label, word) {
-                let at_fs =
-                    channel.log.fired_at_fs[shot] + i64::from(*mark) * channel.design.coding.chip_fs;
+                let at_fs = channel.log.fired_at_fs[shot]
+                    + i64::from(*mark) * channel.design.coding.chip_fs;
                 signal.add(self.in_ticks(at_fs), (height, rms), NEGLIGIBLE * self.sampled.step);
             }
         }

@@ -99,7 +99,7 @@ impl<'a> Forecaster<'a> {
     /// The sensor as it is, in `environment`.
     ///
     /// # Errors
-    /// As [`Operating::of`]; for the receivers that decide bit by bit; and where marks of a code word
+    /// As [`Operating::of`]; for the receivers that decide bit by bit or by samples; and where marks of a code word
     /// follow each other so soon that they are one to the detector.
     pub fn new(design: &'a Design, environment: &Environment) -> Result<Self, Error> {
         let operating = Operating::of(design, environment)?;
@@ -272,6 +272,9 @@ impl<'a> Forecaster<'a> {
 
 /// What of `design` where it is `operating` has no closed form, and what to do instead.
 fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str, String)> {
+    if design.receiver.kind == ReceiverKind::Sampled {
+        return Some(("receivers of samples", "simulate it".to_owned()));
+    }
     if design.is_coded()
         && !matches!(design.receiver.kind, ReceiverKind::Matched | ReceiverKind::Balanced)
     {

@@ -102,6 +102,7 @@ impl Sensor {
                 bit_threshold: 15,
                 returns: 1,
                 pick: Pick::Strongest,
+                sampling: None,
             },
             first_label: 0,
             labels,

@@ -70,8 +70,8 @@ impl FrontEnd {
     pub fn covariance(&self, apart: f64, background: f64) -> f64 {
         let rms = self.photon_rms();
         let of_charge = (ELEMENTARY_CHARGE * self.gain).powi(-2);
-        let white = self.current_noise.powi(2) * of_charge
-            + 2.0 * self.excess() * self.steady(background);
+        let white =
+            self.current_noise.powi(2) * of_charge + 2.0 * self.excess() * self.steady(background);
         let rising = (2.0 * PI * self.voltage_noise * self.capacitance).powi(2) * of_charge;
         let delay = apart / rms;
         // Of white noise, and by its second derivative of noise that rises with the frequency.
@@ -85,8 +85,7 @@ impl FrontEnd {
     /// gain that is gamma-distributed, r·F·(2F − 1)·∫h³.
     pub fn third_cumulant(&self, background: f64) -> f64 {
         let excess = self.excess();
-        let cubes =
-            self.photon_height().powi(3) * self.photon_rms() * (2.0 * PI / 3.0).sqrt();
+        let cubes = self.photon_height().powi(3) * self.photon_rms() * (2.0 * PI / 3.0).sqrt();
         self.steady(background) * excess * (2.0 * excess - 1.0) * cubes
     }
 }
