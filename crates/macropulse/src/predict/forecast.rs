@@ -5,16 +5,16 @@
 
 use std::collections::BTreeMap;
 
-use macropulse_codec::decode::ReceiverKind;
+use macropulse_codec::decode::{ReceiverKind, Sampling};
 
 use super::converters::bank_loss;
 use super::sidelobes::{Aside, Sidelobes};
-use super::{balanced, matched};
+use super::{balanced, matched, sampled};
 use crate::channel::{self, Operating};
-use crate::design::detector::{Awaited, Lit};
+use crate::design::detector::{Awaited, Lit, Model, Sampled};
 use crate::design::{Design, Detector, Tdc};
 use crate::environment::Environment;
-use crate::units::{SPEED_OF_LIGHT, s_from_fs, tof_from_range};
+use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 
 /// There is no forecast of a sensor: why, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -99,7 +99,7 @@ impl<'a> Forecaster<'a> {
     /// The sensor as it is, in `environment`.
     ///
     /// # Errors
-    /// As [`Operating::of`]; for the receivers that decide bit by bit or by samples; and where marks of a code word
+    /// As [`Operating::of`]; for the receivers that decide bit by bit; and where marks of a code word
     /// follow each other so soon that they are one to the detector.
     pub fn new(design: &'a Design, environment: &Environment) -> Result<Self, Error> {
         let operating = Operating::of(design, environment)?;
@@ -154,6 +154,11 @@ impl<'a> Forecaster<'a> {
     /// What it will measure of a target of `reflectance` at `range` metres.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
         let (design, operating) = (self.design, &self.operating);
+        if let (Detector::Sampled(detector), Some(sampling)) =
+            (&design.detector, &design.receiver.sampling)
+        {
+            return self.of_samples((detector, sampling), reflectance, range);
+        }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
         let detected = self.light * operating.link.photons(reflectance, range);
@@ -241,6 +246,40 @@ impl<'a> Forecaster<'a> {
         }
     }
 
+    /// What a receiver of samples will measure of a target of `reflectance` at `range` metres. Its noise is
+    /// that of the amplifier and of steady light; `background` counts for that.
+    fn of_samples(
+        &self,
+        (detector, sampling): (&Sampled, &Sampling),
+        reflectance: f64,
+        range: f64,
+    ) -> Forecast {
+        let (design, mean_weight) = (self.design, self.mean_weight);
+        let detected = self.light * self.operating.link.photons(reflectance, range);
+        let background = self.background * self.operating.background;
+        let parts = (design, detector, sampling);
+        let chances = sampled::chances(parts, background, detected, tof_from_range(range));
+        let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
+        let mark = Lit { photons: detected, background, falling: 0.0 };
+        let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
+        Forecast {
+            range,
+            reflectance,
+            photons_per_shot: detected * mean_weight / efficiency,
+            detected_per_mark: detected,
+            mark_pd: detector.mark_pd(&mark),
+            bank_loss: 0.0,
+            density: 0.0,
+            snr: chances.snr,
+            pd: chances.pd,
+            false_per_shot: design.receiver.false_alarm,
+            precision: (chances.pd * FEWEST >= 1.0)
+                .then_some(SPEED_OF_LIGHT / 2.0 * chances.timing),
+            aside: None,
+            bound: SPEED_OF_LIGHT / 2.0 * design.light.pulse * RMS_OF_FWHM / photons.sqrt(),
+        }
+    }
+
     /// The factor on the light that gives probability `pd` to a target of `reflectance` at `range`
     /// metres; `None` where 10⁹ times the light would not.
     pub fn light_needed(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
@@ -261,7 +300,10 @@ impl<'a> Forecaster<'a> {
     /// `None` where it is not seen at the nearest.
     pub fn farthest(&self, pd: f64, reflectance: f64) -> Option<f64> {
         let scan = &self.design.scan;
-        let (nearest, farthest) = (scan.min_range.max(0.1), 20.0 * scan.max_range);
+        // Nearer, a sampled channel is blind with the mark it has just sent.
+        let blank = self.design.receiver.sampling.as_ref().map_or(0, |known| known.blank_ticks + 2);
+        let blind = s_from_fs(i64::from(blank) * self.design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0;
+        let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
         let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
         match bisect(nearest, farthest, lost) {
             Some(range) if range <= nearest => None,
@@ -272,10 +314,8 @@ impl<'a> Forecaster<'a> {
 
 /// What of `design` where it is `operating` has no closed form, and what to do instead.
 fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str, String)> {
-    if design.receiver.kind == ReceiverKind::Sampled {
-        return Some(("receivers of samples", "simulate it".to_owned()));
-    }
     if design.is_coded()
+        && design.receiver.sampling.is_none()
         && !matches!(design.receiver.kind, ReceiverKind::Matched | ReceiverKind::Balanced)
     {
         return Some((

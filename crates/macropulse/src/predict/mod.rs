@@ -9,6 +9,7 @@ pub mod link;
 mod matched;
 pub mod multiple_access;
 pub mod ranging;
+mod sampled;
 mod sidelobes;
 pub mod verdict;
 

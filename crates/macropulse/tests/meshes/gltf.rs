@@ -108,7 +108,7 @@ fn nodes_that_contain_each_other_or_have_two_parents_are_refused() {
     ] {
         let told = refused("a.gltf", Square { nodes, ..Square::default() }.text());
         let why = ["a child that has another parent", "which is a child"];
-        assert!(told.contains("node 0") && why.iter().any(|why| told.contains(why)), "{told}");
+        assert!(told.contains("node ") && why.iter().any(|why| told.contains(why)), "{told}");
     }
     // As the graph of an attacker has it: 2 to the power of 40 squares.
     let layers = (0..40).map(|layer| format!(r#"{{"children":[{0},{0}]}}"#, layer + 1));

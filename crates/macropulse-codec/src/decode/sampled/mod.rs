@@ -53,6 +53,25 @@ pub struct Sampling {
     pub least_marks: u16,
 }
 
+impl Sampling {
+    /// How much more is asked of a word of which a mark is missing, in standard deviations of the sum.
+    pub const MORE_IF_MISSING: f64 = MISSING as f64;
+
+    /// The matched filter of whole ticks: how much each sample counts, the middle one at the time of the
+    /// mark. It makes 1 of a mark of one photon.
+    pub fn filter(&self) -> Vec<f32> {
+        Pulse::new(self).taps
+    }
+
+    /// How many of its own standard deviations above the least of `marks` in a word one counts at most.
+    pub fn most_above_least(marks: usize) -> f64 {
+        match marks {
+            0 => f64::from(ABOVE),
+            _ => f64::from(ABOVE) - normal_order(1.0, marks as f64).0,
+        }
+    }
+}
+
 /// The returns of the owned shots of `log`, of what was checked.
 pub(super) fn decode(
     receiver: &Receiver,

@@ -1,0 +1,244 @@
+//! What a receiver of samples finds of a target, as far as it does not meet the light of others.
+//!
+//! A mark of n photons is a height n·g(δ) behind the matched filter, δ the part of a tick by which it is
+//! beside a sample, with the noise of the filtered samples and of its own photons. The marks of a word are
+//! judged as the receiver does it: none counts much more than the least, their mean must exceed the
+//! threshold. That is summed over points that fill the cube of all probabilities evenly.
+
+use macropulse_codec::ShotLog;
+use macropulse_codec::decode::Sampling;
+use macropulse_codec::statistics::normal_quantile;
+
+use crate::design::Design;
+use crate::design::detector::Sampled;
+use crate::emit::bands;
+use crate::units::{FS_PER_S, RMS_OF_FWHM};
+
+/// Points of the sum: with four times as many the probability differs by less than 0.001.
+const POINTS: u32 = 2048;
+
+/// The lag of a target and those beside it: noise may lift one of them over the threshold.
+const LAGS: usize = 3;
+
+/// Shots of a channel of which it is told which marks are blanked: more than there are words in the ready
+/// designs.
+const SHOTS: usize = 64;
+
+/// What is to be expected.
+pub(super) struct Chances {
+    /// Probability of a return.
+    pub pd: f64,
+    /// Standard deviation of the time of a return, s.
+    pub timing: f64,
+    /// The mean of the marks over its noise.
+    pub snr: f64,
+}
+
+/// A mark behind the matched filter; times in ticks.
+struct Filtered {
+    /// Variance of the noise, photons².
+    noise: f64,
+    /// Correlation of the noise of samples that are one tick apart, and two.
+    correlation: [f64; 2],
+    /// Variance that a photon adds, in that of a photon alone.
+    of_photon: f64,
+    /// Variance of the time of a mark by when its photons came, of one photon.
+    by_photon: f64,
+    /// rms length of the mark.
+    rms: f64,
+}
+
+impl Filtered {
+    fn of(sampled: &Sampled, sampling: &Sampling, background: f64) -> Self {
+        let front_end = &sampled.front_end;
+        let taps = sampling.filter();
+        let tick = sampled.sample;
+        // Codes of one photon.
+        let step = sampled.step;
+        let covariance = |apart: usize| -> f64 {
+            let mut sum = 0.0;
+            for (one, weight) in taps.iter().enumerate() {
+                for (other, others) in taps.iter().enumerate() {
+                    let ticks = (one + apart).abs_diff(other);
+                    let rounding = if ticks == 0 { step * step / 12.0 } else { 0.0 };
+                    let noise = front_end.covariance(ticks as f64 * tick, background) + rounding;
+                    sum += f64::from(*weight) * f64::from(*others) * noise;
+                }
+            }
+            sum / (step * step)
+        };
+        let noise = covariance(0);
+        let correlation = [1, 2].map(|apart| covariance(apart) / noise);
+        let square = |time: f64| (time / tick).powi(2);
+        // The filter is as long as a mark; a photon behind it, the light of a pulse, and both.
+        let photon = square(front_end.mark_rms()) + square(front_end.photon_rms());
+        let light = square(front_end.pulse * RMS_OF_FWHM);
+        let mark = photon + light;
+        let highest = mark / photon;
+        Self {
+            noise,
+            correlation,
+            of_photon: highest * (photon / (photon + 2.0 * light)).sqrt(),
+            by_photon: highest.powi(3) * light * libm::pow(1.0 + 2.0 * light / photon, -1.5),
+            rms: mark.sqrt(),
+        }
+    }
+
+    /// Standard deviation of the time of a mark of so many `photons`, ticks.
+    fn timing(&self, photons: f64, excess: f64) -> f64 {
+        let square = self.rms * self.rms;
+        let steepness = photons / square * libm::exp(-0.5 / square);
+        // The variance of half the difference of the samples on both sides.
+        let slope = self.noise * (1.0 - self.correlation[1]) / 2.0;
+        (slope / steepness.powi(2) + excess * self.by_photon / photons).sqrt()
+    }
+}
+
+/// What the receiver of `design` finds of marks of so many `photons` that come `tof` seconds after they
+/// were sent, under `background` detections per second.
+pub(super) fn chances(
+    (design, sampled, sampling): (&Design, &Sampled, &Sampling),
+    background: f64,
+    photons: f64,
+    tof: f64,
+) -> Chances {
+    let filtered = Filtered::of(sampled, sampling, background);
+    let (nearest, farthest) = design.receiver.gate_ticks;
+    let lags = f64::from(farthest - nearest) + 1.0;
+    let threshold = -normal_quantile(design.receiver.false_alarm / lags);
+    let weight = design.coding.codebook.max_weight();
+    let by_count: Vec<Seen> = (0..=weight)
+        .map(|count| {
+            let more = if count < weight { Sampling::MORE_IF_MISSING } else { 0.0 };
+            let rule = Rule { threshold: threshold + more, count, weight };
+            match count < usize::from(sampling.least_marks).min(weight) {
+                true => Seen::default(),
+                false => rule.seen(&filtered, photons, sampling.excess),
+            }
+        })
+        .collect();
+    // Stray light shows where it is four deviations of the noise high, and the tick before tells nothing.
+    let shown = (sampled.stray / (4.0 * sampled.rms_noise(background))).max(1.0);
+    let rises = sampled.front_end.mark_rms() / sampled.sample * (2.0 * libm::log(shown)).sqrt();
+    let told = told(design, sampling, (tof, rises.ceil() as i64));
+    let mean = |of: &dyn Fn(usize) -> f64| {
+        told.iter().map(|count| of(*count)).sum::<f64>() / told.len().max(1) as f64
+    };
+    let count = mean(&|count| count as f64).max(1.0);
+    let seen = |count: usize| by_count.get(count).copied().unwrap_or_default();
+    let pd = mean(&|count| seen(count).share);
+    let height = mean(&|count| seen(count).share * seen(count).height) / pd.max(f64::MIN_POSITIVE);
+    let timing = filtered.timing(height.max(f64::MIN_POSITIVE), sampling.excess) * sampled.sample;
+    Chances {
+        pd,
+        timing: libm::hypot(timing, sampled.jitter) / count.sqrt(),
+        snr: photons * count.sqrt() / filtered.noise.sqrt(),
+    }
+}
+
+/// What is found of all words.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    share: f64,
+    /// Mean height of the marks of those.
+    height: f64,
+}
+
+/// How many marks of a word must pass for how many.
+struct Rule {
+    /// Standard deviations of the sum that must be reached.
+    threshold: f64,
+    /// Marks that count, of how many.
+    count: usize,
+    weight: usize,
+}
+
+impl Rule {
+    fn seen(&self, filtered: &Filtered, photons: f64, excess: f64) -> Seen {
+        let deviation =
+            |photons: f64| (filtered.noise + excess * filtered.of_photon * photons.max(0.0)).sqrt();
+        let needed = self.threshold * (filtered.noise / self.count as f64).sqrt();
+        let above = Sampling::most_above_least(self.weight);
+        let [one, two] = filtered.correlation;
+        let rest = (1.0 - one * one).max(0.0).sqrt();
+        let mixed = if rest > 0.0 { (one - one * two) / rest } else { 0.0 };
+        let last = (1.0 - two * two - mixed * mixed).max(0.0).sqrt();
+        let mut heights = vec![[0.0; LAGS]; self.count];
+        let found = (0..POINTS).filter_map(|point| {
+            let mut axes = Axes::new(LAGS * self.count + 1, point);
+            let late = axes.next() - 0.5;
+            let means = [-1.0, 0.0, 1.0]
+                .map(|lag: f64| photons * libm::exp(-0.5 * ((late + lag) / filtered.rms).powi(2)));
+            for heights in &mut heights {
+                let [a, b, c] = [0; LAGS].map(|_| -normal_quantile(axes.next()));
+                let noise = [a, one * a + rest * b, two * a + mixed * b + last * c];
+                for ((height, mean), noise) in heights.iter_mut().zip(means).zip(noise) {
+                    *height = mean + deviation(mean) * noise;
+                }
+            }
+            let is_found = (0..LAGS).any(|lag| {
+                let heights = heights.iter().map(|heights| heights[lag]);
+                let least = heights.clone().fold(f64::INFINITY, f64::min);
+                let cap = least + above * deviation(least);
+                heights.map(|height| height.min(cap)).sum::<f64>() / self.count as f64 >= needed
+            });
+            let sum: f64 = heights.iter().map(|heights| heights[1]).sum();
+            is_found.then_some(sum / self.count as f64)
+        });
+        let (count, sum) =
+            found.fold((0.0, 0.0), |(count, sum), height| (count + 1.0, sum + height));
+        Seen { share: count / f64::from(POINTS), height: sum / f64::max(count, 1.0) }
+    }
+}
+
+/// The coordinates of a point that with others fills a cube evenly: the parts behind the point of multiples
+/// of powers of the root of xᵈ⁺¹ = x + 1.
+struct Axes {
+    step: f64,
+    power: f64,
+    point: f64,
+}
+
+impl Axes {
+    fn new(axes: usize, point: u32) -> Self {
+        let mut root: f64 = 1.5;
+        for _ in 0..32 {
+            root = libm::pow(1.0 + root, 1.0 / (axes as f64 + 1.0));
+        }
+        Self { step: 1.0 / root, power: 1.0, point: f64::from(point) + 1.0 }
+    }
+
+    fn next(&mut self) -> f64 {
+        self.power *= self.step;
+        let part = 0.5 + self.point * self.power;
+        (part - part.floor()).clamp(1e-9, 1.0 - 1e-9)
+    }
+}
+
+/// How many marks of each of some shots come while their channel is not blind with marks of its own.
+/// `rises` ticks before it leaves, the stray light of a mark shows.
+fn told(design: &Design, sampling: &Sampling, (tof, rises): (f64, i64)) -> Vec<usize> {
+    let Some(band) = bands(design, 0).next() else { return Vec::new() };
+    let channels = band.shot_log(design).each_channel();
+    let Some((_, log)) = channels.first() else { return Vec::new() };
+    let tick_fs = design.tdc.tick_fs;
+    let marks = |log: &ShotLog, shot: usize| -> Vec<i64> {
+        let fired = log.fired_at_fs[shot] / tick_fs;
+        let chip = design.coding.chip_fs / tick_fs;
+        let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+        marks.iter().map(|mark| fired + chip * i64::from(*mark)).collect()
+    };
+    let own: Vec<i64> = (0..log.len()).flat_map(|shot| marks(log, shot)).collect();
+    // A tick tells nothing if the one beside it is blind.
+    let blind = |place: i64| {
+        own.iter().any(|mark| {
+            (mark - rises - 1..=mark + i64::from(sampling.blank_ticks) + 1).contains(&place)
+        })
+    };
+    let late = (tof * FS_PER_S as f64 / tick_fs as f64).round() as i64;
+    log.owned
+        .clone()
+        .take(SHOTS)
+        .map(|shot| marks(log, shot).iter().filter(|mark| !blind(**mark + late)).count())
+        .collect()
+}
