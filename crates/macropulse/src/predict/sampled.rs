@@ -5,14 +5,12 @@
 //! judged as the receiver does it: none counts much more than the least, their mean must exceed the
 //! threshold. That is summed over points that fill the cube of all probabilities evenly.
 
-use macropulse_codec::ShotLog;
 use macropulse_codec::decode::Sampling;
 use macropulse_codec::statistics::normal_quantile;
 
 use crate::design::Design;
 use crate::design::detector::Sampled;
-use crate::emit::bands;
-use crate::units::{FS_PER_S, RMS_OF_FWHM};
+use crate::units::{FS_PER_S, RMS_OF_FWHM, s_from_fs};
 
 /// Points of the sum: with four times as many the probability differs by less than 0.001.
 const POINTS: u32 = 2048;
@@ -20,9 +18,8 @@ const POINTS: u32 = 2048;
 /// The lag of a target and those beside it: noise may lift one of them over the threshold.
 const LAGS: usize = 3;
 
-/// Shots of a channel of which it is told which marks are blanked: more than there are words in the ready
-/// designs.
-const SHOTS: usize = 64;
+/// Shots of a channel of which it is told which marks are blanked: six times the words of the example.
+const SHOTS: usize = 60;
 
 /// What is to be expected.
 pub(super) struct Chances {
@@ -215,30 +212,32 @@ impl Axes {
     }
 }
 
-/// How many marks of each of some shots come while their channel is not blind with marks of its own.
-/// `rises` ticks before it leaves, the stray light of a mark shows.
+/// How many marks of each of some shots come while their channel is not blind with marks of its own:
+/// `rises` ticks before it leaves, the stray light of a mark shows. Shots of a channel follow each other
+/// along a line, word after word.
 fn told(design: &Design, sampling: &Sampling, (tof, rises): (f64, i64)) -> Vec<usize> {
-    let Some(band) = bands(design, 0).next() else { return Vec::new() };
-    let channels = band.shot_log(design).each_channel();
-    let Some((_, log)) = channels.first() else { return Vec::new() };
-    let tick_fs = design.tdc.tick_fs;
-    let marks = |log: &ShotLog, shot: usize| -> Vec<i64> {
-        let fired = log.fired_at_fs[shot] / tick_fs;
-        let chip = design.coding.chip_fs / tick_fs;
-        let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+    let coding = &design.coding;
+    let ticks = |time: f64| (time * FS_PER_S as f64 / design.tdc.tick_fs as f64).round() as i64;
+    let period = design.scan.shortest_period();
+    let chip = coding.chip_fs / design.tdc.tick_fs;
+    let macropulse = s_from_fs(design.macropulse_fs());
+    let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
+    let marks = |shot: usize| -> Vec<i64> {
+        let column = shot as u32 % design.scan.columns;
+        let word = coding.first_word + shot as u32 % coding.word_modulus;
+        let marks = coding.codebook.marks(coding.label_of(column as u16), word as u16);
+        let fired = ticks(shot as f64 * period);
         marks.iter().map(|mark| fired + chip * i64::from(*mark)).collect()
     };
-    let own: Vec<i64> = (0..log.len()).flat_map(|shot| marks(log, shot)).collect();
+    let own: Vec<i64> = (0..SHOTS + 2 * around).flat_map(marks).collect();
     // A tick tells nothing if the one beside it is blind.
     let blind = |place: i64| {
         own.iter().any(|mark| {
             (mark - rises - 1..=mark + i64::from(sampling.blank_ticks) + 1).contains(&place)
         })
     };
-    let late = (tof * FS_PER_S as f64 / tick_fs as f64).round() as i64;
-    log.owned
-        .clone()
-        .take(SHOTS)
-        .map(|shot| marks(log, shot).iter().filter(|mark| !blind(**mark + late)).count())
+    let late = ticks(tof);
+    (around..around + SHOTS)
+        .map(|shot| marks(shot).iter().filter(|mark| !blind(**mark + late)).count())
         .collect()
 }
