@@ -10,6 +10,12 @@ const WIDTH_BY_BANDWIDTH: f64 = 0.44;
 /// Peak of a Gaussian of unit area and unit full width at half maximum.
 const PEAK: f64 = 0.939_437_278_699_651_3;
 
+/// Excess noise factor of a multiplication M by a photodiode whose ionisation coefficients have the ratio k:
+/// F = k·M + (1 − k)·(2 − 1/M) \[McI66\].
+pub(super) fn excess(gain: f64, ionisation: f64) -> f64 {
+    ionisation * gain + (1.0 - ionisation) * (2.0 - 1.0 / gain)
+}
+
 /// A photodiode and its amplifier, SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Amplifier {
@@ -34,10 +40,9 @@ impl Amplifier {
         libm::hypot(self.pulse, WIDTH_BY_BANDWIDTH / self.bandwidth)
     }
 
-    /// Excess noise factor of the multiplication, F = k·M + (1 − k)·(2 − 1/M) \[McI66\].
+    /// Excess noise factor of the multiplication.
     pub fn excess(&self) -> f64 {
-        let (k, m) = (self.ionisation, self.gain);
-        k * m + (1.0 - k) * (2.0 - 1.0 / m)
+        excess(self.gain, self.ionisation)
     }
 
     /// Noise without a mark, rms, in detected photons: i_n over the peak current of one,

@@ -7,6 +7,7 @@
 
 use std::f64::consts::PI;
 
+use super::amplifier::excess;
 use crate::units::{ELEMENTARY_CHARGE, RMS_OF_FWHM};
 
 /// rms response of a Gaussian low-pass times its electrical 3 dB bandwidth: √(ln 2)/(2π).
@@ -50,10 +51,9 @@ impl FrontEnd {
         self.mark_rms() / self.photon_rms()
     }
 
-    /// Excess noise factor of the multiplication, F = k·M + (1 − k)·(2 − 1/M) \[McI66\].
+    /// Excess noise factor of the multiplication.
     pub fn excess(&self) -> f64 {
-        let (k, m) = (self.ionisation, self.gain);
-        k * m + (1.0 - k) * (2.0 - 1.0 / m)
+        excess(self.gain, self.ionisation)
     }
 
     /// Detected photons per second that steady light and the dark current are.
