@@ -11,7 +11,7 @@ use super::amplifier::excess;
 use crate::units::{ELEMENTARY_CHARGE, RMS_OF_FWHM};
 
 /// rms response of a Gaussian low-pass times its electrical 3 dB bandwidth: √(ln 2)/(2π).
-const RMS_BY_BANDWIDTH: f64 = 0.132_507_7;
+const RMS_BY_BANDWIDTH: f64 = 0.132_505_181_759_698_4;
 
 /// A photodiode and its amplifier before they are sampled, SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
