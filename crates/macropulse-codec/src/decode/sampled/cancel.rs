@@ -78,7 +78,8 @@ impl<'a> Residual<'a> {
         if sum.score < threshold {
             return None;
         }
-        let clipped = clipped(self.codes, self.sampling, self.pulse, &self.counted);
+        let told = (self.codes, &self.filtered.doubt[..]);
+        let clipped = clipped(told, self.sampling, self.pulse, &self.counted);
         let late = match &clipped {
             Some(clipped) => clipped.late,
             None => in_time(&self.filtered, &self.counted, self.pulse),
@@ -186,7 +187,8 @@ impl<'a> Residual<'a> {
         }
     }
 
-    /// Leaves out what stands about clipped pulses of so many `photons`: how they look is not known.
+    /// Leaves out what stands about clipped pulses of so many `photons`, and all of the run of clipped samples
+    /// that each is in, for which the amplifier holds: how they look is not known.
     fn close(&mut self, places: impl Iterator<Item = i64>, late: f64, photons: f32) {
         let span = self.pulse.span() as i64;
         let sigma = self.filtered.sigma;
@@ -198,8 +200,15 @@ impl<'a> Residual<'a> {
         let last = (-span..=span).rev().find(is_lit).unwrap_or(span);
         let length = self.filtered.doubt.len() as i64;
         for place in places {
-            let from = (place + first).clamp(0, length) as usize;
-            let to = (place + last + 1).clamp(0, length) as usize;
+            let mut from = (place + first).clamp(0, length) as usize;
+            let mut to = (place + last + 1).clamp(0, length) as usize;
+            let is_clipped = |at: usize| self.codes[at] >= self.sampling.full_scale;
+            while from > 0 && is_clipped(from - 1) {
+                from -= 1;
+            }
+            while to < self.codes.len() && is_clipped(to) {
+                to += 1;
+            }
             self.filtered.doubt[from..to].fill(f32::INFINITY);
         }
     }

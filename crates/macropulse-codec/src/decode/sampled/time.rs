@@ -34,20 +34,29 @@ pub(super) struct Clipped {
 
 /// The time of the marks that count if samples there are clipped, from their edges; the
 /// median of the marks. `None` where none is clipped.
+///
+/// What is clipped where the samples tell nothing, by `doubt`, is stray light of own marks or was found
+/// before: a mark just behind it is not timed by that.
 pub(super) fn clipped(
-    codes: &[i16],
+    (codes, doubt): (&[i16], &[f32]),
     sampling: &Sampling,
     pulse: &Pulse,
     counted: &[Mark],
 ) -> Option<Clipped> {
     let is_clipped = |at: &usize| codes[*at] >= sampling.full_scale;
+    let tells = |at: &usize| doubt.get(*at).is_some_and(|doubt| *doubt < f32::INFINITY);
     let mut told: Vec<(f64, f64)> = Vec::new();
     for &Mark { place, .. } in counted {
         let about = (0..=NEAR).flat_map(|apart| [place.saturating_sub(apart), place + apart]);
-        let Some(at) = about.filter(|at| *at < codes.len()).find(is_clipped) else { continue };
+        let mut about = about.filter(|at| *at < codes.len() && tells(at));
+        let Some(at) = about.find(is_clipped) else { continue };
         let before = (0..at).rev().find(|at| !is_clipped(at));
         let behind = (at..codes.len()).find(|at| !is_clipped(at));
         let (Some(before), Some(behind)) = (before, behind) else { continue };
+        // Light that comes while stray light is still clipped has no edge of its own.
+        if !tells(&(before + 1)) {
+            continue;
+        }
         let rises = crossing(codes, sampling, (before, 0.5));
         let falls = match sampling.held_ticks {
             0 => crossing(codes, sampling, (behind, -0.5)),
@@ -114,7 +123,28 @@ mod tests {
         let behind = codes.iter().rposition(|code| *code == 1000).unwrap() + 1;
         codes[behind] = swings_to.unwrap_or(codes[behind]);
         let mark = Mark { place: 20, height: 1e5, doubt: 0.0 };
-        clipped(&codes, &sampling, &Pulse::new(&sampling), &[mark])
+        clipped((&codes, &[0.0; 40]), &sampling, &Pulse::new(&sampling), &[mark])
+    }
+
+    /// Three ticks behind clipped samples of own stray light a mark comes that is not clipped. Control: where
+    /// they tell something, it is taken for theirs.
+    #[test]
+    fn a_mark_behind_stray_light_is_not_timed_by_it() {
+        let (sampling, mark) = (sampling(), Mark { place: 13, height: 1e3, doubt: 0.0 });
+        let pulse = Pulse::new(&sampling);
+        let mut codes = [0; 20];
+        codes[5..11].fill(1000);
+        codes[13] = 100;
+        let mut doubt = [0.0; 20];
+        assert!(clipped((&codes, &doubt), &sampling, &pulse, &[mark]).unwrap().late < -3.0);
+        doubt[4..12].fill(f32::INFINITY);
+        assert!(clipped((&codes, &doubt), &sampling, &pulse, &[mark]).is_none());
+        // Light that is clipped, too, from where the stray light still is: only the other mark has an edge.
+        codes[5..15].fill(1000);
+        let other = Mark { place: 16, ..mark };
+        codes[16] = 1000;
+        let late = clipped((&codes, &doubt), &sampling, &pulse, &[mark, other]).unwrap().late;
+        assert!(late.abs() < 0.5, "{late}");
     }
 
     /// At sixteen phases: to a hundredth of a tick by both edges, to a third by one and the last clipped
@@ -134,8 +164,8 @@ mod tests {
     fn what_is_not_clipped_or_never_ends_is_not_timed_by_edges() {
         let (sampling, mark) = (sampling(), Mark { place: 2, height: 1e5, doubt: 0.0 });
         let pulse = Pulse::new(&sampling);
-        assert!(clipped(&[9, 99, 999, 99, 9], &sampling, &pulse, &[mark]).is_none());
-        assert!(clipped(&[1000; 5], &sampling, &pulse, &[mark]).is_none());
-        assert!(clipped(&[], &sampling, &pulse, &[]).is_none());
+        assert!(clipped((&[9, 99, 999, 99, 9], &[0.0; 5]), &sampling, &pulse, &[mark]).is_none());
+        assert!(clipped((&[1000; 5], &[0.0; 5]), &sampling, &pulse, &[mark]).is_none());
+        assert!(clipped((&[], &[]), &sampling, &pulse, &[]).is_none());
     }
 }
