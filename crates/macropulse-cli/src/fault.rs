@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use macropulse::formats::Format;
 use macropulse::{channel, design, environment, formats, predict, scene, sim, told};
 use macropulse_study::text::broken;
-use macropulse_study::{decoding, paper, record, sweep, validate};
+use macropulse_study::{decoding, designs, paper, record, sweep, validate};
 
 use crate::options::Common;
 
@@ -306,6 +306,17 @@ impl From<sweep::Error> for Fault {
             sweep::Error::Formats(error) => error.into(),
             sweep::Error::View(error) => Self::Ours(error.to_string()),
             sweep::Error::Simulation(error) => error.into(),
+            wrong => Self::Wrong(wrong.to_string()),
+        }
+    }
+}
+
+impl From<designs::Error> for Fault {
+    fn from(error: designs::Error) -> Self {
+        match error {
+            designs::Error::Formats(error) => error.into(),
+            designs::Error::View(error) => Self::Ours(error.to_string()),
+            designs::Error::Simulation(error) => error.into(),
             wrong => Self::Wrong(wrong.to_string()),
         }
     }

@@ -6,6 +6,7 @@ mod codes;
 mod completions;
 mod convert;
 mod decode;
+mod design;
 mod encode;
 mod environments;
 mod explain;
@@ -63,6 +64,7 @@ enum Command {
     Schema(schema::Schema),
     Check(check::Check),
     Budget(budget::Budget),
+    Design(design::Design),
     Codes(codes::Codes),
     Encode(encode::Encode),
     Decode(decode::Decode),
@@ -106,6 +108,7 @@ fn run(options: &Options) -> Result<(), Fault> {
         Command::Schema(schema) => schema::run(schema),
         Command::Check(check) => check::run(check, common),
         Command::Budget(budget) => budget::run(budget, common),
+        Command::Design(design) => design::run(design, common),
         Command::Codes(codes) => codes::run(codes, common),
         Command::Encode(encode) => encode::run(encode, common),
         Command::Decode(decode) => decode::run(decode, common),

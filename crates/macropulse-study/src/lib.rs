@@ -6,6 +6,7 @@
 pub mod budget;
 pub mod codes;
 pub mod decoding;
+pub mod designs;
 pub mod paper;
 pub mod record;
 pub mod sent;

@@ -37,6 +37,8 @@ pub enum Stage {
     Amplifier = 10,
     /// How late does a comparator answer? Indexed by the sample at which it does, parts by channel.
     Comparator = 11,
+    /// What stands in a scene that is made up. Indexed by row of pixels.
+    Scenery = 12,
 }
 
 /// The counter at which a run of random numbers begins.
@@ -106,6 +108,12 @@ pub struct Stream {
 }
 
 impl Stream {
+    /// The next number, between 0 and 1.
+    pub fn fraction(&mut self) -> f64 {
+        let Ok(number) = self.try_next_u32();
+        (f64::from(number) + 0.5) / 4_294_967_296.0
+    }
+
     fn fill(&mut self) {
         self.chance.fill(self.address, &mut self.numbers);
         self.next = 0;

@@ -3,7 +3,35 @@
 
 use std::io;
 
-use crate::names::nearest;
+use serde::de::DeserializeOwned;
+
+use crate::names::{key_at, line_column, nearest, offset_of_key};
+
+/// What the TOML `text` of a file called `origin` says, as a `T`.
+///
+/// # Errors
+/// Where it is wrong, and how, in one sentence.
+pub fn typed<T: DeserializeOwned>(text: &str, origin: &str) -> Result<T, String> {
+    toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start);
+        let (line, column) = line_column(text, start);
+        match text.parse::<toml::Table>() {
+            Err(fault) => format!("{origin}:{line}:{column}: {}", syntax(text, &fault)),
+            Ok(_) => {
+                let key = key_at(text, start).map_or_else(String::new, |key| format!("{key}: "));
+                format!("{origin}:{line}:{column}: {key}{}", wrong(error.message(), None))
+            }
+        }
+    })
+}
+
+/// A sentence about the value at the dotted `path` of the TOML `text` of a file called `origin`.
+pub fn at(text: &str, origin: &str, path: &str, message: &str) -> String {
+    match offset_of_key(text, path).map(|offset| line_column(text, offset)) {
+        Some((line, column)) => format!("{origin}:{line}:{column}: {path}: {message}"),
+        None => format!("{origin}: {path}: {message}"),
+    }
+}
 
 /// Why a file cannot be read.
 pub fn unreadable(error: &io::Error) -> String {

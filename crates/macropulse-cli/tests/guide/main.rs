@@ -45,6 +45,7 @@ pages! {
     first_scan: "docs/guide/first-scan.md",
     golden_model: "docs/guide/golden-model.md",
     interference: "docs/guide/interference.md",
+    never_waiting: "docs/guide/never-waiting.md",
     own_code: "docs/guide/own-code.md",
     own_scanner: "docs/guide/own-scanner.md",
     python: "docs/guide/python.md",

@@ -4,6 +4,7 @@
 //! other shots in flight is that of the same target. The beam is a line.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use macropulse_codec::decode::{ReceiverKind, Sampling};
 
@@ -50,6 +51,8 @@ pub struct Forecaster<'a> {
     mean_weight: f64,
     /// Those of a matched receiver; the dark chips of a balanced one have none.
     sidelobes: Option<Sidelobes>,
+    /// The points of the sums over noise, of a receiver of samples; empty of the others.
+    points: Arc<[sampled::Points]>,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the dark and background counts.
@@ -119,6 +122,8 @@ impl<'a> Forecaster<'a> {
         let (light, background) = (1.0, 1.0);
         let is_matched = design.is_coded() && design.receiver.kind == ReceiverKind::Matched;
         let sidelobes = is_matched.then(|| Sidelobes::of(design));
+        let sampling = design.receiver.sampling.as_ref();
+        let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
         Ok(Self {
             design,
             operating,
@@ -126,6 +131,7 @@ impl<'a> Forecaster<'a> {
             weights,
             mean_weight,
             sidelobes,
+            points: points.into(),
             light,
             background,
         })
@@ -258,7 +264,8 @@ impl<'a> Forecaster<'a> {
         let detected = self.light * self.operating.link.photons(reflectance, range);
         let background = self.background * self.operating.background;
         let parts = (design, detector, sampling);
-        let chances = sampled::chances(parts, background, detected, tof_from_range(range));
+        let chances =
+            sampled::chances(parts, &self.points, background, detected, tof_from_range(range));
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
         let mark = Lit { photons: detected, background, falling: 0.0 };
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);

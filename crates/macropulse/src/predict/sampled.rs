@@ -95,6 +95,7 @@ impl Filtered {
 /// were sent, under `background` detections per second.
 pub(super) fn chances(
     (design, sampled, sampling): (&Design, &Sampled, &Sampling),
+    points: &[Points],
     background: f64,
     photons: f64,
     tof: f64,
@@ -108,9 +109,9 @@ pub(super) fn chances(
         .map(|count| {
             let more = if count < weight { Sampling::MORE_IF_MISSING } else { 0.0 };
             let rule = Rule { threshold: threshold + more, count, weight };
-            match count < usize::from(sampling.least_marks).min(weight) {
+            match count < fewest(sampling, weight) {
                 true => Seen::default(),
-                false => rule.seen(&filtered, photons, sampling.excess),
+                false => rule.seen(&filtered, &points[count], (photons, sampling.excess)),
             }
         })
         .collect();
@@ -133,6 +134,38 @@ pub(super) fn chances(
     }
 }
 
+/// Marks by which the receiver decides at least, of words of so many.
+fn fewest(sampling: &Sampling, weight: usize) -> usize {
+    usize::from(sampling.least_marks).min(weight)
+}
+
+/// The points of the sum for so many marks: how late the light is, ticks, and of each mark the normal
+/// deviates of its noise at each lag.
+#[derive(Debug, Clone)]
+pub(super) struct Points {
+    late: Vec<f64>,
+    deviates: Vec<[f64; LAGS]>,
+}
+
+impl Points {
+    /// For each number of marks that may count of the words of `design`; empty where none is enough.
+    pub(super) fn of(design: &Design, sampling: &Sampling) -> Vec<Self> {
+        let weight = design.coding.codebook.max_weight();
+        let points = |count: usize| {
+            let mut points = Self { late: Vec::new(), deviates: Vec::new() };
+            let enough = count >= fewest(sampling, weight);
+            for point in 0..if enough { POINTS } else { 0 } {
+                let mut axes = Axes::new(LAGS * count + 1, point);
+                points.late.push(axes.next() - 0.5);
+                let deviates = || [0; LAGS].map(|_| -normal_quantile(axes.next()));
+                points.deviates.extend(std::iter::repeat_with(deviates).take(count));
+            }
+            points
+        };
+        (0..=weight).map(points).collect()
+    }
+}
+
 /// What is found of all words.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
@@ -151,7 +184,7 @@ struct Rule {
 }
 
 impl Rule {
-    fn seen(&self, filtered: &Filtered, photons: f64, excess: f64) -> Seen {
+    fn seen(&self, filtered: &Filtered, points: &Points, (photons, excess): (f64, f64)) -> Seen {
         let deviation =
             |photons: f64| (filtered.noise + excess * filtered.of_photon * photons.max(0.0)).sqrt();
         let needed = self.threshold * (filtered.noise / self.count as f64).sqrt();
@@ -161,13 +194,11 @@ impl Rule {
         let mixed = if rest > 0.0 { (one - one * two) / rest } else { 0.0 };
         let last = (1.0 - two * two - mixed * mixed).max(0.0).sqrt();
         let mut heights = vec![[0.0; LAGS]; self.count];
-        let found = (0..POINTS).filter_map(|point| {
-            let mut axes = Axes::new(LAGS * self.count + 1, point);
-            let late = axes.next() - 0.5;
+        let found = points.late.iter().enumerate().filter_map(|(point, late)| {
             let means = [-1.0, 0.0, 1.0]
                 .map(|lag: f64| photons * libm::exp(-0.5 * ((late + lag) / filtered.rms).powi(2)));
-            for heights in &mut heights {
-                let [a, b, c] = [0; LAGS].map(|_| -normal_quantile(axes.next()));
+            let deviates = &points.deviates[point * self.count..][..self.count];
+            for (heights, &[a, b, c]) in heights.iter_mut().zip(deviates) {
                 let noise = [a, one * a + rest * b, two * a + mixed * b + last * c];
                 for ((height, mean), noise) in heights.iter_mut().zip(means).zip(noise) {
                     *height = mean + deviation(mean) * noise;

@@ -85,7 +85,7 @@ pub(super) fn decode(
     for (shots, log) in log.each_channel() {
         let codes = log.channel.first().map_or(&[][..], |channel| samples.of(*channel));
         let fired = receiver.fired_since(&log, samples.epoch);
-        let band = Band { receiver, codebook, log: &log, fired, lags: lags(receiver) };
+        let band = Band { receiver, codebook, log: &log, fired, lags: lags(receiver, codebook) };
         let mut found = find(&band, codes, &pulse, sampling);
         found.sort_by(|one, other| one.shot.cmp(&other.shot).then(one.at().total_cmp(&other.at())));
         for shot in log.owned.clone() {
@@ -117,8 +117,13 @@ pub(super) fn decode(
 }
 
 /// Lags that are looked at: the next one behind the last is needed to tell whether that is a peak.
-fn lags(receiver: &Receiver) -> i64 {
-    i64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + 2
+///
+/// Light from beyond the gate is looked for where a word tells whose it is. Shots of a single mark are all
+/// alike: what comes is taken for an echo in the gate, as every lidar takes it that waits for its echoes.
+fn lags(receiver: &Receiver, codebook: &Codebook) -> i64 {
+    let tells = codebook.words() > 1 || codebook.max_weight() > 1;
+    let beyond = if tells { receiver.light_ticks } else { 0 };
+    i64::from(receiver.gate_ticks.1.max(beyond)) + 2
 }
 
 /// Whether the whole tick next to where light was found is in the gate.

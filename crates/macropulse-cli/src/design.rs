@@ -1,0 +1,70 @@
+//! `macropulse design`: which lidar does what is required?
+
+use std::path::PathBuf;
+
+use clap::Args;
+use macropulse::sim::Watch;
+use macropulse_study::designs::{PAGE, Requirements, Search, make_room};
+
+use crate::fault::{Fault, warn};
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
+use crate::options::Common;
+use crate::progress::Progress;
+use crate::text::{print, print_json};
+
+/// Find lidars that do what is required, coded and waiting, and where each of them wins
+///
+/// Every combination of photodiode, marks and beams that is allowed is worked out in closed form: the
+/// energy that eyes allow, the best pulse, the least aperture. Of those that close, the ones with the
+/// fewest beams are simulated, on a target all around and on a field of tiles at ranges that have nothing
+/// to do with each other. What was counted stays in DIR/trials, so the same command goes on where it was
+/// stopped.
+#[derive(Args)]
+#[command(after_help = "Example:
+  macropulse design docs/examples/requirements.toml -o lidars
+and open lidars/index.html; lidars/coded.toml is a sensor for simulate, budget and sweep")]
+pub struct Design {
+    /// TOML file of what is wanted and of which parts it may be made
+    #[arg(value_name = "REQUIREMENTS")]
+    requirements: PathBuf,
+
+    /// Folder for the results, made if need be
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+
+    /// Print all that was found as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(options: &Design, common: &Common) -> Result<(), Fault> {
+    let required = Requirements::open(&options.requirements)?;
+    let mut folder = Folder::claim_alone(&options.output)?;
+    let interrupt = Interrupt::listen()?;
+    folder.make()?;
+    // What is counted stays there for the next time, however this one ends.
+    folder.keep();
+    make_room(&options.output)?;
+    let progress = Progress::of(common, "design", required.most_shots());
+    let watch = Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
+    let search = Search { required, folder: &options.output, seed: options.seed, watch: &watch };
+    let Some(found) = search.run()? else {
+        warn("the search is not at its end; the same command goes on from here");
+        return Err(Fault::Interrupted);
+    };
+    progress.finish();
+    interrupt.undisturbed(|| found.write(&options.output))?;
+    if options.json {
+        return print_json(vec![found.json()]);
+    }
+    if common.quiet {
+        return Ok(());
+    }
+    print(&found.text())?;
+    print(&format!("\nopen {}\n", options.output.join(PAGE).display()))
+}

@@ -1,0 +1,267 @@
+//! One lidar of all that could be built, as a sensor.
+
+use std::path::{Path, PathBuf};
+
+use macropulse::codec::code::{Family, Separated};
+use macropulse::design::{Design, Detector, Pattern};
+use toml::{Table, Value};
+
+use super::Error;
+use super::parts::Part;
+use super::requirements::Requirements;
+
+/// Words of a code: with ten of them no two shots in flight that are nearer than ten have the same one.
+const WORDS: u32 = 10;
+
+/// Least time between two marks of a word, s: as long as a channel is blind behind a mark of its own, and a
+/// mark more. Words with marks 0.8 ns apart gave nine times as many wrong points.
+const GAP: f64 = 8e-9;
+
+/// Distances between marks differ by so many lengths (full width at half maximum) of a mark behind its
+/// amplifier: two marks that meet two others by less than that look like the same.
+const APART: f64 = 2.0;
+
+/// Steps of the converter to a standard deviation of the noise: the rounding then adds a hundredth to it.
+const STEPS: f64 = 2.5;
+
+/// Share of the false points accepted that the receiver is asked for: the rest is left to what no threshold
+/// knows, remains of light that was cancelled.
+const FALSE_SHARE: f64 = 0.03;
+
+/// A lidar that may or may not do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its photodiodes.
+    pub part: Part,
+    /// Marks of a shot: 1 waits for its echo, more are a code word.
+    pub marks: u32,
+    /// Beams, each with a detector of its own.
+    pub beams: u32,
+    /// Length of a pulse, s, full width at half maximum.
+    pub pulse: f64,
+    /// Bandwidth of the amplifiers, Hz.
+    pub bandwidth: f64,
+    /// Energy of a shot, J.
+    pub energy: f64,
+    /// Diameter of the receiving aperture, m.
+    pub aperture: f64,
+}
+
+/// What is built of it for a purpose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Built {
+    /// All of it.
+    Whole,
+    /// So many of its beams, next to each other: every detector has the same work.
+    Beams(u32),
+}
+
+impl Candidate {
+    /// Whether it waits for the echo of a shot before it fires the next one.
+    pub fn waits(&self) -> bool {
+        self.marks == 1
+    }
+
+    /// `coded` or `waiting`.
+    pub fn scheme(&self) -> &'static str {
+        if self.waits() { "waiting" } else { "coded" }
+    }
+
+    /// A name that tells it from the others of a search.
+    pub fn name(&self) -> String {
+        match self.waits() {
+            true => format!("waiting-{}-{}", self.beams, self.part.name),
+            false => format!("coded-{}-{}-{}", self.beams, self.marks, self.part.name),
+        }
+    }
+
+    /// The sensor.
+    ///
+    /// # Errors
+    /// If the sensor of the requirements cannot be changed into it.
+    pub fn design(&self, required: &Requirements) -> Result<Design, Error> {
+        self.built(required, Built::Whole, &[])
+    }
+
+    /// As [`Candidate::design`], or a part of it, with some keys of the sensor changed.
+    pub(super) fn built(
+        &self,
+        required: &Requirements,
+        built: Built,
+        changes: &[(String, Value)],
+    ) -> Result<Design, Error> {
+        let of = |step: f64| -> Result<Design, Error> {
+            let mut table = self.table(required, built, step)?;
+            changes.iter().for_each(|(path, value)| put(&mut table, path, value.clone()));
+            Ok(Design::from_table(&table, &self.name(), &required.folder, &[])?)
+        };
+        // The step of the converter follows from a noise that is known only of a design.
+        let coarse = of(1.0)?;
+        let Detector::Sampled(detector) = &coarse.detector else {
+            return Err(Error::Asked(format!(
+                "{}: has no sampled detector",
+                required.parts.sensor
+            )));
+        };
+        let step = detector.rms_noise(0.0) / STEPS;
+        of(step)
+    }
+
+    /// The sensor as the keys of its file.
+    fn table(&self, required: &Requirements, built: Built, step: f64) -> Result<Table, Error> {
+        let wanted = &required.wanted;
+        let mut table = required.template.clone();
+        // The beam fills as much of its pixel as that of the template.
+        let [width, height] = required.pitch();
+        let pitch = |across: &str, count: &str| {
+            let key = |name: &str| number(&table, &format!("scan.raster.{name}")).unwrap_or(1.0);
+            key(across) / key(count)
+        };
+        let finer = width.min(height)
+            / pitch("horizontal_deg", "columns").min(pitch("vertical_deg", "rows"));
+        let divergence = number(&table, "light.divergence_mrad").unwrap_or(1.0) * finer;
+        let mut set = |path: &str, value: Value| put(&mut table, path, value);
+        let share = match built {
+            Built::Whole => 1.0,
+            Built::Beams(beams) => f64::from(beams) / f64::from(self.beams),
+        };
+        let beams = (f64::from(self.beams) * share).round();
+        let rows = (f64::from(wanted.rows) * share).round();
+        set("name", self.name().into());
+        set("summary", self.summary(required).into());
+        set("scan.scans_per_s", wanted.scans_per_s.into());
+        set("scan.max_range_m", wanted.range_m.into());
+        set("scan.light_range_m", wanted.clutter_m.into());
+        set("scan.raster.rows", (rows as i64).into());
+        set("scan.raster.columns", wanted.columns.into());
+        set("scan.raster.horizontal_deg", wanted.horizontal_deg.into());
+        set("scan.raster.vertical_deg", (wanted.vertical_deg * share).into());
+        set("scan.raster.beams", (beams as i64).into());
+        set("light.wavelength_nm", self.part.wavelength_nm.into());
+        set("light.pulse_ps", (self.pulse * 1e12).into());
+        let energy = Table::from_iter([("shot_nj".to_owned(), (self.energy * 1e9).into())]);
+        set("light.energy", energy.into());
+        set("light.divergence_mrad", divergence.into());
+        set("optics.aperture_mm", (self.aperture * 1e3).into());
+        set("detector.sampled.efficiency", self.part.efficiency.into());
+        set("detector.sampled.gain", self.part.gain.into());
+        set("detector.sampled.ionisation_ratio", self.part.ionisation_ratio.into());
+        set("detector.sampled.dark_current_na", self.part.dark_current_na.into());
+        set("detector.sampled.capacitance_pf", self.part.capacitance_pf.into());
+        set("detector.sampled.bandwidth_mhz", (self.bandwidth * 1e-6).into());
+        set("detector.sampled.step_photons", step.into());
+        set("receiver.false_alarm", (FALSE_SHARE * wanted.false_points).into());
+        if self.waits() {
+            table.remove("code");
+        } else {
+            let separated = required.words(self.marks, (self.pulse, self.bandwidth))?;
+            put(&mut table, "code.family", family(&separated));
+            put(&mut table, "code.word.modulus", i64::from(WORDS).into());
+        }
+        Ok(table)
+    }
+
+    fn summary(&self, required: &Requirements) -> String {
+        let wanted = &required.wanted;
+        let how = match self.waits() {
+            true => "one pulse a shot, waits for its echo".to_owned(),
+            false => format!("{} marks a shot, waits for none", self.marks),
+        };
+        format!(
+            "{} x {} at {} Hz to {} m in {} beams of {} nm: {how}",
+            wanted.columns,
+            wanted.rows,
+            wanted.scans_per_s,
+            wanted.range_m,
+            self.beams,
+            self.part.wavelength_nm
+        )
+    }
+}
+
+fn family(words: &Separated) -> Value {
+    let &Separated { length, weight, words, gap, apart, seed } = words;
+    let keys =
+        [("length", length), ("weight", weight), ("words", words), ("gap", gap), ("apart", apart)];
+    let keys = keys.map(|(key, value)| (key.to_owned(), Value::from(value)));
+    let mut table = Table::from_iter(keys);
+    table.insert("seed".to_owned(), (seed as i64).into());
+    Table::from_iter([("separated".to_owned(), table.into())]).into()
+}
+
+impl Requirements {
+    /// The shortest words of so many marks that keep their laws, with a pulse, s, and a bandwidth, Hz.
+    fn words(&self, marks: u32, (pulse, bandwidth): (f64, f64)) -> Result<Separated, Error> {
+        let chips = |time: f64| (time / self.chip()).ceil() as u32;
+        // Of a Gaussian low-pass 0.312 over its bandwidth (full width at half maximum).
+        let mark = pulse.hypot(0.312 / bandwidth);
+        let (gap, apart) = (chips(GAP), chips(APART * mark));
+        let distances = WORDS * marks * (marks - 1) / 2;
+        let mut length = gap + apart * distances + 1;
+        while length < u32::from(u16::MAX) {
+            let words = Separated { length, weight: marks, words: WORDS, gap, apart, seed: 1 };
+            if Family::separated(words).is_ok() {
+                return Ok(words);
+            }
+            length += length.div_ceil(16);
+        }
+        Err(Error::Asked(format!("there are no {WORDS} words of {marks} marks")))
+    }
+
+    /// How long such a word lasts, s.
+    pub(super) fn macropulse(&self, marks: u32, shape: (f64, f64)) -> Result<f64, Error> {
+        Ok(f64::from(self.words(marks, shape)?.length) * self.chip())
+    }
+
+    /// Length of a chip, s.
+    fn chip(&self) -> f64 {
+        number(&self.template, "code.chip_ps").unwrap_or(400.0) * 1e-12
+    }
+
+    /// Mean time between the shots of one of so many channels, s.
+    pub(super) fn mean_period(&self, beams: u32) -> f64 {
+        let wanted = &self.wanted;
+        let pixels = f64::from(wanted.rows) * f64::from(wanted.columns);
+        f64::from(beams) / (pixels * wanted.scans_per_s)
+    }
+}
+
+/// The sensor called `name_or_file`, seen from `folder`, all its keys written out; and where files lie that
+/// it names. Refuses what is no raster with a sampled detector.
+pub(super) fn template(name_or_file: &str, folder: &Path) -> Result<(Table, PathBuf), String> {
+    let beside = folder.join(name_or_file);
+    let file = if beside.is_file() { beside } else { PathBuf::from(name_or_file) };
+    let design = Design::open(&file, &[]).map_err(|error| error.to_string())?;
+    if !matches!(design.scan.pattern, Pattern::Raster(_))
+        || !matches!(design.detector, Detector::Sampled(_))
+        || !design.is_coded()
+    {
+        return Err(format!(
+            "{name_or_file} is not a raster with a code and [detector.sampled]; coded-32 is one"
+        ));
+    }
+    let table = design.text.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    Ok((table, file.parent().map(Path::to_path_buf).unwrap_or_default()))
+}
+
+/// Puts `value` at the dotted `path`, tables made on the way.
+pub(super) fn put(table: &mut Table, path: &str, value: Value) {
+    match path.split_once('.') {
+        None => {
+            table.insert(path.to_owned(), value);
+        }
+        Some((outer, inner)) => {
+            let below = table.entry(outer).or_insert_with(|| Table::new().into());
+            if let Some(below) = below.as_table_mut() {
+                put(below, inner, value);
+            }
+        }
+    }
+}
+
+fn number(table: &Table, path: &str) -> Option<f64> {
+    let mut keys = path.split('.');
+    let first = table.get(keys.next()?)?;
+    let value = keys.try_fold(first, |value, key| value.get(key))?;
+    value.as_float().or(value.as_integer().map(|value| value as f64))
+}

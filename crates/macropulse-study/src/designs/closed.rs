@@ -1,0 +1,231 @@
+//! What closed forms say of a candidate: the energy that eyes allow, the least aperture that does, and what
+//! stands in the way.
+
+use argmin::core::{CostFunction, Executor, State};
+use argmin::solver::neldermead::NelderMead;
+use macropulse::design::Design;
+use macropulse::design::safety::strictest;
+use macropulse::predict::Forecaster;
+use macropulse::units::{RMS_OF_FWHM, range_from_tof, tof_from_range};
+
+use super::candidate::Candidate;
+use super::parts::Part;
+use super::requirements::Requirements;
+use super::{Error, Limit};
+
+/// The area of the aperture is found to so much of itself.
+const TOLERANCE: f64 = 0.02;
+
+/// Areas of the aperture are tried from the largest one allowed by such factors, up to [`MOST`] of it.
+const STRIDE: f64 = 4.0;
+
+/// What needs more than so many times the area is not told by how much.
+const MOST: f64 = 1e6;
+
+/// Of a Gaussian low-pass the rms length of its response times its bandwidth, √(ln 2)/(2π).
+const RMS_BY_BANDWIDTH: f64 = 0.132_505_181_759_698_4;
+
+/// A mark must be so many samples long at least (rms): a sampled detector takes no shorter one.
+const SAMPLES: f64 = 1.0 / 1.5;
+
+/// What closed forms say of a candidate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessed {
+    /// The candidate, its energy what eyes allow, its aperture the least that does; the largest allowed
+    /// where none does.
+    pub candidate: Candidate,
+    /// Time between shots of a channel, s.
+    pub period: f64,
+    /// Probability of a return at the range wanted.
+    pub pd: f64,
+    /// Standard deviation of the range there, m; `None` where next to nothing is seen.
+    pub precision: Option<f64>,
+    /// What stands in its way, and by what factor it is missed; `None` where it does.
+    pub limit: Option<(Limit, f64)>,
+}
+
+/// Energy, J, that laser class 1 allows to a shot of the sensor, the share wanted of it.
+pub(super) fn energy(design: &Design, required: &Requirements) -> Option<f64> {
+    let limits = &design.budget.as_ref()?.limits;
+    strictest(limits).map(|limit| required.parts.energy_share * limit.energy)
+}
+
+/// Energy of a shot, J, of which it is only asked how much more eyes allow.
+pub(super) const DIM: f64 = 1e-12;
+
+/// The candidate of these parts, as bright as eyes allow, with the largest aperture.
+pub(super) fn brightest(
+    required: &Requirements,
+    (part, marks, beams): (&Part, u32, u32),
+    (pulse, bandwidth): (f64, f64),
+) -> Result<Candidate, Error> {
+    let aperture = required.parts.aperture_mm[1] * 1e-3;
+    // Class 1 asks for no energy but that of the shots beside each other.
+    let part = part.clone();
+    let dim = Candidate { part, marks, beams, pulse, bandwidth, energy: DIM, aperture };
+    let energy = energy(&dim.design(required)?, required).ok_or_else(|| {
+        Error::Asked(format!("no limit of class 1 is known at {} nm", dim.part.wavelength_nm))
+    })?;
+    Ok(Candidate { energy, ..dim })
+}
+
+/// What closed forms say of `candidate`, which is as bright as eyes allow.
+pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<Assessed, Error> {
+    let wanted = &required.wanted;
+    let design = candidate.design(required)?;
+    let period = design.scan.shortest_period();
+    let forecaster = Forecaster::new(&design, &required.environment)?;
+    let needed = area(required, &forecaster, period);
+    let [least, _] = required.parts.aperture_mm.map(|mm| (mm * 1e-3 / candidate.aperture).powi(2));
+    let factor = needed.clamp(least, 1.0);
+    let forecast = with_area(&forecaster, factor).forecast(wanted.reflectance, wanted.range_m);
+    let listens = tof_from_range(wanted.range_m);
+    let limit = if candidate.waits() && listens > period {
+        Some((Limit::Time, listens / period))
+    } else if needed > 1.0 {
+        Some((Limit::Light, needed))
+    } else {
+        None
+    };
+    let aperture = candidate.aperture * factor.sqrt();
+    Ok(Assessed {
+        candidate: Candidate { aperture, ..candidate },
+        period,
+        pd: forecast.pd,
+        precision: forecast.precision,
+        limit,
+    })
+}
+
+/// As with so many times the area of the aperture: light and daylight.
+fn with_area<'a>(forecaster: &Forecaster<'a>, factor: f64) -> Forecaster<'a> {
+    forecaster.with_light(factor).with_background(factor)
+}
+
+/// The least area of the aperture, over that of the design, with which targets are found as wanted.
+fn area(required: &Requirements, forecaster: &Forecaster, period: f64) -> f64 {
+    let wanted = &required.wanted;
+    let range = clear(wanted.range_m, period);
+    let does = |area: f64| {
+        let forecast = with_area(forecaster, area).forecast(wanted.reflectance, range);
+        forecast.pd >= wanted.pd && forecast.precision.is_some_and(|m| m <= wanted.precision_m)
+    };
+    let [mut low, mut high] = match does(1.0) {
+        true => [1.0 / STRIDE, 1.0],
+        false => [1.0, STRIDE],
+    };
+    while low > 1.0 / MOST && does(low) {
+        (low, high) = (low / STRIDE, low);
+    }
+    while !does(high) {
+        if high > MOST {
+            return f64::INFINITY;
+        }
+        (low, high) = (high, high * STRIDE);
+    }
+    while high > (1.0 + TOLERANCE) * low {
+        let middle = (low * high).sqrt();
+        *(if does(middle) { &mut high } else { &mut low }) = middle;
+    }
+    high
+}
+
+/// The range next to `range`, m, and no farther, at which echoes come half-way between the shots of a channel,
+/// `period` seconds apart; `range` itself where that is beyond. Where echoes come with a shot, marks are lost
+/// to its stray light, some metres of all: how many that is of all ranges a simulation tells.
+fn clear(range: f64, period: f64) -> f64 {
+    let between = range_from_tof(period);
+    match (range / between).floor() {
+        0.0 => range,
+        shots => (shots + 0.5) * between,
+    }
+    .min(range)
+}
+
+/// The pulse, s, and bandwidth, Hz, with which these parts need the least aperture.
+///
+/// Nelder and Mead's simplex over their logarithms, from where the low-pass is as long as the pulse: the
+/// shorter a pulse the more it stands out of the noise, until the noise of the capacitance, which grows with
+/// the bandwidth, or the samples end that.
+pub(super) fn shortest(
+    required: &Requirements,
+    parts: (&Part, u32, u32),
+    sample: f64,
+) -> Result<(f64, f64), Error> {
+    let (part, ..) = parts;
+    let [least, most] = required.parts.pulse_ps.map(|ps| ps * 1e-12);
+    let bounds = Bounds { pulse: [least, most], bandwidth: part.most_bandwidth_mhz * 1e6, sample };
+    let start = bounds.inside([(least * 1.6).ln(), (0.3 / (least * 1.6)).ln()]);
+    let simplex =
+        vec![start.to_vec(), vec![start[0] + 0.4, start[1]], vec![start[0], start[1] - 0.4]];
+    let energy = brightest(required, parts, bounds.values(start))?.energy;
+    let cost = Cost { required, parts, bounds, energy };
+    let failed = |error: argmin::core::Error| Error::Asked(error.to_string());
+    let solver = NelderMead::new(simplex).with_sd_tolerance(0.005).map_err(failed)?;
+    let run = Executor::new(cost, solver).configure(|state| state.max_iters(ITERATIONS));
+    let found = run.run().map_err(failed)?;
+    let best = found.state().get_best_param().cloned().unwrap_or_else(|| start.to_vec());
+    Ok(bounds.values(bounds.inside([best[0], best[1]])))
+}
+
+/// Steps of the simplex at most: of the ready photodiodes none took more than 25 to a hundredth.
+const ITERATIONS: u64 = 40;
+
+/// Within which pulse and bandwidth are looked for.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    /// Shortest and longest pulse, s.
+    pulse: [f64; 2],
+    /// Most bandwidth, Hz.
+    bandwidth: f64,
+    /// From sample to sample, s.
+    sample: f64,
+}
+
+impl Bounds {
+    /// The nearest logarithms of pulse and bandwidth that may be.
+    fn inside(&self, [pulse, bandwidth]: [f64; 2]) -> [f64; 2] {
+        let [least, most] = self.pulse;
+        let pulse = pulse.exp().clamp(least, most);
+        let bandwidth = bandwidth.exp().clamp(1e6, self.bandwidth);
+        // As long as the samples ask for, the low-pass longer if need be.
+        let rest = (SAMPLES * self.sample * 1.001).powi(2) - (RMS_OF_FWHM * pulse).powi(2);
+        let most = if rest > 0.0 { RMS_BY_BANDWIDTH / rest.sqrt() } else { f64::INFINITY };
+        [pulse.ln(), bandwidth.min(most).ln()]
+    }
+
+    /// Pulse, s, and bandwidth, Hz: whole picoseconds and megahertz.
+    fn values(&self, [pulse, bandwidth]: [f64; 2]) -> (f64, f64) {
+        ((pulse.exp() * 1e12).round() * 1e-12, (bandwidth.exp() * 1e-6).floor() * 1e6)
+    }
+}
+
+/// The area of the aperture that a pulse and a bandwidth need.
+struct Cost<'a> {
+    required: &'a Requirements,
+    parts: (&'a Part, u32, u32),
+    bounds: Bounds,
+    /// Energy of a shot, J, which hardly depends on them.
+    energy: f64,
+}
+
+impl CostFunction for Cost<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    /// The logarithm of the area; beside the bounds more by the distance.
+    fn cost(&self, at: &Self::Param) -> Result<Self::Output, argmin::core::Error> {
+        let at = [at[0], at[1]];
+        let inside = self.bounds.inside(at);
+        let beside = (at[0] - inside[0]).abs() + (at[1] - inside[1]).abs();
+        let (pulse, bandwidth) = self.bounds.values(inside);
+        let (part, marks, beams) = self.parts;
+        let aperture = self.required.parts.aperture_mm[1] * 1e-3;
+        let energy = self.energy;
+        let it = Candidate { part: part.clone(), marks, beams, pulse, bandwidth, energy, aperture };
+        let design = it.design(self.required)?;
+        let forecaster = Forecaster::new(&design, &self.required.environment)?;
+        let period = design.scan.shortest_period();
+        Ok(area(self.required, &forecaster, period).min(1e6).ln() + beside)
+    }
+}

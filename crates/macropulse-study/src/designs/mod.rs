@@ -1,0 +1,70 @@
+//! Lidars that do what is required: all that could be built of the parts allowed, in closed form; the best
+//! of them, simulated; and up to where waiting for echoes is better than a code.
+
+mod ablation;
+mod candidate;
+mod closed;
+mod files;
+mod frontier;
+mod json;
+mod listing;
+mod page;
+mod parts;
+mod requirements;
+mod scenery;
+mod search;
+mod trial;
+
+pub use ablation::Ablation;
+pub use candidate::Candidate;
+pub use closed::Assessed;
+pub use files::{PAGE, make_room};
+pub use frontier::{CHANNELS, Frontier, Row};
+pub use parts::Part;
+pub use requirements::{Parts, Requirements, Wanted};
+pub use scenery::Scenery;
+pub use search::{Found, Search};
+pub use trial::{Counts, Trial};
+
+/// Why no lidar was searched for. Each message is one sentence.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Something was asked for that cannot be.
+    #[error("{0}")]
+    Asked(String),
+    /// A candidate is no sensor.
+    #[error(transparent)]
+    Design(#[from] macropulse::design::Error),
+    /// There is no forecast of a candidate.
+    #[error(transparent)]
+    Forecast(#[from] macropulse::predict::Error),
+    /// A scan could not be made.
+    #[error(transparent)]
+    Simulation(#[from] macropulse::sim::Error),
+    /// A scene could not be made.
+    #[error(transparent)]
+    Scene(#[from] macropulse::scene::Error),
+    /// A file could not be written or read.
+    #[error(transparent)]
+    Formats(#[from] macropulse::formats::Error),
+    /// A picture could not be drawn.
+    #[error(transparent)]
+    View(#[from] crate::view::Error),
+}
+
+/// What stands in the way of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limit {
+    /// It would have to wait longer for an echo than it has.
+    Time,
+    /// Eyes allow too little light for the largest aperture.
+    Light,
+    /// Simulated, it misses too many targets.
+    Missed,
+    /// Simulated, it finds too much where nothing is.
+    False,
+    /// Simulated, too many of its points are somewhere else.
+    Wrong,
+    /// Simulated, its ranges spread too far.
+    Precision,
+}

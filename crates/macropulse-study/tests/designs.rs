@@ -1,0 +1,113 @@
+//! From requirements to lidars: what is wrong in a file is said, and what is found does.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use macropulse::design::Design;
+use macropulse::sim::Watch;
+use macropulse_study::designs::{Found, Requirements, Search, make_room};
+
+/// A corner of the field of the paper, so often that the shots of three beams follow each other as soon as
+/// those of fifteen do in its whole field: a search of seconds.
+const SMALL: &str = r#"
+version = 1
+name = "small"
+[wanted]
+rows = 30
+columns = 212
+horizontal_deg = 10.8
+vertical_deg = 1.52
+scans_per_s = 800.0
+range_m = 150.0
+clutter_m = 300.0
+reflectance = 0.1
+[parts]
+detectors = ["inalas"]
+marks = [1, 3]
+beams = [3, 5, 10, 15, 30]
+"#;
+
+const UNWATCHED: Watch = Watch { done: &|_| {}, stop: &|| false };
+
+fn required(changes: &[(&str, &str)]) -> Result<Requirements, String> {
+    let text = changes.iter().fold(SMALL.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    Requirements::from_toml(&text, "mine.toml", Path::new("")).map_err(|error| error.to_string())
+}
+
+fn found(changes: &[(&str, &str)], folder: &Path, seed: u64) -> Found {
+    make_room(folder).unwrap();
+    let required = required(changes).unwrap();
+    Search { required, folder, seed, watch: &UNWATCHED }.run().unwrap().unwrap()
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_said_with_its_place() {
+    for (change, told) in [
+        (
+            ("reflectance = 0.1", "reflectance = 1.5"),
+            "mine.toml:12:1: wanted.reflectance: is 1.5, but must lie between 0.001 and 1",
+        ),
+        (
+            ("range_m", "rnage_m"),
+            "mine.toml:10:1: wanted.rnage_m: unknown key `rnage_m`; did you mean `range_m`?",
+        ),
+        (
+            ("clutter_m = 300.0", "clutter_m = 100"),
+            "mine.toml:11:1: wanted.clutter_m: is 100, nearer than wanted.range_m, 150",
+        ),
+        (
+            ("\"inalas\"", "\"inalaas\""),
+            "mine.toml:14:1: parts.detectors: unknown photodiode `inalaas`; did you mean `inalas`?",
+        ),
+        (("[3, 5,", "[4, 5,"), "mine.toml:16:1: parts.beams: 4 beams do not share 30 rows evenly"),
+        (
+            ("marks = [1, 3]", "marks = [0]"),
+            "mine.toml:15:1: parts.marks: must be numbers from 1 to 8, one at least",
+        ),
+        (
+            ("version = 1", "version = 2"),
+            "mine.toml:2:1: version: is 2, but this program reads version 1",
+        ),
+        (
+            ("[parts]", "[parts]\nsensor = \"hdl-64e\""),
+            "mine.toml:14:1: parts.sensor: hdl-64e is not a raster with a code and [detector.sampled]; coded-32 is one",
+        ),
+        (
+            ("[parts]", "environment = \"noon\"\n[parts]"),
+            "mine.toml:13:1: wanted.environment: unknown key `environment`; known are ",
+        ),
+    ] {
+        let refused = required(&[change]).unwrap_err();
+        assert!(refused.starts_with(told), "{refused}\nand not\n{told}");
+    }
+}
+
+/// Thirty beams have 2.1 µs between the shots of one, in which light comes back from 300 m, fifteen 1.06,
+/// enough for 150 m. One that does not wait needs fewer. What is found keeps to class 1 and finds what is
+/// wanted; the same again is read from its files, to the bit. Control: at ten times the range nothing does.
+#[test]
+fn what_is_found_does_and_is_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = found(&[], folder.path(), 1);
+    let [Some(coded), Some(waiting)] = &first.best else { panic!("{}", first.text()) };
+    assert!(coded.candidate.beams < waiting.candidate.beams, "{}", first.text());
+    let names = first.write(folder.path()).unwrap();
+    assert!(names.iter().any(|name| name == "index.html"), "{names:?}");
+    for (name, best) in [("coded", coded), ("waiting", waiting)] {
+        let design = Design::open(folder.path().join(format!("{name}.toml")), &[]).unwrap();
+        assert_eq!(design.channels(), best.candidate.beams);
+        let limits = &design.budget.as_ref().unwrap().limits;
+        let allowed = macropulse::design::safety::strictest(limits).unwrap().energy;
+        assert!((best.candidate.energy / allowed - 0.9).abs() < 1e-6);
+        for counts in best.counts {
+            assert!(counts.pd() >= 0.9 && counts.rms() < 0.03, "{}", first.text());
+        }
+    }
+    let again = found(&[], folder.path(), 1);
+    assert_eq!(again.json(), first.json());
+    let far = [("range_m = 150.0", "range_m = 1500.0"), ("clutter_m = 300", "clutter_m = 3000")];
+    assert_eq!(found(&far, folder.path(), 1).best, [None, None]);
+}
