@@ -28,7 +28,7 @@ fn crosses(words: &[CodeWord]) -> (u16, u16) {
 }
 
 #[track_caller]
-fn assert_size(family: Family, length: u32, weight: usize, words: usize) {
+fn assert_size(family: &Family, length: u32, weight: usize, words: usize) {
     assert_eq!((family.length(), family.weight(), family.count()), (length, weight, words));
     assert!(family.words().iter().all(|w| w.length == length && w.weight() == weight));
     assert_eq!(family.words().iter().collect::<BTreeSet<_>>().len(), words);
@@ -38,7 +38,7 @@ fn assert_size(family: Family, length: u32, weight: usize, words: usize) {
 fn extended_prime_words_meet_each_other_once() {
     for p in PRIMES {
         let family = Family::extended_prime(p).unwrap();
-        assert_size(family, p * (2 * p - 1), p as usize, p as usize);
+        assert_size(&family, p * (2 * p - 1), p as usize, p as usize);
         let words = family.words();
         assert_eq!(crosses(&words), (1, 1), "p = {p}");
         for (i, word) in words.iter().enumerate() {
@@ -53,7 +53,7 @@ fn extended_prime_words_meet_each_other_once() {
 fn quadratic_congruence_words_have_low_sidelobes() {
     for p in PRIMES {
         let family = Family::quadratic_congruence(p).unwrap();
-        assert_size(family, p * p, p as usize, p as usize - 1);
+        assert_size(&family, p * p, p as usize, p as usize - 1);
         let words = family.words();
         assert_eq!(sidelobes(&words), (2, 2), "p = {p}");
         assert_eq!(crosses(&words).0, if p == 5 { 2 } else { 4 }, "p = {p}");
@@ -68,7 +68,7 @@ fn quadratic_congruence_words_have_low_sidelobes() {
 fn extended_quadratic_congruence_words_have_lower_ones() {
     for p in PRIMES {
         let family = Family::extended_quadratic_congruence(p).unwrap();
-        assert_size(family, p * (2 * p - 1), p as usize, p as usize - 1);
+        assert_size(&family, p * (2 * p - 1), p as usize, p as usize - 1);
         let words = family.words();
         assert_eq!(sidelobes(&words), (1, 1), "p = {p}");
         assert_eq!(crosses(&words), (2, 2), "p = {p}");
@@ -84,7 +84,7 @@ fn orthogonal_words_meet_once_whatever_the_shift() {
     for (length, weight) in [(13, 3), (63, 3), (101, 4), (341, 5), (1000, 5)] {
         let family = Family::orthogonal(length, weight, None).unwrap();
         let count = family.count();
-        assert_size(family, length, weight as usize, count);
+        assert_size(&family, length, weight as usize, count);
         assert!(count as u32 <= (length - 1) / (weight * (weight - 1)));
         let words = family.words();
         assert_eq!(sidelobes(&words), (1, 1), "({length}, {weight}, 1)");
@@ -121,7 +121,7 @@ fn sparse_words_hardly_ever_meet() {
 fn an_m_sequence_in_balance_is_dark_off_its_peak() {
     for degree in 3..=10 {
         let family = Family::m_sequence(degree).unwrap();
-        assert_size(family, (1 << degree) - 1, 1 << (degree - 1), 1);
+        assert_size(&family, (1 << degree) - 1, 1 << (degree - 1), 1);
         let word = &family.words()[0];
         let correlation = balanced(word, word);
         assert_eq!(correlation[0], 1 << (degree - 1));
