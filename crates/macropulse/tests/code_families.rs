@@ -9,6 +9,7 @@ use macropulse::codec::code::correlation::{
     CrossCorrelation, aperiodic_sidelobe, balanced, bipolar, periodic, periodic_sidelobe,
 };
 use macropulse::codec::code::{CodeWord, Family, Sparse};
+use macropulse::design::Design;
 use macropulse::predict::multiple_access::{Hits, MultipleAccess, bit_error_hard, bit_error_soft};
 
 const PRIMES: [u32; 8] = [5, 7, 11, 13, 17, 19, 23, 29];
@@ -115,6 +116,43 @@ fn sparse_words_hardly_ever_meet() {
     approx::assert_relative_eq!(cross.periodic.variance(), 0.0937, max_relative = 0.02);
     let (periodic, aperiodic) = sidelobes(words);
     assert!((2..=3).contains(&periodic) && aperiodic <= periodic, "{periodic} {aperiodic}");
+}
+
+/// All distances between marks of all words, ascending, and the least between neighbouring marks.
+fn distances(words: &[CodeWord]) -> (Vec<u16>, u16) {
+    let pairs = |word: &CodeWord| -> Vec<u16> {
+        let later = |(at, mark): (usize, &u16)| {
+            word.marks[at + 1..].iter().map(|later| later - mark).collect::<Vec<_>>()
+        };
+        word.marks.iter().enumerate().flat_map(later).collect()
+    };
+    let mut all: Vec<u16> = words.iter().flat_map(pairs).collect();
+    all.sort_unstable();
+    let gaps = words.iter().flat_map(|word| word.marks.windows(2).map(|two| two[1] - two[0]));
+    (all, gaps.min().unwrap())
+}
+
+/// Words drawn and words written out alike: ten of three marks in 238 chips, from mark to mark 20 chips
+/// (8 ns) or more, and no two distances nearer than 5 (2 ns). Control: one mark moved by a chip.
+#[test]
+fn marks_of_sampled_sensors_stand_apart_and_so_do_their_distances() {
+    let apart = |distances: &[u16]| distances.windows(2).map(|two| two[1] - two[0]).min().unwrap();
+    for name in ["coded-32", "coded-16"] {
+        let design = Design::open(name, &[]).unwrap();
+        let words = design.coding.codebook.family().words();
+        assert_size(design.coding.codebook.family(), 238, 3, 10);
+        let (all, gap) = distances(&words);
+        assert_eq!(all.len(), 30, "{name}");
+        assert!(gap >= 20 && apart(&all) >= 5, "{name}: {gap}, {}", apart(&all));
+        assert_eq!((sidelobes(&words).1, crosses(&words).1), (1, 1), "{name}");
+        let tight = |mark: &u16| {
+            let mut moved = words[0].clone();
+            moved.marks[1] = *mark;
+            let (all, _) = distances(&[&[moved], &words[1..]].concat());
+            apart(&all) < 5
+        };
+        assert!([words[0].marks[1] - 1, words[0].marks[1] + 1].iter().any(tight), "{name}");
+    }
 }
 
 #[test]

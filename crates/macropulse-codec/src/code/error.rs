@@ -154,13 +154,13 @@ pub enum Error {
     },
     /// Two words that are written out are one.
     #[error(
-        "words {first} and {second}, counted from 0, are the same: no receiver can tell them apart"
+        "words {one} and {other}, counted from 0, are the same: no receiver can tell them apart"
     )]
     SameWords {
         /// The one.
-        first: u32,
+        one: u32,
         /// The other, behind it.
-        second: u32,
+        other: u32,
     },
     /// A label must have between 1 and 16 bits.
     #[error("a label of {bits} bits is not possible; use 1 to 16 bits")]

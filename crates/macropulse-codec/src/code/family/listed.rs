@@ -26,7 +26,7 @@ pub(super) fn words(length: u32, marks: Vec<Vec<u32>>) -> Result<Arc<[CodeWord]>
         }
         let marks: Vec<u16> = marks.into_iter().map(|mark| mark as u16).collect();
         match seen.insert(marks.clone(), word) {
-            Some(first) => Err(Error::SameWords { first, second: word }),
+            Some(one) => Err(Error::SameWords { one, other: word }),
             None => Ok(CodeWord { length, marks }),
         }
     };
