@@ -285,12 +285,12 @@ fn own_light_is_not_taken_for_that_of_others() {
     assert!(errors(&returns, &channel).1 > 100, "{}", errors(&returns, &channel).1);
 }
 
-/// One mark a shot is a word, too.
+/// One mark a shot is a word, too, if no other shot is under way.
 #[test]
 fn a_word_may_be_one_mark() {
-    let mut channel = wall(3.0 * FAINT, 50, 16);
+    let mut channel = wall(3.0 * FAINT, 1, 16);
     let book = macropulse_codec::code::Codebook::single();
-    channel.log.word = vec![0; 50];
+    channel.log.word = vec![0];
     // Of the three marks that are made the first is that of a word of one, and the others come behind the
     // gate.
     channel.echoes.truncate(1);

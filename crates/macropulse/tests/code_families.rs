@@ -9,6 +9,7 @@ use macropulse::codec::code::correlation::{
     CrossCorrelation, aperiodic_sidelobe, balanced, bipolar, periodic, periodic_sidelobe,
 };
 use macropulse::codec::code::{CodeWord, Family, Sparse};
+use macropulse::design::Design;
 use macropulse::predict::multiple_access::{Hits, MultipleAccess, bit_error_hard, bit_error_soft};
 
 const PRIMES: [u32; 8] = [5, 7, 11, 13, 17, 19, 23, 29];
@@ -28,7 +29,7 @@ fn crosses(words: &[CodeWord]) -> (u16, u16) {
 }
 
 #[track_caller]
-fn assert_size(family: Family, length: u32, weight: usize, words: usize) {
+fn assert_size(family: &Family, length: u32, weight: usize, words: usize) {
     assert_eq!((family.length(), family.weight(), family.count()), (length, weight, words));
     assert!(family.words().iter().all(|w| w.length == length && w.weight() == weight));
     assert_eq!(family.words().iter().collect::<BTreeSet<_>>().len(), words);
@@ -38,7 +39,7 @@ fn assert_size(family: Family, length: u32, weight: usize, words: usize) {
 fn extended_prime_words_meet_each_other_once() {
     for p in PRIMES {
         let family = Family::extended_prime(p).unwrap();
-        assert_size(family, p * (2 * p - 1), p as usize, p as usize);
+        assert_size(&family, p * (2 * p - 1), p as usize, p as usize);
         let words = family.words();
         assert_eq!(crosses(&words), (1, 1), "p = {p}");
         for (i, word) in words.iter().enumerate() {
@@ -53,7 +54,7 @@ fn extended_prime_words_meet_each_other_once() {
 fn quadratic_congruence_words_have_low_sidelobes() {
     for p in PRIMES {
         let family = Family::quadratic_congruence(p).unwrap();
-        assert_size(family, p * p, p as usize, p as usize - 1);
+        assert_size(&family, p * p, p as usize, p as usize - 1);
         let words = family.words();
         assert_eq!(sidelobes(&words), (2, 2), "p = {p}");
         assert_eq!(crosses(&words).0, if p == 5 { 2 } else { 4 }, "p = {p}");
@@ -68,7 +69,7 @@ fn quadratic_congruence_words_have_low_sidelobes() {
 fn extended_quadratic_congruence_words_have_lower_ones() {
     for p in PRIMES {
         let family = Family::extended_quadratic_congruence(p).unwrap();
-        assert_size(family, p * (2 * p - 1), p as usize, p as usize - 1);
+        assert_size(&family, p * (2 * p - 1), p as usize, p as usize - 1);
         let words = family.words();
         assert_eq!(sidelobes(&words), (1, 1), "p = {p}");
         assert_eq!(crosses(&words), (2, 2), "p = {p}");
@@ -84,7 +85,7 @@ fn orthogonal_words_meet_once_whatever_the_shift() {
     for (length, weight) in [(13, 3), (63, 3), (101, 4), (341, 5), (1000, 5)] {
         let family = Family::orthogonal(length, weight, None).unwrap();
         let count = family.count();
-        assert_size(family, length, weight as usize, count);
+        assert_size(&family, length, weight as usize, count);
         assert!(count as u32 <= (length - 1) / (weight * (weight - 1)));
         let words = family.words();
         assert_eq!(sidelobes(&words), (1, 1), "({length}, {weight}, 1)");
@@ -117,11 +118,48 @@ fn sparse_words_hardly_ever_meet() {
     assert!((2..=3).contains(&periodic) && aperiodic <= periodic, "{periodic} {aperiodic}");
 }
 
+/// All distances between marks of all words, ascending, and the least between neighbouring marks.
+fn distances(words: &[CodeWord]) -> (Vec<u16>, u16) {
+    let pairs = |word: &CodeWord| -> Vec<u16> {
+        let later = |(at, mark): (usize, &u16)| {
+            word.marks[at + 1..].iter().map(|later| later - mark).collect::<Vec<_>>()
+        };
+        word.marks.iter().enumerate().flat_map(later).collect()
+    };
+    let mut all: Vec<u16> = words.iter().flat_map(pairs).collect();
+    all.sort_unstable();
+    let gaps = words.iter().flat_map(|word| word.marks.windows(2).map(|two| two[1] - two[0]));
+    (all, gaps.min().unwrap())
+}
+
+/// Words drawn and words written out alike: ten of three marks in 238 chips, from mark to mark 20 chips
+/// (8 ns) or more, and no two distances nearer than 5 (2 ns). Control: one mark moved by a chip.
+#[test]
+fn marks_of_sampled_sensors_stand_apart_and_so_do_their_distances() {
+    let apart = |distances: &[u16]| distances.windows(2).map(|two| two[1] - two[0]).min().unwrap();
+    for name in ["coded-32", "coded-16"] {
+        let design = Design::open(name, &[]).unwrap();
+        let words = design.coding.codebook.family().words();
+        assert_size(design.coding.codebook.family(), 238, 3, 10);
+        let (all, gap) = distances(&words);
+        assert_eq!(all.len(), 30, "{name}");
+        assert!(gap >= 20 && apart(&all) >= 5, "{name}: {gap}, {}", apart(&all));
+        assert_eq!((sidelobes(&words).1, crosses(&words).1), (1, 1), "{name}");
+        let tight = |mark: &u16| {
+            let mut moved = words[0].clone();
+            moved.marks[1] = *mark;
+            let (all, _) = distances(&[&[moved], &words[1..]].concat());
+            apart(&all) < 5
+        };
+        assert!([words[0].marks[1] - 1, words[0].marks[1] + 1].iter().any(tight), "{name}");
+    }
+}
+
 #[test]
 fn an_m_sequence_in_balance_is_dark_off_its_peak() {
     for degree in 3..=10 {
         let family = Family::m_sequence(degree).unwrap();
-        assert_size(family, (1 << degree) - 1, 1 << (degree - 1), 1);
+        assert_size(&family, (1 << degree) - 1, 1 << (degree - 1), 1);
         let word = &family.words()[0];
         let correlation = balanced(word, word);
         assert_eq!(correlation[0], 1 << (degree - 1));

@@ -35,9 +35,11 @@ fn measure(design: &Design, scene: &Scene, every: usize) -> Scan {
 /// 10⁻⁴ points per pixel are false. N some 20 000 shots for each, seed 1: a share of 0.9 is known to
 /// 0.002, and 2 false ones would be as many as are allowed. Control: an aperture half as wide.
 #[test]
-fn coded_practical_and_coded_360_see_what_stands_square_on() {
+fn coded_designs_see_what_stands_square_on() {
     let sky = scene("[[object]]\nshape.sphere.radius_m = 1\nposition_m = [-400, 0, 0]\n");
-    for name in ["coded-practical", "coded-360"] {
+    for (name, half) in
+        [("coded-32", "20"), ("coded-16", "18"), ("coded-practical", "32.5"), ("coded-360", "32.5")]
+    {
         let design = Design::open(name, &[]).unwrap();
         let [day, night] = ["clear-day", "night"]
             .map(|sky| Forecaster::new(&design, &Environment::named(sky).unwrap()).unwrap());
@@ -60,7 +62,7 @@ fn coded_practical_and_coded_360_see_what_stands_square_on() {
         assert_eq!(empty.tally.surfaces, 0);
         let false_points = empty.score.count(Outcome::False) as f64;
         assert!(false_points <= 1e-4 * empty.tally.shots as f64, "{name}: {false_points}");
-        let half = [("optics.aperture_mm".to_owned(), "32.5".to_owned())];
+        let half = [("optics.aperture_mm".to_owned(), half.to_owned())];
         let half = measure(&Design::open(name, &half).unwrap(), &room(149.9, 0.1), 20);
         assert!(half.score.right_fraction() < 0.5, "{name}");
     }

@@ -32,11 +32,13 @@ const ROWS: [u32; 2] = [4, 12];
 type Case = (&'static str, &'static str, Option<[f64; 2]>);
 
 /// Ready sensors, those that differ in the order of their lasers alone left out.
-const SENSORS: [Case; 10] = [
+const SENSORS: [Case; 12] = [
     ("kim-park-2016", "clear-day", Some([0.5, 140.0])),
     ("kim-park-2016-fixed", "clear-day", Some([0.1, 100.0])),
     ("kim-park-2016-physical", "night", Some([0.3, 50.0])),
     ("bipolar-gold", "clear-day", Some([0.5, 140.0])),
+    ("coded-32", "clear-day", Some([0.1, 140.0])),
+    ("coded-16", "clear-day", Some([0.1, 140.0])),
     ("coded-practical", "clear-day", None),
     ("coded-360", "clear-day", None),
     ("hdl-64e", "clear-day", Some([0.1, 30.0])),
@@ -76,12 +78,13 @@ fn told(sensor: &str, environment: &str, [reflectance, range]: [f64; 2]) -> Told
     of_cloud(&cloud, if is_sharp { SHARPLY_SQUARE_ON } else { SQUARE_ON })
 }
 
-/// The bands that begin in so many rows in the middle of the first scan.
+/// The bands that have part in so many rows in the middle of the first scan, of shots row by row.
 fn middle(design: &Design, rows: u32) -> Vec<Band> {
     let first = (design.scan.rows - rows) / 2;
-    let rows = u64::from(first)..u64::from(first + rows);
     let columns = u64::from(design.scan.columns);
-    bands(design, 0).filter(|band| rows.contains(&(band.first / columns))).collect()
+    let [from, to] = [first, first + rows].map(|row| u64::from(row) * columns);
+    let has_part = |band: &Band| band.first < to && from < band.first + band.shots;
+    bands(design, 0).filter(has_part).collect()
 }
 
 fn of_cloud(cloud: &PointCloud, within_deg: f32) -> Told {
@@ -151,6 +154,11 @@ fn words_in_balance_tell_reflectance_or_that_they_cannot() {
 #[test]
 fn thresholds_tell_reflectance_or_that_they_cannot() {
     tell(&["coded-practical", "coded-360"]);
+}
+
+#[test]
+fn samples_tell_reflectance_or_that_they_cannot() {
+    tell(&["coded-32", "coded-16"]);
 }
 
 #[test]

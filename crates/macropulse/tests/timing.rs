@@ -208,9 +208,11 @@ fn against_forecast(design: &Design, environment: &str, of_range: &[Sums]) -> f6
 #[test]
 fn what_is_just_seen_is_neither_nearer_nor_farther() {
     for (name, all_wanted) in [
-        ("coded-practical", &[0.3, 0.7, 0.95][..]),
-        ("coded-360", &[0.7, 0.95][..]),
-        ("bipolar-gold", &[0.3, 0.7, 0.95][..]),
+        ("coded-32", &[0.3, 0.7, 0.95][..]),
+        ("coded-16", &[0.3, 0.7]),
+        ("coded-practical", &[0.3, 0.7, 0.95]),
+        ("coded-360", &[0.7, 0.95]),
+        ("bipolar-gold", &[0.3, 0.7, 0.95]),
     ] {
         let design = Design::open(name, &[]).unwrap();
         let forecaster = Forecaster::new(&design, &Environment::default()).unwrap();

@@ -39,6 +39,7 @@ pages! {
     bipolar_gold: "docs/guide/bipolar-gold.md",
     budget: "docs/guide/budget.md",
     cluster: "docs/guide/cluster.md",
+    coded_32: "docs/guide/coded-32.md",
     coded_360: "docs/guide/coded-360.md",
     coded_practical: "docs/guide/coded-practical.md",
     explore: "docs/guide/explore.md",

@@ -63,6 +63,18 @@ const OF_CODES: &[Row] = &[
     ("[code]\nfamily = { prime = \"29\" }", &["mine.toml:5:12:", "take the quotes away"]),
     ("[code]\nfamily = { prime = 28 }", &["mine.toml:5:", "28 is not an odd prime", "29"]),
     ("[code]\nfamily = { gold = 8 }", &["mine.toml:5:1:", "use 5, 6, 7, 9, 10 or 11"]),
+    (
+        "[code]\nfamily = { list = { length = 9, marks = [[0, 5], [0, 5]] } }",
+        &["mine.toml:5:1:", "code.family: words 0 and 1, counted from 0, are the same"],
+    ),
+    (
+        "[code]\nfamily = { list = { length = 9, marks = [[0, 5], [0, -5]] } }",
+        &["mine.toml:5:12:", "-5", "whole number"],
+    ),
+    (
+        "[code]\nfamily = { list = { length = 9, marks = [0, 5] } }",
+        &["mine.toml:5:12:", "must be a list"],
+    ),
     ("[code]\nfamily = { sparse = { length = 100 } }", &["mine.toml:5:12:", "`weight` is missing"]),
     ("[code]\nchip_ps = 3", &["mine.toml:5:1:", "a whole number of TDC ticks"]),
     ("[code]\ncrc = 3", &["mine.toml:5:1:", "is 3", "{ width = …, polynomial = …, init = … }"]),

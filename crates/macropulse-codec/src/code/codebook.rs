@@ -193,8 +193,8 @@ impl Codebook {
     }
 
     /// The family of the code words.
-    pub fn family(&self) -> Family {
-        self.family
+    pub fn family(&self) -> &Family {
+        &self.family
     }
 
     /// Fewest and most marks of a macropulse, label by label: they differ where the words of the

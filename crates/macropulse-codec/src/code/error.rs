@@ -118,6 +118,50 @@ pub enum Error {
         /// Words found.
         found: u32,
     },
+    /// A word that is written out is nowhere lit.
+    #[error(
+        "word {word}, counted from 0, has no marks: list the chips at which it is lit, or leave it out"
+    )]
+    Dark {
+        /// Which word.
+        word: u32,
+    },
+    /// The marks of a word that is written out do not ascend.
+    #[error(
+        "word {word}, counted from 0, has chip {mark} behind chip {before}: list each lit chip once, in \
+         ascending order"
+    )]
+    MarkOrder {
+        /// Which word.
+        word: u32,
+        /// A mark.
+        before: u32,
+        /// The one behind it, which is no later.
+        mark: u32,
+    },
+    /// A mark of a word that is written out lies beyond its end.
+    #[error(
+        "word {word}, counted from 0, is lit at chip {mark}, but its chips are 0 to {last}: use longer \
+         words"
+    )]
+    MarkBeyond {
+        /// Which word.
+        word: u32,
+        /// The mark.
+        mark: u32,
+        /// The last chip of a word.
+        last: u32,
+    },
+    /// Two words that are written out are one.
+    #[error(
+        "words {one} and {other}, counted from 0, are the same: no receiver can tell them apart"
+    )]
+    SameWords {
+        /// The one.
+        one: u32,
+        /// The other, behind it.
+        other: u32,
+    },
     /// A label must have between 1 and 16 bits.
     #[error("a label of {bits} bits is not possible; use 1 to 16 bits")]
     LabelBits {

@@ -2,6 +2,7 @@
 
 mod chance;
 mod congruence;
+mod listed;
 mod orthogonal;
 mod prime;
 mod separated;
@@ -9,6 +10,7 @@ mod shift_register;
 mod sparse;
 
 use std::fmt;
+use std::sync::Arc;
 
 use super::{CodeWord, Error};
 pub use prime::prime_sequence;
@@ -16,7 +18,7 @@ pub use separated::Separated;
 pub use sparse::Sparse;
 
 /// A set of code words. A family that exists is valid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Family {
     /// Prime sequence code over GF(p): `p` words of length p² and weight p, any two of which
     /// coincide in at most 2 marks at any lag \[KP16 §2.2\]. Made by [`Family::prime`].
@@ -64,6 +66,12 @@ pub enum Family {
     /// Words of which all distances between marks differ. Made by [`Family::separated`].
     #[non_exhaustive]
     Separated(Separated),
+    /// Words written out. Made by [`Family::listed`].
+    #[non_exhaustive]
+    Listed {
+        /// One word at least, all of one length.
+        words: Arc<[CodeWord]>,
+    },
     /// A single word of 2ⁿ − 1 chips, half of them lit, that is dark at every shift to a receiver
     /// that subtracts what falls on its dark chips. Made by [`Family::m_sequence`].
     #[non_exhaustive]
@@ -149,6 +157,15 @@ impl Family {
         separated::found(&separated).map(|_| Self::Separated(separated))
     }
 
+    /// The words of `length` chips that are lit at `marks`: for each word its chips, counted from 0.
+    ///
+    /// # Errors
+    /// Where the length is not 1 to 65535 or the number of words not 1 to 65535; where a word has no marks,
+    /// or they do not ascend, or one lies beyond the length; where two words are the same.
+    pub fn listed(length: u32, marks: Vec<Vec<u32>>) -> Result<Self, Error> {
+        listed::words(length, marks).map(|words| Self::Listed { words })
+    }
+
     /// The m-sequence of `degree`. It is one word: its shifts cannot be told from delay.
     ///
     /// # Errors
@@ -167,62 +184,69 @@ impl Family {
 
     /// All words, in the order of their index.
     pub fn words(&self) -> Vec<CodeWord> {
-        match *self {
-            Self::Prime { p } => prime::words(p, p),
-            Self::ExtendedPrime { p } => prime::words(p, 2 * p - 1),
-            Self::QuadraticCongruence { p } => congruence::words(p, p),
-            Self::ExtendedQuadraticCongruence { p } => congruence::words(p, 2 * p - 1),
-            Self::Orthogonal { length, weight, words } => orthogonal::words(length, weight, words),
+        match self {
+            &Self::Prime { p } => prime::words(p, p),
+            &Self::ExtendedPrime { p } => prime::words(p, 2 * p - 1),
+            &Self::QuadraticCongruence { p } => congruence::words(p, p),
+            &Self::ExtendedQuadraticCongruence { p } => congruence::words(p, 2 * p - 1),
+            &Self::Orthogonal { length, weight, words } => orthogonal::words(length, weight, words),
             Self::Sparse(sparse) => {
-                (0..sparse.words).map(|index| sparse::word(&sparse, index)).collect()
+                (0..sparse.words).map(|index| sparse::word(sparse, index)).collect()
             }
             // Found once, it is found again.
-            Self::Separated(separated) => separated::found(&separated).unwrap_or_default(),
-            Self::MSequence { degree } => vec![shift_register::m_sequence(degree)],
-            Self::Gold { degree } => shift_register::gold(degree),
+            Self::Separated(separated) => separated::found(separated).unwrap_or_default(),
+            Self::Listed { words } => words.to_vec(),
+            &Self::MSequence { degree } => vec![shift_register::m_sequence(degree)],
+            &Self::Gold { degree } => shift_register::gold(degree),
             Self::Single => vec![CodeWord { length: 1, marks: vec![0] }],
         }
     }
 
     /// Chips of a word.
     pub fn length(&self) -> u32 {
-        match *self {
-            Self::Prime { p } | Self::QuadraticCongruence { p } => p * p,
-            Self::ExtendedPrime { p } | Self::ExtendedQuadraticCongruence { p } => p * (2 * p - 1),
-            Self::Orthogonal { length, .. }
-            | Self::Sparse(Sparse { length, .. })
-            | Self::Separated(Separated { length, .. }) => length,
-            Self::MSequence { degree } | Self::Gold { degree } => shift_register::length(degree),
+        match self {
+            &Self::Prime { p } | &Self::QuadraticCongruence { p } => p * p,
+            &Self::ExtendedPrime { p } | &Self::ExtendedQuadraticCongruence { p } => {
+                p * (2 * p - 1)
+            }
+            &Self::Orthogonal { length, .. }
+            | &Self::Sparse(Sparse { length, .. })
+            | &Self::Separated(Separated { length, .. }) => length,
+            Self::Listed { words } => words.first().map_or(1, |word| word.length),
+            &Self::MSequence { degree } | &Self::Gold { degree } => shift_register::length(degree),
             Self::Single => 1,
         }
     }
 
-    /// Marks of the heaviest word; the same for every word of all families but the Gold codes.
+    /// Marks of the heaviest word; the same for every word of all families but Gold codes and words
+    /// written out.
     pub fn weight(&self) -> usize {
-        match *self {
+        match self {
             Self::Prime { p }
             | Self::ExtendedPrime { p }
             | Self::QuadraticCongruence { p }
-            | Self::ExtendedQuadraticCongruence { p } => p as usize,
+            | Self::ExtendedQuadraticCongruence { p } => *p as usize,
             Self::Orthogonal { weight, .. }
             | Self::Sparse(Sparse { weight, .. })
-            | Self::Separated(Separated { weight, .. }) => weight as usize,
+            | Self::Separated(Separated { weight, .. }) => *weight as usize,
+            Self::Listed { words } => words.iter().map(CodeWord::weight).max().unwrap_or(0),
             Self::MSequence { degree } => 1 << (degree - 1),
-            Self::Gold { degree } => shift_register::gold_weight(degree),
+            &Self::Gold { degree } => shift_register::gold_weight(degree),
             Self::Single => 1,
         }
     }
 
     /// Number of words.
     pub fn count(&self) -> usize {
-        match *self {
-            Self::Prime { p } | Self::ExtendedPrime { p } => p as usize,
+        match self {
+            Self::Prime { p } | Self::ExtendedPrime { p } => *p as usize,
             Self::QuadraticCongruence { p } | Self::ExtendedQuadraticCongruence { p } => {
-                p as usize - 1
+                *p as usize - 1
             }
             Self::Orthogonal { words, .. }
             | Self::Sparse(Sparse { words, .. })
-            | Self::Separated(Separated { words, .. }) => words as usize,
+            | Self::Separated(Separated { words, .. }) => *words as usize,
+            Self::Listed { words } => words.len(),
             Self::Gold { degree } => (1 << degree) + 1,
             Self::MSequence { .. } | Self::Single => 1,
         }
@@ -249,6 +273,7 @@ impl fmt::Display for Family {
             Self::Separated(Separated { length, weight, gap, apart, .. }) => {
                 write!(f, "separated {length}, {weight}, {gap} and {apart} apart")
             }
+            Self::Listed { .. } => write!(f, "list {}, {}", self.length(), self.weight()),
             Self::MSequence { degree } => write!(f, "m-sequence {degree}"),
             Self::Gold { degree } => write!(f, "Gold {degree}"),
             Self::Single => write!(f, "single mark"),
@@ -295,6 +320,7 @@ mod tests {
                 apart: 3,
                 seed: 1,
             }),
+            Family::listed(9, vec![vec![0, 8], vec![3], vec![0, 1, 2]]),
             Family::m_sequence(5),
             Family::gold(5),
         ];

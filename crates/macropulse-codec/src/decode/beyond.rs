@@ -360,7 +360,7 @@ mod tests {
         for family in [Family::prime(5).unwrap(), Family::gold(5).unwrap()] {
             let (receiver, _, log) = bench();
             let payload = Payload::new(4, Crc::default(), true).unwrap();
-            let codebook = Codebook::new(family, Some(payload), 16, Keying::OnOff).unwrap();
+            let codebook = Codebook::new(family.clone(), Some(payload), 16, Keying::OnOff).unwrap();
             // Dense and irregular enough for every count to occur.
             let tick = (0..6000_u32).filter(|tick| tick.wrapping_mul(0x9E37_79B9) >> 30 == 0);
             let ticks = Ticks { tick: tick.collect(), ..Ticks::default() };

@@ -17,9 +17,11 @@ use super::Error;
 pub const SHOTS: u64 = 20_000;
 
 /// The sensors that are tried.
-pub const SENSORS: [&str; 8] = [
+pub const SENSORS: [&str; 10] = [
     "kim-park-2016",
     "kim-park-2016-fixed",
+    "coded-32",
+    "coded-16",
     "coded-practical",
     "coded-360",
     "bipolar-gold",

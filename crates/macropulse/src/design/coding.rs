@@ -117,8 +117,8 @@ impl Check<'_> {
                 word_modulus: 1,
             });
         };
-        let family =
-            family(file.family).or_else(|error| self.refuse("code.family", error.to_string()))?;
+        let family = family(file.family.clone())
+            .or_else(|error| self.refuse("code.family", error.to_string()))?;
         let chip_fs = self.whole_fs("code.chip_ps", file.chip_ps)?;
         if chip_fs % tdc.tick_fs != 0 {
             return self.refuse("code.chip_ps", "must be a whole number of TDC ticks");

@@ -17,12 +17,13 @@ pub(super) const FAMILIES: &[&str] = &[
     "orthogonal",
     "sparse",
     "separated",
+    "list",
     "m-sequence",
     "gold",
 ];
 
 /// `code.family` as typed.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum FamilyFile {
     /// Prime sequence code over an odd prime p up to 251: p words of p² chips, p of them lit.
@@ -40,6 +41,8 @@ pub(super) enum FamilyFile {
     Sparse(SparseFile),
     /// Marks drawn at random so that all distances between marks, of all words, differ.
     Separated(SeparatedFile),
+    /// Words written out.
+    List(ListFile),
     /// One word of 2ⁿ − 1 chips, half of them lit, n from 3 to 15.
     MSequence(u32),
     /// Gold code: 2ⁿ + 1 words of 2ⁿ − 1 chips, about half of them lit, n one of 5, 6, 7, 9, 10, 11.
@@ -92,6 +95,16 @@ pub(super) struct SeparatedFile {
     seed: u64,
 }
 
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ListFile {
+    /// Chips of a word, up to 65535.
+    length: u32,
+    /// For each word the chips at which it is lit, ascending, counted from 0; no two words alike, up to
+    /// 65535.
+    marks: Vec<Vec<u32>>,
+}
+
 /// The gap that leaves marks as they fall.
 fn one() -> u32 {
     1
@@ -113,6 +126,7 @@ pub(super) fn family(file: FamilyFile) -> Result<Family, code::Error> {
         FamilyFile::Separated(SeparatedFile { length, weight, words, gap, apart, seed }) => {
             Family::separated(Separated { length, weight, words, gap, apart, seed })
         }
+        FamilyFile::List(ListFile { length, marks }) => Family::listed(length, marks),
         FamilyFile::MSequence(degree) => Family::m_sequence(degree),
         FamilyFile::Gold(degree) => Family::gold(degree),
     }
@@ -159,6 +173,10 @@ mod tests {
             ("orthogonal={length=63,weight=3,words=2}", Family::orthogonal(63, 3, Some(2))),
             ("sparse={length=99,weight=3,words=2,seed=4}", sparse(1)),
             ("sparse={length=99,weight=3,words=2,gap=5,seed=4}", sparse(5)),
+            (
+                "list={length=9,marks=[[0,8],[0,5]]}",
+                Family::listed(9, vec![vec![0, 8], vec![0, 5]]),
+            ),
             ("m-sequence=5", Family::m_sequence(5)),
             ("gold=5", Family::gold(5)),
         ];
@@ -182,6 +200,13 @@ mod tests {
             "{}",
             refusal("gold='x'")
         );
+        assert_eq!(
+            refusal("list={length=9,marks=[[0,5],[0,9]]}"),
+            "list={length=9,marks=[[0,5],[0,9]]}: word 1, counted from 0, is lit at chip 9, but its chips \
+             are 0 to 8: use longer words"
+        );
+        assert!(refusal("list={length=9,marks=[0,5]}").contains("must be"));
+        assert!(refusal("list={length=9,marks=[[-1]]}").contains("must be"));
         assert!(refusal("sparse={length=9}").contains("`weight` is missing"));
         assert!(refusal("gold=99999999999").starts_with("gold=99999999999: "));
     }

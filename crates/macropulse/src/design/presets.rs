@@ -3,10 +3,12 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 11] = [
+const PRESETS: [(&str, &str); 13] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
+    ("coded-32", include_str!("../../../../sensors/coded-32.toml")),
+    ("coded-16", include_str!("../../../../sensors/coded-16.toml")),
     ("coded-practical", include_str!("../../../../sensors/coded-practical.toml")),
     ("coded-360", include_str!("../../../../sensors/coded-360.toml")),
     ("bipolar-gold", include_str!("../../../../sensors/bipolar-gold.toml")),

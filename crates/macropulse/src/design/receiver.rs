@@ -38,8 +38,8 @@ pub(super) struct ReceiverFile {
     /// Which returns are kept of more, and which one of a pixel its image shows.
     pick: Option<Pick>,
     /// Marks by which a return is decided at least, none of them blanked (sampled): 2 if it is not given,
-    /// or as many as there are.
-    #[schemars(range(min = 1, max = 65535))]
+    /// or as many as there are; no more than a word has.
+    #[schemars(range(min = 1))]
     least_marks: Option<u32>,
     /// For how long after each mark that is sent no sample counts, ns (sampled).
     #[schemars(range(min = 0, max = 1e6))]

@@ -5,7 +5,7 @@
 //! or the sensitivity it is declared by, the air, and the law of its own detector; of the scene it
 //! knows nothing.
 //!
-//! 1. An amplitude is photons as it stands.
+//! 1. An amplitude is photons as it stands, and so is what a receiver of samples finds.
 //! 2. A count of marks tells the share of them that made an event, as μ = −ln(1 − share). Of a
 //!    detector that every photon fires μ is the photons; of any other they are those n of which
 //!    its law gives that share, p(n) = 1 − exp(−μ): the law turned round.
@@ -36,7 +36,8 @@ pub struct Scale {
 impl Scale {
     /// That of `design` where it is `operating`.
     pub fn of(design: &Design, operating: &Operating) -> Self {
-        let measures = design.receiver.kind == ReceiverKind::Direct;
+        let kind = design.receiver.kind;
+        let measures = matches!(kind, ReceiverKind::Direct | ReceiverKind::Sampled);
         let law = if measures { Vec::new() } else { law(design, operating) };
         Self { link: operating.link, law }
     }

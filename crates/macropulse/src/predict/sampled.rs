@@ -261,10 +261,10 @@ fn told(design: &Design, sampling: &Sampling, (tof, rises): (f64, i64)) -> Vec<u
         marks.iter().map(|mark| fired + chip * i64::from(*mark)).collect()
     };
     let own: Vec<i64> = (0..SHOTS + 2 * around).flat_map(marks).collect();
-    // A tick tells nothing if the one beside it is blind.
+    // A tick tells nothing if the one beside it is blind, of which the last is the one before `blank_ticks`.
     let blind = |place: i64| {
         own.iter().any(|mark| {
-            (mark - rises - 1..=mark + i64::from(sampling.blank_ticks) + 1).contains(&place)
+            (mark - rises - 1..=mark + i64::from(sampling.blank_ticks)).contains(&place)
         })
     };
     let late = ticks(tof);

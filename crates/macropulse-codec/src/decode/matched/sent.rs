@@ -50,7 +50,7 @@ pub(super) struct Words {
 impl Words {
     /// Makes them those of the `codebook`. Kept from band to band: there are hundreds.
     fn of(mut self, codebook: &Codebook, scale: u32, width: u32) -> Self {
-        let of = Some((codebook.family(), scale, width));
+        let of = Some((codebook.family().clone(), scale, width));
         if self.of != of {
             let words = codebook.words();
             let gaps = (0..words).map(|word| {

@@ -78,8 +78,11 @@ impl<'a> Residual<'a> {
         if sum.score < threshold {
             return None;
         }
-        let told = (self.codes, &self.filtered.doubt[..]);
-        let clipped = clipped(told, self.sampling, self.pulse, &self.counted);
+        let codes = (self.codes, &self.filtered.doubt[..]);
+        let clipped = clipped(codes, self.sampling, self.pulse, &self.counted);
+        if clipped.is_some_and(|clipped| !clipped.is_one) {
+            return None;
+        }
         let late = match &clipped {
             Some(clipped) => clipped.late,
             None => in_time(&self.filtered, &self.counted, self.pulse),
@@ -138,9 +141,21 @@ impl<'a> Residual<'a> {
         }
     }
 
+    /// Leaves out clipped marks beside one that is far from being clipped: those are of other light.
+    fn leave_out_clipped(&mut self) {
+        let (codes, full_scale) = (self.codes, self.sampling.full_scale);
+        let far = 0.5 * f32::from(full_scale) / self.pulse.highest();
+        if self.counted.iter().any(|mark| mark.height < far) {
+            let is_clipped =
+                |mark: &Mark| codes.get(mark.place).is_some_and(|code| *code >= full_scale);
+            self.counted.retain(|mark| !is_clipped(mark));
+        }
+    }
+
     /// The sum of the marks at `lag`; `None` where too few tell anything.
     fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
         self.sort(marks, lag);
+        self.leave_out_clipped();
         let is_enough = self.counted.len() >= rule.fewest(marks.len());
         is_enough.then(|| rule.sum(&self.counted, marks.len())).flatten()
     }

@@ -12,7 +12,8 @@ const MOST: usize = 16;
 pub(super) struct Candidate {
     pub shot: usize,
     pub lag: i64,
-    /// By what candidates are ordered: light that is there for certain comes first.
+    /// By what candidates are ordered: light that is there for certain comes first. Of light that is
+    /// clipped, how strong it is is not known, and the nearer one is likely to be the stronger.
     pub rank: f32,
 }
 
@@ -36,7 +37,7 @@ pub(super) fn candidates((band, rule): (&Band, &Rule), filtered: &Filtered) -> V
         search.candidates_of(shot, &mut all);
     }
     all.sort_by(|one: &Candidate, other| {
-        let places = (one.shot, one.lag).cmp(&(other.shot, other.lag));
+        let places = (one.lag, one.shot).cmp(&(other.lag, other.shot));
         other.rank.total_cmp(&one.rank).then(places)
     });
     all

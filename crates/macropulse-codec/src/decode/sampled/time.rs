@@ -30,13 +30,19 @@ pub(super) struct Clipped {
     pub late: f64,
     /// Photons of one of them, about.
     pub photons: f32,
+    /// Whether they are of one light.
+    pub is_one: bool,
 }
 
 /// The time of the marks that count if samples there are clipped, from their edges; the
 /// median of the marks. `None` where none is clipped.
 ///
-/// What is clipped where the samples tell nothing, by `doubt`, is stray light of own marks or was found
-/// before: a mark just behind it is not timed by that.
+/// A clipped pulse lasts for many ticks, so that marks of several lights may lie in those of one word. But the
+/// marks of one light rise together. Where another pulse ends in one of them, that one seems to rise
+/// earlier, and tells no time; none rises later.
+///
+/// Clipped samples at which the signal tells nothing, its `doubt` being infinite, are those of stray light or
+/// of light that was found before.
 pub(super) fn clipped(
     (codes, doubt): (&[i16], &[f32]),
     sampling: &Sampling,
@@ -44,17 +50,16 @@ pub(super) fn clipped(
     counted: &[Mark],
 ) -> Option<Clipped> {
     let is_clipped = |at: &usize| codes[*at] >= sampling.full_scale;
-    let tells = |at: &usize| doubt.get(*at).is_some_and(|doubt| *doubt < f32::INFINITY);
-    let mut told: Vec<(f64, f64)> = Vec::new();
+    let is_its_own = |at: &usize| is_clipped(at) && doubt[*at] < f32::INFINITY;
+    let mut told: Vec<Told> = Vec::new();
     for &Mark { place, .. } in counted {
         let about = (0..=NEAR).flat_map(|apart| [place.saturating_sub(apart), place + apart]);
-        let mut about = about.filter(|at| *at < codes.len() && tells(at));
-        let Some(at) = about.find(is_clipped) else { continue };
+        let Some(at) = about.filter(|at| *at < codes.len()).find(is_its_own) else { continue };
         let before = (0..at).rev().find(|at| !is_clipped(at));
         let behind = (at..codes.len()).find(|at| !is_clipped(at));
         let (Some(before), Some(behind)) = (before, behind) else { continue };
         // Light that comes while stray light is still clipped has no edge of its own.
-        if !tells(&(before + 1)) {
+        if doubt[before + 1] == f32::INFINITY {
             continue;
         }
         let rises = crossing(codes, sampling, (before, 0.5));
@@ -67,19 +72,32 @@ pub(super) fn clipped(
             },
         };
         let (tick, photons) = pulse.between(rises, falls);
-        told.push((tick - place as f64, photons));
+        let rises = before as i64 - place as i64;
+        told.push(Told { rises, late: tick - place as f64, photons });
     }
-    told.sort_by(|one, other| one.0.total_cmp(&other.0));
-    let middle = told.len().checked_sub(1)? / 2;
-    let (late, photons) = match told.len() % 2 {
-        1 => told[middle],
-        _ => {
-            let (one, other) = (told[middle], told[middle + 1]);
-            ((one.0 + other.0) / 2.0, (one.1 + other.1) / 2.0)
-        }
-    };
-    Some(Clipped { late, photons: photons as f32 })
+    let all = told.len();
+    let latest = told.iter().map(|one| one.rises).max()?;
+    told.retain(|one| one.rises + TOGETHER >= latest);
+    told.sort_by(|one, other| one.late.total_cmp(&other.late));
+    let (one, other) = (told[(told.len() - 1) / 2], told[told.len() / 2]);
+    Some(Clipped {
+        late: (one.late + other.late) / 2.0,
+        photons: ((one.photons + other.photons) / 2.0) as f32,
+        is_one: all == 1 || told.len() > 1,
+    })
 }
+
+/// What a clipped mark tells, in ticks from where it is found.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    /// The last sample before it is clipped.
+    rises: i64,
+    late: f64,
+    photons: f64,
+}
+
+/// Marks of one light are first clipped at the same tick, or noise makes it the next one.
+const TOGETHER: i64 = 1;
 
 /// Where a pulse is at a code, from the sample `at` beside clipped ones: where that sample is, or, if it is
 /// too dark to tell, at full scale, by half a tick `inwards`.
@@ -126,27 +144,6 @@ mod tests {
         clipped((&codes, &[0.0; 40]), &sampling, &Pulse::new(&sampling), &[mark])
     }
 
-    /// Three ticks behind clipped samples of own stray light a mark comes that is not clipped. Control: where
-    /// they tell something, it is taken for theirs.
-    #[test]
-    fn a_mark_behind_stray_light_is_not_timed_by_it() {
-        let (sampling, mark) = (sampling(), Mark { place: 13, height: 1e3, doubt: 0.0 });
-        let pulse = Pulse::new(&sampling);
-        let mut codes = [0; 20];
-        codes[5..11].fill(1000);
-        codes[13] = 100;
-        let mut doubt = [0.0; 20];
-        assert!(clipped((&codes, &doubt), &sampling, &pulse, &[mark]).unwrap().late < -3.0);
-        doubt[4..12].fill(f32::INFINITY);
-        assert!(clipped((&codes, &doubt), &sampling, &pulse, &[mark]).is_none());
-        // Light that is clipped, too, from where the stray light still is: only the other mark has an edge.
-        codes[5..15].fill(1000);
-        let other = Mark { place: 16, ..mark };
-        codes[16] = 1000;
-        let late = clipped((&codes, &doubt), &sampling, &pulse, &[mark, other]).unwrap().late;
-        assert!(late.abs() < 0.5, "{late}");
-    }
-
     /// At sixteen phases: to a hundredth of a tick by both edges, to a third by one and the last clipped
     /// sample.
     #[test]
@@ -164,8 +161,43 @@ mod tests {
     fn what_is_not_clipped_or_never_ends_is_not_timed_by_edges() {
         let (sampling, mark) = (sampling(), Mark { place: 2, height: 1e5, doubt: 0.0 });
         let pulse = Pulse::new(&sampling);
-        assert!(clipped((&[9, 99, 999, 99, 9], &[0.0; 5]), &sampling, &pulse, &[mark]).is_none());
-        assert!(clipped((&[1000; 5], &[0.0; 5]), &sampling, &pulse, &[mark]).is_none());
-        assert!(clipped((&[], &[]), &sampling, &pulse, &[]).is_none());
+        let told = |codes: &[i16], doubt: &[f32], marks: &[Mark]| {
+            clipped((codes, doubt), &sampling, &pulse, marks)
+        };
+        assert!(told(&[9, 99, 999, 99, 9], &[0.0; 5], &[mark]).is_none());
+        assert!(told(&[1000; 5], &[0.0; 5], &[mark]).is_none());
+        assert!(told(&[], &[], &[]).is_none());
+    }
+
+    /// Two pulses, of which the other comes so much later than the word says. Where it ended in earlier light,
+    /// which is clipped for longer, the one that rises later tells the time.
+    #[test]
+    fn clipped_marks_of_one_light_rise_together() {
+        let (sampling, pulse) = (sampling(), Pulse::new(&sampling()));
+        let told = |later: f32, third: Option<f32>| {
+            let light = [Some(20.0), Some(60.0 + later), third].into_iter().flatten();
+            let level = |tick: f32| light.clone().map(|at| 1e6 * shape(tick - at)).sum::<f32>();
+            let codes: Vec<i16> =
+                (0..120).map(|tick| level(tick as f32).min(1000.0) as i16).collect();
+            let places = [Some(20), Some(60), third.map(|_| 100)].into_iter().flatten();
+            let marks: Vec<Mark> =
+                places.map(|place| Mark { place, height: 1e4, doubt: 0.0 }).collect();
+            clipped((&codes, &[0.0; 120]), &sampling, &pulse, &marks).unwrap()
+        };
+        assert!(told(0.0, None).is_one && told(0.4, None).is_one);
+        assert!(!told(3.0, None).is_one && !told(-3.0, None).is_one);
+        let merged = told(-2.0, Some(100.0));
+        assert!(merged.is_one && merged.late.abs() < 0.1, "{merged:?}");
+    }
+
+    /// Light beside samples that stray light clips, or light that was found before, is not timed by those.
+    #[test]
+    fn clipped_samples_that_tell_nothing_are_of_other_light() {
+        let (sampling, mark) = (sampling(), Mark { place: 6, height: 1e4, doubt: 0.0 });
+        let (codes, pulse) = ([0, 400, 1000, 1000, 400, 200, 150, 0], Pulse::new(&sampling));
+        let told = |doubt: &[f32; 8]| clipped((&codes, doubt), &sampling, &pulse, &[mark]);
+        assert!(told(&[0.0; 8]).is_some());
+        let blind = f32::INFINITY;
+        assert!(told(&[0.0, blind, blind, blind, blind, blind, 0.0, 0.0]).is_none());
     }
 }
