@@ -27,6 +27,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     .section(receivers(findings))
     .section(claims(findings))
     .section(conclusion(findings))
+    .section(verdict(findings))
     .section(idealisations(findings))
     .files(&files(findings))
     .footer(&format!(
@@ -202,6 +203,33 @@ fn conclusion(findings: &Findings) -> Section {
              it, and what replaces it among the ready sensors.",
         )
         .table(conclusion::table(findings))
+}
+
+/// What is left of the title: whether pulse coding gives an improved refresh rate, and at what price.
+fn verdict(findings: &Findings) -> Section {
+    let outlook = &findings.measured.on_paper.outlook;
+    let range = findings.measured.on_paper.timing.rated_range;
+    let (columns, rows, rate) = outlook.directions;
+    let closing = outlook.closing.iter().filter(|sensor| sensor.lacks.is_empty());
+    let names: Vec<String> = closing.map(|sensor| format!("`{}`", sensor.sensor)).collect();
+    let finding = match names.as_slice() {
+        [] => "No ready sensor that never waits closes by day at class 1.".to_owned(),
+        names => format!(
+            "Pulse coding does give a faster refresh, though not with one beam and words of many marks: \
+             {} never wait, see 10 % at {range:.0} m by day at class 1, and need fewer channels than a \
+             lidar that waits.",
+            names.join(" and ")
+        ),
+    };
+    Section::new("The title, after all")
+        .paragraph(&format!(
+            "{columns} x {rows} directions at {rate:.0} Hz to {range:.0} m: what it takes to do it without \
+             waiting, and what a lidar with the same mirror takes that fires one pulse a shot and waits \
+             for its echo. A lidar that waits only for its range takes what stands behind it for \
+             something nearer; `macropulse design` weighs both for parts and wishes of your own."
+        ))
+        .block(Block::Remark(Tone::Finding, "Improved refresh rate".to_owned(), finding))
+        .table(tables::closing(&outlook.closing))
 }
 
 fn idealisations(findings: &Findings) -> Section {

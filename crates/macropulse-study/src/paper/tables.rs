@@ -2,6 +2,7 @@
 
 use super::claim::{Claim, Verdict};
 use super::experiment::{DISTANCES, Trial};
+use super::measured::Closing;
 use super::receivers::Comparison;
 use crate::view::{self, Align, Cell, Table};
 use macropulse::codec::code::prime_sequence;
@@ -211,4 +212,36 @@ pub(super) fn verdict(claim: &Claim) -> Cell {
         Verdict::Fails => Cell::verdict(view::Verdict::Fails, name),
         Verdict::Unsaid | Verdict::Assumed => Cell::from(name),
     }
+}
+
+/// The sensors that never wait and close, beside lidars that wait.
+pub(super) fn closing(sensors: &[Closing]) -> Table {
+    let header = [
+        ("sensor", Align::Left),
+        ("channels", Align::Right),
+        ("aperture, mm", Align::Right),
+        ("Pd of 10 %, forecast", Align::Right),
+        ("closes?", Align::Left),
+        ("channels waiting for its range", Align::Right),
+        ("channels waiting for all light", Align::Right),
+    ];
+    let missing = |sensor: &Closing| {
+        let each = sensor.lacks.iter().map(|(name, factor)| format!("{name}, {factor:.1} times"));
+        each.collect::<Vec<_>>().join("; ")
+    };
+    sensors.iter().fold(Table::new("", &header), |table, sensor| {
+        let closes = match sensor.lacks.is_empty() {
+            true => Cell::verdict(view::Verdict::Holds, "yes"),
+            false => Cell::verdict(view::Verdict::Fails, &missing(sensor)),
+        };
+        table.row(vec![
+            Cell::from(format!("`{}`", sensor.sensor)),
+            Cell::from(sensor.channels.to_string()),
+            Cell::from(format!("{:.0}", sensor.aperture * 1e3)),
+            Cell::from(format!("{:.3}", sensor.pd)),
+            closes,
+            Cell::from(sensor.waiting[0].to_string()),
+            Cell::from(sensor.waiting[1].to_string()),
+        ])
+    })
 }

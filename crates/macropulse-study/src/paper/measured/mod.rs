@@ -12,7 +12,7 @@ mod system;
 pub use code::{Payloads, Repaired, Words};
 pub use equations::Equations;
 pub use experiment::{Experiment, Seen, Share};
-pub use outlook::Outlook;
+pub use outlook::{Closing, Outlook};
 pub use roles::{Part, Role};
 pub use system::{Converters, Head, Light, Timing};
 

@@ -6,6 +6,7 @@ use macropulse::design::Design;
 use macropulse::environment::Environment;
 use macropulse::predict::Forecaster;
 use macropulse::predict::verdict::{Wanted, checks};
+use macropulse::units::tof_from_range;
 
 /// What the conclusion hopes for.
 #[derive(Debug, Clone)]
@@ -33,6 +34,48 @@ pub struct Outlook {
     pub walsh_in_step: f64,
     /// And at any delay.
     pub walsh: f64,
+    /// The ready sensors that never wait and close, at the paper's field, rate and range.
+    pub closing: Vec<Closing>,
+}
+
+/// A lidar that never waits and closes by day at class 1.
+#[derive(Debug, Clone)]
+pub struct Closing {
+    /// Name of the ready sensor.
+    pub sensor: String,
+    /// Its channels: beams with a detector and a converter each.
+    pub channels: u32,
+    /// Diameter of its aperture, m.
+    pub aperture: f64,
+    /// Probability that it sees 10 % at the range of the paper, by day, forecast.
+    pub pd: f64,
+    /// What it lacks by the budget; empty if it closes.
+    pub lacks: Vec<(&'static str, f64)>,
+    /// Channels that a lidar with its mirror needs which waits for echoes from its range, and from as far as
+    /// its light is followed.
+    pub waiting: [u32; 2],
+}
+
+impl Closing {
+    fn of(sensor: &str, range: f64, sky: &Environment) -> Result<Self, Error> {
+        let design = Design::open(sensor, &[])?;
+        let forecaster = Forecaster::new(&design, sky)?;
+        let by_night = Forecaster::new(&design, &sky.at_night())?;
+        let wanted = Wanted { reflectance: 0.1, range, pd: 0.9, false_points: 1e-4 };
+        let found = checks(&forecaster, &by_night, &wanted);
+        let lacks = found.iter().filter(|check| !check.holds());
+        // With more channels the shots of one are so much farther apart.
+        let of_channel = design.scan.shortest_period() / f64::from(design.channels());
+        let waits = |range: f64| (tof_from_range(range) / of_channel).ceil() as u32;
+        Ok(Self {
+            sensor: sensor.to_owned(),
+            channels: design.channels(),
+            aperture: design.budget.as_ref().map_or(f64::NAN, |budget| budget.aperture),
+            pd: forecaster.forecast(0.1, range).pd,
+            lacks: lacks.map(|check| (check.name, check.shortfall)).collect(),
+            waiting: [range, design.scan.light_range].map(waits),
+        })
+    }
 }
 
 impl Outlook {
@@ -67,6 +110,10 @@ impl Outlook {
             gold: greatest(&gold, slow.coding.codebook.family().length()).1,
             walsh_in_step,
             walsh,
+            closing: ["coded-32", "coded-16"]
+                .into_iter()
+                .map(|sensor| Closing::of(sensor, range, &day))
+                .collect::<Result<_, _>>()?,
         })
     }
 }
