@@ -59,6 +59,14 @@ fn the_text_names_what_the_json_does() {
 }
 
 /// The log of a scan through a pipe is that of the file, and --quiet is.
+/// A word without a label is named with its marks, here those that the sensor file lists.
+#[test]
+fn a_bare_code_word_is_no_single_mark() {
+    let told = Desk::new().run("encode coded-16 --pixel 0,2").out;
+    assert!(told.contains("bare code word") && told.contains("0 21 214"), "{told}");
+    assert!(!told.contains("one mark per shot"), "{told}");
+}
+
 #[test]
 fn a_shot_log_leaves_through_standard_output() {
     let desk = Desk::new();

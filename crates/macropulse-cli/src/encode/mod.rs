@@ -125,6 +125,10 @@ fn text(macropulse: &Macropulse, design: &Design) -> String {
             columns.push("payload", format!("{payload} ({} bits)", payload.len()));
             columns.push("code word", macropulse.shot.word.to_string());
         }
+        None if design.is_coded() => {
+            columns.push("payload", "none: a macropulse is a bare code word");
+            columns.push("code word", macropulse.shot.word.to_string());
+        }
         None => columns.push("payload", "none: this sensor sends one mark per shot"),
     }
     let chip_ps = design.coding.chip_fs as f64 * 1e-3;

@@ -107,7 +107,7 @@ mod tests {
     #[test]
     fn the_paper_in_figures() {
         let family = Family::prime(29).unwrap();
-        let found = Comparison::of(family);
+        let found = Comparison::of(family.clone());
         let cross = CrossCorrelation::of(&family.words());
         assert_eq!((found.marks, found.compared), ((29, 29), 29));
         assert_eq!((found.sidelobes, found.crosses), ((29, 28), (2, 2)));

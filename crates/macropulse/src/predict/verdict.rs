@@ -138,14 +138,18 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
 
 fn converters(design: &Design, forecast: &Forecast) -> Check {
     let loss = forecast.bank_loss;
-    Check {
-        name: "converters",
-        shortfall: if loss > LOSS { 1.0 / (1.0 - loss) } else { loss / LOSS },
-        finding: format!(
+    let finding = match design.receiver.sampling {
+        Some(_) => "every detector has an ADC of its own, which is never busy".to_owned(),
+        None => format!(
             "{:.2} % of detection events find all {} of a detector's bank busy",
             loss * 100.0,
             design.converters_per_channel()
         ),
+    };
+    Check {
+        name: "converters",
+        shortfall: if loss > LOSS { 1.0 / (1.0 - loss) } else { loss / LOSS },
+        finding,
         remedy: "more converters, a shorter dead time, or fewer dark and background counts".into(),
     }
 }
