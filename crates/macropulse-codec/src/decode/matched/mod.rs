@@ -124,6 +124,8 @@ struct Band<'a> {
     /// The last shot before each one at the same row of another column.
     left: Vec<Option<u32>>,
     found: Vec<Option<Detection>>,
+    /// Whether nothing was found of the shots that are looked at for what is left over, nor near them.
+    is_dark_around: bool,
     /// Other surfaces of the shots at hand.
     further: Vec<(usize, Detection)>,
     /// For all lags of a gate.
@@ -151,8 +153,6 @@ struct Band<'a> {
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
     marks: Vec<u32>,
     marks_of: Option<usize>,
-    /// Memory for the bits of a macropulse.
-    bits: Vec<u32>,
     search: Search,
     photons: Photons,
     /// Memory for the residual of a macropulse, and for the marks found in each of its bits.
@@ -206,6 +206,7 @@ impl<'a> Band<'a> {
             above,
             left,
             found,
+            is_dark_around: false,
             further,
             thresholds,
             bit_thresholds,
@@ -221,7 +222,6 @@ impl<'a> Band<'a> {
             counts: Counts::default(),
             marks: Vec::new(),
             marks_of: None,
-            bits: Vec::new(),
             search: memory.search,
             photons: memory.photons,
             residual: Timeline::default(),
@@ -397,8 +397,7 @@ impl<'a> Band<'a> {
         // A long pulse makes several ticks of a mark.
         let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
         let start = self.sent.fired[shot] + detection.lag - farther;
-        let bits = self.sent.lit_from(shot, start);
-        let own = bits.map(|bit| self.field.seen().lit_in(bit, pattern)).sum();
+        let own = self.field.seen().lit_in_all(start, self.sent.bits_that_are(true, shot), pattern);
         let density = self.density_about(shot, detection, own);
         self.thresholds.least(weight, density)
     }
