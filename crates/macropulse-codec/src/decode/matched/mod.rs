@@ -62,9 +62,11 @@ const SURFACES: usize = 3;
 /// Returns of a shot that this receiver can give at most.
 pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
-/// How often chance may light an end of a macropulse where there is none, or leave out as many marks of a
-/// code word in all of its bits as are missing.
+/// How often chance may leave out as many marks of a code word in all of its bits as are missing.
 const BY_CHANCE: f64 = 1e-3;
+
+/// How often chance may light an end of a macropulse where there is none.
+const AT_AN_END: f64 = 1e-2;
 
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
@@ -134,6 +136,8 @@ struct Band<'a> {
     bit_thresholds: Thresholds,
     /// For what chance may do in a single place.
     once_thresholds: Thresholds,
+    /// For both ends of a macropulse.
+    end_thresholds: Thresholds,
     /// For the places of a code word in the pictures that are told by one machine word.
     word_thresholds: Thresholds,
     usual: Usual,
@@ -170,11 +174,12 @@ impl<'a> Band<'a> {
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
         let (of_lags, of_bits) = ((lags, false_alarm), (bits, false_alarm));
-        let wanted = [of_lags, of_bits, (1.0, BY_CHANCE), (2.0 * 64.0 * bits, 0.5)]
-            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
+        let wanted =
+            [of_lags, of_bits, (1.0, BY_CHANCE), (1.0, AT_AN_END), (2.0 * 64.0 * bits, 0.5)]
+                .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
         let mut remembered = memory.thresholds;
-        let [thresholds, bit_thresholds, once_thresholds, word_thresholds] =
-            wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
+        let [thresholds, bit_thresholds, once_thresholds, end_thresholds, word_thresholds] = wanted
+            .map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
@@ -211,6 +216,7 @@ impl<'a> Band<'a> {
             thresholds,
             bit_thresholds,
             once_thresholds,
+            end_thresholds,
             word_thresholds,
             usual: Usual::new(),
             at_hand: 0..0,
@@ -265,6 +271,7 @@ impl<'a> Band<'a> {
                 self.thresholds,
                 self.bit_thresholds,
                 self.once_thresholds,
+                self.end_thresholds,
                 self.word_thresholds,
             ],
         };

@@ -209,7 +209,7 @@ impl Band<'_> {
         let density = self.field.density_without(&sent.light(shot, lag), 0, 0);
         [first, last].into_iter().zip(&sent.bits(shot).ends).all(|(bit, (marks, pattern))| {
             let found = self.field.lit().lit_in(bit, pattern);
-            found >= self.once_thresholds.least(*marks, density)
+            found >= self.end_thresholds.least(*marks, density)
         })
     }
 }

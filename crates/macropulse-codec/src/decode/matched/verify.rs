@@ -85,26 +85,33 @@ impl Band<'_> {
         if is_alone && likely.is_none_or(|likely| is_near(likely, found.lag)) {
             return;
         }
-        let expected = self.expected_lags(shot);
+        // Of a bright one that has no equal the nearest tell whether it is.
+        let is_bright = is_alone && found.stands_out;
+        let expected = self.expected_lags(shot, if is_bright { 1 } else { NEIGHBOURS });
         let mut middles = vec![found.lag];
         for lag in &expected {
             if !middles.iter().any(|middle| is_near(*middle, *lag)) {
                 middles.push(*lag);
             }
         }
+        self.lay_out(shot);
+        // None with fewer has as many that each have a tick.
+        let least = match self.sent.width {
+            1 => found.count,
+            _ => self.marks_with_ticks(shot, found.lag),
+        };
         let (reach, mut most) = (self.sent.reach(), found.count);
         let mut lags = Vec::from_iter(is_alone.then_some(found.lag));
         for middle in middles.into_iter().skip(lags.len()) {
             let Some(best) = self.best_in_block(shot, middle) else { continue };
             most = most.max(best.count);
-            let as_many = self.counts.at_least(most.saturating_sub(twice));
+            let as_many = self.counts.at_least(least.max(most.saturating_sub(twice)));
             let is_among = |at: &i64| as_many[(at / 64) as usize] >> (at % 64) & 1 == 1;
             lags.extend((0..BLOCK).filter(is_among).map(|at| middle - BLOCK / 2 + at));
         }
         if lags == [found.lag] {
             return;
         }
-        self.lay_out(shot);
         let away = |lag: i64| {
             let mut away: Vec<u64> = expected.iter().map(|other| lag.abs_diff(*other)).collect();
             away.sort_unstable();
@@ -126,11 +133,11 @@ impl Band<'_> {
 
     /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
     /// behind it that is not as doubtful; after any where few are settled.
-    fn expected_lags(&self, shot: usize) -> Vec<i64> {
+    fn expected_lags(&self, shot: usize, neighbours: usize) -> Vec<i64> {
         let found = |shot: usize| *self.found.get(shot)?;
         let before = (0..shot).rev().take(WIDEST_GAP).filter_map(found);
-        let before: Vec<i64> = before.map(|found| found.lag).take(NEIGHBOURS).collect();
-        let most = if before.len() < NEIGHBOURS { NEIGHBOURS } else { 1 };
+        let before: Vec<i64> = before.map(|found| found.lag).take(neighbours).collect();
+        let most = if before.len() < neighbours { neighbours } else { 1 };
         let behind = (shot + 1..).take(WIDEST_GAP).filter_map(found);
         let behind = behind.filter(|found| found.margin > 0 || most > 1);
         let behind: Vec<i64> = behind.map(|found| found.lag).take(most).collect();
