@@ -192,7 +192,10 @@ impl Band<'_> {
         }
         let first = shots.start.saturating_sub(WIDEST_GAP);
         let around = first..(shots.end + WIDEST_GAP).min(self.found.len());
-        self.is_dark_around = self.found[around].iter().all(Option::is_none);
+        // Rows above count, too.
+        let is_expected = |shot| (0..7).any(|way| self.expected(shot, 1, way).is_some());
+        self.is_dark_around =
+            self.found[around].iter().all(Option::is_none) && !shots.clone().any(is_expected);
         for shot in shots.clone() {
             if self.is_open(shot) {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
