@@ -69,18 +69,15 @@ impl Timeline {
 
     /// The first tick of `span` that is lit.
     pub fn next_lit(&self, span: Range<i64>) -> Option<i64> {
-        let bit = (span.start - self.origin).max(0) as usize;
-        let mut from = u64::MAX << (bit % 64);
-        for (index, word) in self.words.iter().enumerate().skip(bit / 64) {
-            let start = self.origin + 64 * index as i64;
-            if start >= span.end {
-                return None;
+        let mut tick = span.start.max(self.origin);
+        while tick < span.end.min(self.end()) {
+            match self.from(tick) {
+                0 => tick += 64,
+                ahead => {
+                    let lit = tick + i64::from(ahead.trailing_zeros());
+                    return Some(lit).filter(|lit| *lit < span.end);
+                }
             }
-            if word & from != 0 {
-                let tick = start + i64::from((word & from).trailing_zeros());
-                return Some(tick).filter(|tick| *tick < span.end);
-            }
-            from = u64::MAX;
         }
         None
     }

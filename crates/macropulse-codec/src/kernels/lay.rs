@@ -1,6 +1,14 @@
 //! Ticks laid down as bits, and bits counted.
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+
 use crate::on_every_level;
+
+/// Ticks of a line of the cache, and how far ahead they are asked for: they were last read when their order
+/// was checked, and no prefetcher foresees the next few hundred. Without it laying takes half as long again.
+const LINE: usize = 16;
+const AHEAD: usize = 512;
 
 on_every_level! {
     /// Lights, in `words`, of which the first bit is tick `origin`, those of the sorted `ticks` that
@@ -12,18 +20,27 @@ on_every_level! {
         // The word at hand stays in a register: nothing waits for what was stored.
         let mut at = ((i64::from(*first) - origin) >> 6) as usize;
         let mut bits = words.get(at).copied().unwrap_or(0);
-        for (count, &tick) in ticks.iter().enumerate() {
-            let bit = (i64::from(tick) - origin) as u64;
-            if bit >= until {
-                return count;
+        let mut laid = 0;
+        for line in ticks.chunks(LINE) {
+            // SAFETY: a hint, which reads nothing.
+            #[cfg(target_arch = "x86_64")]
+            unsafe {
+                _mm_prefetch::<_MM_HINT_T0>(line.as_ptr().wrapping_add(AHEAD).cast());
             }
-            let word = (bit >> 6) as usize;
-            let before = if word == at { bits } else { 0 };
-            bits = before | 1 << (bit & 63);
-            at = word;
-            words[word] = bits;
+            for &tick in line {
+                let bit = (i64::from(tick) - origin) as u64;
+                if bit >= until {
+                    return laid;
+                }
+                let word = (bit >> 6) as usize;
+                let before = if word == at { bits } else { 0 };
+                bits = before | 1 << (bit & 63);
+                at = word;
+                words[word] = bits;
+                laid += 1;
+            }
         }
-        ticks.len()
+        laid
     }
 }
 

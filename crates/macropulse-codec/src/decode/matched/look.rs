@@ -1,5 +1,6 @@
 //! In which order the shots are looked for, and what is believed.
 
+use std::iter;
 use std::ops::Range;
 
 use super::track::WIDEST_GAP;
@@ -140,6 +141,7 @@ impl Band<'_> {
     ) -> Option<Detection> {
         let sent = self.sent;
         let weight = sent.weight(shot);
+        // The first pass asks for as many as usual: that bounds so much of the gate that little is counted.
         let bright = match pass {
             Pass::First => self.usual.least(weight).min(weight.div_ceil(2)),
             Pass::Second => weight.div_ceil(2),
@@ -149,15 +151,13 @@ impl Band<'_> {
         let around = shot.saturating_sub(2)..(shot + 3).min(self.found.len());
         let is_even = pass == Pass::First || self.found[around].iter().any(Option::is_some);
         let (reach, closes) = (sent.reach(), sent.gate().end + sent.length());
-        let parts = [reach.start..reach.end.min(closes), closes.max(reach.start)..reach.end];
-        // What comes from beyond must stand out.
-        let found = parts.into_iter().zip([is_even, false]).find_map(|(part, is_even)| {
+        let within = (reach.start..reach.end.min(closes), is_even);
+        // What comes from beyond must stand out, and is bright where it first does: to search for it in the
+        // second pass, too, finds nothing more in the standard scenes and takes a twentieth of the time.
+        let beyond = (pass == Pass::First).then(|| (closes.max(reach.start)..reach.end, false));
+        let found = iter::once(within).chain(beyond).find_map(|(part, is_even)| {
             let lags = self.leftover().lags(shot, part, least, is_even);
-            // As many as usual bound so much of the gate that to ask for fewer is rarely needed.
-            let usual = self.usual.least(weight);
-            let mut search = |least| self.maximum(shot, Source::Residual, &lags, least);
-            let likely = (pass == Pass::First && usual > least).then(|| search(usual)).flatten();
-            let (lag, _) = likely.or_else(|| search(least))?;
+            let (lag, _) = self.maximum(shot, Source::Residual, &lags, least)?;
             self.climb(shot, lag, 1)
         });
         let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);
@@ -190,6 +190,12 @@ impl Band<'_> {
         if shots.is_empty() {
             return;
         }
+        let first = shots.start.saturating_sub(WIDEST_GAP);
+        let around = first..(shots.end + WIDEST_GAP).min(self.found.len());
+        // Rows above count, too.
+        let is_expected = |shot| (0..7).any(|way| self.expected(shot, 1, way).is_some());
+        self.is_dark_around =
+            self.found[around].iter().all(Option::is_none) && !shots.clone().any(is_expected);
         for shot in shots.clone() {
             if self.is_open(shot) {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
@@ -286,16 +292,23 @@ impl Band<'_> {
     }
 
     /// Follows a surface that stands beside others, as behind a pane of glass, along the `shots`, the
-    /// first of which is expected to have it at `lag`: to search for each of them alone takes long.
+    /// first of which is expected to have it about `lag`: to search for each of them alone takes long.
     fn follow(&mut self, shots: Range<usize>, mut lag: i64) {
+        let mut step = None;
         for shot in shots {
             // Each is searched for in all of its gate where that is asked for.
             if self.found[shot].is_none() || !self.is_open(shot) || self.sent.is_thorough() {
                 return;
             }
             let usual = self.usual.least(self.sent.weight(shot));
-            let found = self.climb(shot, lag, usual);
+            let expected = lag + step.unwrap_or(0);
+            let mut found = self.climb(shot, expected, usual);
+            if found.is_none() && step.is_none() {
+                // The slope is not known yet.
+                found = self.beside(shot, expected, Detection::at(lag, usual.saturating_sub(1)));
+            }
             let Some(taken) = self.take_surface(shot, found) else { return };
+            step = Some(taken - lag);
             lag = taken;
         }
     }
@@ -304,6 +317,7 @@ impl Band<'_> {
     fn add_surface(&mut self, shot: usize, found: Detection) {
         let Some(known) = self.found[shot] else {
             self.found[shot] = Some(found);
+            self.is_dark_around = false;
             return;
         };
         let is_beyond = !self.sent.gate().contains(&known.lag);
@@ -315,6 +329,9 @@ impl Band<'_> {
 
     /// Looks for `shot` about its neighbours, also farther ones, where light is left over.
     fn track_leftover(&mut self, shot: usize) -> bool {
+        if self.is_dark_around {
+            return false;
+        }
         let tracked = self.tracked(shot, WIDEST_GAP);
         let tracked = tracked.and_then(|found| self.believed(shot, found));
         if let Some(found) = tracked {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::Detection;
 use super::track::NEAREST_SIDE;
 use crate::ShotLog;
-use crate::code::{CodeWord, Codebook, Family};
+use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timing;
 use crate::decode::{Effort, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
@@ -34,23 +34,27 @@ pub(super) struct Sent<'a> {
 pub(super) const FIRST: usize = 3;
 
 /// The code words of a family, each made when it is first needed: one pixel of a flash has a single
-/// word.
+/// word; and the bits of each label.
 #[derive(Default)]
 pub(super) struct Words {
-    /// Of which family, with so many ticks to a chip and places to a mark.
-    of: Option<(Family, u32, u32)>,
+    /// Of which family and labels, with so many ticks to a chip and places to a mark.
+    of: Option<(Family, Option<Payload>, u32, u32, u32)>,
     /// From each of the first marks to the next one, in ticks; 0 where there is none.
     gaps: Vec<[u32; FIRST]>,
     /// In ticks.
     ticks: Vec<OnceCell<WordTicks>>,
     /// The same as bits, needed only where light is not clear.
     bits: Vec<OnceCell<Bits>>,
+    /// Ticks from the start of a macropulse to each bit of it that is dark, and to each that is lit, by
+    /// label; as above.
+    of_label: Vec<OnceCell<[Vec<u32>; 2]>>,
 }
 
 impl Words {
     /// Makes them those of the `codebook`. Kept from band to band: there are hundreds.
     fn of(mut self, codebook: &Codebook, scale: u32, width: u32) -> Self {
-        let of = Some((codebook.family().clone(), scale, width));
+        let (payload, labels) = (codebook.payload().copied(), codebook.labels());
+        let of = Some((codebook.family().clone(), payload, labels, scale, width));
         if self.of != of {
             let words = codebook.words();
             let gaps = (0..words).map(|word| {
@@ -61,7 +65,9 @@ impl Words {
                 })
             });
             let gaps = gaps.collect();
-            self = Self { of, gaps, ticks: vec![OnceCell::new(); words], bits: Vec::new() };
+            let ticks = vec![OnceCell::new(); words];
+            let of_label = vec![OnceCell::new(); labels as usize];
+            self = Self { of, gaps, ticks, bits: Vec::new(), of_label };
             self.bits.resize_with(words, OnceCell::new);
         }
         self
@@ -202,19 +208,18 @@ impl<'a> Sent<'a> {
         lit.filter_map(|bit| found.get(bit as usize)).sum()
     }
 
-    /// Puts into `after` the ticks from the start of a macropulse of `shot` to each bit of it that is
-    /// lit, or dark.
-    pub fn bits_that_are(&self, is_lit: bool, shot: usize, after: &mut Vec<u32>) {
-        let (scale, lit) = (self.receiver.ticks_per_chip, self.lit_bits(shot));
-        after.clear();
-        if is_lit {
-            after.extend(lit.iter().map(|bit| scale * bit));
-            return;
-        }
-        let bits = self.bits_of_payload() as u32;
-        let (chips, mut lit) = (self.codebook.chips() / bits, lit.iter().peekable());
-        let all = (0..bits).map(|bit| bit * chips);
-        after.extend(all.filter(|bit| lit.next_if_eq(&bit).is_none()).map(|bit| scale * bit));
+    /// Ticks from the start of a macropulse of `shot` to each bit of it that is lit, or dark.
+    pub fn bits_that_are(&self, is_lit: bool, shot: usize) -> &[u32] {
+        let label = self.log.label[shot];
+        let both = self.words.of_label[usize::from(label)].get_or_init(|| {
+            let (scale, lit) = (self.receiver.ticks_per_chip, self.codebook.lit_bits(label));
+            let bits = self.bits_of_payload() as u32;
+            let chips = self.codebook.chips() / bits;
+            let all = (0..bits).map(|bit| bit * chips);
+            let dark = all.filter(|bit| lit.binary_search(bit).is_err()).map(|bit| scale * bit);
+            [dark.collect(), lit.iter().map(|bit| scale * bit).collect()]
+        });
+        &both[usize::from(is_lit)]
     }
 
     /// Ticks per chip.

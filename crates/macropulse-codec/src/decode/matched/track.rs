@@ -15,10 +15,14 @@ const SIDES: i64 = 3;
 /// The lags to both sides of a peak that are always seen with it.
 pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - SAME;
 
-/// A peak so near to where it was expected is no sidelobe of one elsewhere; one that is not is looked
-/// at again in the middle of a block. In the standard scenes 1 to 16 find the same shots in the same
-/// time.
+/// A peak so near to where it was expected is no sidelobe of one elsewhere. In the standard scenes 1 to
+/// 16 find the same shots in the same time.
 const SAME: i64 = 4;
+
+/// A peak farther than this from the middle of its block, of which half are then seen to a side of it, is
+/// looked at again in the middle of one. At [`SAME`] one shot in three of `street` is counted twice, and
+/// one in 40 000 found better.
+const OFF: i64 = BLOCK / 4;
 
 /// Where light is faint, a shot is looked for near one that was found so many shots away: as many as are
 /// passed by between two searches, so that none between is out of reach. Of 1884 shots of a room in which
@@ -57,10 +61,7 @@ impl Band<'_> {
     pub(super) fn tracked(&mut self, shot: usize, gap: usize) -> Option<Detection> {
         let weight = self.sent.weight(shot);
         let usual = self.usual.least(weight);
-        // Fewer are nowhere believed.
-        let least = self.thresholds.least(weight, self.density_in_gate(shot, weight));
-        // A sidelobe of a peak just outside would show half as many marks as the peak.
-        let least = if gap > 1 { least } else { least.max(usual / 2) };
+        let mut least = 0;
         let mut best: Option<Detection> = None;
         let mut tried = [i64::MIN; 7];
         for way in 0..tried.len() {
@@ -69,6 +70,12 @@ impl Band<'_> {
                 continue;
             }
             tried[way] = lag;
+            if least == 0 {
+                // Fewer are nowhere believed.
+                least = self.thresholds.least(weight, self.density_in_gate(shot, weight));
+                // A sidelobe of a peak just outside would show half as many marks as the peak.
+                least = if gap > 1 { least } else { least.max(usual / 2) };
+            }
             let Some(peak) = self.climb(shot, lag, least) else { continue };
             let Some(peak) = self.told_from_chance(shot, peak) else { continue };
             if best.is_none_or(|best| peak.count > best.count)
@@ -96,7 +103,7 @@ impl Band<'_> {
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
-            if best.lag.abs_diff(middle) > SAME as u64 {
+            if best.lag.abs_diff(middle) > OFF as u64 {
                 middle = best.lag;
                 best = self.best_in_block(shot, middle)?;
                 continue;
@@ -116,7 +123,12 @@ impl Band<'_> {
 
     /// The highest of the peaks in the blocks to both sides of that around `middle`, if more marks of `shot` are
     /// found there than at `detection`, or as many earlier.
-    fn beside(&mut self, shot: usize, middle: i64, detection: Detection) -> Option<Detection> {
+    pub(super) fn beside(
+        &mut self,
+        shot: usize,
+        middle: i64,
+        detection: Detection,
+    ) -> Option<Detection> {
         let word = self.sent.bit_length();
         let sides = (1..=SIDES).take_while(|side| side * BLOCK - BLOCK / 2 < word);
         let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
@@ -197,7 +209,7 @@ impl Band<'_> {
         let density = self.field.density_without(&sent.light(shot, lag), 0, 0);
         [first, last].into_iter().zip(&sent.bits(shot).ends).all(|(bit, (marks, pattern))| {
             let found = self.field.lit().lit_in(bit, pattern);
-            found >= self.once_thresholds.least(*marks, density)
+            found >= self.end_thresholds.least(*marks, density)
         })
     }
 }

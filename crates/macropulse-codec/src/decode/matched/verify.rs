@@ -81,26 +81,37 @@ impl Band<'_> {
         let twice = self.sent.bits(shot).shared * self.sent.lit_bits(shot).len() as u32;
         let lines = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
         let likely = lines.or_else(|| self.expected(shot, WIDEST_GAP, 1));
-        if found.margin > twice && likely.is_none_or(|likely| is_near(likely, found.lag)) {
+        let is_alone = found.margin > twice;
+        if is_alone && likely.is_none_or(|likely| is_near(likely, found.lag)) {
             return;
         }
-        let expected = self.expected_lags(shot);
+        // Of a bright one that has no equal the nearest tell whether it is.
+        let is_bright = is_alone && found.stands_out;
+        let expected = self.expected_lags(shot, if is_bright { 1 } else { NEIGHBOURS });
         let mut middles = vec![found.lag];
         for lag in &expected {
             if !middles.iter().any(|middle| is_near(*middle, *lag)) {
                 middles.push(*lag);
             }
         }
+        self.lay_out(shot);
+        // None with fewer has as many that each have a tick.
+        let least = match self.sent.width {
+            1 => found.count,
+            _ => self.marks_with_ticks(shot, found.lag),
+        };
         let (reach, mut most) = (self.sent.reach(), found.count);
-        let mut lags = Vec::new();
-        for middle in middles {
+        let mut lags = Vec::from_iter(is_alone.then_some(found.lag));
+        for middle in middles.into_iter().skip(lags.len()) {
             let Some(best) = self.best_in_block(shot, middle) else { continue };
             most = most.max(best.count);
-            let as_many = self.counts.at_least(most.saturating_sub(twice));
+            let as_many = self.counts.at_least(least.max(most.saturating_sub(twice)));
             let is_among = |at: &i64| as_many[(at / 64) as usize] >> (at % 64) & 1 == 1;
             lags.extend((0..BLOCK).filter(is_among).map(|at| middle - BLOCK / 2 + at));
         }
-        self.lay_out(shot);
+        if lags == [found.lag] {
+            return;
+        }
         let away = |lag: i64| {
             let mut away: Vec<u64> = expected.iter().map(|other| lag.abs_diff(*other)).collect();
             away.sort_unstable();
@@ -122,11 +133,11 @@ impl Band<'_> {
 
     /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
     /// behind it that is not as doubtful; after any where few are settled.
-    fn expected_lags(&self, shot: usize) -> Vec<i64> {
+    fn expected_lags(&self, shot: usize, neighbours: usize) -> Vec<i64> {
         let found = |shot: usize| *self.found.get(shot)?;
         let before = (0..shot).rev().take(WIDEST_GAP).filter_map(found);
-        let before: Vec<i64> = before.map(|found| found.lag).take(NEIGHBOURS).collect();
-        let most = if before.len() < NEIGHBOURS { NEIGHBOURS } else { 1 };
+        let before: Vec<i64> = before.map(|found| found.lag).take(neighbours).collect();
+        let most = if before.len() < neighbours { neighbours } else { 1 };
         let behind = (shot + 1..).take(WIDEST_GAP).filter_map(found);
         let behind = behind.filter(|found| found.margin > 0 || most > 1);
         let behind: Vec<i64> = behind.map(|found| found.lag).take(most).collect();
@@ -413,9 +424,8 @@ impl Band<'_> {
         }
         let light = sent.light(shot, detection.lag);
         let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
-        sent.bits_that_are(false, shot, &mut self.bits);
         let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
-        residual.lit_in_each(light.start, &self.bits, pattern, found);
+        residual.lit_in_each(light.start, sent.bits_that_are(false, shot), pattern, found);
         let most = found.iter().copied().max().unwrap_or(0);
         2 * most * (sent.lit_bits(shot).len() as u32) < detection.count || {
             let density = self.density_beside(shot, detection);
@@ -436,9 +446,8 @@ impl Band<'_> {
         let start = sent.fired[shot] + detection.lag;
         let (in_word, lit) = (f64::from(sent.in_word(shot)), sent.lit_bits(shot).len() as f64);
         let mean = f64::from(detection.count) / lit;
-        sent.bits_that_are(true, shot, &mut self.bits);
         let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
-        self.field.lit().lit_in_each(start, &self.bits, pattern, found);
+        self.field.lit().lit_in_each(start, sent.bits_that_are(true, shot), pattern, found);
         let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
         let squares: f64 = found.iter().map(square).sum();
         squares <= chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word)
@@ -451,10 +460,9 @@ impl Band<'_> {
             return MIDDLE;
         }
         let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
-        sent.bits_that_are(true, shot, &mut self.bits);
-        let count = |place: i64| {
-            self.field.seen().lit_in_all(light.start + place, &self.bits, &bits.pattern)
-        };
+        let lit_bits = sent.bits_that_are(true, shot);
+        let count =
+            |place: i64| self.field.seen().lit_in_all(light.start + place, lit_bits, &bits.pattern);
         let (counts, first) = timing::about(sent.width, sent.receiver.jitter_ticks, count);
         let beside = self.field.density_without(&light, detection.count, 0);
         let known = Known {
