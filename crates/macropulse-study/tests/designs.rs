@@ -4,7 +4,10 @@
 use std::path::Path;
 
 use macropulse::design::Design;
+use macropulse::environment::Environment;
+use macropulse::predict::verdict::Wanted;
 use macropulse::sim::Watch;
+use macropulse_study::budget::{Figures, usual};
 use macropulse_study::designs::{Found, Requirements, Search, make_room};
 
 /// A corner of the field of the paper, so often that the shots of three beams follow each other as soon as
@@ -87,7 +90,7 @@ fn what_is_wrong_in_a_file_is_said_with_its_place() {
 
 /// Thirty beams have 2.1 µs between the shots of one, in which light comes back from 300 m, fifteen 1.06,
 /// enough for 150 m. One that does not wait needs fewer. What is found keeps to class 1 and finds what is
-/// wanted; the same again is read from its files, to the bit. Control: at ten times the range nothing does.
+/// wanted, and the budget says so, too; the same again is read from its files, to the bit. Control: at ten times the range nothing does.
 #[test]
 fn what_is_found_does_and_is_found_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -99,6 +102,10 @@ fn what_is_found_does_and_is_found_again() {
     for (name, best) in [("coded", coded), ("waiting", waiting)] {
         let design = Design::open(folder.path().join(format!("{name}.toml")), &[]).unwrap();
         assert_eq!(design.channels(), best.candidate.beams);
+        let sky = Environment::default();
+        let wanted = Wanted { reflectance: 0.1, ..usual(&design) };
+        let figures = Figures::of(&design, sky, wanted).unwrap();
+        assert!(figures.closes(), "{}", figures.text());
         let limits = &design.budget.as_ref().unwrap().limits;
         let allowed = macropulse::design::safety::strictest(limits).unwrap().energy;
         assert!((best.candidate.energy / allowed - 0.9).abs() < 1e-6);

@@ -6,6 +6,7 @@ use argmin::solver::neldermead::NelderMead;
 use macropulse::design::Design;
 use macropulse::design::safety::strictest;
 use macropulse::predict::Forecaster;
+use macropulse::predict::verdict::slant;
 use macropulse::units::{RMS_OF_FWHM, range_from_tof, tof_from_range};
 
 use super::candidate::Candidate;
@@ -80,8 +81,11 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     let factor = needed.clamp(least, 1.0);
     let forecast = with_area(&forecaster, factor).forecast(wanted.reflectance, wanted.range_m);
     let listens = tof_from_range(wanted.range_m);
+    let smeared = slant(&design, wanted.range_m).map_or(0.0, |check| check.shortfall);
     let limit = if candidate.waits() && listens > period {
         Some((Limit::Time, listens / period))
+    } else if smeared > 1.0 {
+        Some((Limit::Slant, smeared))
     } else if needed > 1.0 {
         Some((Limit::Light, needed))
     } else {
@@ -146,7 +150,7 @@ fn clear(range: f64, period: f64) -> f64 {
 ///
 /// Nelder and Mead's simplex over their logarithms, from where the low-pass is as long as the pulse: the
 /// shorter a pulse the more it stands out of the noise, until the noise of the capacitance, which grows with
-/// the bandwidth, or the samples end that.
+/// the bandwidth, the samples, or a surface aslant end that.
 pub(super) fn shortest(
     required: &Requirements,
     parts: (&Part, u32, u32),
@@ -170,6 +174,10 @@ pub(super) fn shortest(
 
 /// Steps of the simplex at most: of the ready photodiodes none took more than 25 to a hundredth.
 const ITERATIONS: u64 = 40;
+
+/// How steeply pulses cost that are too short for a surface aslant: a pulse that is shorter by some share saves
+/// less than three times that of the area.
+const STEEP: f64 = 10.0;
 
 /// Within which pulse and bandwidth are looked for.
 #[derive(Debug, Clone, Copy)]
@@ -213,7 +221,7 @@ impl CostFunction for Cost<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
-    /// The logarithm of the area; beside the bounds more by the distance.
+    /// The logarithm of the area; beside the bounds more by the distance, and more where marks are smeared.
     fn cost(&self, at: &Self::Param) -> Result<Self::Output, argmin::core::Error> {
         let at = [at[0], at[1]];
         let inside = self.bounds.inside(at);
@@ -226,6 +234,8 @@ impl CostFunction for Cost<'_> {
         let design = it.design(self.required)?;
         let forecaster = Forecaster::new(&design, &self.required.environment)?;
         let period = design.scan.shortest_period();
-        Ok(area(self.required, &forecaster, period).min(1e6).ln() + beside)
+        let range = self.required.wanted.range_m;
+        let smeared = slant(&design, range).map_or(0.0, |check| check.shortfall.max(1.0).ln());
+        Ok(area(self.required, &forecaster, period).min(MOST).ln() + beside + STEEP * smeared)
     }
 }

@@ -24,7 +24,8 @@ const TOLERANCE: f64 = 0.01;
 /// No nearer and no farther range is looked for, m.
 const RANGES: (f64, f64) = (10.0, 3000.0);
 
-/// Where a coded and a waiting lidar end, with the parts of the best of each.
+/// Where a coded and a waiting lidar end, with the parts of the best of each and the aperture of the coded
+/// one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frontier {
     /// Reflectances of the targets.
@@ -64,6 +65,7 @@ impl Frontier {
         coded: &Candidate,
         waiting: &Candidate,
     ) -> Result<Self, Error> {
+        let waiting = &Candidate { aperture: coded.aperture, ..waiting.clone() };
         let reflectances =
             BRIGHTNESS.map(|brightness| (brightness * required.wanted.reflectance).min(1.0));
         let designs = [coded.design(required)?, waiting.design(required)?];

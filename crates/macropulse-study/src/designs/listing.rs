@@ -11,6 +11,7 @@ impl Limit {
     pub fn name(self) -> &'static str {
         match self {
             Self::Time => "time",
+            Self::Slant => "slant",
             Self::Light => "light",
             Self::Missed => "missed targets",
             Self::False => "false points",
@@ -227,7 +228,7 @@ impl Frontier {
     fn text(&self) -> String {
         let percents = self.reflectances.map(|reflectance| short(reflectance * 100.0));
         let mut text = format!(
-            "\nHow far light goes, m, at {} % ({} ns between coded shots, {} ns waited)\n",
+            "\nHow far light goes with one aperture, m, at {} %; {} ns between coded shots, {} ns waited\n",
             percents.join(", "),
             short(self.coded_period * 1e9),
             short(self.waiting_period * 1e9)

@@ -57,6 +57,8 @@ pub enum Error {
 pub enum Limit {
     /// It would have to wait longer for an echo than it has.
     Time,
+    /// Its marks are smeared on a surface aslant.
+    Slant,
     /// Eyes allow too little light for the largest aperture.
     Light,
     /// Simulated, it misses too many targets.

@@ -7,8 +7,8 @@ use super::trial::Counts;
 use super::{Error, Found};
 use crate::text::short;
 use crate::view::{
-    self, Align, Axis, Block, Cell, Chart, Figure, Hue, Line, Page, Section, Series, Stack, Style,
-    Table,
+    self, Align, Axis, Block, Cell, Chart, Figure, Hue, Line, Note, Page, Section, Series, Stack,
+    Style, Table,
 };
 
 impl Found {
@@ -26,10 +26,10 @@ impl Found {
             page = page.section(
                 Section::new("Where never waiting wins")
                     .paragraph(
-                        "Solid, how far the light of the coded lidar goes at each rate; dashed, that \
-                         of the one that waits. Thin, how far it has time to wait with so many \
-                         channels: left of and below its line it can. Across, the most that a coded \
-                         lidar can with so many.",
+                        "Solid, how far the light of a coded lidar goes at each rate; dashed, that of \
+                         one that waits, with the same aperture. Grey, how far that one has time to \
+                         wait with so many channels: left of and below its line it can. Across, the \
+                         most that a coded lidar can with so many.",
                     )
                     .figure(Figure::svg(&frontier.chart().svg(), "")),
             );
@@ -130,10 +130,13 @@ fn found(counts: &[Counts; 2]) -> Vec<Cell> {
     counts.iter().flat_map(of).map(Cell::from).collect()
 }
 
+/// Nearest range that the picture shows, m.
+const NEAREST: f64 = 10.0;
+
 impl Frontier {
     /// Rate against range.
     fn chart(&self) -> Chart {
-        let x = Axis::log("Range, m");
+        let x = Axis::log("Range, m; grey: in reach of so many channels that wait");
         let y = Axis::log("Million pixels per second");
         let mut chart = Chart::new("Rate against range", x, y);
         chart.legend = true;
@@ -151,14 +154,14 @@ impl Frontier {
         let [slowest, fastest] =
             [self.rows.first(), self.rows.last()].map(|row| row.map_or(f64::NAN, rate));
         for (at, channels) in CHANNELS.iter().enumerate() {
-            let near = |row: &&super::Row| row.time[at] >= 1.0 && row.time[at] <= farthest;
-            let points = self.rows.iter().filter(near).map(|row| [row.time[at], rate(row)]);
-            chart.series.push(Series {
-                label: format!("{channels} channels waiting"),
-                points: points.collect(),
-                style: Style::Joined,
-                hue: Hue::Grey,
-            });
+            let there = |row: &&super::Row| row.time[at] >= NEAREST && row.time[at] <= farthest;
+            let points: Vec<[f64; 2]> =
+                self.rows.iter().filter(there).map(|row| [row.time[at], rate(row)]).collect();
+            if let Some(&at) = points.first() {
+                chart.notes.push(Note { at, text: channels.to_string() });
+            }
+            let (label, style, hue) = (String::new(), Style::Joined, Hue::Grey);
+            chart.series.push(Series { label, points, style, hue });
             let most = f64::from(*channels) * self.duty / self.coded_period * 1e-6;
             if most >= slowest && most <= fastest {
                 chart.lines.push(Line::AtY(most, format!("{channels} channels coded")));

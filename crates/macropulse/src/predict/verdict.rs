@@ -154,8 +154,9 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
     }
 }
 
-/// Chips on a surface that is slanted by 45°.
-fn slant(design: &Design, range: f64) -> Option<Check> {
+/// Whether chips, or marks behind the detector, are told apart on a surface at `range` metres that is slanted by
+/// 45°; `None` of a beam that is a line.
+pub fn slant(design: &Design, range: f64) -> Option<Check> {
     if design.light.divergence == 0.0 {
         return None;
     }
