@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use macropulse::{design, environment, scene};
+use macropulse_study::designs;
 
 use crate::fault::Fault;
 use crate::input::STREAM;
@@ -34,6 +35,8 @@ enum Kind {
     Scene,
     /// Sun and air, a table of a scene
     Environment,
+    /// What is wanted of a lidar, for `design`
+    Requirements,
 }
 
 pub fn run(options: &Schema) -> Result<(), Fault> {
@@ -41,6 +44,7 @@ pub fn run(options: &Schema) -> Result<(), Fault> {
         Kind::Sensor => design::schema(),
         Kind::Scene => scene::schema(),
         Kind::Environment => environment::schema(),
+        Kind::Requirements => designs::schema(),
     };
     let text = format!("{schema:#}\n");
     match &options.output {

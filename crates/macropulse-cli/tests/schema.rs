@@ -21,7 +21,7 @@ fn root() -> PathBuf {
 #[test]
 fn the_schemas_in_the_repository_are_those_of_the_program() {
     let desk = Desk::new();
-    for kind in ["sensor", "scene", "environment"] {
+    for kind in ["sensor", "scene", "environment", "requirements"] {
         let name = format!("schemas/{kind}.json");
         let printed = desk.run(&format!("schema {kind}")).out;
         let kept = std::fs::read_to_string(root().join(&name)).unwrap_or_default();

@@ -45,5 +45,5 @@ pub mod told;
 pub mod opened;
 pub mod digest;
 pub mod processor;
-mod schema;
+pub mod schema;
 mod kernels;

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use crate::told;
 
 /// The schema of files that are read as a `T`, in one piece, called `title`.
-pub(crate) fn of<T: JsonSchema>(title: &str) -> Schema {
+pub fn of<T: JsonSchema>(title: &str) -> Schema {
     let mut settings = SchemaSettings::draft07();
     settings.inline_subschemas = true;
     let mut schema = settings.into_generator().into_root_schema_for::<T>();

@@ -97,6 +97,28 @@ proptest! {
     }
 }
 
+/// A LAZ file whose compressed points are longer than those of its header: the library would take gigabytes for
+/// layers that are not there. Control: as it was written it is read.
+#[test]
+fn compressed_points_that_are_longer_than_the_header_says_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("points.laz");
+    let mut bytes = written("laz");
+    let refused = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        Clouds::open(&path).map_or_else(
+            |why| Some(why.to_string()),
+            |mut clouds| clouds.find_map(|cloud| cloud.err().map(|why| why.to_string())),
+        )
+    };
+    assert_eq!(refused(&bytes), None);
+    // The record of the compressor: who wrote it, its head of 54 bytes, 34 bytes, and six for each item.
+    let user = bytes.windows(14).position(|name| name == b"laszip encoded").unwrap();
+    let size_of_second = user - 2 + 54 + 34 + 6 + 2;
+    bytes[size_of_second] += 68;
+    assert!(refused(&bytes).unwrap().contains("damaged"), "{:?}", refused(&bytes));
+}
+
 /// Every place of a header, with the numbers that hurt most.
 #[test]
 fn large_and_small_numbers_everywhere_in_a_header() {

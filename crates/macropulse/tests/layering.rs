@@ -214,6 +214,11 @@ const STUDY: Layers = Layers {
             because: "a budget is a forecast; it names sensor and environment as records do",
         },
         Rule {
+            module: "designs",
+            may_name: &["text", "view"],
+            because: "a search makes sensors and scenes of its own, and tells of them in its own words",
+        },
+        Rule {
             module: "sweep",
             may_name: &["record", "text", "view"],
             because: "a sweep repeats whole scans, counts, and names them as records do",

@@ -1,5 +1,5 @@
 """Holds every ready file and example against the schema that its first line names, and slips against
-all three.
+all of them.
 
 The only argument is the root of the repository.
 """
@@ -29,7 +29,8 @@ def validator(path):
     return kind(schema)
 
 
-SCHEMAS = {kind: validator(ROOT / "schemas" / f"{kind}.json") for kind in ["sensor", "scene", "environment"]}
+KINDS = ["sensor", "scene", "environment", "requirements"]
+SCHEMAS = {kind: validator(ROOT / "schemas" / f"{kind}.json") for kind in KINDS}
 
 
 def files():

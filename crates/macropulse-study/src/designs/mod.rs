@@ -21,7 +21,7 @@ pub use closed::Assessed;
 pub use files::{PAGE, make_room};
 pub use frontier::{CHANNELS, Frontier, Row};
 pub use parts::Part;
-pub use requirements::{Parts, Requirements, Wanted};
+pub use requirements::{Parts, Requirements, Wanted, schema};
 pub use scenery::Scenery;
 pub use search::{Found, Search};
 pub use trial::{Counts, Trial};

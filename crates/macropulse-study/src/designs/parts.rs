@@ -2,10 +2,11 @@
 //! requirements may bring its own.
 
 use macropulse::told;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// A photodiode with its amplifier: the keys of `[detector.sampled]`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
     /// Name by which it is chosen.

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use macropulse::environment::Environment;
 use macropulse::{opened, told};
+use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::Value;
 use toml::Table;
 
 use super::Error;
@@ -32,7 +34,7 @@ pub struct Requirements {
 }
 
 /// `[wanted]`: what the lidar must do.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wanted {
     /// Rows of pixels.
@@ -67,7 +69,7 @@ pub struct Wanted {
 }
 
 /// `[parts]`: what the lidar may be made of.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parts {
     /// Ready sensor or file, a raster with a sampled detector, of which all is taken that is not searched.
@@ -133,17 +135,29 @@ mod usual {
 }
 
 /// The file as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct File {
+    /// Format of this file: 1.
+    #[schemars(range(min = 1, max = 1))]
     version: u32,
+    /// Short name.
     name: String,
+    /// Sun and air: the name of a ready environment; `clear-day` unless it is given.
     #[serde(default)]
     environment: Option<String>,
+    /// What the lidar must do.
     wanted: Wanted,
+    /// What it may be made of.
     parts: Parts,
+    /// Photodiodes beside those that come with the program.
     #[serde(default, rename = "detector")]
     detectors: Vec<Part>,
+}
+
+/// JSON Schema of files of requirements, for editors that complete and check them.
+pub fn schema() -> Value {
+    macropulse::schema::of::<File>("Macropulse requirements").to_value()
 }
 
 /// The format this program reads.

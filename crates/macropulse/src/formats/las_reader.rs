@@ -86,6 +86,10 @@ fn check_layers(bytes: &[u8], header: &Header) -> Result<(), String> {
         bytes.get(at..).filter(|rest| rest.len() >= kind.size()).map(|rest| kind.read(rest) as u64)
     };
     let Ok(vlr) = header.laz_vlr() else { return Ok(()) };
+    // What is compressed must be the points of the header: of longer ones there were more layers.
+    if vlr.items_size() != u64::from(header.point_format().len()) {
+        return Err(fault());
+    }
     let begin = number(96, Kind::U4).ok_or_else(fault)?;
     let table = number(begin, Kind::U8).ok_or_else(fault)?;
     // Where the file was written as a stream, the place of the table is at the end.
