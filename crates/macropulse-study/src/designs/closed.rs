@@ -228,6 +228,14 @@ impl CostFunction for Cost<'_> {
         let beside = (at[0] - inside[0]).abs() + (at[1] - inside[1]).abs();
         let (pulse, bandwidth) = self.bounds.values(inside);
         let (part, marks, beams) = self.parts;
+        if marks > 1 {
+            // Longer marks take longer words, for which there is no time.
+            let lasts = self.required.macropulse(marks, (pulse, bandwidth))?;
+            let over = lasts / self.required.mean_period(beams);
+            if over > 1.0 {
+                return Ok(MOST.ln() + beside + over);
+            }
+        }
         let aperture = self.required.parts.aperture_mm[1] * 1e-3;
         let energy = self.energy;
         let it = Candidate { part: part.clone(), marks, beams, pulse, bandwidth, energy, aperture };

@@ -137,7 +137,8 @@ impl Bench<'_> {
         let counts = counted(&scan.cloud(), &set, (wanted.range_m, design.right_within));
         let text = serde_json::to_string_pretty(&counts).unwrap_or_default() + "\n";
         write_atomically(&path, |out| out.write_all(text.as_bytes()))?;
-        Ok(Some(counts))
+        // As it will be read: numbers as text may lose their last bit.
+        Ok(Some(serde_json::from_str(&text).unwrap_or(counts)))
     }
 }
 
