@@ -18,7 +18,7 @@ pub enum Scenery {
     /// A target of the reflectance wanted just within the range wanted, in every direction.
     Wall,
     /// Tiles of one to twenty-three pixels of a row, a quarter of them open sky, the others anywhere from
-    /// [`NEAREST`] to the farthest thing that may answer, and as bright as the target, three and eight
+    /// 4 m to the farthest thing that may answer, and as bright as the target, three and eight
     /// times as bright: what a street is, without any order that could help.
     Tiles,
 }
