@@ -3,7 +3,6 @@
 use toml::Value;
 
 use super::Error;
-use super::scenery::Scenery;
 use super::trial::{Bench, Counts, Trial};
 
 /// What is left of a lidar if one thing is otherwise.
@@ -11,7 +10,7 @@ use super::trial::{Bench, Counts, Trial};
 pub struct Ablation {
     /// What is changed.
     pub what: String,
-    /// What is found then, in the order of [`Scenery::ALL`].
+    /// What is found then, in the order of [`super::Scenery::ALL`].
     pub counts: [Counts; 2],
 }
 
@@ -51,13 +50,7 @@ pub(super) fn ablations(bench: &Bench, best: &Trial) -> Result<Option<Vec<Ablati
     for (what, changes) in changes(best.candidate.marks, best.candidate.energy * 1e9) {
         let changes: Vec<(String, Value)> =
             changes.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-        let mut counts = [Counts::default(); 2];
-        for (counts, scenery) in counts.iter_mut().zip(Scenery::ALL) {
-            let Some(found) = bench.counts(&best.candidate, scenery, &changes)? else {
-                return Ok(None);
-            };
-            *counts = found;
-        }
+        let Some(counts) = bench.of_each(&best.candidate, &changes)? else { return Ok(None) };
         all.push(Ablation { what: what.to_owned(), counts });
     }
     Ok(Some(all))

@@ -14,18 +14,20 @@ use super::requirements::Requirements;
 const WORDS: u32 = 10;
 
 /// Least time between two marks of a word, s: as long as a channel is blind behind a mark of its own, and a
-/// mark more. Words with marks 0.8 ns apart gave nine times as many wrong points.
+/// mark more. With marks from 0.8 ns apart `coded-16` is wrong in `street` four times as often
+/// (docs/guide/coded-32.md).
 const GAP: f64 = 8e-9;
 
 /// Distances between marks differ by so many lengths (full width at half maximum) of a mark behind its
 /// amplifier: two marks that meet two others by less than that look like the same.
 const APART: f64 = 2.0;
 
-/// Steps of the converter to a standard deviation of the noise: the rounding then adds a hundredth to it.
+/// Steps of the converter to a standard deviation of the noise: the rounding then adds 1.3 % to its variance.
 const STEPS: f64 = 2.5;
 
 /// Share of the false points accepted that the receiver is asked for: the rest is left to what no threshold
-/// knows, remains of light that was cancelled.
+/// knows, remains of light that was cancelled. With 0.3 of them 4·10⁻⁴ of the empty tiles of 32 channels had a
+/// point, with this 2.5·10⁻⁴; it costs a twentieth of the light.
 const FALSE_SHARE: f64 = 0.03;
 
 /// A lidar that may or may not do.
@@ -121,22 +123,22 @@ impl Candidate {
             / pitch("horizontal_deg", "columns").min(pitch("vertical_deg", "rows"));
         let divergence = number(&table, "light.divergence_mrad").unwrap_or(1.0) * finer;
         let mut set = |path: &str, value: Value| put(&mut table, path, value);
-        let share = match built {
-            Built::Whole => 1.0,
-            Built::Beams(beams) => f64::from(beams) / f64::from(self.beams),
+        let beams = match built {
+            Built::Whole => self.beams,
+            Built::Beams(beams) => beams,
         };
-        let beams = (f64::from(self.beams) * share).round();
-        let rows = (f64::from(wanted.rows) * share).round();
+        let rows = wanted.rows / self.beams * beams;
+        let share = f64::from(beams) / f64::from(self.beams);
         set("name", self.name().into());
         set("summary", self.summary(required).into());
         set("scan.scans_per_s", wanted.scans_per_s.into());
         set("scan.max_range_m", wanted.range_m.into());
         set("scan.light_range_m", wanted.clutter_m.into());
-        set("scan.raster.rows", (rows as i64).into());
+        set("scan.raster.rows", rows.into());
         set("scan.raster.columns", wanted.columns.into());
         set("scan.raster.horizontal_deg", wanted.horizontal_deg.into());
         set("scan.raster.vertical_deg", (wanted.vertical_deg * share).into());
-        set("scan.raster.beams", (beams as i64).into());
+        set("scan.raster.beams", beams.into());
         set("light.wavelength_nm", self.part.wavelength_nm.into());
         set("light.pulse_ps", (self.pulse * 1e12).into());
         let energy = Table::from_iter([("shot_nj".to_owned(), (self.energy * 1e9).into())]);

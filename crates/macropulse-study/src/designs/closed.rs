@@ -172,11 +172,11 @@ pub(super) fn shortest(
     Ok(bounds.values(bounds.inside([best[0], best[1]])))
 }
 
-/// Steps of the simplex at most: of the ready photodiodes none took more than 25 to a hundredth.
+/// Steps of the simplex at most: what it has found by then is taken.
 const ITERATIONS: u64 = 40;
 
-/// How steeply pulses cost that are too short for a surface aslant: a pulse that is shorter by some share saves
-/// less than three times that of the area.
+/// How steeply pulses cost that are too short for a surface aslant. In white noise the area grows with the root
+/// of the pulse: any slope far above that keeps to pulses that are long enough.
 const STEEP: f64 = 10.0;
 
 /// Within which pulse and bandwidth are looked for.

@@ -12,10 +12,7 @@ use crate::view::{
 };
 
 impl Found {
-    /// The page.
-    ///
-    /// # Errors
-    /// If the picture cannot be drawn.
+    /// The page, with links to the `files` beside it.
     pub fn page(&self, files: &[String]) -> Page {
         let lead = "What closed forms leave of all parts allowed, what simulation leaves of that, and \
                     up to where waiting is better.";
@@ -45,7 +42,7 @@ impl Found {
     }
 
     /// The picture of the frontier; `None` where there is none.
-    pub fn picture(&self) -> Option<Stack> {
+    fn picture(&self) -> Option<Stack> {
         let charts = vec![self.frontier.as_ref()?.chart()];
         Some(Stack { title: self.required.name.clone(), charts })
     }
@@ -171,7 +168,6 @@ impl Frontier {
     }
 }
 
-/// What the pictures need beside a page.
 impl Found {
     /// The picture as SVG and PNG; `None` where there is none.
     ///

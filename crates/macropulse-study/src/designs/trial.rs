@@ -91,18 +91,29 @@ pub(super) struct Bench<'a> {
 impl Bench<'_> {
     /// What `candidate` finds; `None` if the watch said stop.
     pub fn trial(&self, candidate: &Candidate) -> Result<Option<Trial>, Error> {
-        let mut counts = [Counts::default(); 2];
-        for (counts, scenery) in counts.iter_mut().zip(Scenery::ALL) {
-            let Some(found) = self.counts(candidate, scenery, &[])? else { return Ok(None) };
-            *counts = found;
-        }
+        let Some(counts) = self.of_each(candidate, &[])? else { return Ok(None) };
         let limit = limit(self.required, &counts);
         Ok(Some(Trial { candidate: candidate.clone(), counts, limit }))
     }
 
+    /// What `candidate`, with some keys of its sensor changed, finds of each scene, in the order of
+    /// [`Scenery::ALL`]; `None` if the watch said stop.
+    pub fn of_each(
+        &self,
+        candidate: &Candidate,
+        changes: &[(String, toml::Value)],
+    ) -> Result<Option<[Counts; 2]>, Error> {
+        let mut counts = [Counts::default(); 2];
+        for (counts, scenery) in counts.iter_mut().zip(Scenery::ALL) {
+            let Some(found) = self.counts(candidate, scenery, changes)? else { return Ok(None) };
+            *counts = found;
+        }
+        Ok(Some(counts))
+    }
+
     /// What `candidate`, with some keys of its sensor changed, finds of a scene; from its file if it was
     /// counted before. `None` if the watch said stop.
-    pub fn counts(
+    fn counts(
         &self,
         candidate: &Candidate,
         scenery: Scenery,
