@@ -76,6 +76,13 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    // What a library panics with where a file is damaged is told as an error of that file.
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |told| {
+        if !macropulse::formats::is_contained() {
+            usual(told);
+        }
+    }));
     // A shell that completes a line calls the program once more, with this in its environment.
     CompleteEnv::with_factory(Options::command).var(completions::VARIABLE).complete();
     // -1 is no option: what wants a number refuses it in its own words.

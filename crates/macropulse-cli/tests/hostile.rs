@@ -99,6 +99,24 @@ fn a_device_without_an_end() {
     all_ways(&desk, "zero", &["a device"]);
 }
 
+/// What fuzzers found: files at which a library that we read with panics, and a place so far away that a
+/// ray met what is not there.
+#[test]
+fn damage_that_a_library_panics_at() {
+    let desk = Desk::new();
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
+    let put = |found: &str, name: &str| {
+        fs::copy(corpus.join(found), desk.path().join(name)).unwrap();
+    };
+    put("cloud_laz/no-such-symbol", "a.laz");
+    refused(&desk, "convert a.laz -o out.pcd", &["a.laz", "its data is damaged"]);
+    refused(&desk, "view a.laz -o page.html", &["a.laz", "its data is damaged"]);
+    put("cloud_mcap/record-beyond-chunk", "b.mcap");
+    refused(&desk, "convert b.mcap -o out.pcd", &["b.mcap"]);
+    put("scene/far-away", "c.toml");
+    refused(&desk, "simulate vlp-16 c.toml -o out", &["c.toml", "position_m", "1e10 m at most"]);
+}
+
 #[test]
 fn a_pipe_that_nobody_writes_to() {
     let desk = Desk::new();

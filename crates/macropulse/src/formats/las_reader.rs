@@ -2,6 +2,7 @@
 
 use super::about::About;
 use super::attributes::Attribute;
+use super::contained::contained;
 use super::las::{DESCRIPTION, EXTRA_BYTES, KINDS, TEXT, WHITE, extra_name};
 use super::number::Kind;
 use super::table::{Gathered, Record};
@@ -24,6 +25,11 @@ struct Extra {
 /// The cloud of a LAS or LAZ file, and what it says beside it.
 pub(super) fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
     check_sizes(&bytes)?;
+    contained(|| parse_checked(bytes))?
+}
+
+/// The same, of a file that holds what its header promises.
+fn parse_checked(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
     let header = Header::new(Cursor::new(&bytes)).map_err(|error| error.to_string())?;
     check_layers(&bytes, &header)?;
     let mut reader = Reader::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;

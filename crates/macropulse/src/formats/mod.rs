@@ -7,6 +7,7 @@ mod about;
 mod atomic;
 mod attributes;
 mod clouds;
+mod contained;
 mod csv;
 mod csv_reader;
 mod e57;
@@ -32,6 +33,7 @@ mod table;
 
 pub use atomic::{WholeFile, clear_unfinished, write_atomically};
 pub use clouds::{Clouds, read_cloud, read_pcd};
+pub use contained::is_contained;
 pub use csv::quoted;
 pub use error::Error;
 pub use format::Format;

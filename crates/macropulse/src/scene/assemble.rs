@@ -185,7 +185,7 @@ impl Assembly<'_> {
             let message = "the ground cannot move; let the sensor and the objects move over it";
             return Err(self.source.fault(span, message));
         }
-        let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.source.finite(z, "z_m"))?;
+        let height = ground.z_m.as_ref().map_or(Ok(0.0), |z| self.source.coordinate(z, "z_m"))?;
         let object = self.object("ground".to_owned(), false, 0..0)?;
         let shape = Shape::Plane { normal: [0.0, 0.0, 1.0] };
         self.solids.push(Solid::new(shape, Pose::at([0.0, 0.0, height]), material, object));

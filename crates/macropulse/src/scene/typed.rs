@@ -12,6 +12,16 @@ use super::person::{self, Part};
 use super::pose::Pose;
 use super::spanned::{Spanned, Triple};
 
+/// Coordinates and sizes are no more than this, m: 250 times round the Earth, so that a map
+/// may have its origin anywhere, and small enough for boxes in single precision, of which two sizes are
+/// multiplied.
+const FARTHEST: f64 = 1e10;
+
+/// Whether `length` is a coordinate or a size that something may have.
+fn is_length(length: f64) -> bool {
+    length.abs() <= FARTHEST
+}
+
 impl Source<'_> {
     /// Where something stands and how it moves.
     pub(super) fn motion(&self, stand: &Stand) -> Result<Motion, Error> {
@@ -45,8 +55,9 @@ impl Source<'_> {
         let mut pose = Pose::default();
         if let Some(typed) = &stand.position_m {
             let Triple(position) = *typed.get_ref();
-            if position.iter().any(|value| !value.is_finite()) {
-                let message = "position_m must be three finite numbers";
+            if !position.iter().all(|value| is_length(*value)) {
+                let message =
+                    format!("position_m must be three finite numbers, to {FARTHEST:e} m at most");
                 return Err(self.fault(typed.span(), message));
             }
             pose.position = position;
@@ -64,13 +75,15 @@ impl Source<'_> {
     /// The parts of a shape about the position of its object.
     pub(super) fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Vec<Part>, Error> {
         let fault = |message: &str| self.fault(typed.span(), message);
-        let positive = |value: f64, key: &str| match value > 0.0 && value.is_finite() {
+        let is_size = |size: f64| size > 0.0 && is_length(size);
+        let sizes = format!("finite and above zero, to {FARTHEST:e} m at most");
+        let positive = |value: f64, key: &str| match is_size(value) {
             true => Ok(value),
-            false => Err(fault(&format!("`{key}` must be finite and above zero"))),
+            false => Err(fault(&format!("`{key}` must be {sizes}"))),
         };
-        let each = |Triple(sizes): Triple| match sizes.iter().all(|s| *s > 0.0 && s.is_finite()) {
-            true => Ok(sizes.map(|side| side / 2.0)),
-            false => Err(fault("each of `size_m` must be finite and above zero")),
+        let each = |Triple(each): Triple| match each.iter().all(|size| is_size(*size)) {
+            true => Ok(each.map(|side| side / 2.0)),
+            false => Err(fault(&format!("each of `size_m` must be {sizes}"))),
         };
         let shape = match *typed.get_ref() {
             ShapeTyped::Plane { normal } => match DVec3::from(normal.0).try_normalize() {
@@ -137,6 +150,18 @@ impl Source<'_> {
         match value.is_finite() {
             true => Ok(value),
             false => Err(self.fault(typed.span(), format!("{key} must be a finite number"))),
+        }
+    }
+
+    /// A coordinate.
+    pub(super) fn coordinate(&self, typed: &Spanned<f64>, key: &str) -> Result<f64, Error> {
+        let value = *typed.get_ref();
+        match is_length(value) {
+            true => Ok(value),
+            false => {
+                let message = format!("{key} must be a finite number, to {FARTHEST:e} at most");
+                Err(self.fault(typed.span(), message))
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 //! finished, too.
 
 use super::super::about::About;
+use super::super::contained::contained;
 use super::super::{Error, Format};
 use super::{ABOUT, METADATA, Message, Profile, point_cloud2, ros2};
 use crate::opened;
@@ -79,7 +80,13 @@ impl Messages {
     }
 
     fn advance(&mut self) -> Result<Option<PointCloud>, Error> {
-        while let Some(event) = self.reader.next_event() {
+        loop {
+            let reader = &mut self.reader;
+            let event = match contained(|| reader.next_event()) {
+                Ok(Some(event)) => event,
+                Ok(None) => break,
+                Err(fault) => return Err(self.fault(&fault)),
+            };
             let event = match event {
                 Ok(event) => event,
                 Err(error) => {
