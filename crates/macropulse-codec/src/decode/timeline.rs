@@ -69,17 +69,21 @@ impl Timeline {
 
     /// The first tick of `span` that is lit.
     pub fn next_lit(&self, span: Range<i64>) -> Option<i64> {
-        let mut tick = span.start.max(self.origin);
-        while tick < span.end.min(self.end()) {
-            match self.from(tick) {
-                0 => tick += 64,
-                ahead => {
-                    let lit = tick + i64::from(ahead.trailing_zeros());
-                    return Some(lit).filter(|lit| *lit < span.end);
-                }
-            }
+        let first = (span.start - self.origin).max(0);
+        let last = (span.end - self.origin).min(64 * self.words.len() as i64);
+        if first >= last {
+            return None;
         }
-        None
+        let (word, end) = ((first / 64) as usize, (last as usize).div_ceil(64));
+        let words = &self.words[word..end];
+        let head = words[0] & u64::MAX << (first & 63);
+        let lit = match head {
+            0 => words.iter().skip(1).position(|word| *word != 0).map(|skip| skip + 1)?,
+            _ => 0,
+        };
+        let bits = if lit == 0 { head } else { words[lit] };
+        let bit = 64 * (word + lit) as i64 + i64::from(bits.trailing_zeros());
+        (bit < last).then_some(self.origin + bit)
     }
 
     /// The machine words of `span`, which begins and ends with one.

@@ -17,13 +17,14 @@ on_every_level! {
         let (later_blocks, later_rest) = after.as_chunks::<LANES>();
         // No early end within: a loop that may stop anywhere is not made wide.
         for (blocks, later) in blocks.chunks(TOGETHER).zip(later_blocks.chunks(TOGETHER)) {
-            let mut falls = [false; LANES];
+            // As wide as what is compared, so that it stays in registers.
+            let mut falls = [0; LANES];
             for (before, after) in blocks.iter().zip(later) {
                 for lane in 0..LANES {
-                    falls[lane] |= after[lane] <= before[lane];
+                    falls[lane] |= u32::from(after[lane] <= before[lane]);
                 }
             }
-            if falls.contains(&true) {
+            if falls.iter().fold(0, |any, falls| any | falls) != 0 {
                 return false;
             }
         }

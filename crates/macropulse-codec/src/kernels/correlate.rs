@@ -5,6 +5,7 @@
 //! the next plane. Lags are counted in blocks of four or eight machine words: a shot that is about
 //! where it is expected is seen in the shorter one, and all of a gate is passed in the longer one.
 
+use super::coarse::COARSE;
 use super::level::Level;
 use crate::on_every_level;
 
@@ -116,6 +117,20 @@ impl<const W: usize> Counts<W> {
 #[inline(always)]
 pub(crate) fn is_dark<const W: usize>(lanes: &[u64; W]) -> bool {
     lanes.iter().fold(0, |any, lane| any | lane) == 0
+}
+
+on_every_level! {
+    /// The bits of a block of [`WIDE`] that are lit in any of the blocks of a picture that hold the eight
+    /// ticks so many `behind` bit `first` of it. Blocks that do not end within the words are dark.
+    pub(crate) fn any_behind(words: &[u64], first: usize, behind: &[u32]) -> [u64; WIDE] {
+        let mut any = [0; WIDE];
+        for &behind in behind {
+            for bit in [behind / COARSE as u32, behind.div_ceil(COARSE as u32)] {
+                any = or(any, read(words, first + bit as usize));
+            }
+        }
+        any
+    }
 }
 
 on_every_level! {
@@ -368,7 +383,7 @@ fn add<const W: usize>(a: [u64; W], b: [u64; W], c: [u64; W]) -> ([u64; W], [u64
 
 /// The block of bits that begins with bit `first`; dark where it does not end within the words.
 #[inline(always)]
-pub(crate) fn read<const W: usize>(words: &[u64], first: usize) -> [u64; W] {
+fn read<const W: usize>(words: &[u64], first: usize) -> [u64; W] {
     let (word, shift) = (first / 64, first % 64);
     let mut lanes = [0; W];
     let Some(words) = words.get(word..word + W + 1) else { return lanes };
@@ -386,6 +401,28 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn every_level_tells_what_is_lit_behind_any_of_some_bits(
+            words in proptest::collection::vec(any::<(u64, u64, u64)>(), 0..40),
+            behind in proptest::collection::vec(0..12_000_u32, 0..12),
+            first in 0..1000_usize,
+        ) {
+            let words: Vec<u64> = words.into_iter().map(|(a, b, c)| a & b & c).collect();
+            let is_lit = |bit: usize| words[bit / 64] >> (bit % 64) & 1 == 1;
+            // Eight ticks behind a place in the picture lie in one or two others.
+            let places = behind.iter().flat_map(|&ticks| [ticks / 8, (ticks + 7) / 8]);
+            let places: Vec<usize> = places
+                .map(|place| first + place as usize)
+                .filter(|place| place / 64 + WIDE < words.len())
+                .collect();
+            let lag = |lag: usize| places.iter().any(|place| is_lit(place + lag));
+            for (level, any) in at_each_level(|| any_behind(&words, first, &behind)) {
+                for bit in 0..64 * WIDE {
+                    prop_assert_eq!(any[bit / 64] >> (bit % 64) & 1 == 1, lag(bit), "{:?}", level);
+                }
+            }
+        }
+
         #[test]
         fn every_level_counts_what_is_lit(
             lit in proptest::collection::vec(0..6000_usize, 0..3000),

@@ -18,7 +18,7 @@ use super::sent::Sent;
 use super::track::below;
 use crate::decode::field::{Field, Source};
 use crate::decode::timeline::Timeline;
-use crate::kernels::{COARSE, Counts, WIDE, and, coarse, in_pictures, is_dark, or, read};
+use crate::kernels::{COARSE, Counts, WIDE, and, any_behind, coarse, in_pictures, is_dark};
 
 /// Lags that are counted at once.
 const BLOCK: i64 = 64 * WIDE as i64;
@@ -147,18 +147,6 @@ impl Search {
         self.words.extend([0; WIDE + 1]);
         any
     }
-
-    /// The bits of a block, `first` bits behind the first one noted, of which any of the lit bits, so
-    /// many ticks `after` the beginning, is where the word may be.
-    fn with_words(&self, first: usize, after: impl Iterator<Item = i64>) -> [u64; WIDE] {
-        after.fold([0; WIDE], |mut any, after| {
-            // Eight lags are, so many ticks later, met by two neighbouring bits.
-            for bit in [after, after + COARSE as i64 - 1] {
-                any = or(any, read(&self.words, first + bit as usize / COARSE));
-            }
-            any
-        })
-    }
 }
 
 impl Band<'_> {
@@ -208,9 +196,9 @@ impl Band<'_> {
             for block in (first..=last).step_by(BLOCK as usize) {
                 let mut hits = below(last + 1 - block, [u64::MAX; WIDE], true);
                 if word_tells {
-                    let after = sent.lit_from(shot, 0);
-                    let with_words = self.search.with_words((block - first) as usize, after);
-                    hits = and(hits, with_words);
+                    // Eight lags are, so many ticks later, met by two neighbouring bits.
+                    let (words, behind) = (&self.search.words, sent.bits_that_are(true, shot));
+                    hits = and(hits, any_behind(words, (block - first) as usize, behind));
                 }
                 if is_dark(&hits) {
                     continue;
@@ -246,8 +234,34 @@ impl Band<'_> {
     }
 }
 
-/// Stretches of which the highest is known.
-const PER_TOP: usize = 16;
+/// Stretches of which a [`Group`] is known.
+const PER_GROUP: usize = 16;
+
+/// What some stretches have: the least, the most, and all together.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    least: u32,
+    most: u32,
+    sum: u64,
+}
+
+impl Group {
+    const NONE: Self = Self { least: u32::MAX, most: 0, sum: 0 };
+
+    fn of(stretches: &[u32]) -> Self {
+        stretches.iter().fold(Self::NONE, |group, &ticks| {
+            group.with(Self { least: ticks, most: ticks, sum: u64::from(ticks) })
+        })
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self {
+            least: self.least.min(other.least),
+            most: self.most.max(other.most),
+            sum: self.sum + other.sum,
+        }
+    }
+}
 
 /// Where light that is left over may be looked for.
 pub(super) struct Leftover<'a> {
@@ -260,8 +274,8 @@ pub(super) struct Leftover<'a> {
     cell: i64,
     /// Cells that a macropulse takes up.
     together: usize,
-    /// The highest of every [`PER_TOP`] stretches.
-    tops: Vec<u32>,
+    /// Of every [`PER_GROUP`] stretches.
+    groups: Vec<Group>,
     /// Memory for cells that are counted anew.
     counts: Vec<u32>,
 }
@@ -277,9 +291,9 @@ impl<'a> Leftover<'a> {
         let begin = field.residual_cells(&(first..field.extent().end), &mut cells);
         let together = field.stretch(sent.length() + i64::from(sent.width));
         let stretches = vec![0; cells.len()];
-        let (all, tops) = (0..cells.len(), vec![0; cells.len().div_ceil(PER_TOP)]);
+        let (all, groups) = (0..cells.len(), vec![Group::NONE; cells.len().div_ceil(PER_GROUP)]);
         let (cell, counts) = (field.cell(), Vec::new());
-        let mut leftover = Self { sent, cells, stretches, tops, begin, cell, together, counts };
+        let mut leftover = Self { sent, cells, stretches, groups, begin, cell, together, counts };
         leftover.sum(all);
         leftover
     }
@@ -303,18 +317,29 @@ impl<'a> Leftover<'a> {
             let next = self.cells.get(cell + self.together).copied().unwrap_or(0);
             sum = sum + next - self.cells[cell];
         }
-        let tops = self.tops.iter_mut().zip(self.stretches.chunks(PER_TOP));
-        let changed = stretches.start / PER_TOP..stretches.end.div_ceil(PER_TOP);
-        for (top, stretches) in tops.take(changed.end).skip(changed.start) {
-            *top = stretches.iter().copied().max().unwrap_or(0);
+        let groups = self.groups.iter_mut().zip(self.stretches.chunks(PER_GROUP));
+        let changed = stretches.start / PER_GROUP..stretches.end.div_ceil(PER_GROUP);
+        for (group, stretches) in groups.take(changed.end).skip(changed.start) {
+            *group = Group::of(stretches);
         }
+    }
+
+    /// What the stretches that begin in `cells` have.
+    fn group(&self, cells: Range<usize>) -> Group {
+        let whole = cells.start.div_ceil(PER_GROUP)..cells.end / PER_GROUP;
+        if whole.is_empty() {
+            return Group::of(&self.stretches[cells]);
+        }
+        let before = Group::of(&self.stretches[cells.start..whole.start * PER_GROUP]);
+        let behind = Group::of(&self.stretches[whole.end * PER_GROUP..cells.end]);
+        self.groups[whole].iter().fold(before.with(behind), |group, other| group.with(*other))
     }
 
     /// Whether so many ticks may be anywhere where light of `shot` begins that comes after the `lags`.
     pub fn may_hold(&self, shot: usize, lags: &Range<i64>, ticks: u32) -> bool {
         let cells = self.cells(self.sent.fired[shot], lags);
-        let tops = cells.start / PER_TOP..cells.end.div_ceil(PER_TOP);
-        self.tops[tops].iter().any(|top| *top >= ticks)
+        let groups = cells.start / PER_GROUP..cells.end.div_ceil(PER_GROUP);
+        self.groups[groups].iter().any(|group| group.most >= ticks)
     }
 
     /// The cells in which light of `shot` begins that comes after the `lags`.
@@ -326,9 +351,9 @@ impl<'a> Leftover<'a> {
 
     /// Share of places that are lit by what is left over where light of `shot` may begin.
     pub fn density(&self, shot: usize, lags: &Range<i64>) -> f64 {
-        let stretches = &self.stretches[self.cells(self.sent.fired[shot], lags)];
-        let ticks = stretches.iter().map(|&ticks| f64::from(ticks)).sum::<f64>();
-        let places = (stretches.len().max(1) * self.together) as f64 * self.cell as f64;
+        let cells = self.cells(self.sent.fired[shot], lags);
+        let places = (cells.len().max(1) * self.together) as f64 * self.cell as f64;
+        let ticks = self.group(cells).sum as f64;
         (ticks * f64::from(self.sent.width) / places).min(1.0)
     }
 
@@ -349,24 +374,25 @@ impl<'a> Leftover<'a> {
             return places;
         }
         let cells = self.cells(fired, &lags);
-        let stretches = &self.stretches[cells.clone()];
-        let mean = stretches.iter().map(|&ticks| u64::from(ticks)).sum::<u64>() as f64
-            / stretches.len().max(1) as f64;
+        let all = self.group(cells.clone());
+        let mean = all.sum as f64 / cells.len().max(1) as f64;
         // What is soon searched need not stand out.
         let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
         let is_long = blocks * i64::from(sent.weight(shot)) > SOON && !sent.is_thorough();
-        let fullest = stretches.iter().copied().max().unwrap_or(0);
-        let stands_out = f64::from(fullest) > mean + 5.0 * mean.sqrt();
+        let stands_out = f64::from(all.most) > mean + 5.0 * mean.sqrt();
         // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one where
         // not all of them overlap with what is sought.
-        let emptiest =
-            stretches.iter().copied().min().filter(|_| stretches.len() > 2 * self.together);
-        let enough = enough + emptiest.unwrap_or(0);
+        let enough = enough + if cells.len() > 2 * self.together { all.least } else { 0 };
         if is_long && !stands_out && !is_even {
             return places;
         }
-        let at = |cell: usize| self.begin + self.cell * (cells.start + cell) as i64 - fired;
-        for (cell, _) in stretches.iter().enumerate().filter(|(_, ticks)| **ticks >= enough) {
+        let at = |cell: usize| self.begin + self.cell * cell as i64 - fired;
+        let groups = cells.start / PER_GROUP..cells.end.div_ceil(PER_GROUP);
+        let groups = groups.filter(|group| self.groups[*group].most >= enough);
+        let each = groups.flat_map(|group| {
+            (group * PER_GROUP).max(cells.start)..((group + 1) * PER_GROUP).min(cells.end)
+        });
+        for cell in each.filter(|cell| self.stretches[*cell] >= enough) {
             let (from, to) = (at(cell).max(lags.start), at(cell + 1).min(lags.end));
             match places.last_mut() {
                 Some(last) if last.end >= from => last.end = to,

@@ -149,6 +149,8 @@ struct Band<'a> {
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
+    /// The share of its marks that chance did not reach in the gate of the shot asked for last.
+    least_share: f64,
     /// Which shots are searched for that are tracked no more, of which light does not stand out, and
     /// that are found but faint.
     searched: Paced,
@@ -224,6 +226,7 @@ impl<'a> Band<'a> {
             at_hand: 0..0,
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
+            least_share: 0.5,
             searched: Paced::default(),
             even: Paced::default(),
             again: Paced::default(),
@@ -379,11 +382,29 @@ impl<'a> Band<'a> {
             let density = f64::from(ticks.saturating_sub(count) + 1) * share;
             self.thresholds.least(weight, density.min(1.0)) <= count
         };
-        let (mut low, mut high) = (1, weight + 1);
+        // About as large a share as of the shot before: from there on in steps that double, until it is
+        // passed.
+        let guess = ((self.least_share * f64::from(weight)) as u32).clamp(1, weight);
+        let is_below = is_enough(guess);
+        let (mut low, mut high) = if is_below { (1, guess) } else { (guess + 1, weight + 1) };
+        let (mut step, mut is_passed) = (1, false);
         while low < high {
-            let middle = low.midpoint(high);
-            if is_enough(middle) { high = middle } else { low = middle + 1 }
+            let near = step.min(high - low);
+            let next = match (is_passed, is_below) {
+                (true, _) => low.midpoint(high),
+                (_, true) => high - near,
+                (_, false) => low + near - 1,
+            };
+            let enough = is_enough(next);
+            if enough {
+                high = next
+            } else {
+                low = next + 1
+            }
+            is_passed |= enough != is_below;
+            step *= 2;
         }
+        self.least_share = f64::from(low) / f64::from(weight);
         low
     }
 
