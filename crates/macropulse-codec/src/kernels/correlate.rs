@@ -410,7 +410,7 @@ mod tests {
             let words: Vec<u64> = words.into_iter().map(|(a, b, c)| a & b & c).collect();
             let is_lit = |bit: usize| words[bit / 64] >> (bit % 64) & 1 == 1;
             // Eight ticks behind a place in the picture lie in one or two others.
-            let places = behind.iter().flat_map(|&ticks| [ticks / 8, (ticks + 7) / 8]);
+            let places = behind.iter().flat_map(|&ticks| [ticks / 8, ticks.div_ceil(8)]);
             let places: Vec<usize> = places
                 .map(|place| first + place as usize)
                 .filter(|place| place / 64 + WIDE < words.len())
