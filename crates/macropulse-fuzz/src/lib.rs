@@ -59,6 +59,7 @@ targets! {
     mesh_stl, |bytes| scenes::mesh("stl", bytes), 4096;
     scene, scenes::scene, 4096;
     sensor, sensors::sensor, 4096;
+    requirements, sensors::requirements, 4096;
     directions, sensors::directions, 4096;
     calibration, sensors::calibration, 4096;
     scan, sensors::scan, 4096;

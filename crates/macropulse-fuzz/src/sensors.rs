@@ -6,6 +6,7 @@ use macropulse::design::{Design, family_from_toml};
 use macropulse::memory::Estimate;
 use macropulse::scene::Scene;
 use macropulse::sim;
+use macropulse_study::designs::Requirements;
 
 use crate::{assert_says, with_files};
 
@@ -32,6 +33,16 @@ fn looked_at(text: &str, folder: &Path) -> Option<Design> {
             None
         }
     }
+}
+
+/// Reads `bytes` as what is required of a sensor.
+pub fn requirements(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    with_files(&[], |folder| {
+        if let Err(error) = Requirements::from_toml(text, "any.toml", folder) {
+            assert_says(&error);
+        }
+    });
 }
 
 /// Reads `bytes` as a sensor file.
