@@ -228,7 +228,7 @@ proptest! {
             let mut stream = Stream::new(cut, shots, ticks, false);
             for _ in 0..10 {
                 match stream.next_band(|first| first.saturating_add(until)) {
-                    Ok(Some((log, ticks))) => prop_assert!(log.len() + ticks.len() <= 12),
+                    Ok(Some((log, given))) => prop_assert!(log.len() + given.len() <= 12),
                     Ok(None) | Err(_) => break,
                 }
             }

@@ -5,8 +5,9 @@ mod text;
 
 use std::path::Path;
 
+use macropulse::codec::decode::Error;
 use macropulse::codec::decode::Explanation;
-use macropulse::codec::{ShotLog, Ticks};
+use macropulse::codec::{Given, ShotLog};
 use macropulse::design::Design;
 use macropulse::formats::{versioned, write_atomically};
 use macropulse::sim::{Arrivals, Stretch};
@@ -76,11 +77,14 @@ impl<'a> Explained<'a> {
     /// The shot number `shot` of a band, explained out of its ticks.
     pub fn of(
         design: &'a Design,
-        (log, ticks): (&ShotLog, &Ticks),
+        (log, given): (&ShotLog, &Given),
         shot: usize,
     ) -> Result<Self, Fault> {
         let codebook = &design.coding.codebook;
-        let explanation = design.receiver.explain(codebook, (log, ticks), shot);
+        let explanation = match given {
+            Given::Ticks(ticks) => design.receiver.explain(codebook, (log, ticks), shot),
+            Given::Samples(_) => Err(Error::SamplesAreNotExplained),
+        };
         let explanation = explanation.map_err(|error| Fault::Wrong(error.to_string()))?;
         let pixel = |shot: usize| (log.row[shot], log.column[shot]);
         Ok(Self {
