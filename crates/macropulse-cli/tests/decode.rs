@@ -386,6 +386,61 @@ fn an_explanation_says_what_was_decided() {
     desk.refused(&line, &["--explain 6,0: kim-park-2016 has rows 0 to 5 and columns 0 to 847"]);
 }
 
+/// Of samples as well, and where nothing was found it is said why.
+#[test]
+fn an_explanation_of_samples_says_what_was_decided() {
+    let desk = mini();
+    let pixels = "--explain 2,30 --explain 31,50 --explain 40,80 --explain 60,10 --explain 63,105";
+    let line = format!("simulate mini.toml street --format csv,samples -o out --json {pixels}");
+    let simulated = desk.json(&line);
+    let files = "out/shots-000000.mps out/samples-000000.mpw --environment clear-day";
+    let decoded = desk.json(&format!("decode --sensor mini.toml {files} -o again --json {pixels}"));
+    // Decoded band after band, simulated in the order in which they were asked for.
+    let by_shot = |told: &serde_json::Value| {
+        let mut told = told["explained"].as_array().unwrap().clone();
+        told.sort_by_key(|told| told["shot"].as_u64());
+        told
+    };
+    let mut receiver_s = by_shot(&simulated);
+    for told in &mut receiver_s {
+        assert!(told["light"]["of_this_shot"].is_array(), "{told}");
+        told["light"] = serde_json::Value::Null;
+    }
+    assert_eq!(receiver_s, by_shot(&decoded));
+    let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    let (mut accepted, mut refused) = (0, 0);
+    for told in decoded["explained"].as_array().unwrap() {
+        let pixel = format!(",{},{},", told["row"], told["column"]);
+        let line = points.lines().find(|line| line.contains(&pixel));
+        assert_eq!(line.is_some(), told["decided"] == "accepted", "{told}");
+        let why = told["why"].as_str().unwrap();
+        match line {
+            Some(line) => {
+                let range: f64 = line.split(',').nth(4).unwrap().parse().unwrap();
+                assert!((told["returns"][0]["range_m"].as_f64().unwrap() - range).abs() < 1e-4);
+                assert!(why.contains("A return was accepted at "), "{why}");
+                accepted += 1;
+            }
+            None => {
+                assert!(why.contains(" m"), "{why}");
+                refused += 1;
+            }
+        }
+        assert!(told["noise_photons"].as_f64().unwrap() > 1.0);
+        assert_eq!(told["tested"][0]["marks"].as_array().unwrap().len(), 3, "{told}");
+    }
+    assert!(accepted > 0 && refused > 0, "{accepted} accepted, {refused} refused");
+    for ending in ["txt", "json", "svg", "png"] {
+        let path = desk.path().join(format!("again/explain-000000-31-50.{ending}"));
+        assert!(path.is_file(), "{}", path.display());
+    }
+    let read = |name: &str| fs::read_to_string(desk.path().join(name)).unwrap();
+    let text = read("again/explain-000000-31-50.txt");
+    assert!(text.contains("behind the matched filter") && text.contains("threshold"), "{text}");
+    assert!(text.contains("not known: what is decoded is samples alone"), "{text}");
+    assert!(read("again/index.html").contains("Sum of the marks, over the gate"));
+}
+
 /// What stands above the ticks is what they were made of.
 #[test]
 fn light_that_is_explained_is_that_of_the_ticks() {
