@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 
 use common::Desk;
 
-/// Simulates with ticks, decodes them, and compares every file of points byte by byte; gives the JSON
+/// Simulates with ticks or samples, decodes them, and compares every file of points byte by byte; gives the JSON
 /// of both.
 fn again(
     desk: &Desk,
@@ -19,15 +19,17 @@ fn again(
     rest: &str,
     scans: usize,
 ) -> (serde_json::Value, serde_json::Value) {
+    let (record, ending) =
+        if sensor.contains(MINI) { ("samples", "mpw") } else { ("ticks", "mpt") };
     let formats = "--format pcd,csv,png";
-    let line = format!("simulate {sensor} {rest} {formats},ticks -o out --json -j 1");
+    let line = format!("simulate {sensor} {rest} {formats},{record} -o out --json -j 1");
     let simulated = desk.json(&format!("{line} --scans {scans}"));
     assert!(simulated["counts"]["returns"].as_u64().unwrap() > 0, "{line}");
     let environment = simulated["environment"]["name"].as_str().unwrap();
     let mut returns = 0;
     let mut decoded = serde_json::Value::Null;
     for scan in 0..scans {
-        let files = format!("out/shots-{scan:06}.mps out/ticks-{scan:06}.mpt");
+        let files = format!("out/shots-{scan:06}.mps out/{record}-{scan:06}.{ending}");
         let line = format!("decode {sensor} {files} --environment {environment} {formats} -j 3");
         decoded = desk.json(&format!("{line} -o again --json"));
         returns += decoded["counts"]["returns"].as_u64().unwrap();
@@ -48,6 +50,82 @@ fn again(
 }
 
 const ROWS: &str = "--set scan.raster.rows";
+
+/// A sampled sensor of few shots and no pauses, so that its bands overlap.
+const MINI: &str = "mini.toml";
+
+fn mini() -> Desk {
+    let desk = Desk::new();
+    desk.put(
+        MINI,
+        "version = 1\nname = \"mini\"\nextends = \"coded-32\"\n[scan]\nscans_per_s = 1250.0\n\
+         [scan.raster]\nrows = 64\ncolumns = 106\nbeams = 8\nvertical_deg = 3.24\n\
+         horizontal_deg = 5.4\nduty = 1.0\n[light]\nenergy = { shot_nj = 6.0 }\n",
+    );
+    desk
+}
+
+#[test]
+fn a_sampled_sensor_finds_the_same_points_in_files() {
+    let desk = mini();
+    let (simulated, decoded) = again(&desk, "--sensor mini.toml", "--scene street", 2);
+    let counts = [&simulated["counts"], &decoded["counts"]];
+    assert!(counts.iter().all(|counts| counts["ticks"].is_null()));
+    // Those of overlapping bands are counted in both, and stand in the file once.
+    let codes = counts[1]["samples"].as_u64().unwrap();
+    let bytes = fs::metadata(desk.path().join("out/samples-000001.mpw")).unwrap().len();
+    assert!(codes > 16_000_000 && counts[0]["samples"].as_u64().unwrap() > codes, "{simulated}");
+    assert!(bytes < 2 * codes && bytes * 21 > 40 * codes, "{bytes} bytes of {codes} codes");
+    assert_eq!(decoded["recorded"]["samples"], "out/samples-000001.mpw");
+    // Points leave as they are decided.
+    let was = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    let line = "decode --sensor mini.toml out/shots-000000.mps - -o - --environment clear-day";
+    let samples = fs::File::open(desk.path().join("out/samples-000000.mpw")).unwrap();
+    let streamed = desk.command(line).stdin(samples).output().unwrap();
+    assert!(streamed.status.success() && String::from_utf8(streamed.stdout).unwrap() == was);
+}
+
+#[test]
+fn what_is_wrong_with_samples_is_one_sentence_with_its_place() {
+    let desk = mini();
+    let _ = desk.json("simulate mini.toml wall --format samples -o out --json");
+    let path = |name: &str| desk.path().join("out").join(name);
+    let samples = fs::read(path("samples-000000.mpw")).unwrap();
+    let put = |name: &str, at: usize, others: &[u8]| {
+        let mut bytes = samples.clone();
+        bytes[at..at + others.len()].copy_from_slice(others);
+        fs::write(path(name), bytes).unwrap();
+    };
+    fs::write(path("short.mpw"), &samples[..samples.len() / 2]).unwrap();
+    put("step.mpw", 64, &f64::NAN.to_le_bytes());
+    put("huge.mpw", 136, &u32::MAX.to_le_bytes());
+    put("many.mpw", 16, &u64::MAX.to_le_bytes().map(|byte| byte / 2));
+    put("code.mpw", 144, &i16::MAX.to_le_bytes());
+    put("digest.mpw", 32, &[7; 16]);
+    let start = "decode --sensor mini.toml out/shots-000000.mps";
+    for (samples, words) in [
+        ("out/short.mpw", &["short.mpw: byte ", "truncated"][..]),
+        ("out/step.mpw", &["step.mpw: byte 0: a step of NaN photons"]),
+        ("out/huge.mpw", &["huge.mpw: byte 128: a block of 4294967295 codes", "damaged"]),
+        ("out/many.mpw", &["many.mpw: byte ", "truncated"]),
+        ("out/code.mpw", &["code.mpw: byte 144: code 32767 at tick "]),
+        ("out/digest.mpw", &["digest.mpw: is of another sensor", "name the sensor"]),
+        ("out/shots-000000.mps", &["these are shots, where samples are wanted"]),
+    ] {
+        desk.refused(&format!("{start} {samples} -o a"), words);
+    }
+    let files = "out/shots-000000.mps out/samples-000000.mpw";
+    let other = format!("decode --sensor peregrine {files} -o a");
+    desk.refused(&other, &["samples-000000.mpw: byte 0: these are samples", "records ticks"]);
+    let coarse = format!("decode --sensor mini.toml --set detector.sampled.bits=10 {files} -o a");
+    desk.refused(&coarse, &["codes from -204 to 1843, where those of the sensor are -102 to 921"]);
+    let line = "simulate mini.toml wall --format pcd,ticks -o b";
+    desk.refused(line, &["--format: mini is sampled and has no ticks; ask for `samples`"]);
+    let line = "simulate peregrine wall --format samples -o b";
+    desk.refused(line, &["--format: peregrine is not sampled; ask for `ticks`"]);
+    let line = "encode mini.toml --wall-m 30 -o b";
+    desk.refused(line, &["--wall-m: mini is sampled"]);
+}
 
 #[test]
 fn the_coded_receivers_find_the_same_points_in_files() {
@@ -199,7 +277,7 @@ fn what_is_wrong_with_a_file_is_one_sentence_with_its_place() {
         ("out/far.mps", good.1, &["far.mps: byte 128: shot 0: column 848 is not among the 848"]),
         (good.1, good.0, &["these are ticks, where shots are wanted"]),
         (good.0, "out/nothing", &["out/nothing: cannot be read: there is no such file"]),
-        ("-", "-", &["only one of SHOTS and TICKS can come from stdin"]),
+        ("-", "-", &["only one of SHOTS and RECORD can come from stdin"]),
     ] {
         desk.refused(&format!("{start} {shots} {ticks} -o a"), words);
     }
@@ -214,7 +292,11 @@ fn no_points_are_never_silent() {
     desk.put("none.csv", "# macropulse ticks 1, tick_fs=2500\ntick\n");
     let ran = desk.run(&format!("decode {SMALL} out/shots-000000.mps none.csv -o a --format csv"));
     assert_eq!(ran.code, Some(0));
-    assert!(ran.err.contains("not a single point: no tick lies in the time"), "{}", ran.err);
+    assert!(
+        ran.err.contains("not a single point: nothing was recorded in the time"),
+        "{}",
+        ran.err
+    );
     desk.put("no-shots.csv", "# macropulse shots 1\nshot,fired_fs,row,column,label,word\n");
     let line = format!("decode {SMALL} no-shots.csv out/ticks-000000.mpt -o b");
     desk.refused(&line, &["there is not a single shot"]);
@@ -302,6 +384,61 @@ fn an_explanation_says_what_was_decided() {
     assert!(text("again").contains("not known: what is decoded is ticks alone"));
     let line = format!("decode {sensor} {files} --explain 6,0");
     desk.refused(&line, &["--explain 6,0: kim-park-2016 has rows 0 to 5 and columns 0 to 847"]);
+}
+
+/// Of samples as well, and where nothing was found it is said why.
+#[test]
+fn an_explanation_of_samples_says_what_was_decided() {
+    let desk = mini();
+    let pixels = "--explain 2,30 --explain 31,50 --explain 40,80 --explain 60,10 --explain 63,105";
+    let line = format!("simulate mini.toml street --format csv,samples -o out --json {pixels}");
+    let simulated = desk.json(&line);
+    let files = "out/shots-000000.mps out/samples-000000.mpw --environment clear-day";
+    let decoded = desk.json(&format!("decode --sensor mini.toml {files} -o again --json {pixels}"));
+    // Decoded band after band, simulated in the order in which they were asked for.
+    let by_shot = |told: &serde_json::Value| {
+        let mut told = told["explained"].as_array().unwrap().clone();
+        told.sort_by_key(|told| told["shot"].as_u64());
+        told
+    };
+    let mut receiver_s = by_shot(&simulated);
+    for told in &mut receiver_s {
+        assert!(told["light"]["of_this_shot"].is_array(), "{told}");
+        told["light"] = serde_json::Value::Null;
+    }
+    assert_eq!(receiver_s, by_shot(&decoded));
+    let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    let (mut accepted, mut refused) = (0, 0);
+    for told in decoded["explained"].as_array().unwrap() {
+        let pixel = format!(",{},{},", told["row"], told["column"]);
+        let line = points.lines().find(|line| line.contains(&pixel));
+        assert_eq!(line.is_some(), told["decided"] == "accepted", "{told}");
+        let why = told["why"].as_str().unwrap();
+        match line {
+            Some(line) => {
+                let range: f64 = line.split(',').nth(4).unwrap().parse().unwrap();
+                assert!((told["returns"][0]["range_m"].as_f64().unwrap() - range).abs() < 1e-4);
+                assert!(why.contains("A return was accepted at "), "{why}");
+                accepted += 1;
+            }
+            None => {
+                assert!(why.contains(" m"), "{why}");
+                refused += 1;
+            }
+        }
+        assert!(told["noise_photons"].as_f64().unwrap() > 1.0);
+        assert_eq!(told["tested"][0]["marks"].as_array().unwrap().len(), 3, "{told}");
+    }
+    assert!(accepted > 0 && refused > 0, "{accepted} accepted, {refused} refused");
+    for ending in ["txt", "json", "svg", "png"] {
+        let path = desk.path().join(format!("again/explain-000000-31-50.{ending}"));
+        assert!(path.is_file(), "{}", path.display());
+    }
+    let read = |name: &str| fs::read_to_string(desk.path().join(name)).unwrap();
+    let text = read("again/explain-000000-31-50.txt");
+    assert!(text.contains("behind the matched filter") && text.contains("threshold"), "{text}");
+    assert!(text.contains("not known: what is decoded is samples alone"), "{text}");
+    assert!(read("again/index.html").contains("Sum of the marks, over the gate"));
 }
 
 /// What stands above the ticks is what they were made of.

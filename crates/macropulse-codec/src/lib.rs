@@ -8,7 +8,7 @@
 //! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
 //! * [`ShotLog`], and [`Ticks`] or [`Samples`]: what a receiver is given, as columns; [`Cut`]: how
 //!   they are cut out of a stream.
-//! * [`files`]: shot logs and ticks as text and as bytes.
+//! * [`files`]: shot logs and ticks as text and as bytes, samples as bytes.
 //! * [`decode`]: the receivers, from ticks or samples to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
 //! * [`level`]: which instructions the wide loops use.
@@ -29,6 +29,6 @@ mod ticks;
 
 pub use cut::Cut;
 pub use kernels::level;
-pub use samples::{Record, Samples};
+pub use samples::{Given, Record, Samples};
 pub use shot_log::ShotLog;
 pub use ticks::{Tick, Ticks};

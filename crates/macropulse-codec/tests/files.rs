@@ -1,7 +1,7 @@
 //! Shot logs and ticks as files: what is written is read, what is wrong has a place, and no bytes make
 //! a reader panic. And what is explained of a shot is what is decoded of it.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use macropulse_codec::code::{Codebook, Crc, Family, Keying, Payload};
 use macropulse_codec::decode::{Receiver, ReceiverKind};
@@ -9,7 +9,7 @@ use macropulse_codec::files::{
     Digest, Error, Form, Limits, Place, Shot, ShotHeader, ShotReader, ShotWriter, Stream,
     TickHeader, TickReader, TickWriter, What,
 };
-use macropulse_codec::{Cut, ShotLog, Tick, Ticks};
+use macropulse_codec::{Cut, Given, ShotLog, Tick, Ticks};
 use proptest::prelude::*;
 
 const TICK_FS: i64 = 1000;
@@ -268,8 +268,9 @@ fn bands(shots: &[u8], ticks: &[u8]) -> Result<Vec<Band>, Error> {
     let ticks = TickReader::new(ticks, TICK_FS, LIMITS.channels.min(1))?;
     let mut stream = Stream::new(CUT, shots, ticks, false);
     let mut bands = Vec::new();
-    while let Some(band) = stream.next_band(|shot| (shot / 8 + 1) * 8)? {
-        bands.push(band);
+    while let Some((log, given)) = stream.next_band(|shot| (shot / 8 + 1) * 8)? {
+        let Given::Ticks(ticks) = given else { panic!("samples out of ticks") };
+        bands.push((log, ticks));
     }
     Ok(bands)
 }

@@ -228,7 +228,7 @@ proptest! {
             let mut stream = Stream::new(cut, shots, ticks, false);
             for _ in 0..10 {
                 match stream.next_band(|first| first.saturating_add(until)) {
-                    Ok(Some((log, ticks))) => prop_assert!(log.len() + ticks.len() <= 12),
+                    Ok(Some((log, given))) => prop_assert!(log.len() + given.len() <= 12),
                     Ok(None) | Err(_) => break,
                 }
             }
@@ -303,6 +303,12 @@ proptest! {
             let is_owned = |shot: &u32| log_here.owned.contains(&(*shot as usize));
             prop_assert!(returns.shot.is_sorted() && returns.shot.iter().all(is_owned));
             prop_assert!(returns.peak.iter().zip(&returns.marks).all(|(peak, marks)| peak <= marks));
+        }
+        let shot = usize::from(wrong) % 5;
+        if let Ok(told) = receiver.explain_samples(&codebook(), (&log_here, &record), shot) {
+            prop_assert!(told.shot == shot && told.score.len() >= told.left.len());
+            prop_assert!(told.verdict.returns.len() <= usize::from(receiver.returns));
+            prop_assert!(told.verdict.returns.is_empty() != told.verdict.rejects.is_empty());
         }
         prop_assert!(receiver.decode(&codebook(), &log_here, &ticks).is_err());
         prop_assert!(receiver.explain(&codebook(), (&log_here, &ticks), 0).is_err());

@@ -1,10 +1,10 @@
 //! The receiver of samples: what it finds, how far off, and what it must not find.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod waveform;
 
-use macropulse_codec::decode::{Receiver, Reject, Returns, Sampling};
+use macropulse_codec::decode::{MarkSeen, MarkState, Receiver, Reject, Returns, Sampling};
 use macropulse_codec::level::forced::at_each_level;
 use macropulse_codec::{Samples, ShotLog};
 use rand_chacha::ChaCha8Rng;
@@ -353,4 +353,66 @@ fn every_processor_gives_the_same_bits() {
     for (level, returns) in &found {
         assert_eq!(returns, &found[0].1, "{level:?}");
     }
+}
+
+/// Faint walls, bright ones, clipped ones, and some too faint, N = 240 shots: what is explained of each is
+/// what was decoded of it, and its marks add up to the sum that was told.
+#[test]
+fn what_is_explained_is_what_was_decided() {
+    let ticks = draw(240, (300.0, 2490.0), 11);
+    let light = [FAINT, 40.0, 1e4, 3.0, 150.0, 1e6];
+    let echoes: Vec<(f64, f64)> = ticks.iter().copied().zip(light.into_iter().cycle()).collect();
+    let channel = Channel::of(&echoes, 11);
+    let (receiver, samples) = (receiver(), channel.samples());
+    let decoded = decode(&receiver, &channel);
+    let [mut accepted, mut refused, mut cancelled, mut hidden, mut clipped] = [0; 5];
+    for shot in channel.log.owned.clone() {
+        let given = (&channel.log, &samples);
+        let told = receiver.explain_samples(&codebook(), given, shot).unwrap();
+        let of_shot: Vec<usize> =
+            (0..decoded.len()).filter(|at| decoded.shot[*at] as usize == shot).collect();
+        assert_eq!(told.verdict.returns.len(), of_shot.len(), "shot {shot}");
+        let found: Vec<_> =
+            told.tested.iter().filter_map(|one| Some((one, one.outcome.ok()?))).collect();
+        for (one, at) in told.verdict.returns.iter().zip(of_shot) {
+            assert_eq!((one.tof, one.peak), (decoded.tof[at], decoded.peak[at]));
+            assert_eq!((one.margin, one.photons), (decoded.margin[at], decoded.photons[at]));
+            let fired = told.fired_tick * TICK_FS - channel.log.fired_at_fs[shot];
+            let tof = |lag: i64, late: f64| {
+                (lag as f64 + late) * 1e-15 * TICK_FS as f64 + fired as f64 * 1e-15
+            };
+            let of = found.iter().find(|(tested, light)| {
+                (tof(tested.lag, light.late) - one.tof).abs() < 1e-18 * 1e3
+            });
+            let (tested, light) = of.expect("the light of a return was tested");
+            assert_eq!(light.photons, one.photons);
+            let counted = tested.marks.iter().filter(|mark| mark.state == MarkState::Counted);
+            let counted: Vec<f32> = counted.map(|mark| mark.photons).collect();
+            assert_eq!(counted.len(), usize::from(one.peak), "shot {shot}");
+            // None counts more than is allowed beside the least one: the sum is no higher than that of all.
+            let most = counted.iter().sum::<f32>() / ((counted.len() as f32).sqrt() * told.sigma);
+            let score = tested.score.unwrap();
+            let is_uncertain =
+                tested.marks.iter().any(|mark| mark.doubt > 0.0 && mark.doubt.is_finite());
+            assert!(score <= most * 1.001 || is_uncertain, "{score} of {most}");
+            assert_eq!((score - tested.threshold.unwrap()) as u16, one.margin);
+            clipped += usize::from(light.is_clipped);
+        }
+        if let (true, Some(first)) = (told.cancelled.is_empty(), told.tested.first()) {
+            // Nothing was cancelled at its marks: the sum is that of the first search.
+            let at = (first.lag - told.gate.start) as usize;
+            let is_same = first.score.is_none_or(|score| (score - told.score[at]).abs() < 1e-3);
+            assert!(is_same || first.marks.iter().any(|mark| mark.doubt != 0.0), "shot {shot}");
+        }
+        let is_hidden = |mark: &MarkSeen| mark.state != MarkState::Counted;
+        hidden +=
+            told.tested.iter().flat_map(|one| &one.marks).filter(|mark| is_hidden(mark)).count();
+        accepted += usize::from(!told.verdict.returns.is_empty());
+        refused += usize::from(!told.verdict.rejects.is_empty());
+        cancelled += told.cancelled.len();
+    }
+    assert!(accepted > 100 && refused > 50, "{accepted} accepted, {refused} refused");
+    assert!(cancelled > 20 && hidden > 20 && clipped > 20, "{cancelled}, {hidden}, {clipped}");
+    let beyond = receiver.explain_samples(&codebook(), (&channel.log, &samples), 240);
+    assert!(beyond.is_err());
 }

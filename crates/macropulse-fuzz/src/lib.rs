@@ -68,6 +68,7 @@ targets! {
     vary, words::vary, 128;
     shots, recorded::shots, 4096;
     ticks, recorded::ticks, 4096;
+    samples, recorded::samples, 8192;
     stream, recorded::stream, 4096;
     receiver, receivers::decode, 2048;
 }

@@ -1,7 +1,9 @@
-//! Shots and ticks as text and as bytes.
+//! Shots, ticks and samples as text and as bytes.
 
-use macropulse::codec::Cut;
-use macropulse::codec::files::{Error, Limits, ShotReader, Stream, TickReader};
+use macropulse::codec::files::{
+    Error, Limits, SampleHeader, SampleReader, ShotReader, Stream, TickReader,
+};
+use macropulse::codec::{Cut, Given};
 
 use crate::assert_told;
 
@@ -52,7 +54,35 @@ pub fn stream(bytes: &[u8]) {
     let Some(ticks) = told(TickReader::new(ticks, TICK_FS, LIMITS.channels)) else { return };
     let mut stream = Stream::new(CUT, shots, ticks, true);
     for _ in 0..100 {
-        let Some((log, ticks)) = told(stream.next_band(|first| first + 4)).flatten() else { break };
+        let Some((log, given)) = told(stream.next_band(|first| first + 4)).flatten() else { break };
+        let Given::Ticks(ticks) = given else { break };
         assert!(log.owned.end <= log.len() && ticks.tick.len() == ticks.channel.len());
+    }
+}
+
+/// What the samples of the sensor begin with.
+const SAMPLES: SampleHeader = SampleHeader {
+    tick_fs: TICK_FS,
+    channels: LIMITS.channels,
+    codes: (-102, 921),
+    step_photons: Some(15.0),
+    digest: None,
+    count: None,
+};
+
+/// The shots that samples are cut for: a microsecond apart.
+const SHOTS: &[u8] = b"# macropulse shots 1\nfired_ps,row,column\n0,0,0\n1000,0,1\n2000,0,2\n";
+
+/// Reads `bytes` as samples, and cuts those of three shots out of them.
+pub fn samples(bytes: &[u8]) {
+    let Some(shots) = told(ShotReader::new(SHOTS, LIMITS)) else { return };
+    let Some(samples) = told(SampleReader::new(bytes, &SAMPLES)) else { return };
+    let mut stream = Stream::of_samples(CUT, shots, samples);
+    while let Some((log, given)) = told(stream.next_band(|first| first + 2)).flatten() {
+        let Given::Samples(samples) = given else { break };
+        assert!(log.owned.end <= log.len());
+        assert_eq!(samples.per_channel() * samples.channel.len(), samples.code.len());
+        let (lowest, highest) = SAMPLES.codes;
+        assert!(samples.code.iter().all(|code| (lowest..=highest).contains(code)));
     }
 }

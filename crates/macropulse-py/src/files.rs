@@ -1,4 +1,4 @@
-//! Scans to files, and back; and scan after scan, out of files of points or of shots and ticks.
+//! Scans to files, and back; and scan after scan, out of files of points or of shots and ticks or samples.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -61,8 +61,8 @@ fn format_of(path: &Path, named: Option<&str>) -> PyResult<Format> {
 enum Source {
     /// Points.
     Clouds(CloudsAt),
-    /// Shots and ticks, which the receiver of a sensor decodes.
-    Ticks(Box<Decoding>, Arc<Design>, Box<Scale>),
+    /// Shots and ticks or samples, which the receiver of a sensor decodes.
+    Recorded(Box<Decoding>, Arc<Design>, Box<Scale>),
 }
 
 /// What can go wrong with a [`Source`].
@@ -103,7 +103,7 @@ impl Source {
                     Scan::new(cloud, About { objects, materials, ..About::default() })
                 }))
             }
-            Self::Ticks(decoding, design, scale) => {
+            Self::Recorded(decoding, design, scale) => {
                 let stage = (&**design, &**scale);
                 let next = decoding.next_scan(stage, |_| Ok::<_, decoding::Error>(stop.flow()))?;
                 let about = || About { sensor: Some(Arc::clone(design)), ..About::default() };
@@ -217,18 +217,18 @@ pub fn load_scans(py: Python<'_>, path: PathBuf) -> PyResult<StoredScans> {
 ///
 /// # Errors
 /// If they cannot be read, are none, or are of another sensor.
-pub fn ticks_at(
+pub fn recorded_at(
     py: Python<'_>,
     (design, operating): (Arc<Design>, Operating),
-    [shots, ticks]: [PathBuf; 2],
+    [shots, record]: [PathBuf; 2],
 ) -> PyResult<StoredScans> {
-    let name = format!("{} and {}", shots.display(), ticks.display());
+    let name = format!("{} and {}", shots.display(), record.display());
     let receiver = Arc::clone(&design);
     let decoding = work::done(py, 0, move |_| {
-        let (shots, ticks) = (decoding::Input::open(&shots)?, decoding::Input::open(&ticks)?);
-        Decoding::open(&receiver, shots, ticks)
+        let (shots, record) = (decoding::Input::open(&shots)?, decoding::Input::open(&record)?);
+        Decoding::open(&receiver, shots, record)
     })?;
     let scale = Box::new(Scale::of(&design, &operating));
-    let source = Source::Ticks(Box::new(decoding.or_raise()?), design, scale);
+    let source = Source::Recorded(Box::new(decoding.or_raise()?), design, scale);
     Ok(StoredScans::new(source, name))
 }

@@ -4,19 +4,19 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use macropulse::channel::Operating;
-use macropulse::codec::{ShotLog, Ticks};
+use macropulse::codec::{Given, Samples, ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
 use macropulse::points::{Piece, PointCloud, Scale, Truth};
 use macropulse::scene::Scene as Simulated;
 use macropulse::sim::{self, Scans};
 use macropulse::told;
-use numpy::{Element, PyArray1, PyReadonlyArray1};
+use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
 
 use crate::error::{OrRaise, check_scan, warned, wrong};
-use crate::files::{StoredScans, ticks_at};
+use crate::files::{StoredScans, recorded_at};
 use crate::scan::{About, Scan};
 use crate::scene::Scene;
 use crate::sensor::Sensor;
@@ -25,12 +25,13 @@ use crate::{values, work};
 /// Shots are numbered up to here: more than any sensor fires in its time.
 const MOST_SHOTS: u64 = 1 << 60;
 
-/// What the dictionaries of shots and ticks may hold.
+/// What the dictionaries of shots, ticks and samples may hold.
 const SHOTS: [&str; 8] =
     ["first", "owned", "fired_at_fs", "row", "column", "label", "word", "channel"];
 const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
+const SAMPLES: [&str; 3] = ["epoch", "channel", "code"];
 
-/// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`.
+/// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`, or samples.
 #[pyclass(frozen, module = "macropulse")]
 pub struct Records {
     design: Arc<Design>,
@@ -62,8 +63,12 @@ impl Records {
         let made = work::done(py, 0, move |_| {
             Ok::<_, sim::Error>(Scans::new(&design, &scene, seed)?.record(&band))
         })?;
-        let (log, ticks) = made.or_raise()?;
-        Ok(Some((told_of_shots(py, log)?, told_of_ticks(py, ticks)?)))
+        let (log, given) = made.or_raise()?;
+        let given = match given {
+            Given::Ticks(ticks) => told_of_ticks(py, ticks)?,
+            Given::Samples(samples) => told_of_samples(py, samples)?,
+        };
+        Ok(Some((told_of_shots(py, log)?, given)))
     }
 
     /// How many bands are left.
@@ -78,7 +83,7 @@ impl Records {
 }
 
 /// What the receiver of a sensor is given of one scan: the log of its shots, and the ticks of its
-/// converters; nothing of the scene.
+/// converters, or of a sampled sensor the samples; nothing of the scene.
 ///
 /// A scan comes in bands of about 1700 shots. Each has guard shots at both ends, whose light overlaps
 /// with that of its `owned` ones: they are decoded as well, and their returns dropped.
@@ -94,7 +99,9 @@ impl Records {
 ///     the beginning of the first scan), `owned` (from, until: indices), and the arrays `fired_at_fs`,
 ///     `row`, `column`, `label`, `word` and `channel`; of the ticks `epoch` (absolute time of tick 0,
 ///     in ticks), and the arrays `tick`, `channel` (empty for a single detector) and `amplitude`
-///     (empty where not measured).
+///     (empty where not measured). Of samples, which come in place of ticks, `epoch` (absolute time of the
+///     first, in ticks), `channel` (the detectors), and `code`, an array with a row for each of them and a
+///     column for each tick; 0 is the level without light.
 ///
 /// Raises:
 ///     Error: As `simulate`.
@@ -110,9 +117,6 @@ pub fn record(
     let scene = Arc::clone(&Scene::of(scene)?.get().scene);
     Operating::of(&design, &scene.environment).or_raise()?;
     check_scan(&design, scan)?;
-    if design.receiver.sampling.is_some() {
-        return Err(wrong("sensor: is sampled and has no ticks to record"));
-    }
     let mut left: Vec<Band> = bands(&design, scan).collect();
     left.reverse();
     Ok(Records { design, scene, seed, left: Mutex::new(left) })
@@ -140,7 +144,16 @@ fn told_of_ticks(py: Python<'_>, ticks: Ticks) -> PyResult<Bound<'_, PyDict>> {
     Ok(told)
 }
 
-/// Decodes ticks, from a simulation or from hardware, with no scene: out of arrays, or out of files as
+fn told_of_samples(py: Python<'_>, samples: Samples) -> PyResult<Bound<'_, PyDict>> {
+    let told = PyDict::new(py);
+    let shape = [samples.channel.len(), samples.per_channel()];
+    told.set_item("epoch", samples.epoch)?;
+    told.set_item("channel", PyArray1::from_vec(py, samples.channel))?;
+    told.set_item("code", PyArray1::from_vec(py, samples.code).reshape(shape)?)?;
+    Ok(told)
+}
+
+/// Decodes ticks or samples, from a simulation or from hardware, with no scene: out of arrays, or out of files as
 /// `macropulse decode` does.
 ///
 /// Args:
@@ -150,7 +163,9 @@ fn told_of_ticks(py: Python<'_>, ticks: Ticks) -> PyResult<Bound<'_, PyDict>> {
 ///         would send; without `owned` the returns of all shots are wanted; `first` and `channel` are
 ///         0. Or the path of a shot log, text or binary, as `simulate --format ticks` writes it.
 ///     ticks: As a dictionary, as `record` gives them, at least `tick`, ascending; without `epoch` it
-///         is 0; those of several detectors are sorted by `channel` first. A path if `shots` is one.
+///         is 0; those of several detectors are sorted by `channel` first. Of a sampled sensor its samples,
+///         at least `code`; without `channel` its rows are all detectors in their order. A path if `shots`
+///         is one.
 ///     environment: Sun and air, for the `intensity` of the points.
 ///
 /// Returns:
@@ -178,30 +193,31 @@ pub fn decode(
     let (design, operating) = receiver(sensor, environment)?;
     let (Ok(shots), Ok(ticks)) = (shots.cast::<PyDict>(), ticks.cast::<PyDict>()) else {
         let several = "iterate over them: `for scan in macropulse.decode_scans(...)`";
-        return ticks_at(py, (design, operating), paths(shots, ticks)?)?.only(py, several);
+        return recorded_at(py, (design, operating), paths(shots, ticks)?)?.only(py, several);
     };
-    if shots.contains("tick")? && ticks.contains("row")? {
-        return Err(wrong("shots: has a column `tick`; the shots come first, then the ticks"));
+    for (column, recorded) in [("tick", "ticks"), ("code", "samples")] {
+        if shots.contains(column)? && ticks.contains("row")? {
+            return Err(wrong(format!(
+                "shots: has a column `{column}`; the shots come first, then the {recorded}"
+            )));
+        }
     }
     check_keys(shots, "shots", &SHOTS)?;
-    check_keys(ticks, "ticks", &TICKS)?;
     let log = shot_log(&design, shots)?;
-    let ticks = Ticks {
-        epoch: entry(ticks, ("ticks", "epoch", "a whole number, of ticks"), || 0)?,
-        tick: column(ticks, ("ticks", "tick"), None)?,
-        channel: column(ticks, ("ticks", "channel"), Some(Vec::new()))?,
-        amplitude: column(ticks, ("ticks", "amplitude"), Some(Vec::new()))?,
+    let given = match design.is_sampled() {
+        true => Given::Samples(samples_of(&design, ticks)?),
+        false => Given::Ticks(ticks_of(&design, ticks)?),
     };
-    check_below(&design, ("ticks", "channel"), &ticks.channel, design.channels())?;
-    if ticks.tick.is_empty() {
-        warned(py, "not a single point: there are no ticks")?;
+    if given.is_empty() {
+        let recorded = if design.is_sampled() { "samples" } else { "ticks" };
+        warned(py, &format!("not a single point: there are no {recorded}"))?;
     } else if log.row.is_empty() {
         warned(py, "not a single point: there are no shots")?;
     }
     let receiver = Arc::clone(&design);
     let cloud = work::done(py, 0, move |_| {
         let design = &*receiver;
-        let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
+        let returns = design.receiver.decode(&design.coding.codebook, &log, &given)?;
         let piece = Piece::of(design, &Scale::of(design, &operating), &log, &returns);
         let frame = PointCloud::empty(design, piece.points.scan);
         let cloud = PointCloud::joined(&frame, &[piece]);
@@ -216,7 +232,7 @@ pub fn decode(
 /// Args:
 ///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
 ///     shots: Path of a shot log, text or binary.
-///     ticks: Path of the ticks, text or binary.
+///     ticks: Path of the ticks, text or binary; of a sampled sensor that of the samples.
 ///     environment: Sun and air, for the `intensity` of the points.
 ///
 /// Returns:
@@ -234,7 +250,7 @@ pub fn decode_scans(
     ticks: PathBuf,
     environment: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<StoredScans> {
-    ticks_at(sensor.py(), receiver(sensor, environment)?, [shots, ticks])
+    recorded_at(sensor.py(), receiver(sensor, environment)?, [shots, ticks])
 }
 
 /// The sensor that an argument names, in sun and air.
@@ -251,9 +267,71 @@ fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBu
     match (shots.extract(), ticks.extract()) {
         (Ok(shots), Ok(ticks)) => Ok([shots, ticks]),
         _ => Err(wrong(
-            "shots and ticks: give two dictionaries of columns, or the paths of two files",
+            "shots and ticks or samples: give two dictionaries of columns, or the paths of two files",
         )),
     }
+}
+
+/// The ticks that a dictionary holds.
+fn ticks_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Ticks> {
+    if given.contains("code")? {
+        return Err(wrong(format!(
+            "ticks: has a column `code`, and {} records ticks; is it the sensor that the samples are of?",
+            design.name
+        )));
+    }
+    check_keys(given, "ticks", &TICKS)?;
+    let ticks = Ticks {
+        epoch: entry(given, ("ticks", "epoch", "a whole number, of ticks"), || 0)?,
+        tick: column(given, ("ticks", "tick"), None)?,
+        channel: column(given, ("ticks", "channel"), Some(Vec::new()))?,
+        amplitude: column(given, ("ticks", "amplitude"), Some(Vec::new()))?,
+    };
+    check_below(design, ("ticks", "channel"), &ticks.channel, design.channels())?;
+    Ok(ticks)
+}
+
+/// The samples that a dictionary holds.
+fn samples_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Samples> {
+    if given.contains("tick")? {
+        return Err(wrong(format!(
+            "samples: has a column `tick`, and {} is sampled; is it the sensor that the ticks are of?",
+            design.name
+        )));
+    }
+    check_keys(given, "samples", &SAMPLES)?;
+    let Some(code) = given.get_item("code")? else {
+        return Err(wrong("samples: there is no column `code`"));
+    };
+    let typed = given.py().import("numpy")?.call_method1("asarray", (&code,))?;
+    let shape: Vec<usize> = typed.getattr("shape")?.extract()?;
+    let rows = match shape[..] {
+        [_] => 1,
+        [rows, _] => rows,
+        _ => {
+            return Err(wrong(format!(
+                "samples: `code` has {} dimensions; give it a row for each channel and a column for each \
+                 tick",
+                shape.len()
+            )));
+        }
+    };
+    let flat = PyDict::new(given.py());
+    flat.set_item("code", typed.call_method0("ravel")?)?;
+    let all = (0..=u16::MAX).take(rows).collect();
+    let channel: Vec<u16> = column(given, ("samples", "channel"), Some(all))?;
+    if channel.len() != rows {
+        let count = channel.len();
+        return Err(wrong(format!(
+            "samples: `code` has {rows} rows for {count} channels; give it a row for each"
+        )));
+    }
+    check_below(design, ("samples", "channel"), &channel, design.channels())?;
+    Ok(Samples {
+        epoch: entry(given, ("samples", "epoch", "a whole number, of ticks"), || 0)?,
+        channel,
+        code: column(&flat, ("samples", "code"), None)?,
+    })
 }
 
 /// The log that a dictionary holds, all of whose pixels are the sensor's.
@@ -337,6 +415,10 @@ trait Number: Element + Copy {
 
 impl Number for u16 {
     const WORDS: &'static str = "whole numbers from 0 to 65535";
+}
+
+impl Number for i16 {
+    const WORDS: &'static str = "whole numbers from -32768 to 32767";
 }
 
 impl Number for u32 {

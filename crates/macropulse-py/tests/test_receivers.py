@@ -1,4 +1,4 @@
-"""The receiver's side alone: ticks to points."""
+"""The receiver's side alone: ticks or samples to points."""
 
 import macropulse as mp
 import numpy as np
@@ -27,6 +27,49 @@ def test_ticks_decode_to_the_points_of_the_simulation(kind):
         joined = np.concatenate([getattr(band, column) for band in decoded])
         np.testing.assert_array_equal(joined, getattr(whole, column), err_msg=column)
     assert decoded[0].score is None and "outcome" not in decoded[0].columns()
+
+
+SAMPLED = {
+    "scan.scans_per_s": 1250.0, "scan.raster.rows": 64, "scan.raster.columns": 106, "scan.raster.beams": 8,
+    "scan.raster.vertical_deg": 3.24, "scan.raster.horizontal_deg": 5.4, "scan.raster.duty": 1.0,
+    "light.energy": {"shot_nj": 6.0},
+}
+
+
+def test_samples_decode_to_the_points_of_the_simulation():
+    sensor, scene = mp.Sensor("coded-32", SAMPLED), mp.Scene("street")
+    whole = mp.simulate(sensor, scene, seed=5)
+    decoded = []
+    for shots, samples in mp.record(sensor, scene, seed=5):
+        assert sorted(samples) == ["channel", "code", "epoch"]
+        code = samples["code"]
+        assert code.dtype == np.int16 and code.shape[0] == 8 and code.shape[1] > 100_000
+        assert not code.flags.owndata, "the rows are of one array"
+        np.testing.assert_array_equal(samples["channel"], np.arange(8))
+        decoded.append(mp.decode(sensor, shots, samples, environment="clear-day"))
+    for column in ("x", "range", "intensity", "row", "column", "peak", "margin", "photons"):
+        joined = np.concatenate([getattr(band, column) for band in decoded])
+        np.testing.assert_array_equal(joined, getattr(whole, column), err_msg=column)
+    assert sum(map(len, decoded)) == len(whole) > 1000
+    # Without channels the rows are all of them; half of the samples have no echo from far away.
+    less = {key: samples[key] for key in ("epoch", "code")}
+    assert len(mp.decode(sensor, shots, less)) == len(decoded[-1])
+
+    def told(sensor=sensor, **changed):
+        with pytest.raises(mp.Error) as raised:
+            mp.decode(sensor, shots, {**samples, **changed})
+        return str(raised.value)
+
+    assert "8 rows for 7 channels" in told(channel=np.arange(7))
+    assert "channel has 8" in told(channel=np.arange(1, 9))
+    assert "3 dimensions" in told(code=code[None])
+    assert "whole numbers from -32768 to 32767" in told(code=code.astype(float) + 0.5)
+    assert "entry 0 is 40000" in told(code=np.full(code.shape, 40_000))
+    assert "is sampled" in told(tick=[1])
+    assert "did you mean `code`" in told(cod=code)
+    assert "is it the sensor that" in told(sensor="kim-park-2016-fixed")
+    with pytest.raises(mp.Error, match="then the samples"):
+        mp.decode(sensor, samples, shots)
 
 
 def test_ticks_that_were_made_by_hand():

@@ -1,4 +1,4 @@
-//! Points out of recorded shots and ticks, without a scene: from files, streams, or hardware.
+//! Points out of recorded shots and ticks, or samples, without a scene: from files, streams, or hardware.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -7,15 +7,17 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use macropulse::codec::decode::{self, Returns};
-use macropulse::codec::files::{self, Digest, ShotReader, Stream, TickReader, What};
-use macropulse::codec::{ShotLog, Ticks};
+use macropulse::codec::files::{
+    self, Digest, SampleReader, ShotHeader, ShotReader, Stream, TickReader, What,
+};
+use macropulse::codec::{Given, ShotLog};
 use macropulse::design::Design;
 use macropulse::emit;
 use macropulse::opened;
 use macropulse::points::{Piece, PointCloud, Scale, Truth, Viewpoint};
 use rayon::prelude::*;
 
-/// Why recorded shots and ticks cannot be decoded.
+/// Why recorded shots and ticks or samples cannot be decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The world would not give a file.
@@ -65,18 +67,18 @@ pub enum Error {
     },
 }
 
-/// What the shots and the ticks are called in messages.
+/// What the shots, and the ticks or samples, are called in messages.
 #[derive(Debug, Clone)]
 pub struct Names([String; 2]);
 
 impl fmt::Display for Names {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [shots, ticks] = &self.0;
-        write!(f, "{shots} and {ticks}")
+        let [shots, record] = &self.0;
+        write!(f, "{shots} and {record}")
     }
 }
 
-/// Where shots or ticks come from.
+/// Where shots, ticks or samples come from.
 pub struct Input {
     /// What it is called in messages.
     pub name: String,
@@ -106,7 +108,7 @@ pub struct Band {
     /// Its shots.
     pub log: ShotLog,
     /// What the converters gave.
-    pub ticks: Ticks,
+    pub given: Given,
     /// What the receiver made of both.
     pub returns: Returns,
     /// The points of that.
@@ -115,16 +117,16 @@ pub struct Band {
 
 impl Band {
     fn of(
-        (log, ticks): (ShotLog, Ticks),
+        (log, given): (ShotLog, Given),
         (design, scale): (&Design, &Scale),
     ) -> Result<Self, decode::Error> {
-        let returns = design.receiver.decode(&design.coding.codebook, &log, &ticks)?;
+        let returns = design.receiver.decode(&design.coding.codebook, &log, &given)?;
         let piece = Piece::of(design, scale, &log, &returns);
-        Ok(Self { log, ticks, returns, piece })
+        Ok(Self { log, given, returns, piece })
     }
 }
 
-/// Shots and ticks that are decoded, scan after scan, in the memory of one.
+/// Shots and ticks or samples that are decoded, scan after scan, in the memory of one.
 pub struct Decoding {
     stream: Stream<Box<dyn Read + Send>, Box<dyn Read + Send>>,
     names: Names,
@@ -138,31 +140,47 @@ pub struct Decoding {
 }
 
 impl Decoding {
-    /// The decoding of `shots` and `ticks`, which are of the sensor `design`.
+    /// The decoding of `shots` and of the ticks or samples that were recorded of them, `record`, all of the
+    /// sensor `design`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if one is no such file, [`Error::OfAnother`] if it is of another sensor.
-    pub fn open(design: &Design, shots: Input, ticks: Input) -> Result<Self, Error> {
-        let is_live = shots.is_live || ticks.is_live;
-        let names = Names([shots.name, ticks.name]);
+    pub fn open(design: &Design, shots: Input, record: Input) -> Result<Self, Error> {
+        let is_live = shots.is_live || record.is_live;
+        let names = Names([shots.name, record.name]);
         let invalid = |cause| invalid(&names, cause);
         let shots = ShotReader::new(shots.bytes, design.limits()).map_err(invalid)?;
-        let (tick_fs, channels) = (design.tdc.tick_fs, design.channels());
-        let ticks = TickReader::new(ticks.bytes, tick_fs, channels).map_err(invalid)?;
+        let ShotHeader { position, turn, digest: of_shots, .. } = *shots.header();
+        let (cut, channels) = (design.cut(), design.channels());
+        let (stream, of_record) = match design.sample_header() {
+            Some(wanted) => {
+                let samples = SampleReader::new(record.bytes, &wanted).map_err(invalid)?;
+                let digest = samples.header().digest;
+                (Stream::of_samples(cut, shots, samples), digest)
+            }
+            None => {
+                let tick_fs = design.tdc.tick_fs;
+                let ticks = TickReader::new(record.bytes, tick_fs, channels).map_err(invalid)?;
+                let digest = ticks.header().digest;
+                (Stream::new(cut, shots, ticks, channels > 1), digest)
+            }
+        };
         let wanted = design.recorded_digest();
-        for (digest, name) in [shots.header().digest, ticks.header().digest].iter().zip(&names.0) {
+        for (digest, name) in [of_shots, of_record].iter().zip(&names.0) {
             // Recorded hardware may leave it out.
             if let Some(found) = digest.filter(|digest| *digest != wanted) {
                 let (name, sensor) = (name.clone(), design.name.clone());
                 return Err(Error::OfAnother { name, found, sensor, wanted });
             }
         }
-        let (position, turn) = (shots.header().position, shots.header().turn);
+        // Samples of a band are many: each thread holds those of one.
+        let bands_per_thread = if design.sample_header().is_some() { 1 } else { 2 };
+        let together = if is_live { 1 } else { bands_per_thread * rayon::current_num_threads() };
         Ok(Self {
-            stream: Stream::new(design.cut(), shots, ticks, channels > 1),
+            stream,
             names,
             viewpoint: Viewpoint { position, turn },
-            together: if is_live { 1 } else { 2 * rayon::current_num_threads() },
+            together,
             waiting: VecDeque::new(),
             shots: 0,
             is_over: false,
@@ -230,8 +248,8 @@ impl Decoding {
 }
 
 fn invalid(names: &Names, cause: files::Error) -> Error {
-    let [shots, ticks] = &names.0;
-    let name = if cause.what() == What::Shots { shots } else { ticks }.clone();
+    let [shots, record] = &names.0;
+    let name = if cause.what() == What::Shots { shots } else { record }.clone();
     match cause {
         files::Error::Read { cause, .. } => Error::Unreadable { name, cause },
         cause @ files::Error::Content { .. } => Error::Invalid { name, cause },

@@ -19,7 +19,7 @@ use crate::score::{self, Score};
 use crate::tdc::Converted;
 use crate::{channel, tdc};
 use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
-use macropulse_codec::{Samples, ShotLog, Ticks};
+use macropulse_codec::{Given, ShotLog};
 
 pub use arrivals::{Arrival, Arrivals, Stretch};
 
@@ -172,14 +172,9 @@ impl<'a> Scans<'a> {
     }
 
     /// What the receiver is given of a band.
-    pub fn record(&self, band: &Band) -> (ShotLog, Ticks) {
+    pub fn record(&self, band: &Band) -> (ShotLog, Given) {
         let Self { design, scene, operating, detectors, .. } = self;
-        let setup = Setup { seen: Seen { design, scene, operating }, detectors };
-        let log = band.shot_log(design);
-        let mut memory = Memory::default();
-        let mut converted = record::converted(&setup, &mut memory, &log);
-        record::cut(&setup, &mut memory, (band, &log), &mut converted);
-        (design.cut().known(&log), converted.ticks)
+        record::of(&Setup { seen: Seen { design, scene, operating }, detectors }, band)
     }
 
     /// What comes to the detector in a stretch of the time of a band: truth, for people who ask why;
@@ -214,7 +209,7 @@ impl<'a> Scans<'a> {
                 let known = counted.1.peak_busy;
                 let measured = measure(&setup, memory, (band, known))?;
                 let log = &measured.log;
-                keep(&Record { band, log, given: measured.given.borrowed() });
+                keep(&Record { band, log, given: (&measured.given).into() });
                 let (score, tally, given) = measured.judged(&setup.seen, scale, piece);
                 if let Given::Ticks(ticks) = given {
                     memory.take_back(ticks.tick);
@@ -250,21 +245,6 @@ pub struct Record<'a> {
     pub log: &'a ShotLog,
     /// All ticks, or samples, that belong to it ([`Band::ticks`]).
     pub given: macropulse_codec::Record<'a>,
-}
-
-/// Owned, what a receiver is given of a band.
-enum Given {
-    Ticks(Ticks),
-    Samples(Samples),
-}
-
-impl Given {
-    fn borrowed(&self) -> macropulse_codec::Record<'_> {
-        match self {
-            Self::Ticks(ticks) => ticks.into(),
-            Self::Samples(samples) => samples.into(),
-        }
-    }
 }
 
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
@@ -338,7 +318,7 @@ fn measure<'a>(
     };
     lap(&mut tally);
     let known = design.cut().known(&log);
-    let mut returns = design.receiver.decode(&design.coding.codebook, &known, given.borrowed())?;
+    let mut returns = design.receiver.decode(&design.coding.codebook, &known, &given)?;
     let unknown = (known.first - log.first) as u32;
     returns.shot.iter_mut().for_each(|shot| *shot += unknown);
     lap(&mut tally);
@@ -440,6 +420,10 @@ impl Tally {
             _ if self.echoes == 0 => Some(
                 "every surface met is black at this wavelength, or no longer in the field of the \
                  receiver when its light comes",
+            ),
+            _ if self.samples > 0 => Some(
+                "the receiver found none of the echoes in the samples: too little light for the noise, or \
+                 the channel was blind with its own light",
             ),
             _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")

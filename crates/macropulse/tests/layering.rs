@@ -49,8 +49,8 @@ const CODEC: Layers = Layers {
         },
         Rule {
             module: "files",
-            may_name: &["cut", "shot_log", "ticks"],
-            because: "files hold shots and ticks, whoever made them and whatever decodes them",
+            may_name: &["cut", "samples", "shot_log", "ticks"],
+            because: "files hold shots, ticks and samples, whoever made them and whatever decodes them",
         },
         Rule {
             module: "decode",

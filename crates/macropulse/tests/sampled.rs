@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use macropulse::codec::{Given, Samples};
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
@@ -211,4 +212,44 @@ fn keys_without_effect_and_parts_that_do_not_fit_are_refused() {
     let blank = ("receiver.blank_ns".to_owned(), "3.0".to_owned());
     let told = Design::open("coded-practical", &[blank]).unwrap_err().to_string();
     assert!(told.contains("only `sampled` is given samples"), "{told}");
+}
+
+/// Lines without a pause between them: bands overlap, and have the same samples where they do, though each
+/// is simulated by itself. So who has the stream alone can cut it into the same bands.
+#[test]
+fn bands_that_overlap_have_the_same_samples() {
+    let design = ready(
+        "coded-32",
+        &[
+            ("scan.scans_per_s", "1250.0"),
+            ("scan.raster.duty", "1.0"),
+            ("scan.raster.columns", "106"),
+            ("scan.raster.horizontal_deg", "5.4"),
+            ("scan.raster.beams", "8"),
+            ("light.energy", "{ shot_nj = 6.0 }"),
+        ],
+    );
+    let scene = Scene::open("street").unwrap();
+    let scans = sim::Scans::new(&design, &scene, 3).unwrap();
+    let bands: Vec<Band> = bands(&design, 0).chain(bands(&design, 1)).collect();
+    let records = bands.iter().map(|band| match scans.record(band).1 {
+        Given::Samples(samples) => samples,
+        Given::Ticks(_) => Samples::default(),
+    });
+    let records: Vec<Samples> = records.collect();
+    let (mut compared, mut lit) = (0, 0);
+    for pair in records.windows(2) {
+        let (one, next) = (&pair[0], &pair[1]);
+        assert_eq!((&one.channel, one.channel.len()), (&next.channel, 8));
+        let ends = one.epoch + one.per_channel() as i64;
+        let shared = usize::try_from(ends - next.epoch).unwrap();
+        assert!(shared > 1000, "{shared} ticks of both");
+        for channel in 0..8 {
+            let (of_one, of_next) = (one.of(channel), next.of(channel));
+            assert_eq!(of_one[of_one.len() - shared..], of_next[..shared], "channel {channel}");
+            lit += of_next[..shared].iter().filter(|code| **code > 30).count();
+        }
+        compared += 8 * shared;
+    }
+    assert!(compared > 50_000 && lit > 1000, "{compared} compared, {lit} lit");
 }

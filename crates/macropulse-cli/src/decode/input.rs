@@ -9,17 +9,22 @@ use macropulse_study::decoding::{Decoding, Input};
 use crate::fault::Fault;
 use crate::input::STREAM;
 
-/// The decoding of the shots and ticks at these paths, `-` for stdin, of the sensor `design`; and
-/// what they are called.
-pub fn open(shots: &Path, ticks: &Path, design: &Design) -> Result<(Decoding, [String; 2]), Fault> {
-    if [shots, ticks].iter().all(|path| is_stdin(path)) {
+/// The decoding of the shots and of the ticks or samples, the `record`, at these paths, `-` for stdin, of
+/// the sensor `design`; and what they are called.
+pub fn open(
+    shots: &Path,
+    record: &Path,
+    design: &Design,
+) -> Result<(Decoding, [String; 2]), Fault> {
+    if [shots, record].iter().all(|path| is_stdin(path)) {
         return Err(Fault::Wrong(
-            "only one of SHOTS and TICKS can come from stdin; name a file for the other".to_owned(),
+            "only one of SHOTS and RECORD can come from stdin; name a file for the other"
+                .to_owned(),
         ));
     }
-    let (shots, ticks) = (input(shots)?, input(ticks)?);
-    let names = [shots.name.clone(), ticks.name.clone()];
-    Ok((Decoding::open(design, shots, ticks)?, names))
+    let (shots, record) = (input(shots)?, input(record)?);
+    let names = [shots.name.clone(), record.name.clone()];
+    Ok((Decoding::open(design, shots, record)?, names))
 }
 
 fn is_stdin(path: &Path) -> bool {

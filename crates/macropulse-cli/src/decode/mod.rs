@@ -1,4 +1,4 @@
-//! `macropulse decode`: points out of recorded shots and ticks, without a scene.
+//! `macropulse decode`: points out of recorded shots and ticks, or samples, without a scene.
 
 mod input;
 mod run;
@@ -22,15 +22,16 @@ use crate::simulate::formats::Formats;
 use crate::text::{print, print_json};
 use run::{Run, Setting, Sink};
 
-/// Decode recorded shots and ticks into points
+/// Decode recorded shots and ticks, or samples, into points
 ///
-/// Both come from `simulate --format ticks`, from `encode`, or from hardware: docs/formats.md says how
-/// they are written. The points are those that `simulate` gives, to the byte. A folder gets manifest.json
+/// They come from `simulate --format ticks` or `samples`, from `encode`, or from hardware: docs/formats.md
+/// says how they are written. The points are those that `simulate` gives, to the byte. A folder gets manifest.json
 /// and a page to look at them, index.html, as well.
 #[derive(Args)]
 #[command(after_help = "Examples:
   macropulse simulate kim-park-2016-fixed car-30m --format ticks,pcd -o out
   macropulse decode --sensor kim-park-2016-fixed out/shots-000000.mps out/ticks-000000.mpt -o again
+  macropulse decode --sensor coded-32 out/shots-000000.mps out/samples-000000.mpw -o again
   macropulse decode --sensor mine.toml shots.csv - --format none -o - < ticks.csv
   macropulse decode --sensor mine.toml shots.csv ticks.csv --explain 240,424")]
 pub struct Decode {
@@ -38,9 +39,10 @@ pub struct Decode {
     #[arg(value_name = "SHOTS")]
     shots: PathBuf,
 
-    /// The ticks, or `-` for stdin: points leave as soon as they are decided
-    #[arg(value_name = "TICKS")]
-    ticks: PathBuf,
+    /// The ticks, or of a sampled sensor the samples; `-` for stdin: points leave as soon as they are
+    /// decided
+    #[arg(value_name = "RECORD")]
+    record: PathBuf,
 
     /// Ready sensor or TOML file, as the shots were fired by
     #[arg(long, value_name = "NAME-or-FILE", add = ArgValueCompleter::new(completions::sensors))]
@@ -91,7 +93,7 @@ pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
                 .to_owned(),
         ));
     }
-    let (decoding, names) = input::open(&options.shots, &options.ticks, &design)?;
+    let (decoding, names) = input::open(&options.shots, &options.record, &design)?;
     let interrupt = Interrupt::listen()?;
     let setting = Setting { design: &design, environment: &environment, operating: &operating };
     let run = Run::new(setting, names, options.explain.clone());
@@ -107,10 +109,11 @@ pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
 impl Decode {
     fn formats(&self) -> Result<Formats, Fault> {
         let formats = self.format.clone().unwrap_or_default();
-        match formats.1 {
-            None => Ok(formats),
-            Some(_) => Err(Fault::Wrong(
-                "--format: ticks are what `decode` reads; ask for formats of points".to_owned(),
+        match formats.1.is_none() {
+            true => Ok(formats),
+            false => Err(Fault::Wrong(
+                "--format: ticks and samples are what `decode` reads; ask for formats of points"
+                    .to_owned(),
             )),
         }
     }

@@ -47,7 +47,8 @@ pub struct Run<'a> {
     pub state: State,
     pub scans: u64,
     pub shots: u64,
-    pub ticks: u64,
+    /// Ticks, or samples of all channels.
+    pub recorded: u64,
     pub returns: u64,
     pub rejects: [u64; Reject::ALL.len()],
     pub elapsed: f64,
@@ -71,7 +72,7 @@ impl<'a> Run<'a> {
             state: State::Running,
             scans: 0,
             shots: 0,
-            ticks: 0,
+            recorded: 0,
             returns: 0,
             rejects: Default::default(),
             elapsed: 0.0,
@@ -162,14 +163,14 @@ impl<'a> Run<'a> {
     /// Counts a band, explains what is asked for of it, and prints its points where they are to be.
     fn take(&mut self, band: &Band, sink: &mut Sink) -> Result<(), Fault> {
         self.shots += band.log.owned.len() as u64;
-        self.ticks += band.ticks.len() as u64;
+        self.recorded += band.given.len() as u64;
         self.returns += band.returns.len() as u64;
         let rejects = self.rejects.iter_mut().zip(band.returns.rejects);
         rejects.for_each(|(sum, more)| *sum += more);
         for pixel in &self.asked {
             let shot = explain::shot_of(&band.log, *pixel);
             let Some(shot) = shot else { continue };
-            let given = (&band.log, &band.ticks);
+            let given = (&band.log, &band.given);
             let explained = explain::Explained::of(self.setting.design, given, shot)?;
             self.explained.push((explained.text(), explained.json()));
             if let Sink::Folder(folder, _) = sink {
@@ -200,9 +201,9 @@ impl<'a> Run<'a> {
     /// What its user should know, said at once.
     fn find_warnings(&mut self, sink: &Sink, common: &Common) {
         if self.returns == 0 && self.shots > 0 {
-            let reason = match self.ticks {
+            let reason = match self.recorded {
                 0 => {
-                    "no tick lies in the time in which light of the shots may come: are both of one recording?"
+                    "nothing was recorded in the time in which light of the shots may come: are both of one recording?"
                 }
                 _ => "the receiver found none of the macropulses; --explain ROW,COLUMN says why",
             };
@@ -223,15 +224,15 @@ impl<'a> Run<'a> {
 
     /// What is needed to repeat the run, and what was counted.
     pub fn manifest(&self) -> Value {
-        let [shots, ticks] = &self.inputs;
+        let [shots, record] = &self.inputs;
         let decoded = Decoded {
             design: self.setting.design,
             environment: self.setting.environment,
-            inputs: [shots, ticks],
+            inputs: [shots, record],
             state: self.state,
             scans: self.scans,
             shots: self.shots,
-            ticks: self.ticks,
+            recorded: self.recorded,
             returns: self.returns,
             rejects: self.rejects,
             warnings: &self.warnings,

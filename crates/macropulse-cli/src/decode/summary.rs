@@ -15,7 +15,8 @@ impl Run<'_> {
         let environment = self.setting.environment;
         let mut columns = Columns::default();
         columns.push("shots", grouped(self.shots));
-        columns.push("ticks", grouped(self.ticks));
+        let recorded = if self.setting.design.is_sampled() { "samples" } else { "ticks" };
+        columns.push(recorded, grouped(self.recorded));
         columns.push("returns", grouped(self.returns));
         let kinds = Reject::ALL.into_iter().zip(self.rejects).filter(|(_, count)| *count > 0);
         let kinds: Vec<String> = kinds

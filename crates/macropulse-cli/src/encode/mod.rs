@@ -15,7 +15,7 @@ use macropulse_study::sent::Macropulse;
 use crate::fault::Fault;
 use crate::input::STREAM;
 use crate::options::{Changes, Common};
-use crate::simulate::ticks::Recorded;
+use crate::simulate::recorded::{Kept, Recorded};
 use crate::text::{Columns, grouped, print, print_json};
 use crate::{completions, input};
 
@@ -85,7 +85,7 @@ pub fn run(options: &Encode, common: &Common) -> Result<(), Fault> {
     let design = input::design(sensor, &options.changes.of_sensor()?)?;
     if let Some(output) = &options.output {
         let form = options.format.unwrap_or(Form::Binary);
-        let recorded = Recorded { design: &design, number: options.scan, form };
+        let recorded = Recorded { design: &design, number: options.scan, kept: Kept::Ticks(form) };
         let is_told = !common.quiet || options.json;
         if output == Path::new(STREAM) {
             return match options.wall_m.is_some() || options.json {

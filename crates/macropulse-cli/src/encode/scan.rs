@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::simulate::formats;
-use crate::simulate::ticks::Recorded;
+use crate::simulate::recorded::Recorded;
 use crate::text::{grouped, print_bytes};
 
 /// A form as typed.
@@ -62,6 +62,13 @@ pub fn write(
             design.name, design.scan.light_range
         )));
     }
+    if wall.is_some() && design.is_sampled() {
+        return Err(Fault::Wrong(format!(
+            "--wall-m: {} is sampled and has no ticks; leave it out, and simulate samples with `macropulse \
+             simulate --format samples`",
+            design.name
+        )));
+    }
     let mut folder = Folder::claim(output)?;
     folder.make()?;
     let [shots, ticks] = recorded.names();
@@ -100,7 +107,8 @@ pub fn write(
 
 /// Writes the ticks of an echo of every shot from `range`; gives how many.
 fn write_wall(recorded: Recorded, range: f64, file: &mut WholeFile) -> io::Result<u64> {
-    let Recorded { design, number, form } = recorded;
+    let Recorded { design, number, kept } = recorded;
+    let form = kept.form();
     let mut header = recorded.header(false, 0);
     let mut writer = TickWriter::new(&mut *file, form, &header)?;
     let mut count = 0;

@@ -19,7 +19,7 @@ impl Explained<'_> {
 
     /// The range, m, from which a macropulse comes; of part of one it is not told.
     fn comes_from(&self, train: &Arrival) -> Option<f64> {
-        let sent = &self.explanation.marks;
+        let sent = self.told.marks();
         let (first, arrives) = (sent.first()?, train.marks.first()?);
         let lag = arrives.floor() as i64 - i64::from(*first);
         (train.marks.len() == sent.len()).then(|| self.range(lag))
@@ -68,7 +68,8 @@ impl Explained<'_> {
     /// The same for people.
     pub(super) fn light_text(&self) -> String {
         let Some(arrivals) = &self.arrivals else {
-            return "not known: what is decoded is ticks alone".to_owned();
+            let recorded = if self.design.is_sampled() { "samples" } else { "ticks" };
+            return format!("not known: what is decoded is {recorded} alone");
         };
         let ours: Vec<&Arrival> = self.ours().collect();
         let mut said: Vec<String> = match ours.len() {
@@ -88,7 +89,9 @@ impl Explained<'_> {
         }
         let others = (arrivals.trains.len() - ours.len()) as u64;
         said.push(format!("{} of other shots", counted(others, "pulse train")));
-        said.push(counted(arrivals.events.len() as u64, "detection event"));
+        if !self.design.is_sampled() {
+            said.push(counted(arrivals.events.len() as u64, "detection event"));
+        }
         said.push(format!("background {} /s", grouped(arrivals.background.round() as u64)));
         said.join("; ")
     }

@@ -1,12 +1,15 @@
 //! Why a shot was decided as it was: for people, for programs, and as a picture.
 
 mod light;
+mod samples;
 mod text;
+mod ticks;
 
+use std::ops::Range;
 use std::path::Path;
 
-use macropulse::codec::decode::Explanation;
-use macropulse::codec::{ShotLog, Ticks};
+use macropulse::codec::decode::{Explanation, SampledExplanation, Verdict};
+use macropulse::codec::{Given, ShotLog};
 use macropulse::design::Design;
 use macropulse::formats::{versioned, write_atomically};
 use macropulse::sim::{Arrivals, Stretch};
@@ -32,12 +35,6 @@ pub fn check(design: &Design, pixels: &[Pixel]) -> Result<(), Fault> {
     let (rows, columns) = (design.scan.rows, design.scan.columns);
     let is_outside =
         |(row, column): &&Pixel| u32::from(*row) >= rows || u32::from(*column) >= columns;
-    if !pixels.is_empty() && design.receiver.sampling.is_some() {
-        return Err(Fault::Wrong(format!(
-            "--explain: {} is sampled, and explained are decisions by ticks alone: leave it out",
-            design.name
-        )));
-    }
     match pixels.iter().find(is_outside) {
         None => Ok(()),
         Some((row, column)) => Err(Fault::Wrong(format!(
@@ -54,6 +51,53 @@ pub fn shot_of(log: &ShotLog, (row, column): Pixel) -> Option<usize> {
     log.owned.clone().find(|&shot| (log.row[shot], log.column[shot]) == (row, column))
 }
 
+/// What a receiver tells of its decision.
+enum Told {
+    Ticks(Explanation),
+    Samples(SampledExplanation),
+}
+
+impl Told {
+    /// When the marks of the macropulse leave, in ticks after it was fired.
+    fn marks(&self) -> &[u32] {
+        match self {
+            Self::Ticks(told) => &told.marks,
+            Self::Samples(told) => &told.marks,
+        }
+    }
+
+    /// The absolute tick in which the shot was fired.
+    fn fired_tick(&self) -> i64 {
+        match self {
+            Self::Ticks(told) => told.fired_tick,
+            Self::Samples(told) => told.fired_tick,
+        }
+    }
+
+    /// Lags that are accepted.
+    fn gate(&self) -> &Range<i64> {
+        match self {
+            Self::Ticks(told) => &told.gate,
+            Self::Samples(told) => &told.gate,
+        }
+    }
+
+    /// For how many ticks a mark is looked for.
+    fn width(&self) -> u32 {
+        match self {
+            Self::Ticks(told) => told.width,
+            Self::Samples(_) => 1,
+        }
+    }
+
+    fn verdict(&self) -> &Verdict {
+        match self {
+            Self::Ticks(told) => &told.verdict,
+            Self::Samples(told) => &told.verdict,
+        }
+    }
+}
+
 /// A shot explained, with what is needed to speak of it.
 pub struct Explained<'a> {
     design: &'a Design,
@@ -65,7 +109,7 @@ pub struct Explained<'a> {
     word: u16,
     /// Pixels of the other shots whose light is there.
     others: Vec<Pixel>,
-    explanation: Explanation,
+    told: Told,
     /// Channel of its detector.
     channel: u16,
     /// What came to the detector, where that is known.
@@ -73,15 +117,24 @@ pub struct Explained<'a> {
 }
 
 impl<'a> Explained<'a> {
-    /// The shot number `shot` of a band, explained out of its ticks.
+    /// The shot number `shot` of a band, explained out of its ticks or samples.
     pub fn of(
         design: &'a Design,
-        (log, ticks): (&ShotLog, &Ticks),
+        (log, given): (&ShotLog, &Given),
         shot: usize,
     ) -> Result<Self, Fault> {
-        let codebook = &design.coding.codebook;
-        let explanation = design.receiver.explain(codebook, (log, ticks), shot);
-        let explanation = explanation.map_err(|error| Fault::Wrong(error.to_string()))?;
+        let (receiver, codebook) = (&design.receiver, &design.coding.codebook);
+        let told = match given {
+            Given::Ticks(ticks) => receiver.explain(codebook, (log, ticks), shot).map(Told::Ticks),
+            Given::Samples(samples) => {
+                receiver.explain_samples(codebook, (log, samples), shot).map(Told::Samples)
+            }
+        };
+        let told = told.map_err(|error| Fault::Wrong(error.to_string()))?;
+        let others: Vec<usize> = match &told {
+            Told::Ticks(told) => told.others.iter().map(|other| other.shot).collect(),
+            Told::Samples(told) => told.cancelled.iter().map(|other| other.shot).collect(),
+        };
         let pixel = |shot: usize| (log.row[shot], log.column[shot]);
         Ok(Self {
             design,
@@ -90,8 +143,8 @@ impl<'a> Explained<'a> {
             fired_fs: log.fired_at_fs[shot],
             label: log.label[shot],
             word: log.word[shot],
-            others: explanation.others.iter().map(|other| pixel(other.shot)).collect(),
-            explanation,
+            others: others.into_iter().map(pixel).collect(),
+            told,
             channel: log.channel[shot],
             arrivals: None,
         })
@@ -100,10 +153,10 @@ impl<'a> Explained<'a> {
     /// The time that is explained: from the shot, or where its gate opens, to the end of the last
     /// macropulse within the gate.
     pub fn stretch(&self) -> Stretch {
-        let Explanation { fired_tick, gate, marks, width, .. } = &self.explanation;
-        let lasts = i64::from(marks.last().map_or(0, |last| last + width));
-        let ticks = gate.start.min(0)..gate.end + lasts;
-        Stretch { channel: self.channel, from: *fired_tick, ticks }
+        let gate = self.told.gate();
+        let lasts = self.told.marks().last().map_or(0, |last| last + self.told.width());
+        let ticks = gate.start.min(0)..gate.end + i64::from(lasts);
+        Stretch { channel: self.channel, from: self.told.fired_tick(), ticks }
     }
 
     /// The same with what came to the detector in [`Self::stretch`]: of a simulation it is known.
@@ -114,44 +167,26 @@ impl<'a> Explained<'a> {
     /// The range, m, of light that comes `lag` ticks after the shot.
     fn range(&self, lag: i64) -> f64 {
         let tick_fs = self.design.tdc.tick_fs;
-        let since_fs = (self.explanation.fired_tick + lag) * tick_fs - self.fired_fs + tick_fs / 2;
+        // A tick is taken for its middle, a sample for its beginning.
+        let half = if self.design.is_sampled() { 0 } else { tick_fs / 2 };
+        let since_fs = (self.told.fired_tick() + lag) * tick_fs - self.fired_fs + half;
         range_from_tof(s_from_fs(since_fs))
     }
 
     /// What is told to programs, the correlation apart.
     pub fn json(&self) -> Value {
-        let Explanation { verdict, .. } = &self.explanation;
-        let at = |place: Option<(i64, u16)>| {
-            place.map(|(lag, marks)| {
-                json!({ "lag_ticks": lag, "range_m": self.range(lag), "marks": marks })
+        let verdict = self.told.verdict();
+        let returns = verdict.returns.iter().map(|one| {
+            json!({
+                "range_m": range_from_tof(one.tof),
+                "peak": one.peak,
+                "marks": one.marks,
+                "margin": one.margin,
+                "photons": one.photons,
             })
-        };
-        let returns: Vec<Value> = verdict
-            .returns
-            .iter()
-            .map(|one| {
-                json!({
-                    "range_m": range_from_tof(one.tof),
-                    "peak": one.peak,
-                    "marks": one.marks,
-                    "margin": one.margin,
-                    "photons": one.photons,
-                })
-            })
-            .collect();
-        let others = self.explanation.others.iter().zip(&self.others);
-        let others: Vec<Value> = others
-            .map(|(other, (row, column))| {
-                json!({
-                    "row": row,
-                    "column": column,
-                    "begins_ticks": other.begins,
-                    "marks": other.marks,
-                    "shared": other.shared,
-                })
-            })
-            .collect();
-        json!({
+        });
+        let gate = self.told.gate();
+        let mut json = json!({
             "row": self.pixel.0,
             "column": self.pixel.1,
             "shot": self.id,
@@ -160,37 +195,27 @@ impl<'a> Explained<'a> {
             "code_word": self.word,
             "decided": self.decided(),
             "why": self.why(),
-            "returns": returns,
+            "returns": returns.collect::<Vec<_>>(),
             "rejects": verdict.rejects.iter().map(|(kind, _)| kind.name()).collect::<Vec<_>>(),
-            "marks_ticks": self.explanation.marks,
-            "gate_ticks": [self.explanation.gate.start, self.explanation.gate.end - 1],
-            "window_ticks": self.explanation.width,
-            "ticks_in_time": self.explanation.ticks.len(),
-            "ticks_of_others": self.claimed(),
-            "density": self.explanation.density,
-            "threshold_marks": self.explanation.threshold,
+            "marks_ticks": self.told.marks(),
+            "gate_ticks": [gate.start, gate.end - 1],
             "light": self.light_json(),
-            "peak": at(self.explanation.peak),
-            "sidelobe": at(self.explanation.sidelobe),
-            "others": others,
-        })
+        });
+        match &self.told {
+            Told::Ticks(told) => self.add_ticks(told, &mut json),
+            Told::Samples(told) => self.add_samples(told, &mut json),
+        }
+        json
     }
 
-    /// The same with every tick and every lag.
+    /// The same with every tick, or the signal, and every lag.
     fn whole_json(&self) -> Value {
         let mut json = self.json();
-        let Explanation { ticks, gate, step, found, left, .. } = &self.explanation;
-        json["ticks"] = ticks.iter().map(|(tick, _)| *tick).collect();
-        json["is_of_others"] = ticks.iter().map(|(_, claimed)| *claimed).collect();
         self.add_arrivals(&mut json["light"]);
-        json["correlation"] = json!({
-            "first_lag_ticks": gate.start,
-            "step_ticks": step,
-            "first_range_m": self.range(gate.start),
-            "step_m": self.range(gate.start + step) - self.range(gate.start),
-            "marks": found,
-            "marks_without_others": left,
-        });
+        match &self.told {
+            Told::Ticks(told) => self.add_all_ticks(told, &mut json),
+            Told::Samples(told) => self.add_signal(told, &mut json),
+        }
         json
     }
 
@@ -212,11 +237,6 @@ impl<'a> Explained<'a> {
             write_atomically(&folder.join(file), |out| out.write_all(bytes))?;
         }
         Ok(files.into_iter().map(|(file, _)| file).collect())
-    }
-
-    /// How many ticks other shots account for.
-    fn claimed(&self) -> usize {
-        self.explanation.ticks.iter().filter(|(_, claimed)| *claimed).count()
     }
 }
 

@@ -3,11 +3,51 @@
 use std::str::FromStr;
 
 use macropulse::codec::files::Form;
+use macropulse::design::Design;
 use macropulse::formats::{self, Format};
 
-/// The formats asked for, each once; and in which form shots and ticks are wanted, if they are.
+use super::recorded::Kept;
+
+/// The formats asked for, each once; and what is wanted beside them of what was recorded.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Formats(pub Vec<Format>, pub Option<Form>);
+pub struct Formats(pub Vec<Format>, pub Records);
+
+/// Which records are asked for, with the shots.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Records {
+    /// Ticks, and in which form.
+    pub ticks: Option<Form>,
+    pub samples: bool,
+}
+
+impl Records {
+    /// Whether none is asked for.
+    pub fn is_none(self) -> bool {
+        self == Self::default()
+    }
+
+    /// Takes the record that is called `name`; `false` if none is.
+    pub fn add(&mut self, name: &str) -> bool {
+        let form = form(name);
+        let is_samples = name.trim().eq_ignore_ascii_case("samples");
+        // Both forms hold the same: the last one named counts.
+        self.ticks = form.or(self.ticks);
+        self.samples |= is_samples;
+        is_samples || form.is_some()
+    }
+
+    /// Which of them `design` has, if any is asked for; or the sentence that says why none.
+    pub fn of(self, design: &Design) -> Result<Option<Kept>, String> {
+        let name = &design.name;
+        match (design.is_sampled(), self.ticks) {
+            (true, _) if self.samples => Ok(Some(Kept::Samples)),
+            (false, Some(form)) => Ok(Some(Kept::Ticks(form))),
+            _ if self.is_none() => Ok(None),
+            (true, _) => Err(format!("{name} is sampled and has no ticks; ask for `samples`")),
+            (false, None) => Err(format!("{name} is not sampled; ask for `ticks`")),
+        }
+    }
+}
 
 /// The form of shots and ticks that is called `name`, if it is one.
 pub fn form(name: &str) -> Option<Form> {
@@ -20,7 +60,7 @@ pub fn form(name: &str) -> Option<Form> {
 
 impl Default for Formats {
     fn default() -> Self {
-        Self(vec![Format::Pcd, Format::Png], None)
+        Self(vec![Format::Pcd, Format::Png], Records::default())
     }
 }
 
@@ -31,8 +71,8 @@ impl Formats {
             |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();
         let (known, default) = (names(Format::ALL), names(&Self::default().0));
         format!(
-            "Formats to write: {}, ticks, ticks-csv (shots and ticks, for `decode`), with commas \
-             between them, or none [default: {}]",
+            "Formats to write: {}, ticks, ticks-csv, samples (shots, and ticks or samples, for \
+             `decode`), with commas between them, or none [default: {}]",
             known.join(", "),
             default.join(",")
         )
@@ -44,12 +84,10 @@ impl FromStr for Formats {
 
     /// Names with commas between them; `none` alone is no format at all.
     fn from_str(typed: &str) -> Result<Self, Self::Err> {
-        let (mut list, mut ticks) = (Vec::new(), None);
+        let (mut list, mut records) = (Vec::new(), Records::default());
         if typed.trim() != "none" {
             for name in typed.split(',') {
-                if let Some(form) = form(name) {
-                    // Both hold the same: the last one named counts.
-                    ticks = Some(form);
+                if records.add(name) {
                     continue;
                 }
                 let format = Format::parse(name)?;
@@ -58,7 +96,7 @@ impl FromStr for Formats {
                 }
             }
         }
-        Ok(Self(list, ticks))
+        Ok(Self(list, records))
     }
 }
 
@@ -71,8 +109,21 @@ mod tests {
         assert_eq!(Formats::from_str("pcd,PLY,pcd").unwrap().0, [Format::Pcd, Format::Ply]);
         assert!(Formats::from_str("none").unwrap().0.is_empty());
         let with_ticks = Formats::from_str("ticks-csv,pcd").unwrap();
-        assert_eq!(with_ticks, Formats(vec![Format::Pcd], Some(Form::Text)));
+        let ticks = Records { ticks: Some(Form::Text), samples: false };
+        assert_eq!(with_ticks, Formats(vec![Format::Pcd], ticks));
         assert!(Formats::from_str("").is_err());
         assert!(Formats::from_str("pcd,none").is_err());
+    }
+
+    #[test]
+    fn a_sensor_has_ticks_or_samples() {
+        let [sampled, ticks] =
+            ["coded-32", "peregrine"].map(|name| Design::open(name, &[]).unwrap());
+        let of = |typed: &str, design: &Design| Formats::from_str(typed).unwrap().1.of(design);
+        assert_eq!(of("pcd", &sampled), Ok(None));
+        assert_eq!(of("ticks,samples", &sampled), Ok(Some(Kept::Samples)));
+        assert_eq!(of("ticks,samples", &ticks), Ok(Some(Kept::Ticks(Form::Binary))));
+        assert!(of("ticks", &sampled).unwrap_err().contains("ask for `samples`"));
+        assert!(of("Samples", &ticks).unwrap_err().contains("ask for `ticks`"));
     }
 }

@@ -1,10 +1,10 @@
 //! `macropulse simulate`: sensors in a scene, scan by scan.
 
 pub mod formats;
+pub mod recorded;
 mod run;
 pub mod scenario;
 mod summary;
-pub mod ticks;
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -143,17 +143,11 @@ impl Simulate {
         };
         if let Some(formats) = &self.format {
             scenario.formats.clone_from(&formats.0);
-            scenario.ticks = formats.1;
+            scenario.records = formats.1;
         }
-        let sampled = |design: &&macropulse::design::Design| design.receiver.sampling.is_some();
-        if let Some(design) =
-            scenario.designs.iter().find(sampled).filter(|_| scenario.ticks.is_some())
-        {
-            return Err(Fault::Wrong(format!(
-                "--format: {} is sampled and has no ticks, and samples are not written: leave `ticks` \
-                 out",
-                design.name
-            )));
+        for design in &scenario.designs {
+            let asked = scenario.records.of(design);
+            asked.map_err(|sentence| Fault::Wrong(format!("--format: {sentence}")))?;
         }
         scenario.scans = self.scans.unwrap_or(scenario.scans);
         scenario::check_scans(scenario.scans, &scenario.designs)
@@ -174,7 +168,7 @@ impl Simulate {
     /// A folder for each sensor, proven to be writable; none where nothing is to be written.
     fn folders(&self, scenario: &Scenario) -> Result<Vec<Option<Folder>>, Fault> {
         let Some(output) = &self.output else {
-            if scenario.formats.is_empty() && scenario.ticks.is_none() {
+            if scenario.formats.is_empty() && scenario.records.is_none() {
                 return Ok(scenario.designs.iter().map(|_| None).collect());
             }
             let remedy = "say where the results go with -o DIR, or write none with --format none";

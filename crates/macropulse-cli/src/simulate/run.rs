@@ -12,8 +12,8 @@ use macropulse::sim::{Record, Scans, Tally, Watch};
 use macropulse_study::record::{self, COLOUR, PAGE, Page};
 use serde_json::Value;
 
+use super::recorded::{RecordFiles, Recorded};
 use super::scenario::Scenario;
-use super::ticks::{Recorded, TickFiles};
 use crate::explain::{self, Explained, Pixel};
 use crate::fault::{Fault, note, warn};
 use crate::folder::Folder;
@@ -59,24 +59,25 @@ impl<'a> Run<'a> {
         let mut page = Page::new(design, Some(&scenario.scene));
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         let stage = (design, Some(&scenario.scene));
+        let kept = scenario.records.of(design).map_err(Fault::Wrong)?;
         let mut recorded = folder
             .as_ref()
             .map(|folder| record::Files::new(folder.path(), &scenario.formats, stage));
         while run.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
-            let ticks = match (&mut folder, scenario.ticks) {
-                (Some(folder), Some(form)) => {
+            let record = match (&mut folder, kept) {
+                (Some(folder), Some(kept)) => {
                     if run.scans == 0 {
                         folder.make()?;
                     }
-                    let recorded = Recorded { design, number: run.scans, form };
-                    Some(TickFiles::begin(folder.path(), recorded, (&scans, &scenario.scene))?)
+                    let recorded = Recorded { design, number: run.scans, kept };
+                    Some(RecordFiles::begin(folder.path(), recorded, (&scans, &scenario.scene))?)
                 }
                 _ => None,
             };
-            let keep = |record: &Record| {
-                ticks.iter().for_each(|ticks| ticks.take(record));
+            let keep = |given: &Record| {
+                record.iter().for_each(|files| files.take(given));
             };
             let Some(scan) = scans.scan_kept(run.scans, &watch, &keep)? else { break };
             run.score.add(&scan.score);
@@ -90,15 +91,15 @@ impl<'a> Run<'a> {
                 }
                 let files = interrupt.undisturbed(|| {
                     if run.scans == 0 {
-                        if scenario.ticks.is_none() {
+                        if kept.is_none() {
                             folder.make()?;
                         }
                         run.announce(folder)?;
                     }
-                    let ticks = ticks.map(TickFiles::finish).transpose()?.unwrap_or_default();
+                    let record = record.map(RecordFiles::finish).transpose()?.unwrap_or_default();
                     let files = recorded.add(&cloud)?;
                     folder.keep();
-                    Ok::<_, Fault>((files, ticks))
+                    Ok::<_, Fault>((files, record))
                 })?;
                 run.files.extend(files.0);
                 run.files.extend(files.1);
@@ -144,11 +145,11 @@ impl<'a> Run<'a> {
             let band = bands(self.design, 0).find(is_there);
             let record = band.map(|band| (scans.record(&band), band));
             let shot = record.as_ref().and_then(|((log, _), _)| explain::shot_of(log, *pixel));
-            let (Some(((log, ticks), band)), Some(shot)) = (record, shot) else {
+            let (Some(((log, given), band)), Some(shot)) = (record, shot) else {
                 self.warnings.push("a pixel of --explain has no shot".to_owned());
                 continue;
             };
-            let explained = Explained::of(self.design, (&log, &ticks), shot)?;
+            let explained = Explained::of(self.design, (&log, &given), shot)?;
             let arrivals = scans.arrivals(&band, &explained.stretch());
             let explained = explained.with(arrivals);
             self.explained.push((explained.text(), explained.json()));

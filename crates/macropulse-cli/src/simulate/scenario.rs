@@ -5,7 +5,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use macropulse::channel::Operating;
-use macropulse::codec::files::Form;
 use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
@@ -14,7 +13,7 @@ use macropulse::told;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::formats::{Formats, form};
+use super::formats::{Formats, Records};
 use crate::explain::Pixel;
 use crate::fault::Fault;
 use crate::input::{self, STREAM};
@@ -33,8 +32,8 @@ pub struct Scenario {
     pub scans: u64,
     pub seed: u64,
     pub formats: Vec<Format>,
-    /// In which form shots and ticks are written, if they are.
-    pub ticks: Option<Form>,
+    /// What is written of what was recorded.
+    pub records: Records,
     pub truth: bool,
     /// Pixels to be explained.
     pub explain: Vec<Pixel>,
@@ -79,14 +78,14 @@ impl Scenario {
             sensors.iter().map(|sensor| input::design(sensor, &changes.of_sensor)).collect();
         let (designs, scene) = (designs?, input::scene(scene, &changes.of_scene)?);
         check_operating(&designs, &scene)?;
-        let Formats(formats, ticks) = Formats::default();
+        let Formats(formats, records) = Formats::default();
         Ok(Self {
             designs,
             scene,
             scans: 1,
             seed: 1,
             formats,
-            ticks,
+            records,
             truth: false,
             explain: Vec::new(),
         })
@@ -125,7 +124,7 @@ impl Scenario {
         let scene = Scene::open_changed(&place, &changes.of_scene)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
         check_operating(&designs, &scene)?;
-        let Formats(formats, ticks) = match file.formats {
+        let Formats(formats, records) = match file.formats {
             Some(names) => formats(&source, &names)?,
             None => Formats::default(),
         };
@@ -134,7 +133,7 @@ impl Scenario {
             return Err(source.fault(typed.span(), &format!("scans: {sentence}")));
         }
         let (seed, truth) = (file.seed.unwrap_or(1), file.truth);
-        Ok(Self { designs, scene, scans, seed, formats, ticks, truth, explain: Vec::new() })
+        Ok(Self { designs, scene, scans, seed, formats, records, truth, explain: Vec::new() })
     }
 }
 
@@ -171,10 +170,9 @@ pub fn check_scans(scans: u64, designs: &[Design]) -> Result<(), String> {
 }
 
 fn formats(source: &Source, names: &[Spanned<String>]) -> Result<Formats, Fault> {
-    let (mut formats, mut ticks) = (Vec::new(), None);
+    let (mut formats, mut records) = (Vec::new(), Records::default());
     for name in names {
-        if let Some(form) = form(name.get_ref()) {
-            ticks = Some(form);
+        if records.add(name.get_ref()) {
             continue;
         }
         match Format::parse(name.get_ref()) {
@@ -183,7 +181,7 @@ fn formats(source: &Source, names: &[Spanned<String>]) -> Result<Formats, Fault>
             Err(error) => return Err(source.fault(name.span(), &error.to_string())),
         }
     }
-    Ok(Formats(formats, ticks))
+    Ok(Formats(formats, records))
 }
 
 fn looks_like_a_path(name: &str) -> bool {

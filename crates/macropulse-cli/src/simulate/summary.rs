@@ -39,7 +39,9 @@ impl Run<'_> {
                 .push("on target", format!("{} of {}", counted(points, "point"), grouped(samples)));
         }
         columns.push("rejects", self.rejects());
-        columns.push("converters", self.converters());
+        if !design.is_sampled() {
+            columns.push("converters", self.converters());
+        }
         let stages = self.stages().map(|(stage, s)| format!("{stage}{NO_BREAK}{}", lasted(s)));
         columns.push("time", format!("{}; summed over threads", listed(stages)));
         let environment = &self.scene.environment;
@@ -77,13 +79,19 @@ impl Run<'_> {
     }
 
     fn light(&self) -> String {
-        format!(
-            "{} met, {}, {}, {}",
-            counted(self.tally.surfaces, "surface"),
-            counted(self.tally.echoes, "echo"),
-            counted(self.tally.detections, "detection"),
-            counted(self.tally.ticks, "tick"),
-        )
+        let tally = &self.tally;
+        let recorded = match self.design.is_sampled() {
+            true => counted(tally.samples, "sample"),
+            false => {
+                format!(
+                    "{}, {}",
+                    counted(tally.detections, "detection"),
+                    counted(tally.ticks, "tick")
+                )
+            }
+        };
+        let surfaces = counted(tally.surfaces, "surface");
+        format!("{surfaces} met, {}, {recorded}", counted(tally.echoes, "echo"))
     }
 
     fn interferers(&self) -> String {

@@ -7,7 +7,7 @@ const FEW: &str = "--set scan.raster.rows=2 --set scan.raster.columns=8";
 /// Behind `decode` of the sensor that they were recorded with, into `out`.
 const FILES: &[Row] = &[
     ("ticks.csv shots.csv", &["ticks.csv: line 1", "the shot log comes first, then the ticks"]),
-    ("shots.csv", &["<TICKS>"]),
+    ("shots.csv", &["<RECORD>"]),
     ("shots.csv gone.csv", &["gone.csv: cannot be read: there is no such file"]),
     ("folder ticks.csv", &["folder: cannot be read: it is a folder"]),
     ("shots.csv folder", &["folder: cannot be read: it is a folder"]),
@@ -23,7 +23,7 @@ const FILES: &[Row] = &[
     ("shots.csv columns.csv", &["columns.csv: line 2", "known are tick, channel, amplitude"]),
     ("shots.csv backwards.csv", &["backwards.csv: line 4", "sort them by tick"]),
     ("shots.csv cut.csv", &["cut.csv", "truncated"]),
-    ("- -", &["only one of SHOTS and TICKS can come from stdin"]),
+    ("- -", &["only one of SHOTS and RECORD can come from stdin"]),
     ("shots.csv ticks.csv --explain 99,99", &["rows 0 to 1 and columns 0 to 7"]),
     ("shots.csv ticks.csv --explain 1", &["row,column"]),
     ("shots.csv ticks.csv --format ticks", &["formats of points"]),

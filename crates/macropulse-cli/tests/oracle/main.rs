@@ -18,13 +18,14 @@ use std::sync::LazyLock;
 use common::Desk;
 use serde_json::{Value, json};
 
+/// A Python with NumPy.
+static PYTHON: LazyLock<std::path::PathBuf> = LazyLock::new(|| {
+    let wanted = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracle/requirements.txt");
+    macropulse_testbed::python(&wanted).unwrap()
+});
+
 /// What the oracle says to a question.
 fn ask(desk: &Desk, question: &str, given: &Value) -> Value {
-    static PYTHON: LazyLock<std::path::PathBuf> = LazyLock::new(|| {
-        let wanted =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracle/requirements.txt");
-        macropulse_testbed::python(&wanted).unwrap()
-    });
     let oracle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracle");
     let file = desk.path().join(format!("{question}.json"));
     fs::write(&file, given.to_string()).unwrap();
@@ -43,6 +44,44 @@ fn ask(desk: &Desk, question: &str, given: &Value) -> Value {
 fn assert_near(program: f64, oracle: f64, tolerance: f64) {
     let off = (program / oracle - 1.0).abs();
     assert!(off <= tolerance, "the program says {program}, the oracle {oracle}: off by {off:.2e}");
+}
+
+/// What the script of the documentation says, which reads shots and samples in NumPy by what is written of
+/// their bytes.
+#[test]
+fn samples_are_read_by_what_is_written_of_them() {
+    let desk = Desk::new();
+    desk.put(
+        "mini.toml",
+        "version = 1\nname = \"mini\"\nextends = \"coded-32\"\n[scan]\nscans_per_s = 2500.0\n\
+         [scan.raster]\nrows = 32\ncolumns = 106\nbeams = 8\nvertical_deg = 1.62\n\
+         horizontal_deg = 5.4\nduty = 1.0\n[light]\nenergy = { shot_nj = 4.0 }\n",
+    );
+    let _ = desk.json("simulate mini.toml wall --format csv,samples -o out --json");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/samples.py");
+    let files = ["shots-000000.mps", "samples-000000.mpw"];
+    let said = macropulse_testbed::call(
+        Command::new(&*PYTHON)
+            .arg(script)
+            .args(files.map(|name| desk.path().join("out").join(name))),
+    );
+    let said: Value = serde_json::from_str(&said.unwrap()).unwrap();
+    assert_eq!(said["blocks"], said["blocks_said"]);
+    let header_and_blocks = 128 + 16 * said["blocks"].as_u64().unwrap();
+    let bytes = fs::metadata(desk.path().join("out").join(files[1])).unwrap().len();
+    assert_eq!(header_and_blocks + 2 * said["codes"].as_u64().unwrap(), bytes);
+    // Of a wall square on, all shots are within 0.1 % of the distance; a tick is 6 cm.
+    let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+    let ranges: Vec<f64> = points
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(4).unwrap().parse().unwrap())
+        .collect();
+    let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
+    let range = said["range_m"].as_f64().unwrap();
+    assert!((range - mean).abs() < 0.1, "the script says {range} m, the points {mean} m");
+    let photons = said["photons"].as_f64().unwrap();
+    assert!(photons > 100.0 && said["shots"].as_u64().unwrap() > 2000, "{said}");
 }
 
 mod light {

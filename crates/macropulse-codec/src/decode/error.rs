@@ -181,7 +181,10 @@ pub enum Error {
         /// When it was fired, in ticks from the first sample on.
         ticks: i64,
     },
-    /// What a receiver of samples decides is not explained.
-    #[error("only receivers of ticks are explained, not those of samples: look at the samples")]
-    SamplesAreNotExplained,
+    /// A shot is to be explained that is not in the log.
+    #[error("shot {shot} is not in the log")]
+    NoSuchShot {
+        /// Its index.
+        shot: usize,
+    },
 }

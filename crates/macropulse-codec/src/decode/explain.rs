@@ -15,7 +15,7 @@ use crate::ticks::Ticks;
 use crate::time;
 
 /// Lags of a gate that are counted at most; of longer ones every second, third, … is counted.
-const MOST_LAGS: u64 = 1 << 20;
+pub(super) const MOST_LAGS: u64 = 1 << 20;
 
 /// One shot of a band and what became of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,16 +94,13 @@ impl Receiver {
     /// Why `shot` of `log` was decided as it was, out of all `ticks` of its band.
     ///
     /// # Errors
-    /// As [`Receiver::decode`], and if this is a receiver of samples.
+    /// As [`Receiver::decode`]; of a receiver of samples see [`Receiver::explain_samples`].
     pub fn explain(
         &self,
         codebook: &Codebook,
         (log, ticks): (&ShotLog, &Ticks),
         shot: usize,
     ) -> Result<Explanation, Error> {
-        if self.kind == ReceiverKind::Sampled {
-            return Err(Error::SamplesAreNotExplained);
-        }
         let first = log.owned.start.min(shot);
         let to = |end: usize| {
             let log = ShotLog { owned: first..end, ..log.clone() };
@@ -151,7 +148,7 @@ impl Receiver {
 
 impl Verdict {
     /// That of `shot`, from what came of the shots `before` it and of those and it `together`.
-    fn of(shot: usize, before: &super::Returns, together: &super::Returns) -> Self {
+    pub(super) fn of(shot: usize, before: &super::Returns, together: &super::Returns) -> Self {
         let accepted = |at: usize| Accepted {
             tof: together.tof[at],
             peak: together.peak[at],

@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use super::source::{Source, number};
-use super::{Digest, Error, UNKNOWN, VERSION};
+use super::{Digest, Error, UNKNOWN, VERSION, What};
 
 /// Bytes of every binary header.
 pub(super) const HEADER: usize = 128;
@@ -98,10 +98,17 @@ fn check_kind<R: Read>(source: &Source<R>, kind: &str) -> Result<(), Error> {
     let name = source.name();
     match kind {
         _ if kind == name => Ok(()),
-        "shots" | "ticks" => source.refuse(format!(
-            "these are {kind}, where {name} are wanted: the shot log comes first, then the ticks"
+        "ticks" | "samples" if source.what != What::Shots => source.refuse(format!(
+            "these are {kind}, where the sensor records {name}: is it the one that they were recorded \
+             with?"
         )),
-        _ => source.refuse(format!("`{kind}` are neither shots nor ticks")),
+        "shots" | "ticks" | "samples" => {
+            let behind = if source.what == What::Shots { kind } else { name };
+            source.refuse(format!(
+                "these are {kind}, where {name} are wanted: the shot log comes first, then the {behind}"
+            ))
+        }
+        _ => source.refuse(format!("`{kind}` are neither shots nor ticks nor samples")),
     }
 }
 
@@ -184,7 +191,8 @@ pub(super) fn binary<R: Read>(source: &mut Source<R>) -> Result<[u8; HEADER], Er
     let kind = match &header[..8] {
         b"MPSHOTS\0" => "shots",
         b"MPTICKS\0" => "ticks",
-        _ => return source.refuse("this is no file of Macropulse's shots or ticks"),
+        b"MPSAMPL\0" => "samples",
+        _ => return source.refuse("this is no file of Macropulse's shots, ticks or samples"),
     };
     check_kind(source, kind)?;
     check_version(source, &number!(header, 8, u32).to_string())?;

@@ -1,15 +1,18 @@
-//! Shot logs and ticks as files and streams: the seam at which recorded hardware takes the place of
-//! a simulation.
+//! Shot logs, ticks and samples as files and streams: the seam at which recorded hardware takes the place
+//! of a simulation.
 //!
-//! Both have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
+//! Shots and ticks have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
 //! line that says what they are, and **binary**, little-endian records under a header. A reader
-//! tells them apart by their first byte. `docs/formats.md` has them byte by byte.
+//! tells them apart by their first byte. Samples are binary. `docs/formats.md` has them byte by byte.
 //!
 //! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
-//! record, and keep none. [`Stream`] reads both at once and cuts them into bands to be decoded.
+//! record, and keep none. [`Stream`] reads shots and ticks, or samples, at once and cuts them into bands
+//! to be decoded.
 //! What is wrong is told with the line or the byte where it stands.
 
+mod at_hand;
 mod head;
+mod sample_files;
 mod shots;
 mod source;
 mod stream;
@@ -18,11 +21,12 @@ mod tick_files;
 use std::fmt;
 use std::io;
 
+pub use sample_files::{SampleBlock, SampleHeader, SampleReader, SampleWriter};
 pub use shots::{Limits, Shot, ShotHeader, ShotReader, ShotWriter};
 pub use stream::Stream;
 pub use tick_files::{TickHeader, TickReader, TickWriter};
 
-/// The version of both files that is written, and the only one that is read.
+/// The version of all these files that is written, and the only one that is read.
 pub const VERSION: u32 = 1;
 
 /// No shot and no tick is later, or earlier, than so many fs from the beginning of the first scan.
@@ -40,7 +44,7 @@ pub enum Form {
     Text,
 }
 
-/// What a shot log and ticks are of: a hash of all that is sent and how it is timed. Logs of sensors
+/// What a shot log, ticks and samples are of: a hash of all that is sent and how it is timed. Logs of sensors
 /// that differ in it are not decoded by each other's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Digest(pub [u8; 16]);
@@ -78,13 +82,15 @@ impl fmt::Display for Place {
     }
 }
 
-/// Which of the two files an error is about.
+/// Which of the files an error is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// The shot log.
     Shots,
     /// The ticks.
     Ticks,
+    /// The samples.
+    Samples,
 }
 
 /// Why a file cannot be read.
@@ -111,7 +117,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Which of the two files it is about.
+    /// Which of the files it is about.
     pub fn what(&self) -> What {
         match self {
             Self::Read { what, .. } | Self::Content { what, .. } => *what,

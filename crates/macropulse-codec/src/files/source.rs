@@ -43,6 +43,9 @@ impl<R: Read> Source<R> {
         let source = Self { bytes, form, what, place, passed: 0, line: Vec::new() };
         match first {
             Some(b'#' | b'M') => Ok(source),
+            Some(_) if what == What::Samples => {
+                source.refuse("this is no file of Macropulse's samples")
+            }
             Some(_) => source.refuse(format!(
                 "neither text that begins with `# macropulse {}` nor its binary form",
                 source.name()
@@ -56,12 +59,22 @@ impl<R: Read> Source<R> {
         match self.what {
             What::Shots => "shots",
             What::Ticks => "ticks",
+            What::Samples => "samples",
         }
     }
 
     /// An error about what was read last.
     pub fn refuse<T>(&self, message: impl Into<String>) -> Result<T, Error> {
         Err(Error::Content { what: self.what, place: self.place, message: message.into() })
+    }
+
+    /// An error about what stands so many bytes `behind` the beginning of what was read last.
+    pub fn refuse_behind<T>(&self, behind: u64, message: String) -> Result<T, Error> {
+        let place = match self.place {
+            Place::Byte(byte) => Place::Byte(byte + behind),
+            line => line,
+        };
+        Err(Error::Content { what: self.what, place, message })
     }
 
     /// The next line that is not blank, without its end and the blanks around it; `None` behind the

@@ -1,68 +1,69 @@
-//! Shots and ticks read side by side, and cut into bands that can each be decoded by itself.
+//! Shots and what was recorded of them read side by side, and cut into bands that can each be decoded by
+//! itself.
 
 use std::io::Read;
 use std::ops::Range;
 
-use super::{Error, Shot, ShotReader, TickReader};
+use super::at_hand::{AtHand, SamplesAtHand, TicksAtHand};
+use super::{Error, SampleReader, Shot, ShotReader, TickReader};
 use crate::cut::Cut;
+use crate::samples::Given;
 use crate::shot_log::ShotLog;
-use crate::ticks::{Tick, Ticks};
 
 /// Shots of a band at most, guard shots included.
 const MOST_SHOTS: usize = 1 << 20;
 
-/// Ticks of a band at most: 400 MB of them.
-const MOST_TICKS: usize = 1 << 24;
-
-/// A shot log and ticks under way; of both no more is kept than belongs to one band.
+/// A shot log and ticks or samples under way; of both no more is kept than belongs to one band.
 #[derive(Debug)]
-pub struct Stream<S, T> {
+pub struct Stream<S, R> {
     cut: Cut,
     shots: ShotReader<S>,
-    ticks: TickReader<T>,
-    /// Whether the receiver is given the channel of each tick.
-    several: bool,
+    record: AtHand<R>,
     /// The shots at hand, and the id of the first one.
     at_hand: Vec<Shot>,
     first: u64,
     shots_end: bool,
-    /// The ticks at hand.
-    seen: Vec<Tick>,
-    ticks_end: bool,
     /// The shots that are still to be owned.
     left: Range<u64>,
 }
 
-impl<S: Read, T: Read> Stream<S, T> {
+impl<S: Read, R: Read> Stream<S, R> {
     /// The bands of `shots` and `ticks`, which are of a sensor that is `cut` so; with the channel of
     /// each tick if it has `several`.
-    pub fn new(cut: Cut, shots: ShotReader<S>, ticks: TickReader<T>, several: bool) -> Self {
+    pub fn new(cut: Cut, shots: ShotReader<S>, ticks: TickReader<R>, several: bool) -> Self {
+        Self::of(cut, shots, AtHand::Ticks(TicksAtHand::new(ticks, several)))
+    }
+
+    /// The bands of `shots` and `samples`, which are of a sensor that is `cut` so.
+    pub fn of_samples(cut: Cut, shots: ShotReader<S>, samples: SampleReader<R>) -> Self {
+        Self::of(cut, shots, AtHand::Samples(SamplesAtHand::new(samples)))
+    }
+
+    fn of(cut: Cut, shots: ShotReader<S>, record: AtHand<R>) -> Self {
         let first = shots.header().first;
         let left = shots.header().owned.clone().unwrap_or(first..u64::MAX);
         Self {
             cut,
             shots,
-            ticks,
-            several,
+            record,
             at_hand: Vec::new(),
             first,
             shots_end: false,
-            seen: Vec::new(),
-            ticks_end: false,
             left: left.start.max(first)..left.end,
         }
     }
 
     /// The next band, whose owned shots end before the shot that `until` says of their first one; its
-    /// shots and its ticks. `None` behind the last one.
+    /// shots, and its ticks or samples. `None` behind the last one. What a file of samples does not reach
+    /// at its beginning or end is left out.
     ///
     /// # Errors
-    /// If a file cannot be read, or its shots are fired so far apart, or have so many ticks, that they
-    /// cannot be decoded together.
+    /// If a file cannot be read, if its shots are fired so far apart, or have so many ticks or samples,
+    /// that they cannot be decoded together, or if samples are missing between others.
     pub fn next_band(
         &mut self,
         until: impl Fn(u64) -> u64,
-    ) -> Result<Option<(ShotLog, Ticks)>, Error> {
+    ) -> Result<Option<(ShotLog, Given)>, Error> {
         if !self.cut.is_possible() {
             return self.shots.refuse(
                 "cannot be cut into bands: ticks and clock must last 1 fs or more, and no span may be \
@@ -98,7 +99,7 @@ impl<S: Read, T: Read> Stream<S, T> {
                 self.left.start - 1
             ));
         }
-        Ok(Some((self.cut.known(&log), self.ticks_of(&span, epoch)?)))
+        Ok(Some((self.cut.known(&log), self.record.of(&span, epoch)?)))
     }
 
     /// The id behind the last shot at hand.
@@ -144,31 +145,10 @@ impl<S: Read, T: Read> Stream<S, T> {
         }
     }
 
-    /// The ticks of `span`, counted from `epoch` on.
-    fn ticks_of(&mut self, span: &Range<i64>, epoch: i64) -> Result<Ticks, Error> {
-        let past = self.seen.partition_point(|one| one.tick < span.start);
-        self.seen.drain(..past);
-        while !self.ticks_end && self.seen.last().is_none_or(|last| last.tick < span.end) {
-            match self.ticks.next_tick()? {
-                Some(one) if one.tick < span.start => {}
-                Some(one) => self.seen.push(one),
-                None => self.ticks_end = true,
-            }
-            if self.seen.len() > MOST_TICKS {
-                return self.ticks.refuse(format!(
-                    "more than {MOST_TICKS} ticks belong to shots that are decoded together"
-                ));
-            }
-        }
-        let within = self.seen.partition_point(|one| one.tick < span.end);
-        let kind = (self.several, self.ticks.header().measured);
-        Ok(Ticks::of(&self.seen[..within], epoch, kind))
-    }
-
     /// Reads both files to their ends, so that what is wrong there is not passed over.
-    fn drain(&mut self) -> Result<Option<(ShotLog, Ticks)>, Error> {
+    fn drain(&mut self) -> Result<Option<(ShotLog, Given)>, Error> {
         while self.shots.next_shot()?.is_some() {}
-        while self.ticks.next_tick()?.is_some() {}
+        self.record.drain()?;
         Ok(None)
     }
 }

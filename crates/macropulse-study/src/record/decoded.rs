@@ -8,14 +8,14 @@ use serde_json::{Value, json};
 
 use super::{defaults, named, surroundings};
 
-/// Shots and ticks that were decoded, with what was counted.
+/// Shots, and ticks or samples, that were decoded, with what was counted.
 #[derive(Debug, Clone, Copy)]
 pub struct Decoded<'a> {
     /// The sensor.
     pub design: &'a Design,
     /// Sun and air by which intensity is measured.
     pub environment: &'a Environment,
-    /// What the shots and the ticks were read from.
+    /// What the shots, and the ticks or samples, were read from.
     pub inputs: [&'a str; 2],
     /// How far the run has come.
     pub state: State,
@@ -23,8 +23,8 @@ pub struct Decoded<'a> {
     pub scans: u64,
     /// Shots whose returns are wanted.
     pub shots: u64,
-    /// Ticks, those of guard shots included.
-    pub ticks: u64,
+    /// Ticks, or samples of all channels; those of guard shots included.
+    pub recorded: u64,
     /// Returns found.
     pub returns: u64,
     /// Macropulses refused, by reason.
@@ -44,19 +44,20 @@ impl Decoded<'_> {
         for (kind, count) in Reject::ALL.into_iter().zip(self.rejects) {
             rejects.push(kind.name(), count);
         }
-        let [shots, ticks] = self.inputs;
+        let [shots, record] = self.inputs;
+        let kind = if self.design.is_sampled() { "samples" } else { "ticks" };
         versioned(json!({
             "state": self.state,
             "version": env!("CARGO_PKG_VERSION"),
             "sensor": named(self.design),
             "environment": surroundings(self.environment),
-            "recorded": { "shots": shots, "ticks": ticks },
+            "recorded": { "shots": shots, kind: record },
             "defaults": defaults(self.design),
             "warnings": self.warnings,
             "counts": {
                 "scans": self.scans,
                 "shots": self.shots,
-                "ticks": self.ticks,
+                kind: self.recorded,
                 "returns": self.returns,
             },
             "rejects": rejects,
@@ -81,7 +82,7 @@ mod tests {
             state: State::Finished,
             scans: 1,
             shots: 7,
-            ticks: 30,
+            recorded: 30,
             returns: 5,
             rejects: Default::default(),
             warnings: &[],

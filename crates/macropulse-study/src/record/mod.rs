@@ -201,11 +201,15 @@ pub fn manifest(run: &Run) -> Manifest {
         ("shots", tally.shots),
         ("surfaces", tally.surfaces),
         ("echoes", tally.echoes),
-        ("detections", tally.detections),
-        ("ticks", tally.ticks),
-        ("returns", tally.returns),
     ] {
         manifest.counts.push(name, count);
+    }
+    let recorded = match design.is_sampled() {
+        true => &[("samples", tally.samples)][..],
+        false => &[("detections", tally.detections), ("ticks", tally.ticks)],
+    };
+    for (name, count) in recorded.iter().chain(&[("returns", tally.returns)]) {
+        manifest.counts.push(*name, *count);
     }
     for number in 1..=design.receiver.returns {
         let count = tally.by_number[usize::from(number) - 1];
@@ -222,9 +226,11 @@ pub fn manifest(run: &Run) -> Manifest {
     for (kind, count) in Reject::ALL.into_iter().zip(tally.rejects) {
         manifest.rejects.push(kind.name(), count);
     }
-    manifest.converters.push("peak_busy", u64::from(tally.peak_busy));
-    manifest.converters.push("lost", tally.lost);
-    manifest.converters.push("merged", tally.merged);
+    if !design.is_sampled() {
+        manifest.converters.push("peak_busy", u64::from(tally.peak_busy));
+        manifest.converters.push("lost", tally.lost);
+        manifest.converters.push("merged", tally.merged);
+    }
     for outcome in Outcome::ALL {
         manifest.outcomes.push(outcome.name(), score.count(outcome));
         if design.receiver.returns > 1 {

@@ -97,6 +97,7 @@ pub fn describe(page: &mut Explorer, manifest: &Value) {
         ("seed", &manifest["seed"]),
         ("shots of", &manifest["recorded"]["shots"]),
         ("ticks of", &manifest["recorded"]["ticks"]),
+        ("samples of", &manifest["recorded"]["samples"]),
     ];
     for (what, value) in facts.into_iter().filter(|(_, value)| !value.is_null()) {
         page.fact(what, &text(value));

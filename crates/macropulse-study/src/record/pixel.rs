@@ -45,6 +45,12 @@ fn of(told: &Value) -> Option<Section> {
         };
         section = section.figure(Figure::svg(&chart.svg(), said));
     }
+    if let Some(chart) = signal(told) {
+        let said = "What the filter that is matched to the pulse makes of the samples, at the marks of the \
+                    lag that was tested first; and what was left of it then, echoes of other shots \
+                    cancelled. Points are the marks: green ones counted.";
+        section = section.figure(Figure::svg(&chart.svg(), said));
+    }
     for chart in Counts::of(told)?.charts() {
         section = section.figure(Figure::svg(&chart.svg(), ""));
     }
@@ -57,7 +63,7 @@ pub fn picture(told: &Value) -> Stack {
     let counts = Counts::of(told).into_iter().flat_map(|counts| counts.charts());
     Stack {
         title: format!("{pixel}: {decided}"),
-        charts: arrivals(told).into_iter().chain(counts).collect(),
+        charts: arrivals(told).into_iter().chain(signal(told)).chain(counts).collect(),
     }
 }
 
@@ -117,6 +123,41 @@ fn arrivals(told: &Value) -> Option<Chart> {
     Some(chart)
 }
 
+/// The signal about the marks at the lag that was tested first; of samples alone.
+fn signal(told: &Value) -> Option<Chart> {
+    let signal = &told["signal"];
+    let first = signal["first_tick"].as_f64()?;
+    let whole: Vec<f64> = reals(&signal["photons"]).collect();
+    let left: Vec<f64> = reals(&signal["photons_without_others"]).collect();
+    let most = whole.iter().copied().fold(1.0, f64::max);
+    let least = whole.iter().chain(&left).copied().fold(0.0, f64::min);
+    let last = first + whole.len() as f64;
+    let x = Axis::linear("Ticks since the shot").limits(first, last.max(first + 1.0));
+    let y = Axis::linear("Photons per mark").limits(least * 1.08, most * 1.08);
+    let mut chart = Chart::new("Signal behind the matched filter", x, y);
+    chart.size = [904.0, 320.0];
+    chart.legend = true;
+    let mut push = |label: &str, points: Vec<[f64; 2]>, style: Style, hue: Hue| {
+        chart.series.push(Series { label: label.to_owned(), points, style, hue });
+    };
+    let line =
+        |values: &[f64]| (0..).zip(values).map(|(at, v)| [first + f64::from(at), *v]).collect();
+    push("all light", line(&whole), Style::Line, Hue::Grey);
+    push("without that of other shots", line(&left), Style::Line, Hue::Blue);
+    let marks = told["tested"][0]["marks"].as_array()?;
+    let point = |mark: &&Value| Some([mark["tick"].as_f64()?, mark["photons"].as_f64()?]);
+    let (counted, rest): (Vec<&Value>, Vec<&Value>) =
+        marks.iter().partition(|mark| mark["state"] == "counted");
+    push("marks", counted.iter().filter_map(point).collect(), Style::Points, Hue::Green);
+    push(
+        "marks that tell nothing",
+        rest.iter().filter_map(point).collect(),
+        Style::Points,
+        Hue::Orange,
+    );
+    Some(chart)
+}
+
 /// When light and detection events come, ticks since the shot.
 #[derive(Default)]
 struct Light {
@@ -139,18 +180,43 @@ impl Light {
     }
 }
 
-/// Marks found at the lags of the gate.
+/// How much speaks for each lag of the gate: marks found, or how far the sum of marks is above noise.
 struct Counts {
     /// Range of the first lag, and from one to the next, m.
     first: f64,
     step: f64,
-    found: Vec<i64>,
-    left: Vec<i64>,
-    marks: usize,
+    /// Not a number where nothing can be told.
+    found: Vec<f64>,
+    left: Vec<f64>,
+    /// The end of the axis.
+    most: f64,
     threshold: Option<f64>,
     /// Place of the peak among the lags, and what is said of it.
     peak: Option<(usize, String)>,
+    words: &'static Words,
 }
+
+/// What is said in a chart of [`Counts`].
+struct Words {
+    title: &'static str,
+    axis: &'static str,
+    all: &'static str,
+    left: &'static str,
+}
+
+const OF_TICKS: Words = Words {
+    title: "Marks found",
+    axis: "Marks",
+    all: "all ticks",
+    left: "without those of other shots",
+};
+
+const OF_SAMPLES: Words = Words {
+    title: "Sum of the marks",
+    axis: "Standard deviations of noise",
+    all: "all light",
+    left: "without that of other shots",
+};
 
 impl Counts {
     fn of(told: &Value) -> Option<Self> {
@@ -159,19 +225,34 @@ impl Counts {
         let (first_lag, step_lags) = (first_lag.as_i64()?, step_lags.as_i64()?.max(1));
         let (first, step) =
             (correlation["first_range_m"].as_f64()?, correlation["step_m"].as_f64()?);
-        let found: Vec<i64> = whole(&correlation["marks"]).collect();
-        let left = whole(&correlation["marks_without_others"]).collect();
-        let marks = whole(&told["marks_ticks"]).count();
-        let peak = &told["peak"];
-        let peak = peak["lag_ticks"].as_i64().and_then(|lag| {
-            let place = usize::try_from((lag - first_lag) / step_lags)
-                .ok()
-                .filter(|at| *at < found.len())?;
-            let range = peak["range_m"].as_f64()?;
-            Some((place, format!("{} of {marks} at {range:.3} m", peak["marks"])))
+        let marks = told["marks_ticks"].as_array().map_or(0, Vec::len);
+        let is_sampled = correlation["deviations"].is_array();
+        let (peak, words, keys) = match is_sampled {
+            true => (&told["tested"][0], &OF_SAMPLES, ["deviations", "deviations_without_others"]),
+            false => (&told["peak"], &OF_TICKS, ["marks", "marks_without_others"]),
+        };
+        let [found, left] = keys.map(|key| list(&correlation[key]));
+        let place = peak["lag_ticks"].as_i64().and_then(|lag| {
+            let place = usize::try_from((lag - first_lag) / step_lags).ok();
+            place.filter(|at| *at < found.len() && found[*at].is_finite())
         });
-        let threshold = told["threshold_marks"].as_f64();
-        Some(Self { first, step, found, left, marks, threshold, peak })
+        let said = |range: f64| match is_sampled {
+            true => format!(
+                "{} at {range:.3} m",
+                peak["outcome"].as_str().unwrap_or("").replace('_', " ")
+            ),
+            false => format!("{} of {marks} at {range:.3} m", peak["marks"]),
+        };
+        let peak = place.zip(peak["range_m"].as_f64()).map(|(place, range)| (place, said(range)));
+        let most = match is_sampled {
+            true => found.iter().copied().fold(1.0, f64::max),
+            false => marks.max(1) as f64,
+        };
+        let mut threshold = ["threshold_marks", "threshold_deviations"].iter();
+        let threshold = threshold.find_map(|key| told[*key].as_f64());
+        // The threshold is shown where it is near; marks that are fewer than it are told in words.
+        let most = if is_sampled { most.max(threshold.unwrap_or(0.0)) } else { most };
+        Some(Self { first, step, found, left, most, threshold, peak, words })
     }
 
     fn range(&self, place: usize) -> f64 {
@@ -180,43 +261,53 @@ impl Counts {
 
     /// Over the whole gate and, if there is a peak, about that.
     fn charts(&self) -> Vec<Chart> {
-        let mut charts = vec![self.chart("Marks found, over the gate", 0..self.found.len())];
+        let mut charts = vec![self.chart("over the gate", 0..self.found.len())];
         if let Some((place, _)) = self.peak {
             let around = place.saturating_sub(AROUND)..(place + AROUND + 1).min(self.found.len());
-            charts.push(self.chart("Marks found, about the peak", around));
+            charts.push(self.chart("about the peak", around));
         }
         charts
     }
 
-    fn chart(&self, title: &str, places: std::ops::Range<usize>) -> Chart {
+    fn chart(&self, which: &str, places: std::ops::Range<usize>) -> Chart {
         let ends = [places.start, places.end.max(places.start + 1) - 1].map(|at| self.range(at));
         let x = Axis::linear("Range, m").limits(ends[0], ends[1].max(ends[0] + 1e-3));
-        let y = Axis::linear("Marks").limits(0.0, self.marks.max(1) as f64 * 1.08);
-        let mut chart = Chart::new(title, x, y);
+        let y = Axis::linear(self.words.axis).limits(0.0, self.most * 1.08);
+        let mut chart = Chart::new(&format!("{}, {which}", self.words.title), x, y);
         chart.size = [904.0, 320.0];
         chart.legend = true;
         let together = places.len().div_ceil(PLACES).max(1);
-        for (label, counts, hue) in [
-            ("all ticks", &self.found, Hue::Grey),
-            ("without those of other shots", &self.left, Hue::Blue),
-        ] {
+        for (label, counts, hue) in
+            [(self.words.all, &self.found, Hue::Grey), (self.words.left, &self.left, Hue::Blue)]
+        {
             let counts = counts.get(places.clone()).unwrap_or_default().chunks(together);
             let highest = counts.enumerate().filter_map(|(part, counts)| {
-                let (at, count) = counts.iter().enumerate().max_by_key(|(_, count)| **count)?;
-                Some([self.range(places.start + part * together + at), *count as f64])
+                let told = counts.iter().enumerate().filter(|(_, count)| count.is_finite());
+                // Of equal ones the last.
+                let (at, count) = told.max_by(|one, other| one.1.total_cmp(other.1))?;
+                Some([self.range(places.start + part * together + at), count.max(0.0)])
             });
             let points = highest.collect();
             chart.series.push(Series { label: label.to_owned(), points, style: Style::Line, hue });
         }
-        if let Some(threshold) = self.threshold.filter(|most| *most <= self.marks as f64) {
-            chart.lines.push(Line::AtY(threshold, format!("threshold {threshold}")));
+        if let Some(threshold) = self.threshold.filter(|threshold| *threshold <= self.most) {
+            chart.lines.push(Line::AtY(
+                threshold,
+                format!("threshold {}", (threshold * 100.0).round() / 100.0),
+            ));
         }
         if let Some((place, text)) = self.peak.as_ref().filter(|(at, _)| places.contains(at)) {
-            let at = [self.range(*place), self.found[*place] as f64];
+            let at = [self.range(*place), self.found[*place]];
             chart.notes.push(Note { at, text: text.clone() });
         }
         chart
     }
+}
+
+/// The numbers of a list, one for each entry: what is none is not a number.
+fn list(list: &Value) -> Vec<f64> {
+    let entries = list.as_array().into_iter().flatten();
+    entries.map(|entry| entry.as_f64().unwrap_or(f64::NAN)).collect()
 }
 
 /// The numbers of a list.
@@ -299,6 +390,42 @@ mod tests {
         assert_eq!(arrivals(&told).unwrap().series[0].points[0], [41.0, 0.0]);
         assert_eq!(picture(&told).charts.len(), 2);
         assert_eq!(picture(&told).title, "Row 3, column 10: right");
+    }
+
+    /// Of samples the signal stands in place of the ticks, and lags of which nothing can be told are left
+    /// out.
+    #[test]
+    fn a_pixel_of_a_sampled_sensor_has_its_signal() {
+        let told = json!({
+            "row": 3, "column": 10, "shot": 7, "decided": "accepted", "why": "Three of three.",
+            "marks_ticks": [0, 2, 3], "threshold_deviations": 6.349,
+            "tested": [{
+                "lag_ticks": 41, "range_m": 30.5, "outcome": "found",
+                "marks": [
+                    { "tick": 41, "photons": 410.0, "state": "counted" },
+                    { "tick": 43, "photons": null, "state": "outside" },
+                    { "tick": 44, "photons": 12.5, "state": "hidden" },
+                ],
+            }],
+            "signal": {
+                "first_tick": 40, "photons": [1.0, 410.0, -3.0, 5.0, 900.0],
+                "photons_without_others": [1.0, 410.0, -3.0, 5.0, 12.5],
+            },
+            "correlation": {
+                "first_lag_ticks": 40, "step_ticks": 1, "first_range_m": 30.1, "step_m": 0.4,
+                "deviations": [-1.0, 9.5, null], "deviations_without_others": [-1.0, 7.5, null],
+            },
+        });
+        let chart = signal(&told).unwrap();
+        let of = |at: usize| chart.series[at].points.clone();
+        assert_eq!((of(2), of(3)), (vec![[41.0, 410.0]], vec![[44.0, 12.5]]));
+        assert_eq!(of(1)[4], [44.0, 12.5]);
+        let charts = picture(&told).charts;
+        assert_eq!(charts.len(), 3, "the signal, and the sum over the gate and about the peak");
+        assert_eq!(charts[1].series[0].points.len(), 2);
+        let html = html(&told);
+        assert!(html.contains("threshold 6.35") && html.contains("found at 30.500 m"));
+        assert!(html.contains("Sum of the marks, over the gate"));
     }
 
     #[test]

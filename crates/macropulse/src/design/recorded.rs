@@ -1,8 +1,9 @@
-//! What recorded shots and ticks are held against before they are decoded.
+//! What recorded shots, ticks and samples are held against before they are decoded.
 
-use macropulse_codec::files::{Digest, Limits};
+use macropulse_codec::files::{Digest, Limits, SampleHeader};
 
 use super::Design;
+use super::detector::Detector;
 
 /// Shots of a scan whose places and times go into the digest.
 const SAMPLES: u64 = 256;
@@ -18,6 +19,25 @@ impl Design {
             words: if self.is_coded() { codebook.words() as u32 } else { 1 },
             channels: self.channels(),
         }
+    }
+
+    /// Whether it records samples, and no ticks.
+    pub fn is_sampled(&self) -> bool {
+        matches!(self.detector, Detector::Sampled(_))
+    }
+
+    /// What is said of its samples before they come, their number left open; `None` of a sensor that
+    /// records ticks.
+    pub fn sample_header(&self) -> Option<SampleHeader> {
+        let Detector::Sampled(sampled) = &self.detector else { return None };
+        Some(SampleHeader {
+            tick_fs: self.tdc.tick_fs,
+            channels: self.channels(),
+            codes: sampled.codes,
+            step_photons: Some(sampled.step),
+            digest: Some(self.recorded_digest()),
+            count: None,
+        })
     }
 
     /// The hash of all that is sent and how it is timed: the codebook chip by chip, the lengths of

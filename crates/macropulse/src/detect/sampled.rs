@@ -223,17 +223,20 @@ impl Signal {
         let over = (height / negligible).max(1.0);
         let reach = ((2.0 * libm::log(over)).sqrt() * rms) as i64 + 1;
         let (from, to) = (tick - reach - self.first, tick + reach + 1 - self.first);
-        let (from, to) = (from.max(0), to.min(self.level.len() as i64 - 1));
-        if from > to {
+        let to = to.min(self.level.len() as i64 - 1);
+        if to < 0 {
             return;
         }
+        // From tick to tick a Gaussian grows by a ratio that shrinks by a constant one. What lies before
+        // the span is worked out, too: the rest is then the same to the last bit, wherever a span begins.
         let at = ((from + self.first - tick) as f64 - part) / rms;
-        // From tick to tick a Gaussian grows by a ratio that shrinks by a constant one.
         let mut value = height * libm::exp(-at * at / 2.0);
         let mut grows = libm::exp(-(at + 0.5 / rms) / rms);
         let shrinks = libm::exp(-(rms * rms).recip());
-        for level in &mut self.level[from as usize..=to as usize] {
-            *level += value as f32;
+        for place in from..=to {
+            if let Ok(place) = usize::try_from(place) {
+                self.level[place] += value as f32;
+            }
             value *= grows;
             grows *= shrinks;
         }

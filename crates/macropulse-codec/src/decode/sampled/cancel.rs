@@ -45,6 +45,31 @@ impl Found {
     }
 }
 
+/// Why a candidate is taken for no light of its shot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// Of what is left too few marks tell anything.
+    TooFewMarks,
+    /// A mark is missing, and the others are not equally strong.
+    MarksDiffer,
+    /// The sum of the marks does not reach the threshold.
+    BelowThreshold,
+    /// Clipped marks that are not of one light.
+    ClippedApart,
+}
+
+impl Refusal {
+    /// A word for it, as files have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TooFewMarks => "too_few_marks",
+            Self::MarksDiffer => "marks_differ",
+            Self::BelowThreshold => "below_threshold",
+            Self::ClippedApart => "clipped_apart",
+        }
+    }
+}
+
 /// The signal, less the light that was found.
 pub(super) struct Residual<'a> {
     codes: &'a [i16],
@@ -53,6 +78,8 @@ pub(super) struct Residual<'a> {
     filtered: Filtered,
     /// The marks that count: room for one candidate.
     counted: Vec<Mark>,
+    /// The score of the last candidate, and what it had to reach, as far as it came to that.
+    asked: (Option<f32>, Option<f32>),
 }
 
 impl<'a> Residual<'a> {
@@ -61,7 +88,30 @@ impl<'a> Residual<'a> {
         pulse: &'a Pulse,
         filtered: Filtered,
     ) -> Self {
-        Self { codes, sampling, pulse, filtered, counted: Vec::new() }
+        Self { codes, sampling, pulse, filtered, counted: Vec::new(), asked: (None, None) }
+    }
+
+    /// What is left of the signal.
+    pub(super) fn signal(&self) -> &[f32] {
+        &self.filtered.signal
+    }
+
+    /// What is left at a place, and how uncertain it is; not numbers beyond the record.
+    pub(super) fn at(&self, place: i64) -> (f32, f32) {
+        let Filtered { signal, doubt, .. } = &self.filtered;
+        let at =
+            usize::try_from(place).ok().and_then(|at| Some((*signal.get(at)?, *doubt.get(at)?)));
+        at.unwrap_or((f32::NAN, f32::NAN))
+    }
+
+    /// Whether a mark at this place counted for the last candidate.
+    pub(super) fn counts(&self, place: i64) -> bool {
+        self.counted.iter().any(|mark| mark.place as i64 == place)
+    }
+
+    /// The score of the last candidate and what it had to reach, as far as it came to that.
+    pub(super) fn asked(&self) -> (Option<f32>, Option<f32>) {
+        self.asked
     }
 
     /// Whether the `candidate` is still there; if so, its light is taken away.
@@ -69,19 +119,22 @@ impl<'a> Residual<'a> {
         &mut self,
         candidate: &Candidate,
         (band, rule): (&Band, &Rule),
-    ) -> Option<Found> {
+    ) -> Result<Found, Refusal> {
         let shot = candidate.shot;
         let marks: Vec<i64> = band.marks(shot).map(|mark| band.fired[shot] + mark).collect();
         let lag = self.summit(&marks, candidate.lag);
-        let sum = self.sum(&marks, lag, rule)?;
-        let threshold = self.threshold((&sum, marks.len()), rule)?;
+        self.asked = (None, None);
+        let sum = self.sum(&marks, lag, rule).ok_or(Refusal::TooFewMarks)?;
+        self.asked.0 = Some(sum.score);
+        let threshold = self.threshold((&sum, marks.len()), rule).ok_or(Refusal::MarksDiffer)?;
+        self.asked.1 = Some(threshold);
         if sum.score < threshold {
-            return None;
+            return Err(Refusal::BelowThreshold);
         }
         let codes = (self.codes, &self.filtered.doubt[..]);
         let clipped = clipped(codes, self.sampling, self.pulse, &self.counted);
         if clipped.is_some_and(|clipped| !clipped.is_one) {
-            return None;
+            return Err(Refusal::ClippedApart);
         }
         let late = match &clipped {
             Some(clipped) => clipped.late,
@@ -106,12 +159,12 @@ impl<'a> Residual<'a> {
             Some(clipped) => self.close(places, late, clipped.photons.max(photons)),
             None => self.take_away(places, late, (photons, rule.excess)),
         }
-        Some(found)
+        Ok(found)
     }
 
     /// The lag, of the one that was found and those beside it, at which the marks are highest together:
     /// what was taken away since may have moved it.
-    fn summit(&mut self, marks: &[i64], lag: i64) -> i64 {
+    pub(super) fn summit(&mut self, marks: &[i64], lag: i64) -> i64 {
         self.sort(marks, lag);
         let signal = &self.filtered.signal;
         let height = |late: i64| -> f32 {
@@ -153,7 +206,7 @@ impl<'a> Residual<'a> {
     }
 
     /// The sum of the marks at `lag`; `None` where too few tell anything.
-    fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
+    pub(super) fn sum(&mut self, marks: &[i64], lag: i64, rule: &Rule) -> Option<Sum> {
         self.sort(marks, lag);
         self.leave_out_clipped();
         let is_enough = self.counted.len() >= rule.fewest(marks.len());
@@ -290,7 +343,7 @@ mod tests {
         let filtered = Filtered { signal, doubt, sigma: SIGMA };
         let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
         let candidate = Candidate { shot: 0, lag: 100, rank: 1.0 };
-        let found = residual.test(&candidate, (&band, &rule));
+        let found = residual.test(&candidate, (&band, &rule)).ok();
         let first = 100 + band.marks(0).next().unwrap() as usize;
         (found, (residual.filtered.signal[first], residual.filtered.doubt[first]))
     }

@@ -62,7 +62,7 @@ impl Filtered {
 
 /// When the channel is blind with its own marks: from `core` ticks before they leave, or earlier where
 /// their light already shows, for `blank` ticks; ascending.
-fn own_marks(
+pub(super) fn own_marks(
     codes: &[i16],
     (pulse, core): (&Pulse, i64),
     band: &Band,
@@ -104,7 +104,7 @@ fn above_noise(codes: &[i16]) -> f32 {
 }
 
 /// The `ranges`, which begin one after the other, those that overlap as one, and no empty ones.
-fn merged(ranges: impl Iterator<Item = Range<i64>>) -> Vec<Range<i64>> {
+pub(super) fn merged(ranges: impl Iterator<Item = Range<i64>>) -> Vec<Range<i64>> {
     let mut merged: Vec<Range<i64>> = Vec::new();
     for range in ranges.filter(|range| !range.is_empty()) {
         match merged.last_mut() {

@@ -12,9 +12,12 @@
 //! 4. The range of a return is that of its marks together, that of clipped pulses that of their edges
 //!    ([`time`]).
 //!
+//! What it saw of one shot is told by the same steps ([`explain`]).
+//!
 //! One channel is decoded after the other, in twelve bytes of memory for each of its samples.
 
 mod cancel;
+mod explain;
 mod filter;
 mod pulse;
 mod search;
@@ -24,7 +27,9 @@ use super::{Receiver, Reject, Return, Returns, Strength};
 use crate::code::Codebook;
 use crate::statistics::{normal_order, normal_quantile};
 use crate::{Samples, ShotLog};
+pub use cancel::Refusal;
 use cancel::{Found, Residual};
+pub use explain::{CancelledEcho, Light, MarkSeen, MarkState, SampledExplanation, Tested};
 use filter::Filtered;
 use pulse::Pulse;
 
@@ -140,7 +145,7 @@ fn find(band: &Band, codes: &[i16], pulse: &Pulse, sampling: &Sampling) -> Vec<F
     let rule = Rule::new(band, sampling, filtered.sigma);
     let candidates = search::candidates((band, &rule), &filtered);
     let mut residual = Residual::new((codes, sampling), pulse, filtered);
-    let mut found = |candidate| residual.test(&candidate, (band, &rule));
+    let mut found = |candidate| residual.test(&candidate, (band, &rule)).ok();
     candidates.into_iter().filter_map(&mut found).collect()
 }
 

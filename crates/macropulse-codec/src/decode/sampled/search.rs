@@ -19,19 +19,7 @@ pub(super) struct Candidate {
 
 /// All candidates of the `band`, the strongest first.
 pub(super) fn candidates((band, rule): (&Band, &Rule), filtered: &Filtered) -> Vec<Candidate> {
-    let told = filtered.signal.iter().zip(&filtered.doubt);
-    let open = told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY });
-    let mut search = Search {
-        band,
-        rule,
-        open: open.collect(),
-        floor: (0..rule.least_of.len()).map(|marks| rule.least(marks)).collect(),
-        least: Vec::with_capacity(LAGS),
-        beyond: Vec::with_capacity(LAGS),
-        standing_out: Vec::new(),
-        marks: Vec::new(),
-        counted: Vec::new(),
-    };
+    let mut search = Search::new((band, rule), filtered);
     let mut all = Vec::new();
     for shot in 0..band.fired.len() {
         search.candidates_of(shot, &mut all);
@@ -44,7 +32,7 @@ pub(super) fn candidates((band, rule): (&Band, &Rule), filtered: &Filtered) -> V
 }
 
 /// What the search for one shot after another needs.
-struct Search<'a> {
+pub(super) struct Search<'a> {
     band: &'a Band<'a>,
     rule: &'a Rule,
     /// The signal, infinite where it tells nothing.
@@ -63,11 +51,33 @@ struct Search<'a> {
     counted: Vec<Mark>,
 }
 
-impl Search<'_> {
-    fn candidates_of(&mut self, shot: usize, all: &mut Vec<Candidate>) {
+impl<'a> Search<'a> {
+    /// The search for the shots of a `band` in its filtered signal.
+    pub fn new((band, rule): (&'a Band<'a>, &'a Rule), filtered: &Filtered) -> Self {
+        let told = filtered.signal.iter().zip(&filtered.doubt);
+        let open = told.map(|(signal, doubt)| if *doubt == 0.0 { *signal } else { f32::INFINITY });
+        Self {
+            band,
+            rule,
+            open: open.collect(),
+            floor: (0..rule.least_of.len()).map(|marks| rule.least(marks)).collect(),
+            least: Vec::with_capacity(LAGS),
+            beyond: Vec::with_capacity(LAGS),
+            standing_out: Vec::new(),
+            marks: Vec::new(),
+            counted: Vec::new(),
+        }
+    }
+
+    /// Looks for the light of `shot` from here on.
+    pub fn look_for(&mut self, shot: usize) {
         let fired = self.band.fired[shot];
         self.marks.clear();
         self.marks.extend(self.band.marks(shot).map(|mark| fired + mark));
+    }
+
+    fn candidates_of(&mut self, shot: usize, all: &mut Vec<Candidate>) {
+        self.look_for(shot);
         let (Some(&first), Some(&last)) = (self.marks.first(), self.marks.last()) else { return };
         // Lags of which a mark is in the record.
         let from = (-last).max(0);
@@ -114,8 +124,8 @@ impl Search<'_> {
         is_peak.then_some(Candidate { shot, lag, rank })
     }
 
-    /// The marks at `lag` together, if enough of them count.
-    fn sum(&mut self, lag: i64) -> Option<Sum> {
+    /// The marks at `lag` of the shot that is looked for together, if enough of them count.
+    pub fn sum(&mut self, lag: i64) -> Option<Sum> {
         self.counted.clear();
         for mark in &self.marks {
             let Ok(place) = usize::try_from(mark + lag) else { continue };
