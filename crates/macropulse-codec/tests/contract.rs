@@ -206,6 +206,7 @@ fn sampled() -> (Receiver, Samples) {
         held_ticks: 0,
         recovery_ticks: 0,
         least_marks: 2,
+        coupling: None,
     };
     let kind = ReceiverKind::Sampled;
     let mut code: Vec<i16> = (0..5000).map(|at| at * 3 % 5 - 2).collect();

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use macropulse::channel::Operating;
-use macropulse::design::{Derived, Design};
+use macropulse::design::{Derived, Design, Detector};
 use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
+use macropulse::predict::deepest_baseline;
 use macropulse_study::record::{defaults, surroundings};
 use serde_json::{Map, Value, json};
 
@@ -47,6 +48,9 @@ pub fn report(
     let mut json = json(design, &derived);
     json["environment"] = json!(surroundings(environment));
     json["sunlight_hz"] = operating.background.into();
+    if let Detector::Sampled(sampled) = &design.detector {
+        json["baseline_photons"] = deepest_baseline(design, sampled).into();
+    }
     json["false_rate_hz"] = operating.false_rate.into();
     json["transmission"] = operating.link.transmission(design.scan.rated_range).into();
     json["memory"] = memory::json(&estimate);
@@ -75,6 +79,18 @@ fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> C
     if let Some(noise) = detector.noise(operating.background) {
         let (rms, threshold) = (short(noise.rms), short(noise.threshold));
         columns.push("noise", format!("{rms} photons rms, the threshold at {threshold}"));
+    }
+    if let Detector::Sampled(sampled) = &design.detector
+        && sampled.low_cutoff > 0.0
+    {
+        let (deepest, room) = (deepest_baseline(design, sampled), sampled.below_zero());
+        let back = short(1e6 / sampled.low_cutoff);
+        let told = format!(
+            "own marks pull it down by {} photons of {} that the converter tells; it comes back in {back} µs",
+            short(deepest),
+            short(room)
+        );
+        columns.push("baseline", told);
     }
     let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
     columns.push("false detections", events);

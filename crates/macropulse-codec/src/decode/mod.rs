@@ -20,7 +20,7 @@ pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
-pub use sampled::{STEPS_OF_TICK, Sampling};
+pub use sampled::{Coupling, STEPS_OF_TICK, Sampling};
 
 use serde::Deserialize;
 

@@ -330,6 +330,9 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
             "simulate it, or --set receiver.kind='\"matched\"'".to_owned(),
         ));
     }
+    if let Detector::Sampled(detector) = &design.detector {
+        return sunk(design, detector, operating.background);
+    }
     let Detector::Linear(linear) = &design.detector else { return None };
     let setting = linear.setting(operating.background);
     let needed = setting.comparator?.apart(&setting, TOLD_APART * setting.threshold);
@@ -355,6 +358,27 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
         )
     })
 }
+
+/// Whether the sensor's own marks pull the baseline of a sampled `detector` below the lowest code: above
+/// that a receiver that knows the coupling adds to the samples what it took from them.
+fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(&'static str, String)> {
+    let deepest = sampled::deepest_baseline(design, detector);
+    let room = detector.below_zero();
+    let most = room - SEEN_BELOW * detector.rms_noise(background);
+    (deepest > most.max(0.0)).then(|| {
+        (
+            "a baseline that the sensor's own marks pull below the lowest code",
+            format!(
+                "they pull it down by {deepest:.0} photons, of {room:.0} that the converter tells; \
+                 simulate it, or take a lower `low_cutoff_khz`, more `isolation_db` or a shorter \
+                 `recovery_ns`"
+            ),
+        )
+    })
+}
+
+/// So many standard deviations of the noise must have room below the baseline.
+const SEEN_BELOW: f64 = 4.0;
 
 /// The least number from `low` to `high` of which `holds` is true, to a part in a million, if it
 /// is false below and true above; `None` where it is not even true of `high`.
