@@ -135,7 +135,7 @@ impl Sample {
             let log = band.shot_log(&self.design);
             let mut light = light_of_echoes(&self.design, &log, []);
             let surfaces = (&self.operating.link, &*self.finishes);
-            channel::echoes(&mut light.trains, surfaces, &log, hits);
+            channel::echoes(&mut light.trains, surfaces, &log, hits, None);
             let response = detectors.response(&log, &light, &mut memory);
             let ticks = tdc::ticks(&self.design, response, 0).ticks;
             done(&mut memory, (log, ticks));

@@ -206,6 +206,7 @@ fn sampled() -> (Receiver, Samples) {
         held_ticks: 0,
         recovery_ticks: 0,
         least_marks: 2,
+        coupling: None,
     };
     let kind = ReceiverKind::Sampled;
     let mut code: Vec<i16> = (0..5000).map(|at| at * 3 % 5 - 2).collect();
@@ -231,7 +232,7 @@ fn a_record_of_another_kind_is_refused() {
     let error = receiver.decode(&codebook(), &log(), &ticks()).unwrap_err();
     assert_eq!(error, Error::Record { wants: "samples", given: "ticks" });
     let error = receiver.explain(&codebook(), (&log(), &ticks()), 0).unwrap_err();
-    assert_says(&error, &["only receivers of ticks are explained"]);
+    assert_says(&error, &["decodes samples", "use a receiver of ticks"]);
 }
 
 #[test]

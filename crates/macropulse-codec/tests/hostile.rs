@@ -7,7 +7,7 @@ use macropulse_codec::code::correlation::{
     CrossCorrelation, aperiodic, balanced, bipolar, periodic,
 };
 use macropulse_codec::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, Sparse};
-use macropulse_codec::decode::{Receiver, ReceiverKind, Sampling};
+use macropulse_codec::decode::{Coupling, Receiver, ReceiverKind, Sampling};
 use macropulse_codec::files::{
     Form, Limits, ShotHeader, ShotReader, ShotWriter, Stream, TickHeader, TickReader, TickWriter,
 };
@@ -95,10 +95,12 @@ prop_compose! {
         full_scale in any::<i16>(),
         numbers in [any_u32(), any_u32()],
         least_marks in any::<u16>(),
+        coupling in proptest::option::of((any::<f64>(), any::<f64>())),
     ) -> Sampling {
         let pulse = if is_sane > 0 { sane } else { pulse };
         let [blank_ticks, recovery_ticks] = numbers;
-        Sampling { pulse, excess, full_scale, blank_ticks, held_ticks: 0, recovery_ticks, least_marks }
+        let coupling = coupling.map(|(low_cutoff, limit)| Coupling { low_cutoff, limit });
+        Sampling { pulse, excess, full_scale, blank_ticks, held_ticks: 0, recovery_ticks, least_marks, coupling }
     }
 }
 
@@ -253,7 +255,9 @@ fn lit_samples() -> impl Strategy<Value = Samples> {
 fn sane_sampling() -> impl Strategy<Value = Sampling> {
     let pulse = proptest::collection::vec(0.1..3.0_f32, 1..40);
     let numbers = (0..40_u32, 0..60_u32, 1..4_u16);
-    (pulse, 1.0..9.0_f64, 1..i16::MAX, numbers).prop_map(|(half, excess, full_scale, numbers)| {
+    let coupling = proptest::option::of((0.0..0.1_f64, 1.0..1.3_f64));
+    let all = (pulse, 1.0..9.0_f64, 1..i16::MAX, numbers, coupling);
+    all.prop_map(|(half, excess, full_scale, numbers, coupling)| {
         let mirrored = half.iter().rev().chain(&half[1..]).copied();
         let (blank_ticks, recovery_ticks, least_marks) = numbers;
         let pulse = mirrored.collect();
@@ -265,6 +269,10 @@ fn sane_sampling() -> impl Strategy<Value = Sampling> {
             held_ticks: 0,
             recovery_ticks,
             least_marks,
+            coupling: coupling.map(|(low_cutoff, limit)| Coupling {
+                low_cutoff,
+                limit: limit * f64::from(full_scale),
+            }),
         }
     })
 }

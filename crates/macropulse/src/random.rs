@@ -39,6 +39,8 @@ pub enum Stage {
     Comparator = 11,
     /// What stands in a scene that is made up. Indexed by row of pixels.
     Scenery = 12,
+    /// How bright an echo is with speckle. Indexed by shot and ray.
+    Speckle = 13,
 }
 
 /// The counter at which a run of random numbers begins.

@@ -108,6 +108,7 @@ pub struct Scans<'a> {
     design: &'a Design,
     scene: &'a Scene,
     operating: Operating,
+    chance: Chance,
     scale: Scale,
     detectors: Detectors<'a>,
     memories: Vec<Memory>,
@@ -121,7 +122,8 @@ impl<'a> Scans<'a> {
     /// As [`scan`].
     pub fn new(design: &'a Design, scene: &'a Scene, seed: u64) -> Result<Self, Error> {
         let operating = Operating::in_scene(design, scene)?;
-        let detectors = Detectors::new(design, &operating, Chance::new(seed));
+        let chance = Chance::new(seed);
+        let detectors = Detectors::new(design, &operating, chance);
         let scan = Scan {
             pieces: Vec::new(),
             score: Score::default(),
@@ -129,7 +131,7 @@ impl<'a> Scans<'a> {
             frame: PointCloud::empty(design, 0),
         };
         let scale = Scale::of(design, &operating);
-        Ok(Self { design, scene, operating, scale, detectors, memories: Vec::new(), scan })
+        Ok(Self { design, scene, operating, chance, scale, detectors, memories: Vec::new(), scan })
     }
 
     /// Scan number `number`, in place of the one before it; `None` if the `watch` said stop before
@@ -173,15 +175,16 @@ impl<'a> Scans<'a> {
 
     /// What the receiver is given of a band.
     pub fn record(&self, band: &Band) -> (ShotLog, Given) {
-        let Self { design, scene, operating, detectors, .. } = self;
-        record::of(&Setup { seen: Seen { design, scene, operating }, detectors }, band)
+        let Self { design, scene, operating, chance, detectors, .. } = self;
+        let seen = Seen { design, scene, operating, chance: *chance };
+        record::of(&Setup { seen, detectors }, band)
     }
 
     /// What comes to the detector in a stretch of the time of a band: truth, for people who ask why;
     /// the receiver is not given it.
     pub fn arrivals(&self, band: &Band, stretch: &Stretch) -> Arrivals {
-        let Self { design, scene, operating, detectors, .. } = self;
-        let setup = Setup { seen: Seen { design, scene, operating }, detectors };
+        let Self { design, scene, operating, chance, detectors, .. } = self;
+        let setup = Setup { seen: Seen { design, scene, operating, chance: *chance }, detectors };
         arrivals::arrivals(&setup, band, stretch)
     }
 
@@ -191,8 +194,8 @@ impl<'a> Scans<'a> {
         watch: &Watch,
         keep: &(dyn Fn(&Record) + Sync),
     ) -> Result<Option<&Scan>, Error> {
-        let Self { design, scene, operating, scale, detectors, memories, scan } = self;
-        let setup = Setup { seen: Seen { design, scene, operating }, detectors };
+        let Self { design, scene, operating, chance, scale, detectors, memories, scan } = self;
+        let setup = Setup { seen: Seen { design, scene, operating, chance: *chance }, detectors };
         let number = bands.first().map_or(0, |band| band.scan);
         scan.frame.scan = number;
         scan.frame.viewpoint = viewpoint(&scene.sensor.at(scan_begins_fs(design, number)));

@@ -237,7 +237,12 @@ fn other_words_are_not_found() {
     let scene = Scene::from_toml(SCENE, "steps.toml", Path::new("")).unwrap();
     let log = macropulse::emit::bands(&design, 0).next().unwrap().shot_log(&design);
     let operating = Operating::of(&design, &scene.environment).unwrap();
-    let seen = Seen { design: &design, scene: &scene, operating: &operating };
+    let seen = Seen {
+        design: &design,
+        scene: &scene,
+        operating: &operating,
+        chance: macropulse::random::Chance::new(0),
+    };
     let light = macropulse::channel::light(&seen, &log, &scene.trace(&design, &log));
     let detectors = Detectors::new(&design, &operating, Chance::new(1));
     let detections = detectors.detections(&log, &light, &mut Default::default());

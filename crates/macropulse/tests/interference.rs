@@ -193,7 +193,11 @@ fn detections(design: &Design, scene: &Scene, band: &Band, is_alone: bool) -> Ve
     let log = band.shot_log(design);
     let traced = if is_alone { Traced::default() } else { scene.trace(design, &log) };
     let operating = Operating::of(design, &scene.environment).unwrap();
-    let light = channel::light(&Seen { design, scene, operating: &operating }, &log, &traced);
+    let light = channel::light(
+        &Seen { design, scene, operating: &operating, chance: Chance::new(0) },
+        &log,
+        &traced,
+    );
     let detectors = Detectors::new(design, &operating, Chance::new(SEED));
     let found = detectors.detections(&log, &light, &mut Memory::default());
     found.time.iter().map(|time| found.epoch * 64 + i64::from(*time)).collect()

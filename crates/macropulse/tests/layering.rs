@@ -130,8 +130,8 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "channel",
-            may_name: &["design", "emit", "environment", "scene", "units"],
-            because: "light arrives whether or not it is detected",
+            may_name: &["design", "emit", "environment", "random", "scene", "units"],
+            because: "light arrives whether or not it is detected; how bright, speckle makes random",
         },
         Rule {
             module: "detect",

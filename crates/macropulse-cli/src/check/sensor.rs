@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use macropulse::channel::Operating;
-use macropulse::design::{Derived, Design};
+use macropulse::channel::{Operating, Speckle};
+use macropulse::design::{Derived, Design, Detector};
 use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
+use macropulse::predict::deepest_baseline;
 use macropulse_study::record::{defaults, surroundings};
 use serde_json::{Map, Value, json};
 
@@ -35,6 +36,15 @@ pub fn report(
     for effect in &design.idealised {
         idealised.push(effect.name(), effect.assumption());
     }
+    if let Some(cells) = speckle_cells(design).filter(|_| design.light.linewidth.is_none())
+        && cells < NEGLIGIBLE
+    {
+        let varies = short(100.0 / cells.sqrt());
+        let told = format!(
+            "each echo brings its mean, which would vary by {varies} %: light.linewidth_ghz"
+        );
+        idealised.push("speckle", told);
+    }
     text += &section("Idealised", &idealised);
     let mut defaults = Columns::default();
     for (key, value) in &design.defaults {
@@ -47,10 +57,23 @@ pub fn report(
     let mut json = json(design, &derived);
     json["environment"] = json!(surroundings(environment));
     json["sunlight_hz"] = operating.background.into();
+    if let Detector::Sampled(sampled) = &design.detector {
+        json["baseline_photons"] = deepest_baseline(design, sampled).into();
+    }
+    json["speckle_cells"] = speckle_cells(design).into();
     json["false_rate_hz"] = operating.false_rate.into();
     json["transmission"] = operating.link.transmission(design.scan.rated_range).into();
     json["memory"] = memory::json(&estimate);
     Ok(Report { text, json })
+}
+
+/// Of so many cells speckle varies the light of an echo by a tenth: less than noise does an echo that is only
+/// just found, by a sixth where that is at six standard deviations of it.
+const NEGLIGIBLE: f64 = 100.0;
+
+/// The speckle cells of an echo from the rated range, square on; `None` where beam or aperture are not known.
+fn speckle_cells(design: &Design) -> Option<f64> {
+    Some(Speckle::of(design)?.cells(design.scan.rated_range, 1.0))
 }
 
 /// What sun and air do to it.
@@ -75,6 +98,18 @@ fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> C
     if let Some(noise) = detector.noise(operating.background) {
         let (rms, threshold) = (short(noise.rms), short(noise.threshold));
         columns.push("noise", format!("{rms} photons rms, the threshold at {threshold}"));
+    }
+    if let Detector::Sampled(sampled) = &design.detector
+        && sampled.low_cutoff > 0.0
+    {
+        let (deepest, room) = (deepest_baseline(design, sampled), sampled.below_zero());
+        let back = short(1e6 / sampled.low_cutoff);
+        let told = format!(
+            "own marks pull it down by {} photons of {} that the converter tells; it comes back in {back} µs",
+            short(deepest),
+            short(room)
+        );
+        columns.push("baseline", told);
     }
     let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
     columns.push("false detections", events);
@@ -161,6 +196,11 @@ fn light(design: &Design, derived: &Derived) -> Columns {
         columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));
     }
     let photons = short(derived.reference_photons);
+    if let Some(cells) = speckle_cells(design).filter(|_| design.light.linewidth.is_some()) {
+        let (varies, range) = (short(100.0 / cells.sqrt()), short(design.scan.rated_range));
+        let told = format!("{} cells at {range} m: an echo varies by {varies} %", short(cells));
+        columns.push("speckle", told);
+    }
     columns.push("sensitivity", format!("{photons} photons per mark from the reference target"));
     columns
 }

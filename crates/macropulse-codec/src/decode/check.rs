@@ -1,6 +1,6 @@
 //! What a receiver must be given; all else is refused before it is looked at.
 
-use super::{Error, MOST_RETURNS, Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};
+use super::{Coupling, Error, MOST_RETURNS, Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};
 use crate::code::Codebook;
 use crate::kernels::ascends;
 use crate::{Record, Samples, ShotLog, Ticks};
@@ -92,7 +92,7 @@ fn sampling(sampling: Option<&Sampling>) -> Result<(), Error> {
     let refuse = |setting: &'static str, value: String, possible: &'static str| {
         Err(Error::Setting { setting, value, possible })
     };
-    let Some(Sampling { pulse, excess, full_scale, least_marks, .. }) = sampling else {
+    let Some(Sampling { pulse, excess, full_scale, least_marks, coupling, .. }) = sampling else {
         return refuse("sampling", "missing".into(), "what is known of the signal that is sampled");
     };
     if pulse.len() % 2 == 0 || pulse.len() > LONGEST_PULSE * STEPS_OF_TICK {
@@ -115,6 +115,14 @@ fn sampling(sampling: Option<&Sampling>) -> Result<(), Error> {
     }
     if *full_scale < 1 {
         return refuse("sampling.full_scale", full_scale.to_string(), "1 to 32767");
+    }
+    if let Some(Coupling { low_cutoff, limit }) = coupling {
+        if !(low_cutoff.is_finite() && (0.0..=1.0).contains(low_cutoff)) {
+            return refuse("sampling.coupling.low_cutoff", low_cutoff.to_string(), "0 to 1");
+        }
+        if !(limit.is_finite() && (f64::from(*full_scale)..=1e9).contains(limit)) {
+            return refuse("sampling.coupling.limit", limit.to_string(), "full_scale or more");
+        }
     }
     match least_marks {
         0 => refuse("sampling.least_marks", "0".into(), "1 or more"),

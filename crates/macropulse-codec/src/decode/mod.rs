@@ -21,8 +21,8 @@ pub use explain::{Accepted, Explanation, OtherLight, Verdict};
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 pub use sampled::{
-    CancelledEcho, Light, MarkSeen, MarkState, Refusal, STEPS_OF_TICK, SampledExplanation,
-    Sampling, Tested,
+    CancelledEcho, Coupling, Light, MarkSeen, MarkState, Refusal, STEPS_OF_TICK,
+    SampledExplanation, Sampling, Tested,
 };
 
 use serde::Deserialize;

@@ -16,10 +16,15 @@ const PASSED: usize = 64;
 /// Lags that are looked at in one go.
 const LANES: usize = 16;
 
-/// Filters `codes` with `taps`, of an odd number: entry n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\],
-/// r being half of their number, with 0 for codes beyond the ends and in the `dark` ranges, which ascend
-/// and do not overlap.
-pub(crate) fn filter(codes: &[i16], taps: &[f32], dark: &[Range<usize>], filtered: &mut [f32]) {
+/// Filters `codes`, with as much more as the `rest` says unless that is empty, with `taps`, of an odd number:
+/// entry n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\], r being half of their number, with 0 for
+/// codes beyond the ends and in the `dark` ranges, which ascend and do not overlap.
+pub(crate) fn filter(
+    (codes, rest): (&[i16], &[f32]),
+    taps: &[f32],
+    dark: &[Range<usize>],
+    filtered: &mut [f32],
+) {
     let reach = taps.len() / 2;
     let mut samples = vec![0.0; BLOCK + 2 * reach];
     for (block, sums) in filtered.chunks_mut(BLOCK).enumerate() {
@@ -30,6 +35,10 @@ pub(crate) fn filter(codes: &[i16], taps: &[f32], dark: &[Range<usize>], filtere
         samples.fill(0.0);
         let place = |at: usize| at + reach - begin;
         convert(&codes[from..until], &mut samples[place(from)..place(until)]);
+        if let Some(rest) = rest.get(from..until) {
+            let samples = samples[place(from)..place(until)].iter_mut();
+            samples.zip(rest).for_each(|(sample, rest)| *sample += rest);
+        }
         let first = dark.partition_point(|dark| dark.end <= from);
         for dark in dark[first..].iter().take_while(|dark| dark.start < until) {
             samples[place(dark.start.max(from))..place(dark.end.min(until))].fill(0.0);
@@ -105,7 +114,12 @@ mod tests {
             codes in proptest::collection::vec(any::<i16>(), 0..2300),
             taps in proptest::collection::vec(-1.0..1.0_f32, 1..8),
             dark in (0..2500_usize, 0..300_usize, 0..300_usize, 0..300_usize),
+            has_rest in any::<bool>(),
         ) {
+            let rest: Vec<f32> = match has_rest {
+                true => (0..codes.len()).map(|at| (at % 17) as f32 / 16.0 - 0.5).collect(),
+                false => Vec::new(),
+            };
             let taps: Vec<f32> = taps.iter().chain(&taps[1..]).copied().collect();
             let reach = taps.len() / 2;
             let first = dark.0.min(codes.len());
@@ -118,7 +132,7 @@ mod tests {
             let dark: Vec<Range<usize>> = dark.step_by(2).collect();
             let sample = |at: usize| match at.checked_sub(reach) {
                 Some(at) if at < codes.len() && !dark.iter().any(|dark| dark.contains(&at)) => {
-                    f32::from(codes[at])
+                    f32::from(codes[at]) + rest.get(at).copied().unwrap_or(0.0)
                 }
                 _ => 0.0,
             };
@@ -128,7 +142,7 @@ mod tests {
             let expected: Vec<f32> = (0..codes.len()).map(sum).collect();
             for (level, found) in at_each_level(|| {
                 let mut filtered = vec![1.0; codes.len()];
-                filter(&codes, &taps, &dark, &mut filtered);
+                filter((&codes, &rest), &taps, &dark, &mut filtered);
                 filtered
             }) {
                 prop_assert_eq!(&found, &expected, "{:?}", level);

@@ -136,6 +136,7 @@ pub fn sampling() -> Sampling {
         held_ticks: 0,
         recovery_ticks: 25,
         least_marks: 2,
+        coupling: None,
     }
 }
 

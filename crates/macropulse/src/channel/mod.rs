@@ -18,15 +18,19 @@ mod interferers;
 mod light;
 mod link;
 mod operating;
+mod speckle;
 
 pub use interferers::APERTURE_RADIUS;
 pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Transmitter};
 pub use link::{FILTER, Link};
 pub use operating::{Error, Idealised, Operating, idealised};
 
+pub use speckle::Speckle;
+
 use macropulse_codec::ShotLog;
 
 use crate::design::Design;
+use crate::random::Chance;
 use crate::scene::{Finish, Hits, SUB_MACROPULSES, Scene, Traced};
 use crate::units::{fs_from_s, tof_from_range, tof_fs_from_ranges};
 
@@ -39,11 +43,13 @@ pub struct Seen<'a> {
     pub scene: &'a Scene,
     /// What follows from the sensor and the environment of the scene.
     pub operating: &'a Operating,
+    /// The random numbers of the run.
+    pub chance: Chance,
 }
 
 /// The light that reaches a sensor while it listens to the shots of `log`, which have met `traced`.
 pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
-    let Seen { design, scene, operating } = *seen;
+    let Seen { design, scene, operating, chance } = *seen;
     let mut light = Light {
         transmitters: vec![Transmitter::of(design, 1.0)],
         background: Background { steady: operating.background, ..Background::default() },
@@ -51,9 +57,12 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
     };
     let finishes = scene.finishes(design.light.wavelength);
     let surfaces = (&operating.link, &*finishes);
+    let speckled = Speckle::simulated(design).map(|speckle| (speckle, chance));
     match traced.sub_macropulses.as_slice() {
-        [] => echoes(&mut light.trains, surfaces, log, &traced.middle),
-        each => echoes_of_sub_macropulses(&mut light.trains, (design, surfaces), log, each),
+        [] => echoes(&mut light.trains, surfaces, log, &traced.middle, speckled),
+        each => {
+            echoes_of_sub_macropulses(&mut light.trains, (design, surfaces), log, each, speckled);
+        }
     }
     start_late(&mut light.trains, design, log);
     interferers::add(&mut light, design, scene, log);
@@ -75,16 +84,39 @@ fn start_late(trains: &mut PulseTrains, design: &Design, log: &ShotLog) {
     }
 }
 
-/// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out.
+/// How bright each of `hits` is with speckle, in its mean: by its shot and its place among those of the shot,
+/// so that the marks of a macropulse that is met in parts share it.
+fn factors<'a>(
+    (speckle, chance): &'a (Speckle, Chance),
+    log: &'a ShotLog,
+    hits: &'a Hits,
+) -> impl Iterator<Item = f64> + 'a {
+    let (mut ray, mut before) = (0, u32::MAX);
+    (0..hits.shot.len()).map(move |i| {
+        let shot = hits.shot[i];
+        ray = if shot == before { ray + 1 } else { 0 };
+        before = shot;
+        let surface = (hits.range[i], f64::from(hits.cosine[i]), f64::from(hits.weight[i]));
+        speckle.factor(chance, (log.first + u64::from(shot), ray), surface)
+    })
+}
+
+/// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out. They are
+/// as bright as they are on average, but for what speckle makes of them.
 pub fn echoes(
     trains: &mut PulseTrains,
     (link, finishes): (&Link, &[Finish]),
     log: &ShotLog,
     hits: &Hits,
+    speckled: Option<(Speckle, Chance)>,
 ) {
     let delay_fs = tof_fs_from_ranges(&hits.range);
     let from = trains.photons.len();
     trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(finishes, hits, i)));
+    if let Some(speckled) = &speckled {
+        let echoes = trains.photons[from..].iter_mut();
+        echoes.zip(factors(speckled, log, hits)).for_each(|(photons, factor)| *photons *= factor);
+    }
     let lit = &trains.photons[from..];
     // Nearly always all of them.
     if lit.iter().all(|&photons| photons > 0.0) {
@@ -126,8 +158,11 @@ fn echoes_of_sub_macropulses(
     (design, (link, finishes)): (&Design, (&Link, &[Finish])),
     log: &ShotLog,
     each: &[Hits],
+    speckled: Option<(Speckle, Chance)>,
 ) {
     let codebook = &design.coding.codebook;
+    let drawn = |hits| speckled.iter().flat_map(|it| factors(it, log, hits)).collect();
+    let factors: Vec<Vec<f64>> = each.iter().map(drawn).collect();
     let mut order: Vec<(u32, u8, usize)> = Vec::new();
     for (sub, hits) in each.iter().enumerate() {
         order.extend(hits.shot.iter().enumerate().map(|(i, shot)| (*shot, sub as u8, i)));
@@ -136,7 +171,8 @@ fn echoes_of_sub_macropulses(
     for met in order.chunk_by(|one, next| one.0 == next.0) {
         for (way, &(shot, sub, i)) in met.iter().enumerate() {
             let hits = &each[usize::from(sub)];
-            let photons = link.echo(finishes, hits, i);
+            let factor = factors[usize::from(sub)].get(i).copied().unwrap_or(1.0);
+            let photons = factor * link.echo(finishes, hits, i);
             if photons <= 0.0 {
                 continue;
             }
@@ -231,7 +267,7 @@ mod tests {
         let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
         let mut trains = PulseTrains::default();
         let link = Link::of(&design, &crate::environment::Environment::vacuum_dark());
-        echoes(&mut trains, (&link, &finishes), &log, &hits);
+        echoes(&mut trains, (&link, &finishes), &log, &hits, None);
         assert_eq!((&trains.shot[..], &trains.way[..]), (&[3, 5][..], &[0, 0][..]));
         let delay_fs = crate::units::fs_from_s(crate::units::tof_from_range(30.0));
         assert_eq!(trains.arrives_fs[1], log.fired_at_fs[5] + delay_fs);

@@ -45,14 +45,15 @@ impl Design {
         let jitter_fs = self.most_jitter_fs();
         // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows.
         let lead_fs = 2 * self.listening_fs() + jitter_fs;
-        let under_way_fs = self.light_fs() + jitter_fs;
+        let model = self.detector.model();
+        let under_way_fs = self.light_fs() + jitter_fs + model.settles_fs();
         Cut {
             tick_fs: self.tdc.tick_fs,
             clock_fs: self.tdc.clock_fs,
             jitter_fs,
             listening_fs: self.listening_fs(),
             lead_fs,
-            history_fs: lead_fs + under_way_fs.max(self.detector.model().memory_fs()),
+            history_fs: lead_fs + under_way_fs.max(model.memory_fs()),
         }
     }
 

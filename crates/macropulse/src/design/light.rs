@@ -27,6 +27,10 @@ pub(super) struct LightFile {
     /// Length of a micropulse, ps, full width at half maximum.
     #[schemars(range(min = 0.001, max = 1e9))]
     pulse_ps: f64,
+    /// Spectral width of the laser's line, GHz, full width at half maximum: with it echoes have speckle; left
+    /// out, each brings its mean.
+    #[schemars(range(min = 0, max = 1e6))]
+    linewidth_ghz: Option<f64>,
     /// Energy of a shot, the mean over its labels (of a flash, of a pixel); with a link budget.
     pub energy: Option<EnergyFile>,
 }
@@ -56,6 +60,8 @@ pub struct Light {
     pub footprint_rays: u32,
     /// Length of one micropulse (full width at half maximum), s.
     pub pulse: f64,
+    /// Spectral width of the laser's line (full width at half maximum), Hz, where speckle is simulated.
+    pub linewidth: Option<f64>,
     /// Its rms length, s, where its light is followed into neighbouring chips; `None` where it is
     /// taken to stay in its own.
     pub spread: Option<f64>,
@@ -91,7 +97,13 @@ impl Check<'_> {
             );
         }
         let pulse = self.within("light.pulse_ps", light.pulse_ps, 1e-3, 1e9)? * 1e-12;
+        let without = footprint_off || off(Effect::LinkBudget);
+        let linewidth = light.linewidth_ghz.filter(|_| !without);
+        let linewidth = linewidth
+            .map(|width| self.within("light.linewidth_ghz", width, 0.0, 1e6))
+            .transpose()?;
         Ok(Light {
+            linewidth: linewidth.map(|width| width * 1e9),
             wavelength: self.within("light.wavelength_nm", light.wavelength_nm, 200.0, 20e3)?
                 * 1e-9,
             beam_diameter: self.within(

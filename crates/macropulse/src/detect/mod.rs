@@ -3,6 +3,7 @@
 //! A detector is a function of [`Light`]. Its events carry no trace of their cause: whether a mark
 //! of the sensor's own, a dark count or an interferer made them cannot be told from here on.
 
+mod baseline;
 mod channel;
 mod clock;
 mod colour;

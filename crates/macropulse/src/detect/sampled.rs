@@ -6,8 +6,11 @@
 //!    light of the sensor's own marks.
 //! 3. Noise of the amplifier and of steady light is added, normal with the covariance that both have behind
 //!    the filter, and with the third cumulant that single photons give it.
-//! 4. The converter rounds to its steps and stops at its limits; behind a clipped pulse the signal stays at
-//!    the limit until the amplifier has recovered.
+//! 4. Where that is more than the converter has codes for, the amplifier is at its limit, and stays there
+//!    behind the pulse until it has recovered.
+//! 5. An amplifier that is coupled by a capacitor lets through what is faster than its low cutoff: the
+//!    baseline sinks with all light, and comes back ([`super::baseline`]).
+//! 6. The converter rounds to its steps and stops at its limits.
 //!
 //! Steady light has no level of its own: the amplifier lets no direct current through
 //! (docs/physics.md#sampled).
@@ -17,6 +20,7 @@ use std::ops::Range;
 use macropulse_codec::{Samples, ShotLog};
 use rand_distr::{Distribution, Gamma, Poisson, StandardNormal};
 
+use super::baseline::Baseline;
 use super::channel::{Arrangement, Channel};
 use super::clock::Clock;
 use super::colour::Colour;
@@ -44,6 +48,8 @@ const NEGLIGIBLE: f64 = 1.0 / 16.0;
 pub(super) struct Sampler {
     sampled: Sampled,
     colour: Colour,
+    /// Where light moves it.
+    baseline: Option<Baseline>,
     tick_fs: i64,
     /// rms length of what a photon becomes, in ticks.
     rms: f64,
@@ -71,6 +77,7 @@ impl Sampler {
         Self {
             sampled: *sampled,
             colour,
+            baseline: Baseline::of(sampled),
             tick_fs,
             rms: in_ticks(front_end.photon_rms()),
             height: front_end.photon_height(),
@@ -91,7 +98,8 @@ impl Sampler {
         let clock = Clock::new(design, *first);
         let mut arrangement = Arrangement::default();
         arrangement.fill(design, &clock, log, light);
-        let worked_out = span.start - self.before..span.end;
+        let known = self.baseline.as_ref().map_or(span.start, |it| it.begins(span.start));
+        let worked_out = known - self.before..span.end;
         let mut signal = Signal::default();
         for channel in arrangement.channels(design, clock, log, light) {
             signal.begin(&worked_out);
@@ -101,7 +109,12 @@ impl Sampler {
             let part = u32::from(channel.number) << PART_BITS;
             self.colour.add((chance, part), signal.first, &mut signal.level);
             samples.channel.push(channel.number);
-            self.convert(&signal.level, &mut samples.code);
+            self.limit(&mut signal.level);
+            if let Some(baseline) = &self.baseline {
+                baseline.take_from(&mut signal.level[self.before as usize..], known);
+            }
+            let skipped = (span.start - signal.first) as usize;
+            self.convert(&signal.level[skipped..], &mut samples.code);
         }
         samples
     }
@@ -183,22 +196,32 @@ impl Sampler {
         (tick, (time_fs - tick * self.tick_fs) as f64 / self.tick_fs as f64)
     }
 
-    /// Appends the codes of a signal, without its beginning.
-    fn convert(&self, level: &[f32], codes: &mut Vec<i16>) {
-        let (lowest, highest) = self.sampled.codes;
-        let [low, high] = [lowest, highest].map(f32::from);
-        let steps = (1.0 / self.sampled.step) as f32;
-        let recovery = self.sampled.held_ticks();
-        codes.reserve(level.len());
+    /// Holds the signal at the limit where it is more than the converter has codes for, and behind that until
+    /// the amplifier has recovered.
+    fn limit(&self, level: &mut [f32]) {
+        let (recovery, limit) = (self.sampled.held_ticks(), self.sampled.limit() as f32);
+        let highest = self.sampled.codes.1;
         let mut held = 0;
-        for (place, level) in level.iter().enumerate() {
-            let code = libm::rintf((level * steps).clamp(low, high)) as i16;
+        for level in level {
             let is_held = held > 0;
-            held = if code == highest { recovery } else { held.saturating_sub(1) };
-            if place as i64 >= self.before {
-                codes.push(if is_held { highest } else { code });
+            let is_clipped = self.code(*level) == highest;
+            held = if is_clipped { recovery } else { held.saturating_sub(1) };
+            if is_clipped || is_held {
+                *level = limit;
             }
         }
+    }
+
+    /// Appends the codes of a signal.
+    fn convert(&self, level: &[f32], codes: &mut Vec<i16>) {
+        codes.extend(level.iter().map(|level| self.code(*level)));
+    }
+
+    /// The code of a signal of so many photons.
+    fn code(&self, level: f32) -> i16 {
+        let [low, high] = [self.sampled.codes.0, self.sampled.codes.1].map(f32::from);
+        let steps = (1.0 / self.sampled.step) as f32;
+        libm::rintf((level * steps).clamp(low, high)) as i16
     }
 }
 

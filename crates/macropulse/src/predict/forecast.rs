@@ -11,7 +11,7 @@ use macropulse_codec::decode::{ReceiverKind, Sampling};
 use super::converters::bank_loss;
 use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, matched, sampled};
-use crate::channel::{self, Operating};
+use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, Sampled};
 use crate::design::{Design, Detector, Tdc};
 use crate::environment::Environment;
@@ -157,8 +157,30 @@ impl<'a> Forecaster<'a> {
         Self { background: self.background * factor, ..self.clone() }
     }
 
-    /// What it will measure of a target of `reflectance` at `range` metres.
+    /// What it will measure of a target of `reflectance` at `range` metres. Where speckle is simulated
+    /// probabilities are the mean over the brightness of an echo, and precision that over the echoes that are
+    /// seen.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
+        let mean = self.of_brightness(reflectance, range);
+        let Some(speckle) = Speckle::simulated(self.design) else { return mean };
+        let (mut pd, mut mark_pd, mut square) = (0.0, 0.0, 0.0);
+        for (brightness, share) in brightnesses(speckle.cells(range, 1.0)) {
+            let one = self.of_brightness(brightness * reflectance, range);
+            pd += share * one.pd;
+            mark_pd += share * one.mark_pd;
+            square += share * one.pd * one.precision.unwrap_or(0.0).powi(2);
+        }
+        let is_seen = pd * FEWEST >= 1.0;
+        Forecast {
+            pd: pd.min(1.0),
+            mark_pd: mark_pd.min(1.0),
+            precision: is_seen.then(|| (square / pd).sqrt()),
+            ..mean
+        }
+    }
+
+    /// The same of an echo that is as bright as it is on average.
+    fn of_brightness(&self, reflectance: f64, range: f64) -> Forecast {
         let (design, operating) = (self.design, &self.operating);
         if let (Detector::Sampled(detector), Some(sampling)) =
             (&design.detector, &design.receiver.sampling)
@@ -319,6 +341,24 @@ impl<'a> Forecaster<'a> {
     }
 }
 
+/// Brightnesses of an echo of so many speckle `cells`, M, in its mean, and the share of each, of the gamma
+/// distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).
+///
+/// Its cube root is nearly normal with the mean 1 − 1/9M and the deviation 1/(3·√M) \[WH31\]: in steps of half
+/// a deviation, to four of them, the density of that is summed.
+fn brightnesses(cells: f64) -> Vec<(f64, f64)> {
+    let (middle, deviation) = (1.0 - 1.0 / (9.0 * cells), 1.0 / (3.0 * cells.sqrt()));
+    let roots = (-8..=8).map(|step| middle + 0.5 * f64::from(step) * deviation);
+    let weight = |root: f64| (3.0 * cells - 1.0) * libm::log(root) - cells * (root.powi(3) - 1.0);
+    let most = weight(middle);
+    let each: Vec<(f64, f64)> = roots
+        .filter(|root| *root > 0.0)
+        .map(|root| (root.powi(3), libm::exp(weight(root) - most)))
+        .collect();
+    let all: f64 = each.iter().map(|(_, share)| share).sum();
+    each.into_iter().map(|(brightness, share)| (brightness, share / all)).collect()
+}
+
 /// What of `design` where it is `operating` has no closed form, and what to do instead.
 fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str, String)> {
     if design.is_coded()
@@ -329,6 +369,9 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
             "receivers that decide bit by bit",
             "simulate it, or --set receiver.kind='\"matched\"'".to_owned(),
         ));
+    }
+    if let Detector::Sampled(detector) = &design.detector {
+        return sunk(design, detector, operating.background);
     }
     let Detector::Linear(linear) = &design.detector else { return None };
     let setting = linear.setting(operating.background);
@@ -356,6 +399,27 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
     })
 }
 
+/// Whether the sensor's own marks pull the baseline of a sampled `detector` below the lowest code: above
+/// that a receiver that knows the coupling adds to the samples what it took from them.
+fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(&'static str, String)> {
+    let deepest = sampled::deepest_baseline(design, detector);
+    let room = detector.below_zero();
+    let most = room - SEEN_BELOW * detector.rms_noise(background);
+    (deepest > most.max(0.0)).then(|| {
+        (
+            "a baseline that the sensor's own marks pull below the lowest code",
+            format!(
+                "they pull it down by {deepest:.0} photons, of {room:.0} that the converter tells; \
+                 simulate it, or take a lower `low_cutoff_khz`, more `isolation_db` or a shorter \
+                 `recovery_ns`"
+            ),
+        )
+    })
+}
+
+/// So many standard deviations of the noise must have room below the baseline.
+const SEEN_BELOW: f64 = 4.0;
+
 /// The least number from `low` to `high` of which `holds` is true, to a part in a million, if it
 /// is false below and true above; `None` where it is not even true of `high`.
 fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
@@ -376,4 +440,22 @@ fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
 /// Time, s, from the opening of the range gate to an echo from `range` metres.
 fn since_opening(design: &Design, range: f64) -> f64 {
     (tof_from_range(range) - tof_from_range(design.scan.min_range)).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean 1 and variance 1/M; control: not 1/2M.
+    #[test]
+    fn brightnesses_are_those_of_the_gamma_distribution() {
+        for cells in [1.0, 3.0, 20.0, 200.0, 1e5] {
+            let all = brightnesses(cells);
+            let mean: f64 = all.iter().map(|(x, share)| share * x).sum();
+            let spread: f64 = all.iter().map(|(x, share)| share * (x - mean).powi(2)).sum();
+            approx::assert_relative_eq!(mean, 1.0, max_relative = 5e-3);
+            approx::assert_relative_eq!(spread * cells, 1.0, max_relative = 3e-2);
+            assert!((2.0 * spread * cells - 1.0).abs() > 0.5);
+        }
+    }
 }

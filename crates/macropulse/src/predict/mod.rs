@@ -14,4 +14,5 @@ mod sidelobes;
 pub mod verdict;
 
 pub use forecast::{Error, Forecast, Forecaster};
+pub use sampled::deepest_baseline;
 pub use sidelobes::Aside;

@@ -243,32 +243,65 @@ impl Axes {
     }
 }
 
+/// When the marks of `shot`, counted along a line, leave, in ticks since the line began.
+fn own_marks(design: &Design, shot: usize) -> impl Iterator<Item = i64> {
+    let coding = &design.coding;
+    let column = shot as u32 % design.scan.columns;
+    let word = coding.first_word + shot as u32 % coding.word_modulus;
+    let fired = in_ticks(design, shot as f64 * design.scan.shortest_period());
+    let chip = coding.chip_fs / design.tdc.tick_fs;
+    let marks = coding.codebook.marks(coding.label_of(column as u16), word as u16);
+    marks.iter().map(move |mark| fired + chip * i64::from(*mark))
+}
+
+/// `time` seconds in whole ticks.
+fn in_ticks(design: &Design, time: f64) -> i64 {
+    (time * FS_PER_S as f64 / design.tdc.tick_fs as f64).round() as i64
+}
+
+/// How far below zero the sensor's own marks pull the baseline of an amplifier that is coupled by a
+/// capacitor, at most, in detected photons; 0 where light does not move it.
+///
+/// Behind each mark it lies ω·Q lower, Q its [charge](Sampled::charge) after it was clipped, and comes back
+/// with exp(−ω·t). The words follow each other along a line until so many have been sent as it remembers.
+pub fn deepest_baseline(design: &Design, sampled: &Sampled) -> f64 {
+    if sampled.low_cutoff == 0.0 {
+        return 0.0;
+    }
+    let step = sampled.low_cutoff * sampled.charge(sampled.stray);
+    let remembered = REMEMBERED / (sampled.low_cutoff * design.scan.shortest_period());
+    let shots = SHOTS.max(remembered.ceil().min(MOST_SHOTS) as usize);
+    let (mut deepest, mut baseline, mut before) = (0.0_f64, 0.0, 0);
+    for mark in (0..shots).flat_map(|shot| own_marks(design, shot)) {
+        let apart = (mark - before) as f64 * sampled.sample;
+        baseline = baseline * libm::exp(-sampled.low_cutoff * apart) + step;
+        (deepest, before) = (deepest.max(baseline), mark);
+    }
+    deepest
+}
+
+/// Time constants after which less than a hundredth of what a mark did to the baseline is left.
+const REMEMBERED: f64 = 5.0;
+
+/// As many shots at most, whatever the baseline remembers: of more each does next to nothing to it.
+const MOST_SHOTS: f64 = 1e5;
+
 /// How many marks of each of some shots come while their channel is not blind with marks of its own:
 /// `rises` ticks before it leaves, the stray light of a mark shows. Shots of a channel follow each other
 /// along a line, word after word.
 fn told(design: &Design, sampling: &Sampling, (tof, rises): (f64, i64)) -> Vec<usize> {
-    let coding = &design.coding;
-    let ticks = |time: f64| (time * FS_PER_S as f64 / design.tdc.tick_fs as f64).round() as i64;
     let period = design.scan.shortest_period();
-    let chip = coding.chip_fs / design.tdc.tick_fs;
     let macropulse = s_from_fs(design.macropulse_fs());
     let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
-    let marks = |shot: usize| -> Vec<i64> {
-        let column = shot as u32 % design.scan.columns;
-        let word = coding.first_word + shot as u32 % coding.word_modulus;
-        let marks = coding.codebook.marks(coding.label_of(column as u16), word as u16);
-        let fired = ticks(shot as f64 * period);
-        marks.iter().map(|mark| fired + chip * i64::from(*mark)).collect()
-    };
-    let own: Vec<i64> = (0..SHOTS + 2 * around).flat_map(marks).collect();
+    let own: Vec<i64> = (0..SHOTS + 2 * around).flat_map(|shot| own_marks(design, shot)).collect();
     // A tick tells nothing if the one beside it is blind, of which the last is the one before `blank_ticks`.
     let blind = |place: i64| {
         own.iter().any(|mark| {
             (mark - rises - 1..=mark + i64::from(sampling.blank_ticks)).contains(&place)
         })
     };
-    let late = ticks(tof);
+    let late = in_ticks(design, tof);
     (around..around + SHOTS)
-        .map(|shot| marks(shot).iter().filter(|mark| !blind(**mark + late)).count())
+        .map(|shot| own_marks(design, shot).filter(|mark| !blind(mark + late)).count())
         .collect()
 }

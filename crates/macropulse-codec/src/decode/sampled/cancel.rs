@@ -312,6 +312,7 @@ mod tests {
             held_ticks: 0,
             recovery_ticks: 0,
             least_marks: 2,
+            coupling: None,
         }
     }
 

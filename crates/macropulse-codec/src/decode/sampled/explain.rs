@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::cancel::{Found, Refusal, Residual};
+use super::coupling::Restored;
 use super::filter::{Filtered, merged, own_marks};
 use super::pulse::Pulse;
 use super::search::{Candidate, Search, candidates};
@@ -168,7 +169,9 @@ impl Receiver {
         let fired = self.fired_since(log, samples.epoch);
         let band = Band { receiver: self, codebook, log, fired, lags: super::lags(self, codebook) };
         let codes = samples.of(log.channel[place]);
-        let explained = Bench::new(&band, (codes, sampling), place).explained(samples.epoch);
+        let restored = Restored::of(codes, sampling);
+        let parts = Restored::parts(&restored, codes);
+        let explained = Bench::new(&band, (parts, sampling), place).explained(samples.epoch);
         let told = |echo: &CancelledEcho| CancelledEcho { shot: shots[echo.shot], ..*echo };
         Ok(SampledExplanation {
             shot,
@@ -182,7 +185,8 @@ impl Receiver {
 /// The channel of one shot, looked at while it is decoded.
 struct Bench<'a> {
     band: &'a Band<'a>,
-    codes: &'a [i16],
+    /// Codes, and what each is more than that: see [`Restored::parts`].
+    parts: (&'a [i16], &'a [f32]),
     sampling: &'a Sampling,
     pulse: Pulse,
     shot: usize,
@@ -193,19 +197,23 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(band: &'a Band<'a>, (codes, sampling): (&'a [i16], &'a Sampling), shot: usize) -> Self {
+    fn new(
+        band: &'a Band<'a>,
+        (parts, sampling): ((&'a [i16], &'a [f32]), &'a Sampling),
+        shot: usize,
+    ) -> Self {
         let pulse = Pulse::new(sampling);
         let marks = band.marks(shot).map(|mark| band.fired[shot] + mark).collect();
         let core = pulse.core() as i64;
-        let own = own_marks(codes, (&pulse, core), band, sampling.blank_ticks);
+        let own = own_marks(parts.0, (&pulse, core), band, sampling.blank_ticks);
         let own = own.into_iter().map(|blind| blind.start - core..blind.end + core);
-        Self { band, codes, sampling, shot, marks, own: merged(own), pulse }
+        Self { band, parts, sampling, shot, marks, own: merged(own), pulse }
     }
 
     /// All but the verdict, of samples from the absolute tick `epoch` on.
     fn explained(&self, epoch: i64) -> SampledExplanation {
         let Self { band, sampling, pulse, shot, .. } = self;
-        let filtered = Filtered::of(self.codes, pulse, band, sampling);
+        let filtered = Filtered::of(self.parts, pulse, band, sampling);
         let (sigma, whole) = (filtered.sigma, filtered.signal.clone());
         let rule = Rule::new(band, sampling, sigma);
         let candidates = candidates((band, &rule), &filtered);
@@ -219,7 +227,7 @@ impl<'a> Bench<'a> {
         let best = (0..score.len()).filter(|at| score[*at].is_finite());
         let best = best.max_by(|one, other| score[*one].total_cmp(&score[*other]));
         let best = best.map(|at| gate.start + at as i64 * step);
-        let mut residual = Residual::new((self.codes, sampling), pulse, filtered);
+        let mut residual = Residual::new((self.parts.0, sampling), pulse, filtered);
         let mut tested = Vec::new();
         let mut cancelled: Vec<Found> = Vec::new();
         let mut seen: Option<(Vec<f32>, i64, Vec<f32>)> = None;

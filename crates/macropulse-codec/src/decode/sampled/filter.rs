@@ -24,12 +24,17 @@ pub(super) struct Filtered {
 }
 
 impl Filtered {
-    /// Filters `codes`, the samples of the `band`.
+    /// Filters `codes`, the samples of the `band`, with the `rest` that they leave out, if any.
     ///
     /// Samples are blind from where a mark of the channel's own rises until it is over, and behind clipped
     /// ones; they are taken for dark ones. A tick tells nothing if the middle of the pulse
     /// that would come there is blind.
-    pub(super) fn of(codes: &[i16], pulse: &Pulse, band: &Band, sampling: &Sampling) -> Self {
+    pub(super) fn of(
+        (codes, rest): (&[i16], &[f32]),
+        pulse: &Pulse,
+        band: &Band,
+        sampling: &Sampling,
+    ) -> Self {
         let mut doubt = vec![0.0; codes.len()];
         let core = pulse.core() as i64;
         let leaves = own_marks(codes, (pulse, core), band, sampling.blank_ticks);
@@ -52,7 +57,7 @@ impl Filtered {
         blind.iter().for_each(|blind| doubt[within(blind, core)].fill(f32::INFINITY));
         let dark: Vec<Range<usize>> = blind.iter().map(|blind| within(blind, 0)).collect();
         let mut signal = vec![0.0; codes.len()];
-        filter(codes, &pulse.taps, &dark, &mut signal);
+        filter((codes, rest), &pulse.taps, &dark, &mut signal);
         let rounding = pulse.taps.iter().map(|tap| tap * tap).sum::<f32>() / 12.0;
         let (level, sigma) = noise(&signal, &doubt, pulse.reach);
         signal.iter_mut().for_each(|signal| *signal -= level);
@@ -97,10 +102,14 @@ pub(super) fn own_marks(
 
 /// A code that noise hardly exceeds.
 fn above_noise(codes: &[i16]) -> f32 {
-    let step = codes.len().div_ceil(PICKED).max(1);
-    let mut picked: Vec<f32> = codes.iter().step_by(step).map(|code| f32::from(*code)).collect();
-    let (level, sigma) = quantiles(&mut picked);
+    let (level, sigma) = usual(codes);
     level + LIGHT * sigma.max(1.0)
+}
+
+/// The median of `codes`, and how far the 15.87 % quantile is below it; 0 of none.
+pub(super) fn usual(codes: &[i16]) -> (f32, f32) {
+    let step = codes.len().div_ceil(PICKED).max(1);
+    quantiles(&mut codes.iter().step_by(step).map(|code| f32::from(*code)).collect::<Vec<f32>>())
 }
 
 /// The `ranges`, which begin one after the other, those that overlap as one, and no empty ones.
@@ -231,6 +240,7 @@ mod tests {
             held_ticks: 0,
             recovery_ticks: 0,
             least_marks: 1,
+            coupling: None,
         };
         let pulse = Pulse::new(&sampling);
         let log = crate::ShotLog::of_one_channel(&[50, 80], &[0, 0]);
@@ -241,7 +251,7 @@ mod tests {
         assert_eq!(own_marks(&codes, (&pulse, 1), &band, 15), [46..65, 79..95]);
         assert!(own_marks(&codes, (&pulse, 1), &band, 0).is_empty());
         // A tick tells nothing if the sample beside it is blind.
-        let filtered = Filtered::of(&codes, &pulse, &band, &sampling);
+        let filtered = Filtered::of((&codes, &[]), &pulse, &band, &sampling);
         let open: Vec<usize> = (0..100).filter(|at| filtered.doubt[*at] == 0.0).collect();
         let expected: Vec<usize> = (0..45).chain(66..78).chain(96..100).collect();
         assert_eq!(open, expected);

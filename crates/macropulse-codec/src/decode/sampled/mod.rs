@@ -1,5 +1,7 @@
 //! The receiver of samples: it adds up what stands at the marks of a word.
 //!
+//! 0. Where the amplifier is coupled by a capacitor, the baseline that light has left behind is added to the
+//!    samples again ([`coupling`]).
 //! 1. The samples of a channel are filtered by a filter matched to the pulse of a mark, so that each mark
 //!    is a number of detected photons at one tick ([`filter`]). How strong the noise is, is estimated from
 //!    them. Ticks at which the sensor's own marks are fired, or that follow clipped samples, tell nothing.
@@ -17,6 +19,7 @@
 //! One channel is decoded after the other, in twelve bytes of memory for each of its samples.
 
 mod cancel;
+mod coupling;
 mod explain;
 mod filter;
 mod pulse;
@@ -29,9 +32,12 @@ use crate::statistics::{normal_order, normal_quantile};
 use crate::{Samples, ShotLog};
 pub use cancel::Refusal;
 use cancel::{Found, Residual};
+use coupling::Restored;
 pub use explain::{CancelledEcho, Light, MarkSeen, MarkState, SampledExplanation, Tested};
 use filter::Filtered;
 use pulse::Pulse;
+
+pub use coupling::Coupling;
 
 /// Steps of a tick in which [`Sampling::pulse`] is given.
 pub const STEPS_OF_TICK: usize = 16;
@@ -56,6 +62,8 @@ pub struct Sampling {
     /// Marks of a word that must tell something, neither blanked nor hidden by brighter light, to decide by
     /// them; of a word of fewer marks all.
     pub least_marks: u16,
+    /// Where the amplifier is coupled by a capacitor: the baseline is taken out of the samples first.
+    pub coupling: Option<Coupling>,
 }
 
 impl Sampling {
@@ -141,7 +149,9 @@ fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
 
 /// All light of the shots of a `band` that is told from noise.
 fn find(band: &Band, codes: &[i16], pulse: &Pulse, sampling: &Sampling) -> Vec<Found> {
-    let filtered = Filtered::of(codes, pulse, band, sampling);
+    let restored = Restored::of(codes, sampling);
+    let (codes, rest) = Restored::parts(&restored, codes);
+    let filtered = Filtered::of((codes, rest), pulse, band, sampling);
     let rule = Rule::new(band, sampling, filtered.sigma);
     let candidates = search::candidates((band, &rule), &filtered);
     let mut residual = Residual::new((codes, sampling), pulse, filtered);

@@ -126,6 +126,7 @@ mod tests {
             held_ticks: 0,
             recovery_ticks: 0,
             least_marks: 1,
+            coupling: None,
         }
     }
 

@@ -54,10 +54,15 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
             found.extend(keys.iter().map(|key| Idle { key: (*key).to_owned(), by, why }));
         }
     };
-    let beam = ["light.divergence_mrad", "light.footprint_rays"];
+    let beam = ["light.divergence_mrad", "light.footprint_rays", "light.linewidth_ghz"];
     add(off(Effect::Footprint), &beam, "idealised", FOOTPRINT);
     let declared = off(Effect::LinkBudget);
-    add(declared, &["light.energy", "optics", "safety"], "idealised", BUDGET);
+    add(
+        declared,
+        &["light.energy", "light.linewidth_ghz", "optics", "safety"],
+        "idealised",
+        BUDGET,
+    );
     for given in file.detector.given() {
         let idle = given.file.idle();
         let (keys, why) =

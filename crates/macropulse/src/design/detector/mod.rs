@@ -31,7 +31,7 @@ pub use front_end::FrontEnd;
 pub use geiger::Geiger;
 pub use linear::{Linear, LinearSetting};
 pub use photon_counting::PhotonCounting;
-pub use sampled::Sampled;
+pub use sampled::{BASELINE_BLOCK, Sampled};
 pub use single_stop::{SingleStop, SingleStopSetting};
 pub(in crate::design) use table::{Before, SensitivityFile, Table};
 
@@ -181,6 +181,12 @@ pub trait Model {
 
     /// For how long, fs, its state depends on the light that it has seen; 0 without memory.
     fn memory_fs(&self) -> i64;
+
+    /// For how long before what is asked of it all light must be known, fs, until what it puts out hangs on
+    /// none before; 0 where each moment stands for itself.
+    fn settles_fs(&self) -> i64 {
+        0
+    }
 
     /// Whether an event may depend on other light than that which makes it: on what came before, or
     /// on what else comes while a gate is open.

@@ -3,7 +3,9 @@
 //! Nothing in it decides: what it hands over are codes, and whether a mark is there is the receiver's
 //! question. What stands here as the probability of a mark is that of one mark by itself.
 
-use macropulse_codec::decode::{STEPS_OF_TICK, Sampling};
+use std::f64::consts::TAU;
+
+use macropulse_codec::decode::{Coupling, STEPS_OF_TICK, Sampling};
 use macropulse_codec::statistics::normal_tail;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -20,6 +22,17 @@ const FOUND: f64 = 5.0;
 
 /// Share of all codes that are above the level without light.
 const ABOVE: f64 = 0.9;
+
+/// Ticks of a block: at the beginning of each the baseline is worked out anew from the blocks before it, so
+/// that it is the same in whichever band the block is worked out. Of 4096, adding up the blocks costs
+/// nothing beside the samples, and what is worked out too much is a few microseconds.
+pub const BASELINE_BLOCK: i64 = 4096;
+
+/// What the baseline forgets is less than this share of a step of the converter.
+const FORGOTTEN: f64 = 1.0 / 16.0;
+
+/// A baseline that remembers more ticks would take more time to be found than the light it is of.
+const MOST_REMEMBERED: f64 = 16_777_216.0;
 
 /// A pulse is told to the receiver to so many of its rms lengths: there it is 4·10⁻⁶ of its height.
 const REACH: f64 = 5.0;
@@ -49,6 +62,10 @@ pub(super) struct File {
     /// Capacitance of the photodiode and the amplifier's input, pF.
     #[schemars(range(min = 0, max = 1e6))]
     capacitance_pf: f64,
+    /// Low-frequency cutoff of the amplifier (3 dB) where it is coupled by a capacitor, kHz: behind strong
+    /// light the baseline lies below zero and comes back with 1/(2π·cutoff). 0 where pulses do not move it.
+    #[schemars(range(min = 0, max = 1e6))]
+    low_cutoff_khz: f64,
     /// Dark current that is multiplied, nA.
     #[schemars(range(min = 0, max = 1e6))]
     dark_current_na: f64,
@@ -91,6 +108,9 @@ pub struct Sampled {
     pub codes: (i16, i16),
     /// A step of a code, in detected photons.
     pub step: f64,
+    /// Angular frequency below which the coupling lets nothing through, 1/s; 0 where pulses do not move the
+    /// baseline.
+    pub low_cutoff: f64,
 }
 
 impl Typed for File {
@@ -151,6 +171,7 @@ impl Typed for File {
         }
         let bits = table.count("bits", self.bits, 4, 15)?;
         let codes = f64::from(1 << bits);
+        let low_cutoff = self.low_cutoff(table, &front_end, (sample, codes))?;
         let isolation = within("isolation_db", self.isolation_db, 300.0)?;
         let mark = budget.energy / table.before.coding.codebook.mean_weight();
         let detected = mark / budget.photon_energy() * budget.efficiency;
@@ -163,14 +184,90 @@ impl Typed for File {
             sample,
             codes: ((-(1.0 - ABOVE) * codes) as i16, (ABOVE * codes) as i16),
             step: table.within("step_photons", self.step_photons, 1e-6, 1e12)?,
+            low_cutoff,
         }))
     }
+}
+
+impl File {
+    /// The low cutoff as an angular frequency, 1/s, of a converter with so many `codes`.
+    ///
+    /// As a hundredth of the bandwidth it takes 2 % away from what follows a mark at once; more, and the pulse
+    /// would no longer be the one that the receiver knows.
+    fn low_cutoff(
+        &self,
+        table: &Table,
+        front_end: &FrontEnd,
+        (sample, codes): (f64, f64),
+    ) -> Result<f64, Error> {
+        let key = "low_cutoff_khz";
+        let cutoff = table.within(key, self.low_cutoff_khz, 0.0, 1e6)? * 1e3;
+        if cutoff == 0.0 {
+            return Ok(0.0);
+        }
+        let highest = front_end.bandwidth / 100.0;
+        let lowest = remembered(codes) / (TAU * MOST_REMEMBERED * sample);
+        if cutoff > highest || cutoff < lowest {
+            let message = format!(
+                "is {}, but must be 0 or lie between {:.3} and {:.0}: below, the baseline remembers more \
+                 than {MOST_REMEMBERED} samples, and 0 leaves it where it is; above a hundredth of the \
+                 bandwidth pulses are no longer those of `bandwidth_mhz`",
+                self.low_cutoff_khz,
+                lowest * 1e-3,
+                highest * 1e-3
+            );
+            return table.refuse_key(key, message);
+        }
+        Ok(TAU * cutoff)
+    }
+}
+
+/// Time constants after which all of a range of so many `codes` is forgotten.
+fn remembered(codes: f64) -> f64 {
+    libm::log(codes / FORGOTTEN)
 }
 
 impl Sampled {
     /// rms noise without light of any lidar, in detected photons.
     pub fn rms_noise(&self, background: f64) -> f64 {
         self.front_end.covariance(0.0, background).sqrt()
+    }
+
+    /// What the amplifier puts out while it is at its limit, in detected photons: the whole range of the
+    /// converter, so that what is clipped is told as such until the baseline lies as far below zero as the
+    /// lowest code does.
+    pub fn limit(&self) -> f64 {
+        f64::from(i32::from(self.codes.1) - i32::from(self.codes.0)) * self.step
+    }
+
+    /// How far below zero the converter tells anything, in detected photons.
+    pub fn below_zero(&self) -> f64 {
+        -f64::from(self.codes.0) * self.step
+    }
+
+    /// Blocks of [`BASELINE_BLOCK`] ticks after which the baseline has forgotten what light there was; 0 where
+    /// light does not move it.
+    pub fn remembered_blocks(&self) -> i64 {
+        if self.low_cutoff == 0.0 {
+            return 0;
+        }
+        let codes = f64::from(i32::from(self.codes.1) - i32::from(self.codes.0));
+        let ticks = remembered(codes) / (self.low_cutoff * self.sample);
+        libm::ceil(ticks / BASELINE_BLOCK as f64) as i64
+    }
+
+    /// Time, s, from the beginning of a clipped pulse or of a shorter one of `photons` behind the amplifier to
+    /// where it ends, times how high it is: what it takes from the baseline is that times `low_cutoff`.
+    pub fn charge(&self, photons: f64) -> f64 {
+        let rms = self.front_end.mark_rms();
+        let full = f64::from(self.codes.1) * self.step;
+        match photons < full {
+            true => photons * rms * TAU.sqrt(),
+            false => {
+                let clipped = 2.0 * rms * (2.0 * libm::log(photons / full)).sqrt() + self.recovery;
+                self.limit() * clipped
+            }
+        }
     }
 
     /// Whole ticks of `time` seconds, rounded up.
@@ -197,6 +294,10 @@ impl Sampled {
             held_ticks: self.held_ticks(),
             recovery_ticks: self.ticks(recovery),
             least_marks,
+            coupling: (self.low_cutoff > 0.0).then(|| Coupling {
+                low_cutoff: self.low_cutoff * self.sample,
+                limit: self.limit() / self.step,
+            }),
         }
     }
 
@@ -235,6 +336,14 @@ impl Model for Sampled {
 
     fn memory_fs(&self) -> i64 {
         0
+    }
+
+    /// The baseline, with the block in which a band begins and one for pulses that are not over there.
+    fn settles_fs(&self) -> i64 {
+        match self.remembered_blocks() {
+            0 => 0,
+            blocks => (blocks + 2) * BASELINE_BLOCK * fs_from_s(self.sample),
+        }
     }
 
     fn refusal(&self, _: f64) -> Option<String> {
