@@ -210,7 +210,7 @@ pub fn decode(
     };
     if given.is_empty() {
         let recorded = if design.is_sampled() { "samples" } else { "ticks" };
-        warned(py, &format!("not a single point: there are no {recorded}"))?;
+        warned(py, format!("not a single point: there are no {recorded}"))?;
     } else if log.row.is_empty() {
         warned(py, "not a single point: there are no shots")?;
     }
