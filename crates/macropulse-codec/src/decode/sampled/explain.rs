@@ -161,17 +161,24 @@ impl Receiver {
         let (Some((shots, log)), Some(sampling)) = (of_channel, &self.sampling) else {
             return Err(Error::NoSuchShot { shot });
         };
-        let place = log.owned.start;
         let decoded = match samples.is_empty() {
             true => self.nothing_of(1),
             false => super::decode(self, codebook, (log, samples), sampling),
         };
-        let fired = self.fired_since(log, samples.epoch);
+        // Where there are no samples nothing but the shot matters, and its own tick is the epoch: that of the
+        // samples, and the times of other shots, may be too far away to be counted.
+        let place = log.owned.start;
+        let (log, epoch) = match samples.is_empty() {
+            true => (&log.part(place..place + 1), self.fired(log, place)),
+            false => (log, samples.epoch),
+        };
+        let place = log.owned.start;
+        let fired = self.fired_since(log, epoch);
         let band = Band { receiver: self, codebook, log, fired, lags: super::lags(self, codebook) };
         let codes = samples.of(log.channel[place]);
         let restored = Restored::of(codes, sampling);
         let parts = Restored::parts(&restored, codes);
-        let explained = Bench::new(&band, (parts, sampling), place).explained(samples.epoch);
+        let explained = Bench::new(&band, (parts, sampling), place).explained(epoch);
         let told = |echo: &CancelledEcho| CancelledEcho { shot: shots[echo.shot], ..*echo };
         Ok(SampledExplanation {
             shot,
