@@ -67,7 +67,7 @@ impl<'a> Band<'a> {
     fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.fired_since(log, ticks.epoch);
-        let late = i64::from(window(receiver.jitter_ticks)) - 1;
+        let late = i64::from(window(receiver.jitter())) - 1;
         let scale = i64::from(receiver.ticks_per_chip);
         let (nearest, farthest) = gate(receiver);
         let lags = (farthest - nearest).max(0) as f64 + 1.0;
@@ -190,11 +190,11 @@ impl<'a> Band<'a> {
             let late = self.ticks[first..].iter().map(|&tick| (i64::from(tick) - from) as usize);
             late.take_while(|late| *late < room).for_each(|late| counts[late] += 1);
         }
-        let (counts, first) = timing::about(width, self.receiver.jitter_ticks, |place| {
+        let (counts, first) = timing::about(width, self.receiver.jitter(), |place| {
             counts.get((place - places.start) as usize).copied().unwrap_or(0)
         });
         let known = Known {
-            sigma: self.receiver.jitter_ticks,
+            sigma: self.receiver.jitter(),
             marks: marks.len() as f64,
             others: others / f64::from(width),
             neighbours: &timing::neighbours(&marks, places.end - places.start),

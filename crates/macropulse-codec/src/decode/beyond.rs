@@ -12,7 +12,7 @@ use std::cell::Cell;
 use std::ops::Range;
 
 use super::field::{self, Field};
-use super::{FARTHEST_JITTER, Receiver, Reject, Return, Returns};
+use super::{Receiver, Reject, Return, Returns};
 use crate::code::Codebook;
 use crate::{ShotLog, Ticks};
 
@@ -43,7 +43,7 @@ pub(super) fn exclude(
     }
     let fired = receiver.fired_since(log, ticks.epoch);
     // Half of the window in which a mark is looked for, and rounding.
-    let slack = 1 + (2.0 * receiver.jitter_ticks).ceil().min(FARTHEST_JITTER / 2.0) as u32;
+    let slack = 1 + (2.0 * receiver.jitter()).ceil() as u32;
     let width = 2 * slack + 1;
     let length = i64::from(codebook.chips() * receiver.ticks_per_chip);
     // What is asked of a return: its macropulse, and as much to both sides.

@@ -15,7 +15,7 @@
 use std::array;
 
 use super::field::{Field, Memory};
-use super::{Energy, FARTHEST_JITTER, MARGIN, MIDDLE, Receiver, Reject, Return, Returns, Window};
+use super::{Energy, MARGIN, MIDDLE, Receiver, Reject, Return, Returns, Window};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -132,8 +132,8 @@ impl<'a> Band<'a> {
         let words: Vec<Vec<i64>> = (0..codebook.words()).map(in_ticks).collect();
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
         // Both the opening tick and the mark jitter: √2 σ between them, of which 2 σ are allowed.
-        let slack = (8_f64.sqrt() * receiver.jitter_ticks).min(FARTHEST_JITTER);
-        let slack = if receiver.jitter_ticks > 0.05 { slack.ceil() as u32 } else { 0 };
+        let slack = 8_f64.sqrt() * receiver.jitter();
+        let slack = if receiver.jitter() > 0.05 { slack.ceil() as u32 } else { 0 };
         let width = 2 * slack + 1;
         let patterns = |width: u32| {
             let bits = |word: &Vec<i64>| word.iter().map(|&mark| mark as usize).collect::<Vec<_>>();

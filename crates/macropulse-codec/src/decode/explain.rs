@@ -201,7 +201,7 @@ impl<'a> Bench<'a> {
         let (nearest, farthest) = receiver.gate_ticks;
         let gate = i64::from(nearest)..i64::from(farthest) + 1;
         let step = ((gate.end - gate.start) as u64).div_ceil(MOST_LAGS) as i64;
-        let width = if is_direct { 1 } else { window(receiver.jitter_ticks) };
+        let width = if is_direct { 1 } else { window(receiver.jitter()) };
         let length = marks.last().map_or(0, |last| i64::from(*last)) + i64::from(width);
         let until = gate.end + length;
         let of_channel =

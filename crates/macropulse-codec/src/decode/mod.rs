@@ -109,8 +109,9 @@ const MARGIN: i64 = 2048;
 /// Where in its tick light comes that only one tick tells of.
 const MIDDLE: f64 = 0.5;
 
-/// How far from its place a mark is looked for at most, in ticks.
-const FARTHEST_JITTER: f64 = 1023.0;
+/// The most jitter that is decoded as such, in ticks: a mark is looked for 2 σ to both sides of its place,
+/// and the ticks that are looked at are limited thereby.
+const MOST_JITTER: f64 = 255.0;
 
 impl ReceiverKind {
     /// Returns of a shot that this receiver can give at most.
@@ -247,6 +248,11 @@ impl Receiver {
         returns
     }
 
+    /// The jitter that is decoded, in ticks.
+    fn jitter(&self) -> f64 {
+        self.jitter_ticks.min(MOST_JITTER)
+    }
+
     /// The absolute tick in which `shot` was fired.
     fn fired(&self, log: &ShotLog, shot: usize) -> i64 {
         log.fired_at_fs[shot].div_euclid(self.tick_fs)
@@ -286,7 +292,7 @@ impl Receiver {
 /// For how many ticks from its earliest place on a mark is looked for: ±2 σ of the jitter and the
 /// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
 fn window(jitter: f64) -> u32 {
-    if jitter > 0.05 { 1 + (4.0 * jitter).ceil().min(FARTHEST_JITTER) as u32 } else { 1 }
+    if jitter > 0.05 { 1 + (4.0 * jitter).ceil() as u32 } else { 1 }
 }
 
 /// The energy of a return as a count of marks tells it.

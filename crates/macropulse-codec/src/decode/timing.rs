@@ -105,7 +105,7 @@ pub(super) fn about(width: u32, sigma: f64, count: impl Fn(i64) -> u32) -> (Vec<
 /// The `width` ticks in which `receiver` looks for what a mark makes, if its light is `late` ticks behind
 /// the beginning of the first.
 pub(super) fn window(receiver: &Receiver, width: u32, late: f64) -> Window {
-    let &Receiver { jitter_ticks: sigma, photons_apart, .. } = receiver;
+    let (sigma, photons_apart) = (receiver.jitter(), receiver.photons_apart);
     let coverage = match width {
         // Jitter that hardly leaves a tick.
         1 => 1.0,

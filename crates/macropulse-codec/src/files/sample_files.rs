@@ -212,6 +212,9 @@ fn unlike(header: &SampleHeader, step: f64, wanted: &SampleHeader) -> Option<Str
             wanted.tick_fs
         ));
     }
+    if tick_fs < 1 {
+        return Some(format!("samples {tick_fs} fs apart, where they are 1 fs or more"));
+    }
     if channels != wanted.channels {
         return Some(format!("{channels} channels, where the sensor has {}", wanted.channels));
     }

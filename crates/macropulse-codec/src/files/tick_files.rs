@@ -61,6 +61,9 @@ impl<R: Read> TickReader<R> {
                 header.tick_fs
             ));
         }
+        if tick_fs < 1 {
+            return source.refuse(format!("ticks of {tick_fs} fs, where one lasts 1 fs or more"));
+        }
         if channels > 1 && !header.several {
             return source.refuse(format!(
                 "the ticks have no channel, and the sensor has {channels} of them"

@@ -105,7 +105,7 @@ impl<'a> Sent<'a> {
     ) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.fired_since(log, epoch);
-        let width = window(receiver.jitter_ticks);
+        let width = window(receiver.jitter());
         let words = words.of(codebook, receiver.ticks_per_chip, width);
         let in_words: Vec<u32> = (0..codebook.words())
             .map(|word| codebook.word(word as u16).marks.len() as u32)

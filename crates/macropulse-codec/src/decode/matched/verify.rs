@@ -452,10 +452,10 @@ impl Band<'_> {
         let lit_bits = sent.bits_that_are(true, shot);
         let count =
             |place: i64| self.field.seen().lit_in_all(light.start + place, lit_bits, &bits.pattern);
-        let (counts, first) = timing::about(sent.width, sent.receiver.jitter_ticks, count);
+        let (counts, first) = timing::about(sent.width, sent.receiver.jitter(), count);
         let beside = self.field.density_without(&light, detection.count, 0);
         let known = Known {
-            sigma: sent.receiver.jitter_ticks,
+            sigma: sent.receiver.jitter(),
             marks: f64::from(sent.weight(shot)),
             others: beside / f64::from(sent.width),
             neighbours: &bits.neighbours,
