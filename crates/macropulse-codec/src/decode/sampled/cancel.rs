@@ -194,13 +194,16 @@ impl<'a> Residual<'a> {
         }
     }
 
-    /// Leaves out clipped marks beside one that is far from being clipped: those are of other light.
+    /// Leaves out marks in whose filtered pulse a clipped sample is, beside one that is far from being
+    /// clipped: those are of other light, or beside it.
     fn leave_out_clipped(&mut self) {
-        let (codes, full_scale) = (self.codes, self.sampling.full_scale);
+        let (codes, full_scale, reach) = (self.codes, self.sampling.full_scale, self.pulse.reach);
         let far = 0.5 * f32::from(full_scale) / self.pulse.highest();
         if self.counted.iter().any(|mark| mark.height < far) {
-            let is_clipped =
-                |mark: &Mark| codes.get(mark.place).is_some_and(|code| *code >= full_scale);
+            let is_clipped = |mark: &Mark| {
+                let end = codes.len().min(mark.place + reach + 1);
+                codes[mark.place.saturating_sub(reach)..end].iter().any(|code| *code >= full_scale)
+            };
             self.counted.retain(|mark| !is_clipped(mark));
         }
     }
@@ -319,6 +322,16 @@ mod tests {
     /// What becomes of a shot whose three marks are so strong at a lag of 100, of which those that are
     /// `blind` tell nothing; and what is left at the first, with how uncertain that is.
     fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, (f32, f32)) {
+        tested_beside([0.0; 3], heights, blind)
+    }
+
+    /// The same where other light, so strong, comes four ticks behind the first mark and the second, and
+    /// four before the last.
+    fn tested_beside(
+        others: [f32; 3],
+        heights: [f32; 3],
+        blind: [bool; 3],
+    ) -> (Option<Found>, (f32, f32)) {
         let words = Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, seed: 1 };
         let family = Family::separated(words).unwrap();
         let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
@@ -329,15 +342,18 @@ mod tests {
         let (fired, lags) = (vec![0], 200);
         let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
         let (mut signal, mut doubt, mut codes) = (vec![0.0; 300], vec![0.0; 300], vec![0; 300]);
-        for ((mark, height), blind) in band.marks(0).zip(heights).zip(blind) {
-            for tick in -8..=8 {
-                let at = (100 + mark + tick) as usize;
-                signal[at] += height * pulse.answer(tick as f64);
-                let code = height * libm::expf(-(tick * tick) as f32 / 2.0) / 10.0;
-                codes[at] = codes[at].max(code.min(1000.0) as i16);
+        for (at, late) in [4, 4, -4].into_iter().enumerate() {
+            let mark = 100 + band.marks(0).nth(at).unwrap();
+            for (height, late) in [(heights[at], 0), (others[at], late)] {
+                for tick in -8..=8 {
+                    let at = (mark + late + tick) as usize;
+                    signal[at] += height * pulse.answer(tick as f64);
+                    let code = height * libm::expf(-(tick * tick) as f32 / 2.0) / 10.0;
+                    codes[at] = codes[at].max(code.min(1000.0) as i16);
+                }
             }
-            if blind {
-                doubt[(100 + mark) as usize] = f32::INFINITY;
+            if blind[at] {
+                doubt[mark as usize] = f32::INFINITY;
             }
         }
         let rule = Rule::new(&band, &sampling, SIGMA);
@@ -375,6 +391,16 @@ mod tests {
         // Three need not: a bright one has light of others.
         let found = tested([600.0, 600.0, 9000.0], [false; 3]).0.unwrap();
         assert!((600.0..700.0).contains(&found.photons), "{}", found.photons);
+    }
+
+    /// Two marks at the rims of clipped light, none of them clipped itself, and noise at the third.
+    #[test]
+    fn rims_of_clipped_light_are_no_marks() {
+        let all = [false; 3];
+        assert!(tested_beside([0.0, 1e5, 1e5], [110.0, 0.0, 0.0], all).0.is_none());
+        // A true one is told by the marks that are left.
+        let found = tested_beside([0.0, 0.0, 1e5], [600.0; 3], all).0.unwrap();
+        assert_eq!((found.marks, found.is_clipped), (2, false));
     }
 
     #[test]
