@@ -5,7 +5,7 @@
 //! `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Effect};
+use crate::design::{Design, Detector, Effect};
 use crate::emit::bands;
 use crate::environment::Environment;
 use crate::scene::Scene;
@@ -41,6 +41,13 @@ const PER_MARK_SEEN: f64 = 20.0;
 /// Of a detection event without light of lidars: its time, before and after it is merged with others,
 /// and its tick.
 const PER_NOISE: f64 = 40.0;
+
+/// Of a sample of a channel: its code, and the same once more where it is written.
+const PER_SAMPLE: f64 = 4.0;
+
+/// Of a sample of the one channel that is simulated or decoded: its signal and noise, filtered, what hides it,
+/// and what the receiver weighs of it.
+const PER_SAMPLE_AT_WORK: f64 = 40.0;
 
 /// The memory of a run, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -124,5 +131,11 @@ fn band(design: &Design, operating: &Operating) -> u64 {
     let marks = shots * design.coding.codebook.mean_weight();
     // A slot of the converters' time is lit or not: noise beyond that is not kept.
     let noise = (operating.false_rate * lasts).min(lasts / tick) * f64::from(design.channels());
-    (shots * per_shot + marks * PER_MARK_SEEN + noise * PER_NOISE) as u64
+    let sampled = match design.detector {
+        Detector::Sampled(_) => {
+            lasts / tick * (f64::from(design.channels()) * PER_SAMPLE + PER_SAMPLE_AT_WORK)
+        }
+        _ => 0.0,
+    };
+    (shots * per_shot + marks * PER_MARK_SEEN + noise * PER_NOISE + sampled) as u64
 }
