@@ -60,7 +60,7 @@ fn mini() -> Desk {
         MINI,
         "version = 1\nname = \"mini\"\nextends = \"coded-32\"\n[scan]\nscans_per_s = 1250.0\n\
          [scan.raster]\nrows = 64\ncolumns = 106\nbeams = 8\nvertical_deg = 3.24\n\
-         horizontal_deg = 5.4\nduty = 1.0\n[light]\nenergy = { shot_nj = 6.0 }\n",
+         horizontal_deg = 5.4\nmirror = \"uniform\"\nduty = 1.0\n[light]\nenergy = { shot_nj = 6.0 }\n",
     );
     desk
 }

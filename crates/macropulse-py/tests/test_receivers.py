@@ -32,6 +32,7 @@ def test_ticks_decode_to_the_points_of_the_simulation(kind):
 SAMPLED = {
     "scan.scans_per_s": 1250.0, "scan.raster.rows": 64, "scan.raster.columns": 106, "scan.raster.beams": 8,
     "scan.raster.vertical_deg": 3.24, "scan.raster.horizontal_deg": 5.4, "scan.raster.duty": 1.0,
+    "scan.raster.mirror": "uniform",
     "light.energy": {"shot_nj": 6.0},
 }
 

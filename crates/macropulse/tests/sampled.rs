@@ -21,6 +21,7 @@ fn ready(name: &str, set: &[(&str, &str)]) -> Design {
     let fewer = [
         ("scan.raster.rows", "64"),
         ("scan.raster.vertical_deg", "3.24"),
+        ("scan.raster.mirror", "uniform"),
         ("scan.raster.duty", "0.048"),
     ];
     let set: Vec<(String, String)> = fewer
@@ -252,6 +253,7 @@ fn a_baseline_is_the_same_in_both_bands_that_see_it() {
     let design = design(&[
         ("detector.sampled.low_cutoff_khz", "10.0"),
         ("scan.scans_per_s", "1200.0"),
+        ("scan.raster.mirror", "uniform"),
         ("scan.raster.duty", "1.0"),
         ("idealised", "['eye-safety']"),
     ]);
@@ -321,6 +323,7 @@ fn bands_that_overlap_have_the_same_samples() {
         "coded-32",
         &[
             ("scan.scans_per_s", "1250.0"),
+            ("scan.raster.mirror", "uniform"),
             ("scan.raster.duty", "1.0"),
             ("scan.raster.columns", "106"),
             ("scan.raster.horizontal_deg", "5.4"),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use macropulse::channel::{Operating, Speckle};
-use macropulse::design::{Derived, Design, Detector};
+use macropulse::design::{Derived, Design, Detector, Mirror, Pattern, Polygon};
 use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
 use macropulse::predict::deepest_baseline;
@@ -117,6 +117,13 @@ fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> C
     columns
 }
 
+/// The polygon of a sensor that has one, and the lines that it draws in a second.
+fn polygon(design: &Design) -> Option<(&Polygon, f64)> {
+    let Pattern::Raster(raster) = &design.scan.pattern else { return None };
+    let Mirror::Polygon(polygon) = &raster.mirror else { return None };
+    Some((polygon, f64::from(raster.lines()) / design.scan.period()))
+}
+
 fn times(design: &Design, derived: &Derived) -> Columns {
     let mut columns = Columns::default();
     let scan = &design.scan;
@@ -139,6 +146,16 @@ fn times(design: &Design, derived: &Derived) -> Columns {
             "",
             format!("{period} ns between shots of the same one of {detectors} detectors"),
         );
+    }
+    if let Some((polygon, lines)) = polygon(design) {
+        let told = format!(
+            "{} facets of {} mm, {} turns a minute, corners at {} m/s",
+            polygon.facets,
+            short(polygon.facet() * 1e3),
+            short(60.0 * polygon.turns(lines)),
+            short(polygon.tip_speed(lines))
+        );
+        columns.push("polygon", told);
     }
     columns.push("shortest dwell", format!("{} ns", short(derived.shortest_dwell * 1e9)));
     columns.push("range gate", format!("{} ns", short(derived.gate * 1e9)));
@@ -221,6 +238,12 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "columns": design.scan.columns,
         "shots_per_scan": design.shots_per_scan(),
         "scan_rate_hz": design.scan.rate_millihertz as f64 * 1e-3,
+        "polygon": polygon(design).map(|(polygon, lines)| json!({
+            "facets": polygon.facets,
+            "facet_mm": polygon.facet() * 1e3,
+            "turns_per_s": polygon.turns(lines),
+            "tip_m_per_s": polygon.tip_speed(lines),
+        })),
         "pixel_period_ns": derived.pixel_period * 1e9,
         "shortest_dwell_ns": derived.shortest_dwell * 1e9,
         "range_gate_ns": derived.gate * 1e9,

@@ -55,7 +55,7 @@ fn samples_are_read_by_what_is_written_of_them() {
         "mini.toml",
         "version = 1\nname = \"mini\"\nextends = \"coded-32\"\n[scan]\nscans_per_s = 2500.0\n\
          [scan.raster]\nrows = 32\ncolumns = 106\nbeams = 8\nvertical_deg = 1.62\n\
-         horizontal_deg = 5.4\nduty = 1.0\n[light]\nenergy = { shot_nj = 4.0 }\n",
+         horizontal_deg = 5.4\nmirror = \"uniform\"\nduty = 1.0\n[light]\nenergy = { shot_nj = 4.0 }\n",
     );
     let _ = desk.json("simulate mini.toml wall --format csv,samples -o out --json");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/samples.py");

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use super::Error;
 use super::parts::Part;
+use super::polygon::POLYGON;
 use super::requirements::Requirements;
 
 /// Words of a code: with ten of them no two shots in flight that are nearer than ten have the same one.
@@ -145,6 +146,9 @@ impl Candidate {
         set("light.energy", energy.into());
         set("light.divergence_mrad", divergence.into());
         set("optics.aperture_mm", (self.aperture * 1e3).into());
+        if let Some(polygon) = required.polygon(self.aperture) {
+            set(&format!("{POLYGON}.diameter_mm"), (polygon.diameter * 1e3).into());
+        }
         set("detector.sampled.efficiency", self.part.efficiency.into());
         set("detector.sampled.gain", self.part.gain.into());
         set("detector.sampled.ionisation_ratio", self.part.ionisation_ratio.into());
@@ -261,7 +265,7 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) {
     }
 }
 
-fn number(table: &Table, path: &str) -> Option<f64> {
+pub(super) fn number(table: &Table, path: &str) -> Option<f64> {
     let mut keys = path.split('.');
     let first = table.get(keys.next()?)?;
     let value = keys.try_fold(first, |value, key| value.get(key))?;

@@ -82,6 +82,8 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     let forecast = with_area(&forecaster, factor).forecast(wanted.reflectance, wanted.range_m);
     let listens = tof_from_range(wanted.range_m);
     let smeared = slant(&design, wanted.range_m).map_or(0.0, |check| check.shortfall);
+    let aperture = candidate.aperture * factor.sqrt();
+    let candidate = Candidate { aperture, ..candidate };
     let limit = if candidate.waits() && listens > period {
         Some((Limit::Time, listens / period))
     } else if smeared > 1.0 {
@@ -89,16 +91,9 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     } else if needed > 1.0 {
         Some((Limit::Light, needed))
     } else {
-        None
+        required.too_fast(&candidate).map(|factor| (Limit::Mirror, factor))
     };
-    let aperture = candidate.aperture * factor.sqrt();
-    Ok(Assessed {
-        candidate: Candidate { aperture, ..candidate },
-        period,
-        pd: forecast.pd,
-        precision: forecast.precision,
-        limit,
-    })
+    Ok(Assessed { candidate, period, pd: forecast.pd, precision: forecast.precision, limit })
 }
 
 /// As with so many times the area of the aperture: light and daylight.

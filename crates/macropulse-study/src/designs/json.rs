@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::requirements::Requirements;
 use super::scenery::Scenery;
 use super::trial::{Counts, Trial};
 use super::{Candidate, Found, Limit};
@@ -10,7 +11,7 @@ impl Found {
     /// All of it as one JSON object; the names of its keys end in their units.
     pub fn json(&self) -> Value {
         let closed = self.assessed.iter().map(|one| {
-            let mut told = candidate(&one.candidate);
+            let mut told = candidate(&self.required, &one.candidate);
             told["period_ns"] = json!(one.period * 1e9);
             told["pd"] = json!(one.pd);
             told["precision_m"] = json!(one.precision);
@@ -22,12 +23,13 @@ impl Found {
             told["what"] = json!(ablation.what);
             told
         });
+        let of = |it: &Trial| trial(&self.required, it);
         json!({
             "requirements": self.required.name,
             "closed_form": closed.collect::<Vec<_>>(),
-            "simulated": self.trials.iter().map(trial).collect::<Vec<_>>(),
-            "coded": self.best[0].as_ref().map(trial),
-            "waiting": self.best[1].as_ref().map(trial),
+            "simulated": self.trials.iter().map(of).collect::<Vec<_>>(),
+            "coded": self.best[0].as_ref().map(of),
+            "waiting": self.best[1].as_ref().map(of),
             "ablations": ablations.collect::<Vec<_>>(),
             "frontier": self.frontier.as_ref().map(|frontier| json!({
                 "reflectances": frontier.reflectances,
@@ -46,13 +48,14 @@ impl Found {
     }
 }
 
-fn candidate(it: &Candidate) -> Value {
+fn candidate(required: &Requirements, it: &Candidate) -> Value {
     json!({
         "name": it.name(),
         "photodiode": it.part.name,
         "marks": it.marks,
         "channels": it.beams,
         "aperture_mm": it.aperture * 1e3,
+        "tip_m_per_s": required.tip_speed(it),
         "energy_nj": it.energy * 1e9,
         "pulse_ps": it.pulse * 1e12,
         "bandwidth_mhz": it.bandwidth * 1e-6,
@@ -68,8 +71,8 @@ fn limit(limit: Option<(Limit, f64)>) -> Value {
     }
 }
 
-fn trial(it: &Trial) -> Value {
-    let mut told = candidate(&it.candidate);
+fn trial(required: &Requirements, it: &Trial) -> Value {
+    let mut told = candidate(required, &it.candidate);
     told["limit"] = limit(it.limit);
     told["found"] = counts(&it.counts);
     told

@@ -13,6 +13,7 @@ impl Limit {
             Self::Time => "time",
             Self::Slant => "slant",
             Self::Light => "light",
+            Self::Mirror => "speed of the polygon",
             Self::Missed => "missed targets",
             Self::False => "false points",
             Self::Wrong => "wrong points",
@@ -30,6 +31,11 @@ pub(super) fn told(limit: Option<(Limit, f64)>) -> String {
         }
         Some((limit, _)) => format!("{}, whatever the factor", limit.name()),
     }
+}
+
+/// Speed of the corners of a polygon, m/s; a dash where there is none.
+fn corners(speed: Option<f64>) -> String {
+    speed.map_or("-".to_owned(), |speed| format!("{speed:.0} m/s"))
 }
 
 /// A share that was counted: at least the one that a single case would be.
@@ -94,12 +100,13 @@ impl Found {
     /// Of each photodiode and number of marks, the fewest beams that do and those with the least aperture.
     fn table_of_parts(&self) -> String {
         let mut text = format!(
-            "  {:<16} {:>5} {:>6} {:>9} {:>9} {:>8} {:>8} {:>9}  {}\n",
+            "  {:<16} {:>5} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>9}  {}\n",
             "photodiode",
             "marks",
             "beams",
             "period",
             "aperture",
+            "corners",
             "energy",
             "pulse",
             "bandwidth",
@@ -108,12 +115,13 @@ impl Found {
         for one in self.outstanding() {
             let it = &one.candidate;
             text += &format!(
-                "  {:<16} {:>5} {:>6} {:>6.0} ns {:>6.1} mm {:>5.1} nJ {:>5.0} ps {:>5.0} MHz  {}\n",
+                "  {:<16} {:>5} {:>6} {:>6.0} ns {:>6.1} mm {:>8} {:>5.1} nJ {:>5.0} ps {:>5.0} MHz  {}\n",
                 it.part.name,
                 it.marks,
                 it.beams,
                 one.period * 1e9,
                 it.aperture * 1e3,
+                corners(self.required.tip_speed(it)),
                 it.energy * 1e9,
                 it.pulse * 1e12,
                 it.bandwidth * 1e-6,

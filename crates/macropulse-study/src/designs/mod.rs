@@ -10,6 +10,7 @@ mod json;
 mod listing;
 mod page;
 mod parts;
+mod polygon;
 mod requirements;
 mod scenery;
 mod search;
@@ -61,6 +62,8 @@ pub enum Limit {
     Slant,
     /// Eyes allow too little light for the largest aperture.
     Light,
+    /// The corners of its polygon would be too fast.
+    Mirror,
     /// Simulated, it misses too many targets.
     Missed,
     /// Simulated, it finds too much where nothing is.

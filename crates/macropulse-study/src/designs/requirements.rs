@@ -93,6 +93,9 @@ pub struct Parts {
     /// Share of the energy that laser class 1 allows.
     #[serde(default = "usual::energy_share")]
     pub energy_share: f64,
+    /// Fastest corners of a polygon, m/s; as fast as they must be unless it is given.
+    #[serde(default)]
+    pub tip_m_per_s: Option<f64>,
 }
 
 /// What is taken where a file leaves something open.
@@ -235,7 +238,7 @@ impl Requirements {
             .map_err(|error| refused("environment", &error.to_string()))?;
         let (template, folder) = super::candidate::template(&parts.sensor, folder)
             .map_err(|message| refused("parts.sensor", &message))?;
-        Ok(Self {
+        let required = Self {
             name: file.name,
             wanted: file.wanted,
             environment,
@@ -244,7 +247,12 @@ impl Requirements {
             template,
             folder,
             text: text.to_owned(),
-        })
+        };
+        if required.parts.tip_m_per_s.is_some() && !required.has_polygon() {
+            let message = format!("has no effect: {} has no polygon", required.parts.sensor);
+            return refuse("parts.tip_m_per_s", &message);
+        }
+        Ok(required)
     }
 
     /// Width and height of a pixel, degrees.
@@ -278,6 +286,7 @@ fn limits(file: &File) -> Vec<(&'static str, f64, f64, f64)> {
         ("parts.energy_share", energy_share, 1e-6, 1.0),
     ];
     limits.extend(aperture_mm.map(|value| ("parts.aperture_mm", value, 0.1, 1e3)));
+    limits.extend(file.parts.tip_m_per_s.map(|value| ("parts.tip_m_per_s", value, 0.1, 1e4)));
     limits.extend(pulse_ps.map(|value| ("parts.pulse_ps", value, 10.0, 1e5)));
     limits
 }

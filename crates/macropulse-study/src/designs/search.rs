@@ -185,14 +185,16 @@ fn fewest_beams(
     assessed: &[Assessed],
     marks: u32,
 ) -> Result<Option<Vec<Trial>>, Error> {
-    let most = bench.required.parts.aperture_mm[1] * 1e-3;
+    let most = |of: &Candidate| bench.required.most_aperture(of.beams).max(of.aperture);
     let candidates = smallest(assessed, marks);
     let with = |candidate: &Candidate, aperture| Candidate { aperture, ..candidate.clone() };
     let mut trials = Vec::new();
     let (mut from, mut to) = (0, candidates.len());
     while from < to {
         let middle = (from + to) / 2;
-        let Some(trial) = bench.trial(&with(candidates[middle], most))? else { return Ok(None) };
+        let Some(trial) = bench.trial(&with(candidates[middle], most(candidates[middle])))? else {
+            return Ok(None);
+        };
         match trial.limit {
             None => to = middle,
             Some(_) => from = middle + 1,
@@ -200,7 +202,7 @@ fn fewest_beams(
         trials.push(trial);
     }
     if let Some(best) = candidates.get(to) {
-        let (mut least, mut does) = (best.aperture, most);
+        let (mut least, mut does) = (best.aperture, most(best));
         for _ in 0..HALVINGS {
             let aperture = ((least * does).sqrt() / ROUND).ceil() * ROUND;
             if aperture >= does {

@@ -142,7 +142,7 @@ mod tests {
         let sensor = schema();
         for (path, told) in [
             ("scan.max_range_m", "a number from 0.01 to 100000"),
-            ("scan.raster.mirror", "\"uniform\" or \"sinusoidal\""),
+            ("scan.raster.mirror", "\"uniform\" or \"sinusoidal\" or { polygon = … }"),
             ("light.energy", "\"class-1\" or { shot_nj = … }"),
             ("idealised", "a list, as [ … ]"),
             ("scan.spinning.lasers[3].origin_mm", "a list of 3 numbers, as [1.0, 2.0, 3.0]"),

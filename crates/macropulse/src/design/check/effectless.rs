@@ -71,6 +71,9 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
             add(true, &[&format!("detector.{}.{key}", given.name)], "idealised", why);
         }
     }
+    for idle in file.scan.idle() {
+        add(true, &[idle.key], idle.by, idle.why);
+    }
     let kind = file.receiver.kind;
     let bitwise = matches!(kind, ReceiverKindFile::Literal | ReceiverKindFile::Blind);
     let sampled = kind == ReceiverKindFile::Sampled;

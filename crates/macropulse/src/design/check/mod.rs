@@ -16,7 +16,9 @@ use super::light::LightFile;
 use super::limits::Check;
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
+use super::{
+    Budget, Coding, Design, Detector, Effect, Error, Light, Mirror, Pattern, Raster, Scan, Tdc,
+};
 use crate::design::tdc::TdcFile;
 use crate::schema;
 use crate::told;
@@ -108,6 +110,7 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     let check = Check { chain };
     faults.keep(check.clock(&design));
     faults.keep(check.timing(&mut design));
+    faults.keep(check.facets(&design));
     if faults.is_empty() { Ok(design) } else { Err(faults.into_error(chain)) }
 }
 
@@ -321,6 +324,31 @@ impl Check<'_> {
             return self.refuse("tdc.resolution_ps", TOO_FINE);
         }
         Ok(())
+    }
+
+    /// The facets of a polygon must hold the light that comes and goes at both ends of a line.
+    fn facets(&self, design: &Design) -> Result<(), Error> {
+        let Pattern::Raster(Raster { mirror: Mirror::Polygon(polygon), grid, .. }) =
+            &design.scan.pattern
+        else {
+            return Ok(());
+        };
+        let beam = (design.light.beam_diameter, "beam");
+        let aperture = design.budget.as_ref().map(|budget| (budget.aperture, "aperture"));
+        let (width, of) = aperture.filter(|aperture| aperture.0 > beam.0).unwrap_or(beam);
+        let widest = polygon.widest(grid.horizontal);
+        if width <= widest {
+            return Ok(());
+        }
+        let message = format!(
+            "at the ends of a line the facets, {:.1} mm wide, hold light of {:.1} mm, and the {of} has \
+             {:.1}: {:.1} or more, or fewer facets",
+            polygon.facet() * 1e3,
+            widest * 1e3,
+            width * 1e3,
+            (polygon.least_diameter(grid.horizontal, width) * 1e4).ceil() * 0.1
+        );
+        self.refuse("scan.raster.mirror.polygon.diameter_mm", message)
     }
 
     /// A macropulse must end before the next one that the same detector sees begins.

@@ -10,6 +10,7 @@ mod flash;
 mod grid;
 mod laser;
 mod model;
+mod polygon;
 mod raster;
 mod rosette;
 mod spinning;
@@ -26,6 +27,7 @@ pub use grid::Grid;
 pub use laser::Laser;
 pub use model::Extent;
 pub(crate) use model::Model;
+pub use polygon::Polygon;
 pub use raster::{Mirror, Raster};
 pub use rosette::{Prism, Rosette};
 pub use spinning::{Firing, Spinning};
@@ -85,6 +87,11 @@ macro_rules! patterns {
                 let all = [$(self.$file.as_ref().map(|file| file as &dyn Typed),)+];
                 all.into_iter().flatten()
             }
+
+            /// The keys of patterns that mean nothing.
+            pub(super) fn idle(&self) -> impl Iterator<Item = Idle> {
+                self.patterns().filter_map(|pattern| pattern.idle())
+            }
         }
     };
 }
@@ -109,6 +116,18 @@ trait Typed {
     /// # Errors
     /// If a value lies outside its limits.
     fn check(&self, check: &Check, period: f64) -> Result<Pattern, Error>;
+
+    /// The key that means nothing, typed or not, because of another one.
+    fn idle(&self) -> Option<Idle> {
+        None
+    }
+}
+
+/// A key without effect, the key of the setting that makes it so, and how.
+pub(super) struct Idle {
+    pub key: &'static str,
+    pub by: &'static str,
+    pub why: &'static str,
 }
 
 /// Where and when the sensor looks.
