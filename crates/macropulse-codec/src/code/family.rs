@@ -3,6 +3,7 @@
 mod chance;
 mod congruence;
 mod listed;
+mod order;
 mod orthogonal;
 mod prime;
 mod separated;

@@ -4,10 +4,11 @@
 //! Let D be the distances from each mark of a word to each later one, of all words together. Every one of
 //! them is `gap` chips or more, and any two are `apart` chips or more from each other. Where two marks
 //! of one word meet two of another, or of itself shifted, a distance is the same: so no more than one mark
-//! does, even of pulses that are up to `apart` chips long.
+//! does, even of pulses that are up to `apart` chips long. A channel is taken to be blind for a `gap` behind
+//! each mark that it sends: the words follow each other so that few are lost by that ([`super::order`]).
 
 use super::super::{CodeWord, Error};
-use super::chance::Chance;
+use super::{chance::Chance, order};
 
 /// Words drawn at random of which all distances between marks differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -57,7 +58,7 @@ pub(super) fn found(family: &Separated) -> Result<Vec<CodeWord>, Error> {
     for attempt in 0..if distances <= room { TRIES } else { 0 } {
         let all = drawn(family, attempt, &mut left);
         if all.len() == words as usize {
-            return Ok(all);
+            return Ok(order::ordered(all, gap));
         }
         most = most.max(all.len() as u32);
     }

@@ -109,9 +109,8 @@ pub(super) fn decode(
             if within.is_empty() {
                 returns.reject(if from < to { Reject::OutsideGate } else { Reject::NoPeak });
             }
-            // Bright light of which a mark is hidden is stronger than faint one with all.
-            let strength =
-                |one: &Found| Strength { peak: 0, light: f32::from(one.marks) * one.photons };
+            // Light of which a mark is hidden is no weaker for that.
+            let strength = |one: &Found| Strength { peak: 0, light: one.photons };
             receiver.pick.keep(receiver.returns.into(), &mut within, strength);
             let tick = samples.epoch + band.fired[shot];
             all.extend(within.iter().map(|one| Return {
