@@ -124,8 +124,11 @@ impl<'a> Run<'a> {
             run.folder = folder.path().display().to_string();
             run.files.push(PAGE.to_owned());
             interrupt.undisturbed(|| {
-                let manifest = run.manifest();
+                let mut manifest = run.manifest();
+                // The page tells nothing of each scan, and a hundred thousand as JSON values are 200 MB.
+                let scans = std::mem::take(&mut manifest.scans);
                 page.write(folder.path(), &manifest.value())?;
+                manifest.scans = scans;
                 manifest.write(folder.path())
             })?;
         }

@@ -182,7 +182,7 @@ impl<'a> Residual<'a> {
     /// more than what may be left of other light.
     fn sort(&mut self, marks: &[i64], lag: i64) {
         self.counted.clear();
-        let Filtered { signal, doubt, sigma } = &self.filtered;
+        let Filtered { signal, doubt, sigma, .. } = &self.filtered;
         for mark in marks {
             let Ok(place) = usize::try_from(mark + lag) else { continue };
             let (Some(&height), Some(&doubt)) = (signal.get(place), doubt.get(place)) else {
@@ -194,15 +194,17 @@ impl<'a> Residual<'a> {
         }
     }
 
-    /// Leaves out marks in whose filtered pulse a clipped sample is, beside one that is far from being
+    /// Leaves out marks in whose filtered pulse a clipped sample counts, beside one that is far from being
     /// clipped: those are of other light, or beside it.
     fn leave_out_clipped(&mut self) {
-        let (codes, full_scale, reach) = (self.codes, self.sampling.full_scale, self.pulse.reach);
+        let (codes, reach, filtered) = (self.codes, self.pulse.reach, &self.filtered);
+        let full_scale = self.sampling.full_scale;
         let far = 0.5 * f32::from(full_scale) / self.pulse.highest();
         if self.counted.iter().any(|mark| mark.height < far) {
             let is_clipped = |mark: &Mark| {
-                let end = codes.len().min(mark.place + reach + 1);
-                codes[mark.place.saturating_sub(reach)..end].iter().any(|code| *code >= full_scale)
+                let within =
+                    mark.place.saturating_sub(reach)..codes.len().min(mark.place + reach + 1);
+                within.into_iter().any(|at| codes[at] >= full_scale && !filtered.is_dark(at))
             };
             self.counted.retain(|mark| !is_clipped(mark));
         }
@@ -357,7 +359,7 @@ mod tests {
             }
         }
         let rule = Rule::new(&band, &sampling, SIGMA);
-        let filtered = Filtered { signal, doubt, sigma: SIGMA };
+        let filtered = Filtered { signal, doubt, dark: Vec::new(), sigma: SIGMA };
         let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
         let candidate = Candidate { shot: 0, lag: 100, rank: 1.0 };
         let found = residual.test(&candidate, (&band, &rule)).ok();

@@ -19,6 +19,8 @@ pub(super) struct Filtered {
     /// Standard deviation of what was taken away from it there; 0 where nothing was, infinite where the
     /// signal tells nothing.
     pub doubt: Vec<f32>,
+    /// Samples that were taken for dark ones, ascending.
+    pub dark: Vec<Range<usize>>,
     /// Standard deviation of the noise.
     pub sigma: f32,
 }
@@ -61,7 +63,13 @@ impl Filtered {
         let rounding = pulse.taps.iter().map(|tap| tap * tap).sum::<f32>() / 12.0;
         let (level, sigma) = noise(&signal, &doubt, pulse.reach);
         signal.iter_mut().for_each(|signal| *signal -= level);
-        Self { signal, doubt, sigma: sigma.max(rounding.sqrt()) }
+        Self { signal, doubt, dark, sigma: sigma.max(rounding.sqrt()) }
+    }
+
+    /// Whether the sample at this place was taken for a dark one.
+    pub(super) fn is_dark(&self, place: usize) -> bool {
+        let after = self.dark.partition_point(|dark| dark.start <= place);
+        after > 0 && place < self.dark[after - 1].end
     }
 }
 
