@@ -60,7 +60,9 @@ impl Requirements {
         };
         let of = |diameter| Polygon { facets, diameter };
         let largest = tip / of(1.0).tip_speed(self.lines(beams));
-        most.min(of((largest / STEP).floor() * STEP).widest(self.horizontal()))
+        let widest = of((largest / STEP).floor() * STEP).widest(self.horizontal());
+        // A little less, so that no rounding asks for the next larger polygon.
+        most.min(widest * (1.0 - 1e-9))
     }
 }
 
