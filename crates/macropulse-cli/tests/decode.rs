@@ -54,6 +54,12 @@ const ROWS: &str = "--set scan.raster.rows";
 /// A sampled sensor of few shots and no pauses, so that its bands overlap.
 const MINI: &str = "mini.toml";
 
+/// The line of the pixel that was explained, in a table of points.
+fn point_of<'a>(points: &'a str, told: &serde_json::Value) -> Option<&'a str> {
+    let pixel = [told["row"].to_string(), told["column"].to_string()];
+    points.lines().find(|line| line.split(',').skip(6).take(2).eq(&pixel))
+}
+
 fn mini() -> Desk {
     let desk = Desk::new();
     desk.put(
@@ -363,8 +369,7 @@ fn an_explanation_says_what_was_decided() {
     assert_eq!(receiver_s, decoded["explained"]);
     let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
     for told in decoded["explained"].as_array().unwrap() {
-        let pixel = format!(",{},{},", told["row"], told["column"]);
-        let line = points.lines().find(|line| line.contains(&pixel));
+        let line = point_of(&points, told);
         assert_eq!(line.is_some(), told["decided"] == "accepted", "{told}");
         if let Some(line) = line {
             let range: f64 = line.split(',').nth(4).unwrap().parse().unwrap();
@@ -410,8 +415,7 @@ fn an_explanation_of_samples_says_what_was_decided() {
     let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
     let (mut accepted, mut refused) = (0, 0);
     for told in decoded["explained"].as_array().unwrap() {
-        let pixel = format!(",{},{},", told["row"], told["column"]);
-        let line = points.lines().find(|line| line.contains(&pixel));
+        let line = point_of(&points, told);
         assert_eq!(line.is_some(), told["decided"] == "accepted", "{told}");
         let why = told["why"].as_str().unwrap();
         match line {
