@@ -147,6 +147,7 @@ impl Candidate {
         set("light.divergence_mrad", divergence.into());
         set("optics.aperture_mm", (self.aperture * 1e3).into());
         if let Some(polygon) = required.polygon(self.aperture) {
+            set(&format!("{POLYGON}.facets"), i64::from(polygon.facets).into());
             set(&format!("{POLYGON}.diameter_mm"), (polygon.diameter * 1e3).into());
         }
         set("detector.sampled.efficiency", self.part.efficiency.into());

@@ -18,8 +18,12 @@ impl Requirements {
         self.facets().is_some()
     }
 
+    /// Facets: as many as draw in no larger share of their time than those of the sensor do.
     fn facets(&self) -> Option<u32> {
-        number(&self.template, &format!("{POLYGON}.facets")).map(|facets| facets as u32)
+        let of_sensor = |key: &str| number(&self.template, key);
+        let (facets, field) =
+            (of_sensor(&format!("{POLYGON}.facets"))?, of_sensor("scan.raster.horizontal_deg")?);
+        Some((facets * field / self.wanted.horizontal_deg + 1e-9).floor().clamp(2.0, 360.0) as u32)
     }
 
     /// The smallest polygon with facets for such an `aperture`, m, and for the beam beside it.
@@ -99,6 +103,10 @@ mod tests {
         assert_eq!(required.polygon(most).map(|polygon| polygon.diameter), Some(0.116));
         // Half as many lines, and the file's own limit holds.
         assert_eq!(required.most_aperture(32), 0.05);
+        // Of a quarter of the field as large a share of the time with four times as many facets.
+        let mut narrow = required;
+        narrow.wanted.horizontal_deg = 10.8;
+        assert_eq!(narrow.polygon(0.04).map(|polygon| polygon.facets), Some(24));
     }
 
     #[test]
