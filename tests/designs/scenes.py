@@ -17,7 +17,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "macropulse"
+from table import PROGRAM, number
+
 SENSOR, PERFECT = "coded-32", "kim-park-2016"
 LEAST = 0.1
 
@@ -55,10 +56,6 @@ def seen(points):
     return lit
 
 
-def grouped(count):
-    return f"{count:,}".replace(",", " ")
-
-
 def main():
     scenes = [one["name"] for one in json.loads(
         subprocess.run([PROGRAM, "scenes", "--json"], check=True, capture_output=True).stdout
@@ -75,8 +72,8 @@ def main():
             empty = outcomes["empty"] + outcomes["false"]
             lit = sum(outcomes.values()) - empty
             print(
-                f"| `{scene}` | {grouped(len(wanted))} | {len(wanted & found) / len(wanted):.2%} | "
-                f"{outcomes['wrong']} of {grouped(lit)} | {outcomes['false']} of {grouped(empty)} |",
+                f"| `{scene}` | {number(len(wanted))} | {100 * len(wanted & found) / len(wanted):.2f} % | "
+                f"{outcomes['wrong']} of {number(lit)} | {outcomes['false']} of {number(empty)} |",
                 flush=True,
             )
 

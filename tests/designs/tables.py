@@ -9,11 +9,10 @@ Sixty rows are simulated, as many to a beam as the whole sensor has: N = 50 880 
 
 import json
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
-PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "macropulse"
+from table import PROGRAM, number, share
 
 # Sixty rows about the horizon.
 ROWS = {"scan.raster.rows": "60", "scan.raster.vertical_deg": "3.0375"}
@@ -103,18 +102,6 @@ def simulate(sensor, scene, changes=()):
 def lit(outcomes):
     """Pixels with an echo."""
     return sum(outcomes[name] for name in ("right", "near", "wrong", "missed"))
-
-
-def share(count, of):
-    """As the pages write it: 1.6·10⁻³."""
-    if not count:
-        return "0"
-    digits, power = f"{count / of:.1e}".split("e")
-    return f"{digits}·10" + str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
-def number(count):
-    return f"{count:,}".replace(",", " ")
 
 
 def wall(sensor, changes):

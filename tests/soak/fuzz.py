@@ -70,8 +70,7 @@ def main():
     parser.add_argument("--keep", action="store_true", help="into docs/hardening.md")
     parser.add_argument("--built", type=Path, help="folder of fuzzers that are built already")
     arguments = parser.parse_args()
-    source = (FUZZ / "Cargo.toml").read_text()
-    targets = arguments.target or re.findall(r'path = "fuzz_targets/(\w+)\.rs"', source)
+    targets = arguments.target or soak.fuzz_targets()
     folder = arguments.built or built()
     counted = FUZZ / "target" / "executions.json"
     counts = json.loads(counted.read_text()) if counted.exists() else {}

@@ -55,8 +55,7 @@ def main():
     parser.add_argument("--target", action="append", help="only this one; repeatable")
     parser.add_argument("--keep", action="store_true", help="into docs/hardening.md")
     arguments = parser.parse_args()
-    source = (soak.ROOT / "fuzz" / "Cargo.toml").read_text()
-    targets = arguments.target or re.findall(r'path = "fuzz_targets/(\w+)\.rs"', source)
+    targets = arguments.target or soak.fuzz_targets()
     program = built()
     counts = json.loads(COUNTED.read_text()) if COUNTED.exists() else {}
     cases = dict.fromkeys(targets, FIRST)

@@ -24,6 +24,11 @@ def program():
     sys.exit("no program: cargo build -p macropulse-cli --release, or name one in MACROPULSE")
 
 
+def fuzz_targets():
+    """Names of the targets of the fuzzers."""
+    return re.findall(r'path = "fuzz_targets/(\w+)\.rs"', (ROOT / "fuzz" / "Cargo.toml").read_text())
+
+
 def files(folder):
     """All files below a folder, each with its bytes, but hidden ones."""
     found = {}

@@ -174,7 +174,7 @@ impl Decoding {
             }
         }
         // Samples of a band are many: each thread holds those of one.
-        let bands_per_thread = if design.sample_header().is_some() { 1 } else { 2 };
+        let bands_per_thread = if design.is_sampled() { 1 } else { 2 };
         let together = if is_live { 1 } else { bands_per_thread * rayon::current_num_threads() };
         Ok(Self {
             stream,

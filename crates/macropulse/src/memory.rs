@@ -5,7 +5,7 @@
 //! `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Detector, Effect};
+use crate::design::{Design, Effect};
 use crate::emit::bands;
 use crate::environment::Environment;
 use crate::scene::Scene;
@@ -131,11 +131,9 @@ fn band(design: &Design, operating: &Operating) -> u64 {
     let marks = shots * design.coding.codebook.mean_weight();
     // A slot of the converters' time is lit or not: noise beyond that is not kept.
     let noise = (operating.false_rate * lasts).min(lasts / tick) * f64::from(design.channels());
-    let sampled = match design.detector {
-        Detector::Sampled(_) => {
-            lasts / tick * (f64::from(design.channels()) * PER_SAMPLE + PER_SAMPLE_AT_WORK)
-        }
-        _ => 0.0,
+    let sampled = match design.is_sampled() {
+        true => lasts / tick * (f64::from(design.channels()) * PER_SAMPLE + PER_SAMPLE_AT_WORK),
+        false => 0.0,
     };
     (shots * per_shot + marks * PER_MARK_SEEN + noise * PER_NOISE + sampled) as u64
 }

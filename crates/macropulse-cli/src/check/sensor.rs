@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use macropulse::channel::{Operating, Speckle};
-use macropulse::design::{Derived, Design, Detector, Mirror, Pattern, Polygon};
+use macropulse::design::{Derived, Design, Detector, Polygon};
 use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
 use macropulse::predict::deepest_baseline;
@@ -119,8 +119,7 @@ fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> C
 
 /// The polygon of a sensor that has one, and the lines that it draws in a second.
 fn polygon(design: &Design) -> Option<(&Polygon, f64)> {
-    let Pattern::Raster(raster) = &design.scan.pattern else { return None };
-    let Mirror::Polygon(polygon) = &raster.mirror else { return None };
+    let (raster, polygon) = design.scan.polygon()?;
     Some((polygon, f64::from(raster.lines()) / design.scan.period()))
 }
 

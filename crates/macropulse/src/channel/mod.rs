@@ -24,7 +24,6 @@ pub use interferers::APERTURE_RADIUS;
 pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Transmitter};
 pub use link::{FILTER, Link};
 pub use operating::{Error, Idealised, Operating, idealised};
-
 pub use speckle::Speckle;
 
 use macropulse_codec::ShotLog;

@@ -3,6 +3,13 @@
 use super::Error;
 use super::document::Chain;
 
+/// A key without effect, the key of the setting that makes it so, and how.
+pub(super) struct Idle {
+    pub key: String,
+    pub by: &'static str,
+    pub why: &'static str,
+}
+
 /// Tests values, and tells where those that are wrong stand.
 pub(super) struct Check<'a> {
     pub chain: &'a Chain,

@@ -37,9 +37,8 @@ pub(super) fn ordered(words: Vec<CodeWord>, gap: u32) -> Vec<CodeWord> {
     let mut search = Search { lost, often: vec![0; 3 * length] };
     let begun = |attempt: u64| {
         let mut order: Vec<usize> = (0..count).collect();
-        let mut chance = Chance::new(attempt, 0);
-        for last in (1..if attempt == 0 { 0 } else { count }).rev() {
-            order.swap(last, chance.below(last as u32 + 1) as usize);
+        if attempt > 0 {
+            Chance::new(attempt, 0).shuffle(&mut order);
         }
         order
     };
@@ -146,7 +145,7 @@ mod tests {
         let mut chance = Chance::new(7, 7);
         for _ in 0..20 {
             let mut other = words.clone();
-            (1..10_u32).rev().for_each(|at| other.swap(at as usize, chance.below(at + 1) as usize));
+            chance.shuffle(&mut other);
             assert!(sum(&other) >= 105, "{}", sum(&other));
         }
     }

@@ -74,9 +74,8 @@ struct Round {
 impl Round {
     fn new(length: u32, round: u64) -> Self {
         let mut order: Vec<u32> = (1..length).collect();
-        let mut chance = Chance::new(round, 0);
-        for last in (1..if round == 0 { 0 } else { order.len() }).rev() {
-            order.swap(last, chance.below(last as u32 + 1) as usize);
+        if round > 0 {
+            Chance::new(round, 0).shuffle(&mut order);
         }
         Self { length, order, taken: vec![false; length as usize], steps: STEPS }
     }

@@ -43,8 +43,8 @@ pub struct SampledExplanation {
     /// The same when its first candidate was tested, or of none at the end: without the light that was found
     /// by then.
     pub left: Vec<f32>,
-    /// The signal behind the matched filter about the marks of `looked_at`, from this tick on, and what of
-    /// it was left then.
+    /// The signal behind the matched filter about the marks at the first lag of `tested`: the tick that it
+    /// begins with, the signal at first, and what of it was left when that lag was tested.
     pub signal: (i64, Vec<f32>, Vec<f32>),
     /// Lags that were tested, in the order in which they were: first those whose light is there for certain.
     /// Of none, the lag with the highest score, as it would have been tested at the end.
@@ -108,7 +108,8 @@ pub enum MarkState {
     Blind,
     /// Light of others was cancelled there, and what is left may be of that.
     Hidden,
-    /// Clipped, where another mark is far from being so: of other light.
+    /// A clipped sample is in its filtered pulse, and another mark is far from being clipped: it is of other
+    /// light, or at the rim of it.
     Clipped,
     /// Not in the record.
     Outside,
@@ -161,16 +162,15 @@ impl Receiver {
         let (Some((shots, log)), Some(sampling)) = (of_channel, &self.sampling) else {
             return Err(Error::NoSuchShot { shot });
         };
-        let decoded = match samples.is_empty() {
-            true => self.nothing_of(1),
-            false => super::decode(self, codebook, (log, samples), sampling),
-        };
         // Where there are no samples nothing but the shot matters, and its own tick is the epoch: that of the
         // samples, and the times of other shots, may be too far away to be counted.
-        let place = log.owned.start;
-        let (log, epoch) = match samples.is_empty() {
-            true => (&log.part(place..place + 1), self.fired(log, place)),
-            false => (log, samples.epoch),
+        let alone;
+        let (log, epoch, decoded) = if samples.is_empty() {
+            alone = log.part(log.owned.clone());
+            (&alone, self.fired(&alone, 0), self.nothing_of(1))
+        } else {
+            let decoded = super::decode(self, codebook, (log, samples), sampling);
+            (log, samples.epoch, decoded)
         };
         let place = log.owned.start;
         let fired = self.fired_since(log, epoch);

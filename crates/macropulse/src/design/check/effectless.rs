@@ -6,16 +6,9 @@
 
 use super::SensorFile;
 use crate::design::document::Typed;
-use crate::design::limits::Check;
+use crate::design::limits::{Check, Idle};
 use crate::design::receiver::ReceiverKindFile;
 use crate::design::{Effect, Error, Label};
-
-/// A key without effect, the key of the setting that makes it so, and how.
-struct Idle {
-    key: String,
-    by: &'static str,
-    why: &'static str,
-}
 
 const FOOTPRINT: &str = "the beam has no width while \"footprint\" is in this list: \
                          --with footprint simulates it";
@@ -48,7 +41,7 @@ pub(super) fn idle_keys(file: &SensorFile, idealised: &[Effect]) -> Vec<String> 
 
 fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     let off = |effect| idealised.contains(&effect);
-    let mut found = Vec::new();
+    let mut found: Vec<Idle> = file.scan.idle().collect();
     let mut add = |holds: bool, keys: &[&str], by, why| {
         if holds {
             found.extend(keys.iter().map(|key| Idle { key: (*key).to_owned(), by, why }));
@@ -70,9 +63,6 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
         for key in keys {
             add(true, &[&format!("detector.{}.{key}", given.name)], "idealised", why);
         }
-    }
-    for idle in file.scan.idle() {
-        add(true, &[idle.key], idle.by, idle.why);
     }
     let kind = file.receiver.kind;
     let bitwise = matches!(kind, ReceiverKindFile::Literal | ReceiverKindFile::Blind);

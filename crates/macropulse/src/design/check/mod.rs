@@ -16,9 +16,7 @@ use super::light::LightFile;
 use super::limits::Check;
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::{
-    Budget, Coding, Design, Detector, Effect, Error, Light, Mirror, Pattern, Raster, Scan, Tdc,
-};
+use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
 use crate::design::tdc::TdcFile;
 use crate::schema;
 use crate::told;
@@ -328,15 +326,12 @@ impl Check<'_> {
 
     /// The facets of a polygon must hold the light that comes and goes at both ends of a line.
     fn facets(&self, design: &Design) -> Result<(), Error> {
-        let Pattern::Raster(Raster { mirror: Mirror::Polygon(polygon), grid, .. }) =
-            &design.scan.pattern
-        else {
-            return Ok(());
-        };
+        let Some((raster, polygon)) = design.scan.polygon() else { return Ok(()) };
+        let horizontal = raster.grid.horizontal;
         let beam = (design.light.beam_diameter, "beam");
         let aperture = design.budget.as_ref().map(|budget| (budget.aperture, "aperture"));
         let (width, of) = aperture.filter(|aperture| aperture.0 > beam.0).unwrap_or(beam);
-        let widest = polygon.widest(grid.horizontal);
+        let widest = polygon.widest(horizontal);
         if width <= widest {
             return Ok(());
         }
@@ -346,7 +341,7 @@ impl Check<'_> {
             polygon.facet() * 1e3,
             widest * 1e3,
             width * 1e3,
-            (polygon.least_diameter(grid.horizontal, width) * 1e4).ceil() * 0.1
+            (polygon.least_diameter(horizontal, width) * 1e4).ceil() * 0.1
         );
         self.refuse("scan.raster.mirror.polygon.diameter_mm", message)
     }

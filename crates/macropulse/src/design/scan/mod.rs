@@ -34,7 +34,7 @@ pub use spinning::{Firing, Spinning};
 pub use table::Table;
 
 use super::Error;
-use super::limits::Check;
+use super::limits::{Check, Idle};
 
 /// The list of all patterns: variant, file in this folder, and name in a sensor file. Every other
 /// list of them follows from this one.
@@ -123,13 +123,6 @@ trait Typed {
     }
 }
 
-/// A key without effect, the key of the setting that makes it so, and how.
-pub(super) struct Idle {
-    pub key: &'static str,
-    pub by: &'static str,
-    pub why: &'static str,
-}
-
 /// Where and when the sensor looks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
@@ -158,6 +151,16 @@ impl Scan {
     /// What its pattern is, in a few words for people.
     pub fn summary(&self) -> String {
         self.model().summary()
+    }
+
+    /// The polygon that leads the beams of a raster, if one does.
+    pub fn polygon(&self) -> Option<(&Raster, &Polygon)> {
+        match &self.pattern {
+            Pattern::Raster(raster @ Raster { mirror: Mirror::Polygon(polygon), .. }) => {
+                Some((raster, polygon))
+            }
+            _ => None,
+        }
     }
 
     /// What its pattern answers.

@@ -9,9 +9,9 @@ use serde::Deserialize;
 use super::grid::{self, Grid};
 use super::model::{Extent, Model, Moment};
 use super::polygon::Polygon;
-use super::{Directions, Idle, Pattern, Typed};
+use super::{Directions, Pattern, Typed};
 use crate::design::Error;
-use crate::design::limits::Check;
+use crate::design::limits::{Check, Idle};
 use crate::design::safety::{Beams, Line, Lines};
 
 /// Line by line.
@@ -150,7 +150,7 @@ impl Typed for File {
 
     fn idle(&self) -> Option<Idle> {
         matches!(self.mirror, MirrorFile::Polygon { .. }).then_some(Idle {
-            key: "scan.raster.duty",
+            key: "scan.raster.duty".to_owned(),
             by: "scan.raster.mirror",
             why: "the facets of a polygon and the field give it",
         })
