@@ -57,6 +57,12 @@ phase_ns = {phase}
 drift_ppm = {drift}
 """
 
+# The words that the study found for both.
+WORDS_OF_THE_STUDY = (
+    "[[0,127,158],[0,50,170],[0,21,214],[0,66,142],[0,149,237],"
+    "[0,71,132],[0,56,231],[0,81,181],[0,95,203],[0,188,225]]"
+)
+
 # One change of coded-16 at a time; words of as many chips as they need.
 CHANGES = [
     ("nothing", {}),
@@ -70,6 +76,7 @@ CHANGES = [
         "gaps from 0.8 ns",
         {"code.family": "{separated={length=60,weight=3,words=10,gap=2,apart=1,seed=1}}"},
     ),
+    ("the words of the study", {"code.family": f"{{list={{length=238,marks={WORDS_OF_THE_STUDY}}}}}"}),
     (
         "two marks",
         {"code.family": "{separated={length=238,weight=2,words=10,gap=20,apart=5,seed=1}}"},

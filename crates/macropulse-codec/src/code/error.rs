@@ -69,6 +69,16 @@ pub enum Error {
         /// Most words of a family.
         possible: u32,
     },
+    /// Echoes of a word come while too many others are sent.
+    #[error(
+        "words that follow each other for later = {later} words are not possible; use 0 to {possible}"
+    )]
+    Later {
+        /// What was asked for.
+        later: u32,
+        /// Most words behind each other.
+        possible: u32,
+    },
     /// There are not so many orthogonal words, whoever looks for them.
     #[error(
         "{words} words of {weight} marks in {length} chips cannot be orthogonal; there are {bound} \

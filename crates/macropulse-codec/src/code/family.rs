@@ -2,8 +2,8 @@
 
 mod chance;
 mod congruence;
+mod followers;
 mod listed;
-mod order;
 mod orthogonal;
 mod prime;
 mod separated;
@@ -66,7 +66,12 @@ pub enum Family {
     Sparse(Sparse),
     /// Words of which all distances between marks differ. Made by [`Family::separated`].
     #[non_exhaustive]
-    Separated(Separated),
+    Separated {
+        /// What was asked for.
+        asked: Separated,
+        /// What was found.
+        words: Arc<[CodeWord]>,
+    },
     /// Words written out. Made by [`Family::listed`].
     #[non_exhaustive]
     Listed {
@@ -155,7 +160,8 @@ impl Family {
     /// Where the length is not 1 to 65535, the weight not 1 to 64, the number of words not 1 to 4096, or
     /// a search finds fewer.
     pub fn separated(separated: Separated) -> Result<Self, Error> {
-        separated::found(&separated).map(|_| Self::Separated(separated))
+        let words = separated::found(&separated)?.into();
+        Ok(Self::Separated { asked: separated, words })
     }
 
     /// The words of `length` chips that are lit at `marks`: for each word its chips, counted from 0.
@@ -194,9 +200,7 @@ impl Family {
             Self::Sparse(sparse) => {
                 (0..sparse.words).map(|index| sparse::word(sparse, index)).collect()
             }
-            // Found once, it is found again.
-            Self::Separated(separated) => separated::found(separated).unwrap_or_default(),
-            Self::Listed { words } => words.to_vec(),
+            Self::Separated { words, .. } | Self::Listed { words } => words.to_vec(),
             &Self::MSequence { degree } => vec![shift_register::m_sequence(degree)],
             &Self::Gold { degree } => shift_register::gold(degree),
             Self::Single => vec![CodeWord { length: 1, marks: vec![0] }],
@@ -210,10 +214,10 @@ impl Family {
             &Self::ExtendedPrime { p } | &Self::ExtendedQuadraticCongruence { p } => {
                 p * (2 * p - 1)
             }
-            &Self::Orthogonal { length, .. }
-            | &Self::Sparse(Sparse { length, .. })
-            | &Self::Separated(Separated { length, .. }) => length,
-            Self::Listed { words } => words.first().map_or(1, |word| word.length),
+            &Self::Orthogonal { length, .. } | &Self::Sparse(Sparse { length, .. }) => length,
+            Self::Separated { words, .. } | Self::Listed { words } => {
+                words.first().map_or(1, |word| word.length)
+            }
             &Self::MSequence { degree } | &Self::Gold { degree } => shift_register::length(degree),
             Self::Single => 1,
         }
@@ -227,10 +231,12 @@ impl Family {
             | Self::ExtendedPrime { p }
             | Self::QuadraticCongruence { p }
             | Self::ExtendedQuadraticCongruence { p } => *p as usize,
-            Self::Orthogonal { weight, .. }
-            | Self::Sparse(Sparse { weight, .. })
-            | Self::Separated(Separated { weight, .. }) => *weight as usize,
-            Self::Listed { words } => words.iter().map(CodeWord::weight).max().unwrap_or(0),
+            Self::Orthogonal { weight, .. } | Self::Sparse(Sparse { weight, .. }) => {
+                *weight as usize
+            }
+            Self::Separated { words, .. } | Self::Listed { words } => {
+                words.iter().map(CodeWord::weight).max().unwrap_or(0)
+            }
             Self::MSequence { degree } => 1 << (degree - 1),
             &Self::Gold { degree } => shift_register::gold_weight(degree),
             Self::Single => 1,
@@ -244,10 +250,8 @@ impl Family {
             Self::QuadraticCongruence { p } | Self::ExtendedQuadraticCongruence { p } => {
                 *p as usize - 1
             }
-            Self::Orthogonal { words, .. }
-            | Self::Sparse(Sparse { words, .. })
-            | Self::Separated(Separated { words, .. }) => *words as usize,
-            Self::Listed { words } => words.len(),
+            Self::Orthogonal { words, .. } | Self::Sparse(Sparse { words, .. }) => *words as usize,
+            Self::Separated { words, .. } | Self::Listed { words } => words.len(),
             Self::Gold { degree } => (1 << degree) + 1,
             Self::MSequence { .. } | Self::Single => 1,
         }
@@ -271,7 +275,7 @@ impl fmt::Display for Family {
             Self::Sparse(Sparse { length, weight, gap, .. }) => {
                 write!(f, "sparse {length}, {weight}, {gap} apart")
             }
-            Self::Separated(Separated { length, weight, gap, apart, .. }) => {
+            Self::Separated { asked: Separated { length, weight, gap, apart, .. }, .. } => {
                 write!(f, "separated {length}, {weight}, {gap} and {apart} apart")
             }
             Self::Listed { .. } => write!(f, "list {}, {}", self.length(), self.weight()),
@@ -319,6 +323,7 @@ mod tests {
                 words: 5,
                 gap: 4,
                 apart: 3,
+                later: 2,
                 seed: 1,
             }),
             Family::listed(9, vec![vec![0, 8], vec![3], vec![0, 1, 2]]),

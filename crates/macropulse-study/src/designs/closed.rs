@@ -225,7 +225,7 @@ impl CostFunction for Cost<'_> {
         let (part, marks, beams) = self.parts;
         if marks > 1 {
             // Longer marks take longer words, for which there is no time.
-            let lasts = self.required.macropulse(marks, (pulse, bandwidth))?;
+            let lasts = self.required.macropulse((marks, beams), (pulse, bandwidth))?;
             let over = lasts / self.required.mean_period(beams);
             if over > 1.0 {
                 return Ok(MOST.ln() + beside + over);

@@ -1,5 +1,6 @@
 //! What a search found, as text for people.
 
+use super::candidate::SCHEMES;
 use super::frontier::{CHANNELS, Frontier};
 use super::scenery::Scenery;
 use super::trial::{Counts, Trial};
@@ -153,7 +154,7 @@ impl Found {
     /// What the search comes to: a sentence for each answer.
     pub fn verdict(&self) -> Columns {
         let mut columns = Columns::default();
-        for (name, best) in ["coded", "waiting"].into_iter().zip(&self.best) {
+        for (name, best) in SCHEMES.into_iter().zip(&self.best) {
             columns.push(
                 name,
                 match best {

@@ -27,6 +27,8 @@ pub struct Requirements {
     pub detectors: Vec<Part>,
     /// The sensor whose keys are taken where nothing is searched, as it was written.
     pub(super) template: Table,
+    /// The shortest over the mean time between shots of its channels, where no polygon decides that.
+    pub(super) burst: f64,
     /// Where files lie that the template names.
     pub(super) folder: PathBuf,
     /// The text of the file: what decides all that is found.
@@ -236,7 +238,7 @@ impl Requirements {
         let environment = file.environment.as_deref().unwrap_or("clear-day");
         let environment = Environment::named(environment)
             .map_err(|error| refused("environment", &error.to_string()))?;
-        let (template, folder) = super::candidate::template(&parts.sensor, folder)
+        let (template, folder, burst) = super::candidate::template(&parts.sensor, folder)
             .map_err(|message| refused("parts.sensor", &message))?;
         let required = Self {
             name: file.name,
@@ -245,6 +247,7 @@ impl Requirements {
             parts,
             detectors,
             template,
+            burst,
             folder,
             text: text.to_owned(),
         };

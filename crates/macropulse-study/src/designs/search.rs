@@ -104,13 +104,6 @@ impl Requirements {
     }
 }
 
-/// The shortest time, s, between shots of a channel that has so many beams beside it.
-pub(super) fn period(required: &Requirements, design: &Design, beams: u32) -> f64 {
-    let per_beam = design.scan.shortest_period() / f64::from(design.channels());
-    debug_assert!(required.wanted.rows.is_multiple_of(beams));
-    per_beam * f64::from(beams)
-}
-
 /// Every combination of photodiode, marks and beams that has time enough, in closed form.
 fn assess_all(required: &Requirements, watch: &Watch) -> Result<Option<Vec<Assessed>>, Error> {
     let mut combinations: Vec<(&Part, u32)> = Vec::new();
@@ -136,22 +129,23 @@ fn assess_beams(required: &Requirements, part: &Part, marks: u32) -> Result<Vec<
     let (energy, part) = (DIM, part.clone());
     let bare = Candidate { part, marks: 1, beams: most, pulse, bandwidth, energy, aperture };
     let design = bare.design(required)?;
-    let time = |beams: u32| period(required, &design, beams);
+    let time = |beams: u32| required.shortest_period(beams);
     let listens = tof_from_range(required.wanted.range_m);
+    let has_time = |beams: u32, shape: (f64, f64)| -> Result<bool, Error> {
+        if marks == 1 {
+            return Ok(time(beams) >= listens);
+        }
+        let is_between = (SOONEST..=2.0 * listens).contains(&time(beams));
+        Ok(is_between && required.macropulse((marks, beams), shape)? <= required.mean_period(beams))
+    };
     let possible = |shape: (f64, f64)| -> Result<Vec<u32>, Error> {
-        let lasts = match marks {
-            1 => 0.0,
-            _ => required.macropulse(marks, shape)?,
-        };
-        let has_time = |beams: &&u32| match marks {
-            1 => time(**beams) >= listens,
-            _ => {
-                let [soonest, latest] = [SOONEST, 2.0 * listens];
-                (soonest..=latest).contains(&time(**beams))
-                    && lasts <= required.mean_period(**beams)
+        let mut all = Vec::new();
+        for beams in beams {
+            if has_time(*beams, shape)? {
+                all.push(*beams);
             }
-        };
-        Ok(beams.iter().filter(has_time).copied().collect())
+        }
+        Ok(all)
     };
     let roughly = possible((pulse, bandwidth))?;
     let apart = if marks == 1 { listens } else { APART };

@@ -91,6 +91,10 @@ pub(super) struct SeparatedFile {
     /// Every two distances, of all words, differ by so many chips at least.
     #[serde(default = "one")]
     apart: u32,
+    /// Up to how many words later an echo of a word may come, 0 to 16. A channel is blind for `gap` chips behind
+    /// each mark that it sends: words are looked for of which no echo loses two marks to that, or few.
+    #[serde(default = "two")]
+    later: u32,
     /// What the words are drawn by.
     seed: u64,
 }
@@ -110,6 +114,11 @@ fn one() -> u32 {
     1
 }
 
+/// The shots that are under way in a channel of `coded-32`.
+fn two() -> u32 {
+    2
+}
+
 /// The code family that a sensor file names.
 pub(super) fn family(file: FamilyFile) -> Result<Family, code::Error> {
     match file {
@@ -123,8 +132,8 @@ pub(super) fn family(file: FamilyFile) -> Result<Family, code::Error> {
         FamilyFile::Sparse(SparseFile { length, weight, words, gap, seed }) => {
             Family::sparse(Sparse { length, weight, words, gap, seed })
         }
-        FamilyFile::Separated(SeparatedFile { length, weight, words, gap, apart, seed }) => {
-            Family::separated(Separated { length, weight, words, gap, apart, seed })
+        FamilyFile::Separated(SeparatedFile { length, weight, words, gap, apart, later, seed }) => {
+            Family::separated(Separated { length, weight, words, gap, apart, later, seed })
         }
         FamilyFile::List(ListFile { length, marks }) => Family::listed(length, marks),
         FamilyFile::MSequence(degree) => Family::m_sequence(degree),

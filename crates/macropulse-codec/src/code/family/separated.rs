@@ -5,10 +5,11 @@
 //! them is `gap` chips or more, and any two are `apart` chips or more from each other. Where two marks
 //! of one word meet two of another, or of itself shifted, a distance is the same: so no more than one mark
 //! does, even of pulses that are up to `apart` chips long. A channel is taken to be blind for a `gap` behind
-//! each mark that it sends: the words follow each other so that few are lost by that ([`super::order`]).
+//! each mark that it sends: an echo loses two marks to that at no range, where there is room, and else at few
+//! ([`super::followers`]).
 
 use super::super::{CodeWord, Error};
-use super::{chance::Chance, order};
+use super::{chance::Chance, followers};
 
 /// Words drawn at random of which all distances between marks differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -23,6 +24,8 @@ pub struct Separated {
     pub gap: u32,
     /// And differs by so many at least from every other one.
     pub apart: u32,
+    /// Up to how many words later an echo of a word may come, 0 to 16: the shots of a channel in flight.
+    pub later: u32,
     /// What the words are drawn by.
     pub seed: u64,
 }
@@ -32,6 +35,9 @@ const MOST_MARKS: u32 = 64;
 
 /// More words of three marks do not fit into the longest word.
 const MOST_WORDS: u32 = 4096;
+
+/// More words behind each other have no room.
+const MOST_LATER: u32 = 16;
 
 /// Places looked at at most, for each mark that there is: half a second.
 const MOST_LOOKED_AT: u64 = 1 << 25;
@@ -43,7 +49,7 @@ const TRIES: u32 = 32;
 
 /// As many words as were asked for.
 pub(super) fn found(family: &Separated) -> Result<Vec<CodeWord>, Error> {
-    let &Separated { length, weight, words, gap, apart, .. } = family;
+    let &Separated { length, weight, words, gap, apart, later, .. } = family;
     super::checked_length(length, weight)?;
     if weight > MOST_MARKS {
         return Err(Error::Weight { weight, length: length.min(MOST_MARKS) });
@@ -52,13 +58,18 @@ pub(super) fn found(family: &Separated) -> Result<Vec<CodeWord>, Error> {
         return Err(Error::Words { words, possible: MOST_WORDS });
     }
     let (mut most, mut left) = (0, MOST_LOOKED_AT);
+    if later > MOST_LATER {
+        return Err(Error::Later { later, possible: MOST_LATER });
+    }
     // So many distances must lie apart; more tries do not help where they cannot.
     let distances = u64::from(words) * u64::from(weight) * u64::from(weight - 1) / 2;
     let room = u64::from(length.saturating_sub(gap)) / u64::from(apart.max(1)) + 1;
     for attempt in 0..if distances <= room { TRIES } else { 0 } {
         let all = drawn(family, attempt, &mut left);
         if all.len() == words as usize {
-            return Ok(order::ordered(all, gap));
+            // Behind those with which families are begun.
+            let mut chance = Chance::new(family.seed, TRIES.into());
+            return Ok(followers::redrawn(family, all, &mut chance));
         }
         most = most.max(all.len() as u32);
     }
@@ -82,29 +93,38 @@ fn drawn(family: &Separated, attempt: u32, left: &mut u64) -> Vec<CodeWord> {
     words
 }
 
+impl Separated {
+    /// Marks a `distance`, and what is nearer to it than `apart`, as `taken`.
+    pub(super) fn take(&self, taken: &mut [bool], distance: usize) {
+        let apart = self.apart.max(1) as usize;
+        let end = (distance + apart).min(taken.len());
+        taken[(distance + 1).saturating_sub(apart)..end].fill(true);
+    }
+}
+
 /// A word with marks at places drawn among all that are possible, and the distances that are `taken` then.
-fn word(
+pub(super) fn word(
     family: &Separated,
     mut taken: Vec<bool>,
     (chance, left): (&mut Chance, &mut u64),
 ) -> Option<(Vec<u16>, Vec<bool>)> {
-    let apart = family.apart.max(1) as usize;
+    let [gap, apart] = [family.gap, family.apart].map(|chips| chips.max(1) as usize);
     let mut marks = vec![0_usize];
+    let mut distances = Vec::new();
     while marks.len() < family.weight as usize {
         *left = left.checked_sub(taken.len() as u64 * marks.len() as u64)?;
         let fits = |place: &usize| {
-            let mut distances: Vec<usize> =
-                marks.iter().map(|mark| place.abs_diff(*mark)).collect();
-            distances.sort_unstable();
-            distances[0] >= family.gap.max(1) as usize
-                && distances.iter().all(|distance| !taken[*distance])
-                && distances.windows(2).all(|pair| pair[1] - pair[0] >= apart)
+            distances.clear();
+            distances.extend(marks.iter().map(|mark| place.abs_diff(*mark)));
+            distances.iter().all(|distance| *distance >= gap && !taken[*distance]) && {
+                distances.sort_unstable();
+                distances.windows(2).all(|pair| pair[1] - pair[0] >= apart)
+            }
         };
         let possible: Vec<usize> = (1..taken.len()).filter(fits).collect();
         let place = *possible.get(chance.below(possible.len() as u32) as usize)?;
-        for distance in marks.iter().map(|mark| place.abs_diff(*mark)) {
-            let end = (distance + apart).min(taken.len());
-            taken[(distance + 1).saturating_sub(apart)..end].fill(true);
+        for mark in &marks {
+            family.take(&mut taken, place.abs_diff(*mark));
         }
         marks.push(place);
     }
@@ -118,7 +138,7 @@ mod tests {
     use super::*;
 
     const D2: Separated =
-        Separated { length: 238, weight: 3, words: 10, gap: 20, apart: 5, seed: 1 };
+        Separated { length: 238, weight: 3, words: 10, gap: 20, apart: 5, later: 2, seed: 1 };
 
     /// All distances between marks of all words, counted here pair by pair.
     fn distances(words: &[CodeWord]) -> Vec<u16> {
@@ -141,6 +161,7 @@ mod tests {
                 words,
                 gap,
                 apart,
+                later: 2,
                 seed,
             };
             for family in [

@@ -334,7 +334,8 @@ mod tests {
         heights: [f32; 3],
         blind: [bool; 3],
     ) -> (Option<Found>, (f32, f32)) {
-        let words = Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, seed: 1 };
+        let words =
+            Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, later: 0, seed: 1 };
         let family = Family::separated(words).unwrap();
         let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
         let (sampling, log) = (sampling(), ShotLog::of_one_channel(&[0], &[0]));
