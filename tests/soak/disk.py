@@ -18,12 +18,17 @@ SCAN = ["simulate", soak.SENSOR, "street", *soak.SMALL, "-q"]
 LINES = {
     "simulate": [*SCAN, "--scans", "2", "--format", "pcd,ply,las,laz,npy,csv,e57,mcap,png,ticks", "--truth",
                  "-o", "out"],
+    "simulate, samples": ["simulate", *soak.SAMPLED, "street", "-q", "--scans", "2", "--format", "pcd,samples",
+                          "-o", "out"],
     "sweep": ["sweep", soak.SENSOR, "street", *soak.SMALL, "-q", "--seeds", "2",
               "--vary", "detector.photon-counting.missed_marks=0,0.5", "-o", "out"],
     "convert": ["convert", "in/scan-000000.pcd", "-o", "out/cloud.laz", "-q"],
     "view": ["view", "in", "-o", "out/page.html", "-q"],
     "decode": ["decode", "--sensor", soak.SENSOR, *soak.SMALL, "in/shots-000000.mps", "in/ticks-000000.mpt",
                "--format", "pcd,csv", "-o", "out", "-q"],
+    "decode, samples": ["decode", "--sensor", *soak.SAMPLED, "sampled/shots-000000.mps",
+                        "sampled/samples-000000.mpw", "--format", "pcd", "-o", "out", "-q"],
+    "design": ["design", "requirements.toml", "-o", "out", "-q"],
 }
 
 
@@ -43,11 +48,16 @@ def main():
         subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", shim, source, "-ldl"], check=True)
         made = soak.run([*SCAN, "--scans", "1", "--format", "pcd,ticks", "-o", "in"], cwd=folder)
         assert made[0] == 0, made
+        made = soak.run(["simulate", *soak.SAMPLED, "street", "-q", "--format", "samples", "-o", "sampled"], cwd=folder)
+        assert made[0] == 0, made
+        (folder / "requirements.toml").write_text(soak.REQUIREMENTS)
         for name, words in LINES.items():
             (folder / "out").mkdir()
             code, told = soak.run(words, cwd=folder)
             assert code == 0, (name, told)
             whole = soak.files(folder / "out")
+            shutil.rmtree(folder / "out")
+            (folder / "out").mkdir()
             counted = folder / "calls"
             base = {**os.environ, "LD_PRELOAD": str(shim), "ENOSPC_UNDER": str(folder / "out")}
             soak.run(words, cwd=folder, env={**base, "ENOSPC_COUNT": str(counted)})

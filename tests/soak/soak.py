@@ -13,6 +13,30 @@ REPORT = ROOT / "docs" / "hardening.md"
 SMALL = ["--set", "scan.raster.rows=8", "--set", "scan.raster.columns=24"]
 SENSOR = "kim-park-2016-fixed"
 
+# The same of a sensor whose converters give samples: two of its beams, as dense in time.
+SAMPLED = ["coded-32", "--without", "eye-safety", "--set", "scan.scans_per_s=10000", "--set", "scan.raster.rows=4",
+           "--set", "scan.raster.beams=2", "--set", "scan.raster.columns=24", "--set", "scan.raster.vertical_deg=0.2",
+           "--set", "scan.raster.horizontal_deg=1.2", "--set", "scan.raster.mirror=uniform",
+           "--set", "scan.raster.duty=0.8"]
+
+# A search for a lidar that takes seconds, and finds one.
+REQUIREMENTS = """version = 1
+name = "small"
+[wanted]
+rows = 30
+columns = 212
+horizontal_deg = 10.8
+vertical_deg = 1.52
+scans_per_s = 800.0
+range_m = 150.0
+clutter_m = 300.0
+reflectance = 0.5
+[parts]
+detectors = ["inalas"]
+marks = [3]
+beams = [15, 30]
+"""
+
 
 def program():
     """The program under test: MACROPULSE, or the one that cargo has built."""
