@@ -2,33 +2,18 @@
 
 use crate::on_every_level;
 
-/// Numbers that are compared side by side.
-const LANES: usize = 64;
-
-/// Blocks of them after which it is asked whether any was out of order.
-const TOGETHER: usize = 64;
+/// Numbers after which it is asked whether any was out of order.
+const TOGETHER: usize = 1 << 12;
 
 on_every_level! {
     /// Whether each of `numbers` is greater than the one before it.
     pub(crate) fn ascends(numbers: &[u32]) -> bool {
         let later = numbers.get(1..).unwrap_or_default();
-        let (before, after) = (&numbers[..later.len()], later);
-        let (blocks, rest) = before.as_chunks::<LANES>();
-        let (later_blocks, later_rest) = after.as_chunks::<LANES>();
         // No early end within: a loop that may stop anywhere is not made wide.
-        for (blocks, later) in blocks.chunks(TOGETHER).zip(later_blocks.chunks(TOGETHER)) {
-            // As wide as what is compared, so that it stays in registers.
-            let mut falls = [0; LANES];
-            for (before, after) in blocks.iter().zip(later) {
-                for lane in 0..LANES {
-                    falls[lane] |= u32::from(after[lane] <= before[lane]);
-                }
-            }
-            if falls.iter().fold(0, |any, falls| any | falls) != 0 {
-                return false;
-            }
-        }
-        rest.iter().zip(later_rest).all(|(before, after)| before < after)
+        numbers.chunks(TOGETHER).zip(later.chunks(TOGETHER)).all(|(before, after)| {
+            let pairs = before.iter().zip(after);
+            pairs.fold(0, |falls, (before, after)| falls | u32::from(after <= before)) == 0
+        })
     }
 }
 

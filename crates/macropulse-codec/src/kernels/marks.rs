@@ -1,40 +1,31 @@
 //! Code words against ticks.
 
+use super::level::Level;
 use crate::on_every_level;
 
 /// Ticks that are compared in one go.
 const LANES: usize = 16;
 
-/// The marks of a code word in ticks, made as long as whole blocks of ticks are.
+/// The marks of a code word in ticks.
 #[derive(Debug, Clone)]
 pub(crate) struct WordTicks {
+    /// How many there are.
     marks: usize,
-    ticks: Vec<[u32; LANES]>,
-    /// All bits where there is a mark, none in the filling.
-    used: Vec<[u32; LANES]>,
+    /// They, and a filling up to whole blocks.
+    ticks: Vec<u32>,
 }
 
 impl WordTicks {
     /// A word with the given `marks`, `scale` ticks a chip.
     pub(crate) fn new(marks: &[u16], scale: u32) -> Self {
-        let (mut ticks, mut used) = (Vec::new(), Vec::new());
-        for marks in marks.chunks(LANES) {
-            let at = |lane: usize| marks.get(lane).copied();
-            let in_lanes = |of: &dyn Fn(Option<u16>) -> u32| std::array::from_fn(|l| of(at(l)));
-            ticks.push(in_lanes(&|mark| scale * u32::from(mark.unwrap_or(0))));
-            used.push(in_lanes(&|mark| if mark.is_some() { u32::MAX } else { 0 }));
-        }
-        Self { marks: marks.len(), ticks, used }
+        let mut ticks: Vec<u32> = marks.iter().map(|mark| scale * u32::from(*mark)).collect();
+        ticks.resize(marks.len().next_multiple_of(LANES), 0);
+        Self { marks: marks.len(), ticks }
     }
 
     /// Number of marks.
     pub(crate) fn marks(&self) -> usize {
         self.marks
-    }
-
-    /// The tick of each mark, in order.
-    pub(crate) fn get(&self, mark: usize) -> Option<u32> {
-        self.ticks.as_flattened()[..self.marks].get(mark).copied()
     }
 }
 
@@ -43,11 +34,12 @@ on_every_level! {
     pub(crate) fn places_of(word: &WordTicks, bits: &[u32], scale: u32, places: &mut Vec<u32>) {
         // The filling of a word is written over by the next one.
         let all = bits.len() * word.marks;
-        places.resize(all + word.ticks.len() * LANES, 0);
+        places.resize(all + word.ticks.len(), 0);
         let mut rest = &mut places[..];
+        let (blocks, _) = word.ticks.as_chunks::<LANES>();
         for &bit in bits {
             let begin = scale * bit;
-            for (block, marks) in rest.as_chunks_mut::<LANES>().0.iter_mut().zip(&word.ticks) {
+            for (block, marks) in rest.as_chunks_mut::<LANES>().0.iter_mut().zip(blocks) {
                 *block = marks.map(|mark| begin + mark);
             }
             rest = &mut rest[word.marks..];
@@ -56,46 +48,81 @@ on_every_level! {
     }
 }
 
+/// Whether the first ticks are the marks of `word`, begun at `begun.0 + begun.1 · bit` for
+/// each of `bits`, with no tick between them. `false` where there are too few ticks.
+pub(crate) fn begin_with(
+    ticks: &[u32],
+    word: &WordTicks,
+    bits: &[u32],
+    begun: (u32, u32),
+) -> bool {
+    let marks = &word.ticks[..word.marks];
+    let Some(ticks) = ticks.get(..bits.len() * marks.len()) else { return false };
+    match Level::here() {
+        // SAFETY: the processor has what this level asks for, and there are as many ticks as marks.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { avx512::are_marks(ticks, marks, bits, begun) },
+        _ => are_marks(ticks, marks, bits, begun),
+    }
+}
+
 on_every_level! {
-    /// Whether the first ticks are the marks of `word`, begun at `begun.0 + begun.1 · bit` for
-    /// each of `bits`, with no tick between them. `false` where there are too few ticks.
-    pub(crate) fn begin_with(
-        ticks: &[u32],
-        word: &WordTicks,
-        bits: &[u32],
-        begun: (u32, u32),
-    ) -> bool {
+    /// The same of as many ticks as there are marks.
+    fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], begun: (u32, u32)) -> bool {
         let (start, scale) = begun;
-        if ticks.len() < bits.len() * word.marks {
-            return false;
-        }
-        let mut rest = ticks;
-        for &bit in bits {
-            let begin = start.wrapping_add(scale.wrapping_mul(bit));
-            let mut wrong = [0; LANES];
-            let mut block = rest;
-            for (marks, used) in word.ticks.iter().zip(&word.used) {
-                // The filling of the last block reaches beyond the word, and at the end of the
-                // list beyond that.
-                let ticks = match block.first_chunk::<LANES>() {
-                    Some(ticks) => *ticks,
-                    None => {
-                        let mut ticks = [0; LANES];
-                        ticks[..block.len()].copy_from_slice(block);
-                        ticks
-                    }
-                };
-                for lane in 0..LANES {
-                    wrong[lane] |= (ticks[lane] ^ begin.wrapping_add(marks[lane])) & used[lane];
+        bits.iter().zip(ticks.chunks_exact(marks.len().max(1))).all(|(bit, ticks)| {
+            let begin = start.wrapping_add(scale.wrapping_mul(*bit));
+            let pairs = ticks.iter().zip(marks);
+            pairs.fold(0, |wrong, (tick, mark)| wrong | tick ^ begin.wrapping_add(*mark)) == 0
+        })
+    }
+}
+
+/// The same, a block in one instruction.
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    use super::LANES;
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    ///
+    /// The processor must have AVX-512 F, and there must be as many `ticks` as marks in all bits.
+    #[target_feature(enable = "avx512f")]
+    pub(super) unsafe fn are_marks(
+        ticks: &[u32],
+        marks: &[u32],
+        bits: &[u32],
+        (start, scale): (u32, u32),
+    ) -> bool {
+        let (whole, rest) = (marks.len() / LANES, marks.len() % LANES);
+        let last: __mmask16 = (1 << rest) - 1;
+        let mut ticks = ticks.as_ptr();
+        let mut wrong: __mmask16 = 0;
+        for (index, &bit) in bits.iter().enumerate() {
+            let begin = _mm512_set1_epi32(start.wrapping_add(scale.wrapping_mul(bit)) as i32);
+            let mut marks = marks.as_ptr();
+            for _ in 0..whole {
+                // SAFETY: a whole block of both is left.
+                unsafe {
+                    let expected = _mm512_add_epi32(begin, _mm512_loadu_si512(marks.cast()));
+                    wrong |= _mm512_cmpneq_epi32_mask(expected, _mm512_loadu_si512(ticks.cast()));
+                    (ticks, marks) = (ticks.add(LANES), marks.add(LANES));
                 }
-                block = &block[LANES.min(block.len())..];
             }
-            if wrong.iter().fold(0, |any, wrong| any | wrong) != 0 {
+            // SAFETY: of both so many are left, and no more is read.
+            unsafe {
+                let expected = _mm512_maskz_loadu_epi32(last, marks.cast());
+                let found = _mm512_maskz_loadu_epi32(last, ticks.cast());
+                let expected = _mm512_add_epi32(begin, expected);
+                wrong |= _mm512_mask_cmpneq_epi32_mask(last, expected, found);
+                ticks = ticks.add(rest);
+            }
+            // Of another macropulse the first bit tells; of the one that is expected all bits fit.
+            if index == 0 && wrong != 0 {
                 return false;
             }
-            rest = &rest[word.marks..];
         }
-        true
+        wrong == 0
     }
 }
 

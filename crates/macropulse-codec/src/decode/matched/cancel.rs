@@ -141,7 +141,7 @@ impl Canceller<'_> {
         let in_flight = self.in_flight(tick);
         let shot = self.nearest_first().into_iter().find_map(|lags| {
             in_flight.clone().find(|&shot| {
-                sent.gaps(shot)[0] == gap && self.start(shot, tick, (0, &lags)).is_some()
+                sent.first_marks(shot)[0].gap == gap && self.start(shot, tick, (0, &lags)).is_some()
             })
         });
         shot.map_or(0, |shot| self.fits_in_a_row(shot, place))
@@ -172,8 +172,7 @@ impl Canceller<'_> {
     fn start(&self, shot: usize, tick: i64, (hidden, lags): (usize, &Range<i64>)) -> Option<i64> {
         let sent = self.sent;
         let fired = sent.fired.get(shot)?;
-        let (bit, mark) = (sent.lit_from(shot, 0).next()?, sent.word(shot).get(hidden)?);
-        let start = tick - bit - i64::from(mark);
+        let start = tick - sent.first_mark(shot, hidden)?;
         let possible = lags.contains(&(start - fired)) && sent.weight(shot) >= self.least;
         possible.then_some(start)
     }
@@ -264,7 +263,7 @@ impl Canceller<'_> {
                 let next = Some(self.next).filter(|next| *next < self.detections.len());
                 for shot in next.into_iter().chain(in_flight.clone()) {
                     // Nearly every shot is refused here.
-                    let gap = self.sent.gaps(shot)[hidden];
+                    let gap = self.sent.first_marks(shot)[hidden].gap;
                     let is_next_there = match gap {
                         0..64 => ahead >> gap & 1 == 1,
                         _ => self.seen.has(tick + i64::from(gap)),

@@ -33,14 +33,28 @@ pub(super) struct Sent<'a> {
 /// macropulse.
 pub(super) const FIRST: usize = 3;
 
+/// One of the first marks of a word.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct First {
+    /// Ticks from the start of the word to it.
+    mark: u32,
+    /// Ticks from it to the next one; 0 where there is none.
+    pub gap: u32,
+    /// Whether the word has as many marks.
+    exists: bool,
+}
+
 /// The code words of a family, each made when it is first needed: one pixel of a flash has a single
 /// word; and the bits of each label.
 #[derive(Default)]
 pub(super) struct Words {
     /// Of which family and labels, with so many ticks to a chip and places to a mark.
     of: Option<(Family, Option<Payload>, u32, u32, u32)>,
-    /// From each of the first marks to the next one, in ticks; 0 where there is none.
-    gaps: Vec<[u32; FIRST]>,
+    /// The first marks of each, in ticks, and from each of them to the next one; 0 where there is none.
+    first: Vec<[First; FIRST]>,
+    /// Ticks from the start of a macropulse to the first bit of it that is lit, by label; none where all
+    /// are dark.
+    first_bits: Vec<Option<u32>>,
     /// In ticks.
     ticks: Vec<OnceCell<WordTicks>>,
     /// The same as bits, needed only where light is not clear.
@@ -57,17 +71,21 @@ impl Words {
         let of = Some((codebook.family().clone(), payload, labels, scale, width));
         if self.of != of {
             let words = codebook.words();
-            let gaps = (0..words).map(|word| {
+            let first = (0..words).map(|word| {
                 let marks = &codebook.word(word as u16).marks;
                 std::array::from_fn(|mark| {
                     let pair = marks.get(mark).zip(marks.get(mark + 1));
-                    pair.map_or(0, |(mark, next)| scale * u32::from(next - mark))
+                    let gap = pair.map_or(0, |(mark, next)| scale * u32::from(next - mark));
+                    let mark = marks.get(mark).map(|mark| scale * u32::from(*mark));
+                    First { mark: mark.unwrap_or(0), gap, exists: mark.is_some() }
                 })
             });
-            let gaps = gaps.collect();
+            let first = first.collect();
+            let lit = (0..labels).map(|label| codebook.lit_bits(label as u16).first());
+            let first_bits = lit.map(|bit| bit.map(|bit| scale * bit)).collect();
             let ticks = vec![OnceCell::new(); words];
             let of_label = vec![OnceCell::new(); labels as usize];
-            self = Self { of, gaps, ticks, bits: Vec::new(), of_label };
+            self = Self { of, first, first_bits, ticks, bits: Vec::new(), of_label };
             self.bits.resize_with(words, OnceCell::new);
         }
         self
@@ -122,9 +140,16 @@ impl<'a> Sent<'a> {
         Self { reach, receiver, codebook, log, epoch, fired, weights, width, words }
     }
 
-    /// Ticks from each of the first marks of `shot` to the next one.
-    pub fn gaps(&self, shot: usize) -> &[u32; FIRST] {
-        &self.words.gaps[usize::from(self.log.word[shot])]
+    /// The first marks of the word of `shot`.
+    pub fn first_marks(&self, shot: usize) -> &[First; FIRST] {
+        &self.words.first[usize::from(self.log.word[shot])]
+    }
+
+    /// Ticks from the start of the macropulse of `shot` to its first mark but for those `hidden`.
+    pub fn first_mark(&self, shot: usize, hidden: usize) -> Option<i64> {
+        let bit = self.words.first_bits[usize::from(self.log.label[shot])]?;
+        let first = self.first_marks(shot)[hidden];
+        first.exists.then_some(i64::from(bit) + i64::from(first.mark))
     }
 
     /// The code word of `shot`, as ticks in a row.

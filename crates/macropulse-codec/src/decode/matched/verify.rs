@@ -22,15 +22,23 @@ impl Band<'_> {
         let owned = self.sent.log.owned.clone();
         let mut surfaces = Vec::new();
         self.further.sort_by_key(|(shot, _)| *shot);
+        let mut others = 0;
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
+            let before = |other: &&(usize, Detection)| other.0 < shot;
+            others += self.further[others..].iter().take_while(before).count();
+            let is_alone = self.further.get(others).is_none_or(|(other, _)| *other > shot);
+            let alone = self.found[shot].filter(|_| is_alone);
+            if let Some(found) = alone.filter(|found| self.is_clear(shot, *found)) {
+                returns.push(self.measured(shot, found));
+                continue;
+            }
             self.choose_of_equals(shot);
             let Some(first) = self.found[shot] else {
                 returns.reject(Reject::NoPeak);
                 continue;
             };
             surfaces.push(first);
-            let further = self.further.partition_point(|(other, _)| *other < shot)..;
-            let further = self.further[further].iter().take_while(|(other, _)| *other == shot);
+            let further = self.further[others..].iter().take_while(|(other, _)| *other == shot);
             surfaces.extend(further.map(|(_, surface)| surface));
             if surfaces.len() > 1 {
                 surfaces.sort_by_key(|surface| (u32::MAX - surface.count, surface.lag));
@@ -167,15 +175,22 @@ impl Band<'_> {
         if !self.sent.gate().contains(&surface.lag) {
             return Some(Reject::OutsideGate);
         }
-        // Where all light was cancelled, it was as macropulses without a gap.
-        let is_clear = !self.is_open(shot) && surface.count == self.sent.weight(shot);
-        if is_clear {
+        if self.is_clear(shot, surface) {
             return None;
         }
         if !surface.is_sure && !self.is_its_own(shot, surface) {
             return Some(Reject::NoPeak);
         }
         (!self.carries_its_label(shot, surface)).then_some(Reject::LabelMismatch)
+    }
+
+    /// Whether all light of `shot` was cancelled, and the `surface` from within the gate with it: then it was a
+    /// macropulse without a gap.
+    fn is_clear(&self, shot: usize, surface: Detection) -> bool {
+        let sent = self.sent;
+        surface.count == sent.weight(shot)
+            && sent.gate().contains(&surface.lag)
+            && !self.is_open(shot)
     }
 
     /// Whether light of other returns, of other shots or another surface of this one, does not account
