@@ -15,7 +15,8 @@
 //! that follow. Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
 //!
 //! Of the light of guard shots only that is cancelled which may overlap with light of owned ones: what is
-//! older tells nothing of these, and some of it is that of shots that the log does not know.
+//! older or younger tells nothing of these, and some of it is that of shots that the log does not know, or
+//! ends behind the ticks.
 
 use std::ops::Range;
 
@@ -61,14 +62,15 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Option<Cancelled> {
         seen: Timeline::default(),
         residual: Timeline::default(),
     };
-    let mut place = begin(ticks, canceller.owned, sent.length());
-    while place < ticks.len() && canceller.patience > 0 {
+    let mut place = begin(ticks, canceller.owned.start, sent.length());
+    let end = ticks.partition_point(|tick| i64::from(*tick) < canceller.owned.end);
+    while place < end && canceller.patience > 0 {
         place += match canceller.in_a_row(place) {
             0 => canceller.woven(place),
             count => count,
         };
     }
-    if place < ticks.len() {
+    if place < end {
         // The few that were found are soon found again; to tell their ticks from all others is not soon
         // done.
         return None;
@@ -99,10 +101,13 @@ fn begin(ticks: &[u32], owned: i64, length: i64) -> usize {
     (first..=last).max_by_key(gap).unwrap_or(first)
 }
 
-/// The first tick at which light of an owned shot may come.
-fn owned_light(sent: &Sent) -> i64 {
-    let first = sent.fired.get(sent.log.owned.start);
-    first.map_or(0, |fired| fired + sent.reach().start)
+/// The ticks at which light of an owned shot may come.
+fn owned_light(sent: &Sent) -> Range<i64> {
+    let owned = &sent.log.owned;
+    match owned.is_empty() {
+        true => 0..0,
+        false => sent.arrival(owned.start).start..sent.arrival(owned.end - 1).end,
+    }
 }
 
 struct Canceller<'a> {
@@ -116,9 +121,9 @@ struct Canceller<'a> {
     /// Ticks of which no macropulse without a gap can begin, in order.
     left: Vec<u32>,
     patience: usize,
-    /// The first tick at which light of an owned shot may come. What is left before that is of macropulses
-    /// that began even earlier.
-    owned: i64,
+    /// The ticks at which light of an owned shot may come. What is left before that is of macropulses
+    /// that began even earlier, and behind it of such as end even later.
+    owned: Range<i64>,
     /// Light of no shot before this one can come any more.
     oldest: usize,
     /// This one, and those after it, are not fired yet.
@@ -235,7 +240,7 @@ impl Canceller<'_> {
                 Some(ends) => last = last.max(ends),
                 None => {
                     self.residual.clear(tick);
-                    if tick >= self.owned {
+                    if self.owned.contains(&tick) {
                         self.patience -= 1;
                         self.left.push(tick as u32);
                     } else {
@@ -257,7 +262,7 @@ impl Canceller<'_> {
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
         let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
         // Of ticks that may belong to no known shot only what is likely is asked.
-        let (parts, most_hidden) = if tick < self.owned { (1, 1) } else { (2, FIRST) };
+        let (parts, most_hidden) = if self.owned.contains(&tick) { (2, FIRST) } else { (1, 1) };
         for lags in self.nearest_first().into_iter().take(parts) {
             for hidden in 0..most_hidden {
                 let next = Some(self.next).filter(|next| *next < self.detections.len());
