@@ -327,10 +327,8 @@ fn measure<'a>(
     lap(&mut tally);
     let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
     let hits = traced.middle;
-    let in_gate = |i: &usize| {
-        let row = log.row[hits.shot[*i] as usize];
-        design.scan.gate(row).contains(&hits.range[*i])
-    };
+    let gates = design.scan.gates();
+    let in_gate = |i: &usize| gates.of(log.row[hits.shot[*i] as usize]).contains(&hits.range[*i]);
     tally.shots = log.owned.len() as u64;
     let surfaces = (0..hits.shot.len()).filter(|i| owned(&hits.shot[*i]));
     tally.surfaces = surfaces.filter(in_gate).count() as u64;

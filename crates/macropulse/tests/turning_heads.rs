@@ -258,7 +258,7 @@ fn a_calibration_is_a_list_of_lasers() {
                 Some((row, column))
             );
         }
-        assert_eq!(design.scan.range_offset(row), listed.scan.range_offset(row));
+        assert_eq!(design.scan.gates().offset(row), listed.scan.gates().offset(row));
     }
     // What the file says is in the digest of the sensor.
     let before = design.digest();

@@ -50,12 +50,7 @@ on_every_level! {
 
 /// Whether the first ticks are the marks of `word`, begun at `begun.0 + begun.1 · bit` for
 /// each of `bits`, with no tick between them. `false` where there are too few ticks.
-pub(crate) fn begin_with(
-    ticks: &[u32],
-    word: &WordTicks,
-    bits: &[u32],
-    begun: (u32, u32),
-) -> bool {
+pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], begun: (u32, u32)) -> bool {
     let marks = &word.ticks[..word.marks];
     let Some(ticks) = ticks.get(..bits.len() * marks.len()) else { return false };
     match Level::here() {

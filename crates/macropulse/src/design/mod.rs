@@ -41,7 +41,7 @@ pub use family::family_from_toml;
 pub use light::Light;
 pub use presets::{names as preset_names, text as preset_text};
 pub use scan::{
-    Directions, Extent, Firing, Flash, Grid, Laser, Mirror, Pattern, Polygon, Prism, Raster,
+    Directions, Extent, Firing, Flash, Gates, Grid, Laser, Mirror, Pattern, Polygon, Prism, Raster,
     Rosette, Scan, Spinning, Table,
 };
 pub use schema::schema;

@@ -74,11 +74,11 @@ impl Piece {
         for column in reals.into_iter().chain([&mut points.range, &mut points.intensity]) {
             column.resize(returns.len(), 0.0);
         }
-        let directions = design.directions();
+        let (directions, gates) = (design.directions(), design.scan.gates());
         let beside = directions.have_origins();
         for (at, &tof) in returns.tof.iter().enumerate() {
             let (row, column) = (points.row[at], points.column[at]);
-            let range = range_from_tof(tof) + design.scan.range_offset(row);
+            let range = range_from_tof(tof) + gates.offset(row);
             let mut point =
                 directions.of_shot(log, returns.shot[at] as usize).map(|part| part * range);
             if beside {

@@ -28,7 +28,7 @@ pub fn ghosts(piece: &Piece, design: &Design, log: &ShotLog, light: &Light) -> u
             return false;
         }
         // As the clock of the laser has it.
-        let measured = f64::from(points.range[at]) - design.scan.range_offset(log.row[shot]);
+        let measured = f64::from(points.range[at]) - design.scan.gates().offset(log.row[shot]);
         let tof_fs = fs_from_s(tof_from_range(measured));
         let begins_fs = log.fired_at_fs[shot] + tof_fs;
         let own = design.coding.codebook.marks(log.label[shot], log.word[shot]);

@@ -83,6 +83,7 @@ pub fn judge(
     hits: &Hits,
 ) -> Score {
     let mut score = Score::default();
+    let gates = design.scan.gates();
     let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
     let mut at = 0;
     piece.points.truth.pixels.blank(log.owned.len());
@@ -92,7 +93,12 @@ pub fn judge(
         while next < hits.shot.len() && hits.shot[next] as usize == shot {
             next += 1;
         }
-        let gate = design.scan.gate(log.row[shot]);
+        let is_silent = piece.shot.get(at).is_none_or(|&of| of as usize != shot);
+        if first == next && is_silent {
+            score.pixels[Outcome::Empty as usize] += 1;
+            continue;
+        }
+        let gate = gates.of(log.row[shot]);
         let met = (first..next).filter(|&i| gate.contains(&hits.range[i]));
         let surface = |i: Option<usize>, outcome: Outcome| match i {
             None => Surface { outcome, ..Surface::NONE },

@@ -215,16 +215,14 @@ impl Scan {
         self.model().pixel_at(libm::atan2(y, x), libm::asin(z.clamp(-1.0, 1.0)))
     }
 
-    /// How much is added to what a shot to `row` measures, m.
-    pub fn range_offset(&self, row: u16) -> f64 {
-        self.model().range_offsets().get(usize::from(row)).copied().unwrap_or(0.0)
+    /// The range gates of its shots.
+    pub fn gates(&self) -> Gates<'_> {
+        Gates { ranges: (self.min_range, self.max_range), offsets: self.model().range_offsets() }
     }
 
-    /// The ranges at which a surface is within the gate of a shot to `row`, m: the gate is one of
-    /// its clock, which starts too late for a laser with a range offset.
+    /// The ranges at which a surface is within the gate of a shot to `row`, m.
     pub fn gate(&self, row: u16) -> RangeInclusive<f64> {
-        let offset = self.range_offset(row);
-        self.min_range + offset..=self.max_range + offset
+        self.gates().of(row)
     }
 
     /// Everything it looks at.
@@ -237,6 +235,31 @@ impl Scan {
     pub(super) fn moment(&self, order: u64) -> f64 {
         let moment = self.model().moment(order, self.period());
         moment.shots as f64 / self.shots() as f64 * self.period() + moment.then
+    }
+}
+
+/// The range gates of the shots of a scan: each is one of its clock, which starts too late for a laser with a
+/// range offset.
+#[derive(Debug, Clone, Copy)]
+pub struct Gates<'a> {
+    /// The nearest and the farthest range, m, of a laser without an offset.
+    ranges: (f64, f64),
+    /// By row, m; empty where there are none.
+    offsets: &'a [f64],
+}
+
+impl Gates<'_> {
+    /// How much is added to what a shot to `row` measures, m.
+    #[inline]
+    pub fn offset(&self, row: u16) -> f64 {
+        self.offsets.get(usize::from(row)).copied().unwrap_or(0.0)
+    }
+
+    /// The ranges at which a surface is within the gate of a shot to `row`, m.
+    #[inline]
+    pub fn of(&self, row: u16) -> RangeInclusive<f64> {
+        let (nearest, farthest) = self.ranges;
+        nearest + self.offset(row)..=farthest + self.offset(row)
     }
 }
 
