@@ -201,8 +201,8 @@ impl Band<'_> {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
                 for _ in 0..=SURFACES {
                     let Some(lag) = self.look_for_leftover(shot) else { break };
-                    self.follow(shot + 1..at_hand, lag);
-                    self.follow((shots.start..shot).rev(), lag);
+                    self.follow(&mut (shot + 1..at_hand), lag);
+                    self.follow(&mut (shots.start..shot).rev(), lag);
                 }
             }
         }
@@ -296,7 +296,7 @@ impl Band<'_> {
 
     /// Follows a surface that stands beside others, as behind a pane of glass, along the `shots`, the
     /// first of which is expected to have it about `lag`: to search for each of them alone takes long.
-    fn follow(&mut self, shots: impl Iterator<Item = usize>, mut lag: i64) {
+    fn follow(&mut self, shots: &mut dyn Iterator<Item = usize>, mut lag: i64) {
         let mut step = None;
         for shot in shots {
             // Each is searched for in all of its gate where that is asked for.

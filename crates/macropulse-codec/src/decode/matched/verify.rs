@@ -22,46 +22,19 @@ impl Band<'_> {
         let owned = self.sent.log.owned.clone();
         let mut surfaces = Vec::new();
         self.further.sort_by_key(|(shot, _)| *shot);
-        let mut others = 0;
+        let mut further = 0;
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
             let before = |other: &&(usize, Detection)| other.0 < shot;
-            others += self.further[others..].iter().take_while(before).count();
-            let is_alone = self.further.get(others).is_none_or(|(other, _)| *other > shot);
-            let alone = self.found[shot].filter(|_| is_alone);
-            if let Some(found) = alone.filter(|found| self.is_clear(shot, *found)) {
-                returns.push(self.measured(shot, found));
-                continue;
-            }
-            self.choose_of_equals(shot);
-            let Some(first) = self.found[shot] else {
-                returns.reject(Reject::NoPeak);
-                continue;
-            };
-            surfaces.push(first);
-            let further = self.further[others..].iter().take_while(|(other, _)| *other == shot);
-            surfaces.extend(further.map(|(_, surface)| surface));
-            if surfaces.len() > 1 {
-                surfaces.sort_by_key(|surface| (u32::MAX - surface.count, surface.lag));
-            }
-            let mut why = None;
-            surfaces.retain(|surface| {
-                let wrong = self.what_is_wrong(shot, *surface);
-                why = why.or(wrong);
-                wrong.is_none()
-            });
-            if surfaces.is_empty() {
-                // Light of others claims nothing.
-                self.found[shot] = self.found[shot].filter(|_| why != Some(Reject::NoPeak));
-                returns.reject(why.unwrap_or(Reject::NoPeak));
-                continue;
-            }
-            if surfaces.len() > 1 {
-                surfaces.sort_by_key(|surface| surface.lag);
-                let receiver = self.sent.receiver;
-                // Of one shot, as many marks are as much light.
-                let strength =
-                    |surface: &Detection| Strength { peak: surface.count as u16, light: f32::NAN };
-                receiver.pick.keep(receiver.returns.into(), &mut surfaces, strength);
+            further += self.further[further..].iter().take_while(before).count();
+            let is_alone = self.further.get(further).is_none_or(|(other, _)| *other > shot);
+            let clear = self.found[shot].filter(|found| is_alone && self.is_clear(shot, *found));
+            match clear {
+                Some(found) => surfaces.push(found),
+                None => {
+                    if let Err(why) = self.verify(shot, further, &mut surfaces) {
+                        returns.reject(why);
+                    }
+                }
             }
             for surface in surfaces.drain(..) {
                 returns.push(self.measured(shot, surface));
@@ -73,6 +46,46 @@ impl Band<'_> {
         // Older light overlaps with nothing that is still to come.
         let oldest = self.in_flight_before(shots.end);
         self.further.retain(|(shot, _)| *shot >= oldest);
+    }
+
+    /// Puts those surfaces of `shot` that give returns into `surfaces`, by their lag; its further ones are those
+    /// from number `further` on.
+    ///
+    /// # Errors
+    /// If there are none, why.
+    fn verify(
+        &mut self,
+        shot: usize,
+        further: usize,
+        surfaces: &mut Vec<Detection>,
+    ) -> Result<(), Reject> {
+        self.choose_of_equals(shot);
+        surfaces.push(self.found[shot].ok_or(Reject::NoPeak)?);
+        let further = self.further[further..].iter().take_while(|(other, _)| *other == shot);
+        surfaces.extend(further.map(|(_, surface)| surface));
+        if surfaces.len() > 1 {
+            surfaces.sort_by_key(|surface| (u32::MAX - surface.count, surface.lag));
+        }
+        let mut why = None;
+        surfaces.retain(|surface| {
+            let wrong = self.what_is_wrong(shot, *surface);
+            why = why.or(wrong);
+            wrong.is_none()
+        });
+        if surfaces.is_empty() {
+            // Light of others claims nothing.
+            self.found[shot] = self.found[shot].filter(|_| why != Some(Reject::NoPeak));
+            return Err(why.unwrap_or(Reject::NoPeak));
+        }
+        if surfaces.len() > 1 {
+            surfaces.sort_by_key(|surface| surface.lag);
+            let receiver = self.sent.receiver;
+            // Of one shot, as many marks are as much light.
+            let strength =
+                |surface: &Detection| Strength { peak: surface.count as u16, light: f32::NAN };
+            receiver.pick.keep(receiver.returns.into(), surfaces, strength);
+        }
+        Ok(())
     }
 
     /// Takes for the lag of `shot`, of several with as many marks, the one nearest to where its neighbours
