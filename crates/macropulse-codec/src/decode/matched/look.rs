@@ -200,9 +200,12 @@ impl Band<'_> {
             if self.is_open(shot) {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
                 for _ in 0..=SURFACES {
+                    let is_further = self.found[shot].is_some();
                     let Some(lag) = self.look_for_leftover(shot) else { break };
                     self.follow(&mut (shot + 1..at_hand), lag);
-                    self.follow(&mut (shots.start..shot).rev(), lag);
+                    if is_further {
+                        self.follow(&mut (shots.start..shot).rev(), lag);
+                    }
                 }
             }
         }
