@@ -103,7 +103,23 @@ fn one_line(text: &str) -> String {
         sign => sign,
     };
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    lines.collect::<Vec<_>>().join(" ").chars().map(harmless).collect()
+    let text: String = lines.collect::<Vec<_>>().join(" ").chars().map(harmless).collect();
+    clipped(text)
+}
+
+/// Most letters of a sentence, at its beginning and at its end: a word of a file may have millions.
+const MOST_LETTERS: [usize; 2] = [3000, 1000];
+
+/// A sentence of which too long a middle is left out.
+fn clipped(text: String) -> String {
+    let [head, tail] = MOST_LETTERS;
+    let place = |letter: Option<(usize, char)>| letter.map(|(place, _)| place);
+    let from = place(text.char_indices().nth(head));
+    let to = place(text.char_indices().rev().nth(tail));
+    match (from, to) {
+        (Some(from), Some(to)) if from < to => format!("{} … {}", &text[..from], &text[to..]),
+        _ => text,
+    }
 }
 
 /// What clap could not make sense of, as one sentence; help and version are no faults.
@@ -353,6 +369,15 @@ mod tests {
     #[test]
     fn a_terminal_is_told_nothing_to_obey() {
         assert_eq!(one_line(" a\u{1b}[31mb\u{7}\tc\n\n d"), "a\u{fffd}[31mb\u{fffd} c d");
+    }
+
+    #[test]
+    fn a_word_of_millions_of_letters_is_told_by_its_beginning_and_its_end() {
+        let told = one_line(&format!("a.obj: line 1 has {}; mend it", "\u{e9}".repeat(1_000_000)));
+        assert!(told.starts_with("a.obj: line 1 has \u{e9}") && told.ends_with("\u{e9}; mend it"));
+        assert!(told.chars().count() < 4100 && told.contains(" … "));
+        let whole = "\u{e9}".repeat(4000);
+        assert_eq!(one_line(&whole), whole);
     }
 
     #[test]

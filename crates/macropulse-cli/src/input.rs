@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use macropulse::design::{Design, preset_text};
 use macropulse::opened::{self, LONGEST_TEXT};
-use macropulse::scene::Scene;
+use macropulse::scene::{Room, Scene};
 
 use crate::fault::Fault;
 
@@ -31,17 +31,19 @@ pub fn design(name: &OsStr, changes: &[(String, String)]) -> Result<Design, Faul
     }
 }
 
-/// The scene called `name`, with single values changed.
+/// The scene called `name`, with single values changed, if there is `room` for its meshes.
 ///
 /// # Errors
 /// What is wrong with the name, the text or a change.
-pub fn scene(name: &OsStr, changes: &[(String, String)]) -> Result<Scene, Fault> {
+pub fn scene(name: &OsStr, changes: &[(String, String)], room: Room) -> Result<Scene, Fault> {
     match name.to_str() {
-        Some(STREAM) => Ok(Scene::from_toml_changed(stdin()?, ORIGIN, Path::new(""), changes)?),
+        Some(STREAM) => {
+            Ok(Scene::from_toml_within(stdin()?, ORIGIN, Path::new(""), changes, room)?)
+        }
         Some(sensor) if preset_text(sensor).is_some() => Err(Fault::Wrong(format!(
             "{sensor}: is a sensor, where a scene is wanted; `macropulse scenes` lists the ready ones"
         ))),
-        _ => Ok(Scene::open_changed(name, changes)?),
+        _ => Ok(Scene::open_within(name, changes, room)?),
     }
 }
 

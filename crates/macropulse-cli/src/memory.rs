@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use macropulse::memory::Estimate;
+use macropulse::scene::Room;
 use serde_json::{Value, json};
 
 use crate::fault::Fault;
@@ -39,6 +40,11 @@ impl MemoryLimit {
     /// The same of what is to be checked alone: refused is what not even one thread could do.
     pub fn allow_alone(&self, what: &str, estimated: &Estimate) -> Result<(), Fault> {
         self.allow_with(1, what, estimated)
+    }
+
+    /// The room that it leaves for the meshes of a scene.
+    pub fn room(&self) -> Room {
+        self.bytes(machine()).map_or_else(Room::default, |(bytes, _)| Room::of_bytes(bytes))
     }
 
     fn allow_with(&self, threads: usize, what: &str, estimated: &Estimate) -> Result<(), Fault> {

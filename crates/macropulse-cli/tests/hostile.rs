@@ -161,6 +161,37 @@ fn a_text_without_an_end() {
     }
 }
 
+/// What a file is not is told by its beginning, however long it is.
+#[test]
+fn files_of_nothing_but_zeros() {
+    let desk = Desk::new();
+    let zeros = |name: &str, length| {
+        fs::File::create(desk.path().join(name)).unwrap().set_len(length).unwrap();
+    };
+    for ending in ["pcd", "ply", "las", "laz", "csv", "e57", "npy", "mcap"] {
+        zeros(&format!("zeros.{ending}"), (8 << 30) - 1);
+        refused(&desk, &format!("convert zeros.{ending} -o out.pcd"), &["zeros"]);
+    }
+    for ending in ["glb", "gltf", "stl", "obj"] {
+        zeros(&format!("zeros.{ending}"), (1 << 30) - 1);
+        desk.put("s.toml", &SCENE.replace("MESH", &format!("zeros.{ending}")));
+        refused(&desk, "check s.toml", &["zeros"]);
+    }
+}
+
+/// Faces that stand before the vertices of their file are kept until those are there.
+#[test]
+fn a_mesh_of_millions_of_faces_before_its_vertices() {
+    let desk = Desk::new();
+    let header = "ply\nformat binary_little_endian 1.0\nelement face 12000000\nproperty list uchar \
+                  uchar vertex_indices\nelement vertex 3\nproperty float x\nproperty float y\n\
+                  property float z\nend_header\n";
+    let body = vec![0; 12_000_000 + 36];
+    fs::write(desk.path().join("a.ply"), [header.as_bytes(), &body].concat()).unwrap();
+    desk.put("s.toml", &SCENE.replace("MESH", "a.ply"));
+    refused(&desk, "check s.toml", &["a.ply", "no triangles"]);
+}
+
 #[test]
 fn a_text_of_millions_of_values() {
     let desk = Desk::new();

@@ -97,6 +97,45 @@ fn what_takes_too_much_is_refused_before_it_is_begun() {
     assert_eq!(ran.code, Some(0), "{}", ran.err);
 }
 
+/// A mesh that does not fit is refused while it is read, not when the memory is spent.
+#[test]
+fn a_mesh_is_not_read_beyond_the_limit() {
+    let desk = Desk::new();
+    let corners = "v 0 0 0\nv 0 1 0\nv 0 0 1\n";
+    let faces = "f 1 2 3\n".repeat(3_000_000);
+    let vertices = "v 0 0 0\n".repeat(6_000_000);
+    let solid =
+        "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n";
+    desk.put("late.obj", &format!("{corners}{faces}"));
+    desk.put("early.obj", &format!("{faces}{corners}"));
+    desk.put("loose.obj", &format!("{vertices}f 1 2 3\n"));
+    desk.put("a.stl", &format!("solid a\n{}endsolid a\n", solid.repeat(500_000)));
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+               property float z\nelement face 500000\nproperty list uchar int vertex_indices\n\
+               end_header\n0 0 0\n0 1 0\n0 0 1\n";
+    desk.put("a.ply", &format!("{ply}{}", "3 0 1 2\n".repeat(500_000)));
+    for mesh in ["late.obj", "early.obj", "loose.obj", "a.stl", "a.ply"] {
+        desk.put(
+            "s.toml",
+            &format!("version = 1\n[[object]]\nmesh = {mesh:?}\nmaterial = \"white\"\n"),
+        );
+        for line in [
+            "check s.toml --memory-limit 100MB",
+            "simulate peregrine s.toml -o out --memory-limit 100MB",
+            "sweep peregrine s.toml --vary tdc.bits=8,9 -o out --memory-limit 100MB",
+        ] {
+            desk.refused(line, &[mesh, "holds more than", "--memory-limit"]);
+        }
+        let limited = format!(
+            "ulimit -v 400000; MALLOC_ARENA_MAX=1 exec {:?} check s.toml -j 1 --memory-limit 100MB",
+            env!("CARGO_BIN_EXE_macropulse")
+        );
+        let mut command = Command::new("sh");
+        let ended = command.args(["-c", &limited]).current_dir(desk.path()).output().unwrap();
+        assert_eq!(ended.status.code(), Some(2), "{mesh}: {ended:?}");
+    }
+}
+
 #[test]
 fn what_is_estimated_is_told() {
     let desk = Desk::new();

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use macropulse::design::Design;
-use macropulse::scene::{Scene, apart};
+use macropulse::scene::{Room, Scene, apart};
 use macropulse_study::sweep::{Axis, Metric, Shard};
 
 use crate::assert_says;
@@ -22,7 +22,9 @@ pub fn set(bytes: &[u8]) {
     if !changes.of_scene.is_empty() {
         let scene = Scene::builtin("wall").unwrap_or_default();
         let base = Path::new("/nothing/there");
-        if let Err(error) = Scene::from_toml_changed(scene, "wall", base, &changes.of_scene) {
+        if let Err(error) =
+            Scene::from_toml_within(scene, "wall", base, &changes.of_scene, Room::default())
+        {
             assert_says(&error);
         }
     }

@@ -8,14 +8,11 @@ use crate::channel::{Error, Operating};
 use crate::design::{Design, Effect};
 use crate::emit::bands;
 use crate::environment::Environment;
-use crate::scene::Scene;
+use crate::scene::{PER_TRIANGLE, Scene};
 use crate::units::s_from_fs;
 
 /// The program itself, its threads and what they hold ready, bytes.
 const PROGRAM: u64 = 19_000_000;
-
-/// Of a triangle while it is loaded; 178 of them are what `tests/memory.rs` allows an STL file.
-const PER_TRIANGLE: u64 = 220;
 
 /// Of a shape, or of a copy of a mesh.
 const PER_COPY: u64 = 512;

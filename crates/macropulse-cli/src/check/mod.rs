@@ -97,9 +97,12 @@ impl Report {
                 let environment = Surroundings::alone(changes)?;
                 sensor::report(&input::design(name, &changes.of_sensor)?, &environment, memory)
             }
-            Kind::Scene => scene::report(&input::scene(name, &of_scenes.of_scene)?, memory),
+            Kind::Scene => {
+                scene::report(&input::scene(name, &of_scenes.of_scene, memory.room())?, memory)
+            }
             Kind::Scenario => {
-                scenario(&name.to_string_lossy(), &Scenario::open(name, &of_scenes)?, memory)
+                let read = Scenario::open(name, &of_scenes, memory.room())?;
+                scenario(&name.to_string_lossy(), &read, memory)
             }
         }
     }

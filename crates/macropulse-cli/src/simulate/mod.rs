@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::memory::Estimate;
-use macropulse::scene::Changes;
+use macropulse::scene::{Changes, Room};
 
 use crate::completions;
 use crate::explain;
@@ -134,11 +134,13 @@ impl Simulate {
             changes.of_sensor.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
         }
         let scene = self.scene.as_ref().or(self.named_scene.as_ref());
+        let room = self.memory.room();
         let mut scenario = match (&self.sensor, scene) {
-            (Some(alone), None) => open(alone, &changes)?,
+            (Some(alone), None) => open(alone, &changes, room)?,
             (sensor, scene) => {
                 let sensors: Vec<OsString> = sensor.iter().chain(&self.sensors).cloned().collect();
-                Scenario::of(&sensors, scene.map_or(OsStr::new(""), OsString::as_os_str), &changes)?
+                let scene = scene.map_or(OsStr::new(""), OsString::as_os_str);
+                Scenario::of(&sensors, scene, &changes, room)?
             }
         };
         if let Some(formats) = &self.format {
@@ -203,10 +205,10 @@ pub fn run(options: &Simulate, common: &Common) -> Result<(), Fault> {
 }
 
 /// The scenario called `name`; a sensor or a scene in its place is a slip worth a hint.
-fn open(name: &OsStr, changes: &Changes) -> Result<Scenario, Fault> {
+fn open(name: &OsStr, changes: &Changes, room: Room) -> Result<Scenario, Fault> {
     let called = name.display();
     match Kind::of(name)? {
-        Kind::Scenario => Scenario::open(name, changes),
+        Kind::Scenario => Scenario::open(name, changes, room),
         Kind::Sensor => Err(Fault::Wrong(format!(
             "{called}: is a sensor; name a scene behind it, as in `macropulse simulate {called} street`"
         ))),

@@ -8,7 +8,7 @@ use macropulse::channel::Operating;
 use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
-use macropulse::scene::{Changes, Scene};
+use macropulse::scene::{Changes, Room, Scene};
 use macropulse::told;
 use serde::Deserialize;
 use toml::Spanned;
@@ -57,7 +57,12 @@ struct ScenarioFile {
 
 impl Scenario {
     /// One scan of the sensors in the scene, each a ready one or a file.
-    pub fn of(sensors: &[OsString], scene: &OsStr, changes: &Changes) -> Result<Self, Fault> {
+    pub fn of(
+        sensors: &[OsString],
+        scene: &OsStr,
+        changes: &Changes,
+        room: Room,
+    ) -> Result<Self, Fault> {
         if sensors
             .iter()
             .map(OsString::as_os_str)
@@ -76,7 +81,7 @@ impl Scenario {
         }
         let designs: Result<Vec<_>, _> =
             sensors.iter().map(|sensor| input::design(sensor, &changes.of_sensor)).collect();
-        let (designs, scene) = (designs?, input::scene(scene, &changes.of_scene)?);
+        let (designs, scene) = (designs?, input::scene(scene, &changes.of_scene, room)?);
         check_operating(&designs, &scene)?;
         let Formats(formats, records) = Formats::default();
         Ok(Self {
@@ -92,7 +97,7 @@ impl Scenario {
     }
 
     /// The scenario in the file called `name`; names of files count from its folder.
-    pub fn open(name: &OsStr, changes: &Changes) -> Result<Self, Fault> {
+    pub fn open(name: &OsStr, changes: &Changes, room: Room) -> Result<Self, Fault> {
         let (text, origin) = input::text(name)?;
         let source = Source { text: &text, origin: &origin };
         let file: ScenarioFile =
@@ -121,7 +126,7 @@ impl Scenario {
         let name = file.scene.get_ref();
         let ready = Scene::builtin(name).is_some() || !looks_like_a_path(name);
         let place = if ready { PathBuf::from(name) } else { folder.join(name) };
-        let scene = Scene::open_changed(&place, &changes.of_scene)
+        let scene = Scene::open_within(&place, &changes.of_scene, room)
             .map_err(|error| source.fault(file.scene.span(), &error.to_string()))?;
         check_operating(&designs, &scene)?;
         let Formats(formats, records) = match file.formats {
@@ -215,12 +220,13 @@ impl Source<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use macropulse_fuzz::mutate::Mutator;
 
     fn told(text: &str) -> String {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).unwrap();
-        match Scenario::open(path.as_os_str(), &Changes::default()) {
+        match Scenario::open(path.as_os_str(), &Changes::default(), Room::default()) {
             Err(Fault::Wrong(sentence)) => sentence.rsplit_once("s.toml").unwrap().1.to_owned(),
             _ => "accepted".to_owned(),
         }
@@ -250,6 +256,39 @@ mod tests {
         assert!(
             told("version = 1\nsensor = \"perigrine\"\nscene = \"wall\"\n").starts_with(":2:10: ")
         );
+    }
+
+    /// Scenarios changed anyhow: each is read, or refused in a sentence. `MACROPULSE_FUZZ_CASES` sets how
+    /// many.
+    #[test]
+    fn any_scenario_is_read_or_refused() {
+        let line = |text: &str| text.as_bytes().to_vec();
+        let examples = [
+            line("version = 1\nsensor = \"peregrine\"\nscene = \"wall\"\nscans = 3\nseed = 7\n"),
+            line(
+                "version = 1\nsensors = [\"vlp-16\", \"a.toml\"]\nscene = \"a/b.toml\"\ntruth = true\n",
+            ),
+            line(
+                "version = 1\nsensor = \"vlp-16\"\nscene = \"wall\"\nformats = [\"pcd\", \"ticks\"]\n",
+            ),
+        ];
+        let cases = std::env::var("MACROPULSE_FUZZ_CASES");
+        let cases: u32 = cases.map_or(300, |typed| typed.parse().unwrap());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.toml");
+        let (mut mutator, mut read) = (Mutator::new(15), 0);
+        for _ in 0..cases {
+            let text = mutator.next(&examples, 200);
+            std::fs::write(&path, &text).unwrap();
+            match Scenario::open(path.as_os_str(), &Changes::default(), Room::default()) {
+                Ok(_) => read += 1,
+                Err(fault) => {
+                    let is_told = matches!(fault, Fault::Wrong(said) if !said.is_empty());
+                    assert!(is_told, "{}", String::from_utf8_lossy(&text));
+                }
+            }
+        }
+        assert!(read > 0 && read < cases, "{read} of {cases}");
     }
 
     #[test]

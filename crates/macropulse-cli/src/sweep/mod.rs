@@ -160,7 +160,7 @@ impl Sweep {
 
 pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     refuse_no_folder(&options.output)?;
-    let plan = Plan::of(&options.request()?)?;
+    let plan = Plan::within(&options.request()?, options.memory.room())?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;
     let seed = options.seed;

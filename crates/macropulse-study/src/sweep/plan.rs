@@ -12,7 +12,7 @@ use macropulse::channel::{Operating, idealised};
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
 use macropulse::formats::{Entries, Named, Surroundings};
-use macropulse::scene::{Changes, Scene, apart};
+use macropulse::scene::{Changes, Room, Scene, apart};
 
 /// More jobs than this are taken for a slip.
 const MOST_JOBS: u64 = 100_000;
@@ -88,6 +88,14 @@ impl Plan {
     /// If a sensor, the scene, a key or a value is wrong, nothing is varied, or more than two
     /// things are, or there would be too many jobs.
     pub fn of(request: &Request) -> Result<Self, Error> {
+        Self::within(request, Room::default())
+    }
+
+    /// The same, if there is `room` for the meshes of all its scenes.
+    ///
+    /// # Errors
+    /// As [`Plan::of`], and if there is not.
+    pub fn within(request: &Request, mut room: Room) -> Result<Self, Error> {
         let axes = axes(request)?;
         let count = axes.iter().map(|axis| axis.values.len() as u64).product::<u64>();
         let seeds = request.seeds.end.saturating_sub(request.seeds.start);
@@ -104,12 +112,13 @@ impl Plan {
         for values in &combinations {
             let changes = changes(request, &axes, values).of_scene;
             if scenes.iter().all(|(known, _)| *known != changes) {
-                let scene = Scene::open_changed(&request.scene, &changes).map_err(|error| {
-                    match axes.iter().any(Axis::is_of_scene) {
+                let scene = Scene::open_within(&request.scene, &changes, room).map_err(
+                    |error| match axes.iter().any(Axis::is_of_scene) {
                         true => at(&axes, values, &error.to_string()),
                         false => error.into(),
-                    }
-                })?;
+                    },
+                )?;
+                room = room.beside(scene.kept().0);
                 scenes.push((changes, scene));
             }
         }

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::opened;
 use crate::points::PointCloud;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Most bytes of a file with one cloud, which is read at once.
@@ -41,7 +42,7 @@ impl Clouds {
         if let Format::Mcap(_) = format {
             return Ok(Self(Source::Many(Box::new(Messages::open(path)?))));
         }
-        let read = || opened::bytes(path, MOST_BYTES).map_err(|cause| Error::read(path, cause));
+        let read = || whole(path, format).map_err(|cause| Error::read(path, cause));
         let parsed = match format {
             Format::Pcd => pcd_reader::parse(&read()?),
             Format::Ply => ply_reader::parse(&read()?),
@@ -74,6 +75,29 @@ impl Iterator for Clouds {
             Source::One { cloud, .. } => cloud.take().map(|cloud| Ok(*cloud)),
             Source::Many(messages) => messages.next(),
         }
+    }
+}
+
+/// Bytes of a file by which it is told whether it may be of its format.
+const BEGINNING: usize = 4096;
+
+/// All bytes of the file at `path`; or its beginning, if that is none of a file of this format.
+fn whole(path: &Path, format: Format) -> io::Result<Vec<u8>> {
+    let mut begins = Vec::with_capacity(BEGINNING);
+    opened::file(path, MOST_BYTES)?.take(BEGINNING as u64).read_to_end(&mut begins)?;
+    if may_begin(&begins, format) { opened::bytes(path, MOST_BYTES) } else { Ok(begins) }
+}
+
+/// Whether a file of this format may begin so.
+fn may_begin(bytes: &[u8], format: Format) -> bool {
+    match format {
+        Format::Las | Format::Laz => bytes.starts_with(b"LASF"),
+        Format::E57 => bytes.starts_with(b"ASTM-E57"),
+        Format::Npy => bytes.starts_with(b"\x93NUMPY"),
+        Format::Ply => bytes.starts_with(b"ply"),
+        // Text at first.
+        Format::Pcd | Format::Csv => !bytes.starts_with(b"\0"),
+        _ => true,
     }
 }
 

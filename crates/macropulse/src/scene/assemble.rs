@@ -24,6 +24,7 @@ use super::moving::{Mover, MovingShape};
 use super::placed::{self, Placed, stand};
 use super::pose::Pose;
 use super::readers::{self, Reach, Read, WithoutMaterials};
+use super::room::Room;
 use super::spanned::Spanned;
 use super::{Object, Scene};
 use crate::digest::Digest;
@@ -36,6 +37,7 @@ struct Assembly<'a> {
     base: &'a Path,
     /// Whether meshes may name files anywhere.
     outside: bool,
+    room: Room,
     /// Meshes in memory, by name; they go before files.
     given: &'a BTreeMap<String, Mesh>,
     /// Materials the file defines; they go before the library.
@@ -51,12 +53,13 @@ struct Assembly<'a> {
     meshes: Meshes,
 }
 
-/// Makes the scene that `source` describes; meshes are looked for among those `given`, and then in
-/// `base`.
+/// Makes the scene that `source` describes, if there is `room` for its meshes; they are looked for
+/// among those `given`, and then in `base`.
 pub(super) fn scene(
     source: Source<'_>,
     base: &Path,
     given: &BTreeMap<String, Mesh>,
+    room: Room,
 ) -> Result<Scene, Error> {
     let file = source.parse()?;
     if *file.version.get_ref() != 1 {
@@ -67,6 +70,7 @@ pub(super) fn scene(
         source,
         base,
         outside: file.outside_files,
+        room,
         given,
         defined: vec![],
         materials: vec![],
@@ -238,7 +242,8 @@ impl Assembly<'_> {
         }
         let origin = self.mesh_origin(&name, written)?;
         let (given, reach) = (self.given, Reach { scene: self.base, outside: self.outside });
-        let known = self.meshes.of(&origin, || read(&origin, given, reach))?;
+        let room = self.room.beside(self.meshes.triangles());
+        let known = self.meshes.of(&origin, || read(&origin, given, (reach, room)))?;
         let mesh = Rc::clone(&known.mesh);
         self.warnings.extend(known.left_out.iter().map(|said| format!("{name}: {said}")));
         if origin != Origin::Car {
@@ -354,13 +359,17 @@ impl Assembly<'_> {
 }
 
 /// The mesh of this origin, as its file has it, or as it is `given`.
-fn read(origin: &Origin, given: &BTreeMap<String, Mesh>, reach: Reach<'_>) -> Result<Read, Error> {
+fn read(
+    origin: &Origin,
+    given: &BTreeMap<String, Mesh>,
+    within: (Reach<'_>, Room),
+) -> Result<Read, Error> {
     match origin {
         Origin::Car => car::mesh().map(Read::from),
         Origin::Given { name, .. } => {
             let mesh = given.get(name).cloned().unwrap_or_default();
             mesh.checked(Path::new(name)).map(Read::from)
         }
-        Origin::File { path, without, .. } => readers::read(path, *without, reach),
+        Origin::File { path, without, .. } => readers::read(path, *without, within),
     }
 }

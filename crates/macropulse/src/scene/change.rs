@@ -5,10 +5,9 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::file::object_names;
-use super::{Error, Scene};
+use super::{Error, Room, Scene, text_of};
 use crate::environment;
 use crate::names::{nearest, toml_value};
-use crate::opened;
 
 /// Names of the three numbers of a position or size.
 const COORDINATES: [&str; 3] = ["x", "y", "z"];
@@ -24,9 +23,21 @@ impl Scene {
         name_or_file: impl AsRef<Path>,
         changes: &[(String, String)],
     ) -> Result<Self, Error> {
+        Self::open_within(name_or_file, changes, Room::default())
+    }
+
+    /// As [`Scene::open_changed`], if there is `room` for its meshes.
+    ///
+    /// # Errors
+    /// As [`Scene::open_changed`], and if there is not.
+    pub fn open_within(
+        name_or_file: impl AsRef<Path>,
+        changes: &[(String, String)],
+        room: Room,
+    ) -> Result<Self, Error> {
         let path = name_or_file.as_ref();
         if changes.is_empty() {
-            return Self::open(path);
+            return Self::open_in(path, room);
         }
         let builtin = path.to_str().and_then(Self::builtin);
         // What is no scene at all is said as it is without changes.
@@ -36,27 +47,25 @@ impl Scene {
         }
         let (text, base) = match builtin {
             Some(text) => (text.to_owned(), Path::new("")),
-            None => {
-                let text = opened::text(path)
-                    .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
-                (text, path.parent().unwrap_or(Path::new("")))
-            }
+            None => text_of(path)?,
         };
-        Self::from_toml_changed(&text, &path.display().to_string(), base, changes)
+        Self::from_toml_within(&text, &path.display().to_string(), base, changes, room)
     }
 
-    /// As [`Scene::from_toml`], with `changes` of single values as [`Scene::open_changed`] takes them.
+    /// As [`Scene::from_toml`], with `changes` of single values as [`Scene::open_changed`] takes them,
+    /// if there is `room` for its meshes.
     ///
     /// # Errors
-    /// As [`Scene::open_changed`].
-    pub fn from_toml_changed(
+    /// As [`Scene::open_within`].
+    pub fn from_toml_within(
         text: &str,
         origin: &str,
         base: &Path,
         changes: &[(String, String)],
+        room: Room,
     ) -> Result<Self, Error> {
         // What is wrong without the changes is said with its place in the file.
-        match Self::from_toml(text, origin, base) {
+        match Self::from_toml_in(text, origin, base, room) {
             Ok(scene) if changes.is_empty() => return Ok(scene),
             // A change may allow it.
             Err(Error::Outside { .. }) if !changes.is_empty() => {}
@@ -81,7 +90,7 @@ impl Scene {
             })?;
         }
         let text = toml::to_string(&table).map_err(|error| refused(error.to_string()))?;
-        Self::from_toml(&text, origin, base).map_err(|error| match error {
+        Self::from_toml_in(&text, origin, base, room).map_err(|error| match error {
             // Its place would be in a text that is not that of the file.
             Error::Typed { message, .. } => refused(message),
             error => error,

@@ -59,6 +59,11 @@ pub(super) struct Known {
 pub(super) struct Meshes(Vec<Known>);
 
 impl Meshes {
+    /// How many triangles they have together.
+    pub fn triangles(&self) -> usize {
+        self.0.iter().map(|known| known.mesh.triangles.len()).sum()
+    }
+
     /// The mesh of this origin, which `read` gives if it is new.
     pub fn of(
         &mut self,

@@ -26,6 +26,7 @@ mod polygon;
 mod pose;
 mod raycast;
 mod readers;
+mod room;
 mod schema;
 mod spanned;
 mod trace;
@@ -48,6 +49,8 @@ pub use material::{Diffuse, Finish, Material, library};
 pub use mesh::Mesh;
 pub use motion::{Motion, Moving};
 pub use pose::{Pose, Transform};
+pub(crate) use room::PER_TRIANGLE;
+pub use room::Room;
 pub use schema::schema;
 pub use trace::{SUB_MACROPULSES, Traced};
 
@@ -105,7 +108,11 @@ impl Scene {
     /// # Errors
     /// If it is neither, or the file is wrong; the message says what to do.
     pub fn open(name_or_file: impl AsRef<Path>) -> Result<Self, Error> {
-        let path = name_or_file.as_ref();
+        Self::open_in(name_or_file.as_ref(), Room::default())
+    }
+
+    /// As [`Scene::open`], if there is `room` for its meshes.
+    fn open_in(path: &Path, room: Room) -> Result<Self, Error> {
         if let Some(name) = path.to_str()
             && let Some(text) = Self::builtin(name)
         {
@@ -114,7 +121,8 @@ impl Scene {
         let name = path.display().to_string();
         // What looks like a path is meant as one.
         if path.is_file() || path.extension().is_some() || path.components().count() > 1 {
-            return Self::from_file(path);
+            let (text, base) = text_of(path)?;
+            return Self::from_toml_in(&text, &name, base, room);
         }
         Err(Error::UnknownScene {
             nearest: crate::names::nearest(&name, builtin_names()).map(str::to_owned),
@@ -128,9 +136,7 @@ impl Scene {
     /// # Errors
     /// If the file or one of its meshes cannot be read or is wrong.
     pub fn from_file(path: &Path) -> Result<Self, Error> {
-        let text = opened::text(path)
-            .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
-        let base = path.parent().unwrap_or(Path::new(""));
+        let (text, base) = text_of(path)?;
         Self::from_toml(&text, &path.display().to_string(), base)
     }
 
@@ -140,7 +146,12 @@ impl Scene {
     /// # Errors
     /// If the text or one of the meshes is wrong.
     pub fn from_toml(text: &str, origin: &str, base: &Path) -> Result<Self, Error> {
-        assemble::scene(Source::typed(text, origin), base, &BTreeMap::new())
+        Self::from_toml_in(text, origin, base, Room::default())
+    }
+
+    /// As [`Scene::from_toml`], if there is `room` for its meshes.
+    fn from_toml_in(text: &str, origin: &str, base: &Path, room: Room) -> Result<Self, Error> {
+        assemble::scene(Source::typed(text, origin), base, &BTreeMap::new(), room)
     }
 
     /// The scene that `table` describes, as a scene file does. `origin` is its name in messages,
@@ -161,7 +172,7 @@ impl Scene {
             message: fault.to_string(),
         })?;
         let source = Source { text: &text, origin, place: Place::Key };
-        assemble::scene(source, base, meshes)
+        assemble::scene(source, base, meshes, Room::default())
     }
 
     /// The TOML text of a built-in scene.
@@ -267,6 +278,13 @@ impl Scene {
         self.interferers.iter().for_each(|interferer| hash.interferer(interferer));
         hash.text()
     }
+}
+
+/// The text of the scene file at `path`, and the folder in which its meshes are looked for.
+fn text_of(path: &Path) -> Result<(String, &Path), Error> {
+    let text =
+        opened::text(path).map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+    Ok((text, path.parent().unwrap_or(Path::new(""))))
 }
 
 impl fmt::Debug for Scene {

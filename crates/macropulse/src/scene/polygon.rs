@@ -93,6 +93,42 @@ impl Cutter {
     }
 }
 
+/// Polygons that a file tells before their corners, to be cut when those are there.
+#[derive(Default)]
+pub(super) struct Early {
+    /// Of all of them, one polygon behind the other.
+    corners: Vec<u32>,
+    /// Of each: the line that tells it, how many corners it has, and its material.
+    polygons: Vec<(u32, u32, u16)>,
+}
+
+impl Early {
+    /// Keeps the polygon that is told on this line. Fewer than three corners are none.
+    pub(super) fn push(&mut self, line: usize, corners: &[u32], material: u16) {
+        if corners.len() < 3 {
+            return;
+        }
+        // A file has fewer bytes than these can count.
+        let [line, count] = [line, corners.len()].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        self.corners.extend(corners);
+        self.polygons.push((line, count, material));
+    }
+
+    /// How many triangles they will be.
+    pub(super) fn triangles(&self) -> usize {
+        self.corners.len() - 2 * self.polygons.len()
+    }
+
+    /// Each of them: its line, its corners and its material.
+    pub(super) fn all(&self) -> impl Iterator<Item = (usize, &[u32], u16)> {
+        self.polygons.iter().scan(self.corners.as_slice(), |rest, (line, count, material)| {
+            let (corners, behind) = rest.split_at_checked(*count as usize)?;
+            *rest = behind;
+            Some((*line as usize, corners, *material))
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,6 +157,17 @@ mod tests {
         let bent = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.3], [0.0, 1.0, 0.0]];
         assert_eq!(cut(bent.to_vec()).triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(cut(square[..2].to_vec()).triangles.len(), 0);
+    }
+
+    #[test]
+    fn polygons_told_early_are_kept_as_they_were() {
+        let mut early = Early::default();
+        early.push(7, &[4, 5, 6], 1);
+        early.push(8, &[1, 2], 1);
+        early.push(9, &[0, 1, 2, 3], 2);
+        assert_eq!(early.triangles(), 3);
+        let all: Vec<_> = early.all().collect();
+        assert_eq!(all, [(7, &[4, 5, 6][..], 1), (9, &[0, 1, 2, 3][..], 2)]);
     }
 
     #[test]

@@ -180,6 +180,20 @@ fn extensions_that_do_not_touch_the_shape_may_be_required() {
     }
 }
 
+/// Such an animation is of no node, and may be of what the crate that reads it does not know.
+#[test]
+fn animations_of_anything_are_left_out_like_others() {
+    let animation = r#"{"channels":[{"sampler":0,"target":{"path":"pointer","extensions":
+{"KHR_animation_pointer":{"pointer":"/materials/0/alphaCutoff"}}}}],"samplers":[{"input":0,"output":1}]}"#;
+    let more = format!(
+        r#","extensionsUsed":["KHR_animation_pointer"],"extensionsRequired":["KHR_animation_pointer"],
+"animations":[{animation},{animation}]"#
+    );
+    let scene = white("a.gltf", Square { more: &more, ..Square::default() }.text()).unwrap();
+    assert_eq!(scene.triangles(), 2);
+    assert!(scene.warnings.iter().any(|said| said.contains("its 2 animations are left out")));
+}
+
 #[test]
 fn quantised_positions_are_read() {
     let more = r#","extensionsUsed":["KHR_mesh_quantization"],"extensionsRequired":["KHR_mesh_quantization"]"#;

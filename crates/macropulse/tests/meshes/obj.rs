@@ -91,6 +91,29 @@ fn a_line_may_name_several_material_files() {
 }
 
 #[test]
+fn a_line_of_a_material_may_go_on_on_the_next() {
+    let obj = format!("mtllib a.mtl\n{CORNERS}usemtl red\nf 1 2 3\n");
+    let mtl = "newmtl \\\nred\nKd 1 \\\r\n 0 \\\n 0\n";
+    let names = materials(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl.as_bytes())]);
+    assert_eq!(names, ["o/red"]);
+}
+
+/// Some programs name the file again before every part; and any file may name many.
+#[test]
+fn material_files_are_looked_for_once_and_not_without_end() {
+    let named = |lines: &str| {
+        let obj = format!("{lines}\n{CORNERS}usemtl red\nf 1 2 3\n");
+        let files = folder(&[("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl red\nKd 1 0 0\n")]);
+        object(files.path(), "mesh = \"a.obj\"").map(|scene| scene.triangles())
+    };
+    let began = std::time::Instant::now();
+    assert_eq!(named(&"mtllib a.mtl\n".repeat(1_000_000)), Ok(1));
+    let told = named(&format!("mtllib{}", " a.mtl".repeat(1_000_000))).unwrap_err();
+    assert!(told.contains("line 1 names more material files than the 4096"), "{told}");
+    assert!(began.elapsed().as_secs() < 3, "{:?}", began.elapsed());
+}
+
+#[test]
 fn a_material_without_a_name_is_none() {
     let obj = format!("mtllib a.mtl\n{CORNERS}usemtl\nf 1 2 3\nusemtl  \nf 1 3 4\n");
     let names = materials(&[("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl red\nKd 1 0 0\n")]);

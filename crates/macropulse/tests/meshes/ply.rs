@@ -1,5 +1,6 @@
 //! PLY, as text and as bytes.
 
+use super::tetra::{folder, object};
 use super::{BAY, assert_is_the_l, refused, triangles, white};
 
 /// A flat polygon with these corners, as text.
@@ -39,6 +40,49 @@ fn comments_in_latin_1_and_byte_order_marks_do_not_matter() {
     bytes.extend((0..6).flat_map(i32::to_le_bytes));
     assert_is_the_l(&white("latin.ply", &bytes).unwrap());
     assert_eq!(triangles("mark.ply", [b"\xef\xbb\xbf".to_vec(), bytes].concat()), 4);
+}
+
+#[test]
+fn lines_may_end_as_on_any_system() {
+    let text = polygon(&BAY);
+    assert_is_the_l(&white("mac.ply", text.replace('\n', "\r")).unwrap());
+    assert_is_the_l(&white("windows.ply", text.replace('\n', "\r\n")).unwrap());
+}
+
+#[test]
+fn faces_may_stand_before_their_vertices() {
+    let text = polygon(&BAY);
+    let (header, body) = text.split_once("end_header\n").unwrap();
+    let (before, face) = header.split_at(header.find("element face").unwrap());
+    let (start, vertex) = before.split_at(before.find("element vertex").unwrap());
+    let (places, corners) = body.split_at(body.find("6 0 1").unwrap());
+    let turned = format!("{start}{face}{vertex}end_header\n{corners}{places}");
+    assert_is_the_l(&white("a.ply", turned).unwrap());
+}
+
+/// The index of a material, of many, is found without a look at all the others.
+#[test]
+fn tens_of_thousands_of_materials_take_little_time() {
+    let names: String = (0..30_000).map(|index| format!("comment material m{index}\n")).collect();
+    let text = polygon(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        .replace("comment material concrete\n", &names)
+        .replace("element face 1", "element face 200000")
+        .replace("3 0 1 2\n", &"3 0 1 2\n".repeat(200_000));
+    let began = std::time::Instant::now();
+    assert_eq!(triangles("a.ply", text), 200_000);
+    assert!(began.elapsed().as_secs() < 5, "{:?}", began.elapsed());
+}
+
+#[test]
+fn an_index_below_zero_is_of_no_material() {
+    let text = polygon(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        .replace("element face 1", "element face 2")
+        .replace("end_header", "property int material_index\nend_header")
+        .replace("3 0 1 2\n", "3 0 1 2 -1\n3 0 1 2 0\n");
+    let files = folder(&[("a.ply", text.as_bytes())]);
+    let scene = object(files.path(), "name = \"o\"\nmesh = \"a.ply\"").unwrap();
+    let names: Vec<&str> = scene.materials.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names.len(), 2, "{names:?}");
 }
 
 #[test]

@@ -31,6 +31,16 @@ fn all_solids_of_a_text_are_read() {
 }
 
 #[test]
+fn a_solid_may_be_called_as_what_it_has() {
+    for name in ["facet", "big facet", "facet of a vertex endloop"] {
+        let text = format!("solid {name}\n{}endsolid {name}\n", facet(0.0));
+        assert_eq!(triangles("a.stl", &text), 1, "{name}");
+        let twice = format!("{text}{text}").replace('\n', " ");
+        assert_eq!(triangles("one-line.stl", &twice), 2, "{name}");
+    }
+}
+
+#[test]
 fn words_may_be_in_capitals_and_apart_by_tabs() {
     let text = format!("solid a\n{}endsolid a\n", facet(0.0));
     assert_eq!(triangles("capitals.stl", text.to_uppercase()), 1);

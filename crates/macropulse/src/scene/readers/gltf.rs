@@ -14,7 +14,7 @@ mod document;
 
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::io::Read as _;
+use std::io::{BufRead as _, Read as _};
 use std::path::Path;
 
 use ::gltf::mesh::Mode;
@@ -25,6 +25,7 @@ use glam::{DMat4, DQuat, DVec3};
 use super::{DAMAGED, Reach, Read, counted, luminance, no_surfaces, open, too_many_materials};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
+use crate::scene::room::Room;
 use accessor::Buffers;
 
 /// Bytes of the file, or made from them.
@@ -43,7 +44,7 @@ const TOO_LARGE: &str = "export it in parts or with fewer details";
 
 /// Reads the default scene of the glTF file at `path`, or its first, as one mesh in the axes of
 /// the file, m.
-pub(super) fn read(path: &Path, reach: Reach<'_>) -> Result<Read, Error> {
+pub(super) fn read(path: &Path, (reach, room): (Reach<'_>, Room)) -> Result<Read, Error> {
     let bytes = whole(path)?;
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
     let [text, binary] = document::container(&bytes).map_err(damaged)?;
@@ -56,11 +57,13 @@ pub(super) fn read(path: &Path, reach: Reach<'_>) -> Result<Read, Error> {
         materials: HashMap::new(),
         visits: MOST_VISITS,
         limits: [MOST_CORNERS; 2],
+        room: (room, path),
         told: Told::default(),
     };
     walk.all(&document).map_err(|fault| match fault {
         Fault::Damaged(problem) => damaged(problem.into_owned()),
         Fault::Materials => too_many_materials(path),
+        Fault::NoRoom(error) => error,
         Fault::TooLarge(what) => Error::mesh(path, format!("holds more than {what}"), TOO_LARGE),
     })?;
     Ok(Read { left_out: walk.told.left_out(&document), mesh: walk.mesh })
@@ -70,8 +73,15 @@ pub(super) fn read(path: &Path, reach: Reach<'_>) -> Result<Read, Error> {
 fn whole(path: &Path) -> Result<Vec<u8>, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut bytes = Vec::new();
-    // One byte more than allowed tells that there are more.
-    open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    let mut file = open(path)?;
+    let begins = file.fill_buf().map_err(unreadable)?;
+    // What is no glTF tells it by its beginning; of others one byte more than allowed tells that
+    // there are more.
+    let most = match document::may_begin(begins) {
+        true => MOST_BYTES + 1,
+        false => begins.len() as u64,
+    };
+    file.take(most).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MOST_BYTES {
         return Err(Error::mesh(path, "is larger than 1 GiB", TOO_LARGE));
     }
@@ -82,6 +92,7 @@ fn whole(path: &Path) -> Result<Vec<u8>, Error> {
 enum Fault {
     Damaged(Cow<'static, str>),
     Materials,
+    NoRoom(Error),
     TooLarge(String),
 }
 
@@ -138,6 +149,8 @@ struct Walk<'a> {
     visits: usize,
     /// Vertices and triangles that the mesh may have.
     limits: [usize; 2],
+    /// What there is room for, and the file.
+    room: (Room, &'a Path),
     told: Told,
 }
 
@@ -198,9 +211,9 @@ impl Walk<'_> {
         let count = positions.count();
         let corners = primitive.indices().map_or(count, |indices| indices.count());
         match mode {
-            Mode::Points => self.told.points += corners,
-            Mode::Lines => self.told.lines += corners / 2,
-            Mode::LineLoop | Mode::LineStrip => self.told.lines += 1,
+            Mode::Points => self.told.points = self.told.points.saturating_add(corners),
+            Mode::Lines => self.told.lines = self.told.lines.saturating_add(corners / 2),
+            Mode::LineLoop | Mode::LineStrip => self.told.lines = self.told.lines.saturating_add(1),
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => {
                 return self.surface(primitive, place, (count, corners));
             }
@@ -223,6 +236,9 @@ impl Walk<'_> {
         {
             return Err(Fault::TooLarge(format!("{MOST_CORNERS} vertices or triangles")));
         }
+        let (room, path) = self.room;
+        let size = (self.mesh.vertices.len() + count, self.mesh.triangles.len() + triangles);
+        room.check(size, path).map_err(Fault::NoRoom)?;
         self.told.has_targets |= primitive.morph_targets().len() > 0;
         let Some(positions) = primitive.get(&Semantic::Positions) else { return Ok(()) };
         let places = self.buffers.places(&positions)?;

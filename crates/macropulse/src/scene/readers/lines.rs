@@ -13,6 +13,24 @@ const LONGEST: usize = 1 << 24;
 const UTF_8: &[u8] = b"\xef\xbb\xbf";
 const UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
+/// What is wrong with a line, to go on after its number, or with the whole file.
+pub(super) enum Fault {
+    Line(String),
+    File(Error),
+}
+
+impl From<String> for Fault {
+    fn from(problem: String) -> Self {
+        Self::Line(problem)
+    }
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::File(error)
+    }
+}
+
 /// The lines of a file, one after the other.
 pub(super) struct Lines<'a, R> {
     file: &'a mut R,
@@ -69,19 +87,22 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 
     /// Lets `take` have the number of each line and the line; what that says is wrong with it, and
-    /// then what to do.
+    /// then what to do. Or it says what is wrong with the whole file.
     ///
     /// # Errors
     /// As [`Lines::next`], and what `take` says.
-    pub(super) fn each(
+    pub(super) fn each<F: Into<Fault>>(
         &mut self,
         remedy: &str,
-        mut take: impl FnMut(usize, &str) -> Result<(), String>,
+        mut take: impl FnMut(usize, &str) -> Result<(), F>,
     ) -> Result<(), Error> {
         while let Some((number, line)) = self.next()? {
-            if let Err(problem) = take(number, &line) {
+            if let Err(fault) = take(number, &line) {
                 drop(line);
-                return Err(self.fault(problem, remedy));
+                return Err(match fault.into() {
+                    Fault::Line(problem) => self.fault(problem, remedy),
+                    Fault::File(error) => error,
+                });
             }
         }
         Ok(())
@@ -125,6 +146,56 @@ impl<'a, R: BufRead> Lines<'a, R> {
             break;
         }
         Ok(is_there)
+    }
+}
+
+/// The bytes of a text whose lines end as on any system, ended as on Unix.
+pub(super) struct UnixLines<R> {
+    file: R,
+    some: Vec<u8>,
+    /// Of `some`, what has been given.
+    given: usize,
+    /// Whether a return came last, behind which a line feed is no end of another line.
+    is_returned: bool,
+}
+
+impl<R: BufRead> UnixLines<R> {
+    pub(super) fn of(file: R) -> Self {
+        Self { file, some: Vec::new(), given: 0, is_returned: false }
+    }
+}
+
+impl<R: BufRead> BufRead for UnixLines<R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        while self.given == self.some.len() {
+            self.given = 0;
+            self.some.clear();
+            let bytes = self.file.fill_buf()?;
+            if bytes.is_empty() {
+                break;
+            }
+            for byte in bytes {
+                if !(self.is_returned && *byte == b'\n') {
+                    self.some.push(if *byte == b'\r' { b'\n' } else { *byte });
+                }
+                self.is_returned = *byte == b'\r';
+            }
+            let length = bytes.len();
+            self.file.consume(length);
+        }
+        Ok(&self.some[self.given..])
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.given = self.some.len().min(self.given + count);
+    }
+}
+
+impl<R: BufRead> io::Read for UnixLines<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let count = io::Read::read(&mut self.fill_buf()?, into)?;
+        self.consume(count);
+        Ok(count)
     }
 }
 
@@ -179,6 +250,16 @@ mod tests {
             assert_eq!(lines(text.as_bytes()), wanted, "{text:?}");
         }
         assert_eq!(lines(b""), []);
+    }
+
+    #[test]
+    fn ends_of_lines_become_those_of_unix_wherever_a_buffer_ends() {
+        for size in 1..6 {
+            let file = io::BufReader::with_capacity(size, b"a\r\n\r\nb\rc\n\nd\r".as_slice());
+            let mut text = String::new();
+            io::Read::read_to_string(&mut UnixLines::of(file), &mut text).unwrap();
+            assert_eq!(text, "a\n\nb\nc\n\nd\n");
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ use std::path::Path;
 
 use super::error::Error;
 use super::mesh::Mesh;
+use super::room::Room;
 use crate::opened;
 pub(super) use beside::Reach;
 
@@ -44,17 +45,17 @@ impl From<Mesh> for Read {
     }
 }
 
-/// Reads the mesh at `path`, and the files it names within `reach`.
+/// Reads the mesh at `path`, and the files it names within `reach`, if there is `room` for it.
 pub(super) fn read(
     path: &Path,
     without: WithoutMaterials,
-    reach: Reach<'_>,
+    (reach, room): (Reach<'_>, Room),
 ) -> Result<Read, Error> {
     let Read { mesh, left_out } = match extension(path).as_str() {
-        "obj" => obj::read(path, without, reach)?,
-        "stl" => stl::read(path)?.into(),
-        "ply" => ply::read(path)?.into(),
-        "glb" | "gltf" => gltf::read(path, reach)?,
+        "obj" => obj::read(path, without, (reach, room))?,
+        "stl" => stl::read(path, room)?.into(),
+        "ply" => ply::read(path, room)?.into(),
+        "glb" | "gltf" => gltf::read(path, (reach, room))?,
         _ => {
             return Err(Error::mesh(
                 path,
@@ -70,7 +71,7 @@ pub(super) fn read(
 
 /// Reads the PLY file that `bytes` are; `path` is its name in messages.
 pub(super) fn read_ply(bytes: &[u8], path: &Path) -> Result<Mesh, Error> {
-    ply::read_from(&mut Cursor::new(bytes), path)?.checked(path)
+    ply::read_from(&mut Cursor::new(bytes), path, Room::default())?.checked(path)
 }
 
 /// Whether `path` is a glTF file, whose axes and unit are fixed by its specification.
@@ -106,8 +107,11 @@ fn no_surfaces(lines: usize, points: usize) -> Option<String> {
         .filter(|(count, _)| *count > 0)
         .map(|(count, what)| counted(count, what))
         .collect();
-    let verb =
-        if lines + points == 1 { "is no surface, and is" } else { "are no surfaces, and are" };
+    let verb = if lines.saturating_add(points) == 1 {
+        "is no surface, and is"
+    } else {
+        "are no surfaces, and are"
+    };
     (!said.is_empty()).then(|| format!("{} {verb} left out", said.join(" and ")))
 }
 
@@ -135,7 +139,7 @@ mod tests {
 
     #[test]
     fn unknown_formats_and_missing_files_are_refused() {
-        let reach = Reach { scene: Path::new(""), outside: false };
+        let reach = (Reach { scene: Path::new(""), outside: false }, Room::default());
         let told =
             |name| read(Path::new(name), WithoutMaterials::Fine, reach).unwrap_err().to_string();
         assert!(told("a.blend").contains("use .obj, .stl, .ply, .glb or .gltf"));

@@ -8,25 +8,30 @@ mod mtl;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::lines::{Lines, numbers};
+use super::lines::{Fault, Lines, numbers};
 use super::{DAMAGED, Reach, Read, WithoutMaterials, no_surfaces, open};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
-use crate::scene::polygon::Cutter;
+use crate::scene::polygon::{Cutter, Early};
+use crate::scene::room::Room;
 use mtl::Library;
 
 pub(super) fn read(
     path: &Path,
     without: WithoutMaterials,
-    reach: Reach<'_>,
+    (reach, room): (Reach<'_>, Room),
 ) -> Result<Read, Error> {
     let mut file = open(path)?;
     let mut obj = Obj::default();
     let mut lines = Lines::of(&mut file, path)?.joined();
-    lines.each(DAMAGED, |number, line| obj.line(number, line))?;
+    lines.each(DAMAGED, |number, line| -> Result<(), Fault> {
+        obj.line(number, line)?;
+        Ok(room.check(obj.size(), path)?)
+    })?;
     obj.cut_early().map_err(|(number, problem)| {
         Error::mesh(path, format!("line {number} {problem}"), DAMAGED)
     })?;
+    room.check(obj.size(), path)?;
     let left_out = obj.left_out();
     let mut mesh = obj.mesh;
     // Colours are guesses for objects without a material of their own.
@@ -34,7 +39,6 @@ pub(super) fn read(
         let (mut library, mut known) = (Library::new(), HashSet::new());
         for named in &obj.libraries {
             for file in mtl::files(path, named, reach)? {
-                // Some programs name it again before every part.
                 if !known.contains(&file) {
                     mtl::read(&file, &mut library)?;
                     known.insert(file);
@@ -50,6 +54,9 @@ pub(super) fn read(
 
 const TOO_MANY: &str = "has one material more than the 65536 that can be told apart";
 
+/// Most material files, each of which is looked for.
+const MOST_LIBRARIES: usize = 4096;
+
 /// What has been read so far.
 #[derive(Default)]
 struct Obj {
@@ -59,12 +66,14 @@ struct Obj {
     materials: HashMap<String, u16>,
     /// What the faces that follow are made of: its name, and its index once it has a face.
     material: (String, Option<u16>),
-    /// What lines `mtllib` name.
+    /// What lines `mtllib` name, each once, and all of them together in words.
     libraries: Vec<String>,
+    known_libraries: HashSet<String>,
+    named: usize,
     /// Those of a face.
     corners: Vec<u32>,
-    /// Faces whose vertices are told behind them: line, corners, material.
-    early: Vec<(usize, Vec<u32>, u16)>,
+    /// Faces whose vertices are told behind them.
+    early: Early,
     lines: usize,
     points: usize,
     has_free_form: bool,
@@ -84,9 +93,30 @@ impl Obj {
             "p" => self.points += words().count(),
             "curv" | "curv2" | "surf" => self.has_free_form = true,
             "usemtl" => self.material = (rest.to_owned(), None),
-            "mtllib" if !rest.is_empty() => self.libraries.push(rest.to_owned()),
+            "mtllib" if !rest.is_empty() => self.library(rest)?,
             _ => {}
         }
+        Ok(())
+    }
+
+    /// How many vertices and triangles there are, and will be.
+    fn size(&self) -> (usize, usize) {
+        (self.mesh.vertices.len(), self.mesh.triangles.len() + self.early.triangles())
+    }
+
+    fn library(&mut self, named: &str) -> Result<(), String> {
+        // Some programs name it again before every part.
+        if self.known_libraries.contains(named) {
+            return Ok(());
+        }
+        self.named += named.split_whitespace().count();
+        if self.named > MOST_LIBRARIES {
+            return Err(format!(
+                "names more material files than the {MOST_LIBRARIES} that are read"
+            ));
+        }
+        self.known_libraries.insert(named.to_owned());
+        self.libraries.push(named.to_owned());
         Ok(())
     }
 
@@ -117,7 +147,7 @@ impl Obj {
         }
         let material = self.material()?;
         if self.corners.iter().any(|corner| *corner as usize >= count) {
-            self.early.push((number, self.corners.clone(), material));
+            self.early.push(number, &self.corners, material);
         } else {
             self.cutter.add(&mut self.mesh, &self.corners, material)?;
         }
@@ -145,12 +175,12 @@ impl Obj {
     /// Adds the faces that were told before their vertices; or says which has none, by line.
     fn cut_early(&mut self) -> Result<(), (usize, String)> {
         let count = self.mesh.vertices.len();
-        for (number, corners, material) in std::mem::take(&mut self.early) {
+        for (number, corners, material) in std::mem::take(&mut self.early).all() {
             if let Some(corner) = corners.iter().find(|corner| **corner as usize >= count) {
                 let named = u64::from(*corner) + 1;
                 return Err((number, format!("names vertex {named}, but there are only {count}")));
             }
-            let cut = self.cutter.add(&mut self.mesh, &corners, material);
+            let cut = self.cutter.add(&mut self.mesh, corners, material);
             cut.map_err(|problem| (number, problem))?;
         }
         Ok(())

@@ -3,20 +3,22 @@
 //! The format has no materials. A file that says `comment material NAME` for each, counted from 0,
 //! and has a property `material_index` of its faces names them all the same.
 
+use std::collections::HashMap;
 use std::io::{BufRead, Cursor};
 use std::path::Path;
 
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
-    DefaultElement, ElementDef, Header, Property, PropertyAccess, PropertyAccessResult,
+    DefaultElement, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult,
     PropertyType,
 };
 
-use super::lines::Lines;
+use super::lines::{Lines, UnixLines};
 use super::{DAMAGED, open, too_many_materials};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
-use crate::scene::polygon::Cutter;
+use crate::scene::polygon::{Cutter, Early};
+use crate::scene::room::Room;
 
 /// Longer headers are none, bytes.
 const LONGEST_HEADER: usize = 1 << 20;
@@ -30,31 +32,41 @@ const AT_ONCE: usize = 1 << 14;
 /// What a list of corners is called.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-pub(super) fn read(path: &Path) -> Result<Mesh, Error> {
-    read_from(&mut open(path)?, path)
+pub(super) fn read(path: &Path, room: Room) -> Result<Mesh, Error> {
+    read_from(&mut open(path)?, path, room)
 }
 
-/// Reads the mesh from `file`, whose name in messages is `path`.
-pub(super) fn read_from(file: &mut impl BufRead, path: &Path) -> Result<Mesh, Error> {
+/// Reads the mesh from `file`, whose name in messages is `path`, if there is `room` for it.
+pub(super) fn read_from(file: &mut impl BufRead, path: &Path, room: Room) -> Result<Mesh, Error> {
     let (header, lines) = header(file, path)?;
-    let mut body = Body { reader: Reader::new(file), header: &header, path, lines };
-    let mut mesh = Mesh::default();
-    let mut materials = Vec::new();
-    for name in header.comments.iter().filter_map(|comment| comment.strip_prefix("material ")) {
-        materials.push(mesh.material(name.trim()).ok_or_else(|| too_many_materials(path))?);
+    let header = &header;
+    match header.encoding {
+        Encoding::Ascii => {
+            let reader = Reader::new(UnixLines::of(file));
+            body(Body { reader, header, path, lines, room })
+        }
+        _ => body(Body { reader: Reader::new(file), header, path, lines, room }),
     }
-    let mut faces = Faces { materials, ..Faces::default() };
+}
+
+/// Reads what is behind the header.
+fn body(mut body: Body<'_, impl BufRead>) -> Result<Mesh, Error> {
+    let (header, path) = (body.header, body.path);
+    let mut mesh = Mesh::default();
+    let mut faces = Faces::default();
+    for name in header.comments.iter().filter_map(|comment| comment.strip_prefix("material ")) {
+        let material = faces.material_called(name.trim(), &mut mesh);
+        faces.materials.push(material.ok_or_else(|| too_many_materials(path))?);
+    }
     for (name, element) in &header.elements {
         match name.as_str() {
-            "vertex" => {
-                body.each(element, |vertices: &[Vertex]| {
-                    mesh.vertices.extend(vertices.iter().map(|vertex| vertex.0));
-                    Ok(())
-                })?;
-            }
+            "vertex" => body.each(element, |vertices: &[Vertex]| {
+                mesh.vertices.extend(vertices.iter().map(|vertex| vertex.0));
+                Ok(faces.size(&mesh))
+            })?,
             "face" => body.each(element, |read| faces.add(read, &mut mesh))?,
             "tristrips" => body.each(element, |read| faces.add_strips(read, &mut mesh))?,
-            _ => body.each(element, |_: &[Other]| Ok(()))?,
+            _ => body.each(element, |_: &[Other]| Ok((0, 0)))?,
         }
     }
     faces.cut_early(&mut mesh).map_err(|problem| Error::mesh(path, problem, DAMAGED))?;
@@ -129,14 +141,16 @@ struct Body<'a, R: BufRead> {
     path: &'a Path,
     /// Of the header.
     lines: usize,
+    room: Room,
 }
 
 impl<R: BufRead> Body<'_, R> {
-    /// Reads the elements of a kind, and lets `take` have some at a time; what that says is wrong.
+    /// Reads the elements of a kind, and lets `take` have some at a time; how many vertices and
+    /// triangles there are by then, or what is wrong.
     fn each<E: PropertyAccess>(
         &mut self,
         element: &ElementDef,
-        mut take: impl FnMut(&[E]) -> Result<(), String>,
+        mut take: impl FnMut(&[E]) -> Result<(usize, usize), String>,
     ) -> Result<(), Error> {
         let damaged = |problem: String| Error::mesh(self.path, problem, DAMAGED);
         let parser = Parser::<E>::new();
@@ -151,7 +165,7 @@ impl<R: BufRead> Body<'_, R> {
                 }
                 _ => damaged(told(&fault, self.lines)),
             })?;
-            take(&read).map_err(damaged)?;
+            self.room.check(take(&read).map_err(damaged)?, self.path)?;
         }
         Ok(())
     }
@@ -211,7 +225,9 @@ impl PropertyAccess for Face {
             };
             self.corners = corners;
         } else if name == "material_index" {
-            self.material = number(&property).map(|index| index as usize);
+            // Below 0 it says that there is none.
+            let index = number(&property).filter(|index| *index >= 0.0);
+            self.material = index.map(|index| index as usize);
         } else {
             return PropertyAccessResult::Ignored;
         }
@@ -232,31 +248,41 @@ impl PropertyAccess for Other {
 #[derive(Default)]
 struct Faces {
     cutter: Cutter,
+    /// Those that the header names, and all by name.
     materials: Vec<u16>,
+    known: HashMap<String, u16>,
     corners: Vec<u32>,
-    /// Faces that were told before the vertices: corners, material.
-    early: Vec<(Vec<u32>, u16)>,
+    /// Faces that were told before the vertices.
+    early: Early,
 }
 
 impl Faces {
-    fn add(&mut self, faces: &[Face], mesh: &mut Mesh) -> Result<(), String> {
+    fn add(&mut self, faces: &[Face], mesh: &mut Mesh) -> Result<(usize, usize), String> {
         for face in faces {
             self.corners.clear();
             for corner in &face.corners {
                 self.corners.push(index(*corner)?);
             }
+            if self.corners.len() < 3 {
+                continue;
+            }
             let material = self.material(face, mesh)?;
             if mesh.vertices.is_empty() {
-                self.early.push((self.corners.clone(), material));
+                self.early.push(0, &self.corners, material);
             } else {
                 self.cutter.add(mesh, &self.corners, material)?;
             }
         }
-        Ok(())
+        Ok(self.size(mesh))
+    }
+
+    /// How many vertices and triangles there are, and will be.
+    fn size(&self, mesh: &Mesh) -> (usize, usize) {
+        (mesh.vertices.len(), mesh.triangles.len() + self.early.triangles())
     }
 
     /// Adds strips of triangles, of which each ends at a negative number.
-    fn add_strips(&mut self, strips: &[Face], mesh: &mut Mesh) -> Result<(), String> {
+    fn add_strips(&mut self, strips: &[Face], mesh: &mut Mesh) -> Result<(usize, usize), String> {
         for strip in strips {
             let material = self.material(strip, mesh)?;
             for strip in strip.corners.split(|corner| *corner < 0) {
@@ -265,20 +291,33 @@ impl Faces {
                 }
             }
         }
-        Ok(())
+        Ok(self.size(mesh))
     }
 
-    fn material(&self, face: &Face, mesh: &mut Mesh) -> Result<u16, String> {
+    fn material(&mut self, face: &Face, mesh: &mut Mesh) -> Result<u16, String> {
         match face.material.and_then(|index| self.materials.get(index)) {
             Some(material) => Ok(*material),
-            None => mesh.material("").ok_or_else(|| "has more than 65535 materials".to_owned()),
+            None => self
+                .material_called("", mesh)
+                .ok_or_else(|| "has more than 65535 materials".to_owned()),
         }
+    }
+
+    /// The material of this name, which is added if it is new; `None` where there are as many as can
+    /// be counted.
+    fn material_called(&mut self, name: &str, mesh: &mut Mesh) -> Option<u16> {
+        if let Some(known) = self.known.get(name) {
+            return Some(*known);
+        }
+        let new = mesh.add_material(name, None)?;
+        self.known.insert(name.to_owned(), new);
+        Some(new)
     }
 
     /// Adds the faces that were told before the vertices.
     fn cut_early(&mut self, mesh: &mut Mesh) -> Result<(), String> {
-        for (corners, material) in std::mem::take(&mut self.early) {
-            self.cutter.add(mesh, &corners, material)?;
+        for (_, corners, material) in std::mem::take(&mut self.early).all() {
+            self.cutter.add(mesh, corners, material)?;
         }
         Ok(())
     }

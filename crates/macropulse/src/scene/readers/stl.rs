@@ -8,11 +8,12 @@ use std::io::{BufRead, Read};
 use std::ops::Range;
 use std::path::Path;
 
-use super::lines::{Lines, numbers};
+use super::lines::{Fault, Lines, numbers};
 use super::{DAMAGED, open};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
 use crate::scene::polygon::Cutter;
+use crate::scene::room::Room;
 
 /// Bytes before the facets of a binary file: 80 that say anything, and their number.
 const HEADER: usize = 84;
@@ -20,12 +21,15 @@ const HEADER: usize = 84;
 /// Bytes of a facet: its normal and three corners as floats, and two bytes that say anything.
 const FACET: usize = 50;
 
-pub(super) fn read(path: &Path) -> Result<Mesh, Error> {
+pub(super) fn read(path: &Path, room: Room) -> Result<Mesh, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut file = open(path)?;
     let length = file.get_ref().metadata().map_err(unreadable)?.len();
     let begins = file.fill_buf().map_err(unreadable)?;
-    if is_text(begins, length) { text(&mut file, path) } else { binary(&mut file, path, length) }
+    match is_text(begins, length) {
+        true => text(&mut file, path, room),
+        false => binary(&mut file, (path, length), room),
+    }
 }
 
 /// Whether a file of this length that begins so is text. Many programs begin a binary file with
@@ -42,7 +46,7 @@ fn is_text(begins: &[u8], length: u64) -> bool {
     is_wide || is_solid && !begins.iter().take(512).any(|byte| *byte == 0)
 }
 
-fn binary(file: &mut impl Read, path: &Path, length: u64) -> Result<Mesh, Error> {
+fn binary(file: &mut impl Read, (path, length): (&Path, u64), room: Room) -> Result<Mesh, Error> {
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
     let mut header = [0; HEADER];
     file.read_exact(&mut header)
@@ -53,6 +57,7 @@ fn binary(file: &mut impl Read, path: &Path, length: u64) -> Result<Mesh, Error>
         let problem = format!("says that it has {count} facets, and ends within number {there}");
         return Err(damaged(problem));
     }
+    room.check((3 * count as usize, count as usize), path)?;
     let mut mesh = Mesh::default();
     mesh.vertices.reserve_exact(3 * count as usize);
     let material = mesh.material("").unwrap_or_default();
@@ -67,11 +72,15 @@ fn binary(file: &mut impl Read, path: &Path, length: u64) -> Result<Mesh, Error>
     Ok(mesh)
 }
 
-fn text(file: &mut impl BufRead, path: &Path) -> Result<Mesh, Error> {
+fn text(file: &mut impl BufRead, path: &Path, room: Room) -> Result<Mesh, Error> {
     let mut lines = Lines::of(file, path)?;
     let mut text = Text::default();
     text.material = text.mesh.material("").unwrap_or_default();
-    lines.each(DAMAGED, |_, line| text.line(line))?;
+    lines.each(DAMAGED, |_, line| -> Result<(), Fault> {
+        text.line(line)?;
+        let corners = text.mesh.vertices.len() + text.corners.len();
+        Ok(room.check((corners, text.mesh.triangles.len()), path)?)
+    })?;
     if text.is_open || !text.corners.is_empty() {
         return Err(Error::mesh(path, "ends within a facet", DAMAGED));
     }
@@ -114,8 +123,17 @@ impl Text {
             } else if is("endfacet") {
                 self.is_open = false;
             } else if is("solid") || is("endsolid") {
-                // A name may be any words.
-                self.is_open |= words.any(|word| word.eq_ignore_ascii_case("facet"));
+                // A name may be any words; a facet on the same line goes on with its normal.
+                while let Some(word) = words.next() {
+                    let next = words.clone().next().unwrap_or_default();
+                    let begins = |known: [&str; 2]| {
+                        [word, next].iter().zip(known).all(|(a, b)| a.eq_ignore_ascii_case(b))
+                    };
+                    if begins(["facet", "normal"]) {
+                        self.is_open = true;
+                        break;
+                    }
+                }
             }
         }
         Ok(())

@@ -27,7 +27,7 @@ const HARMLESS: [&str; 10] = [
     "KHR_lights_",
     "EXT_lights_",
     "KHR_xmp",
-    "KHR_animation_pointer",
+    POINTERS,
     "EXT_mesh_features",
     "EXT_structural_metadata",
 ];
@@ -47,6 +47,12 @@ pub(super) fn adds_shape(name: &str) -> bool {
 
 fn is_harmless(name: &str) -> bool {
     name == QUANTISED || HARMLESS.iter().any(|begins| name.starts_with(begins))
+}
+
+/// Whether a file that begins so may be a glTF: a container, or text that is an object.
+pub(super) fn may_begin(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    bytes.starts_with(b"glTF") || text.is_empty() || text.starts_with(b"{")
 }
 
 /// JSON and binary part of a file: those of a `.glb`, or all of it and nothing.
@@ -81,6 +87,8 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
         return Err(Error::mesh(path, problem, TOO_LARGE));
     }
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
+    let stilled = stilled(text);
+    let text = stilled.as_deref().unwrap_or(text);
     let root: Root = ::gltf::json::deserialize::from_slice(text)
         .map_err(|fault| damaged(format!("is no readable glTF ({fault})")))?;
     if let Some(extension) = root.extensions_required.iter().find(|name| !is_harmless(name)) {
@@ -97,6 +105,19 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
         return Err(Error::mesh(path, problem, "export it with all data in one buffer"));
     }
     Ok(Document::from_json_without_validation(root))
+}
+
+/// An extension by which an animation may change anything, also what is no node.
+const POINTERS: &str = "KHR_animation_pointer";
+
+/// A document with such animations as if they did nothing: the crate takes each for one of a node.
+/// `None` where there are none.
+fn stilled(text: &[u8]) -> Option<Vec<u8>> {
+    let text = std::str::from_utf8(text).ok().filter(|text| text.contains(POINTERS))?;
+    let mut document: serde_json::Value = serde_json::from_str(text).ok()?;
+    let animations = document.get_mut("animations")?.as_array_mut()?;
+    animations.fill(serde_json::json!({ "channels": [], "samplers": [] }));
+    serde_json::to_vec(&document).ok()
 }
 
 /// Most buffers of a document, each of which may be a file to open.
@@ -165,6 +186,16 @@ mod tests {
         let file = b"glTF\x02\0\0\0\x16\0\0\0\x02\0\0\0JSON{}";
         let [text, binary] = container(file).unwrap();
         assert_eq!((&*text, &*binary), (b"{}".as_slice(), b"".as_slice()));
+    }
+
+    #[test]
+    fn a_file_may_be_told_by_its_beginning() {
+        for bytes in [&b"glTF\x02"[..], b"{}", b"\xef\xbb\xbf\r\n {", b" ", b""] {
+            assert!(may_begin(bytes), "{bytes:?}");
+        }
+        for bytes in [&b"\0\0"[..], b"solid", b"\xff\xfe{\0"] {
+            assert!(!may_begin(bytes), "{bytes:?}");
+        }
     }
 
     #[test]

@@ -55,7 +55,7 @@ fn absent(path: &Path, named: &str) -> Error {
 /// If it cannot be read, or a colour is none.
 pub(super) fn read(path: &Path, library: &mut Library) -> Result<(), Error> {
     let mut file = open(path)?;
-    let mut lines = Lines::of(&mut file, path)?;
+    let mut lines = Lines::of(&mut file, path)?.joined();
     // The material that is told about, unless it is known already.
     let mut name: Option<String> = None;
     let remedy = "mend it, or give the object `material = \"…\"`";
