@@ -108,8 +108,9 @@ pub(super) fn chances(
     let by_count: Vec<Seen> = (0..=weight)
         .map(|count| {
             let more = if count < weight { Sampling::MORE_IF_MISSING } else { 0.0 };
-            let rule = Rule { threshold: threshold + more, count, weight };
-            match count < fewest(sampling, weight) {
+            let fewest = fewest(sampling, weight);
+            let rule = Rule { threshold: threshold + more, count, weight, fewest };
+            match count < fewest {
                 true => Seen::default(),
                 false => rule.seen(&filtered, &points[count], (photons, sampling.excess)),
             }
@@ -181,13 +182,18 @@ struct Rule {
     /// Marks that count, of how many.
     count: usize,
     weight: usize,
+    /// Marks that must count.
+    fewest: usize,
 }
 
 impl Rule {
     fn seen(&self, filtered: &Filtered, points: &Points, (photons, excess): (f64, f64)) -> Seen {
         let deviation =
             |photons: f64| (filtered.noise + excess * filtered.of_photon * photons.max(0.0)).sqrt();
-        let needed = self.threshold * (filtered.noise / self.count as f64).sqrt();
+        // What the sum of so many marks must be.
+        let needed = |threshold: f64, count: usize| threshold * (filtered.noise * count as f64).sqrt();
+        let all = needed(self.threshold, self.count);
+        let others = needed(self.threshold + Sampling::MORE_IF_MISSING, self.count.max(1) - 1);
         let above = Sampling::most_above_least(self.weight);
         let [one, two] = filtered.correlation;
         let rest = (1.0 - one * one).max(0.0).sqrt();
@@ -207,8 +213,14 @@ impl Rule {
             let is_found = (0..LAGS).any(|lag| {
                 let heights = heights.iter().map(|heights| heights[lag]);
                 let least = heights.clone().fold(f64::INFINITY, f64::min);
+                let most = heights.clone().fold(f64::NEG_INFINITY, f64::max);
                 let cap = least + above * deviation(least);
-                heights.map(|height| height.min(cap)).sum::<f64>() / self.count as f64 >= needed
+                let far = least + Sampling::FAR_ABOVE_LEAST * deviation(least);
+                let sum = heights.map(|height| height.min(cap)).sum::<f64>();
+                match most > far && self.count > self.fewest {
+                    true => sum - most.min(cap) >= others,
+                    false => sum >= all,
+                }
             });
             let sum: f64 = heights.iter().map(|heights| heights[1]).sum();
             is_found.then_some(sum / self.count as f64)

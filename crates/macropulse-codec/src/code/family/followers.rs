@@ -185,7 +185,7 @@ mod tests {
         let two = Separated { words: 2, ..WORDS };
         assert_eq!(two.lost(&Family::separated(two).unwrap().words()), 0);
         let heavy = Separated {
-            length: 60_000,
+            length: 20_000,
             weight: 24,
             words: 4,
             gap: 9,

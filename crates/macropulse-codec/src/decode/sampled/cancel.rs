@@ -396,6 +396,16 @@ mod tests {
         assert!((600.0..700.0).contains(&found.photons), "{}", found.photons);
     }
 
+    /// Bright light of others in one mark, and in the two others what noise alone may be. Control: light that is not so
+    /// far above them counts, and two that are as strong as is asked of two are found beside any.
+    #[test]
+    fn a_bright_mark_of_others_does_not_carry_two_faint_ones() {
+        let found = |faint, bright| tested([faint, bright, faint], [false; 3]).0.is_some();
+        let deviation = (SIGMA * SIGMA + 5.56 * 100.0).sqrt();
+        assert!(found(100.0, 100.0 + 4.9 * deviation) && !found(100.0, 100.0 + 5.1 * deviation));
+        assert!(!found(100.0, 1000.0) && !found(170.0, 1000.0) && found(180.0, 1000.0));
+    }
+
     /// Two marks at the rims of clipped light, none of them clipped itself, and noise at the third.
     #[test]
     fn rims_of_clipped_light_are_no_marks() {

@@ -76,6 +76,10 @@ impl Sampling {
         Pulse::new(self).taps
     }
 
+    /// By how many of its own standard deviations the least of the marks that count lies below one that has light
+    /// of others on it, and counts for nothing where enough are left.
+    pub const FAR_ABOVE_LEAST: f64 = FAR as f64;
+
     /// How many of its own standard deviations above the least of `marks` in a word one counts at most.
     pub fn most_above_least(marks: usize) -> f64 {
         match marks {
@@ -221,7 +225,8 @@ struct Sum {
     most: f32,
     /// How far the marks are apart.
     spread: f32,
-    /// Standard deviations of noise alone that the sum is above 0.
+    /// Standard deviations of noise alone that the sum is above 0; without a mark far above the least, which is
+    /// of others.
     score: f32,
 }
 
@@ -229,6 +234,10 @@ struct Sum {
 /// of so many marks is below their mean: 2.5 of three marks. Nearly one in five words of three marks
 /// has a mark that is cut by noise alone, by which 0.04 deviations of their mean are lost.
 const ABOVE: f32 = 1.65;
+
+/// A mark so many standard deviations of the least above it has light of others on it: of three marks of one
+/// light noise alone makes two differ by that once in 200 words.
+const FAR: f32 = 5.0;
 
 /// How often the least strength of a mark is bounded by halves, and by what share of the noise that bound is
 /// lowered so that no rounding matters.
@@ -276,7 +285,9 @@ impl Rule {
     /// The marks that count, out of so many `marks`, together; `None` of none.
     ///
     /// Each is weighed by the inverse of its variance. How much one counts at most follows from the least
-    /// of those that are certain, if any is.
+    /// of those that are certain, if any is. One far above that has light of others, with which the least of
+    /// noise would do: where enough are left without it, their score is told, and less by what is asked more of
+    /// them.
     fn sum(&self, counted: &[Mark], marks: usize) -> Option<Sum> {
         let heights = counted.iter().map(|mark| mark.height);
         let (lowest, most) = (heights.clone().reduce(f32::min)?, heights.reduce(f32::max)?);
@@ -284,13 +295,24 @@ impl Rule {
         let least = certain.reduce(f32::min).unwrap_or(lowest);
         let cap = self.cap(least, marks);
         let (mut sum, mut weights) = (0.0, 0.0);
+        let mut of_most = 0.0;
         for mark in counted {
             let weight = mark.weight(self.sigma);
             sum += weight * mark.height.min(cap);
             weights += weight;
+            if mark.height == most {
+                of_most = weight;
+            }
         }
-        let (mean, score) = (sum / weights, sum / (weights.sqrt() * self.sigma));
-        Some(Sum { mean, least, spread: most - lowest, most, score })
+        let score = |sum: f32, weights: f32| sum / (weights.sqrt() * self.sigma);
+        let is_of_others = most > least + FAR * self.deviation(least)
+            && counted.len() > self.fewest(marks)
+            && weights > of_most;
+        let score = match is_of_others {
+            true => score(sum - of_most * cap.min(most), weights - of_most) - MISSING,
+            false => score(sum, weights),
+        };
+        Some(Sum { mean: sum / weights, least, spread: most - lowest, most, score })
     }
 
     /// How strong the least of so many marks must be, in detected photons, for the others, none of which
