@@ -191,7 +191,8 @@ impl Rule {
         let deviation =
             |photons: f64| (filtered.noise + excess * filtered.of_photon * photons.max(0.0)).sqrt();
         // What the sum of so many marks must be.
-        let needed = |threshold: f64, count: usize| threshold * (filtered.noise * count as f64).sqrt();
+        let needed =
+            |threshold: f64, count: usize| threshold * (filtered.noise * count as f64).sqrt();
         let all = needed(self.threshold, self.count);
         let others = needed(self.threshold + Sampling::MORE_IF_MISSING, self.count.max(1) - 1);
         let above = Sampling::most_above_least(self.weight);
