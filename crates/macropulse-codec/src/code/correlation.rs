@@ -9,14 +9,20 @@
 //!   \[KP16 eq. 4\].
 //!
 //! The first is what an isolated word meets, the second an endless row of the same word. Both are
-//! counted from mark to mark: w² steps for words of weight w, however long they are. The shorter
-//! of two words of different length is taken to end in dark chips.
+//! counted from mark to mark: w² steps for words of weight w, however long they are; or, of dense words,
+//! bit by bit, 64 chips at a time. The shorter of two words of different length is taken to end in dark
+//! chips.
 
 use super::CodeWord;
+use crate::kernels::{Pattern, lit_in_each};
 
 /// Periodic correlation Θ_ab(l) for l = 0 … N−1.
 pub fn periodic(a: &CodeWord, b: &CodeWord) -> Vec<u16> {
     let length = a.length.max(b.length);
+    if are_dense(a, b, length) {
+        let again = b.marks.iter().map(|mark| usize::from(*mark) + length as usize);
+        return in_bits(a, b.marks.iter().map(|mark| usize::from(*mark)).chain(again), length);
+    }
     let mut coincidences = vec![0; length as usize];
     for &from in &a.marks {
         for &to in &b.marks {
@@ -46,6 +52,12 @@ pub fn bipolar(a: &CodeWord, b: &CodeWord) -> Vec<i32> {
 /// Aperiodic correlation C_ab(l).
 pub fn aperiodic(a: &CodeWord, b: &CodeWord) -> Aperiodic {
     let length = a.length.max(b.length) as i32;
+    if are_dense(a, b, length as u32) {
+        let before = length as usize - 1;
+        let marks = b.marks.iter().map(|mark| usize::from(*mark) + before);
+        let coincidences = in_bits(a, marks, 2 * length as u32 - 1);
+        return Aperiodic { length, coincidences };
+    }
     let mut coincidences = vec![0; (2 * length).max(1) as usize - 1];
     for &from in &a.marks {
         for &to in &b.marks {
@@ -54,6 +66,28 @@ pub fn aperiodic(a: &CodeWord, b: &CodeWord) -> Aperiodic {
         }
     }
     Aperiodic { length, coincidences }
+}
+
+/// Whether two words of `length` chips have so many marks that to count them in bits takes fewer steps.
+fn are_dense(a: &CodeWord, b: &CodeWord, length: u32) -> bool {
+    let pairs = a.weight() as u64 * b.weight() as u64;
+    let is_within = |word: &CodeWord| word.marks.iter().all(|mark| u32::from(*mark) < length);
+    pairs > u64::from(length) * u64::from(length.div_ceil(64)) && is_within(a) && is_within(b)
+}
+
+/// How many marks of `a` are `lit`, moved on by 0 … `lags` − 1 chips.
+fn in_bits(a: &CodeWord, lit: impl Iterator<Item = usize>, lags: u32) -> Vec<u16> {
+    let mut bits = vec![0_u64; (lags + a.length) as usize / 64 + 1];
+    for place in lit {
+        if let Some(word) = bits.get_mut(place / 64) {
+            *word |= 1 << (place % 64);
+        }
+    }
+    let pattern = Pattern::new(a.marks.iter().map(|mark| usize::from(*mark)), 1);
+    let lags: Vec<u32> = (0..lags).collect();
+    let mut counts = vec![0; lags.len()];
+    lit_in_each(&bits, 0, &lags, &pattern, &mut counts);
+    counts.into_iter().map(|count| u16::try_from(count).unwrap_or(u16::MAX)).collect()
 }
 
 /// Counts a coincidence at `place`; marks beyond the end of their word have none.
@@ -198,6 +232,30 @@ mod tests {
             let by_definition: u16 =
                 (0..length).map(|n| chip(a, n) * chip(b, (n + lag) % length)).sum::<u16>();
             assert_eq!(counted[lag as usize], by_definition, "periodic, lag {lag}");
+        }
+    }
+
+    /// Words of one to all of 130 chips, and of different lengths: the same as from mark to mark.
+    #[test]
+    fn dense_words_are_counted_in_bits_alike() {
+        let word = |length: u32, every: u16, from: u16| CodeWord {
+            length,
+            marks: (from..length as u16).step_by(usize::from(every)).collect(),
+        };
+        let words =
+            [word(130, 1, 0), word(130, 2, 1), word(130, 3, 0), word(97, 1, 5), word(64, 1, 0)];
+        for (a, b) in words.iter().flat_map(|a| words.iter().map(move |b| (a, b))) {
+            let length = a.length.max(b.length) as i32;
+            assert!(are_dense(a, b, length as u32));
+            let alone = aperiodic(a, b);
+            let of_chips =
+                |lag: i32| -> u16 { (0..length).map(|n| chip(a, n) * chip(b, n + lag)).sum() };
+            for lag in 1 - length..length {
+                assert_eq!(alone.at(lag), of_chips(lag), "{} {} {lag}", a.length, b.length);
+            }
+            for (lag, met) in (0..).zip(periodic(a, b)) {
+                assert_eq!(met, of_chips(lag) + of_chips(lag - length), "{lag}");
+            }
         }
     }
 
