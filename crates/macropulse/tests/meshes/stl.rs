@@ -69,6 +69,17 @@ fn a_binary_file_may_begin_with_solid() {
     );
 }
 
+/// A count of facets that was never filled in.
+#[test]
+fn facets_that_are_not_counted_are_told_of() {
+    let mut bytes = binary(b"", 3, 0.0);
+    bytes[80..84].fill(0);
+    let told = refused("a.stl", &bytes);
+    assert!(told.contains("no facets, and has bytes of 3"), "{told}");
+    let told = refused("a.stl", &bytes[..84]);
+    assert!(told.contains("holds no triangles"), "{told}");
+}
+
 #[test]
 fn normals_are_not_needed() {
     assert_eq!(triangles("a.stl", binary(b"", 2, f32::NAN)), 2);

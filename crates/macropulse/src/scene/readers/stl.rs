@@ -57,6 +57,9 @@ fn binary(file: &mut impl Read, (path, length): (&Path, u64), room: Room) -> Res
         let problem = format!("says that it has {count} facets, and ends within number {there}");
         return Err(damaged(problem));
     }
+    if count == 0 && there > 0 {
+        return Err(damaged(format!("says that it has no facets, and has bytes of {there}")));
+    }
     room.check((3 * count as usize, count as usize), path)?;
     let mut mesh = Mesh::default();
     mesh.vertices.reserve_exact(3 * count as usize);
