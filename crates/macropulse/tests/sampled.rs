@@ -98,8 +98,9 @@ fn a_sampled_lidar_finds_what_an_independent_simulation_of_it_found() {
 }
 
 /// The same for half as many bands: 10 % at 149 m Pd 0.991, rms 1.00 cm, none wrong (N 7976), 30 % 0.999 and
-/// 0.48 cm; of white at 75 m 0.963, since of one word two marks come while the channel is blind. H0: Pd no
-/// more than 0.005 below, rms within a sixth; N = 13 568, seed 5. Control: of 5 % four in ten are seen.
+/// 0.48 cm; of white at 75 m 0.963, since there two marks of some words of the study come while the channel is
+/// blind. H0: Pd no more than 0.005 below, rms within a sixth; N = 13 568, seed 5. Control: of 5 % four in ten
+/// are seen.
 #[test]
 fn half_as_many_bands_find_what_they_found() {
     let design = ready("coded-16", &[]);
@@ -113,15 +114,15 @@ fn half_as_many_bands_find_what_they_found() {
     }
     let blind = found(&design, (75.0, 1.0), 5);
     let pd = blind.right / blind.pixels;
-    assert!((0.89..0.98).contains(&pd) && blind.wrong / blind.pixels < 1e-3, "{pd}");
+    assert!(pd > 0.963 - 0.005 && blind.wrong / blind.pixels < 1e-3, "{pd}");
     let faint = found(&design, (149.0, 0.05), 5);
     let pd = faint.right / faint.pixels;
     assert!((0.3..0.5).contains(&pd), "{pd}");
 }
 
-/// At Pd between 0.05 and 1, and ranges at which one word in two has a mark that is blanked (60 m), three in
-/// ten (75 m) and none (110 m): found is what is forecast, Pd to 0.02, at 60 m to 0.035, and precision to a
-/// fifth. N = 27 136 each, seed 8: a share is known to 0.003. Control: with a tenth more light it is not.
+/// At Pd between 0.05 and 1, and ranges at which many words have a mark that is blanked (60 and 75 m) and none
+/// (110 m): found is what is forecast, Pd to 0.02, and precision to a fifth. N = 27 136 each, seed 8: a share
+/// is known to 0.003. Control: with a tenth more light it is not.
 #[test]
 fn forecasts_of_samples_hold() {
     let design = design(&[]);
@@ -134,9 +135,7 @@ fn forecasts_of_samples_hold() {
         let (pd, precision) = (found.right / found.pixels, forecast.precision.unwrap());
         let which = format!("{range} m, {reflectance}: {pd}, {} m", found.rms);
         assert!((0.05..0.95).contains(&pd), "{which}");
-        // FIXME: where one word in two has a mark missing, more is forecast than is found.
-        let within = if range == 60.0 { 0.035 } else { 0.02 };
-        assert!((forecast.pd - pd).abs() < within, "{which}, not {}", forecast.pd);
+        assert!((forecast.pd - pd).abs() < 0.02, "{which}, not {}", forecast.pd);
         assert!((found.rms / precision - 1.0).abs() < 0.2, "{which}, not {precision} m");
         let brighter = forecaster.forecast(1.1 * reflectance, range).pd;
         assert!((brighter - pd).abs() > 0.02, "{which}: control {brighter}");

@@ -1,4 +1,5 @@
-//! What a receiver of samples finds of a target, as far as it does not meet the light of others.
+//! What a receiver of samples finds of a target that all shots of a channel meet alike, as far as its light does
+//! not meet that of others.
 //!
 //! A mark of n photons is a height n·g(δ) behind the matched filter, δ the part of a tick by which it is
 //! beside a sample, with the noise of the filtered samples and of its own photons. The marks of a word are
@@ -6,7 +7,7 @@
 //! threshold. That is summed over points that fill the cube of all probabilities evenly.
 
 use macropulse_codec::decode::Sampling;
-use macropulse_codec::statistics::normal_quantile;
+use macropulse_codec::statistics::{normal_quantile, normal_tail};
 
 use crate::design::Design;
 use crate::design::detector::Sampled;
@@ -81,6 +82,32 @@ impl Filtered {
         }
     }
 
+    /// What the receiver takes for the level and the standard deviation of its noise, photons, where a share of
+    /// so many marks to a tick has `photons` each.
+    ///
+    /// It takes the median of the signal, and how far the 15.87 % quantile is below it, which are 0 and −1 standard
+    /// deviations of noise alone. Light that does not stand out raises a quantile z by
+    ///
+    /// Δ(z) = marks to a tick · ∫ (Φ(z) − Φ(z − s(t))) dt / φ(z),
+    ///
+    /// s(t) the mark at time t in standard deviations: a ripple of the distribution, to first order.
+    fn estimated(&self, photons: f64, per_tick: f64) -> Estimated {
+        let sigma = self.noise.sqrt();
+        let highest = photons / sigma;
+        let kept = normal_tail(highest - Sampling::STANDS_OUT);
+        let step = self.rms / 8.0;
+        let raised = |z: f64| -> f64 {
+            let lower = |step_of: i32| {
+                let t = f64::from(step_of) / 8.0;
+                normal_tail(-z) - normal_tail(highest * libm::exp(-0.5 * t * t) - z)
+            };
+            let density = libm::exp(-0.5 * z * z) / std::f64::consts::TAU.sqrt();
+            per_tick * kept * step * (-32..=32).map(lower).sum::<f64>() / density
+        };
+        let (level, low) = (raised(0.0), raised(-1.0));
+        Estimated { level: sigma * level, deviation: sigma * (1.0 + level - low) }
+    }
+
     /// Standard deviation of the time of a mark of so many `photons`, ticks.
     fn timing(&self, photons: f64, excess: f64) -> f64 {
         let square = self.rms * self.rms;
@@ -89,6 +116,13 @@ impl Filtered {
         let slope = self.noise * (1.0 - self.correlation[1]) / 2.0;
         (slope / steepness.powi(2) + excess * self.by_photon / photons).sqrt()
     }
+}
+
+/// Noise as the receiver estimates it, photons.
+#[derive(Debug, Clone, Copy)]
+struct Estimated {
+    level: f64,
+    deviation: f64,
 }
 
 /// What the receiver of `design` finds of marks of so many `photons` that come `tof` seconds after they
@@ -105,11 +139,13 @@ pub(super) fn chances(
     let lags = f64::from(farthest - nearest) + 1.0;
     let threshold = -normal_quantile(design.receiver.false_alarm / lags);
     let weight = design.coding.codebook.max_weight();
+    let per_tick = weight as f64 * sampled.sample / design.scan.shortest_period();
+    let estimated = filtered.estimated(photons, per_tick);
     let by_count: Vec<Seen> = (0..=weight)
         .map(|count| {
             let more = if count < weight { Sampling::MORE_IF_MISSING } else { 0.0 };
             let fewest = fewest(sampling, weight);
-            let rule = Rule { threshold: threshold + more, count, weight, fewest };
+            let rule = Rule { threshold: threshold + more, count, weight, fewest, estimated };
             match count < fewest {
                 true => Seen::default(),
                 false => rule.seen(&filtered, &points[count], (photons, sampling.excess)),
@@ -184,6 +220,7 @@ struct Rule {
     weight: usize,
     /// Marks that must count.
     fewest: usize,
+    estimated: Estimated,
 }
 
 impl Rule {
@@ -191,8 +228,8 @@ impl Rule {
         let deviation =
             |photons: f64| (filtered.noise + excess * filtered.of_photon * photons.max(0.0)).sqrt();
         // What the sum of so many marks must be.
-        let needed =
-            |threshold: f64, count: usize| threshold * (filtered.noise * count as f64).sqrt();
+        let Estimated { level, deviation: estimated } = self.estimated;
+        let needed = |threshold: f64, count: usize| threshold * estimated * (count as f64).sqrt();
         let all = needed(self.threshold, self.count);
         let others = needed(self.threshold + Sampling::MORE_IF_MISSING, self.count.max(1) - 1);
         let above = Sampling::most_above_least(self.weight);
@@ -208,7 +245,7 @@ impl Rule {
             for (heights, &[a, b, c]) in heights.iter_mut().zip(deviates) {
                 let noise = [a, one * a + rest * b, two * a + mixed * b + last * c];
                 for ((height, mean), noise) in heights.iter_mut().zip(means).zip(noise) {
-                    *height = mean + deviation(mean) * noise;
+                    *height = mean + deviation(mean) * noise - level;
                 }
             }
             let is_found = (0..LAGS).any(|lag| {

@@ -59,6 +59,7 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Option<Cancelled> {
         // None: where all shots have one word, light of any would pass for that of the first.
         next: sent.fired.len(),
         owned: owned_light(sent),
+        gaps: Default::default(),
         seen: Timeline::default(),
         residual: Timeline::default(),
     };
@@ -130,6 +131,8 @@ struct Canceller<'a> {
     end: usize,
     /// The shot after the last one found.
     next: usize,
+    /// Of each shot, the ticks from each of its first marks to the next one, or 64 where these are more.
+    gaps: [Vec<u8>; FIRST],
     /// The ticks where macropulses overlap, and those of them that are not cancelled.
     seen: Timeline,
     residual: Timeline,
@@ -200,6 +203,7 @@ impl Canceller<'_> {
     fn woven(&mut self, place: usize) -> usize {
         let (sent, ticks) = (self.sent, self.ticks);
         let first = i64::from(ticks[place]);
+        self.know_gaps();
         // Macropulses may have begun under one that was cancelled.
         let begin = (first - sent.bit_length()).div_euclid(64) * 64;
         let before = ticks[..place].iter().rev().take_while(|tick| i64::from(**tick) >= begin);
@@ -231,7 +235,8 @@ impl Canceller<'_> {
                 None => tick = end,
             }
             if tick > last {
-                return ticks[place..].partition_point(|other| i64::from(*other) < tick);
+                // All before it are laid.
+                return ticks[place..laid].partition_point(|other| i64::from(*other) < tick);
             }
             if tick + sent.length() + 128 > end {
                 continue;
@@ -257,29 +262,60 @@ impl Canceller<'_> {
         laid - place
     }
 
+    /// Looks up the gaps of all shots, once.
+    fn know_gaps(&mut self) {
+        let sent = self.sent;
+        for (hidden, gaps) in self.gaps.iter_mut().enumerate() {
+            let shots = gaps.len()..sent.fired.len();
+            let gap = |shot: usize| sent.first_marks(shot)[hidden].gap.min(64) as u8;
+            gaps.extend(shots.map(gap));
+        }
+    }
+
     /// Finds the shot of which `tick` is the first mark that is not cancelled, cancels its marks, and
     /// tells when its light ends.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
         let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
         // Of ticks that may belong to no known shot only what is likely is asked.
         let (parts, most_hidden) = if self.owned.contains(&tick) { (2, FIRST) } else { (1, 1) };
+        let next = self.next..self.detections.len().min(self.next + 1);
         for lags in self.nearest_first().into_iter().take(parts) {
             for hidden in 0..most_hidden {
-                let next = Some(self.next).filter(|next| *next < self.detections.len());
-                for shot in next.into_iter().chain(in_flight.clone()) {
-                    // Nearly every shot is refused here.
-                    let gap = self.sent.first_marks(shot)[hidden].gap;
-                    let is_next_there = match gap {
-                        0..64 => ahead >> gap & 1 == 1,
-                        _ => self.seen.has(tick + i64::from(gap)),
-                    };
-                    if !is_next_there {
-                        continue;
+                for shots in [next.clone(), in_flight.clone()] {
+                    if let Some(found) = self.first_of(shots, (tick, ahead), (hidden, &lags)) {
+                        return Some(found);
                     }
-                    if let Some(start) = self.fits(shot, tick, (hidden, &lags)) {
-                        self.keep(shot, start);
-                        return Some(start + self.sent.length());
-                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// Finds the first of the `shots` as [`Self::shot_at`] does, with so many marks `hidden` and after one of
+    /// the `lags`; `ahead` are the ticks from `tick` on.
+    fn first_of(
+        &mut self,
+        shots: Range<usize>,
+        (tick, ahead): (i64, u64),
+        (hidden, lags): (usize, &Range<i64>),
+    ) -> Option<i64> {
+        for from in shots.clone().step_by(64) {
+            // Nearly every shot is refused here: its second mark is not there.
+            let gaps = &self.gaps[hidden][from..shots.end.min(from + 64)];
+            let mut may_be = gaps.iter().enumerate().fold(0, |may_be, (at, gap)| {
+                let is_next_there = ahead >> (gap & 63) & 1 | u64::from(gap >> 6);
+                may_be | is_next_there << at
+            });
+            while may_be != 0 {
+                let shot = from + may_be.trailing_zeros() as usize;
+                may_be &= may_be - 1;
+                let gap = self.sent.first_marks(shot)[hidden].gap;
+                if gap >= 64 && !self.seen.has(tick + i64::from(gap)) {
+                    continue;
+                }
+                if let Some(start) = self.fits(shot, tick, (hidden, lags)) {
+                    self.keep(shot, start);
+                    return Some(start + self.sent.length());
                 }
             }
         }

@@ -200,12 +200,8 @@ impl Band<'_> {
             if self.is_open(shot) {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
                 for _ in 0..=SURFACES {
-                    let is_further = self.found[shot].is_some();
                     let Some(lag) = self.look_for_leftover(shot) else { break };
-                    self.follow(&mut (shot + 1..at_hand), lag);
-                    if is_further {
-                        self.follow(&mut (shots.start..shot).rev(), lag);
-                    }
+                    self.follow(shot + 1..at_hand, lag);
                 }
             }
         }
@@ -226,7 +222,7 @@ impl Band<'_> {
         // must replace another return.
         let (least, visible) = match known {
             Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
-                if !self.sent.is_thorough() && !self.again.is_due(shot) {
+                if !known.stands_out && !self.again.is_due(shot) {
                     return None;
                 }
                 (known.count, known.count - known.count / 4)
@@ -273,11 +269,9 @@ impl Band<'_> {
     /// Notes that in such a `share` of the gate of `shot` nothing was found but what was known.
     fn note_search(&mut self, shot: usize, may_be_even: bool, share: f64) {
         match self.found[shot] {
-            // Light that is left over is that of one shot and in the gates of all that are in flight with it:
-            // of these not all are asked, as it is followed to both sides once it is found. If none is, 28
-            // of 74 519 shots of `street` as declared are found at a fainter surface; a quarter of the pause
-            // finds what a half does.
-            Some(_) => self.again.note(shot, false, share / 2.0),
+            // Faint ones are looked at again now and then. If none is, 28 of 74 519 shots of `street` as
+            // declared are found at a fainter surface; a quarter of the pause finds what a half does.
+            Some(known) if !known.stands_out => self.again.note(shot, false, share / 2.0),
             None if may_be_even => self.even.note(shot, false, share),
             _ => {}
         }
@@ -299,7 +293,7 @@ impl Band<'_> {
 
     /// Follows a surface that stands beside others, as behind a pane of glass, along the `shots`, the
     /// first of which is expected to have it about `lag`: to search for each of them alone takes long.
-    fn follow(&mut self, shots: &mut dyn Iterator<Item = usize>, mut lag: i64) {
+    fn follow(&mut self, shots: Range<usize>, mut lag: i64) {
         let mut step = None;
         for shot in shots {
             // Each is searched for in all of its gate where that is asked for.

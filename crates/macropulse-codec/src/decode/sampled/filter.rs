@@ -10,7 +10,7 @@ use crate::kernels::filter;
 const PICKED: usize = 1 << 17;
 
 /// From so many standard deviations above the level on, what stands there is light.
-const LIGHT: f32 = 4.0;
+pub(super) const LIGHT: f32 = 4.0;
 
 /// The samples of a channel, filtered: the signal in detected photons per mark.
 pub(super) struct Filtered {

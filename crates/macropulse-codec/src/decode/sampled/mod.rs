@@ -76,6 +76,10 @@ impl Sampling {
         Pulse::new(self).taps
     }
 
+    /// From so many standard deviations above its level on, the signal is light, of which the noise is not
+    /// estimated.
+    pub const STANDS_OUT: f64 = filter::LIGHT as f64;
+
     /// By how many of its own standard deviations the least of the marks that count lies below one that has light
     /// of others on it, and counts for nothing where enough are left.
     pub const FAR_ABOVE_LEAST: f64 = FAR as f64;
