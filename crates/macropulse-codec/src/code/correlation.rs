@@ -14,7 +14,6 @@
 //! chips.
 
 use super::CodeWord;
-use crate::kernels::{Pattern, lit_in_each};
 
 /// Periodic correlation Θ_ab(l) for l = 0 … N−1.
 pub fn periodic(a: &CodeWord, b: &CodeWord) -> Vec<u16> {
@@ -77,17 +76,37 @@ fn are_dense(a: &CodeWord, b: &CodeWord, length: u32) -> bool {
 
 /// How many marks of `a` are `lit`, moved on by 0 … `lags` − 1 chips.
 fn in_bits(a: &CodeWord, lit: impl Iterator<Item = usize>, lags: u32) -> Vec<u16> {
-    let mut bits = vec![0_u64; (lags + a.length) as usize / 64 + 1];
-    for place in lit {
-        if let Some(word) = bits.get_mut(place / 64) {
+    let marks = bits(a.marks.iter().map(|mark| usize::from(*mark)), a.length as usize);
+    // Read as far as the marks reach, one machine word beyond.
+    let lit = bits(lit, lags as usize + 64 * (marks.len() + 1));
+    let mut counts = vec![0; lags as usize];
+    count_each(&marks, &lit, &mut counts);
+    counts
+}
+
+/// So many bits, of which those at `places` are set.
+fn bits(places: impl Iterator<Item = usize>, length: usize) -> Vec<u64> {
+    let mut words = vec![0_u64; length.div_ceil(64)];
+    for place in places {
+        if let Some(word) = words.get_mut(place / 64) {
             *word |= 1 << (place % 64);
         }
     }
-    let pattern = Pattern::new(a.marks.iter().map(|mark| usize::from(*mark)), 1);
-    let lags: Vec<u32> = (0..lags).collect();
-    let mut counts = vec![0; lags.len()];
-    lit_in_each(&bits, 0, &lags, &pattern, &mut counts);
-    counts.into_iter().map(|count| u16::try_from(count).unwrap_or(u16::MAX)).collect()
+    words
+}
+
+/// Counts the `marks` that are `lit` where they are moved on by 0, 1, 2 … bits.
+fn count_each(marks: &[u64], lit: &[u64], counts: &mut [u16]) {
+    for (lag, count) in counts.iter_mut().enumerate() {
+        let (word, shift) = (lag / 64, lag % 64);
+        let lit = &lit[word..];
+        let pairs = marks.iter().zip(lit).zip(&lit[1..]);
+        // Two shifts, because a shift by 64 does not give 0.
+        let met = pairs.map(|((marks, here), next)| {
+            u64::from((marks & (here >> shift | next << 1 << (63 - shift))).count_ones())
+        });
+        *count = u16::try_from(met.sum::<u64>()).unwrap_or(u16::MAX);
+    }
 }
 
 /// Counts a coincidence at `place`; marks beyond the end of their word have none.
