@@ -43,8 +43,8 @@ for first, channel, code in blocks(data, header):
         total += code[start : start + len(total)]
         heard += 1
 mean = total / max(heard, 1) * float(header["step_photons"])
-# Behind the stray light of the sensor's own marks, which all leave within 100 ns.
-behind = int(1e8 / tick_fs)
+# Behind the stray light of the sensor's own marks, which all leave within 144 ns.
+behind = int(1.5e8 / tick_fs)
 lag = behind + int(np.argmax(mean[behind:]))
 print(json.dumps({
     "blocks": found,
