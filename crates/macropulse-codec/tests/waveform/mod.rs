@@ -37,7 +37,7 @@ const POLE: f64 = 2.95;
 /// Ten words of three marks.
 pub fn codebook() -> Codebook {
     let words =
-        Separated { length: 238, weight: 3, words: 10, gap: 20, apart: 5, later: 2, seed: 1 };
+        Separated { length: 238, weight: 3, words: 10, gap: 20, apart: 5, later: 0, seed: 1 };
     Codebook::new(Family::separated(words).unwrap(), None, 1, Keying::OnOff).unwrap()
 }
 
