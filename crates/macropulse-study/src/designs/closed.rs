@@ -96,6 +96,16 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     Ok(Assessed { candidate, period, pd: forecast.pd, precision: forecast.precision, limit })
 }
 
+/// By what factor `candidate` is forecast to miss more targets at the range that is wanted than may be missed, if
+/// it does: a trial's wall stands a little nearer, where other marks are lost to own light.
+pub(super) fn missed(required: &Requirements, candidate: &Candidate) -> Result<Option<f64>, Error> {
+    let wanted = &required.wanted;
+    let design = candidate.design(required)?;
+    let forecaster = Forecaster::new(&design, &required.environment)?;
+    let pd = forecaster.forecast(wanted.reflectance, wanted.range_m).pd;
+    Ok((pd < wanted.pd).then(|| (1.0 - pd) / (1.0 - wanted.pd)))
+}
+
 /// As with so many times the area of the aperture: light and daylight.
 fn with_area<'a>(forecaster: &Forecaster<'a>, factor: f64) -> Forecaster<'a> {
     forecaster.with_light(factor).with_background(factor)

@@ -64,7 +64,7 @@ pub enum Limit {
     Light,
     /// The corners of its polygon would be too fast.
     Mirror,
-    /// Simulated, it misses too many targets.
+    /// Simulated, or forecast for the very range that is wanted, it misses too many targets.
     Missed,
     /// Simulated, it finds too much where nothing is.
     False,

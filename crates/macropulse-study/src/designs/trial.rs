@@ -12,6 +12,7 @@ use macropulse::sim::{Scans, Watch};
 use serde::{Deserialize, Serialize};
 
 use super::candidate::{Built, Candidate};
+use super::closed;
 use super::requirements::Requirements;
 use super::scenery::{Scenery, Set};
 use super::{Error, Limit};
@@ -92,7 +93,10 @@ impl Bench<'_> {
     /// What `candidate` finds; `None` if the watch said stop.
     pub fn trial(&self, candidate: &Candidate) -> Result<Option<Trial>, Error> {
         let Some(counts) = self.of_each(candidate, &[])? else { return Ok(None) };
-        let limit = limit(self.required, &counts);
+        let limit = match limit(self.required, &counts) {
+            None => closed::missed(self.required, candidate)?.map(|over| (Limit::Missed, over)),
+            limit => limit,
+        };
         Ok(Some(Trial { candidate: candidate.clone(), counts, limit }))
     }
 
