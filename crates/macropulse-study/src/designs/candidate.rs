@@ -77,7 +77,7 @@ impl Candidate {
         self.marks == 1
     }
 
-    /// One of [`SCHEMES`].
+    /// `coded` or `waiting`.
     pub fn scheme(&self) -> &'static str {
         SCHEMES[usize::from(self.waits())]
     }
