@@ -73,8 +73,6 @@ impl Band<'_> {
             if least == 0 {
                 // Fewer are nowhere believed.
                 least = self.thresholds.least(weight, self.density_in_gate(shot, weight));
-                // A sidelobe of a peak just outside would show half as many marks as the peak.
-                least = if gap > 1 { least } else { least.max(usual / 2) };
             }
             let Some(peak) = self.climb(shot, lag, least) else { continue };
             let Some(peak) = self.told_from_chance(shot, peak) else { continue };
