@@ -89,35 +89,26 @@ mod avx512 {
         bits: &[u32],
         (start, scale): (u32, u32),
     ) -> bool {
-        let (whole, rest) = (marks.len() / LANES, marks.len() % LANES);
-        let last: __mmask16 = (1 << rest) - 1;
-        let mut ticks = ticks.as_ptr();
         let mut wrong: __mmask16 = 0;
-        for (index, &bit) in bits.iter().enumerate() {
-            let begin = _mm512_set1_epi32(start.wrapping_add(scale.wrapping_mul(bit)) as i32);
-            let mut marks = marks.as_ptr();
-            for _ in 0..whole {
-                // SAFETY: a whole block of both is left.
-                unsafe {
-                    let expected = _mm512_add_epi32(begin, _mm512_loadu_si512(marks.cast()));
-                    wrong |= _mm512_cmpneq_epi32_mask(expected, _mm512_loadu_si512(ticks.cast()));
-                    (ticks, marks) = (ticks.add(LANES), marks.add(LANES));
-                }
+        for (block, of_block) in marks.chunks(LANES).enumerate() {
+            let used = u16::MAX >> (LANES - of_block.len());
+            // SAFETY: no more is read than the block has.
+            let of_block = unsafe { _mm512_maskz_loadu_epi32(used, of_block.as_ptr().cast()) };
+            for (index, &bit) in bits.iter().enumerate() {
+                let begin = _mm512_set1_epi32(start.wrapping_add(scale.wrapping_mul(bit)) as i32);
+                // SAFETY: so many ticks are there for each bit, and no more is read.
+                let found = unsafe {
+                    let first = ticks.as_ptr().add(index * marks.len() + block * LANES);
+                    _mm512_maskz_loadu_epi32(used, first.cast())
+                };
+                let expected = _mm512_add_epi32(begin, of_block);
+                wrong |= _mm512_mask_cmpneq_epi32_mask(used, expected, found);
             }
-            // SAFETY: of both so many are left, and no more is read.
-            unsafe {
-                let expected = _mm512_maskz_loadu_epi32(last, marks.cast());
-                let found = _mm512_maskz_loadu_epi32(last, ticks.cast());
-                let expected = _mm512_add_epi32(begin, expected);
-                wrong |= _mm512_mask_cmpneq_epi32_mask(last, expected, found);
-                ticks = ticks.add(rest);
-            }
-            // Of another macropulse the first bit tells; of the one that is expected all bits fit.
-            if index == 0 && wrong != 0 {
+            if wrong != 0 {
                 return false;
             }
         }
-        wrong == 0
+        true
     }
 }
 

@@ -149,8 +149,6 @@ struct Band<'a> {
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
     rare: f64,
-    /// The share of its marks that chance did not reach in the gate of the shot asked for last.
-    least_share: f64,
     /// Which shots are searched for that are tracked no more, of which light does not stand out, and
     /// that are found but faint.
     searched: Paced,
@@ -226,7 +224,6 @@ impl<'a> Band<'a> {
             at_hand: 0..0,
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
-            least_share: 0.5,
             searched: Paced::default(),
             even: Paced::default(),
             again: Paced::default(),
@@ -246,7 +243,10 @@ impl<'a> Band<'a> {
         let mut returns = Returns::with_capacity(self.sent.log.owned.len());
         let (shots, mut first, mut settled) = (self.found.len(), 0, 0);
         if matches!(self.open, Open::None) {
-            self.settle(0..shots, &mut returns);
+            match self.further.is_empty() {
+                true => self.settle_clear(&mut returns),
+                false => self.settle(0..shots, &mut returns),
+            }
             first = shots;
         }
         while first < shots {
@@ -382,29 +382,14 @@ impl<'a> Band<'a> {
             let density = f64::from(ticks.saturating_sub(count) + 1) * share;
             self.thresholds.least(weight, density.min(1.0)) <= count
         };
-        // About as large a share as of the shot before: from there on in steps that double, until it is
-        // passed.
-        let guess = ((self.least_share * f64::from(weight)) as u32).clamp(1, weight);
-        let is_below = is_enough(guess);
-        let (mut low, mut high) = if is_below { (1, guess) } else { (guess + 1, weight + 1) };
-        let (mut step, mut is_passed) = (1, false);
+        let (mut low, mut high) = (1, weight + 1);
         while low < high {
-            let near = step.min(high - low);
-            let next = match (is_passed, is_below) {
-                (true, _) => low.midpoint(high),
-                (_, true) => high - near,
-                (_, false) => low + near - 1,
-            };
-            let enough = is_enough(next);
-            if enough {
-                high = next
-            } else {
-                low = next + 1
+            let middle = low.midpoint(high);
+            match is_enough(middle) {
+                true => high = middle,
+                false => low = middle + 1,
             }
-            is_passed |= enough != is_below;
-            step *= 2;
         }
-        self.least_share = f64::from(low) / f64::from(weight);
         low
     }
 

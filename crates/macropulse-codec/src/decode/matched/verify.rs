@@ -48,6 +48,36 @@ impl Band<'_> {
         self.further.retain(|(shot, _)| *shot >= oldest);
     }
 
+    /// As [`Self::settle`], of all shots of a band of which all light was cancelled, one surface of a shot at
+    /// most: nothing is to be asked of them but whether they lie in the gate.
+    pub(super) fn settle_clear(&mut self, returns: &mut Returns) {
+        let (sent, gate) = (self.sent, self.sent.gate());
+        let owned = sent.log.owned.clone();
+        let mut clear = Vec::with_capacity(owned.len());
+        for (shot, found) in owned.clone().zip(&self.found[owned]) {
+            match found {
+                Some(found) if gate.contains(&found.lag) => {
+                    let start = sent.fired[shot] + found.lag + sent.epoch;
+                    let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start, MIDDLE);
+                    let (marks, margin) = (found.count as u16, found.margin as u16);
+                    let Energy { photons, saturated } = self.photons.of_all(found.count);
+                    clear.push(Return {
+                        shot,
+                        tof,
+                        peak: marks,
+                        marks,
+                        margin,
+                        photons,
+                        saturated,
+                    });
+                }
+                Some(_) => returns.reject(Reject::OutsideGate),
+                None => returns.reject(Reject::NoPeak),
+            }
+        }
+        returns.extend(&clear);
+    }
+
     /// Puts those surfaces of `shot` that give returns into `surfaces`, by their lag; its further ones are those
     /// from number `further` on.
     ///
