@@ -10,7 +10,8 @@ use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
 use macropulse::random::{Chance, Stage};
 use macropulse::scene::{Finish, Hits, Material, Scene};
-use macropulse::{tdc, units};
+use macropulse::tdc::{self, Wanted};
+use macropulse::units;
 use rand::RngExt;
 
 use crate::Fallible;
@@ -137,7 +138,10 @@ impl Sample {
             let surfaces = (&self.operating.link, &*self.finishes);
             channel::echoes(&mut light.trains, surfaces, &log, hits, None);
             let response = detectors.response(&log, &light, &mut memory);
-            let ticks = tdc::ticks(&self.design, response, 0).ticks;
+            let span = band.ticks(&self.design).0;
+            let wanted = Wanted { from: span.start, ..Wanted::ALL };
+            let mut ticks = tdc::ticks(&self.design, response, wanted).ticks;
+            ticks.keep(&span);
             done(&mut memory, (log, ticks));
         }
     }

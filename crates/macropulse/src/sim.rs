@@ -4,6 +4,7 @@ mod arrivals;
 mod record;
 
 use std::sync::Mutex;
+use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -16,7 +17,7 @@ use crate::processor::thread_seconds;
 use crate::random::Chance;
 use crate::scene::{Hits, Pose, Scene};
 use crate::score::{self, Score};
-use crate::tdc::Converted;
+use crate::tdc::{Converted, Wanted};
 use crate::{channel, tdc};
 use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
 use macropulse_codec::{Given, ShotLog};
@@ -206,6 +207,7 @@ impl<'a> Scans<'a> {
         let next = || left.lock().ok()?.next();
         let threads = memories.par_iter_mut().with_max_len(1).map(|memory| {
             let mut counted = (Score::default(), Tally::default());
+            let (began, computed) = (Instant::now(), thread_seconds());
             while !(watch.stop)()
                 && let Some((band, piece)) = next()
             {
@@ -220,6 +222,10 @@ impl<'a> Scans<'a> {
                 counted.0.add(&score);
                 counted.1.add(&tally);
                 (watch.done)(band.shots);
+            }
+            let on_processor = (thread_seconds() - computed) / began.elapsed().as_secs_f64();
+            if on_processor.is_finite() {
+                counted.1.seconds.iter_mut().for_each(|seconds| *seconds *= on_processor);
             }
             Ok(counted)
         });
@@ -264,11 +270,11 @@ impl Measured<'_> {
     /// Makes the returns of a band the points of `piece`, and counts; and what was given back.
     fn judged(mut self, seen: &Seen, scale: &Scale, piece: &mut Piece) -> (Score, Tally, Given) {
         let Seen { design, scene, .. } = *seen;
-        let began = thread_seconds();
+        let began = Instant::now();
         piece.fill(design, scale, &self.log, &self.returns);
         let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
         score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
-        self.tally.seconds[POINTS] += thread_seconds() - began;
+        self.tally.seconds[POINTS] += began.elapsed().as_secs_f64();
         (score, self.tally, self.given)
     }
 }
@@ -280,6 +286,9 @@ struct Setup<'a> {
 }
 
 /// Measures a band of a scan of which it is `known` that so many converters were busy at once.
+///
+/// The seconds of its stages are those of the wall clock: to ask for the processor time of a thread after each
+/// stage takes a thirtieth of a clean scan.
 fn measure<'a>(
     setup: &Setup<'a>,
     memory: &mut Memory,
@@ -287,12 +296,12 @@ fn measure<'a>(
 ) -> Result<Measured<'a>, Error> {
     let Setup { seen: Seen { design, scene, .. }, detectors } = *setup;
     let mut tally = Tally::default();
-    let mut began = thread_seconds();
+    let mut began = Instant::now();
     let mut stages = 0..POINTS;
     let mut lap = |tally: &mut Tally| {
         let stage = stages.next().unwrap_or(POINTS);
-        let ended = thread_seconds();
-        tally.seconds[stage] += ended - began;
+        let ended = Instant::now();
+        tally.seconds[stage] += (ended - began).as_secs_f64();
         began = ended;
     };
     let log = band.shot_log(design);
@@ -310,10 +319,12 @@ fn measure<'a>(
         None => {
             let response = detectors.response(&log, &light, memory);
             lap(&mut tally);
-            let mut converted = tdc::ticks(design, response, known);
-            tally.ticks = converted.ticks.tick.len() as u64;
+            let from = band.ticks(design).0.start;
+            let wanted = Wanted { known_busy: known, from };
+            let mut converted = tdc::ticks(design, response, wanted);
+            tally.ticks = converted.made;
             record::cut(setup, memory, (band, &log), &mut converted);
-            let Converted { ticks, peak_busy, lost, merged } = converted;
+            let Converted { ticks, peak_busy, lost, merged, .. } = converted;
             tally.detections = tally.ticks + merged + lost;
             (tally.merged, tally.lost, tally.peak_busy) = (merged, lost, peak_busy);
             Given::Ticks(ticks)
@@ -380,7 +391,8 @@ pub struct Tally {
     pub by_number: [u64; MOST_RETURNS as usize],
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
-    /// Seconds of processor time spent in each of [`Tally::STAGES`], summed over threads.
+    /// Seconds of processor time spent in each of [`Tally::STAGES`], summed over threads: the time of all of
+    /// them together is that of the processor, their shares of it are those of the wall clock.
     pub seconds: [f64; POINTS + 1],
 }
 

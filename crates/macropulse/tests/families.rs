@@ -246,7 +246,7 @@ fn other_words_are_not_found() {
     let light = macropulse::channel::light(&seen, &log, &scene.trace(&design, &log));
     let detectors = Detectors::new(&design, &operating, Chance::new(1));
     let detections = detectors.detections(&log, &light, &mut Default::default());
-    let ticks = macropulse::tdc::ticks(&design, detections, 0).ticks;
+    let ticks = macropulse::tdc::ticks(&design, detections, macropulse::tdc::Wanted::ALL).ticks;
     let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).unwrap().len();
     let mut wrong = log.clone();
     wrong.word.iter_mut().for_each(|word| *word = (*word + 50) % 100);

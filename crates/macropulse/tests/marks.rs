@@ -8,7 +8,7 @@ use macropulse::detect::{Detectors, Memory, Response};
 use macropulse::emit::Band;
 use macropulse::environment::Environment;
 use macropulse::random::Chance;
-use macropulse::tdc::{self, Converted};
+use macropulse::tdc::{self, Converted, Wanted};
 use proptest::prelude::*;
 
 const COUNTING: [(&str, &str); 3] =
@@ -23,13 +23,19 @@ fn sensor(name: &str, counting: &[(&str, &str)], tdc: &[(&str, String)]) -> Desi
 }
 
 /// The ticks of `light` in both ways; `None` where marks are not all there is.
-fn both_ways(design: &Design, log: &ShotLog, light: &Light, known: u32) -> Option<[Converted; 2]> {
+fn both_ways(
+    design: &Design,
+    log: &ShotLog,
+    light: &Light,
+    wanted: Wanted,
+) -> Option<[Converted; 2]> {
     let operating = Operating::of(design, &Environment::vacuum_dark()).unwrap();
     let detectors = Detectors::new(design, &operating, Chance::new(1));
     let memory = &mut Memory::default();
     let marks = detectors.response(log, light, memory);
-    let by_marks = matches!(marks, Response::Marks(_)).then(|| tdc::ticks(design, marks, known))?;
-    Some([by_marks, tdc::ticks(design, detectors.detections(log, light, memory), known)])
+    let by_marks =
+        matches!(marks, Response::Marks(_)).then(|| tdc::ticks(design, marks, wanted))?;
+    Some([by_marks, tdc::ticks(design, detectors.detections(log, light, memory), wanted)])
 }
 
 proptest! {
@@ -41,6 +47,7 @@ proptest! {
         converters in 1..300_u32,
         dead_ns in 0..6_u32,
         known in 0..300_u32,
+        unwanted in 0..100_u32,
         fixed: bool,
         first in prop_oneof![Just(500_u64), Just(828)],
     ) {
@@ -58,8 +65,18 @@ proptest! {
         let mut echoes: Vec<Echo> = late.iter().enumerate().map(echo).collect();
         echoes.sort_by_key(|echo| echo.shot);
         let light = light_of_echoes(&design, &log, echoes);
-        let [marks, events] = both_ways(&design, &log, &light, known).unwrap();
-        prop_assert_eq!(marks, events);
+        let wanted = Wanted { known_busy: known, ..Wanted::ALL };
+        let [marks, events] = both_ways(&design, &log, &light, wanted).unwrap();
+        prop_assert_eq!(&marks, &events);
+        // Without those that nobody wants, all others are as they were.
+        let place = marks.ticks.len() * unwanted as usize / 100;
+        let Some(tick) = marks.ticks.tick.get(place) else { return Ok(()) };
+        let from = marks.ticks.epoch + i64::from(*tick);
+        let [mut some, _] = both_ways(&design, &log, &light, Wanted { from, ..wanted }).unwrap();
+        prop_assert!(some.ticks.len() <= marks.ticks.len());
+        let mut kept = marks;
+        [&mut kept, &mut some].map(|converted| converted.ticks.keep(&(from..i64::MAX)));
+        prop_assert_eq!(some, kept);
     }
 }
 
@@ -78,7 +95,7 @@ fn ticks_of_marks_at_random_ranges_are_those_of_their_events() {
             Echo { shot, delay_fs, photons: f64::INFINITY }
         });
         let light = light_of_echoes(&design, &log, echoes);
-        let [marks, events] = both_ways(&design, &log, &light, 0).unwrap();
+        let [marks, events] = both_ways(&design, &log, &light, Wanted::ALL).unwrap();
         assert!(marks.ticks.tick.is_sorted(), "seed {seed}");
         assert_eq!(marks, events, "seed {seed}");
     }
@@ -103,7 +120,7 @@ fn ticks_come_in_order_where_a_dark_beginning_is_overtaken() {
         };
         let at_fs = [(ends, -700_000 * early), (begins, 700_000 * late), (dark, 0)];
         let light = light_of_echoes(&design, &log, at_fs.map(echo));
-        let [marks, events] = both_ways(&design, &log, &light, 0).unwrap();
+        let [marks, events] = both_ways(&design, &log, &light, Wanted::ALL).unwrap();
         assert!(marks.ticks.tick.is_sorted(), "{early}, {late}");
         assert_eq!(marks, events, "{early}, {late}");
         let [last, first, first_of_dark] = [
@@ -133,7 +150,7 @@ fn marks_of_one_tick_are_one_with_converters_that_are_never_dead() {
     for late in [-2, -1, 0, 1, 2] {
         // Steps of a tenth of a tick about that place.
         let light = at([0, late * 33_000 - apart]);
-        let [marks, events] = both_ways(&design, &log, &light, 0).unwrap();
+        let [marks, events] = both_ways(&design, &log, &light, Wanted::ALL).unwrap();
         assert_eq!(marks, events, "{late}");
         let both = light.arrivals_fs(0).count() + light.arrivals_fs(1).count();
         assert!(late != 0 || events.ticks.tick.len() == both - 1, "{late}");
@@ -146,7 +163,7 @@ fn marks_are_not_all_there_is_where_anything_else_is() {
     let photons = |design: &Design, photons| {
         let log = Band { scan: 0, first: 0, shots: 40 }.shot_log(design);
         let light = light_of_echoes(design, &log, [Echo { shot: 3, delay_fs: 5000, photons }]);
-        both_ways(design, &log, &light, 0)
+        both_ways(design, &log, &light, Wanted::ALL)
     };
     assert!(photons(&sensor("kim-park-2016", &COUNTING, &[]), f64::INFINITY).is_some());
     assert!(photons(&sensor("kim-park-2016", &COUNTING, &[]), 3.0).is_none());

@@ -19,7 +19,7 @@ use macropulse::predict::converters::bank_loss;
 use macropulse::random::Chance;
 use macropulse::scene::Scene;
 use macropulse::sim::{self, Scan};
-use macropulse::tdc;
+use macropulse::tdc::{self, Wanted};
 
 /// Chance of a false alarm in each comparison of this file.
 const ALPHA: f64 = 1e-4;
@@ -191,7 +191,7 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(2));
             let found = detectors.detections(&log, &light, &mut Memory::default());
             // Several photons of one mark are one tick.
-            let events = tdc::ticks(&design, found, 0).ticks.tick.len() as u64;
+            let events = tdc::ticks(&design, found, Wanted::ALL).ticks.tick.len() as u64;
             let predicted = mark_pd(&design, photons);
             assert!(
                 agrees(events, marks, predicted),
@@ -249,7 +249,7 @@ fn a_small_bank_loses_what_erlang_says() {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(4));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
-            let ticks = tdc::ticks(&design, found, 0);
+            let ticks = tdc::ticks(&design, found, Wanted::ALL);
             events += ticks.ticks.tick.len() as u64 + ticks.lost;
             lost += ticks.lost;
         }

@@ -15,7 +15,7 @@ use super::Setup;
 use crate::channel::{self, Light, Seen};
 use crate::detect::Memory;
 use crate::emit::Band;
-use crate::tdc::{self, Converted};
+use crate::tdc::{self, Converted, Wanted};
 
 /// What the receiver is given of `band`: its shots, and its ticks or samples.
 pub(super) fn of(setup: &Setup, band: &Band) -> (ShotLog, Given) {
@@ -40,7 +40,7 @@ fn light<'a>(setup: &Setup<'a>, log: &ShotLog) -> Light<'a> {
 
 /// What the converters make of the light of the shots of `log`.
 fn converted(setup: &Setup, memory: &mut Memory, (log, light): (&ShotLog, &Light)) -> Converted {
-    tdc::ticks(setup.seen.design, setup.detectors.response(log, light, memory), 0)
+    tdc::ticks(setup.seen.design, setup.detectors.response(log, light, memory), Wanted::ALL)
 }
 
 /// Leaves of what was `converted` of a band, with its guard shots, the ticks that belong to it.

@@ -7,12 +7,12 @@
 
 use macropulse_codec::Ticks;
 
-use super::bank::Bank;
+use super::{Taken, bank::Bank};
 use crate::detect::Marks;
 use crate::kernels::{Macropulse, PAD, Words, distinct, merge};
 
-/// The ticks of `marks`; how many marks those were, and how many fell into the tick of another one.
-pub(super) fn ticks(bank: &mut Bank, marks: Marks) -> (Ticks, usize, usize) {
+/// The ticks of `marks`; of those before the absolute tick `from` as few as may be.
+pub(super) fn ticks(bank: &mut Bank, marks: Marks, from: i64) -> Taken {
     let Marks { epoch, words: exact, mut macropulses, ticks } = marks;
     let words = &exact.words;
     // Bits that are dark to begin with may let one that begins later come first.
@@ -24,28 +24,39 @@ pub(super) fn ticks(bank: &mut Bank, marks: Marks) -> (Ticks, usize, usize) {
     layout.ticks.clear();
     // Converters that are never dead take several marks of one tick for one, too.
     let dead = bank.dead.max(1);
-    let mut at = 0;
+    let from = from.saturating_sub(epoch);
+    let begin_wanted = macropulses.partition_point(|sent| i64::from(first(sent)) < from);
+    let (mut at, mut unwanted) = (0, None);
     while at < macropulses.len() {
+        let mut end = begin_wanted;
+        if at >= begin_wanted {
+            // All ticks so far come before those of this run.
+            let before = |ticks: &[u32]| ticks.partition_point(|tick| i64::from(*tick) < from);
+            let drop = |ticks: &mut Vec<u32>| ticks.drain(..before(ticks)).count();
+            unwanted.get_or_insert_with(|| drop(&mut layout.ticks));
+            end = macropulses.len();
+        }
         let known = bank.peak / exact.busiest.max(1);
-        let (run, last) = layout.add_run(&macropulses[at..], (dead, known > 0));
+        let (run, last) = layout.add_run(&macropulses[at..end], (dead, known > 0));
         at += run;
         let Some(last) = last else { continue };
         // The last one of the run, and all that begin while its converters are busy.
-        let from = layout.ticks.len() - words.count(&last);
+        let begin = layout.ticks.len() - words.count(&last);
         let mut together = 1;
         while let Some(next) = macropulses.get(at)
             && layout.is_near(next, dead)
         {
-            layout.add_among(next, from);
+            layout.add_among(next, begin);
             together += 1;
             at += 1;
         }
         if together > known {
-            bank.take_from(&mut layout.ticks, from);
+            bank.take_from(&mut layout.ticks, begin);
         }
     }
     let Layout { ticks, found, merged, .. } = layout;
-    (Ticks { epoch, tick: ticks, ..Ticks::default() }, found, merged)
+    let made = ticks.len() + unwanted.unwrap_or(0);
+    Taken { ticks: Ticks { epoch, tick: ticks, ..Ticks::default() }, made, found, merged }
 }
 
 /// The ticks of some macropulses.

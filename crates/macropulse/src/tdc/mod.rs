@@ -23,6 +23,8 @@ use crate::detect::{Detections, Response};
 pub struct Converted {
     /// What the receiver is given.
     pub ticks: Ticks,
+    /// Ticks that were made, those among them that nobody wanted.
+    pub made: u64,
     /// Most converters busy at once, in any one channel; no less than was known before.
     pub peak_busy: u32,
     /// Events that found every converter busy.
@@ -57,24 +59,45 @@ impl Reading {
     }
 }
 
-/// The ticks of the `response` of the detectors to one band, in the memory that it had. In other bands
-/// of its scan `known` converters were busy at once, 0 where none was measured: only more of them
-/// are new, and most of a band is converted without looking for fewer.
-pub fn ticks<'a>(design: &Design, response: impl Into<Response<'a>>, known: u32) -> Converted {
-    let converters = design.converters_per_channel() as usize;
-    let mut bank =
-        Bank { converters, dead: design.tdc.dead_ticks(), peak: converters.min(known as usize) };
-    let (ticks, found, merged) = match response.into() {
-        Response::Events(events) => of_events(&mut bank, events),
-        Response::Marks(marks) => marks::ticks(&mut bank, marks),
-    };
-    let lost = (found - merged - ticks.tick.len()) as u64;
-    Converted { ticks, peak_busy: bank.peak as u32, lost, merged: merged as u64 }
+/// What is known and wanted of a band before its ticks are made.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// Converters that were busy at once in other bands of its scan, 0 where none was measured: only more of
+    /// them are new, and most of a band is converted without looking for fewer.
+    pub known_busy: u32,
+    /// The absolute tick from which on ticks are wanted: earlier ones may be left out, and are where that
+    /// saves time.
+    pub from: i64,
 }
 
-/// The ticks of detection events; how many those were, and how many fell into the tick of another
-/// one.
-fn of_events(bank: &mut Bank, events: Detections) -> (Ticks, usize, usize) {
+impl Wanted {
+    /// All ticks, of a band before which nothing is known.
+    pub const ALL: Self = Self { known_busy: 0, from: i64::MIN };
+}
+
+/// What is `wanted` of the `response` of the detectors to one band, in the memory that it had.
+pub fn ticks<'a>(design: &Design, response: impl Into<Response<'a>>, wanted: Wanted) -> Converted {
+    let converters = design.converters_per_channel() as usize;
+    let peak = converters.min(wanted.known_busy as usize);
+    let mut bank = Bank { converters, dead: design.tdc.dead_ticks(), peak };
+    let Taken { ticks, made, found, merged } = match response.into() {
+        Response::Events(events) => of_events(&mut bank, events),
+        Response::Marks(marks) => marks::ticks(&mut bank, marks, wanted.from),
+    };
+    let (lost, merged) = ((found - merged - made) as u64, merged as u64);
+    Converted { ticks, made: made as u64, peak_busy: bank.peak as u32, lost, merged }
+}
+
+/// Ticks, how many were made, of how many events, and how many of these fell into the tick of another one.
+struct Taken {
+    ticks: Ticks,
+    made: usize,
+    found: usize,
+    merged: usize,
+}
+
+/// The ticks of detection events.
+fn of_events(bank: &mut Bank, events: Detections) -> Taken {
     let Detections { epoch, mut time, mut channel, mut amplitude } = events;
     let found = time.len();
     let merged = if channel.is_empty() && amplitude.is_empty() {
@@ -82,7 +105,8 @@ fn of_events(bank: &mut Bank, events: Detections) -> (Ticks, usize, usize) {
     } else {
         bank.take_by_channel(&mut time, &mut channel, &mut amplitude)
     };
-    (Ticks { epoch, tick: time, channel, amplitude }, found, merged)
+    let ticks = Ticks { epoch, tick: time, channel, amplitude };
+    Taken { made: ticks.len(), ticks, found, merged }
 }
 
 #[cfg(test)]
@@ -98,7 +122,7 @@ mod tests {
     }
 
     fn timed(design: &Design, epoch: i64, time: Vec<u32>) -> Converted {
-        ticks(design, Detections { epoch, time, ..Detections::default() }, 0)
+        ticks(design, Detections { epoch, time, ..Detections::default() }, Wanted::ALL)
     }
 
     #[test]
@@ -142,7 +166,7 @@ mod tests {
             channel: vec![0, 0, 1],
             amplitude: vec![1.0, 2.0, 3.0],
         };
-        let Converted { ticks, lost, .. } = ticks(&design, detections, 0);
+        let Converted { ticks, lost, .. } = ticks(&design, detections, Wanted::ALL);
         assert_eq!((ticks.tick, lost), (vec![100, 100], 1));
         assert_eq!((ticks.channel, ticks.amplitude), (vec![0, 1], vec![1.0, 3.0]));
     }
@@ -167,6 +191,7 @@ mod tests {
             busy_until.push_back(u64::from(tick) + dead);
             found.peak_busy = found.peak_busy.max(busy_until.len() as u32);
             found.ticks.tick.push(tick);
+            found.made += 1;
         }
         found
     }
@@ -192,7 +217,7 @@ mod tests {
             prop_assert_eq!(timed(&design, 0, times.clone()), expected.clone());
             let detections = Detections { time: times, ..Detections::default() };
             let peak_busy = expected.peak_busy.max(known.min(converters));
-            let knowing = ticks(&design, detections, known);
+            let knowing = ticks(&design, detections, Wanted { known_busy: known, ..Wanted::ALL });
             prop_assert_eq!(knowing, Converted { peak_busy, ..expected });
         }
 
@@ -207,7 +232,7 @@ mod tests {
             let without = timed(&design, 0, times.clone());
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
             let detections = Detections { time: times, amplitude, ..Detections::default() };
-            let with = ticks(&design, detections, 0);
+            let with = ticks(&design, detections, Wanted::ALL);
             let of_ticks: Vec<f32> = with.ticks.tick.iter().map(|tick| *tick as f32).collect();
             prop_assert_eq!(&with.ticks.amplitude, &of_ticks);
             let ticks = Ticks { amplitude: Vec::new(), ..with.ticks.clone() };
