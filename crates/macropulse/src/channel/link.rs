@@ -27,6 +27,7 @@ impl Link {
     }
 
     /// One-way transmission of the air over `range` metres: exp(−σ·R).
+    #[inline]
     pub fn transmission(&self, range: f64) -> f64 {
         match self.extinction == 0.0 {
             true => 1.0,
@@ -77,6 +78,7 @@ impl Link {
 
     /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which
     /// includes the cosine) at `range` metres.
+    #[inline]
     pub fn photons(&self, reflectance: f64, range: f64) -> f64 {
         if reflectance <= 0.0 || range <= 0.0 {
             return 0.0;

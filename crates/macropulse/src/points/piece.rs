@@ -62,8 +62,10 @@ impl Piece {
         points.saturated.extend(&returns.saturated);
         // The last number among those of a shot is how many they are.
         points.number_of_returns.extend(&returns.number);
-        for at in (1..returns.len()).rev().filter(|&at| returns.number[at] > 1) {
-            points.number_of_returns[at - 1] = points.number_of_returns[at];
+        if returns.number.iter().any(|number| *number > 1) {
+            for at in (1..returns.len()).rev().filter(|&at| returns.number[at] > 1) {
+                points.number_of_returns[at - 1] = points.number_of_returns[at];
+            }
         }
         let fired = returns.shot.iter().map(|&shot| shot as usize);
         points.row.extend(fired.clone().map(|shot| log.row[shot]));
@@ -76,20 +78,24 @@ impl Piece {
         }
         let (directions, gates) = (design.directions(), design.scan.gates());
         let beside = directions.have_origins();
-        for (at, &tof) in returns.tof.iter().enumerate() {
-            let (row, column) = (points.row[at], points.column[at]);
-            let range = range_from_tof(tof) + gates.offset(row);
-            let mut point =
-                directions.of_shot(log, returns.shot[at] as usize).map(|part| part * range);
-            if beside {
-                let begins = directions.origin(row, column);
-                point = [0, 1, 2].map(|axis| begins[axis] + point[axis]);
-            }
-            points.x[at] = point[0] as f32;
-            points.y[at] = point[1] as f32;
-            points.z[at] = point[2] as f32;
-            points.range[at] = range as f32;
-            points.intensity[at] = scale.reflectance(points.photons[at], range);
+        let count = returns.len();
+        let (rows, columns, photons) =
+            (&points.row[..count], &points.column[..count], &points.photons[..count]);
+        let (x, y, z) = (&mut points.x[..count], &mut points.y[..count], &mut points.z[..count]);
+        let (ranges, intensity) = (&mut points.range[..count], &mut points.intensity[..count]);
+        let (tof, shots) = (&returns.tof[..count], &returns.shot[..count]);
+        for at in 0..count {
+            let range = range_from_tof(tof[at]) + gates.offset(rows[at]);
+            let [to_x, to_y, to_z] = directions.of_shot(log, shots[at] as usize);
+            let [from_x, from_y, from_z] = match beside {
+                true => directions.origin(rows[at], columns[at]),
+                false => [0.0; 3],
+            };
+            x[at] = (from_x + to_x * range) as f32;
+            y[at] = (from_y + to_y * range) as f32;
+            z[at] = (from_z + to_z * range) as f32;
+            ranges[at] = range as f32;
+            intensity[at] = scale.reflectance(photons[at], range);
         }
     }
 

@@ -63,6 +63,7 @@ impl Scale {
 
     /// Reflectance of a surface square on at `range` metres of which `photons` per mark are detected;
     /// 1 for a detector without a photon scale, which never misses.
+    #[inline]
     pub(super) fn reflectance(&self, photons: f32, range: f64) -> f32 {
         let white = self.link.photons(1.0, range);
         if white.is_finite() { (f64::from(photons) / white) as f32 } else { 1.0 }

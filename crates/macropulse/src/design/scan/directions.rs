@@ -136,7 +136,7 @@ impl Directions {
 
     /// The unit vector at which the middle of a pixel lies; where each scan goes on where the one
     /// before it ended, that of the first scan.
-    #[inline]
+    #[inline(always)]
     pub fn of(&self, row: u16, column: u16) -> [f64; 3] {
         let (row, column) = (usize::from(row), usize::from(column));
         match &self.course {
@@ -150,7 +150,7 @@ impl Directions {
     }
 
     /// The unit vector along which a shot of `log` is sent.
-    #[inline]
+    #[inline(always)]
     pub fn of_shot(&self, log: &ShotLog, shot: usize) -> [f64; 3] {
         let (row, column) = (log.row[shot], log.column[shot]);
         let Course::Path(path) = &self.course else { return self.of(row, column) };
