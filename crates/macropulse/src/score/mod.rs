@@ -86,6 +86,12 @@ pub fn judge(
     let gates = design.scan.gates();
     let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
     let mut at = 0;
+    let outcome = |error: Option<f64>| match error.map(f64::abs) {
+        None => Outcome::False,
+        Some(error) if error <= design.right_within => Outcome::Right,
+        Some(error) if error <= NEAR => Outcome::Near,
+        Some(_) => Outcome::Wrong,
+    };
     piece.points.truth.pixels.blank(log.owned.len());
     piece.points.truth.returns.blank(piece.shot.len());
     for shot in log.owned.clone() {
@@ -111,6 +117,21 @@ pub fn judge(
             },
         };
         let on_target = |i: usize| scene.objects[usize::from(hits.object[i])].is_target;
+        let pixel = shot - log.owned.start;
+        let follows = piece.shot.get(at + 1).is_some_and(|&of| of as usize == shot);
+        if next == first + 1 && !is_silent && !follows && gate.contains(&hits.range[first]) {
+            // One surface and one return, as nearly always: the steps below come to this.
+            let outcome = outcome(Some(hits.range[first] - f64::from(piece.points.range[at])));
+            let is_on_target = on_target(first);
+            let answered = matches!(outcome, Outcome::Right | Outcome::Near);
+            piece.points.truth.returns.set(at, surface(Some(first), outcome));
+            piece.points.truth.pixels.outcome[pixel] = outcome;
+            score.samples_on_target += u64::from(is_on_target);
+            score.points_on_target += u64::from(is_on_target && answered);
+            score.pixels[outcome as usize] += 1;
+            at += 1;
+            continue;
+        }
         score.samples_on_target += u64::from(met.clone().any(on_target));
         // The return shown, its outcome, and whether it comes from the target.
         let mut shown: Option<(usize, Outcome, bool)> = None;
@@ -118,12 +139,7 @@ pub fn judge(
             let measured = f64::from(piece.points.range[at]);
             let error = |i: usize| (hits.range[i] - measured).abs();
             let nearest = met.clone().min_by(|&a, &b| error(a).total_cmp(&error(b)));
-            let outcome = match nearest {
-                None => Outcome::False,
-                Some(i) if error(i) <= design.right_within => Outcome::Right,
-                Some(i) if error(i) <= NEAR => Outcome::Near,
-                Some(_) => Outcome::Wrong,
-            };
+            let outcome = outcome(nearest.map(error));
             let answered = matches!(outcome, Outcome::Right | Outcome::Near);
             let source = if answered { nearest } else { met.clone().next() };
             piece.points.truth.returns.set(at, surface(source, outcome));
@@ -143,7 +159,7 @@ pub fn judge(
             (None, None) => Outcome::Empty,
             (None, Some(_)) => Outcome::Missed,
         };
-        let (pixels, pixel) = (&mut piece.points.truth.pixels, shot - log.owned.start);
+        let pixels = &mut piece.points.truth.pixels;
         match outcome {
             Outcome::Empty => {}
             Outcome::Missed => pixels.set(pixel, surface(first, outcome)),
