@@ -90,7 +90,18 @@ pub fn text(measured: &Measured) -> Fallible<String> {
     Ok(page::table(&["what", "goal", "measured", "met"], &rows))
 }
 
-fn speeds(measured: &Measured) -> Fallible<Vec<Goal>> {
+/// What is wanted of decoding.
+pub struct Decode {
+    /// The condition, in words.
+    pub name: &'static str,
+    pub scene: &'static str,
+    pub condition: Condition,
+    /// The least speed.
+    pub least: f64,
+}
+
+/// All that is wanted of decoding.
+pub fn decoding() -> impl Iterator<Item = Decode> {
     let noise = |missed, counts| Condition::Noise { missed, counts };
     let wanted = [
         ("clean", "street", Condition::CLEAN, 1.0 / 1.5),
@@ -103,8 +114,18 @@ fn speeds(measured: &Measured) -> Fallible<Vec<Goal>> {
         ("clean", "random", Condition::CLEAN, 1.0 / 8.0),
         ("20 % missed, 10⁹ counts/s", "random", noise(0.2, 1e9), 1.0 / 250.0),
     ];
+    wanted.into_iter().map(|(name, scene, condition, least)| Decode {
+        name,
+        scene,
+        condition,
+        least,
+    })
+}
+
+fn speeds(measured: &Measured) -> Fallible<Vec<Goal>> {
+    let noise = |missed, counts| Condition::Noise { missed, counts };
     let mut goals = Vec::new();
-    for (name, scene, condition, least) in wanted {
+    for Decode { name, scene, condition, least } in decoding() {
         let decoded = measured.decoding.of(scene, condition);
         let what = format!("speed of decoding `{scene}`, {name}");
         goals.push(Goal::at_least(&what, least, decoded.map(|decoded| decoded.speed), speed));

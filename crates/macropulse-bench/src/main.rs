@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 mod decode;
 mod embree;
+mod floor;
 mod generate;
 mod goals;
 mod machine;
@@ -24,7 +25,8 @@ mod scans;
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// The sections that are written, in the order in which they are measured.
-const SECTIONS: [&str; 7] = ["rays", "generate", "decode", "plain", "growth", "scans", "goals"];
+const SECTIONS: [&str; 8] =
+    ["rays", "generate", "decode", "floor", "plain", "growth", "scans", "goals"];
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -58,6 +60,7 @@ fn section(name: &str) -> Fallible<()> {
         "rays" => rays::measure()?.text(),
         "generate" => generate::measure()?.text(),
         "decode" => decode::measure()?.text(),
+        "floor" => floor::text()?,
         "plain" => plain::text()?,
         "growth" => decode::growth()?,
         "scans" => scans::measure()?.text(),
@@ -75,6 +78,7 @@ fn everything() -> Fallible<()> {
     write("generate", &generating.text())?;
     let decoding = decode::measure()?;
     write("decode", &decoding.text())?;
+    section("floor")?;
     section("plain")?;
     section("growth")?;
     let scans = scans::measure()?;

@@ -94,6 +94,14 @@ pub struct Sample {
     bands: Vec<(Band, Hits)>,
 }
 
+/// An echo as the scene has it.
+pub struct Echo {
+    /// Ticks from the epoch to the beginning of its macropulse.
+    pub start: usize,
+    /// Ticks from there to each of its marks.
+    pub marks: Vec<u32>,
+}
+
 /// What the receiver is given of a band.
 pub type Given = (ShotLog, Ticks);
 
@@ -144,6 +152,37 @@ impl Sample {
             ticks.keep(&span);
             done(&mut memory, (log, ticks));
         }
+    }
+
+    /// How many ticks a mark is looked for in: ± 2 σ of the jitter and the tick itself.
+    pub fn window(&self) -> u32 {
+        let jitter = self.design.receiver.jitter_ticks;
+        if jitter > 0.05 { 1 + (4.0 * jitter).ceil() as u32 } else { 1 }
+    }
+
+    /// The echoes from within the range gate, band by band, in the order of their arrival.
+    pub fn echoes(&self) -> Vec<Vec<Echo>> {
+        let Design { receiver, coding, scan, tdc, .. } = &self.design;
+        let scale = receiver.ticks_per_chip;
+        let of_band = |(band, hits): &(Band, Hits)| {
+            let log = band.shot_log(&self.design);
+            let epoch = self.design.cut().epoch(log.fired_at_fs[0]);
+            let all = hits.shot.iter().zip(&hits.range);
+            let within = all.filter(|(_, range)| **range <= scan.max_range);
+            let echo = |(shot, range): (&u32, &f64)| {
+                let shot = *shot as usize;
+                let arrives =
+                    log.fired_at_fs[shot] + units::fs_from_s(units::tof_from_range(*range));
+                let marks = coding.codebook.marks(log.label[shot], log.word[shot]);
+                let start = arrives.div_euclid(tdc.tick_fs) - epoch;
+                let marks = marks.iter().map(|mark| scale * u32::from(*mark)).collect();
+                Echo { start: start.max(0) as usize, marks }
+            };
+            let mut echoes: Vec<Echo> = within.map(echo).collect();
+            echoes.sort_by_key(|echo| echo.start);
+            echoes
+        };
+        self.bands.iter().map(of_band).collect()
     }
 
     /// What the receiver is given.

@@ -11,7 +11,7 @@
 //! * [`files`]: shot logs and ticks as text and as bytes, samples as bytes.
 //! * [`decode`]: the receivers, from ticks or samples to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
-//! * [`level`]: which instructions the wide loops use.
+//! * [`level`]: which instructions the wide loops use; [`steps`]: two of these loops by themselves.
 
 #![cfg_attr(test, allow(missing_docs))]
 
@@ -19,6 +19,7 @@ pub mod code;
 pub mod decode;
 pub mod files;
 pub mod statistics;
+pub mod steps;
 pub mod time;
 
 mod cut;

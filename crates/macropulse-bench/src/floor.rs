@@ -1,0 +1,154 @@
+//! What decoding costs at least: an experiment beside the receiver that is told where all light comes from.
+//!
+//! In noise every tick is laid down as a bit, twice, as what is explained must be told from what was seen; of
+//! each echo the marks are counted at 256 lags about its range, which is taken from the scene, and put
+//! out. Without noise every tick is held against the one before it and against the one that is
+//! expected. Nothing is searched for, doubted, timed or written down. Ticks are laid down and marks are counted
+//! by the loops of the receiver.
+
+use std::hint::black_box;
+
+use macropulse::codec::on_every_level;
+use macropulse::codec::steps::{LAGS, lay, most};
+
+use crate::Fallible;
+use crate::goals;
+use crate::machine::least_seconds;
+use crate::page::{self, speed, three};
+use crate::sample::{Condition, Echo, Given, Sample};
+
+/// Ticks that are laid down together: 2 × 128 kB, which a second cache holds.
+const STRETCH: usize = 1 << 20;
+
+/// Half of the lags are before the one that is told.
+const BEFORE: usize = LAGS / 2;
+
+/// The table.
+pub fn text() -> Fallible<String> {
+    let mut rows = Vec::new();
+    for goals::Decode { name, scene, condition, least } in goals::decoding() {
+        let sample = Sample::of(condition.design()?, scene, 24)?;
+        let given = sample.given();
+        let ticks: usize = given.iter().map(|(_, ticks)| ticks.tick.len()).sum();
+        let seconds = match condition {
+            Condition::CLEAN => read(&given),
+            _ => laid_and_counted(&sample, &given),
+        };
+        rows.push(vec![
+            format!("`{scene}`, {name}"),
+            format!("≥ {}", speed(least)),
+            speed(sample.speed(seconds)),
+            three(1e9 * seconds / sample.shots()),
+            three(ticks as f64 / sample.shots()),
+        ]);
+    }
+    let head = ["decoding", "goal", "floor", "ns a shot", "ticks a shot"];
+    Ok(page::table(&head, &rows))
+}
+
+/// Seconds to hold each tick against the one before it and against what is expected.
+fn read(given: &[Given]) -> f64 {
+    let expected: Vec<Vec<u32>> = given.iter().map(|(_, ticks)| ticks.tick.clone()).collect();
+    least_seconds(|| {
+        for ((_, ticks), expected) in given.iter().zip(&expected) {
+            black_box(falls(&ticks.tick) | differs(&ticks.tick, expected));
+        }
+    })
+}
+
+on_every_level! {
+    fn falls(ticks: &[u32]) -> u32 {
+        let pairs = ticks.iter().zip(ticks.get(1..).unwrap_or_default());
+        pairs.fold(0, |falls, (before, after)| falls | u32::from(after <= before))
+    }
+}
+
+on_every_level! {
+    fn differs(ticks: &[u32], expected: &[u32]) -> u32 {
+        ticks.iter().zip(expected).fold(0, |differs, (tick, expected)| differs | tick ^ expected)
+    }
+}
+
+/// Seconds to lay all ticks down, and to count and put out the marks of all echoes.
+fn laid_and_counted(sample: &Sample, given: &[Given]) -> f64 {
+    let echoes = sample.echoes();
+    let width = sample.window();
+    let longest = echoes.iter().flatten().filter_map(|echo| echo.marks.last());
+    let room = (STRETCH + *longest.max().unwrap_or(&0) as usize).div_ceil(64) + 8;
+    let [mut seen, mut lit, mut left] = [(); 3].map(|()| vec![0; room]);
+    least_seconds(|| {
+        for ((_, ticks), echoes) in given.iter().zip(&echoes) {
+            let (mut ticks, mut echoes) = (&ticks.tick[..], &echoes[..]);
+            let mut begin = 0;
+            while !echoes.is_empty() {
+                ticks = &ticks[ticks.partition_point(|tick| (*tick as usize) < begin)..];
+                seen.fill(0);
+                lay(&mut seen, begin as i64, ticks);
+                left.copy_from_slice(&seen);
+                if width > 1 {
+                    widen(&seen, width, &mut lit);
+                }
+                let found = if width > 1 { &lit } else { &seen };
+                let here = echoes.partition_point(|echo| echo.start < begin + STRETCH);
+                for Echo { start, marks } in &echoes[..here] {
+                    // Where the first lag would come before the stretch, it is the first one that does not.
+                    let first = start.saturating_sub(begin + BEFORE);
+                    black_box(most(found, first as u32, marks));
+                    put_out(&mut left, start.saturating_sub(begin), marks);
+                }
+                echoes = &echoes[here..];
+                begin += STRETCH;
+            }
+            black_box(&left);
+        }
+    })
+}
+
+on_every_level! {
+    /// Lights in `lit` each place of which one of so many ticks from it on is in `words`.
+    fn widen(words: &[u64], width: u32, lit: &mut [u64]) {
+        let next = words.iter().skip(1).chain([&0]);
+        for ((lit, word), next) in lit.iter_mut().zip(words).zip(next) {
+            *lit = (1..width).fold(*word, |lit, by| lit | word >> by | next << (64 - by));
+        }
+    }
+}
+
+/// Puts the `marks` of a macropulse that begins at bit `start` out.
+fn put_out(words: &mut [u64], start: usize, marks: &[u32]) {
+    for mark in marks {
+        let bit = start + *mark as usize;
+        if let Some(word) = words.get_mut(bit / 64) {
+            *word &= !(1 << (bit % 64));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_told_is_there() {
+        let sample = Sample::of(Condition::CLEAN.design().unwrap(), "street", 240).unwrap();
+        let (given, echoes) = (sample.given(), sample.echoes());
+        let (mut found, mut marks_of_all) = (0, 0);
+        for ((_, ticks), echoes) in given.iter().zip(&echoes) {
+            let end = *ticks.tick.last().unwrap() as usize;
+            let mut seen = vec![0; end / 64 + 1];
+            assert_eq!(lay(&mut seen, 0, &ticks.tick), ticks.tick.len());
+            let first = ticks.tick[0] as usize;
+            let is_whole = |echo: &&Echo| {
+                let last = echo.marks.last().map_or(0, |mark| *mark as usize);
+                echo.start > first && echo.start + last < end
+            };
+            for Echo { start, marks } in echoes.iter().filter(is_whole) {
+                found += most(&seen, (start - BEFORE) as u32, marks);
+                marks_of_all += marks.len() as u32;
+                put_out(&mut seen, *start, marks);
+            }
+        }
+        // Every mark is there, but for those that lie under a macropulse that was put out before.
+        assert!(100 * found > 95 * marks_of_all, "{found} of {marks_of_all}");
+    }
+}

@@ -1,0 +1,22 @@
+//! Two steps of the matched receiver by themselves, for who wants to time or to study them.
+
+use crate::kernels::{self, Counts, NARROW};
+
+/// Lags at which [`most`] counts.
+pub const LAGS: usize = 64 * NARROW;
+
+/// Lights, in `words`, of which the first bit is tick `origin`, those of the ascending `ticks` that they have
+/// room for, and tells how many these are. None may be before the origin, and all must be dark.
+pub fn lay(words: &mut [u64], origin: i64, ticks: &[u32]) -> usize {
+    let end = origin + 64 * words.len() as i64;
+    kernels::lay(words, origin, ticks, end)
+}
+
+/// The most of `marks`, bits from the beginning of a macropulse on, that are lit in `words` where it begins
+/// at bit `first` or up to [`LAGS`] − 1 bits later. Bits beyond the end are dark; there are 65 535 marks at
+/// most.
+pub fn most(words: &[u64], first: u32, marks: &[u32]) -> u32 {
+    let mut counts = Counts::<NARROW>::default();
+    counts.add(words, first, marks, marks.iter().copied().max().unwrap_or(0));
+    counts.highest([u64::MAX; NARROW]).map_or(0, |(_, count)| count)
+}
