@@ -4,7 +4,7 @@
 //! each echo the marks are counted at 256 lags about its range, which is taken from the scene, and put
 //! out. Without noise every tick is held against the one before it and against the one that is
 //! expected. Nothing is searched for, doubted, timed or written down. Ticks are laid down and marks are counted
-//! by the loops of the receiver.
+//! by the loops of the receiver, so that it takes as much longer as it does besides.
 
 use std::hint::black_box;
 

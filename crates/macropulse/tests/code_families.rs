@@ -137,7 +137,7 @@ fn distances(words: &[CodeWord]) -> (Vec<u16>, u16) {
 #[test]
 fn marks_of_sampled_sensors_stand_apart_and_so_do_their_distances() {
     let apart = |distances: &[u16]| distances.windows(2).map(|two| two[1] - two[0]).min().unwrap();
-    for (name, chips) in [("coded-32", 360), ("coded-16", 300)] {
+    for (name, chips) in [("coded-32", 340), ("coded-16", 300)] {
         let design = Design::open(name, &[]).unwrap();
         let words = design.coding.codebook.family().words();
         assert_size(design.coding.codebook.family(), chips, 3, 10);

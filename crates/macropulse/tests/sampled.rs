@@ -42,7 +42,7 @@ fn room(range: f64, reflectance: f64) -> Scene {
     let text = format!(
         "version = 1\nenvironment = \"clear-day\"\nsensor.position_m = [0.0, 0.0, 0.0]\n\
          [[material]]\nname = \"paint\"\ndiffuse = {reflectance}\n[[object]]\n\
-         shape.sphere.radius_m = {range:.1}\nmaterial = \"paint\"\n"
+         shape.sphere.radius_m = {range:?}\nmaterial = \"paint\"\n"
     );
     Scene::from_toml(&text, "room", Path::new("")).unwrap()
 }
@@ -142,20 +142,44 @@ fn forecasts_of_samples_hold() {
     }
 }
 
-/// Beyond the gate there is light of which none is to be told, and in the open none at all: no more points
-/// than accepted, 3e-5 a shot; N = 27 136 each, seed 6, α = 1e-3 of 4 of a mean of 0.8. Control: a threshold
-/// for one in a hundred shots is crossed.
+/// Of a wall of 30 % all words are found at every range: no echo loses two marks of three to own light, whichever
+/// shot is sent when it comes. In steps of half a tick, 3 cm, from 5 m to the end of the gate. Control: words of 8 ns
+/// from mark to mark, for which own light was once taken, lose one in seven at 70.33 m; so do simulated shots, to 0.02,
+/// N = 27 136, seed 12.
+#[test]
+fn no_range_is_hidden_by_own_light() {
+    let day = Environment::named("clear-day").unwrap();
+    let own = design(&[]);
+    let forecaster = Forecaster::new(&own, &day).unwrap();
+    let lost = |range: &f64| forecaster.forecast(0.3, *range).pd < 0.999;
+    let lost: Vec<f64> = (0..4830).map(|step| 5.0 + 0.03 * f64::from(step)).filter(lost).collect();
+    assert!(lost.is_empty(), "{lost:?}");
+    let nearer = "{separated={length=360,weight=3,words=10,gap=20,apart=5,later=2,seed=1}}";
+    let nearer = design(&[("code.family", nearer)]);
+    let forecast = Forecaster::new(&nearer, &day).unwrap().forecast(0.3, 70.33).pd;
+    let pd = |design: &Design| {
+        let found = found(design, (70.33, 0.3), 12);
+        found.right / found.pixels
+    };
+    assert!((0.8..0.9).contains(&forecast), "{forecast}");
+    assert!((pd(&nearer) - forecast).abs() < 0.02 && pd(&own) > 0.999);
+}
+
+/// In the open there are no more points than the receiver is asked for, 3e-5 a shot; N = 27 136, seed 6, α = 1e-3
+/// of 4 of a mean of 0.8. With a wall of 10 % beyond the gate there are no more than the design accepts, 1e-4: what of
+/// its light is not found lies beside noise; N = 108 544, seeds 6 to 9, α = 1e-3 of 22 of a mean of 10.9. Of 203 520
+/// by other seeds 12 had a point. Control: a threshold for one in a hundred shots is crossed.
 #[test]
 fn there_are_no_more_points_of_nothing_than_accepted() {
-    let nothing = |design: &Design, range: f64| {
-        let found = found(design, (range, 0.1), 6);
+    let nothing = |design: &Design, range: f64, seed: u64| {
+        let found = found(design, (range, 0.1), seed);
         found.right + found.wrong
     };
     let own = design(&[]);
-    assert!(nothing(&own, 200.0) <= 4.0);
-    assert!(nothing(&own, 2000.0) <= 4.0);
+    assert!((6..10).map(|seed| nothing(&own, 200.0, seed)).sum::<f64>() <= 22.0);
+    assert!(nothing(&own, 2000.0, 6) <= 4.0);
     let loose = design(&[("receiver.false_alarm", "1e-2")]);
-    assert!(nothing(&loose, 2000.0) > 60.0);
+    assert!(nothing(&loose, 2000.0, 6) > 60.0);
 }
 
 /// Pulses near by are clipped, and timed by their edges. Own stray light blanks a part of the time: at 5 m

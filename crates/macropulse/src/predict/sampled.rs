@@ -232,7 +232,7 @@ impl Rule {
         let needed = |threshold: f64, count: usize| threshold * estimated * (count as f64).sqrt();
         let all = needed(self.threshold, self.count);
         let others = needed(self.threshold + Sampling::MORE_IF_MISSING, self.count.max(1) - 1);
-        let above = Sampling::most_above_least(self.weight);
+        let above = Sampling::most_above_least(self.count, self.weight);
         let [one, two] = filtered.correlation;
         let rest = (1.0 - one * one).max(0.0).sqrt();
         let mixed = if rest > 0.0 { (one - one * two) / rest } else { 0.0 };

@@ -21,6 +21,13 @@ const EQUAL: f32 = 3.0;
 /// … and this share of their mean.
 const SPREAD: f32 = 0.08;
 
+/// By what factor marks may differ on which no other light was found: the spot moves on during a word, and where it
+/// lies across an edge one mark has more of it on the surface than another. Of `coded-32`, whose spot moves by 0.3
+/// pixels, eleven of 302 pixels of `car-70m`, all at its outline, had a mark hidden and the others apart by factors
+/// of 1.3 to 1.9; with this none is lost, and of `coded-16` on tiles without neighbours no more points are false, 33
+/// of 196 012 as before.
+const SPLIT: f32 = 2.0;
+
 /// Light that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Found {
@@ -80,6 +87,8 @@ pub(super) struct Residual<'a> {
     counted: Vec<Mark>,
     /// The score of the last candidate, and what it had to reach, as far as it came to that.
     asked: (Option<f32>, Option<f32>),
+    /// Whether all candidates were tested once.
+    is_again: bool,
 }
 
 impl<'a> Residual<'a> {
@@ -88,7 +97,20 @@ impl<'a> Residual<'a> {
         pulse: &'a Pulse,
         filtered: Filtered,
     ) -> Self {
-        Self { codes, sampling, pulse, filtered, counted: Vec::new(), asked: (None, None) }
+        Self {
+            codes,
+            sampling,
+            pulse,
+            filtered,
+            counted: Vec::new(),
+            asked: (None, None),
+            is_again: false,
+        }
+    }
+
+    /// From here on marks may differ on which no other light was found: all that can be explained otherwise is.
+    pub(super) fn look_again(&mut self) {
+        self.is_again = true;
     }
 
     /// What is left of the signal.
@@ -223,12 +245,14 @@ impl<'a> Residual<'a> {
         if self.counted.len() == marks {
             return Some(rule.threshold);
         }
-        // Of marks that are clipped, or nearly so, it is not known how strong they are.
-        let is_told = sum.most * self.pulse.highest() < 0.5 * f32::from(self.sampling.full_scale);
+        // Of marks that are all clipped, or nearly so, it is not known how strong they are.
+        let lowest = sum.most - sum.spread;
+        let is_told = lowest * self.pulse.highest() < 0.5 * f32::from(self.sampling.full_scale);
         let doubt = self.counted.iter().map(|mark| mark.doubt).fold(0.0, f32::max);
         let both = std::f32::consts::SQRT_2 * rule.deviation(sum.mean);
         let differ = EQUAL * deviation(doubt, both) + SPREAD * sum.mean;
-        (!is_told || sum.spread <= differ).then_some(rule.threshold + super::MISSING)
+        let is_split = self.is_again && doubt == 0.0 && sum.most <= SPLIT * sum.least;
+        (!is_told || sum.spread <= differ || is_split).then_some(rule.threshold + super::MISSING)
     }
 
     /// Takes pulses of so many `photons` away, that came `late` behind the `places`.
@@ -293,141 +317,4 @@ fn deviation(one: f32, other: f32) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::STEPS_OF_TICK;
-    use super::*;
-    use crate::code::{Codebook, Family, Keying, Separated};
-    use crate::decode::Receiver;
-    use crate::{ShotLog, decode::ReceiverKind};
-
-    /// Noise, in photons, none of which is in the signal.
-    const SIGMA: f32 = 36.0;
-
-    fn sampling() -> Sampling {
-        let steps = 4 * STEPS_OF_TICK as i32;
-        let at = |step: i32| {
-            let ticks = step as f32 / STEPS_OF_TICK as f32;
-            libm::expf(-ticks * ticks / 2.0) / 10.0
-        };
-        Sampling {
-            pulse: (-steps..=steps).map(at).collect(),
-            excess: 5.56,
-            full_scale: 1000,
-            blank_ticks: 0,
-            held_ticks: 0,
-            recovery_ticks: 0,
-            least_marks: 2,
-            coupling: None,
-        }
-    }
-
-    /// What becomes of a shot whose three marks are so strong at a lag of 100, of which those that are
-    /// `blind` tell nothing; and what is left at the first, with how uncertain that is.
-    fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, (f32, f32)) {
-        tested_beside([0.0; 3], heights, blind)
-    }
-
-    /// The same where other light, so strong, comes four ticks behind the first mark and the second, and
-    /// four before the last.
-    fn tested_beside(
-        others: [f32; 3],
-        heights: [f32; 3],
-        blind: [bool; 3],
-    ) -> (Option<Found>, (f32, f32)) {
-        let words =
-            Separated { length: 60, weight: 3, words: 1, gap: 15, apart: 4, later: 0, seed: 1 };
-        let family = Family::separated(words).unwrap();
-        let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
-        let (sampling, log) = (sampling(), ShotLog::of_one_channel(&[0], &[0]));
-        let pulse = Pulse::new(&sampling);
-        let kind = ReceiverKind::Sampled;
-        let receiver = Receiver { kind, false_alarm: 1e-5, ..Receiver::matched(1) };
-        let (fired, lags) = (vec![0], 200);
-        let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
-        let (mut signal, mut doubt, mut codes) = (vec![0.0; 300], vec![0.0; 300], vec![0; 300]);
-        for (at, late) in [4, 4, -4].into_iter().enumerate() {
-            let mark = 100 + band.marks(0).nth(at).unwrap();
-            for (height, late) in [(heights[at], 0), (others[at], late)] {
-                for tick in -8..=8 {
-                    let at = (mark + late + tick) as usize;
-                    signal[at] += height * pulse.answer(tick as f64);
-                    let code = height * libm::expf(-(tick * tick) as f32 / 2.0) / 10.0;
-                    codes[at] = codes[at].max(code.min(1000.0) as i16);
-                }
-            }
-            if blind[at] {
-                doubt[mark as usize] = f32::INFINITY;
-            }
-        }
-        let rule = Rule::new(&band, &sampling, SIGMA);
-        let filtered = Filtered { signal, doubt, dark: Vec::new(), sigma: SIGMA };
-        let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
-        let candidate = Candidate { shot: 0, lag: 100, rank: 1.0 };
-        let found = residual.test(&candidate, (&band, &rule)).ok();
-        let first = 100 + band.marks(0).next().unwrap() as usize;
-        (found, (residual.filtered.signal[first], residual.filtered.doubt[first]))
-    }
-
-    /// How strong a mark of `count` equal ones is whose sum is so many standard deviations.
-    fn height(score: f32, count: f32) -> f32 {
-        score * SIGMA / count.sqrt()
-    }
-
-    /// 10⁻⁵ false returns in 100 001 lags: 10⁻¹⁰ each, of which the normal bound is 6.36 σ.
-    #[test]
-    fn more_is_asked_of_words_of_which_a_mark_is_missing() {
-        let all = [false; 3];
-        let one = [true, false, false];
-        let with = |score, count, blind| tested([height(score, count); 3], blind).0;
-        assert!(with(6.33, 3.0, all).is_none() && with(6.39, 3.0, all).is_some());
-        assert!(with(6.83, 2.0, one).is_none() && with(6.89, 2.0, one).is_some());
-        assert!(with(100.0, 1.0, [true, true, false]).is_none());
-        let margin = with(9.4, 3.0, all).unwrap().margin;
-        assert_eq!((margin, with(9.4, 2.0, one).unwrap().margin), (3, 2));
-    }
-
-    #[test]
-    fn two_marks_must_be_equal() {
-        let one = [true, false, false];
-        assert!(tested([0.0, 900.0, 1000.0], one).0.is_some());
-        assert!(tested([0.0, 600.0, 1400.0], one).0.is_none());
-        // Three need not: a bright one has light of others.
-        let found = tested([600.0, 600.0, 9000.0], [false; 3]).0.unwrap();
-        assert!((600.0..700.0).contains(&found.photons), "{}", found.photons);
-    }
-
-    /// Bright light of others in one mark, and in the two others what noise alone may be. Control: light that is not so
-    /// far above them counts, and two that are as strong as is asked of two are found beside any.
-    #[test]
-    fn a_bright_mark_of_others_does_not_carry_two_faint_ones() {
-        let found = |faint, bright| tested([faint, bright, faint], [false; 3]).0.is_some();
-        let deviation = (SIGMA * SIGMA + 5.56 * 100.0).sqrt();
-        assert!(found(100.0, 100.0 + 4.9 * deviation) && !found(100.0, 100.0 + 5.1 * deviation));
-        assert!(!found(100.0, 1000.0) && !found(170.0, 1000.0) && found(180.0, 1000.0));
-    }
-
-    /// Two marks at the rims of clipped light, none of them clipped itself, and noise at the third.
-    #[test]
-    fn rims_of_clipped_light_are_no_marks() {
-        let all = [false; 3];
-        assert!(tested_beside([0.0, 1e5, 1e5], [110.0, 0.0, 0.0], all).0.is_none());
-        // A true one is told by the marks that are left.
-        let found = tested_beside([0.0, 0.0, 1e5], [600.0; 3], all).0.unwrap();
-        assert_eq!((found.marks, found.is_clipped), (2, false));
-    }
-
-    #[test]
-    fn what_is_found_is_taken_away() {
-        let (found, (left, doubt)) = tested([1000.0; 3], [false; 3]);
-        let found = found.unwrap();
-        assert_eq!((found.lag, found.marks, found.is_clipped), (100, 3, false));
-        assert!(found.late.abs() < 1e-3 && (found.photons - 1000.0).abs() < 1.0, "{found:?}");
-        // √(F·1000 + (4 %·1000)²).
-        assert!(left.abs() < 1.0 && (doubt - 84.6).abs() < 0.1, "{left} ± {doubt}");
-        let (found, (left, doubt)) = tested([100.0; 3], [false; 3]);
-        assert!(found.is_none() && (left - 100.0).abs() < 1e-3 && doubt == 0.0, "{left} ± {doubt}");
-        // What is left of clipped pulses tells nothing.
-        let (found, (_, doubt)) = tested([1e5; 3], [false; 3]);
-        assert!(found.unwrap().is_clipped && doubt == f32::INFINITY);
-    }
-}
+mod tests;

@@ -8,7 +8,7 @@ use super::coupling::Restored;
 use super::filter::{Filtered, merged, own_marks};
 use super::pulse::Pulse;
 use super::search::{Candidate, Search, candidates};
-use super::{Band, Rule, Sampling};
+use super::{Band, Rule, Sampling, look_at};
 use crate::code::Codebook;
 use crate::decode::explain::{MOST_LAGS, Verdict};
 use crate::decode::{Error, Receiver, Returns, check};
@@ -243,16 +243,20 @@ impl<'a> Bench<'a> {
                 .map(|lag| residual.sum(&self.marks, lag, &rule).map_or(f32::NAN, |sum| sum.score));
             (left.collect(), lag, residual.signal().to_vec())
         };
-        for candidate in &candidates {
+        look_at(&candidates, &mut residual, |residual, candidate| {
             if candidate.shot == *shot {
-                seen.get_or_insert_with(|| look(&mut residual, candidate.lag));
-                tested.push(self.test(&mut residual, candidate, &rule));
-            } else if let Ok(found) = residual.test(candidate, (band, &rule))
-                && seen.is_none()
-            {
+                seen.get_or_insert_with(|| look(residual, candidate.lag));
+                let told = self.test(residual, candidate, &rule);
+                let refusal = told.outcome.err();
+                tested.push(told);
+                return refusal;
+            }
+            let found = residual.test(candidate, (band, &rule));
+            if let (Ok(found), true) = (found, seen.is_none()) {
                 cancelled.push(found);
             }
-        }
+            found.err()
+        });
         let is_candidate = !tested.is_empty();
         if let (false, Some(lag)) = (is_candidate, best) {
             seen = Some(look(&mut residual, lag));
