@@ -150,7 +150,8 @@ impl Sample {
             let wanted = Wanted { from: span.start, ..Wanted::ALL };
             let mut ticks = tdc::ticks(&self.design, response, wanted).ticks;
             ticks.keep(&span);
-            done(&mut memory, (log, ticks));
+            // As in a whole scan: no shot of which only some light is there.
+            done(&mut memory, (self.design.cut().known(&log), ticks));
         }
     }
 
@@ -201,8 +202,9 @@ impl Sample {
     /// How it did.
     pub fn score(&self, given: &[Given], returns: &[Returns]) -> Score {
         let mut score = Score::default();
-        for (((_, hits), (log, _)), returns) in self.bands.iter().zip(given).zip(returns) {
-            score.add(&self.design, log, (hits, returns));
+        for (((band, hits), (log, _)), returns) in self.bands.iter().zip(given).zip(returns) {
+            let unknown = (log.first - band.shot_log(&self.design).first) as usize;
+            score.add(&self.design, (log, unknown), (hits, returns));
         }
         score
     }
@@ -237,11 +239,18 @@ pub struct Score {
 }
 
 impl Score {
-    fn add(&mut self, design: &Design, log: &ShotLog, (hits, returns): (&Hits, &Returns)) {
+    /// Adds the owned shots of `log`, before which so many were met by `hits` that are `unknown` to the receiver.
+    fn add(
+        &mut self,
+        design: &Design,
+        (log, unknown): (&ShotLog, usize),
+        (hits, returns): (&Hits, &Returns),
+    ) {
         let gate = design.scan.min_range..=design.scan.max_range;
         for shot in log.owned.clone() {
-            let own = hits.shot.partition_point(|&other| (other as usize) < shot)
-                ..hits.shot.partition_point(|&other| other as usize <= shot);
+            let met = shot + unknown;
+            let own = hits.shot.partition_point(|&other| (other as usize) < met)
+                ..hits.shot.partition_point(|&other| other as usize <= met);
             let ranges = hits.range[own].iter().filter(|range| gate.contains(range));
             let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
             let has_echo = ranges.clone().next().is_some() && !marks.is_empty();
