@@ -139,6 +139,9 @@ fn command(line: &str) -> Option<(&str, &str)> {
 fn written(number: f64, form: &str) -> Option<String> {
     if let Some(decimals) = form.strip_prefix('.').and_then(|form| form.strip_suffix('e')) {
         let decimals: usize = decimals.parse().ok()?;
+        if number == 0.0 {
+            return Some("0".into());
+        }
         let text = format!("{number:.decimals$e}");
         let (digits, power) = text.split_once('e')?;
         let raised = power.chars().map(|sign| match sign {
@@ -232,6 +235,7 @@ fn numbers_are_written_as_on_the_pages() {
         (1234.5678, ".3", "1 234.568"),
         (4.04e-7, ".0e", "4·10⁻⁷"),
         (4.684e-17, ".1e", "4.7·10⁻¹⁷"),
+        (0.0, ".1e", "0"),
     ] {
         assert_eq!(written(number, form).as_deref(), Some(text));
     }
