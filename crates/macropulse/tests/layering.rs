@@ -28,6 +28,11 @@ const CODEC: Layers = Layers {
     may_name: &[],
     modules: &[
         Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
+        Rule {
+            module: "steps",
+            may_name: &["kernels"],
+            because: "steps of a receiver by themselves are its loops and nothing else",
+        },
         Rule { module: "statistics", may_name: &[], because: "distributions depend on nothing" },
         Rule { module: "time", may_name: &[], because: "the unit of time depends on nothing" },
         Rule {
