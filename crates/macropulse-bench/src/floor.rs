@@ -85,10 +85,13 @@ fn laid_and_counted(sample: &Sample, given: &[Given]) -> f64 {
                 seen.fill(0);
                 lay(&mut seen, begin as i64, ticks);
                 left.copy_from_slice(&seen);
-                if width > 1 {
-                    widen(&seen, width, &mut lit);
-                }
-                let found = if width > 1 { &lit } else { &seen };
+                let found = match width {
+                    1 => &seen,
+                    _ => {
+                        widen(&seen, width, &mut lit);
+                        &lit
+                    }
+                };
                 let here = echoes.partition_point(|echo| echo.start < begin + STRETCH);
                 for Echo { start, marks } in &echoes[..here] {
                     // Where the first lag would come before the stretch, it is the first one that does not.
