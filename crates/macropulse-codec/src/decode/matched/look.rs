@@ -76,13 +76,26 @@ impl Usual {
     pub(super) fn least(&self, weight: u32) -> u32 {
         usual(self.share, weight)
     }
+
+    /// Fewest of `weight` marks that most have: one standard deviation below the mean. Of 18 494 shots of
+    /// `street` with 40 % missed three are taken for sidelobes that their neighbours let expect where as many
+    /// as usual are enough, one with this, none with the mean, which takes a tenth longer.
+    pub(super) fn of_most(&self, weight: u32) -> u32 {
+        below_mean(self.share, weight, 1.0)
+    }
 }
 
 /// Fewest of `weight` marks that are usual where a `share` of them is found: three standard deviations
-/// below the mean, of the binomial and of a mark.
+/// below the mean.
 pub(super) fn usual(share: f64, weight: u32) -> u32 {
+    below_mean(share, weight, 3.0)
+}
+
+/// So many standard deviations, of the binomial and of a mark, below the mean of `weight` marks of which a
+/// `share` is found.
+fn below_mean(share: f64, weight: u32, deviations: f64) -> u32 {
     let mean = share * f64::from(weight);
-    (mean - 3.0 * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
+    (mean - deviations * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
 }
 
 impl Band<'_> {
@@ -238,7 +251,7 @@ impl Band<'_> {
             return None;
         }
         let may_be_even = known.is_none() && self.even.is_due(shot);
-        let is_even = self.sent.wants_further() || self.sent.is_thorough() || may_be_even;
+        let is_even = self.sent.wants_further() || may_be_even;
         let lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
         let searched: i64 = lags.iter().map(|lags| lags.end - lags.start).sum();
         let share = searched as f64 / (gate.end - gate.start) as f64;
@@ -291,13 +304,33 @@ impl Band<'_> {
         Some(found.lag)
     }
 
+    /// Finds one more surface of `shot` that neither chance nor light of other shots gives, and cancels it.
+    pub(super) fn finds_another_surface(&mut self, shot: usize) -> bool {
+        let gate = self.sent.gate();
+        let left = self.leftover().density(shot, &gate);
+        // Half of its marks may lie under ticks that are cancelled already.
+        let least = self.least_in_gate(shot).div_ceil(2);
+        let least = self.thresholds.least(self.sent.weight(shot), left).max(least);
+        let lags = self.leftover().lags(shot, gate, least, true);
+        let most = self.maximum(shot, Source::Residual, &lags, least);
+        let found = most.and_then(|(lag, _)| self.found_at(shot, lag));
+        let found = found.and_then(|found| self.told_from_chance(shot, found));
+        // Light of other shots does not give as many in each bit.
+        let is_own = |found: &Detection| {
+            found.stands_out && !self.is_known(shot, found.lag) && self.is_even(shot, *found)
+        };
+        let Some(found) = found.filter(is_own) else { return false };
+        self.cancel(shot, found.lag);
+        self.further.push((shot, found));
+        true
+    }
+
     /// Follows a surface that stands beside others, as behind a pane of glass, along the `shots`, the
     /// first of which is expected to have it about `lag`: to search for each of them alone takes long.
     fn follow(&mut self, shots: Range<usize>, mut lag: i64) {
         let mut step = None;
         for shot in shots {
-            // Each is searched for in all of its gate where that is asked for.
-            if self.found[shot].is_none() || !self.is_open(shot) || self.sent.is_thorough() {
+            if self.found[shot].is_none() || !self.is_open(shot) {
                 return;
             }
             let usual = self.usual.least(self.sent.weight(shot));

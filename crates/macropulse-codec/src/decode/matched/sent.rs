@@ -304,9 +304,10 @@ impl<'a> Sent<'a> {
         self.receiver.effort == Effort::Thorough
     }
 
-    /// Whether surfaces of a shot beside the strongest one are asked for.
+    /// Whether surfaces of a shot beside the strongest one are looked for wherever they may be: they are
+    /// asked for, or light of one must not pass for that of a bit that should be dark.
     pub fn wants_further(&self) -> bool {
-        self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
+        self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest || self.is_thorough()
     }
 
     /// Whether no smaller share of the marks was found of one shot than of another one.

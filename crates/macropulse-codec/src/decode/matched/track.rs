@@ -15,8 +15,8 @@ const SIDES: i64 = 3;
 /// The lags to both sides of a peak that are always seen with it.
 pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - SAME;
 
-/// A peak so near to where it was expected is no sidelobe of one elsewhere. In the standard scenes 1 to
-/// 16 find the same shots in the same time.
+/// A peak so near to where it was expected is hardly ever a sidelobe of one elsewhere. In the standard
+/// scenes 1 to 16 find the same shots in the same time.
 const SAME: i64 = 4;
 
 /// A peak farther than this from the middle of its block, of which half are then seen to a side of it, is
@@ -93,11 +93,13 @@ impl Band<'_> {
     ///
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
-    /// unless as many marks as usual are there, and marks at both of its ends.
+    /// unless as many marks as usual are there, and marks at both of its ends; or where it was to be
+    /// expected as many as of most.
     pub(super) fn climb(&mut self, shot: usize, lag: i64, at_least: u32) -> Option<Detection> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
         let usual = self.usual.least(weight).max(weight.div_ceil(2));
+        let of_most = self.usual.of_most(weight);
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
@@ -106,9 +108,9 @@ impl Band<'_> {
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
-            let is_certain = best.count >= usual
-                && (best.lag.abs_diff(lag) <= SAME as u64
-                    || self.both_ends_are_lit(shot, best.lag));
+            let is_expected = best.lag.abs_diff(lag) <= SAME as u64 && best.count >= of_most;
+            let is_certain =
+                best.count >= usual && (is_expected || self.both_ends_are_lit(shot, best.lag));
             if best.count == weight || is_certain {
                 break;
             }

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::ops::Range;
 
 use super::track::{BLOCK, NEAREST_SIDE, WIDEST_GAP};
-use super::{Band, Detection};
+use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
 use crate::decode::timing::{self, Known};
@@ -459,24 +459,38 @@ impl Band<'_> {
 
     /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
     ///
-    /// A dark bit is lit if it has half the marks of a lit one and more than chance gives it; only the
-    /// residual counts, as other shots may well shine there.
+    /// Only the residual counts, as other shots may well shine there; and so may another surface of this one,
+    /// which is looked for then.
     fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
-        let sent = self.sent;
-        if sent.bits_of_payload() == 1 {
+        if self.sent.bits_of_payload() == 1 {
             return true;
         }
         if !detection.is_sure && !self.is_even(shot, detection) {
             return false;
         }
+        for _ in 0..SURFACES {
+            if !self.is_lit_where_dark(shot, detection) {
+                return true;
+            }
+            if !self.finds_another_surface(shot) {
+                return false;
+            }
+        }
+        !self.is_lit_where_dark(shot, detection)
+    }
+
+    /// Whether a bit of `shot` that should be dark has half the marks of a lit one in the residual, and more
+    /// than chance gives it.
+    fn is_lit_where_dark(&mut self, shot: usize, detection: Detection) -> bool {
+        let sent = self.sent;
         let light = sent.light(shot, detection.lag);
         let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
         let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
         residual.lit_in_each(light.start, sent.bits_that_are(false, shot), pattern, found);
         let most = found.iter().copied().max().unwrap_or(0);
-        2 * most * (sent.lit_bits(shot).len() as u32) < detection.count || {
+        2 * most * (sent.lit_bits(shot).len() as u32) >= detection.count && {
             let density = self.density_beside(shot, detection);
-            most < self.bit_thresholds.least(sent.in_word(shot), density)
+            most >= self.bit_thresholds.least(sent.in_word(shot), density)
         }
     }
 
