@@ -6,6 +6,7 @@ use std::process::Command;
 
 use crate::Fallible;
 use crate::decode::{self, Decoding};
+use crate::effort::Efforts;
 use crate::generate::Generating;
 use crate::page::{self, grouped, speed, three};
 use crate::rays::{LEAKED_OF, Rays};
@@ -20,6 +21,8 @@ pub struct Measured<'a> {
     pub generating: &'a Generating,
     /// From ticks to returns.
     pub decoding: &'a Decoding,
+    /// Quick receivers beside thorough ones.
+    pub efforts: &'a Efforts,
     /// Whole scans.
     pub scans: &'a WholeScans,
 }
@@ -137,6 +140,8 @@ fn speeds(measured: &Measured) -> Fallible<Vec<Goal>> {
             goals.push(Goal::at_most(what, 0.0, Some(score.wrong as f64), grouped));
         }
     }
+    let what = "shots found otherwise than by a thorough receiver, where most are";
+    goals.push(Goal::at_most(what, 0.01, Some(100.0 * measured.efforts.most()), percent));
     let generating = measured.generating.speed("street", Condition::CLEAN);
     let what = "speed of generating `street`, clean";
     goals.push(Goal::at_least(what, 1.0 / 1.5, generating, speed));

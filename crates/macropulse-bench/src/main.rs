@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 mod decode;
+mod effort;
 mod embree;
 mod floor;
 mod generate;
@@ -25,8 +26,8 @@ mod scans;
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// The sections that are written, in the order in which they are measured.
-const SECTIONS: [&str; 8] =
-    ["rays", "generate", "decode", "floor", "plain", "growth", "scans", "goals"];
+const SECTIONS: [&str; 9] =
+    ["rays", "generate", "decode", "floor", "effort", "plain", "growth", "scans", "goals"];
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -61,6 +62,7 @@ fn section(name: &str) -> Fallible<()> {
         "generate" => generate::measure()?.text(),
         "decode" => decode::measure()?.text(),
         "floor" => floor::text()?,
+        "effort" => effort::measure()?.text(),
         "plain" => plain::text()?,
         "growth" => decode::growth()?,
         "scans" => scans::measure()?.text(),
@@ -79,6 +81,8 @@ fn everything() -> Fallible<()> {
     let decoding = decode::measure()?;
     write("decode", &decoding.text())?;
     section("floor")?;
+    let efforts = effort::measure()?;
+    write("effort", &efforts.text())?;
     section("plain")?;
     section("growth")?;
     let scans = scans::measure()?;
@@ -87,6 +91,7 @@ fn everything() -> Fallible<()> {
         rays: &rays,
         generating: &generating,
         decoding: &decoding,
+        efforts: &efforts,
         scans: &scans,
     };
     write("goals", &goals::text(&measured)?)

@@ -1,0 +1,124 @@
+//! What a quick receiver finds otherwise than a thorough one.
+
+use std::collections::BTreeSet;
+
+use macropulse::codec::decode::{Effort, Receiver, Returns};
+use macropulse::processor::thread_seconds;
+
+use crate::Fallible;
+use crate::page::{self, grouped, three};
+use crate::sample::{Condition, Sample};
+
+/// One band in so many is decoded: a thorough receiver takes minutes for a scan.
+const EVERY: usize = 24;
+
+/// The detectors, and their names: without noise, in some, in faint light, and in dense noise.
+const DETECTORS: [(&str, Condition); 6] = [
+    ("clean", Condition::CLEAN),
+    ("20 % missed, 10⁹ counts/s", Condition::Noise { missed: 0.2, counts: 1e9 }),
+    ("40 % missed", Condition::Noise { missed: 0.4, counts: 0.0 }),
+    ("10¹⁰ counts/s", Condition::Noise { missed: 0.0, counts: 1e10 }),
+    ("20 % missed, 10¹⁰ counts/s", Condition::Noise { missed: 0.2, counts: 1e10 }),
+    ("as declared", Condition::Declared),
+];
+
+/// What was measured.
+pub struct Efforts(Vec<Row>);
+
+struct Row {
+    scene: &'static str,
+    detector: &'static str,
+    shots: f64,
+    /// Shots of which they do not give the same ranges.
+    differ: usize,
+    /// How many times as long the thorough one takes.
+    longer: f64,
+}
+
+/// Measures it.
+pub fn measure() -> Fallible<Efforts> {
+    let mut rows = Vec::new();
+    for scene in ["street"] {
+        for (detector, condition) in [DETECTORS[0], DETECTORS[2], DETECTORS[5]] {
+            let mut sample = Sample::of(condition.design()?, scene, EVERY)?;
+            let given = sample.given();
+            let mut decode = |effort| -> Fallible<(Vec<Returns>, f64)> {
+                sample.design.receiver = Receiver { effort, ..sample.design.receiver.clone() };
+                let began = thread_seconds();
+                let returns = sample.decode(&given)?;
+                Ok((returns, thread_seconds() - began))
+            };
+            let (thorough, long) = decode(Effort::Thorough)?;
+            let (quick, short) = decode(Effort::Quick)?;
+            let differ =
+                quick.iter().zip(&thorough).map(|(quick, thorough)| differ(quick, thorough));
+            for (band, (q, t)) in quick.iter().zip(&thorough).enumerate() {
+                for (a, b, n) in [(q, t, "quick"), (t, q, "thorough")] {
+                    for i in 0..a.len() {
+                        if !(0..b.len()).any(|j| b.shot[j] == a.shot[i] && b.tof[j] == a.tof[i]) {
+                            eprintln!(
+                                "{scene} {detector} band {band} shot {} of {:?} {n} {:.4} m {}/{} margin {}",
+                                a.shot[i],
+                                given[band].0.owned,
+                                a.tof[i] * 1.49896229e8,
+                                a.peak[i],
+                                a.marks[i],
+                                a.margin[i]
+                            );
+                        }
+                    }
+                }
+                if std::env::var("DUMP").is_ok() {
+                    for k in 0..q.len() {
+                        if q.shot[k].abs_diff(1) < 4000
+                            && std::env::var("BAND")
+                                .is_ok_and(|b| b.parse::<usize>().unwrap() == band)
+                        {
+                            eprintln!(
+                                "Q {} {:.4} {}/{}",
+                                q.shot[k],
+                                q.tof[k] * 1.49896229e8,
+                                q.peak[k],
+                                q.marks[k]
+                            );
+                        }
+                    }
+                }
+            }
+            let (differ, shots) = (differ.sum(), sample.shots());
+            rows.push(Row { scene, detector, shots, differ, longer: long / short });
+        }
+    }
+    Ok(Efforts(rows))
+}
+
+/// Shots of which not the same ranges are returned.
+fn differ(one: &Returns, other: &Returns) -> usize {
+    let returned = |returns: &Returns| -> BTreeSet<(u32, u64)> {
+        returns.shot.iter().copied().zip(returns.tof.iter().map(|tof| tof.to_bits())).collect()
+    };
+    let (one, other) = (returned(one), returned(other));
+    one.symmetric_difference(&other).map(|(shot, _)| *shot).collect::<BTreeSet<u32>>().len()
+}
+
+impl Efforts {
+    /// The largest share of the shots that is found otherwise under any detector in a scene with surfaces.
+    pub fn most(&self) -> f64 {
+        let with_surfaces = self.0.iter().filter(|row| row.scene != "random");
+        with_surfaces.map(|row| row.differ as f64 / row.shots).fold(0.0, f64::max)
+    }
+
+    /// The table.
+    pub fn text(&self) -> String {
+        let row = |row: &Row| {
+            vec![
+                format!("`{}`, {}", row.scene, row.detector),
+                grouped(row.shots),
+                grouped(row.differ as f64),
+                format!("{} ×", three(row.longer)),
+            ]
+        };
+        let head = ["decoding", "shots", "found otherwise", "thorough takes"];
+        page::table(&head, &self.0.iter().map(row).collect::<Vec<_>>())
+    }
+}
