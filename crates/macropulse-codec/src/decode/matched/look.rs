@@ -304,8 +304,9 @@ impl Band<'_> {
         Some(found.lag)
     }
 
-    /// Finds one more surface of `shot` that neither chance nor light of other shots gives, and cancels it.
-    pub(super) fn finds_another_surface(&mut self, shot: usize) -> bool {
+    /// Finds one more surface of `shot`, found at `lag`, that neither chance nor light of other shots gives,
+    /// and cancels it.
+    pub(super) fn finds_another_surface(&mut self, shot: usize, lag: i64) -> bool {
         let gate = self.sent.gate();
         let left = self.leftover().density(shot, &gate);
         // Half of its marks may lie under ticks that are cancelled already.
@@ -315,9 +316,14 @@ impl Band<'_> {
         let most = self.maximum(shot, Source::Residual, &lags, least);
         let found = most.and_then(|(lag, _)| self.found_at(shot, lag));
         let found = found.and_then(|found| self.told_from_chance(shot, found));
-        // Light of other shots does not give as many in each bit.
+        // Light of another label is whole bits away, and not as much in each bit.
+        let (width, bit) = (i64::from(self.sent.width), self.sent.bit_length());
         let is_own = |found: &Detection| {
-            found.stands_out && !self.is_known(shot, found.lag) && self.is_even(shot, *found)
+            let away = (found.lag - lag).rem_euclid(bit);
+            found.stands_out
+                && (width..=bit - width).contains(&away)
+                && !self.is_known(shot, found.lag)
+                && self.is_even(shot, *found)
         };
         let Some(found) = found.filter(is_own) else { return false };
         self.cancel(shot, found.lag);

@@ -472,7 +472,7 @@ impl Band<'_> {
             if !self.is_lit_where_dark(shot, detection) {
                 return true;
             }
-            if !self.finds_another_surface(shot) {
+            if !self.finds_another_surface(shot, detection.lag) {
                 return false;
             }
         }
