@@ -7,7 +7,7 @@ use macropulse::processor::thread_seconds;
 
 use crate::Fallible;
 use crate::page::{self, grouped, three};
-use crate::sample::{Condition, Sample};
+use crate::sample::{Condition, SCENES, Sample};
 
 /// One band in so many is decoded: a thorough receiver takes minutes for a scan.
 const EVERY: usize = 24;
@@ -38,8 +38,8 @@ struct Row {
 /// Measures it.
 pub fn measure() -> Fallible<Efforts> {
     let mut rows = Vec::new();
-    for scene in ["street"] {
-        for (detector, condition) in [DETECTORS[0], DETECTORS[2], DETECTORS[5]] {
+    for scene in SCENES {
+        for (detector, condition) in DETECTORS {
             let mut sample = Sample::of(condition.design()?, scene, EVERY)?;
             let given = sample.given();
             let mut decode = |effort| -> Fallible<(Vec<Returns>, f64)> {
@@ -52,39 +52,6 @@ pub fn measure() -> Fallible<Efforts> {
             let (quick, short) = decode(Effort::Quick)?;
             let differ =
                 quick.iter().zip(&thorough).map(|(quick, thorough)| differ(quick, thorough));
-            for (band, (q, t)) in quick.iter().zip(&thorough).enumerate() {
-                for (a, b, n) in [(q, t, "quick"), (t, q, "thorough")] {
-                    for i in 0..a.len() {
-                        if !(0..b.len()).any(|j| b.shot[j] == a.shot[i] && b.tof[j] == a.tof[i]) {
-                            eprintln!(
-                                "{scene} {detector} band {band} shot {} of {:?} {n} {:.4} m {}/{} margin {}",
-                                a.shot[i],
-                                given[band].0.owned,
-                                a.tof[i] * 1.49896229e8,
-                                a.peak[i],
-                                a.marks[i],
-                                a.margin[i]
-                            );
-                        }
-                    }
-                }
-                if std::env::var("DUMP").is_ok() {
-                    for k in 0..q.len() {
-                        if q.shot[k].abs_diff(1) < 4000
-                            && std::env::var("BAND")
-                                .is_ok_and(|b| b.parse::<usize>().unwrap() == band)
-                        {
-                            eprintln!(
-                                "Q {} {:.4} {}/{}",
-                                q.shot[k],
-                                q.tof[k] * 1.49896229e8,
-                                q.peak[k],
-                                q.marks[k]
-                            );
-                        }
-                    }
-                }
-            }
             let (differ, shots) = (differ.sum(), sample.shots());
             rows.push(Row { scene, detector, shots, differ, longer: long / short });
         }
