@@ -3,12 +3,13 @@
 //! The target is extended, Lambertian and square on, and so is all around it: the light of the
 //! other shots in flight is that of the same target. The beam is a line.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use macropulse_codec::decode::{ReceiverKind, Sampling};
 
 use super::converters::bank_loss;
+use super::own_light::OwnLight;
 use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
@@ -161,11 +162,50 @@ impl<'a> Forecaster<'a> {
     /// probabilities are the mean over the brightness of an echo, and precision that over the echoes that are
     /// seen.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
-        let mean = self.of_brightness(reflectance, range);
+        let told = self.own_light(range).map(|own| own.told_at(range));
+        self.of_told(reflectance, range, told.as_deref().unwrap_or_default())
+    }
+
+    /// The least that it will find up to `farthest` metres of a target of `reflectance`, and where: as
+    /// [`Forecaster::forecast`], at the one of all ranges that is worst. Next to where a channel of samples has just
+    /// sent a mark nothing is told, and nothing is asked. Near by, where marks are clipped, more may be found.
+    pub fn worst(&self, reflectance: f64, farthest: f64) -> Forecast {
+        let mut worst = self.forecast(reflectance, farthest);
+        let Some(own) = self.own_light(farthest) else { return worst };
+        // Of two ranges at which as many marks are told the farther one has less light.
+        let mut looked_at = BTreeSet::new();
+        for (range, told) in own.each_told(self.design.scan.min_range, farthest) {
+            let mut sorted = told.clone();
+            sorted.sort_unstable();
+            if looked_at.insert(sorted) {
+                let here = self.of_told(reflectance, range, &told);
+                if here.pd < worst.pd {
+                    worst = here;
+                }
+            }
+        }
+        worst
+    }
+
+    /// What the channels are blind with, if they are sampled, for echoes from so many metres at most.
+    fn own_light(&self, farthest: f64) -> Option<OwnLight> {
+        let (Detector::Sampled(detector), Some(sampling)) =
+            (&self.design.detector, &self.design.receiver.sampling)
+        else {
+            return None;
+        };
+        let background = self.background * self.operating.background;
+        let blind = sampled::blind(detector, sampling, background);
+        Some(OwnLight::of(self.design, blind, tof_from_range(farthest)))
+    }
+
+    /// The same where of some shots so many marks each are `told`, which only receivers of samples ask.
+    fn of_told(&self, reflectance: f64, range: f64, told: &[usize]) -> Forecast {
+        let mean = self.of_brightness(reflectance, range, told);
         let Some(speckle) = Speckle::simulated(self.design) else { return mean };
         let (mut pd, mut mark_pd, mut square) = (0.0, 0.0, 0.0);
         for (brightness, share) in brightnesses(speckle.cells(range, 1.0)) {
-            let one = self.of_brightness(brightness * reflectance, range);
+            let one = self.of_brightness(brightness * reflectance, range, told);
             pd += share * one.pd;
             mark_pd += share * one.mark_pd;
             square += share * one.pd * one.precision.unwrap_or(0.0).powi(2);
@@ -180,12 +220,12 @@ impl<'a> Forecaster<'a> {
     }
 
     /// The same of an echo that is as bright as it is on average.
-    fn of_brightness(&self, reflectance: f64, range: f64) -> Forecast {
+    fn of_brightness(&self, reflectance: f64, range: f64, told: &[usize]) -> Forecast {
         let (design, operating) = (self.design, &self.operating);
         if let (Detector::Sampled(detector), Some(sampling)) =
             (&design.detector, &design.receiver.sampling)
         {
-            return self.of_samples((detector, sampling), reflectance, range);
+            return self.of_samples((detector, sampling), reflectance, range, told);
         }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
@@ -281,13 +321,13 @@ impl<'a> Forecaster<'a> {
         (detector, sampling): (&Sampled, &Sampling),
         reflectance: f64,
         range: f64,
+        told: &[usize],
     ) -> Forecast {
         let (design, mean_weight) = (self.design, self.mean_weight);
         let detected = self.light * self.operating.link.photons(reflectance, range);
         let background = self.background * self.operating.background;
         let parts = (design, detector, sampling);
-        let chances =
-            sampled::chances(parts, &self.points, background, detected, tof_from_range(range));
+        let chances = sampled::chances(parts, &self.points, background, detected, told);
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
         let mark = Lit { photons: detected, background, falling: 0.0 };
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);

@@ -8,11 +8,13 @@ pub mod interference;
 pub mod link;
 mod matched;
 pub mod multiple_access;
+mod own_light;
 pub mod ranging;
 mod sampled;
 mod sidelobes;
 pub mod verdict;
 
 pub use forecast::{Error, Forecast, Forecaster};
+pub use own_light::{Blind, OwnLight};
 pub use sampled::deepest_baseline;
 pub use sidelobes::Aside;

@@ -9,18 +9,16 @@
 use macropulse_codec::decode::Sampling;
 use macropulse_codec::statistics::{normal_quantile, normal_tail};
 
+use super::own_light::{Blind, SHOTS, own_marks};
 use crate::design::Design;
 use crate::design::detector::Sampled;
-use crate::units::{FS_PER_S, RMS_OF_FWHM, s_from_fs};
+use crate::units::RMS_OF_FWHM;
 
 /// Points of the sum: with four times as many the probability differs by less than 0.001.
 const POINTS: u32 = 2048;
 
 /// The lag of a target and those beside it: noise may lift one of them over the threshold.
 const LAGS: usize = 3;
-
-/// Shots of a channel of which it is told which marks are blanked: six times the words of the example.
-const SHOTS: usize = 60;
 
 /// What is to be expected.
 pub(super) struct Chances {
@@ -125,14 +123,22 @@ struct Estimated {
     deviation: f64,
 }
 
-/// What the receiver of `design` finds of marks of so many `photons` that come `tof` seconds after they
-/// were sent, under `background` detections per second.
+/// When the channels of `design` are blind with what they send, under `background` detections per second: stray
+/// light shows where it is four deviations of the noise high.
+pub(super) fn blind(sampled: &Sampled, sampling: &Sampling, background: f64) -> Option<Blind> {
+    let shown = (sampled.stray / (4.0 * sampled.rms_noise(background))).max(1.0);
+    let shows = sampled.front_end.mark_rms() / sampled.sample * (2.0 * libm::log(shown)).sqrt();
+    Blind::of(sampling, shows)
+}
+
+/// What the receiver of `design` finds of marks of so many `photons`, under `background` detections per second, of
+/// some shots of which so many marks each are `told`.
 pub(super) fn chances(
     (design, sampled, sampling): (&Design, &Sampled, &Sampling),
     points: &[Points],
     background: f64,
     photons: f64,
-    tof: f64,
+    told: &[usize],
 ) -> Chances {
     let filtered = Filtered::of(sampled, sampling, background);
     let (nearest, farthest) = design.receiver.gate_ticks;
@@ -152,10 +158,6 @@ pub(super) fn chances(
             }
         })
         .collect();
-    // Stray light shows where it is four deviations of the noise high, and the tick before tells nothing.
-    let shown = (sampled.stray / (4.0 * sampled.rms_noise(background))).max(1.0);
-    let rises = sampled.front_end.mark_rms() / sampled.sample * (2.0 * libm::log(shown)).sqrt();
-    let told = told(design, sampling, (tof, rises.ceil() as i64));
     let mean = |of: &dyn Fn(usize) -> f64| {
         told.iter().map(|count| of(*count)).sum::<f64>() / told.len().max(1) as f64
     };
@@ -293,22 +295,6 @@ impl Axes {
     }
 }
 
-/// When the marks of `shot`, counted along a line, leave, in ticks since the line began.
-fn own_marks(design: &Design, shot: usize) -> impl Iterator<Item = i64> {
-    let coding = &design.coding;
-    let column = shot as u32 % design.scan.columns;
-    let word = coding.first_word + shot as u32 % coding.word_modulus;
-    let fired = in_ticks(design, shot as f64 * design.scan.shortest_period());
-    let chip = coding.chip_fs / design.tdc.tick_fs;
-    let marks = coding.codebook.marks(coding.label_of(column as u16), word as u16);
-    marks.iter().map(move |mark| fired + chip * i64::from(*mark))
-}
-
-/// `time` seconds in whole ticks.
-fn in_ticks(design: &Design, time: f64) -> i64 {
-    (time * FS_PER_S as f64 / design.tdc.tick_fs as f64).round() as i64
-}
-
 /// How far below zero the sensor's own marks pull the baseline of an amplifier that is coupled by a
 /// capacitor, at most, in detected photons; 0 where light does not move it.
 ///
@@ -335,23 +321,3 @@ const REMEMBERED: f64 = 5.0;
 
 /// As many shots at most, whatever the baseline remembers: of more each does next to nothing to it.
 const MOST_SHOTS: f64 = 1e5;
-
-/// How many marks of each of some shots come while their channel is not blind with marks of its own:
-/// `rises` ticks before it leaves, the stray light of a mark shows. Shots of a channel follow each other
-/// along a line, word after word.
-fn told(design: &Design, sampling: &Sampling, (tof, rises): (f64, i64)) -> Vec<usize> {
-    let period = design.scan.shortest_period();
-    let macropulse = s_from_fs(design.macropulse_fs());
-    let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
-    let own: Vec<i64> = (0..SHOTS + 2 * around).flat_map(|shot| own_marks(design, shot)).collect();
-    // A tick tells nothing if the one beside it is blind, of which the last is the one before `blank_ticks`.
-    let blind = |place: i64| {
-        own.iter().any(|mark| {
-            (mark - rises - 1..=mark + i64::from(sampling.blank_ticks)).contains(&place)
-        })
-    };
-    let late = in_ticks(design, tof);
-    (around..around + SHOTS)
-        .map(|shot| own_marks(design, shot).filter(|mark| !blind(mark + late)).count())
-        .collect()
-}

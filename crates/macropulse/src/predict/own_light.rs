@@ -1,0 +1,220 @@
+//! When a channel that is sampled is blind with what it sends itself, and which marks of echoes that hides.
+
+use macropulse_codec::code::CodeWord;
+use macropulse_codec::decode::Sampling;
+
+use crate::design::Design;
+use crate::units::{FS_PER_S, range_from_tof, s_from_fs, tof_from_range};
+
+/// Shots of a channel of which it is told which marks are hidden: six times the words of the example.
+pub const SHOTS: usize = 60;
+
+/// Ticks about a mark that a channel sends in which it tells nothing: from so many before the mark leaves to so
+/// many behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Blind {
+    before: i64,
+    behind: i64,
+}
+
+impl Blind {
+    /// However bright the stray light of the mark is; `None` where the receiver is never blind.
+    pub fn at_most(sampling: &Sampling) -> Option<Self> {
+        Self::of(sampling, f64::INFINITY)
+    }
+
+    /// Of stray light that shows from `shows` ticks before its mark on.
+    ///
+    /// The receiver takes samples for dark ones from the one before the first that is lit, of those that its
+    /// filter reaches, to the last of `blank_ticks`. No mark is told within half the length of its filter of
+    /// these, most of the filter: as many ticks as leave a tenth of its energy outside to one side.
+    pub(super) fn of(sampling: &Sampling, shows: f64) -> Option<Self> {
+        if sampling.blank_ticks == 0 {
+            return None;
+        }
+        let taps = sampling.filter();
+        let reach = taps.len() / 2;
+        let energy = |taps: &[f32]| taps.iter().map(|tap| tap * tap).sum::<f32>();
+        let is_told = |apart: &usize| energy(&taps[..reach - apart]) < 0.1 * energy(&taps);
+        let core = (0..reach).find(is_told).unwrap_or(reach) as i64;
+        let lit = shows.min((core + reach as i64) as f64).floor() as i64;
+        let rises = if lit > core { lit + 1 } else { core };
+        let behind = i64::from(sampling.blank_ticks) - 1 + core;
+        Some(Self { before: rises + core, behind })
+    }
+
+    /// The same for an echo that comes between two ticks, and is found at either.
+    pub fn between_ticks(self) -> Self {
+        Self { behind: self.behind + 1, ..self }
+    }
+
+    /// From the first tick to the last.
+    pub fn ticks(self) -> u32 {
+        (self.before + 1 + self.behind).max(0) as u32
+    }
+}
+
+/// Shots that a channel sends along a line, word after word, and when it is blind with them.
+#[derive(Debug, Clone)]
+pub struct OwnLight {
+    /// When the marks leave of the shots whose echoes are looked at, in ticks since the line began.
+    shots: Vec<Vec<i64>>,
+    /// Whether the channel is blind, tick by tick.
+    blind: Vec<bool>,
+    /// First tick behind a mark in which it is told again.
+    over: i64,
+    ticks_per_s: f64,
+}
+
+impl OwnLight {
+    /// Of `design`, to echoes that come up to `tof` seconds later.
+    pub(super) fn of(design: &Design, blind: Option<Blind>, tof: f64) -> Self {
+        Self::new(design, blind, tof, |shot| own_marks(design, shot).collect())
+    }
+
+    /// As if the shots of `design` were these `words` in turn, to echoes that come up to `tof` seconds later.
+    pub fn of_words(design: &Design, words: &[CodeWord], blind: Blind, tof: f64) -> Self {
+        let marks = |shot: usize| match words.get(shot % words.len().max(1)) {
+            Some(word) => leave(design, shot, &word.marks).collect(),
+            None => Vec::new(),
+        };
+        Self::new(design, Some(blind), tof, marks)
+    }
+
+    fn new(
+        design: &Design,
+        blind: Option<Blind>,
+        tof: f64,
+        marks: impl Fn(usize) -> Vec<i64>,
+    ) -> Self {
+        let period = design.scan.shortest_period();
+        let lasts = |marks: Vec<i64>| {
+            marks.last().zip(marks.first()).map_or(0, |(last, first)| last - first)
+        };
+        let longest = (0..SHOTS).map(|shot| lasts(marks(shot))).max().unwrap_or(0);
+        let macropulse = s_from_fs(longest * design.tdc.tick_fs);
+        let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
+        let mut shots: Vec<Vec<i64>> = (0..SHOTS + 2 * around).map(marks).collect();
+        let last = shots.iter().flatten().copied().max().unwrap_or(0);
+        let over = blind.map_or(1, |blind| blind.behind + 1);
+        let mut is_blind = Vec::new();
+        if let Some(blind) = blind {
+            is_blind.resize((last + over) as usize, false);
+            for mark in shots.iter().flatten() {
+                let from = (mark - blind.before).max(0) as usize;
+                is_blind[from..(mark + over) as usize].fill(true);
+            }
+        }
+        shots.truncate(around + SHOTS);
+        shots.drain(..around);
+        Self { shots, blind: is_blind, over, ticks_per_s: ticks_per_s(design) }
+    }
+
+    /// How many marks of each shot are told of an echo from `range` metres.
+    pub fn told_at(&self, range: f64) -> Vec<usize> {
+        self.told((tof_from_range(range) * self.ticks_per_s).round() as i64)
+    }
+
+    /// The same of every tick at which an echo from `nearest` to `farthest` metres may come, with its range, m, the
+    /// farthest first. Where a channel is still blind with the mark itself nothing is asked.
+    pub fn each_told(
+        &self,
+        nearest: f64,
+        farthest: f64,
+    ) -> impl Iterator<Item = (f64, Vec<usize>)> {
+        let ticks = |range: f64| tof_from_range(range) * self.ticks_per_s;
+        let from = (ticks(nearest).ceil() as i64).max(self.over);
+        let range = |late: i64| range_from_tof(late as f64 / self.ticks_per_s);
+        (from..=ticks(farthest) as i64).rev().map(move |late| (range(late), self.told(late)))
+    }
+
+    /// How many marks of each shot are told of an echo that comes so many ticks later.
+    fn told(&self, late: i64) -> Vec<usize> {
+        let is_told = |mark: &&i64| {
+            let place = usize::try_from(**mark + late).ok();
+            !place.and_then(|place| self.blind.get(place)).is_some_and(|is_blind| *is_blind)
+        };
+        self.shots.iter().map(|marks| marks.iter().filter(is_told).count()).collect()
+    }
+}
+
+/// When the marks of `shot`, counted along a line, leave, in ticks since the line began.
+pub(super) fn own_marks(design: &Design, shot: usize) -> impl Iterator<Item = i64> {
+    let coding = &design.coding;
+    let column = shot as u32 % design.scan.columns;
+    let word = coding.first_word + shot as u32 % coding.word_modulus;
+    leave(design, shot, coding.codebook.marks(coding.label_of(column as u16), word as u16))
+}
+
+/// When `marks`, in chips, of such a shot leave.
+fn leave<'a>(
+    design: &Design,
+    shot: usize,
+    marks: &'a [u16],
+) -> impl Iterator<Item = i64> + use<'a> {
+    let fired = in_ticks(design, shot as f64 * design.scan.shortest_period());
+    let chip = design.coding.chip_fs / design.tdc.tick_fs;
+    marks.iter().map(move |mark| fired + chip * i64::from(*mark))
+}
+
+/// `time` seconds in whole ticks.
+fn in_ticks(design: &Design, time: f64) -> i64 {
+    (time * ticks_per_s(design)).round() as i64
+}
+
+fn ticks_per_s(design: &Design) -> f64 {
+    FS_PER_S as f64 / design.tdc.tick_fs as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use macropulse_codec::code::{Family, Separated};
+
+    use super::*;
+
+    /// At the worst tick from `nearest` metres to 150, and at all together, shots of which less than two marks are told.
+    fn lost(design: &Design, nearest: f64) -> [usize; 2] {
+        let sampling = design.receiver.sampling.as_ref().unwrap();
+        let blind = Blind::at_most(sampling).map(Blind::between_ticks);
+        let own = OwnLight::of(design, blind, tof_from_range(150.0));
+        own.each_told(nearest, 150.0).fold([0, 0], |[most, all], (_, told)| {
+            let here = told.iter().filter(|told| **told < 2).count();
+            [most.max(here), all + here]
+        })
+    }
+
+    /// Of 400 ps to a tick, as walls in steps of half a tick show: 6 ticks before a mark to 16 behind it, echoes between
+    /// two ticks included. Fewer behind a shorter mark, and none where there is no stray light.
+    #[test]
+    fn a_channel_is_blind_from_where_its_own_light_shows() {
+        let of = |changes: &[(&str, &str)]| {
+            let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+            let changes: Vec<_> = changes.iter().map(owned).collect();
+            let design = Design::open("coded-32", &changes).unwrap();
+            Blind::at_most(design.receiver.sampling.as_ref().unwrap())
+        };
+        assert_eq!(of(&[]), Some(Blind { before: 6, behind: 15 }));
+        assert_eq!(of(&[]).unwrap().between_ticks().ticks(), 23);
+        let shorter = of(&[("light.pulse_ps", "510"), ("detector.sampled.bandwidth_mhz", "519")]);
+        assert_eq!(shorter, Some(Blind { before: 5, behind: 15 }));
+        assert_eq!(of(&[("receiver.blank_ns", "0")]), None);
+    }
+
+    /// As counted from the marks that are sent by `tests/designs/words.py`. Words in turn are those of the sensor.
+    #[test]
+    fn echoes_lose_to_own_light_what_the_marks_sent_say() {
+        let wide = Design::open("coded-32", &[]).unwrap();
+        assert_eq!(lost(&wide, 5.0), [0, 0]);
+        let narrow = Design::open("coded-16", &[]).unwrap();
+        let [most, all] = lost(&narrow, 5.0);
+        assert_eq!(most, SHOTS / 5);
+        approx::assert_relative_eq!(all as f64 / (2418 * SHOTS) as f64, 0.01204, epsilon = 5e-6);
+        let blind = Blind::at_most(narrow.receiver.sampling.as_ref().unwrap()).unwrap();
+        let family =
+            Separated { length: 300, weight: 3, words: 10, gap: 20, apart: 5, later: 4, seed: 39 };
+        let words = Family::separated(family).unwrap().words();
+        let own = OwnLight::of_words(&narrow, &words, blind, tof_from_range(150.0));
+        let same = OwnLight::of(&narrow, Some(blind), tof_from_range(150.0));
+        assert!(own.each_told(1.0, 150.0).eq(same.each_told(1.0, 150.0)));
+    }
+}
