@@ -2,34 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use macropulse::codec::code::{Family, Separated};
+use macropulse::codec::code::Separated;
 use macropulse::design::{Design, Detector, Pattern, Polygon};
-use macropulse::units::tof_from_range;
 use toml::{Table, Value};
 
 use super::Error;
 use super::parts::Part;
 use super::polygon::POLYGON;
 use super::requirements::Requirements;
-
-/// Words of a code: with ten of them no two shots in flight that are nearer than ten have the same one.
-const WORDS: u32 = 10;
-
-/// Least time between two marks of a word, s: as long as a channel is blind behind a mark of its own, and a
-/// mark more. With marks from 0.8 ns apart `coded-16` is wrong in `street` four times as often
-/// (docs/guide/coded-32.md).
-const GAP: f64 = 8e-9;
-
-/// Words that lose nothing to own light may last such a share of the time between shots of a channel, as those of
-/// `coded-32` do. With 16 beams words of 0.7 to 0.8 of it had 23 to 102 points of 36 686 wrong, the shortest 6.
-const LONGEST: f64 = 0.31;
-
-/// Words that keep more followers take longer than [`LONGEST`] by far.
-const MOST_LATER: u32 = 4;
-
-/// Distances between marks differ by so many lengths (full width at half maximum) of a mark behind its
-/// amplifier: two marks that meet two others by less than that look like the same.
-const APART: f64 = 2.0;
+use super::words::{WORDS, family};
 
 /// Steps of the converter to a standard deviation of the noise: the rounding then adds 1.3 % to its variance.
 const STEPS: f64 = 2.5;
@@ -60,6 +41,8 @@ pub struct Candidate {
     pub energy: f64,
     /// Diameter of the receiving aperture, m.
     pub aperture: f64,
+    /// Its words; `None` of one that waits.
+    pub words: Option<Separated>,
 }
 
 /// What is built of it for a purpose.
@@ -106,7 +89,7 @@ impl Candidate {
         changes: &[(String, Value)],
     ) -> Result<Design, Error> {
         let of = |step: f64| -> Result<Design, Error> {
-            let mut table = self.table(required, built, step)?;
+            let mut table = self.table(required, built, step);
             changes.iter().for_each(|(path, value)| put(&mut table, path, value.clone()));
             Ok(Design::from_table(&table, &self.name(), &required.folder, &[])?)
         };
@@ -123,7 +106,7 @@ impl Candidate {
     }
 
     /// The sensor as the keys of its file.
-    fn table(&self, required: &Requirements, built: Built, step: f64) -> Result<Table, Error> {
+    fn table(&self, required: &Requirements, built: Built, step: f64) -> Table {
         let wanted = &required.wanted;
         let mut table = required.template.clone();
         // The beam fills as much of its pixel as that of the template.
@@ -170,15 +153,16 @@ impl Candidate {
         set("detector.sampled.bandwidth_mhz", (self.bandwidth * 1e-6).into());
         set("detector.sampled.step_photons", step.into());
         set("receiver.false_alarm", (FALSE_SHARE * wanted.false_points).into());
-        if self.waits() {
-            table.remove("code");
-        } else {
-            let separated =
-                required.words((self.marks, self.beams), (self.pulse, self.bandwidth))?;
-            put(&mut table, "code.family", family(&separated));
-            put(&mut table, "code.word.modulus", i64::from(WORDS).into());
+        match &self.words {
+            None => {
+                table.remove("code");
+            }
+            Some(words) => {
+                put(&mut table, "code.family", family(words));
+                put(&mut table, "code.word.modulus", i64::from(WORDS).into());
+            }
         }
-        Ok(table)
+        table
     }
 
     fn summary(&self, required: &Requirements) -> String {
@@ -199,83 +183,7 @@ impl Candidate {
     }
 }
 
-fn family(words: &Separated) -> Value {
-    let &Separated { length, weight, words, gap, apart, later, seed } = words;
-    let keys = [
-        ("length", length),
-        ("weight", weight),
-        ("words", words),
-        ("gap", gap),
-        ("apart", apart),
-        ("later", later),
-    ];
-    let keys = keys.map(|(key, value)| (key.to_owned(), Value::from(value)));
-    let mut table = Table::from_iter(keys);
-    table.insert("seed".to_owned(), (seed as i64).into());
-    Table::from_iter([("separated".to_owned(), table.into())]).into()
-}
-
 impl Requirements {
-    /// Words of so many marks that keep their laws, with a pulse, s, and a bandwidth, Hz, for one of so many
-    /// beams: the shortest of which no echo loses two marks to own light, and where these take too much of the
-    /// time between shots the shortest.
-    fn words(
-        &self,
-        (marks, beams): (u32, u32),
-        (pulse, bandwidth): (f64, f64),
-    ) -> Result<Separated, Error> {
-        let chips = |time: f64| (time / self.chip()).ceil() as u32;
-        // Of a Gaussian low-pass 0.312 over its bandwidth (full width at half maximum).
-        let mark = pulse.hypot(0.312 / bandwidth);
-        let (gap, apart) = (chips(GAP), chips(APART * mark));
-        let period = self.shortest_period(beams);
-        let last = tof_from_range(self.wanted.range_m);
-        // By a majority of fewer an echo cannot be found that has lost one, and of more it is found without two.
-        let is_lost_by_two = marks.div_ceil(2) == 2;
-        let distances = WORDS * marks * (marks - 1) / 2;
-        let mut length = gap + apart * distances + 1;
-        let mut shortest = None;
-        while length < u32::from(u16::MAX) {
-            let lasts = f64::from(length) * self.chip();
-            if shortest.is_some() && lasts > LONGEST * period {
-                break;
-            }
-            let later = ((last + lasts) / period) as u32;
-            let words = Separated {
-                length,
-                weight: marks,
-                words: WORDS,
-                gap,
-                apart,
-                later: if is_lost_by_two { later.min(MOST_LATER) } else { 0 },
-                seed: 1,
-            };
-            if let Ok(family) = Family::separated(words) {
-                if !is_lost_by_two || words.lost(&family.words()) == 0 {
-                    return Ok(words);
-                }
-                shortest.get_or_insert(words);
-            }
-            length += length.div_ceil(16);
-        }
-        let none = || Error::Asked(format!("there are no {WORDS} words of {marks} marks"));
-        shortest.ok_or_else(none)
-    }
-
-    /// How long such a word lasts, s.
-    pub(super) fn macropulse(
-        &self,
-        marks_and_beams: (u32, u32),
-        shape: (f64, f64),
-    ) -> Result<f64, Error> {
-        Ok(f64::from(self.words(marks_and_beams, shape)?.length) * self.chip())
-    }
-
-    /// Length of a chip, s.
-    fn chip(&self) -> f64 {
-        number(&self.template, "code.chip_ps").unwrap_or(400.0) * 1e-12
-    }
-
     /// Shortest time between the shots of one of so many channels, s.
     pub(super) fn shortest_period(&self, beams: u32) -> f64 {
         let share = match self.polygon(self.parts.aperture_mm[1] * 1e-3) {

@@ -10,7 +10,6 @@ use macropulse::predict::verdict::slant;
 use macropulse::units::{RMS_OF_FWHM, range_from_tof, tof_from_range};
 
 use super::candidate::Candidate;
-use super::parts::Part;
 use super::requirements::Requirements;
 use super::{Error, Limit};
 
@@ -45,6 +44,16 @@ pub struct Assessed {
     pub limit: Option<(Limit, f64)>,
 }
 
+/// The range at which least is found: a trial's wall stands at one range, where other marks are lost to own light than
+/// at others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worst {
+    /// That range, m.
+    pub range: f64,
+    /// Probability of a return there.
+    pub pd: f64,
+}
+
 /// Energy, J, that laser class 1 allows to a shot of the sensor, the share wanted of it.
 pub(super) fn energy(design: &Design, required: &Requirements) -> Option<f64> {
     let limits = &design.budget.as_ref()?.limits;
@@ -54,16 +63,9 @@ pub(super) fn energy(design: &Design, required: &Requirements) -> Option<f64> {
 /// Energy of a shot, J, of which it is only asked how much more eyes allow.
 pub(super) const DIM: f64 = 1e-12;
 
-/// The candidate of these parts, as bright as eyes allow, with the largest aperture.
-pub(super) fn brightest(
-    required: &Requirements,
-    (part, marks, beams): (&Part, u32, u32),
-    (pulse, bandwidth): (f64, f64),
-) -> Result<Candidate, Error> {
-    let aperture = required.parts.aperture_mm[1] * 1e-3;
+/// As bright as eyes allow.
+pub(super) fn brightest(required: &Requirements, dim: Candidate) -> Result<Candidate, Error> {
     // Class 1 asks for no energy but that of the shots beside each other.
-    let part = part.clone();
-    let dim = Candidate { part, marks, beams, pulse, bandwidth, energy: DIM, aperture };
     let energy = energy(&dim.design(required)?, required).ok_or_else(|| {
         Error::Asked(format!("no limit of class 1 is known at {} nm", dim.part.wavelength_nm))
     })?;
@@ -96,14 +98,13 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     Ok(Assessed { candidate, period, pd: forecast.pd, precision: forecast.precision, limit })
 }
 
-/// By what factor `candidate` is forecast to miss more targets at the range that is wanted than may be missed, if
-/// it does: a trial's wall stands a little nearer, where other marks are lost to own light.
-pub(super) fn missed(required: &Requirements, candidate: &Candidate) -> Result<Option<f64>, Error> {
+/// Where `candidate` is forecast to find least of the targets wanted, up to the range wanted.
+pub(super) fn worst(required: &Requirements, candidate: &Candidate) -> Result<Worst, Error> {
     let wanted = &required.wanted;
     let design = candidate.design(required)?;
     let forecaster = Forecaster::new(&design, &required.environment)?;
-    let pd = forecaster.forecast(wanted.reflectance, wanted.range_m).pd;
-    Ok((pd < wanted.pd).then(|| (1.0 - pd) / (1.0 - wanted.pd)))
+    let worst = forecaster.worst(wanted.reflectance, wanted.range_m);
+    Ok(Worst { range: worst.range, pd: worst.pd })
 }
 
 /// As with so many times the area of the aperture: light and daylight.
@@ -151,30 +152,30 @@ fn clear(range: f64, period: f64) -> f64 {
     .min(range)
 }
 
-/// The pulse, s, and bandwidth, Hz, with which these parts need the least aperture.
+/// With the pulse and the bandwidth with which `dim` needs the least aperture, and the shortest words of such marks.
 ///
 /// Nelder and Mead's simplex over their logarithms, from where the low-pass is as long as the pulse: the
 /// shorter a pulse the more it stands out of the noise, until the noise of the capacitance, which grows with
 /// the bandwidth, the samples, or a surface aslant end that.
-pub(super) fn shortest(
+pub(super) fn shaped(
     required: &Requirements,
-    parts: (&Part, u32, u32),
+    dim: &Candidate,
     sample: f64,
-) -> Result<(f64, f64), Error> {
-    let (part, ..) = parts;
+) -> Result<Candidate, Error> {
     let [least, most] = required.parts.pulse_ps.map(|ps| ps * 1e-12);
-    let bounds = Bounds { pulse: [least, most], bandwidth: part.most_bandwidth_mhz * 1e6, sample };
+    let bandwidth = dim.part.most_bandwidth_mhz * 1e6;
+    let bounds = Bounds { pulse: [least, most], bandwidth, sample };
     let start = bounds.inside([(least * 1.6).ln(), (0.3 / (least * 1.6)).ln()]);
     let simplex =
         vec![start.to_vec(), vec![start[0] + 0.4, start[1]], vec![start[0], start[1] - 0.4]];
-    let energy = brightest(required, parts, bounds.values(start))?.energy;
-    let cost = Cost { required, parts, bounds, energy };
+    let bright = brightest(required, bounds.candidate(required, dim, start)?)?;
+    let cost = Cost { required, bright: &bright, bounds };
     let failed = |error: argmin::core::Error| Error::Asked(error.to_string());
     let solver = NelderMead::new(simplex).with_sd_tolerance(0.005).map_err(failed)?;
     let run = Executor::new(cost, solver).configure(|state| state.max_iters(ITERATIONS));
     let found = run.run().map_err(failed)?;
     let best = found.state().get_best_param().cloned().unwrap_or_else(|| start.to_vec());
-    Ok(bounds.values(bounds.inside([best[0], best[1]])))
+    bounds.candidate(required, dim, bounds.inside([best[0], best[1]]))
 }
 
 /// Steps of the simplex at most: what it has found by then is taken.
@@ -207,19 +208,26 @@ impl Bounds {
         [pulse.ln(), bandwidth.min(most).ln()]
     }
 
-    /// Pulse, s, and bandwidth, Hz: whole picoseconds and megahertz.
-    fn values(&self, [pulse, bandwidth]: [f64; 2]) -> (f64, f64) {
-        ((pulse.exp() * 1e12).round() * 1e-12, (bandwidth.exp() * 1e-6).floor() * 1e6)
+    /// As `like` with the pulse and bandwidth of these logarithms, in whole picoseconds and megahertz, and the
+    /// shortest words of such marks.
+    fn candidate(
+        &self,
+        required: &Requirements,
+        like: &Candidate,
+        [pulse, bandwidth]: [f64; 2],
+    ) -> Result<Candidate, Error> {
+        let pulse = (pulse.exp() * 1e12).round() * 1e-12;
+        let bandwidth = (bandwidth.exp() * 1e-6).floor() * 1e6;
+        required.with_shortest_words(Candidate { pulse, bandwidth, ..like.clone() })
     }
 }
 
 /// The area of the aperture that a pulse and a bandwidth need.
 struct Cost<'a> {
     required: &'a Requirements,
-    parts: (&'a Part, u32, u32),
+    /// As bright as eyes allow, which hardly depends on them.
+    bright: &'a Candidate,
     bounds: Bounds,
-    /// Energy of a shot, J, which hardly depends on them.
-    energy: f64,
 }
 
 impl CostFunction for Cost<'_> {
@@ -228,27 +236,21 @@ impl CostFunction for Cost<'_> {
 
     /// The logarithm of the area; beside the bounds more by the distance, and more where marks are smeared.
     fn cost(&self, at: &Self::Param) -> Result<Self::Output, argmin::core::Error> {
+        let required = self.required;
         let at = [at[0], at[1]];
         let inside = self.bounds.inside(at);
         let beside = (at[0] - inside[0]).abs() + (at[1] - inside[1]).abs();
-        let (pulse, bandwidth) = self.bounds.values(inside);
-        let (part, marks, beams) = self.parts;
-        if marks > 1 {
-            // Longer marks take longer words, for which there is no time.
-            let lasts = self.required.macropulse((marks, beams), (pulse, bandwidth))?;
-            let over = lasts / self.required.mean_period(beams);
-            if over > 1.0 {
-                return Ok(MOST.ln() + beside + over);
-            }
+        let candidate = self.bounds.candidate(required, self.bright, inside)?;
+        // Longer marks take longer words, for which there is no time.
+        let over = required.macropulse(&candidate) / required.mean_period(candidate.beams);
+        if over > 1.0 {
+            return Ok(MOST.ln() + beside + over);
         }
-        let aperture = self.required.parts.aperture_mm[1] * 1e-3;
-        let energy = self.energy;
-        let it = Candidate { part: part.clone(), marks, beams, pulse, bandwidth, energy, aperture };
-        let design = it.design(self.required)?;
-        let forecaster = Forecaster::new(&design, &self.required.environment)?;
+        let design = candidate.design(required)?;
+        let forecaster = Forecaster::new(&design, &required.environment)?;
         let period = design.scan.shortest_period();
-        let range = self.required.wanted.range_m;
+        let range = required.wanted.range_m;
         let smeared = slant(&design, range).map_or(0.0, |check| check.shortfall.max(1.0).ln());
-        Ok(area(self.required, &forecaster, period).min(MOST).ln() + beside + STEEP * smeared)
+        Ok(area(required, &forecaster, period).min(MOST).ln() + beside + STEEP * smeared)
     }
 }

@@ -75,6 +75,7 @@ fn trial(required: &Requirements, it: &Trial) -> Value {
     let mut told = candidate(required, &it.candidate);
     told["limit"] = limit(it.limit);
     told["found"] = counts(&it.counts);
+    told["worst"] = json!({ "range_m": it.worst.range, "pd": it.worst.pd });
     told
 }
 

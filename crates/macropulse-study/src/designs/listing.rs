@@ -4,7 +4,7 @@ use super::candidate::SCHEMES;
 use super::frontier::{CHANNELS, Frontier};
 use super::scenery::Scenery;
 use super::trial::{Counts, Trial};
-use super::{Assessed, Found, Limit};
+use super::{Assessed, Found, Limit, Worst};
 use crate::text::{Columns, section, short};
 
 impl Limit {
@@ -16,6 +16,7 @@ impl Limit {
             Self::Light => "light",
             Self::Mirror => "speed of the polygon",
             Self::Missed => "missed targets",
+            Self::Worst => "missed targets at the worst range",
             Self::False => "false points",
             Self::Wrong => "wrong points",
             Self::Precision => "precision",
@@ -216,7 +217,8 @@ impl Trial {
         for (scenery, counts) in Scenery::ALL.into_iter().zip(&self.counts) {
             text += &format!("    {:<6} {}\n", scenery.name(), counts.line());
         }
-        text
+        let Worst { pd, range } = self.worst;
+        text + &format!("    worst  Pd {pd:.4} forecast at {range:.2} m\n")
     }
 }
 

@@ -15,10 +15,11 @@ mod requirements;
 mod scenery;
 mod search;
 mod trial;
+mod words;
 
 pub use ablation::Ablation;
 pub use candidate::Candidate;
-pub use closed::Assessed;
+pub use closed::{Assessed, Worst};
 pub use files::{PAGE, make_room};
 pub use frontier::{CHANNELS, Frontier, Row};
 pub use parts::Part;
@@ -64,8 +65,10 @@ pub enum Limit {
     Light,
     /// The corners of its polygon would be too fast.
     Mirror,
-    /// Simulated, or forecast for the very range that is wanted, it misses too many targets.
+    /// Simulated, it misses too many targets.
     Missed,
+    /// It is forecast to miss too many targets at the worst range up to the one wanted, where own light hides marks.
+    Worst,
     /// Simulated, it finds too much where nothing is.
     False,
     /// Simulated, too many of its points are somewhere else.

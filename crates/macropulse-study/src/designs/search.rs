@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::ablation::{ABLATIONS, Ablation, ablations};
 use super::candidate::Candidate;
-use super::closed::{Assessed, DIM, assess, brightest, shortest};
+use super::closed::{Assessed, DIM, assess, brightest, shaped};
 use super::frontier::Frontier;
 use super::parts::Part;
 use super::requirements::Requirements;
@@ -127,40 +127,37 @@ fn assess_beams(required: &Requirements, part: &Part, marks: u32) -> Result<Vec<
     // When shots are fired does not depend on what they are.
     let aperture = required.parts.aperture_mm[1] * 1e-3;
     let (energy, part) = (DIM, part.clone());
-    let bare = Candidate { part, marks: 1, beams: most, pulse, bandwidth, energy, aperture };
-    let design = bare.design(required)?;
+    let words = None;
+    let dim = Candidate { part, marks, beams: most, pulse, bandwidth, energy, aperture, words };
+    let dim = required.with_shortest_words(dim)?;
+    let sample = sample(&dim.design(required)?);
     let time = |beams: u32| required.shortest_period(beams);
     let listens = tof_from_range(required.wanted.range_m);
-    let has_time = |beams: u32, shape: (f64, f64)| -> Result<bool, Error> {
-        if marks == 1 {
-            return Ok(time(beams) >= listens);
-        }
-        let is_between = (SOONEST..=2.0 * listens).contains(&time(beams));
-        Ok(is_between && required.macropulse((marks, beams), shape)? <= required.mean_period(beams))
-    };
-    let possible = |shape: (f64, f64)| -> Result<Vec<u32>, Error> {
-        let mut all = Vec::new();
-        for beams in beams {
-            if has_time(*beams, shape)? {
-                all.push(*beams);
+    // How long the shortest words of such marks last does not depend on the beams.
+    let possible = |of: &Candidate| -> Vec<u32> {
+        let has_time = |beams: &u32| match marks {
+            1 => time(*beams) >= listens,
+            _ => {
+                (SOONEST..=2.0 * listens).contains(&time(*beams))
+                    && required.macropulse(of) <= required.mean_period(*beams)
             }
-        }
-        Ok(all)
+        };
+        beams.iter().copied().filter(has_time).collect()
     };
-    let roughly = possible((pulse, bandwidth))?;
+    let roughly = possible(&dim);
     let apart = if marks == 1 { listens } else { APART };
     let usual = roughly.iter().copied().find(|beams| time(*beams) >= apart);
     let Some(usual) = usual.or(roughly.last().copied()) else {
         // With all beams there are there is not time enough.
         let lacks = if marks == 1 { listens } else { SOONEST } / time(most);
-        let candidate = Candidate { marks, ..bare };
         let (period, limit) = (time(most), Some((Limit::Time, lacks)));
-        return Ok(vec![Assessed { candidate, period, pd: 0.0, precision: None, limit }]);
+        return Ok(vec![Assessed { candidate: dim, period, pd: 0.0, precision: None, limit }]);
     };
-    let shape = shortest(required, (&bare.part, marks, usual), sample(&design))?;
-    let each =
-        |beams: &u32| assess(required, brightest(required, (&bare.part, marks, *beams), shape)?);
-    possible(shape)?.iter().map(each).collect()
+    let dim = shaped(required, &Candidate { beams: usual, ..dim }, sample)?;
+    let each = |beams: &u32| {
+        assess(required, brightest(required, Candidate { beams: *beams, ..dim.clone() })?)
+    };
+    possible(&dim).iter().map(each).collect()
 }
 
 /// Pulse, s, with which it is looked which beams there is time for.
@@ -183,26 +180,28 @@ fn fewest_beams(
     let candidates = smallest(assessed, marks);
     let with = |candidate: &Candidate, aperture| Candidate { aperture, ..candidate.clone() };
     let mut trials = Vec::new();
+    let mut best = None;
     let (mut from, mut to) = (0, candidates.len());
     while from < to {
         let middle = (from + to) / 2;
-        let Some(trial) = bench.trial(&with(candidates[middle], most(candidates[middle])))? else {
+        let candidate = bench.required.with_best_words(candidates[middle])?;
+        let Some(trial) = bench.trial(&with(&candidate, most(&candidate)))? else {
             return Ok(None);
         };
         match trial.limit {
-            None => to = middle,
+            None => (to, best) = (middle, Some(candidate)),
             Some(_) => from = middle + 1,
         }
         trials.push(trial);
     }
-    if let Some(best) = candidates.get(to) {
-        let (mut least, mut does) = (best.aperture, most(best));
+    if let Some(best) = best {
+        let (mut least, mut does) = (best.aperture, most(&best));
         for _ in 0..HALVINGS {
             let aperture = ((least * does).sqrt() / ROUND).ceil() * ROUND;
             if aperture >= does {
                 break;
             }
-            let Some(trial) = bench.trial(&with(best, aperture))? else { return Ok(None) };
+            let Some(trial) = bench.trial(&with(&best, aperture))? else { return Ok(None) };
             *(if trial.limit.is_none() { &mut does } else { &mut least }) = aperture;
             trials.push(trial);
         }

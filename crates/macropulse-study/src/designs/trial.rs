@@ -12,7 +12,7 @@ use macropulse::sim::{Scans, Watch};
 use serde::{Deserialize, Serialize};
 
 use super::candidate::{Built, Candidate};
-use super::closed;
+use super::closed::{Worst, worst};
 use super::requirements::Requirements;
 use super::scenery::{Scenery, Set};
 use super::{Error, Limit};
@@ -76,6 +76,8 @@ pub struct Trial {
     pub candidate: Candidate,
     /// What it found, in the order of [`Scenery::ALL`].
     pub counts: [Counts; 2],
+    /// Where it is forecast to find least, up to the range wanted.
+    pub worst: Worst,
     /// What it fails by, and the factor; `None` where it does all that is wanted.
     pub limit: Option<(Limit, f64)>,
 }
@@ -93,11 +95,9 @@ impl Bench<'_> {
     /// What `candidate` finds; `None` if the watch said stop.
     pub fn trial(&self, candidate: &Candidate) -> Result<Option<Trial>, Error> {
         let Some(counts) = self.of_each(candidate, &[])? else { return Ok(None) };
-        let limit = match limit(self.required, &counts) {
-            None => closed::missed(self.required, candidate)?.map(|over| (Limit::Missed, over)),
-            limit => limit,
-        };
-        Ok(Some(Trial { candidate: candidate.clone(), counts, limit }))
+        let worst = worst(self.required, candidate)?;
+        let limit = limit(self.required, &counts).or_else(|| missed_at_worst(self.required, worst));
+        Ok(Some(Trial { candidate: candidate.clone(), counts, worst, limit }))
     }
 
     /// What `candidate`, with some keys of its sensor changed, finds of each scene, in the order of
@@ -216,4 +216,13 @@ fn limit(required: &Requirements, counts: &[Counts; 2]) -> Option<(Limit, f64)> 
             over(Limit::Wrong, &|counts| [counts.wrong, counts.echoes], wanted.wrong_points)
         })
         .or_else(|| (rms > 1.0).then_some((Limit::Precision, rms)))
+}
+
+/// Forecasts of samples are so exact: with four times as many points of their sum they differ by less.
+const EXACT: f64 = 1e-3;
+
+/// By what factor more is forecast to be missed at the `worst` range than may be, if it is.
+fn missed_at_worst(required: &Requirements, worst: Worst) -> Option<(Limit, f64)> {
+    let wanted = required.wanted.pd;
+    (worst.pd < wanted - EXACT).then(|| (Limit::Worst, (1.0 - worst.pd) / (1.0 - wanted)))
 }
