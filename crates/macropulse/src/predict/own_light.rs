@@ -1,5 +1,7 @@
 //! When a channel that is sampled is blind with what it sends itself, and which marks of echoes that hides.
 
+use std::ops::Range;
+
 use macropulse_codec::code::CodeWord;
 use macropulse_codec::decode::Sampling;
 
@@ -59,8 +61,8 @@ impl Blind {
 pub struct OwnLight {
     /// When the marks leave of the shots whose echoes are looked at, in ticks since the line began.
     shots: Vec<Vec<i64>>,
-    /// Whether the channel is blind, tick by tick.
-    blind: Vec<bool>,
+    /// When the channel is blind, in ticks since then: one time after another, none of which overlap.
+    blind: Vec<Range<i64>>,
     /// First tick behind a mark in which it is told again.
     over: i64,
     ticks_per_s: f64,
@@ -95,19 +97,22 @@ impl OwnLight {
         let macropulse = s_from_fs(longest * design.tdc.tick_fs);
         let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
         let mut shots: Vec<Vec<i64>> = (0..SHOTS + 2 * around).map(marks).collect();
-        let last = shots.iter().flatten().copied().max().unwrap_or(0);
         let over = blind.map_or(1, |blind| blind.behind + 1);
-        let mut is_blind = Vec::new();
+        let mut marks: Vec<i64> = shots.iter().flatten().copied().collect();
+        marks.sort_unstable();
+        let mut times: Vec<Range<i64>> = Vec::new();
         if let Some(blind) = blind {
-            is_blind.resize((last + over) as usize, false);
-            for mark in shots.iter().flatten() {
-                let from = (mark - blind.before).max(0) as usize;
-                is_blind[from..(mark + over) as usize].fill(true);
+            for mark in marks {
+                let (start, end) = (mark - blind.before, mark + over);
+                match times.last_mut() {
+                    Some(last) if start <= last.end => last.end = end,
+                    _ => times.push(start..end),
+                }
             }
         }
         shots.truncate(around + SHOTS);
         shots.drain(..around);
-        Self { shots, blind: is_blind, over, ticks_per_s: ticks_per_s(design) }
+        Self { shots, blind: times, over, ticks_per_s: ticks_per_s(design) }
     }
 
     /// How many marks of each shot are told of an echo from `range` metres.
@@ -131,8 +136,9 @@ impl OwnLight {
     /// How many marks of each shot are told of an echo that comes so many ticks later.
     fn told(&self, late: i64) -> Vec<usize> {
         let is_told = |mark: &&i64| {
-            let place = usize::try_from(**mark + late).ok();
-            !place.and_then(|place| self.blind.get(place)).is_some_and(|is_blind| *is_blind)
+            let place = **mark + late;
+            let next = self.blind.partition_point(|time| time.end <= place);
+            !self.blind.get(next).is_some_and(|time| time.contains(&place))
         };
         self.shots.iter().map(|marks| marks.iter().filter(is_told).count()).collect()
     }
