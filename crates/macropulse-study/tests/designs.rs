@@ -12,7 +12,7 @@ use macropulse_study::budget::{Figures, usual};
 use macropulse_study::designs::{Found, Requirements, Search, make_room};
 
 /// A corner of the field of the paper, so often that the shots of three beams follow each other as soon as
-/// those of fifteen do in its whole field: a search of seconds.
+/// those of fifteen do in its whole field: a search of half a minute.
 const SMALL: &str = r#"
 version = 1
 name = "small"
@@ -114,6 +114,8 @@ fn what_is_found_does_and_is_found_again() {
         for counts in best.counts {
             assert!(counts.pd() >= 0.9 && counts.rms() < 0.03, "{}", first.text());
         }
+        assert!(best.worst.pd > 0.899, "{}", first.text());
+        assert!((5.0..=150.0).contains(&best.worst.range), "{}", first.text());
     }
     let again = found(&[], folder.path(), 1);
     assert!(again.json() == first.json(), "{}", again.text());

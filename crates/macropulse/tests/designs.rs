@@ -46,9 +46,14 @@ fn coded_designs_see_what_stands_square_on() {
         for reflectance in [0.1, 0.3, 1.0] {
             let wanted = Wanted { reflectance, range: 150.0, pd: 0.9, false_points: 1e-4 };
             let checks = checks(&day, &night, &wanted);
-            // The macropulse of the one lasts for half of a pixel: too long for slanted surfaces.
             let failing = checks.iter().filter(|check| !check.holds()).map(|check| check.name);
-            let expected: &[&str] = if name == "coded-practical" { &["slant"] } else { &[] };
+            let expected: &[&str] = match name {
+                // Its macropulse lasts for half of a pixel: too long for slanted surfaces.
+                "coded-practical" => &["slant"],
+                // At some ranges, one word in five.
+                "coded-16" => &["own light"],
+                _ => &[],
+            };
             assert_eq!(failing.collect::<Vec<_>>(), expected, "{name}, {reflectance}: {checks:?}");
         }
         for reflectance in [0.1, 0.3] {

@@ -4,7 +4,7 @@ use super::frontier::{CHANNELS, Frontier};
 use super::listing::{share, told};
 use super::scenery::Scenery;
 use super::trial::Counts;
-use super::{Error, Found};
+use super::{Error, Found, Worst};
 use crate::text::short;
 use crate::view::{
     self, Align, Axis, Block, Cell, Chart, Figure, Hue, Line, Note, Page, Section, Series, Stack,
@@ -78,11 +78,14 @@ impl Found {
     fn table_of_trials(&self) -> Table {
         let mut table = Table::new("", &[("lidar", Align::Left), ("aperture, mm", Align::Right)]);
         table.header.extend(header());
-        table.header.push(("limit".to_owned(), Align::Left));
+        let last = [("worst: Pd", Align::Right), ("at, m", Align::Right), ("limit", Align::Left)];
+        table.header.extend(last.map(|(name, align)| (name.to_owned(), align)));
         for trial in &self.trials {
             let mut cells: Vec<Cell> =
                 vec![trial.candidate.name().into(), short(trial.candidate.aperture * 1e3).into()];
             cells.extend(found(&trial.counts));
+            let Worst { pd, range } = trial.worst;
+            cells.extend([format!("{pd:.4}").into(), format!("{range:.2}").into()]);
             let verdict = match trial.limit {
                 None => view::Verdict::Holds,
                 Some(_) => view::Verdict::Fails,

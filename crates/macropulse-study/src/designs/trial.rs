@@ -7,6 +7,7 @@ use macropulse::emit::{Band, bands};
 use macropulse::formats::write_atomically;
 use macropulse::opened;
 use macropulse::points::PointCloud;
+use macropulse::predict::verdict::missed;
 use macropulse::score::Estimate;
 use macropulse::sim::{Scans, Watch};
 use serde::{Deserialize, Serialize};
@@ -218,11 +219,8 @@ fn limit(required: &Requirements, counts: &[Counts; 2]) -> Option<(Limit, f64)> 
         .or_else(|| (rms > 1.0).then_some((Limit::Precision, rms)))
 }
 
-/// Forecasts of samples are so exact: with four times as many points of their sum they differ by less.
-const EXACT: f64 = 1e-3;
-
 /// By what factor more is forecast to be missed at the `worst` range than may be, if it is.
 fn missed_at_worst(required: &Requirements, worst: Worst) -> Option<(Limit, f64)> {
-    let wanted = required.wanted.pd;
-    (worst.pd < wanted - EXACT).then(|| (Limit::Worst, (1.0 - worst.pd) / (1.0 - wanted)))
+    let over = missed(worst.pd, required.wanted.pd);
+    (over > 1.0).then_some((Limit::Worst, over))
 }

@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use super::forecast::{Forecast, Forecaster};
 use super::link::spot_depth;
+use super::own_light::Blind;
 use crate::design::Design;
 use crate::design::safety::strictest;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
@@ -44,7 +45,7 @@ impl Check {
     }
 }
 
-/// What must hold, in the order of the light: eyes, the light alone, sunlight, converters, false
+/// What must hold, in the order of the light: eyes, the light alone, own light, sunlight, converters, false
 /// returns, chips on a slanted surface. `by_night` is the same without the sun. What is idealised
 /// is left out.
 pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Vec<Check> {
@@ -55,6 +56,9 @@ pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Ve
     let light = light(by_night, wanted);
     let bright_enough = light.holds();
     checks.push(light);
+    if bright_enough {
+        checks.extend(own_light(by_night, wanted));
+    }
     if bright_enough && day.budget.is_some() && by_day.operating().background > 0.0 {
         checks.push(sunlight(by_day, wanted, &forecast));
     }
@@ -107,6 +111,9 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
             "{factor:.3} times the energy, or an aperture {:.2} times as wide",
             factor.sqrt()
         ),
+        None if night.design().receiver.sampling.is_some() => {
+            "no amount of light would do: own light hides too many marks there".to_owned()
+        }
         None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
     };
     Check {
@@ -118,6 +125,32 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
         ),
         remedy,
     }
+}
+
+/// Forecasts of samples are so exact: with four times as many points of their sum they differ by less.
+const EXACT: f64 = 1e-3;
+
+/// By what factor more is missed where returns have probability `pd` than where they have the one `wanted`: 1 at
+/// most, if a forecast does not tell one from the other.
+pub fn missed(pd: f64, wanted: f64) -> f64 {
+    let factor = (1.0 - pd) / (1.0 - wanted).max(f64::MIN_POSITIVE);
+    if pd < wanted - EXACT { factor } else { factor.min(1.0) }
+}
+
+/// Whether enough is found at the range up to the one wanted at which own light hides most marks; `None` of a
+/// channel that it does not blind.
+fn own_light(night: &Forecaster, wanted: &Wanted) -> Option<Check> {
+    Blind::at_most(night.design().receiver.sampling.as_ref()?)?;
+    let worst = night.worst(wanted.reflectance, wanted.range);
+    Some(Check {
+        name: "own light",
+        shortfall: missed(worst.pd, wanted.pd),
+        finding: format!(
+            "Pd {:.3} at {:.2} m, the worst range, wanted {}",
+            worst.pd, worst.range, wanted.pd
+        ),
+        remedy: "words that lose fewer marks to own light, or more channels".into(),
+    })
 }
 
 fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
