@@ -216,9 +216,9 @@ fn verdict(findings: &Findings) -> Section {
         [] => "No ready sensor that never waits closes by day at class 1.".to_owned(),
         names => format!(
             "Pulse coding does give a faster refresh, though not with one beam and words of many marks: \
-             {} never wait, see 10 % at {range:.0} m by day at class 1, and need fewer channels than a \
-             lidar that waits.",
-            names.join(" and ")
+             a lidar that never waits, as {}, sees 10 % at {range:.0} m by day at class 1, and needs \
+             fewer channels than one that waits.",
+            names.join(" or ")
         ),
     };
     Section::new("The title, after all")
