@@ -28,18 +28,13 @@ impl Blind {
     /// Of stray light that shows from `shows` ticks before its mark on.
     ///
     /// The receiver takes samples for dark ones from the one before the first that is lit, of those that its
-    /// filter reaches, to the last of `blank_ticks`. No mark is told within half the length of its filter of
-    /// these, most of the filter: as many ticks as leave a tenth of its energy outside to one side.
+    /// filter reaches, to the last of `blank_ticks`. No mark is told within [`Sampling::core`] of these.
     pub(super) fn of(sampling: &Sampling, shows: f64) -> Option<Self> {
         if sampling.blank_ticks == 0 {
             return None;
         }
-        let taps = sampling.filter();
-        let reach = taps.len() / 2;
-        let energy = |taps: &[f32]| taps.iter().map(|tap| tap * tap).sum::<f32>();
-        let is_told = |apart: &usize| energy(&taps[..reach - apart]) < 0.1 * energy(&taps);
-        let core = (0..reach).find(is_told).unwrap_or(reach) as i64;
-        let lit = shows.min((core + reach as i64) as f64).floor() as i64;
+        let (core, reach) = (i64::from(sampling.core()), sampling.filter().len() as i64 / 2);
+        let lit = shows.min((core + reach) as f64).floor() as i64;
         let rises = if lit > core { lit + 1 } else { core };
         let behind = i64::from(sampling.blank_ticks) - 1 + core;
         Some(Self { before: rises + core, behind })

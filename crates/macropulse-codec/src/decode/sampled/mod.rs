@@ -78,6 +78,12 @@ impl Sampling {
         Pulse::new(self).taps
     }
 
+    /// Ticks by which a mark may be apart from what is blind and still be told: where no more than a tenth of the
+    /// energy of the filter is missing.
+    pub fn core(&self) -> u32 {
+        Pulse::new(self).core() as u32
+    }
+
     /// From so many standard deviations above its level on, the signal is light, of which the noise is not
     /// estimated.
     pub const STANDS_OUT: f64 = filter::LIGHT as f64;
