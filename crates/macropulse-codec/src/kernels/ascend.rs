@@ -1,19 +1,67 @@
 //! Whether numbers ascend.
 
+use super::level::Level;
 use crate::on_every_level;
 
 /// Numbers after which it is asked whether any was out of order.
 const TOGETHER: usize = 1 << 12;
 
+/// Whether each of `numbers` is greater than the one before it.
+pub(crate) fn ascends(numbers: &[u32]) -> bool {
+    match Level::here() {
+        // SAFETY: the processor has what this level asks for.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { avx512::ascends(numbers) },
+        _ => plainly(numbers),
+    }
+}
+
 on_every_level! {
-    /// Whether each of `numbers` is greater than the one before it.
-    pub(crate) fn ascends(numbers: &[u32]) -> bool {
+    /// The same.
+    fn plainly(numbers: &[u32]) -> bool {
         let later = numbers.get(1..).unwrap_or_default();
         // No early end within: a loop that may stop anywhere is not made wide.
         numbers.chunks(TOGETHER).zip(later.chunks(TOGETHER)).all(|(before, after)| {
             let pairs = before.iter().zip(after);
             pairs.fold(0, |falls, (before, after)| falls | u32::from(after <= before)) == 0
         })
+    }
+}
+
+/// The same, each number read once: what is before a block is moved up out of the block before it.
+#[cfg(target_arch = "x86_64")]
+mod avx512 {
+    use std::arch::x86_64::*;
+
+    /// Numbers of a block.
+    const LANES: usize = 16;
+
+    /// # Safety
+    ///
+    /// The processor must have AVX-512 F.
+    #[target_feature(enable = "avx512f")]
+    pub(super) unsafe fn ascends(numbers: &[u32]) -> bool {
+        // SAFETY: any bits are numbers.
+        let (head, blocks, tail) = unsafe { numbers.align_to::<__m512i>() };
+        let Some((first, rest)) = blocks.split_first() else { return super::plainly(numbers) };
+        // With the number beside them, by which they hang together with the blocks.
+        let (head, tail) = (&numbers[..=head.len()], &numbers[numbers.len() - tail.len() - 1..]);
+        let falls = |block: __m512i, before: __m512i| {
+            let earlier = _mm512_alignr_epi32::<{ LANES as i32 - 1 }>(block, before);
+            _mm512_cmple_epu32_mask(block, earlier)
+        };
+        // Nothing is before the first number of all.
+        let (mut before, mut any) = (*first, falls(*first, *first) & !1);
+        for together in rest.chunks(super::TOGETHER / LANES) {
+            for block in together {
+                any |= falls(*block, before);
+                before = *block;
+            }
+            if any != 0 {
+                return false;
+            }
+        }
+        any == 0 && super::plainly(head) && super::plainly(tail)
     }
 }
 

@@ -79,6 +79,9 @@ mod avx512 {
     use super::LANES;
     use std::arch::x86_64::*;
 
+    /// Blocks that are compared in each pass over the bits: words have two, rarely more.
+    const BLOCKS: usize = 2;
+
     /// # Safety
     ///
     /// The processor must have AVX-512 F, and there must be as many `ticks` as marks in all bits.
@@ -89,22 +92,38 @@ mod avx512 {
         bits: &[u32],
         (start, scale): (u32, u32),
     ) -> bool {
-        let mut wrong: __mmask16 = 0;
-        for (block, of_block) in marks.chunks(LANES).enumerate() {
-            let used = u16::MAX >> (LANES - of_block.len());
-            // SAFETY: no more is read than the block has.
-            let of_block = unsafe { _mm512_maskz_loadu_epi32(used, of_block.as_ptr().cast()) };
-            for (index, &bit) in bits.iter().enumerate() {
-                let begin = _mm512_set1_epi32(start.wrapping_add(scale.wrapping_mul(bit)) as i32);
-                // SAFETY: so many ticks are there for each bit, and no more is read.
-                let found = unsafe {
-                    let first = ticks.as_ptr().add(index * marks.len() + block * LANES);
-                    _mm512_maskz_loadu_epi32(used, first.cast())
-                };
-                let expected = _mm512_add_epi32(begin, of_block);
-                wrong |= _mm512_mask_cmpneq_epi32_mask(used, expected, found);
+        let start = _mm512_set1_epi32(start as i32);
+        for (pass, of_pass) in marks.chunks(BLOCKS * LANES).enumerate() {
+            let used: [__mmask16; BLOCKS] = std::array::from_fn(|block| {
+                let left = of_pass.len().saturating_sub(block * LANES).min(LANES);
+                ((1_u32 << left) - 1) as u16
+            });
+            // SAFETY: no more is read than the pass has.
+            let expected = std::array::from_fn::<_, BLOCKS, _>(|block| unsafe {
+                let first = of_pass.as_ptr().wrapping_add(block * LANES);
+                _mm512_add_epi32(start, _mm512_maskz_loadu_epi32(used[block], first.cast()))
+            });
+            let mut wrong = [_mm512_setzero_si512(); BLOCKS];
+            for (index, bit) in bits.iter().enumerate() {
+                let begin = _mm512_set1_epi32(scale.wrapping_mul(*bit) as i32);
+                let of_bit = ticks.as_ptr().wrapping_add(index * marks.len() + pass * BLOCKS * LANES);
+                for block in 0..BLOCKS {
+                    // SAFETY: so many ticks are there for each bit, and no more is read.
+                    let found = unsafe {
+                        let first = of_bit.wrapping_add(block * LANES);
+                        _mm512_maskz_loadu_epi32(used[block], first.cast())
+                    };
+                    let mark = _mm512_add_epi32(begin, expected[block]);
+                    // What is wrong already, or not the same in both.
+                    const OR_DIFFERENT: i32 = 0b1111_0110;
+                    wrong[block] =
+                        _mm512_ternarylogic_epi32::<OR_DIFFERENT>(wrong[block], found, mark);
+                }
             }
-            if wrong != 0 {
+            let of_block = |block: usize| {
+                _mm512_mask_test_epi32_mask(used[block], wrong[block], wrong[block])
+            };
+            if (0..BLOCKS).fold(0, |any, block| any | of_block(block)) != 0 {
                 return false;
             }
         }
