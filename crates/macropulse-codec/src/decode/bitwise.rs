@@ -281,8 +281,8 @@ impl<'a> Band<'a> {
         let is_lit = |found: u16| found >= self.receiver.bit_threshold;
         let lit = own.enumerate().filter(|&(_, &found)| is_lit(found));
         let first = macropulse.start - i64::from(self.slack);
-        let starts = lit.map(|(bit, _)| first + bit as i64 * self.bit_length);
-        self.field.cancel(starts, &self.around[usize::from(macropulse.word)]);
+        let after = Vec::from_iter(lit.map(|(bit, _)| bit as u32 * self.bit_length as u32));
+        self.field.cancel(first, &after, &self.around[usize::from(macropulse.word)]);
     }
 
     /// Keeps the claim with most marks on each shot; of equals, the first one.

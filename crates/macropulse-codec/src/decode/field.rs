@@ -150,9 +150,9 @@ impl<'a> Field<'a> {
         self.residual.has(tick)
     }
 
-    /// Cancels the ticks of `pattern`, begun at each of `starts`.
-    pub fn cancel(&mut self, starts: impl Iterator<Item = i64>, pattern: &Pattern) {
-        starts.for_each(|start| self.residual.put_out(start, pattern));
+    /// Cancels the ticks of `pattern`, begun so many ticks `after` `start`, for each of these, ascending.
+    pub fn cancel(&mut self, start: i64, after: &[u32], pattern: &Pattern) {
+        self.residual.put_out(start, after, pattern);
     }
 
     /// Where marks count as found in the `source`, for all of `span`; made in `memory` where need be.

@@ -260,11 +260,6 @@ impl Receiver {
 
     /// The ticks in which the shots were fired, from tick `epoch` on.
     fn fired_since(&self, log: &ShotLog, epoch: i64) -> Vec<i64> {
-        self.all_fired(log).iter().map(|fired| fired - epoch).collect()
-    }
-
-    /// The absolute ticks in which the shots were fired.
-    fn all_fired(&self, log: &ShotLog) -> Vec<i64> {
         // Whole numbers up to here are exact as floating-point ones, and a quotient of two is
         // wrong by one at most; a division of whole numbers takes several times as long.
         const EXACT: i64 = 1 << 52;
@@ -273,11 +268,11 @@ impl Receiver {
         let ticks = |fired: &i64| {
             let since = fired - first + rest;
             if since.abs() >= EXACT {
-                return fired.div_euclid(self.tick_fs);
+                return fired.div_euclid(self.tick_fs) - epoch;
             }
             let about = (since as f64 / self.tick_fs as f64) as i64;
             let over = since - about * self.tick_fs;
-            start + about + i64::from(over >= self.tick_fs) - i64::from(over < 0)
+            start - epoch + about + i64::from(over >= self.tick_fs) - i64::from(over < 0)
         };
         log.fired_at_fs.iter().map(ticks).collect()
     }
@@ -285,7 +280,13 @@ impl Receiver {
     /// Two-way time of flight, s, of light that left at `fired_at_fs` and came `late` ticks after
     /// `tick` began: half a tick, where no more is known.
     fn tof(&self, fired_at_fs: i64, tick: i64, late: f64) -> f64 {
-        time::s_from_fs(tick * self.tick_fs - fired_at_fs) + late * time::s_from_fs(self.tick_fs)
+        self.tofs(late)(fired_at_fs, tick)
+    }
+
+    /// The same for many that come as `late`: what they have in common is worked out once.
+    fn tofs(&self, late: f64) -> impl Fn(i64, i64) -> f64 + use<> {
+        let (tick_fs, late) = (self.tick_fs, late * time::s_from_fs(self.tick_fs));
+        move |fired_at_fs, tick| time::s_from_fs(tick * tick_fs - fired_at_fs) + late
     }
 }
 
@@ -365,7 +366,7 @@ mod tests {
             let fired_at_fs: Vec<i64> = times.iter().map(|time| first + time).collect();
             let expected: Vec<i64> = fired_at_fs.iter().map(|time| time.div_euclid(2497)).collect();
             let log = ShotLog { fired_at_fs, ..ShotLog::default() };
-            assert_eq!(receiver.all_fired(&log), expected);
+            assert_eq!(receiver.fired_since(&log, 0), expected);
         }
     }
 

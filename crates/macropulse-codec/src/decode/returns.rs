@@ -138,19 +138,6 @@ impl Returns {
         self.saturated.push(found.saturated);
     }
 
-    /// Adds those of further shots, one of each.
-    pub(super) fn extend(&mut self, found: &[Return]) {
-        // Column by column: entry by entry takes twice as long.
-        self.number.resize(self.len() + found.len(), 1);
-        self.shot.extend(found.iter().map(|one| one.shot as u32));
-        self.tof.extend(found.iter().map(|one| one.tof));
-        self.peak.extend(found.iter().map(|one| one.peak));
-        self.marks.extend(found.iter().map(|one| one.marks));
-        self.margin.extend(found.iter().map(|one| one.margin));
-        self.photons.extend(found.iter().map(|one| one.photons));
-        self.saturated.extend(found.iter().map(|one| one.saturated));
-    }
-
     /// Takes out those whose light came `closes` seconds after firing or later.
     pub(super) fn refuse_beyond(&mut self, closes: f64) {
         if self.tof.iter().all(|tof| *tof < closes) {

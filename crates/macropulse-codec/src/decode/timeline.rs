@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use crate::kernels::{
-    Pattern, lay, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, put_out,
+    Pattern, are_lit, dark_before, lay, light_up, lit_in, lit_in_all, lit_in_each, look_ahead,
+    put_out,
 };
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
@@ -77,11 +78,8 @@ impl Timeline {
         let (word, end) = ((first / 64) as usize, (last as usize).div_ceil(64));
         let words = &self.words[word..end];
         let head = words[0] & u64::MAX << (first & 63);
-        let lit = match head {
-            0 => words.iter().skip(1).position(|word| *word != 0).map(|skip| skip + 1)?,
-            _ => 0,
-        };
-        let bits = if lit == 0 { head } else { words[lit] };
+        let lit = if head == 0 { 1 + dark_before(&words[1..]) } else { 0 };
+        let bits = if lit == 0 { head } else { *words.get(lit)? };
         let bit = 64 * (word + lit) as i64 + i64::from(bits.trailing_zeros());
         (bit < last).then_some(self.origin + bit)
     }
@@ -108,18 +106,27 @@ impl Timeline {
         (&self.words, (tick - self.origin).max(0) as usize)
     }
 
-    /// Darkens the ticks of `pattern`, begun at `tick`.
-    pub fn put_out(&mut self, tick: i64, pattern: &Pattern) {
-        if let Ok(bit) = usize::try_from(tick - self.origin) {
-            put_out(&mut self.words, bit, pattern);
-        }
+    /// Darkens the ticks of `pattern`, begun so many ticks `after` `tick`, for each of these, ascending, but
+    /// those that begin before all.
+    pub fn put_out(&mut self, tick: i64, after: &[u32], pattern: &Pattern) {
+        let first = tick - self.origin;
+        let before = after.partition_point(|after| first + i64::from(*after) < 0);
+        put_out(&mut self.words, first as usize, &after[before..], pattern);
     }
 
-    /// Lights the ticks of `pattern`, begun at `tick`.
-    pub fn light_up(&mut self, tick: i64, pattern: &Pattern) {
-        if let Ok(bit) = usize::try_from(tick - self.origin) {
-            light_up(&mut self.words, bit, pattern);
-        }
+    /// Whether all ticks of `pattern` are lit if it begins so many ticks `after` `tick`, for each of these,
+    /// ascending.
+    pub fn are_lit(&self, tick: i64, after: &[u32], pattern: &Pattern) -> bool {
+        let first = tick - self.origin;
+        let begins = after.first().is_none_or(|after| first + i64::from(*after) >= 0);
+        begins && are_lit(&self.words, first as usize, after, pattern)
+    }
+
+    /// Lights the same.
+    pub fn light_up(&mut self, tick: i64, after: &[u32], pattern: &Pattern) {
+        let first = tick - self.origin;
+        let before = after.partition_point(|after| first + i64::from(*after) < 0);
+        light_up(&mut self.words, first as usize, &after[before..], pattern);
     }
 
     fn place(&self, tick: i64) -> Option<(usize, u64)> {

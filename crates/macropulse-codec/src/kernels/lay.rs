@@ -44,6 +44,28 @@ on_every_level! {
 }
 
 on_every_level! {
+    /// How many of `words` are dark before the first one that is not; all where none is lit.
+    pub(crate) fn dark_before(words: &[u64]) -> usize {
+        const TOGETHER: usize = 16;
+        let (blocks, _) = words.as_chunks::<TOGETHER>();
+        let is_dark = |block: &&[u64; TOGETHER]| block.iter().fold(0, |any, word| any | word) == 0;
+        let dark = TOGETHER * blocks.iter().take_while(is_dark).count();
+        dark + words[dark..].iter().take_while(|word| **word == 0).count()
+    }
+}
+
+on_every_level! {
+    /// One bit for each of up to 64 `gaps`: whether bit `gap` of `ahead` is lit; of those from 64 on it is
+    /// not known, and told that it is.
+    pub(crate) fn lit_after(gaps: &[u8], ahead: u64) -> u64 {
+        gaps.iter().zip(0..64).fold(0, |lit, (gap, at)| {
+            let may_be = ahead >> (gap & 63) | u64::from(gap >> 6);
+            lit | (may_be & 1) << at
+        })
+    }
+}
+
+on_every_level! {
     /// Counts the lit bits of each `length` words.
     pub(crate) fn count_each(words: &[u64], length: usize, counts: &mut [u32]) {
         for (words, count) in words.chunks(length).zip(counts) {
@@ -59,6 +81,26 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn every_level_finds_what_is_lit(
+            words in proptest::collection::vec(0..40_u64, 0..70),
+            gaps in proptest::collection::vec(0..70_u8, 0..65),
+            ahead in any::<u64>(),
+        ) {
+            let words: Vec<u64> = words.into_iter().map(|word| word.saturating_sub(38) << 40).collect();
+            let expected = words.iter().position(|word| *word != 0).unwrap_or(words.len());
+            for (level, dark) in at_each_level(|| dark_before(&words)) {
+                prop_assert_eq!(dark, expected, "{:?}", level);
+            }
+            let is_lit = |gap: u8| gap > 63 || ahead >> gap & 1 == 1;
+            for (level, lit) in at_each_level(|| lit_after(&gaps, ahead)) {
+                for at in 0..64 {
+                    let expected = gaps.get(at).is_some_and(|gap| is_lit(*gap));
+                    prop_assert_eq!(lit >> at & 1 == 1, expected, "{:?} {}", level, at);
+                }
+            }
+        }
+
         #[test]
         fn every_level_lays_and_counts(
             ticks in proptest::collection::btree_set(2000..3000_u32, 0..300),

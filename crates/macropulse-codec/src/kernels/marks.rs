@@ -106,7 +106,8 @@ mod avx512 {
             let mut wrong = [_mm512_setzero_si512(); BLOCKS];
             for (index, bit) in bits.iter().enumerate() {
                 let begin = _mm512_set1_epi32(scale.wrapping_mul(*bit) as i32);
-                let of_bit = ticks.as_ptr().wrapping_add(index * marks.len() + pass * BLOCKS * LANES);
+                let of_bit =
+                    ticks.as_ptr().wrapping_add(index * marks.len() + pass * BLOCKS * LANES);
                 for block in 0..BLOCKS {
                     // SAFETY: so many ticks are there for each bit, and no more is read.
                     let found = unsafe {
@@ -120,9 +121,8 @@ mod avx512 {
                         _mm512_ternarylogic_epi32::<OR_DIFFERENT>(wrong[block], found, mark);
                 }
             }
-            let of_block = |block: usize| {
-                _mm512_mask_test_epi32_mask(used[block], wrong[block], wrong[block])
-            };
+            let of_block =
+                |block: usize| _mm512_mask_test_epi32_mask(used[block], wrong[block], wrong[block]);
             if (0..BLOCKS).fold(0, |any, block| any | of_block(block)) != 0 {
                 return false;
             }

@@ -25,9 +25,9 @@ pub(crate) use ascend::ascends;
 pub(crate) use balance::{Balance, Chips, best_balance};
 pub(crate) use coarse::{COARSE, coarse, in_pictures};
 pub(crate) use correlate::{Counts, NARROW, WIDE, and, any_behind, is_dark, or};
-pub(crate) use lay::{count_each, lay};
+pub(crate) use lay::{count_each, dark_before, lay, lit_after};
 pub(crate) use marks::{WordTicks, begin_with, places_of};
 pub(crate) use pattern::{
-    Pattern, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, parted, put_out,
+    Pattern, are_lit, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, parted, put_out,
 };
 pub(crate) use waveform::{LAGS, filter, lower, standing_out};

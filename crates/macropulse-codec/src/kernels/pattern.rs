@@ -70,20 +70,31 @@ on_every_level! {
 /// in a block.
 #[inline(always)]
 fn add_lit(sums: &mut [u64; LANES], words: &[u64], first: usize, pattern: &Pattern) {
-    let (begin, shift) = (first / 64, first % 64);
+    let (begin, shift) = parts(first);
     for block in (0..pattern.reach()).step_by(LANES) {
-        let mask = shifted(&pattern.words[block..], shift);
-        let words = words.get(begin + block..).unwrap_or_default();
-        let words = match words.first_chunk::<LANES>() {
-            Some(words) => *words,
-            None => {
-                let mut last = [0; LANES];
-                last[..words.len()].copy_from_slice(words);
-                last
-            }
-        };
+        let (mask, words) = (shifted(&pattern.words[block..], shift), at(words, begin + block));
         for lane in 0..LANES {
             sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
+        }
+    }
+}
+
+/// The word that `bit` is in, and its place there.
+#[inline(always)]
+fn parts(bit: usize) -> (usize, usize) {
+    (bit / 64, bit % 64)
+}
+
+/// A block of `words` from word `first` on, dark beyond their end.
+#[inline(always)]
+fn at(words: &[u64], first: usize) -> [u64; LANES] {
+    let words = words.get(first..).unwrap_or_default();
+    match words.first_chunk::<LANES>() {
+        Some(words) => *words,
+        None => {
+            let mut last = [0; LANES];
+            last[..words.len()].copy_from_slice(words);
+            last
         }
     }
 }
@@ -95,25 +106,51 @@ pub(crate) fn lit_in(words: &[u64], first: usize, pattern: &Pattern) -> u32 {
 }
 
 on_every_level! {
-    /// Puts the bits of `pattern`, begun at bit `first`, out in `words`. What reaches beyond the end
-    /// is left away.
-    pub(crate) fn put_out(words: &mut [u64], first: usize, pattern: &Pattern) {
-        under(words, first, pattern, |word, mask| *word &= !mask);
+    /// Whether all bits of `pattern`, begun so many bits `after` bit `first`, are lit in `words`, for all
+    /// of these, modulo 2⁶⁴. What reaches beyond the end is dark.
+    pub(crate) fn are_lit(words: &[u64], first: usize, after: &[u32], pattern: &Pattern) -> bool {
+        // A closure would not be compiled for the level.
+        for after in after {
+            let (begin, shift) = parts(first.wrapping_add(*after as usize));
+            let mut dark = 0;
+            for block in (0..pattern.reach()).step_by(LANES) {
+                let mask = shifted(&pattern.words[block..], shift);
+                let words = at(words, begin + block);
+                for lane in 0..LANES {
+                    dark |= mask[lane] & !words[lane];
+                }
+            }
+            if dark != 0 {
+                return false;
+            }
+        }
+        true
     }
 }
 
 on_every_level! {
-    /// Lights the bits of `pattern`, begun at bit `first`, in `words`. What reaches beyond the end is
-    /// left away.
-    pub(crate) fn light_up(words: &mut [u64], first: usize, pattern: &Pattern) {
-        under(words, first, pattern, |word, mask| *word |= mask);
+    /// Puts the bits of `pattern`, begun so many bits `after` bit `first`, out in `words`, for all of
+    /// these, modulo 2⁶⁴. What reaches beyond the end is left away.
+    pub(crate) fn put_out(words: &mut [u64], first: usize, after: &[u32], pattern: &Pattern) {
+        for after in after {
+            under(words, first.wrapping_add(*after as usize), pattern, |word, mask| *word &= !mask);
+        }
+    }
+}
+
+on_every_level! {
+    /// Lights the same in `words`.
+    pub(crate) fn light_up(words: &mut [u64], first: usize, after: &[u32], pattern: &Pattern) {
+        for after in after {
+            under(words, first.wrapping_add(*after as usize), pattern, |word, mask| *word |= mask);
+        }
     }
 }
 
 /// Does `to_word` with each of the `words` under `pattern`, begun at bit `first`, and its bits.
 #[inline(always)]
 fn under(words: &mut [u64], first: usize, pattern: &Pattern, to_word: impl Fn(&mut u64, u64)) {
-    let (begin, shift) = (first / 64, first % 64);
+    let (begin, shift) = parts(first);
     for block in (0..pattern.reach()).step_by(LANES) {
         let mask = shifted(&pattern.words[block..], shift);
         let words = words.get_mut(begin + block..).unwrap_or_default();
@@ -246,6 +283,7 @@ mod tests {
         ) {
             let pattern = Pattern::new(bits.iter().copied(), width);
             let within: BTreeSet<usize> = bits.iter().flat_map(|b| first + b..first + b + width).collect();
+            let pattern_bits = within.len() as u32;
             let mut words = vec![0_u64; 1500_usize.div_ceil(64)];
             lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
             let count = lit.intersection(&within).count() as u32;
@@ -260,6 +298,19 @@ mod tests {
                 lit_in_each(&words, first, &after, &pattern, &mut counts);
                 (counts, lit_in_all(&words, first, &after, &pattern))
             });
+            let mut full = words.clone();
+            light_up(&mut full, first, &after, &pattern);
+            let is_all = first + 700 + bits.last().map_or(0, |last| last + width) <= 64 * words.len();
+            for words in [&words, &full] {
+                let expected = after.iter().map(|after| {
+                    lit_in(words, first + *after as usize, &pattern)
+                });
+                let expected = expected.sum::<u32>() == 3 * pattern_bits;
+                for (level, all) in at_each_level(|| are_lit(words, first, &after, &pattern)) {
+                    prop_assert_eq!(all, expected, "{:?}", level);
+                }
+            }
+            prop_assert!(!is_all || are_lit(&full, first, &after, &pattern));
             for (level, (counts, all)) in each {
                 let one_by_one = after.map(|after| lit_in(&words, first + after as usize, &pattern));
                 prop_assert_eq!(counts, one_by_one, "{:?}", level);
@@ -267,7 +318,12 @@ mod tests {
             }
             let put_out = at_each_level(|| {
                 let mut rest = words.clone();
-                put_out(&mut rest, first, &pattern);
+                put_out(&mut rest, first, &[0], &pattern);
+                let mut without = words.clone();
+                put_out(&mut without, first, &after, &pattern);
+                let mut in_turn = words.clone();
+                after.iter().for_each(|after| put_out(&mut in_turn, first + *after as usize, &[0], &pattern));
+                assert_eq!(without, in_turn);
                 rest
             });
             let mut more = words.clone();
@@ -278,7 +334,7 @@ mod tests {
             });
             let lit_up = at_each_level(|| {
                 let mut more = words.clone();
-                light_up(&mut more, first, &pattern);
+                light_up(&mut more, first, &[0], &pattern);
                 more
             });
             for ((level, rest), (_, all)) in put_out.into_iter().zip(lit_up) {

@@ -23,7 +23,7 @@ use std::ops::Range;
 use super::Detection;
 use super::sent::{FIRST, Sent};
 use crate::decode::timeline::Timeline;
-use crate::kernels::begin_with;
+use crate::kernels::{begin_with, lit_after};
 
 /// Ticks without a complete macropulse after which cancellation ends, and how many more for each
 /// macropulse that was found. With four more, four dark counts to a macropulse are borne for ever, and
@@ -302,10 +302,7 @@ impl Canceller<'_> {
         for from in shots.clone().step_by(64) {
             // Nearly every shot is refused here: its second mark is not there.
             let gaps = &self.gaps[hidden][from..shots.end.min(from + 64)];
-            let mut may_be = gaps.iter().enumerate().fold(0, |may_be, (at, gap)| {
-                let is_next_there = ahead >> (gap & 63) & 1 | u64::from(gap >> 6);
-                may_be | is_next_there << at
-            });
+            let mut may_be = lit_after(gaps, ahead);
             while may_be != 0 {
                 let shot = from + may_be.trailing_zeros() as usize;
                 may_be &= may_be - 1;
@@ -331,13 +328,12 @@ impl Canceller<'_> {
         (hidden, lags): (usize, &Range<i64>),
     ) -> Option<i64> {
         let start = self.start(shot, tick, (hidden, lags))?;
-        let bits = self.sent.bits(shot);
-        let in_word = bits.marks.len() as u32;
-        let lit_bits = || self.sent.lit_from(shot, start);
-        if lit_bits().any(|bit| self.seen.lit_in(bit, &bits.pattern) < in_word) {
+        let (lit_bits, pattern) =
+            (self.sent.bits_that_are(true, shot), &self.sent.bits(shot).pattern);
+        if !self.seen.are_lit(start, lit_bits, pattern) {
             return None;
         }
-        lit_bits().for_each(|bit| self.residual.put_out(bit, &bits.pattern));
+        self.residual.put_out(start, lit_bits, pattern);
         Some(start)
     }
 

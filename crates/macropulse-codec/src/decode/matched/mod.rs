@@ -345,7 +345,8 @@ impl<'a> Band<'a> {
     /// Cancels the ticks of `shot` at `lag`.
     fn cancel(&mut self, shot: usize, lag: i64) {
         let start = self.sent.fired[shot] + lag - self.sent.farther();
-        self.field.cancel(self.sent.lit_from(shot, start), &self.sent.bits(shot).cancelled);
+        let lit_bits = self.sent.bits_that_are(true, shot);
+        self.field.cancel(start, lit_bits, &self.sent.bits(shot).cancelled);
         if let Some(leftover) = &mut self.leftover {
             leftover.renew(&self.field, &self.sent.light(shot, lag));
         }

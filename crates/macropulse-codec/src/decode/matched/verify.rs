@@ -52,30 +52,29 @@ impl Band<'_> {
     /// most: nothing is to be asked of them but whether they lie in the gate.
     pub(super) fn settle_clear(&mut self, returns: &mut Returns) {
         let (sent, gate) = (self.sent, self.sent.gate());
-        let owned = sent.log.owned.clone();
-        let mut clear = Vec::with_capacity(owned.len());
-        for (shot, found) in owned.clone().zip(&self.found[owned]) {
-            match found {
-                Some(found) if gate.contains(&found.lag) => {
-                    let start = sent.fired[shot] + found.lag + sent.epoch;
-                    let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start, MIDDLE);
-                    let (marks, margin) = (found.count as u16, found.margin as u16);
-                    let Energy { photons, saturated } = self.photons.of_all(found.count);
-                    clear.push(Return {
-                        shot,
-                        tof,
-                        peak: marks,
-                        marks,
-                        margin,
-                        photons,
-                        saturated,
-                    });
-                }
+        let mut clear: Vec<u32> = Vec::with_capacity(sent.log.owned.len());
+        for shot in sent.log.owned.clone() {
+            match self.found[shot] {
+                Some(found) if gate.contains(&found.lag) => clear.push(shot as u32),
                 Some(_) => returns.reject(Reject::OutsideGate),
                 None => returns.reject(Reject::NoPeak),
             }
         }
-        returns.extend(&clear);
+        // Column by column: entry by entry takes twice as long.
+        let tof = sent.receiver.tofs(MIDDLE);
+        let found = |shot: u32| self.found[shot as usize].unwrap_or(Detection::at(0, 0));
+        returns.tof.extend(clear.iter().map(|&shot| {
+            let start = sent.fired[shot as usize] + found(shot).lag + sent.epoch;
+            tof(sent.log.fired_at_fs[shot as usize], start)
+        }));
+        returns.margin.extend(clear.iter().map(|shot| found(*shot).margin as u16));
+        returns.peak.extend(clear.iter().map(|shot| sent.weight(*shot as usize) as u16));
+        returns.marks.extend_from_slice(&returns.peak);
+        let energy = |marks: &u16| self.photons.of_all(u32::from(*marks));
+        returns.photons.extend(returns.peak.iter().map(energy).map(|energy| energy.photons));
+        returns.saturated.resize(clear.len(), true);
+        returns.number.resize(clear.len(), 1);
+        returns.shot = clear;
     }
 
     /// Puts those surfaces of `shot` that give returns into `surfaces`, by their lag; its further ones are those
@@ -280,7 +279,7 @@ impl Band<'_> {
             let bits = sent.bits(other);
             let before = 2 * sent.farther() + i64::from(sent.width - 1);
             let start = sent.fired[other] + theirs.lag - before;
-            sent.lit_from(other, start).for_each(|bit| claimed.light_up(bit, &bits.claimed));
+            claimed.light_up(start, sent.bits_that_are(true, other), &bits.claimed);
         }
         if !is_claimed {
             return true;
@@ -290,7 +289,7 @@ impl Band<'_> {
         own.clear_all(claimed.origin(), stretch.end - claimed.origin());
         let pattern = &sent.bits(shot).cancelled;
         let start = light.start - sent.farther();
-        sent.lit_from(shot, start).for_each(|bit| own.light_up(bit, pattern));
+        own.light_up(start, sent.bits_that_are(true, shot), pattern);
         let lit = self.field.lit();
         // Free places, claimed ones, and claimed ones of its own: all of them, and those lit.
         let places = parted(claimed.words(&stretch), own.words(&stretch), lit.words(&stretch));
