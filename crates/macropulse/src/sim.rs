@@ -336,12 +336,13 @@ fn measure<'a>(
     let unknown = (known.first - log.first) as u32;
     returns.shot.iter_mut().for_each(|shot| *shot += unknown);
     lap(&mut tally);
-    let owned = |shot: &u32| log.owned.contains(&(*shot as usize));
     let hits = traced.middle;
     let gates = design.scan.gates();
-    let in_gate = |i: &usize| gates.of(log.row[hits.shot[*i] as usize]).contains(&hits.range[*i]);
+    let before = |shot: usize| hits.shot.partition_point(|other| (*other as usize) < shot);
+    let met = before(log.owned.start)..before(log.owned.end);
+    let surfaces = hits.shot[met.clone()].iter().zip(&hits.range[met]);
+    let in_gate = |&(shot, range): &(&u32, &f64)| gates.of(log.row[*shot as usize]).contains(range);
     tally.shots = log.owned.len() as u64;
-    let surfaces = (0..hits.shot.len()).filter(|i| owned(&hits.shot[*i]));
     tally.surfaces = surfaces.filter(in_gate).count() as u64;
     let owned = log.first + log.owned.start as u64..log.first + log.owned.end as u64;
     for (transmitter, shot) in light.trains.transmitter.iter().zip(&light.trains.shot) {

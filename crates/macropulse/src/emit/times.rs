@@ -15,10 +15,17 @@ pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
 
 /// The times of consecutive shots, where all of them are equally far apart: those of
 /// [`fired_at_fs`] without a division for each.
-///
-/// The exact time is a whole number of femtoseconds and a rest, counted in parts of one; a shot
-/// later both have grown by the same.
 pub(super) struct EqualSteps {
+    /// Of every so many shots, the first ones beginning side by side: the time of a shot has to wait for
+    /// that of the one before it in its run.
+    runs: [Run; SIDE_BY_SIDE],
+}
+
+const SIDE_BY_SIDE: usize = 4;
+
+/// The time of a shot: a whole number of femtoseconds and a rest, counted in parts of one. So many shots
+/// later both have grown by the same.
+struct Run {
     fs: i64,
     rest: u64,
     /// How far `fs` lies beyond the last tick of the chip clock.
@@ -32,28 +39,32 @@ impl EqualSteps {
     /// From shot number `first` on, counted from the first one of the first scan; `None` where
     /// shots are not equally far apart.
     pub(super) fn new(design: &Design, first: u64) -> Option<Self> {
-        if !design.scan.model().equal_steps() {
-            return None;
-        }
-        let (parts, chip_fs) = (parts_of_fs(design), design.coding.chip_fs);
-        let numerator = u128::from(first) * NUMERATOR;
-        let whole = |numerator: u128| (numerator / parts) as i64;
-        let rest = |numerator: u128| (numerator % parts) as u64;
-        let step_fs = whole(NUMERATOR);
-        Some(Self {
-            fs: whole(numerator),
-            rest: rest(numerator),
-            beyond_fs: whole(numerator) % chip_fs,
-            step: (step_fs, rest(NUMERATOR), step_fs % chip_fs),
-            parts: parts as u64,
-            chip_fs,
-        })
+        let run = |shot: usize| Run::new(design, first + shot as u64);
+        design.scan.model().equal_steps().then(|| Self { runs: std::array::from_fn(run) })
     }
 
     /// The times of as many shots as there are places in `fired_at_fs`.
     pub(super) fn fill(mut self, fired_at_fs: &mut [i64]) {
-        for place in fired_at_fs {
-            *place = self.next();
+        let (whole, rest) = fired_at_fs.as_chunks_mut::<SIDE_BY_SIDE>();
+        whole.iter_mut().for_each(|places| *places = self.runs.each_mut().map(Run::next));
+        rest.iter_mut().zip(&mut self.runs).for_each(|(place, run)| *place = run.next());
+    }
+}
+
+impl Run {
+    /// Every so many shots from number `first` on.
+    fn new(design: &Design, first: u64) -> Self {
+        let (parts, chip_fs) = (parts_of_fs(design), design.coding.chip_fs);
+        let whole = |shots: u64| (u128::from(shots) * NUMERATOR / parts) as i64;
+        let rest = |shots: u64| (u128::from(shots) * NUMERATOR % parts) as u64;
+        let apart = SIDE_BY_SIDE as u64;
+        Self {
+            fs: whole(first),
+            rest: rest(first),
+            beyond_fs: whole(first) % chip_fs,
+            step: (whole(apart), rest(apart), whole(apart) % chip_fs),
+            parts: parts as u64,
+            chip_fs,
         }
     }
 
