@@ -20,7 +20,10 @@ pub fn measure() -> Fallible<Generating> {
 
 fn one(scene: &str, condition: Condition) -> Fallible<f64> {
     let sample = Sample::of(condition.design()?, scene, EVERY)?;
-    let seconds = least_seconds(|| sample.ticks(|memory, (_, ticks)| memory.take_back(ticks.tick)));
+    let detectors = sample.detectors();
+    let seconds = least_seconds(|| {
+        sample.ticks(&detectors, |memory, (_, ticks)| memory.take_back(ticks.tick));
+    });
     Ok(sample.speed(seconds))
 }
 

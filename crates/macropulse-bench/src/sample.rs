@@ -136,9 +136,13 @@ impl Sample {
         self.design.speed(self.shots(), seconds)
     }
 
+    /// The detectors: a run makes them once.
+    pub fn detectors(&self) -> Detectors<'_> {
+        Detectors::new(&self.design, &self.operating, Chance::new(SEED))
+    }
+
     /// From shot log to ticks, band by band.
-    pub fn ticks(&self, mut done: impl FnMut(&mut Memory, Given)) {
-        let detectors = Detectors::new(&self.design, &self.operating, Chance::new(SEED));
+    pub fn ticks(&self, detectors: &Detectors, mut done: impl FnMut(&mut Memory, Given)) {
         let mut memory = Memory::default();
         for (band, hits) in &self.bands {
             let log = band.shot_log(&self.design);
@@ -189,7 +193,7 @@ impl Sample {
     /// What the receiver is given.
     pub fn given(&self) -> Vec<Given> {
         let mut given = Vec::new();
-        self.ticks(|_, band| given.push(band));
+        self.ticks(&self.detectors(), |_, band| given.push(band));
         given
     }
 

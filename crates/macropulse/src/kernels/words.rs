@@ -12,6 +12,9 @@ pub(crate) struct Words {
     padded: usize,
     /// Marks of each word.
     weights: Vec<u32>,
+    /// Times of the first and of the last mark of each word that has any: two numbers beside each other
+    /// are soon looked up.
+    ends: Vec<Option<[u32; 2]>>,
     /// Length of a bit.
     bit: u32,
 }
@@ -36,14 +39,18 @@ impl Words {
         (chip, length): (u32, u32),
     ) -> Self {
         let padded = most.next_multiple_of(STEP);
-        let (mut marks, mut weights) = (Vec::new(), Vec::new());
+        let (mut marks, mut weights, mut ends) = (Vec::new(), Vec::new(), Vec::new());
         for word in words {
             let kept = &word[..word.len().min(padded)];
             marks.extend(kept.iter().map(|mark| u32::from(*mark) * chip));
             weights.push(kept.len() as u32);
+            let first_and_last = kept.first().zip(kept.last());
+            ends.push(
+                first_and_last.map(|ends| [ends.0, ends.1].map(|end| u32::from(*end) * chip)),
+            );
             marks.resize(weights.len() * padded, 0);
         }
-        Self { marks, padded, weights, bit: length * chip }
+        Self { marks, padded, weights, ends, bit: length * chip }
     }
 
     fn word(&self, word: u16) -> &[u32] {
@@ -70,11 +77,10 @@ impl Words {
     /// When the first and the last mark of `sent` arrive; `None` if it has none.
     #[inline]
     pub(crate) fn ends(&self, sent: &Macropulse) -> Option<[u32; 2]> {
-        let word = self.word(sent.word);
-        let last = (self.weights[usize::from(sent.word)] as usize).checked_sub(1)?;
+        let [first, last] = self.ends[usize::from(sent.word)]?;
         let (first_bit, last_bit) = (sent.lit.trailing_zeros(), sent.lit.checked_ilog2()?);
         let at = |bit: u32, mark: u32| sent.start.wrapping_add(bit * self.bit + mark);
-        Some([at(first_bit, word[0]), at(last_bit, *word.get(last)?)])
+        Some([at(first_bit, first), at(last_bit, last)])
     }
 
     /// The bits of `sent` that begin at `time` or before, and the others: those of them that may
