@@ -340,10 +340,16 @@ fn measure<'a>(
     let gates = design.scan.gates();
     let before = |shot: usize| hits.shot.partition_point(|other| (*other as usize) < shot);
     let met = before(log.owned.start)..before(log.owned.end);
-    let surfaces = hits.shot[met.clone()].iter().zip(&hits.range[met]);
-    let in_gate = |&(shot, range): &(&u32, &f64)| gates.of(log.row[*shot as usize]).contains(range);
+    let ranges = hits.range[met.clone()].iter();
+    tally.surfaces = match gates.of_all() {
+        Some(gate) => ranges.filter(|range| gate.contains(range)).count(),
+        None => {
+            let surfaces = hits.shot[met].iter().zip(ranges);
+            let gate = |shot: u32| gates.of(log.row[shot as usize]);
+            surfaces.filter(|(shot, range)| gate(**shot).contains(range)).count()
+        }
+    } as u64;
     tally.shots = log.owned.len() as u64;
-    tally.surfaces = surfaces.filter(in_gate).count() as u64;
     let owned = log.first + log.owned.start as u64..log.first + log.owned.end as u64;
     for (transmitter, shot) in light.trains.transmitter.iter().zip(&light.trains.shot) {
         match transmitter {

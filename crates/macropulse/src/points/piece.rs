@@ -46,15 +46,15 @@ impl Piece {
         points.scan = scan;
         (points.rows, points.columns) = (design.scan.rows as usize, design.scan.columns as usize);
         (points.returns_per_shot, points.pick) = (design.receiver.returns, design.receiver.pick);
-        let time_ns = |shot: usize| log.fired_at_fs[shot] as f64 * 1e-6;
-        let pixel = |shot: usize| {
-            usize::from(log.row[shot]) * points.columns + usize::from(log.column[shot])
-        };
-        self.pixel.extend(log.owned.clone().map(|shot| pixel(shot) as u32));
+        let time_ns = |fired_at_fs: i64| fired_at_fs as f64 * 1e-6;
+        let (owned, columns) = (log.owned.clone(), points.columns as u32);
+        let pixels = log.row[owned.clone()].iter().zip(&log.column[owned.clone()]);
+        self.pixel
+            .extend(pixels.map(|(row, column)| u32::from(*row) * columns + u32::from(*column)));
         // No early end: a loop that may stop anywhere takes several times as long.
         let next = self.pixel.iter().zip(self.pixel.iter().skip(1));
         self.in_a_row = next.fold(true, |all, (before, after)| all & (*after == before + 1));
-        points.fired_ns.extend(log.owned.clone().map(time_ns));
+        points.fired_ns.extend(log.fired_at_fs[owned].iter().map(|fired| time_ns(*fired)));
         self.shot.extend(&returns.shot);
         points.return_number.extend(&returns.number);
         points.peak.extend(&returns.peak);
@@ -72,7 +72,7 @@ impl Piece {
         let fired = returns.shot.iter().map(|&shot| shot as usize);
         points.row.extend(fired.clone().map(|shot| log.row[shot]));
         points.column.extend(fired.clone().map(|shot| log.column[shot]));
-        points.time_ns.extend(fired.map(time_ns));
+        points.time_ns.extend(fired.map(|shot| time_ns(log.fired_at_fs[shot])));
         // Written in place: columns that grow one by one take longer than what they hold.
         let reals = [&mut points.x, &mut points.y, &mut points.z];
         for column in reals.into_iter().chain([&mut points.range, &mut points.intensity]) {

@@ -261,6 +261,12 @@ impl Gates<'_> {
         let (nearest, farthest) = self.ranges;
         nearest + self.offset(row)..=farthest + self.offset(row)
     }
+
+    /// The same where it is that of all rows.
+    pub fn of_all(&self) -> Option<RangeInclusive<f64>> {
+        let (nearest, farthest) = self.ranges;
+        self.offsets.is_empty().then_some(nearest..=farthest)
+    }
 }
 
 /// Pixels of the largest range image: a scan of it takes some 4 GB.
