@@ -1,4 +1,4 @@
-//! Two steps of the matched receiver by themselves, for who wants to time or to study them.
+//! Some steps of the matched receiver by themselves, for who wants to time or to study them.
 
 use crate::kernels::{self, Counts, NARROW};
 
@@ -10,6 +10,17 @@ pub const LAGS: usize = 64 * NARROW;
 pub fn lay(words: &mut [u64], origin: i64, ticks: &[u32]) -> usize {
     let end = origin + 64 * words.len() as i64;
     kernels::lay(words, origin, ticks, end)
+}
+
+/// Whether each of `ticks` is later than the one before it.
+pub fn ascends(ticks: &[u32]) -> bool {
+    kernels::ascends(ticks)
+}
+
+/// Lights, in `lit`, the places at which a mark counts as found by one of the lit bits of `words`, as many:
+/// each of these and the `width` − 1 places before it. Width is 1 or more.
+pub fn widen(words: &[u64], lit: &mut [u64], width: u32) {
+    kernels::look_ahead(words, lit, width.saturating_sub(1) as usize);
 }
 
 /// The most of `marks`, bits from the beginning of a macropulse on, that are lit in `words` where it begins
