@@ -53,6 +53,14 @@ on_every_level! {
 pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], begun: (u32, u32)) -> bool {
     let marks = &word.ticks[..word.marks];
     let Some(ticks) = ticks.get(..bits.len() * marks.len()) else { return false };
+    let (start, scale) = begun;
+    // Where another macropulse lies over it this tells.
+    let last = bits.last().zip(marks.last());
+    let last =
+        last.map(|(bit, mark)| start.wrapping_add(scale.wrapping_mul(*bit)).wrapping_add(*mark));
+    if ticks.last().copied() != last {
+        return false;
+    }
     match Level::here() {
         // SAFETY: the processor has what this level asks for, and there are as many ticks as marks.
         #[cfg(target_arch = "x86_64")]

@@ -44,8 +44,16 @@ impl Scale {
 
     /// Photons per mark of which a detector makes as many events as one that every photon fires makes
     /// of `photons`.
+    #[inline]
     pub(super) fn detected(&self, photons: f32) -> f32 {
-        let Some(last) = self.law.len().checked_sub(1) else { return photons };
+        match self.law.len().checked_sub(1) {
+            Some(last) => self.turned_round(photons, last),
+            None => photons,
+        }
+    }
+
+    /// The same by the law, of which the entry number `last` is the last one.
+    fn turned_round(&self, photons: f32, last: usize) -> f32 {
         if photons <= 0.0 {
             return 0.0;
         }

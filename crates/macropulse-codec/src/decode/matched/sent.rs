@@ -216,6 +216,7 @@ impl<'a> Sent<'a> {
     }
 
     /// The first chip of each lit bit of `shot`.
+    #[inline]
     pub fn lit_bits(&self, shot: usize) -> &'a [u32] {
         self.codebook.lit_bits(self.log.label[shot])
     }

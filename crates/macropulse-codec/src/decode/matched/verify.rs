@@ -49,7 +49,7 @@ impl Band<'_> {
     }
 
     /// As [`Self::settle`], of all shots of a band of which all light was cancelled, one surface of a shot at
-    /// most: nothing is to be asked of them but whether they lie in the gate.
+    /// most, into `returns` without any yet: nothing is to be asked of them but whether they lie in the gate.
     pub(super) fn settle_clear(&mut self, returns: &mut Returns) {
         let (sent, gate) = (self.sent, self.sent.gate());
         let mut clear: Vec<u32> = Vec::with_capacity(sent.log.owned.len());
