@@ -6,7 +6,7 @@ use crate::kernels::{self, Counts, NARROW};
 pub const LAGS: usize = 64 * NARROW;
 
 /// Lights, in `words`, of which the first bit is tick `origin`, those of the ascending `ticks` that they have
-/// room for, and tells how many these are. None may be before the origin, and all must be dark.
+/// room for, and tells how many these are. None may be before the origin.
 pub fn lay(words: &mut [u64], origin: i64, ticks: &[u32]) -> usize {
     let end = origin + 64 * words.len() as i64;
     kernels::lay(words, origin, ticks, end)

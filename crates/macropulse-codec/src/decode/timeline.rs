@@ -109,24 +109,28 @@ impl Timeline {
     /// Darkens the ticks of `pattern`, begun so many ticks `after` `tick`, for each of these, ascending, but
     /// those that begin before all.
     pub fn put_out(&mut self, tick: i64, after: &[u32], pattern: &Pattern) {
-        let first = tick - self.origin;
-        let before = after.partition_point(|after| first + i64::from(*after) < 0);
-        put_out(&mut self.words, first as usize, &after[before..], pattern);
+        let (first, after) = self.begun(tick, after);
+        put_out(&mut self.words, first, after, pattern);
     }
 
     /// Whether all ticks of `pattern` are lit if it begins so many ticks `after` `tick`, for each of these,
     /// ascending.
     pub fn are_lit(&self, tick: i64, after: &[u32], pattern: &Pattern) -> bool {
-        let first = tick - self.origin;
-        let begins = after.first().is_none_or(|after| first + i64::from(*after) >= 0);
-        begins && are_lit(&self.words, first as usize, after, pattern)
+        let (first, begun) = self.begun(tick, after);
+        begun.len() == after.len() && are_lit(&self.words, first, begun, pattern)
     }
 
-    /// Lights the same.
+    /// Lights the same ticks as [`Self::put_out`] darkens.
     pub fn light_up(&mut self, tick: i64, after: &[u32], pattern: &Pattern) {
+        let (first, after) = self.begun(tick, after);
+        light_up(&mut self.words, first, after, pattern);
+    }
+
+    /// The bit of `tick`, modulo 2⁶⁴, and those so many ticks `after` it, ascending, that are not before all.
+    fn begun<'b>(&self, tick: i64, after: &'b [u32]) -> (usize, &'b [u32]) {
         let first = tick - self.origin;
         let before = after.partition_point(|after| first + i64::from(*after) < 0);
-        light_up(&mut self.words, first as usize, &after[before..], pattern);
+        (first as usize, &after[before..])
     }
 
     fn place(&self, tick: i64) -> Option<(usize, u64)> {

@@ -139,7 +139,7 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// Lights the same in `words`.
+    /// Lights the bits in `words` that [`put_out`] puts out.
     pub(crate) fn light_up(words: &mut [u64], first: usize, after: &[u32], pattern: &Pattern) {
         for after in after {
             under(words, first.wrapping_add(*after as usize), pattern, |word, mask| *word |= mask);
