@@ -62,9 +62,9 @@ impl<'a> Field<'a> {
         let [mut seen, mut lit, mut residual] = memory;
         // Twice as long as need be, so that it is moved less often.
         let length = 2 * (length + 3 * MARGIN + 2 * cell + i64::from(width));
-        seen.clear_all(begin, length);
-        residual.clear_all(begin, length);
-        lit.clear_all(begin, if width > 1 { length } else { 0 });
+        seen.begin(begin, length);
+        residual.begin(begin, length);
+        lit.begin(begin, if width > 1 { length } else { 0 });
         let before = vec![laid as u32];
         Self { ticks, laid, width, cell, cell_bits, begin, before, seen, lit, residual }
     }

@@ -37,6 +37,14 @@ impl Timeline {
     pub fn begin(&mut self, origin: i64, length: i64) {
         self.origin = origin;
         self.words.resize((length.max(0) / 64 + 1) as usize, 0);
+        self.forget_from(0);
+    }
+
+    /// In tests lights what is not told from machine word `word` on, as nothing may depend on it.
+    fn forget_from(&mut self, word: usize) {
+        if cfg!(test) {
+            self.words[word..].fill(u64::MAX);
+        }
     }
 
     /// Makes it the `words` that begin at `origin`, with the `reach` ticks before each lit one.
@@ -51,6 +59,7 @@ impl Timeline {
     pub fn slide(&mut self, origin: i64) {
         let moved = (((origin - self.origin) / 64) as usize).min(self.words.len());
         self.words.copy_within(moved.., 0);
+        self.forget_from(self.words.len() - moved);
         self.origin = origin;
     }
 

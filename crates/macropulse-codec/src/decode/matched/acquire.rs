@@ -98,7 +98,7 @@ impl Pictures {
                 continue;
             }
             let start = extent.start + segment * SEGMENT;
-            let ticks = start..start + SEGMENT + 64;
+            let ticks = start..(start + SEGMENT + 64).min(extent.end);
             let words = field.lit_in(source, &ticks, memory).words(&ticks);
             let begin = (segment * SEGMENT / PER_WORD) as usize;
             for (shift, picture) in self.words.chunks_exact_mut(self.stride).enumerate() {

@@ -107,6 +107,16 @@ impl Band<'_> {
         }
     }
 
+    /// Notes that none of a block of shots can be found.
+    pub(super) fn pass_by(&mut self, block: Range<usize>) {
+        for shot in block {
+            let is_found = !self.is_sought(shot);
+            if is_found || self.searched.is_due(shot) {
+                self.searched.note(shot, is_found, 1.0);
+            }
+        }
+    }
+
     /// Tracks the shots of a block from both sides, and acquires those that are no fainter than the
     /// others but were not expected where they are.
     fn look_where_expected(&mut self, block: Range<usize>) {

@@ -145,6 +145,9 @@ struct Band<'a> {
     usual: Usual,
     /// The time of which all light is at hand.
     at_hand: Range<i64>,
+    /// All ticks of the band, sorted, and fewest that make a return.
+    ticks: &'a [u32],
+    fewest: usize,
     /// What is left over of it, once that is asked for.
     leftover: Option<Leftover<'a>>,
     /// A normal variable exceeds it as rarely as false returns are accepted.
@@ -185,6 +188,8 @@ impl<'a> Band<'a> {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
+        let mut thresholds = thresholds;
+        let fewest = fewest_ticks(sent, &mut thresholds);
         let open = match &cancelled {
             Some(cancelled) if cancelled.residual.is_empty() => Open::None,
             Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
@@ -200,7 +205,7 @@ impl<'a> Band<'a> {
         let (extent, above, left) = match open {
             Open::None => ((0, 0), vec![], vec![]),
             _ => (
-                (begin, (GATES_PER_BLOCK + 2) * light + 2 * sent.length()),
+                (begin, (GATES_PER_BLOCK + 2) * light + 4 * sent.length()),
                 last_beside(columns, rows),
                 last_beside(rows, columns),
             ),
@@ -222,6 +227,8 @@ impl<'a> Band<'a> {
             word_thresholds,
             usual: Usual::new(),
             at_hand: 0..0,
+            ticks,
+            fewest,
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
             searched: Paced::default(),
@@ -258,12 +265,16 @@ impl<'a> Band<'a> {
             settled = closed.end;
             if block.clone().chain(closed.clone()).any(|shot| self.is_open(shot)) {
                 self.at_hand = Self::span(self.sent, block.clone());
-                self.field.cover(self.at_hand.clone());
-                self.search.forget();
-                self.leftover = None;
-                self.cancel_found(block.clone());
-                self.look_for(block);
-                self.look_for_leftovers(closed.clone(), first);
+                if self.is_too_dark() {
+                    self.pass_by(block);
+                } else {
+                    self.field.cover(self.at_hand.clone());
+                    self.search.forget();
+                    self.leftover = None;
+                    self.cancel_found(block.clone());
+                    self.look_for(block);
+                    self.look_for_leftovers(closed.clone(), first);
+                }
             }
             self.settle(closed, &mut returns);
         }
@@ -283,6 +294,15 @@ impl<'a> Band<'a> {
         (returns, memory)
     }
 
+    /// Whether no macropulse of the time at hand can have as many ticks as the fewest that are believed.
+    fn is_too_dark(&self) -> bool {
+        let before = |end: i64| self.ticks.partition_point(|tick| i64::from(*tick) < end);
+        let ticks = &self.ticks[before(self.at_hand.start)..before(self.at_hand.end)];
+        let light = self.sent.light(0, 0);
+        let is_long = |some: &[u32]| i64::from(some[some.len() - 1] - some[0]) >= light.end - light.start;
+        ticks.windows(self.fewest).all(is_long)
+    }
+
     /// The end of the block of shots that begins with `first`.
     fn end_of_block(&self, first: usize) -> usize {
         let gate = self.sent.arrival(first);
@@ -295,8 +315,8 @@ impl<'a> Band<'a> {
         let last = sent.arrival(block.end - 1);
         let first = sent.arrival(block.start);
         // Shots that are settled with the block are as old as the light of its first one, and their
-        // light is compared with bits a macropulse before it.
-        first.start - (first.end - first.start) - sent.length()..last.end
+        // light is compared with bits a macropulse before it, and one behind it.
+        first.start - (first.end - first.start) - sent.length()..last.end + 2 * sent.length()
     }
 
     /// The first shot of which light may still come when that of `shot` does.
@@ -436,6 +456,16 @@ impl<'a> Band<'a> {
 /// Cells in which ticks are counted, to a macropulse: 8 take a tenth more time in noise, 2 as long as 4
 /// or a fifth more.
 const CELLS: i64 = 4;
+
+/// Fewest ticks in which a shot may be believed to be: those of the lightest one, alone in its gate.
+fn fewest_ticks(sent: &Sent, thresholds: &mut Thresholds) -> usize {
+    let Some(weight) = sent.lightest() else { return 1 };
+    // No stretch of cells about a gate is longer.
+    let gate = sent.gate();
+    let longest = gate.end - gate.start + 2 * sent.length();
+    let density = f64::from(sent.width) / longest as f64;
+    sent.ticks_of_any(thresholds.least(weight, density)).max(1) as usize
+}
 
 /// For each shot, how many of the sorted `ticks` lie where its light may be.
 fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {

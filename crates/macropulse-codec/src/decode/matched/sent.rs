@@ -62,6 +62,8 @@ pub(super) struct Words {
     /// Ticks from the start of a macropulse to each bit of it that is dark, and to each that is lit, by
     /// label; as above.
     of_label: Vec<OnceCell<[Vec<u32>; 2]>>,
+    /// Most marks of any that one tick may count for.
+    per_tick: u32,
 }
 
 impl Words {
@@ -85,7 +87,11 @@ impl Words {
             let first_bits = lit.map(|bit| bit.map(|bit| scale * bit)).collect();
             let ticks = vec![OnceCell::new(); words];
             let of_label = vec![OnceCell::new(); labels as usize];
-            self = Self { of, first, first_bits, ticks, bits: Vec::new(), of_label };
+            let crowding = (0..words).map(|word| {
+                crowding(codebook.word(word as u16), width.div_ceil(scale.max(1)))
+            });
+            let per_tick = crowding.max().unwrap_or(1);
+            self = Self { of, first, first_bits, ticks, bits: Vec::new(), of_label, per_tick };
             self.bits.resize_with(words, OnceCell::new);
         }
         self
@@ -298,6 +304,16 @@ impl<'a> Sent<'a> {
         let bits = self.bits(shot);
         let alone = marks.saturating_sub(bits.shared * self.lit_bits(shot).len() as u32);
         alone.max(marks.div_ceil(bits.per_tick))
+    }
+
+    /// Fewest marks of a shot that has any.
+    pub fn lightest(&self) -> Option<u32> {
+        self.weights.iter().copied().filter(|weight| *weight > 0).min()
+    }
+
+    /// Fewest ticks that can be so many marks of any shot.
+    pub fn ticks_of_any(&self, marks: u32) -> u32 {
+        marks.div_ceil(self.words.per_tick.max(1))
     }
 
     /// Whether every shot is searched for in all of its gate.
