@@ -84,6 +84,11 @@ impl Timeline {
         if first >= last {
             return None;
         }
+        if last - first <= 64 {
+            let bits = self.from(self.origin + first) & u64::MAX >> (64 - (last - first));
+            let lit = self.origin + first + i64::from(bits.trailing_zeros());
+            return (bits != 0).then_some(lit);
+        }
         let (word, end) = ((first / 64) as usize, (last as usize).div_ceil(64));
         let words = &self.words[word..end];
         let head = words[0] & u64::MAX << (first & 63);
@@ -172,14 +177,11 @@ impl Timeline {
         first.map_or(0, |first| lit_in_all(&self.words, first, after, pattern))
     }
 
-    /// The same if it begins so many ticks `after` `tick`, for each of these; put into `counts`. There
-    /// must be a tick `tick`.
+    /// The same if it begins so many ticks `after` `tick`, for each of these; put into `counts`.
     pub fn lit_in_each(&self, tick: i64, after: &[u32], pattern: &Pattern, counts: &mut Vec<u32>) {
         counts.clear();
         counts.resize(after.len(), 0);
-        if let Ok(first) = usize::try_from(tick - self.origin) {
-            lit_in_each(&self.words, first, after, pattern, counts);
-        }
+        lit_in_each(&self.words, (tick - self.origin) as usize, after, pattern, counts);
     }
 
     /// Sixty-four ticks from `tick` on, the first one in the lowest bit.

@@ -9,6 +9,8 @@ const LANES: usize = 8;
 #[derive(Debug, Clone)]
 pub(crate) struct Pattern {
     words: Vec<u64>,
+    /// Blocks that hold its bits where it begins with a word.
+    blocks: usize,
 }
 
 impl Pattern {
@@ -20,10 +22,10 @@ impl Pattern {
             words.resize(words.len().max(word + 1), 0);
             words[word] |= 1 << (bit % 64);
         }
+        let blocks = (words.len() - 1).div_ceil(LANES);
         // What is shifted out of the last word goes into one more.
-        let blocks = words.len().div_ceil(LANES);
-        words.resize(1 + blocks * LANES, 0);
-        Self { words }
+        words.resize(1 + words.len().div_ceil(LANES) * LANES, 0);
+        Self { words, blocks }
     }
 
     /// Words that have bits of the pattern, wherever in the first one of them it begins.
@@ -33,8 +35,8 @@ impl Pattern {
 }
 
 on_every_level! {
-    /// How many bits of `pattern`, begun so many bits `after` bit `first`, are lit in `words`, for each
-    /// of these. What reaches beyond the end is dark.
+    /// How many bits of `pattern`, begun so many bits `after` bit `first`, modulo 2⁶⁴, are lit in `words`,
+    /// for each of these. What reaches beyond the end is dark.
     pub(crate) fn lit_in_each(
         words: &[u64],
         first: usize,
@@ -44,7 +46,7 @@ on_every_level! {
     ) {
         for (count, after) in counts.iter_mut().zip(after) {
             let mut sums = [0; LANES];
-            add_lit(&mut sums, words, first + *after as usize, pattern);
+            add_lit(&mut sums, words, first.wrapping_add(*after as usize), pattern);
             *count = sums.iter().sum::<u64>() as u32;
         }
     }
@@ -71,32 +73,47 @@ on_every_level! {
 #[inline(always)]
 fn add_lit(sums: &mut [u64; LANES], words: &[u64], first: usize, pattern: &Pattern) {
     let (begin, shift) = parts(first);
-    for block in (0..pattern.reach()).step_by(LANES) {
-        let (mask, words) = (shifted(&pattern.words[block..], shift), at(words, begin + block));
+    let (blocks, _) = pattern.words[1..].as_chunks::<LANES>();
+    for (block, mask) in blocks.iter().take(pattern.blocks).enumerate() {
+        let words = begun(words, begin + block * LANES, shift);
         for lane in 0..LANES {
             sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
         }
     }
 }
 
+/// A block of `words` from bit `shift` of word `first` on, dark beyond their end.
+#[inline(always)]
+fn begun(words: &[u64], first: usize, shift: usize) -> [u64; LANES] {
+    let words = words.get(first..).unwrap_or_default();
+    let last;
+    let words = match words.first_chunk::<{ LANES + 1 }>() {
+        Some(words) => words,
+        None => {
+            last = at_end(words);
+            &last
+        }
+    };
+    let mut lanes = [0; LANES];
+    for lane in 0..LANES {
+        // Two shifts, because a shift by 64 does not give 0.
+        lanes[lane] = words[lane] >> shift | words[lane + 1] << 1 << (63 ^ shift);
+    }
+    lanes
+}
+
+/// The last `words`, and dark ones.
+#[cold]
+fn at_end(words: &[u64]) -> [u64; LANES + 1] {
+    let mut last = [0; LANES + 1];
+    last[..words.len()].copy_from_slice(words);
+    last
+}
+
 /// The word that `bit` is in, and its place there.
 #[inline(always)]
 fn parts(bit: usize) -> (usize, usize) {
     (bit / 64, bit % 64)
-}
-
-/// A block of `words` from word `first` on, dark beyond their end.
-#[inline(always)]
-fn at(words: &[u64], first: usize) -> [u64; LANES] {
-    let words = words.get(first..).unwrap_or_default();
-    match words.first_chunk::<LANES>() {
-        Some(words) => *words,
-        None => {
-            let mut last = [0; LANES];
-            last[..words.len()].copy_from_slice(words);
-            last
-        }
-    }
 }
 
 /// How many bits of `pattern`, begun at bit `first`, are lit in `words`. What reaches beyond the end is
@@ -112,10 +129,10 @@ on_every_level! {
         // A closure would not be compiled for the level.
         for after in after {
             let (begin, shift) = parts(first.wrapping_add(*after as usize));
+            let (blocks, _) = pattern.words[1..].as_chunks::<LANES>();
             let mut dark = 0;
-            for block in (0..pattern.reach()).step_by(LANES) {
-                let mask = shifted(&pattern.words[block..], shift);
-                let words = at(words, begin + block);
+            for (block, mask) in blocks.iter().take(pattern.blocks).enumerate() {
+                let words = begun(words, begin + block * LANES, shift);
                 for lane in 0..LANES {
                     dark |= mask[lane] & !words[lane];
                 }

@@ -233,11 +233,18 @@ impl<'a> Sent<'a> {
         self.lit_bits(shot).iter().map(move |&bit| start + scale * i64::from(bit))
     }
 
-    /// The sum of `found`, a number for each bit, over the lit bits of `shot`.
-    pub fn in_bits(&self, shot: usize, found: &[u32]) -> u32 {
-        let length = self.codebook.chips() / self.bits_of_payload() as u32;
-        let lit = self.lit_bits(shot).iter().map(|bit| bit / length);
-        lit.filter_map(|bit| found.get(bit as usize)).sum()
+    /// The sums of `found` over the lit bits of `shot`, where that has a number for each bit from as many before
+    /// its first one as a payload has, to as many behind its last one: if it begins that many bits earlier,
+    /// one fewer, and so on, until as many later.
+    pub fn in_bits(&self, shot: usize, found: &[u32]) -> Vec<u32> {
+        let bits = self.bits_of_payload() as usize;
+        let length = self.codebook.chips() / bits as u32;
+        let mut sums = vec![0; 2 * bits + 1];
+        for bit in self.lit_bits(shot) {
+            let found = found.get((bit / length) as usize..).unwrap_or_default();
+            sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
+        }
+        sums
     }
 
     /// Ticks from the start of a macropulse of `shot` to each bit of it that is lit, or dark.

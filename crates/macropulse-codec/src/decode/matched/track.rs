@@ -146,9 +146,8 @@ impl Band<'_> {
             return None;
         }
         let words = self.words_about(shot, sent.fired[shot] + detection.lag);
-        let count = |away: i64| sent.in_bits(shot, &words[(bits + away) as usize..]);
-        let reach = sent.reach();
-        let lags = (-bits..=bits).map(|away| (count(away), detection.lag + away * length));
+        let (counts, reach) = (sent.in_bits(shot, &words), sent.reach());
+        let lags = (-bits..).zip(counts).map(|(away, count)| (count, detection.lag + away * length));
         let higher = lags.filter(|(count, lag)| *count > detection.count && reach.contains(lag));
         let (_, lag) = higher.max_by_key(|(count, lag)| (*count, -lag))?;
         self.best_in_block(shot, lag)

@@ -392,10 +392,9 @@ impl Band<'_> {
         let words = self.words_about(shot, start);
         let mut found = Vec::new();
         for other in std::iter::once(one).chain(alike) {
-            for away in 1 - bits..bits {
+            for (away, count) in (-bits..).zip(sent.in_bits(other, &words)) {
                 let lag = start + away * length - sent.fired[other];
-                if lags.contains(&lag) {
-                    let count = sent.in_bits(other, &words[(bits + away) as usize..]);
+                if away.abs() < bits && lags.contains(&lag) {
                     found.push((other, Detection::at(lag, count)));
                 }
             }
@@ -407,9 +406,10 @@ impl Band<'_> {
     /// tick `start` on as a payload has, to twice as many behind it.
     pub(super) fn words_about(&self, shot: usize, start: i64) -> Vec<u32> {
         let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
-        let pattern = &self.sent.bits(shot).pattern;
-        let at = |bit: i64| self.field.lit().lit_in(start + bit * length, pattern);
-        (-bits..2 * bits).map(at).collect()
+        let after: Vec<u32> = (0..3 * bits).map(|bit| (bit * length) as u32).collect();
+        let (pattern, mut found) = (&self.sent.bits(shot).pattern, Vec::new());
+        self.field.lit().lit_in_each(start - bits * length, &after, pattern, &mut found);
+        found
     }
 
     /// The returns found so far of which light overlaps with `light`.
