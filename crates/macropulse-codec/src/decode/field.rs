@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::timeline::Timeline;
-use crate::kernels::{Pattern, count_each, look_ahead};
+use crate::kernels::{COARSE, Pattern, coarse, count_each, look_ahead};
 
 /// Ticks before the stretch that is asked for and behind it, so that whole blocks of lags can be
 /// looked at at its ends.
@@ -31,6 +31,43 @@ pub(super) struct Field<'a> {
     seen: Timeline,
     lit: Timeline,
     residual: Timeline,
+    picture: Picture,
+}
+
+/// Where marks count as found, one bit for every eight ticks from the beginning on: lit where any of the
+/// sixteen from the first of them on is.
+#[derive(Debug, Default)]
+pub(super) struct Picture {
+    words: Vec<u64>,
+    /// Whether any of the eight is: what it is made of.
+    fine: Vec<u64>,
+}
+
+impl Picture {
+    /// Makes what is missing of that of `words`.
+    fn extend(&mut self, words: &[u64]) {
+        let made = self.words.len();
+        // The last word does not know its next one.
+        let there = (words.len() / COARSE).max(1 + made) - 1;
+        self.fine.resize(there + 1, 0);
+        coarse(&words[(COARSE * made).min(words.len())..], 0, &mut self.fine[made..]);
+        self.words.resize(there + 1, 0);
+        look_ahead(&self.fine[made..], &mut self.words[made..], 1);
+        self.words.truncate(there);
+    }
+
+    /// Lets it begin so many ticks later.
+    fn slide(&mut self, later: i64) {
+        let word = 64 * COARSE as i64;
+        let known = if later % word == 0 { self.words.len() } else { 0 };
+        let passed = ((later / word) as usize).min(known);
+        self.words.truncate(known);
+        self.words.drain(..passed);
+    }
+
+    fn forget(&mut self) {
+        self.words.clear();
+    }
 }
 
 /// Which ticks are looked at.
@@ -43,7 +80,7 @@ pub(super) enum Source {
 }
 
 /// Memory of a field, whatever is in it.
-pub(super) type Memory = [Timeline; 3];
+pub(super) type Memory = ([Timeline; 3], Picture);
 
 impl<'a> Field<'a> {
     /// The field of the sorted `ticks`, from `begin` on, no longer than `length` ticks at a time;
@@ -59,19 +96,20 @@ impl<'a> Field<'a> {
         let cell = 1 << cell_bits;
         let begin = (begin - MARGIN).div_euclid(cell) * cell;
         let laid = ticks.partition_point(|&tick| i64::from(tick) < begin);
-        let [mut seen, mut lit, mut residual] = memory;
+        let ([mut seen, mut lit, mut residual], mut picture) = memory;
+        picture.forget();
         // Twice as long as need be, so that it is moved less often.
         let length = 2 * (length + 3 * MARGIN + 2 * cell + i64::from(width));
         seen.begin(begin, length);
         residual.begin(begin, length);
         lit.begin(begin, if width > 1 { length } else { 0 });
         let before = vec![laid as u32];
-        Self { ticks, laid, width, cell, cell_bits, begin, before, seen, lit, residual }
+        Self { ticks, laid, width, cell, cell_bits, begin, before, seen, lit, residual, picture }
     }
 
     /// Gives its memory back.
     pub fn into_memory(self) -> Memory {
-        [self.seen, self.lit, self.residual]
+        ([self.seen, self.lit, self.residual], self.picture)
     }
 
     /// Where the ticks that are laid down end.
@@ -114,6 +152,7 @@ impl<'a> Field<'a> {
         let lit = (self.width > 1).then_some(&mut self.lit);
         let all = [&mut self.seen, &mut self.residual].into_iter().chain(lit);
         all.for_each(|timeline| timeline.slide(origin));
+        self.picture.slide(origin - self.begin);
         if self.end() > origin {
             let passed = ((origin - self.begin) / self.cell) as usize;
             self.before.drain(..passed);
@@ -138,6 +177,14 @@ impl<'a> Field<'a> {
     /// Where marks count as found.
     pub fn lit(&self) -> &Timeline {
         if self.width == 1 { &self.seen } else { &self.lit }
+    }
+
+    /// The picture of where marks count as found, as far as that is at hand, and the tick of its first bit.
+    pub fn picture(&mut self) -> (&[u64], i64) {
+        let extent = self.extent();
+        let lit = if self.width == 1 { &self.seen } else { &self.lit };
+        self.picture.extend(lit.words(&extent));
+        (&self.picture.words, extent.start)
     }
 
     /// The ticks as they came.

@@ -162,6 +162,9 @@ struct Band<'a> {
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
     marks: Vec<u32>,
     marks_of: Option<usize>,
+    /// Where these are in the picture, and how many of them may be found.
+    in_picture: Vec<u32>,
+    bounding: Counts<NARROW>,
     search: Search,
     photons: Photons,
     /// Memory for the residual of a macropulse, and for the marks found in each of its bits.
@@ -237,6 +240,8 @@ impl<'a> Band<'a> {
             counts: Counts::default(),
             marks: Vec::new(),
             marks_of: None,
+            in_picture: Vec::new(),
+            bounding: Counts::default(),
             search: memory.search,
             photons: memory.photons,
             residual: Timeline::default(),

@@ -2,7 +2,7 @@
 
 use super::look::LONGEST_PAUSE;
 use super::{Band, Detection};
-use crate::kernels::{NARROW, and, is_dark, or, places_of};
+use crate::kernels::{COARSE, NARROW, and, is_dark, or, places_of};
 
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
@@ -132,9 +132,33 @@ impl Band<'_> {
         let word = self.sent.bit_length();
         let sides = (1..=SIDES).take_while(|side| side * BLOCK - BLOCK / 2 < word);
         let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
+        let (bounds, first) = self.bounds(shot, middle - BLOCK / 2 - SIDES * BLOCK, detection.count);
+        let may_hold = |side: &i64| {
+            let begin = (side - BLOCK / 2 - first) / COARSE as i64;
+            let among = below(begin + BLOCK / COARSE as i64 + 1, bounds, true);
+            !is_dark(&below(begin, among, false))
+        };
         let of = |peak: &Detection| (peak.count, std::cmp::Reverse(peak.lag));
-        let peaks = sides.filter_map(|side| self.best_in_block(shot, side));
+        let peaks = sides.filter(may_hold).filter_map(|side| self.best_in_block(shot, side));
         peaks.max_by_key(of).filter(|peak| of(peak) > of(&detection))
+    }
+
+    /// Of each eight lags from about `lag` on, whether `least` marks of `shot` may be found at any of them; and
+    /// which is the first.
+    ///
+    /// The picture has one bit for the sixteen ticks on which a mark may fall that is so much later: it has as
+    /// many of the marks at least as are found at any of the lags.
+    fn bounds(&mut self, shot: usize, lag: i64, least: u32) -> ([u64; NARROW], i64) {
+        self.lay_out(shot);
+        let fired = self.sent.fired[shot];
+        let (picture, origin) = self.field.picture();
+        let bit = (fired + lag - origin).div_euclid(COARSE as i64).max(0);
+        self.in_picture.clear();
+        self.in_picture.extend(self.marks.iter().map(|mark| mark / COARSE as u32));
+        let farthest = self.in_picture.last().copied().unwrap_or(0);
+        self.bounding.clear();
+        self.bounding.add(picture, bit as u32, &self.in_picture, farthest);
+        (self.bounding.at_least(least), origin + COARSE as i64 * bit - fired)
     }
 
     /// The best peak at which more marks of `shot` are found than at `detection`, some of its bits
