@@ -201,11 +201,11 @@ impl Band<'_> {
     /// Marks of `shot`, which are at hand, found at `lag`, where each tick counts for one of them: the
     /// earliest that it may be.
     fn marks_with_ticks(&self, shot: usize, lag: i64) -> u32 {
-        let (sent, seen) = (self.sent, self.field.seen());
+        let (sent, seen, lit) = (self.sent, self.field.seen(), self.field.lit());
         let start = sent.fired[shot] + lag;
         let (mut count, mut free) = (0, start);
-        for mark in &self.marks {
-            let first = start + i64::from(*mark);
+        let places = self.marks.iter().map(|mark| start + i64::from(*mark));
+        for first in places.filter(|place| lit.has(*place)) {
             let tick = seen.next_lit(first.max(free)..first + i64::from(sent.width));
             (count, free) = tick.map_or((count, free), |tick| (count + 1, tick + 1));
         }
