@@ -28,6 +28,6 @@ pub fn widen(words: &[u64], lit: &mut [u64], width: u32) {
 /// most.
 pub fn most(words: &[u64], first: u32, marks: &[u32]) -> u32 {
     let mut counts = Counts::<NARROW>::default();
-    counts.add(words, first, marks, marks.iter().copied().max().unwrap_or(0));
+    counts.count(words, first, marks, marks.iter().copied().max().unwrap_or(0));
     counts.highest([u64::MAX; NARROW]).map_or(0, |(_, count)| count)
 }

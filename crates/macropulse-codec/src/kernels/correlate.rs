@@ -18,34 +18,34 @@ pub(crate) const WIDE: usize = 8;
 /// Planes of a count; a macropulse has at most 65535 marks.
 const PLANES: usize = 16;
 
+/// The lowest planes, to which marks are added one by one, and those above them: for up to 255 marks few,
+/// which stay in registers.
+const LOW: usize = 4;
+const FEW: usize = 4;
+const MANY: usize = PLANES - LOW;
+
 /// Counts of a block of 64 · W lags, in bit planes: plane p has weight 2^p. W is [`NARROW`] or
 /// [`WIDE`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Counts<const W: usize> {
     planes: [[u64; W]; PLANES],
-    /// Planes that can be lit at all.
+    /// Planes that can be lit at all, or [`LOW`].
     used: usize,
-    /// Marks that were added, at most what a count can be.
-    added: usize,
+    /// Marks that were counted, at most what a count can be.
+    counted: usize,
 }
 
 impl<const W: usize> Default for Counts<W> {
     fn default() -> Self {
-        Self { planes: [[0; W]; PLANES], used: 0, added: 0 }
+        Self { planes: [[0; W]; PLANES], used: LOW, counted: 0 }
     }
 }
 
 impl<const W: usize> Counts<W> {
-    /// Nothing counted yet.
-    pub(crate) fn clear(&mut self) {
-        self.planes[..self.used].fill([0; W]);
-        (self.used, self.added) = (0, 0);
-    }
-
-    /// Adds, for each lag of the block, how many of the marks are lit: bit `place + first + lag` of
+    /// Counts, for each lag of the block, how many of the marks are lit: bit `place + first + lag` of
     /// `words` for each of `places`, the lowest bit first. Bits beyond the end are dark. At most
-    /// 65535 marks can be added, none behind the `farthest` place.
-    pub(crate) fn add(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
+    /// 65535 marks can be counted, none behind the `farthest` place.
+    pub(crate) fn count(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
         debug_assert!(places.iter().all(|place| *place <= farthest));
         // Nothing before the first lag is looked at.
         let words = words.get(first as usize / 64..).unwrap_or_default();
@@ -59,22 +59,23 @@ impl<const W: usize> Counts<W> {
             longer.resize(reach, 0);
             &longer
         };
-        self.added += places.len();
-        self.used = ((usize::BITS - self.added.leading_zeros()) as usize).min(PLANES);
-        let planes = self.planes[..self.used].as_flattened_mut();
-        match (Level::here(), W) {
-            // SAFETY: the processor has what this level asks for, every mark lies so that its
-            // block ends within the words, and a place fits into 32 bits.
-            #[cfg(target_arch = "x86_64")]
-            (Level::Avx512, NARROW) if words.len() < 1 << 26 => unsafe {
-                avx512::narrow(words, first, places, planes);
-            },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            (Level::Avx512, WIDE) if words.len() < 1 << 26 => unsafe {
-                avx512::wide(words, first, places, planes);
-            },
-            (_, NARROW) => narrow(words, first, places, planes),
+        self.counted = places.len();
+        self.used = ((usize::BITS - self.counted.leading_zeros()) as usize).clamp(LOW, PLANES);
+        let planes = self.planes.as_flattened_mut();
+        // SAFETY: the processor has what this level asks for, every mark lies so that its block ends within
+        // the words, a place fits into 32 bits, and there is a plane for each bit of the highest count.
+        #[cfg(target_arch = "x86_64")]
+        if Level::here() == Level::Avx512 && words.len() < 1 << 26 {
+            return match (W, self.used > LOW + FEW) {
+                (NARROW, false) => unsafe { avx512::narrow::<FEW>(words, first, places, planes) },
+                (NARROW, true) => unsafe { avx512::narrow::<MANY>(words, first, places, planes) },
+                (_, false) => unsafe { avx512::wide::<FEW>(words, first, places, planes) },
+                (_, true) => unsafe { avx512::wide::<MANY>(words, first, places, planes) },
+            };
+        }
+        let planes = &mut planes[..W * self.used];
+        match W {
+            NARROW => narrow(words, first, places, planes),
             _ => wide(words, first, places, planes),
         }
     }
@@ -91,7 +92,7 @@ impl<const W: usize> Counts<W> {
 
     /// One bit for each lag with `least` marks or more.
     pub(crate) fn at_least(&self, least: u32) -> [u64; W] {
-        if least as usize > self.added {
+        if least as usize > self.counted {
             return [0; W];
         }
         let mut enough = [u64::MAX; W];
@@ -134,16 +135,16 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// [`Counts::add`] to blocks of [`NARROW`], where none reaches beyond the end.
+    /// [`Counts::count`] in blocks of [`NARROW`], where none reaches beyond the end.
     fn narrow(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
-        add_within::<NARROW>(words, first, places, planes);
+        count_within::<NARROW>(words, first, places, planes);
     }
 }
 
 on_every_level! {
-    /// [`Counts::add`] to blocks of [`WIDE`], where none reaches beyond the end.
+    /// [`Counts::count`] in blocks of [`WIDE`], where none reaches beyond the end.
     fn wide(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
-        add_within::<WIDE>(words, first, places, planes);
+        count_within::<WIDE>(words, first, places, planes);
     }
 }
 
@@ -178,10 +179,10 @@ fn highest_of<const W: usize>(planes: &[u64], allowed: &[u64]) -> Option<(u32, u
 }
 
 #[inline(always)]
-fn add_within<const W: usize>(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
+fn count_within<const W: usize>(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
     let (planes, _) = planes.as_chunks_mut::<W>();
-    let low = |plane: usize| planes.get(plane).copied().unwrap_or([0; W]);
-    let (mut ones, mut twos, mut fours) = (low(0), low(1), low(2));
+    planes.fill([0; W]);
+    let (mut ones, mut twos, mut fours) = ([0; W], [0; W], [0; W]);
     let whole = places.chunks_exact(8);
     let rest = whole.remainder();
     for eight in whole {
@@ -219,7 +220,7 @@ fn add_within<const W: usize>(words: &[u64], first: u32, places: &[u32], planes:
 /// The same where a block is one register, and one instruction cuts it out of two.
 #[cfg(target_arch = "x86_64")]
 mod avx512 {
-    use super::{NARROW, WIDE};
+    use super::{LOW, NARROW, WIDE};
     use std::arch::x86_64::*;
 
     /// Marks that are added up before anything is carried beyond the fourth plane.
@@ -234,22 +235,17 @@ mod avx512 {
             ///
             /// The processor must have AVX-512 F, VL and VBMI2, and `words`, fewer than 2^26, must
             /// reach a block and one word beyond the one in which the bit `first + place` lies, for
-            /// each of `places`.
+            /// each of `places`. These must be fewer than 16 · 2^`HIGH`, and there must be as many more
+            /// `planes` than [`LOW`].
             #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
-            pub(super) unsafe fn $name(
+            pub(super) unsafe fn $name<const HIGH: usize>(
                 words: &[u64],
                 first: u32,
                 places: &[u32],
                 planes: &mut [u64],
             ) {
-                let (planes, _) = planes.as_chunks_mut::<$lanes>();
-                let (low, high) = planes.split_at_mut(planes.len().min(4));
-                let mut sums = [$dark(); 4];
-                for (sum, plane) in sums.iter_mut().zip(&*low) {
-                    // SAFETY: a plane is as long as a register.
-                    *sum = unsafe { $load(plane.as_ptr().cast()) };
-                }
-                let [mut ones, mut twos, mut fours, mut eights] = sums;
+                let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
+                let mut high = [$dark(); HIGH];
                 // Three bits are summed in each lag, and carried to the next plane.
                 macro_rules! add {
                     ($a:expr, $b:expr, $c:expr) => {{
@@ -273,13 +269,12 @@ mod avx512 {
                 }
                 // The blocks of eight marks are added, and one is carried to the fourth plane.
                 macro_rules! eight_from {
-                    ($eight:expr, $block:ident) => {{
-                        let eight = $eight;
-                        let (sum, a) = add!(ones, $block!(eight[0]), $block!(eight[1]));
-                        let (sum, b) = add!(sum, $block!(eight[2]), $block!(eight[3]));
+                    ($first:literal, $block:ident) => {{
+                        let (sum, a) = add!(ones, $block!($first), $block!($first + 1));
+                        let (sum, b) = add!(sum, $block!($first + 2), $block!($first + 3));
                         let (sum_of_twos, c) = add!(twos, a, b);
-                        let (sum, a) = add!(sum, $block!(eight[4]), $block!(eight[5]));
-                        let (sum, b) = add!(sum, $block!(eight[6]), $block!(eight[7]));
+                        let (sum, a) = add!(sum, $block!($first + 4), $block!($first + 5));
+                        let (sum, b) = add!(sum, $block!($first + 6), $block!($first + 7));
                         ones = sum;
                         let (sum, d) = add!(sum_of_twos, a, b);
                         twos = sum;
@@ -289,39 +284,38 @@ mod avx512 {
                     }};
                 }
                 macro_rules! sixteen_from {
-                    ($sixteen:expr, $block:ident) => {{
-                        let sixteen = $sixteen;
-                        let a = eight_from!(&sixteen[..8], $block);
-                        let b = eight_from!(&sixteen[8..], $block);
+                    ($block:ident) => {{
+                        let a = eight_from!(0, $block);
+                        let b = eight_from!(8, $block);
                         let mut carried;
                         (eights, carried) = add!(eights, a, b);
-                        for plane in &mut *high {
-                            // SAFETY: a plane is as long as a register.
-                            unsafe {
-                                let sum = $load(plane.as_ptr().cast());
-                                $store(plane.as_mut_ptr().cast(), $xor(sum, carried));
-                                carried = $and(sum, carried);
-                            }
+                        for plane in &mut high {
+                            (*plane, carried) = ($xor(*plane, carried), $and(*plane, carried));
                         }
                     }};
                 }
                 let (whole, rest) = places.as_chunks::<SIXTEEN>();
                 for places in whole {
-                    sixteen_from!(places, bits);
-                }
-                if !rest.is_empty() {
-                    let mut last = [$dark(); SIXTEEN];
-                    for (block, place) in last.iter_mut().zip(rest) {
-                        *block = bits!(*place);
-                    }
-                    macro_rules! known {
-                        ($block:expr) => {
-                            $block
+                    macro_rules! block {
+                        ($at:expr) => {
+                            bits!(places[$at])
                         };
                     }
-                    sixteen_from!(&last, known);
+                    sixteen_from!(block);
                 }
-                for (plane, sum) in low.iter_mut().zip([ones, twos, fours, eights]) {
+                if !rest.is_empty() {
+                    macro_rules! block_or_dark {
+                        ($at:expr) => {
+                            match rest.get($at) {
+                                Some(place) => bits!(*place),
+                                None => $dark(),
+                            }
+                        };
+                    }
+                    sixteen_from!(block_or_dark);
+                }
+                let sums = [ones, twos, fours, eights].into_iter().chain(high);
+                for (plane, sum) in planes.chunks_exact_mut($lanes).zip(sums) {
                     // SAFETY: a plane is as long as a register.
                     unsafe { $store(plane.as_mut_ptr().cast(), sum) };
                 }
@@ -427,12 +421,10 @@ mod tests {
         fn every_level_counts_what_is_lit(
             lit in proptest::collection::vec(0..6000_usize, 0..3000),
             places in proptest::collection::vec(0..6500_u32, 0..300),
-            then in proptest::collection::vec(0..6500_u32, 0..40),
             first in 0..1000_u32,
             least in 0..200_u32,
             allowed in any::<[u64; WIDE]>(),
         ) {
-            let places = [places, then];
             counts_what_is_lit::<WIDE>(&lit, &places, (first, least), allowed)?;
             let [a, b, c, d, ..] = allowed;
             counts_what_is_lit::<NARROW>(&lit, &places, (first, least), [a, b, c, d])?;
@@ -441,7 +433,7 @@ mod tests {
 
     fn counts_what_is_lit<const W: usize>(
         lit: &[usize],
-        places: &[Vec<u32>; 2],
+        places: &[u32],
         (first, least): (u32, u32),
         allowed: [u64; W],
     ) -> Result<(), TestCaseError> {
@@ -449,13 +441,15 @@ mod tests {
         lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
         let is_lit = |bit: usize| words.get(bit / 64).is_some_and(|w| w >> (bit % 64) & 1 == 1);
         let found = |lag| {
-            let all = places.iter().flatten();
-            all.filter(|place| is_lit((first + lag + **place) as usize)).count() as u32
+            let is_lit = |place: &&u32| is_lit((first + lag + **place) as usize);
+            places.iter().filter(is_lit).count() as u32
         };
         let expected: Vec<u32> = (0..64 * W as u32).map(found).collect();
         let counted = at_each_level(|| {
             let mut counts = Counts::<W>::default();
-            places.iter().for_each(|places| counts.add(&words, first, places, 6500));
+            // What was counted before is forgotten.
+            counts.count(&words, 0, &[7; 20], 6500);
+            counts.count(&words, first, places, 6500);
             counts
         });
         let is_allowed = |lag: &usize| allowed[lag / 64] >> (lag % 64) & 1 == 1;
@@ -469,9 +463,6 @@ mod tests {
             }
             let expected = highest.map(|lag| (lag as u32, expected[lag]));
             prop_assert_eq!(counts.highest(allowed), expected);
-            let mut again = counts;
-            again.clear();
-            prop_assert_eq!(again.highest(allowed).map(|(_, count)| count), highest.map(|_| 0));
         }
         Ok(())
     }

@@ -124,9 +124,8 @@ impl Search {
 
     /// The bits from bit `first` of the pictures on that may have `needed` marks.
     fn bounded(&mut self, first: u32, needed: u32) -> [u64; WIDE] {
-        self.counts.clear();
         let marks = &self.places;
-        self.counts.add(&self.pictures.words, first, &marks.places, marks.farthest);
+        self.counts.count(&self.pictures.words, first, &marks.places, marks.farthest);
         self.counts.at_least(needed)
     }
 
@@ -136,9 +135,8 @@ impl Search {
         self.words.clear();
         let mut any = false;
         for block in (first..first + bits).step_by(BLOCK as usize) {
-            self.counts.clear();
             let marks = &self.word;
-            self.counts.add(&self.pictures.words, block, &marks.places, marks.farthest);
+            self.counts.count(&self.pictures.words, block, &marks.places, marks.farthest);
             let noted = self.counts.at_least(needed);
             any |= !is_dark(&noted);
             self.words.extend(noted);
@@ -225,8 +223,7 @@ impl Band<'_> {
         let (words, begin) = self.field.lit_in(source, &span, &mut search.lit).at(start);
         let farthest = self.marks.last().copied().unwrap_or(0);
         search.counted += BLOCK;
-        search.counts.clear();
-        search.counts.add(words, begin as u32, &self.marks, farthest);
+        search.counts.count(words, begin as u32, &self.marks, farthest);
         let allowed = below(lags.start - first, [u64::MAX; WIDE], false);
         let allowed = below(lags.end - first, allowed, true);
         let highest = search.counts.highest(allowed);

@@ -156,8 +156,7 @@ impl Band<'_> {
         self.in_picture.clear();
         self.in_picture.extend(self.marks.iter().map(|mark| mark / COARSE as u32));
         let farthest = self.in_picture.last().copied().unwrap_or(0);
-        self.bounding.clear();
-        self.bounding.add(picture, bit as u32, &self.in_picture, farthest);
+        self.bounding.count(picture, bit as u32, &self.in_picture, farthest);
         (self.bounding.at_least(least), origin + COARSE as i64 * bit - fired)
     }
 
@@ -208,9 +207,8 @@ impl Band<'_> {
         }
         self.lay_out(shot);
         let (words, begin) = self.field.lit().at(self.sent.fired[shot] + first);
-        self.counts.clear();
         let farthest = self.marks.last().copied().unwrap_or(0);
-        self.counts.add(words, begin as u32, &self.marks, farthest);
+        self.counts.count(words, begin as u32, &self.marks, farthest);
         let (at, count) = self.counts.highest(and(allowed, wanted))?;
         let (at, width) = (i64::from(at), i64::from(self.sent.width));
         let before = below(at - width, allowed, true);
