@@ -235,6 +235,17 @@ impl Band<'_> {
     }
 }
 
+/// Which of the `lags` are lit, ascending.
+pub(super) fn lit<const W: usize>(lags: [u64; W]) -> impl Iterator<Item = i64> {
+    (0..).step_by(64).zip(lags).flat_map(|(first, mut lags)| {
+        std::iter::from_fn(move || {
+            let next = (lags != 0).then(|| first + i64::from(lags.trailing_zeros()));
+            lags &= lags.wrapping_sub(1);
+            next
+        })
+    })
+}
+
 /// Those of `lags` that are below `end`, or those that are not.
 pub(super) fn below<const W: usize>(end: i64, lags: [u64; W], wanted: bool) -> [u64; W] {
     std::array::from_fn(|lane| {

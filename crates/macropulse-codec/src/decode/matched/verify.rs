@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::ops::Range;
 
-use super::track::{BLOCK, NEAREST_SIDE, WIDEST_GAP};
+use super::track::{BLOCK, NEAREST_SIDE, WIDEST_GAP, lit};
 use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
 use crate::decode::timeline::Timeline;
@@ -157,8 +157,7 @@ impl Band<'_> {
             let Some(best) = self.best_in_block(shot, middle) else { continue };
             most = most.max(best.count);
             let as_many = self.counts.at_least(least.max(most.saturating_sub(twice)));
-            let is_among = |at: &i64| as_many[(at / 64) as usize] >> (at % 64) & 1 == 1;
-            lags.extend((0..BLOCK).filter(is_among).map(|at| middle - BLOCK / 2 + at));
+            lags.extend(lit(as_many).map(|at| middle - BLOCK / 2 + at));
         }
         if lags == [found.lag] {
             return;
