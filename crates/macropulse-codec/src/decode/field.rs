@@ -35,38 +35,41 @@ pub(super) struct Field<'a> {
 }
 
 /// Where marks count as found, one bit for every eight ticks from the beginning on: lit where any of the
-/// sixteen from the first of them on is.
+/// sixteen from the first of them on is. Made where it is looked at.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     words: Vec<u64>,
-    /// Whether any of the eight is: what it is made of.
+    /// Which segments are made.
+    made: Vec<bool>,
+    /// Whether any of eight ticks is lit, for the segment that is made.
     fine: Vec<u64>,
 }
 
-impl Picture {
-    /// Makes what is missing of that of `words`.
-    fn extend(&mut self, words: &[u64]) {
-        let made = self.words.len();
-        // The last word does not know its next one.
-        let there = (words.len() / COARSE).max(1 + made) - 1;
-        self.fine.resize(there + 1, 0);
-        coarse(&words[(COARSE * made).min(words.len())..], 0, &mut self.fine[made..]);
-        self.words.resize(there + 1, 0);
-        look_ahead(&self.fine[made..], &mut self.words[made..], 1);
-        self.words.truncate(there);
-    }
+/// Machine words of a picture that are made together: those of 32 768 ticks.
+const SEGMENT: usize = 64;
 
-    /// Lets it begin so many ticks later.
-    fn slide(&mut self, later: i64) {
-        let word = 64 * COARSE as i64;
-        let known = if later % word == 0 { self.words.len() } else { 0 };
-        let passed = ((later / word) as usize).min(known);
-        self.words.truncate(known);
-        self.words.drain(..passed);
+impl Picture {
+    /// Makes what is missing of the bits `from` to `to`, of a picture of `words`.
+    fn make(&mut self, words: &[u64], (from, to): (usize, usize)) {
+        let segments = words.len() / COARSE / SEGMENT + 1;
+        self.made.resize(segments, false);
+        self.words.resize(segments * SEGMENT, 0);
+        // The last word looks at its next one.
+        self.fine.resize(SEGMENT + 1, 0);
+        for segment in from / 64 / SEGMENT..(to / 64 / SEGMENT + 1).min(segments) {
+            if std::mem::replace(&mut self.made[segment], true) {
+                continue;
+            }
+            let begin = segment * SEGMENT;
+            coarse(words.get(COARSE * begin..).unwrap_or_default(), 0, &mut self.fine);
+            let (made, [next]) = (&self.fine[..SEGMENT], [self.fine[SEGMENT]]);
+            look_ahead(made, &mut self.words[begin..begin + SEGMENT], 1);
+            self.words[begin + SEGMENT - 1] |= next << 63;
+        }
     }
 
     fn forget(&mut self) {
-        self.words.clear();
+        self.made.clear();
     }
 }
 
@@ -120,6 +123,7 @@ impl<'a> Field<'a> {
     /// Lays down the ticks of `span`, and forgets what was before. A span never begins before the one
     /// asked for last.
     pub fn cover(&mut self, span: Range<i64>) {
+        self.picture.forget();
         let origin = (span.start - MARGIN).max(self.begin).div_euclid(self.cell) * self.cell;
         let to = span.end + 2 * MARGIN + i64::from(self.width);
         if to + self.cell > self.seen.end() {
@@ -152,7 +156,6 @@ impl<'a> Field<'a> {
         let lit = (self.width > 1).then_some(&mut self.lit);
         let all = [&mut self.seen, &mut self.residual].into_iter().chain(lit);
         all.for_each(|timeline| timeline.slide(origin));
-        self.picture.slide(origin - self.begin);
         if self.end() > origin {
             let passed = ((origin - self.begin) / self.cell) as usize;
             self.before.drain(..passed);
@@ -179,11 +182,12 @@ impl<'a> Field<'a> {
         if self.width == 1 { &self.seen } else { &self.lit }
     }
 
-    /// The picture of where marks count as found, as far as that is at hand, and the tick of its first bit.
-    pub fn picture(&mut self) -> (&[u64], i64) {
+    /// The picture of where marks count as found, from tick `from` to `to` at least, and the tick of its first bit.
+    pub fn picture(&mut self, from: i64, to: i64) -> (&[u64], i64) {
         let extent = self.extent();
         let lit = if self.width == 1 { &self.seen } else { &self.lit };
-        self.picture.extend(lit.words(&extent));
+        let bit = |tick: i64| (tick - extent.start).max(0) as usize / COARSE;
+        self.picture.make(lit.words(&extent), (bit(from), bit(to)));
         (&self.picture.words, extent.start)
     }
 

@@ -304,7 +304,8 @@ impl<'a> Band<'a> {
         let before = |end: i64| self.ticks.partition_point(|tick| i64::from(*tick) < end);
         let ticks = &self.ticks[before(self.at_hand.start)..before(self.at_hand.end)];
         let light = self.sent.light(0, 0);
-        let is_long = |some: &[u32]| i64::from(some[some.len() - 1] - some[0]) >= light.end - light.start;
+        let is_long =
+            |some: &[u32]| i64::from(some[some.len() - 1] - some[0]) >= light.end - light.start;
         ticks.windows(self.fewest).all(is_long)
     }
 

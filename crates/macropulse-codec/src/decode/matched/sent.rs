@@ -87,9 +87,8 @@ impl Words {
             let first_bits = lit.map(|bit| bit.map(|bit| scale * bit)).collect();
             let ticks = vec![OnceCell::new(); words];
             let of_label = vec![OnceCell::new(); labels as usize];
-            let crowding = (0..words).map(|word| {
-                crowding(codebook.word(word as u16), width.div_ceil(scale.max(1)))
-            });
+            let crowding = (0..words)
+                .map(|word| crowding(codebook.word(word as u16), width.div_ceil(scale.max(1))));
             let per_tick = crowding.max().unwrap_or(1);
             self = Self { of, first, first_bits, ticks, bits: Vec::new(), of_label, per_tick };
             self.bits.resize_with(words, OnceCell::new);

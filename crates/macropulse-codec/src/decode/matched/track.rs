@@ -132,7 +132,8 @@ impl Band<'_> {
         let word = self.sent.bit_length();
         let sides = (1..=SIDES).take_while(|side| side * BLOCK - BLOCK / 2 < word);
         let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
-        let (bounds, first) = self.bounds(shot, middle - BLOCK / 2 - SIDES * BLOCK, detection.count);
+        let (bounds, first) =
+            self.bounds(shot, middle - BLOCK / 2 - SIDES * BLOCK, detection.count);
         let may_hold = |side: &i64| {
             let begin = (side - BLOCK / 2 - first) / COARSE as i64;
             let among = below(begin + BLOCK / COARSE as i64 + 1, bounds, true);
@@ -150,9 +151,11 @@ impl Band<'_> {
     /// many of the marks at least as are found at any of the lags.
     fn bounds(&mut self, shot: usize, lag: i64, least: u32) -> ([u64; NARROW], i64) {
         self.lay_out(shot);
-        let fired = self.sent.fired[shot];
-        let (picture, origin) = self.field.picture();
-        let bit = (fired + lag - origin).div_euclid(COARSE as i64).max(0);
+        let (fired, seen_at_once) = (self.sent.fired[shot], BLOCK * COARSE as i64);
+        let from = fired + lag;
+        let to = from + seen_at_once + self.sent.length();
+        let (picture, origin) = self.field.picture(from, to);
+        let bit = (from - origin).div_euclid(COARSE as i64).max(0);
         self.in_picture.clear();
         self.in_picture.extend(self.marks.iter().map(|mark| mark / COARSE as u32));
         let farthest = self.in_picture.last().copied().unwrap_or(0);
@@ -170,7 +173,8 @@ impl Band<'_> {
         }
         let words = self.words_about(shot, sent.fired[shot] + detection.lag);
         let (counts, reach) = (sent.in_bits(shot, &words), sent.reach());
-        let lags = (-bits..).zip(counts).map(|(away, count)| (count, detection.lag + away * length));
+        let lags =
+            (-bits..).zip(counts).map(|(away, count)| (count, detection.lag + away * length));
         let higher = lags.filter(|(count, lag)| *count > detection.count && reach.contains(lag));
         let (_, lag) = higher.max_by_key(|(count, lag)| (*count, -lag))?;
         self.best_in_block(shot, lag)
