@@ -35,7 +35,8 @@ pub(super) struct Field<'a> {
 }
 
 /// Where marks count as found, one bit for every eight ticks from the beginning on: lit where any of the
-/// sixteen from the first of them on is. Made where it is looked at.
+/// sixteen from the first of them on is, so that a mark is met by the bit of its place whichever of eight lags
+/// it comes after. Made where it is looked at.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     words: Vec<u64>,
@@ -276,5 +277,36 @@ impl<'a> Field<'a> {
     /// Ticks that are counted together.
     pub fn cell(&self) -> i64 {
         self.cell
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_picture_shows_sixteen_ticks_with_each_bit(
+            ticks in proptest::collection::btree_set(0_u32..90_000, 0..300),
+            width in 1..9_u32,
+            spans in proptest::collection::vec((0..40_000_i64, 1..50_000_i64), 1..4),
+        ) {
+            let ticks: Vec<u32> = ticks.into_iter().collect();
+            let mut field = Field::new(&ticks, width, (0, 90_000), 4096, Memory::default());
+            field.cover(0..90_000);
+            let lit: Vec<bool> = (0..90_016).map(|tick| field.lit().has(tick)).collect();
+            for (from, length) in spans {
+                let to = (from + length).min(89_000);
+                let (picture, origin) = field.picture(from, to);
+                prop_assert!(origin <= 0);
+                for bit in (from - origin) / 8..=(to - origin) / 8 {
+                    let first = origin + 8 * bit;
+                    let any = (first.max(0)..first + 16).any(|tick| lit[tick as usize]);
+                    let shown = picture[(bit / 64) as usize] >> (bit % 64) & 1 == 1;
+                    prop_assert_eq!(shown, any, "{} from {}", bit, origin);
+                }
+            }
+        }
     }
 }

@@ -215,6 +215,12 @@ mod tests {
             let expected =
                 (0..64).fold(0, |word, bit| word | u64::from(timeline.has(tick + bit)) << bit);
             assert_eq!(timeline.from(tick), expected, "from {tick}");
+            for end in
+                [tick - 1, tick, tick + 1, tick + 5, tick + 63, tick + 64, tick + 65, tick + 300]
+            {
+                let next = (tick..end).find(|tick| timeline.has(*tick));
+                assert_eq!(timeline.next_lit(tick..end), next, "from {tick} to {end}");
+            }
         }
     }
 }

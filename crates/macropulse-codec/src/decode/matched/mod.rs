@@ -186,13 +186,13 @@ impl<'a> Band<'a> {
             [of_lags, of_bits, (1.0, BY_CHANCE), (1.0, AT_AN_END), (2.0 * 64.0 * bits, 0.5)]
                 .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
         let mut remembered = memory.thresholds;
-        let [thresholds, bit_thresholds, once_thresholds, end_thresholds, word_thresholds] = wanted
-            .map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
+        let [mut thresholds, bit_thresholds, once_thresholds, end_thresholds, word_thresholds] =
+            wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
-        let mut thresholds = thresholds;
-        let fewest = fewest_ticks(sent, &mut thresholds);
+        let cell = (sent.length() / CELLS).max(64);
+        let fewest = fewest_ticks(sent, cell, &mut thresholds);
         let open = match &cancelled {
             Some(cancelled) if cancelled.residual.is_empty() => Open::None,
             Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
@@ -213,7 +213,6 @@ impl<'a> Band<'a> {
                 last_beside(rows, columns),
             ),
         };
-        let cell = sent.length() / CELLS;
         memory.search.forget();
         Self {
             field: Field::new(ticks, sent.width, extent, cell, memory.field),
@@ -463,12 +462,13 @@ impl<'a> Band<'a> {
 /// or a fifth more.
 const CELLS: i64 = 4;
 
-/// Fewest ticks in which a shot may be believed to be: those of the lightest one, alone in its gate.
-fn fewest_ticks(sent: &Sent, thresholds: &mut Thresholds) -> usize {
+/// Fewest ticks in which a shot may be believed to be: those of the lightest one, alone in its gate. Ticks are
+/// counted in stretches no longer than `cell`.
+fn fewest_ticks(sent: &Sent, cell: i64, thresholds: &mut Thresholds) -> usize {
     let Some(weight) = sent.lightest() else { return 1 };
     // No stretch of cells about a gate is longer.
     let gate = sent.gate();
-    let longest = gate.end - gate.start + 2 * sent.length();
+    let longest = gate.end - gate.start + sent.length() + 2 * cell;
     let density = f64::from(sent.width) / longest as f64;
     sent.ticks_of_any(thresholds.least(weight, density)).max(1) as usize
 }

@@ -1,5 +1,7 @@
 //! The matched receiver against plain code: every lag, every mark, one by one.
 
+mod shortcuts;
+
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rand_chacha::ChaCha8Rng;

@@ -1,0 +1,77 @@
+//! What is passed by would not have been found.
+
+use super::*;
+use crate::decode::matched::Detection;
+use crate::decode::matched::track::BLOCK;
+
+proptest! {
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(60) })]
+
+    /// The highest peak beside a block is that of every lag with every mark, whichever blocks are refused.
+    #[test]
+    fn the_highest_peak_beside_a_block_is_the_exhaustive_one(
+        book in 0..8_usize,
+        missed in 0..80_u32,
+        false_ticks in prop_oneof![Just(0), 1..120_u32],
+        jitter in prop_oneof![Just(0.0), 0.1..3.0_f64],
+        scale in 1..9_u32,
+        count in 0..30_u32,
+        middle in 100..4900_i64,
+        seed in 0..u64::MAX,
+    ) {
+        let sensor = Sensor::crowded(books().remove(book));
+        let log = sensor.log(12);
+        let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
+        let (ticks, _) = sensor.ticks(&log, weather, seed);
+        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
+        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let mut band = Band::new(&sent, (&ticks.tick, None), Memory::default());
+        band.field.cover(Band::span(&sent, 0..12));
+        for shot in 4..8 {
+            let marks = counter(&sent, &ticks.tick, shot);
+            let sides = (1..4).take_while(|side| side * BLOCK - BLOCK / 2 < sent.bit_length());
+            let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
+            let lags = sides.flat_map(|side| side - BLOCK / 2..side + BLOCK / 2);
+            let lags = lags.filter(|lag| sent.reach().contains(lag));
+            let highest = lags.map(|lag| (marks(lag), -lag)).max();
+            let expected = highest.filter(|highest| *highest > (count, -middle));
+            let found = band.beside(shot, middle, Detection::at(middle, count));
+            prop_assert_eq!(found.map(|found| (found.count, -found.lag)), expected);
+        }
+    }
+}
+
+/// A receiver that passes nothing by gives the same returns: N = 96 000 shots, seeds 1 to 1000, of which 19 in
+/// 20 marks are missed or more, with few false ticks or none. Negative control: one that asks for two
+/// ticks more than the fewest that are believed passes some by.
+#[test]
+fn shots_that_are_too_dark_to_be_found_are_passed_by() {
+    let (mut passed, mut lost, mut all) = (0, 0, 0);
+    for seed in 1..=1000 {
+        let book = books().remove(seed as usize % 7);
+        let sensor = Sensor { period: 2500, ..Sensor::crowded(book) };
+        let log = sensor.log(96);
+        let missed = 95 + seed as u32 % 6;
+        let weather = Weather { missed, ..CLEAR };
+        let (mut ticks, _) = sensor.ticks(&log, weather, seed);
+        // Of those that are left all but one in four or in sixteen.
+        let kept = if seed % 2 == 0 { 4 } else { 16 };
+        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        ticks.tick.retain(|_| chance.next_u32().is_multiple_of(kept));
+        let receiver = sensor.receiver(if seed % 3 == 0 { 0.6 } else { 0.0 });
+        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let decoded = |more: Option<usize>| {
+            let mut band = Band::new(&sent, (&ticks.tick, None), Memory::default());
+            band.at_hand = Band::span(&sent, 0..96);
+            band.fewest = more.map_or(1, |more| band.fewest + more);
+            let is_dark = band.is_too_dark();
+            (is_dark, band.decode().0)
+        };
+        let (whole, passing, hasty) = (decoded(None), decoded(Some(0)), decoded(Some(2)));
+        assert_eq!(passing.1, whole.1, "{seed}");
+        passed += u32::from(passing.0 && !whole.0);
+        lost += whole.1.len() - hasty.1.len();
+        all += whole.1.len();
+    }
+    assert!(passed > 50 && lost > 50, "{passed} passed by, {lost} of {all} lost in haste");
+}
