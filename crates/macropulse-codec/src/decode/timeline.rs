@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::kernels::{
-    Pattern, are_lit, dark_before, lay, light_up, lit_in, lit_in_all, lit_in_each, look_ahead,
-    put_out,
+    Pattern, are_lit, dark_before, lay, light_up, lit_in, lit_in_all, lit_in_any, lit_in_each,
+    look_ahead, put_out,
 };
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
@@ -177,7 +177,13 @@ impl Timeline {
         first.map_or(0, |first| lit_in_all(&self.words, first, after, pattern))
     }
 
-    /// The same if it begins so many ticks `after` `tick`, for each of these; put into `counts`.
+    /// How many ticks of `pattern` are lit at one at least of the places so many ticks `after` `tick` where it
+    /// may begin.
+    pub fn lit_in_any(&self, tick: i64, after: &[u32], pattern: &Pattern) -> u32 {
+        lit_in_any(&self.words, (tick - self.origin) as usize, after, pattern)
+    }
+
+    /// As [`Self::lit_in`] if it begins so many ticks `after` `tick`, for each of these; put into `counts`.
     pub fn lit_in_each(&self, tick: i64, after: &[u32], pattern: &Pattern, counts: &mut Vec<u32>) {
         counts.clear();
         counts.resize(after.len(), 0);

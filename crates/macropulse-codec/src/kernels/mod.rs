@@ -28,6 +28,7 @@ pub(crate) use correlate::{Counts, NARROW, WIDE, and, any_behind, is_dark, or};
 pub(crate) use lay::{count_each, dark_before, lay, lit_after};
 pub(crate) use marks::{WordTicks, begin_with, places_of};
 pub(crate) use pattern::{
-    Pattern, are_lit, light_up, lit_in, lit_in_all, lit_in_each, look_ahead, parted, put_out,
+    Pattern, are_lit, light_up, lit_in, lit_in_all, lit_in_any, lit_in_each, look_ahead, parted,
+    put_out,
 };
 pub(crate) use waveform::{LAGS, filter, lower, standing_out};

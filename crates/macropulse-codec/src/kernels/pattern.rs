@@ -28,6 +28,12 @@ impl Pattern {
         Self { words, blocks }
     }
 
+    /// The blocks that hold its bits where it begins with a word.
+    fn own(&self) -> &[[u64; LANES]] {
+        let (blocks, _) = self.words[1..].as_chunks();
+        &blocks[..self.blocks]
+    }
+
     /// Words that have bits of the pattern, wherever in the first one of them it begins.
     pub(crate) fn reach(&self) -> usize {
         self.words.len() - 1
@@ -68,13 +74,34 @@ on_every_level! {
     }
 }
 
+on_every_level! {
+    /// How many bits of `pattern` are lit in `words` wherever it begins, so many bits `after` bit `first`,
+    /// modulo 2⁶⁴: any of these. What reaches beyond the end is dark.
+    pub(crate) fn lit_in_any(words: &[u64], first: usize, after: &[u32], pattern: &Pattern) -> u32 {
+        let mut sums = [0; LANES];
+        for (block, mask) in pattern.own().iter().enumerate() {
+            let mut any = [0; LANES];
+            for after in after {
+                let (begin, shift) = parts(first.wrapping_add(*after as usize));
+                let lit = begun(words, begin + block * LANES, shift);
+                for lane in 0..LANES {
+                    any[lane] |= lit[lane];
+                }
+            }
+            for lane in 0..LANES {
+                sums[lane] += u64::from((any[lane] & mask[lane]).count_ones());
+            }
+        }
+        sums.iter().sum::<u64>() as u32
+    }
+}
+
 /// Adds to `sums` how many bits of `pattern`, begun at bit `first`, are lit in `words`, by their place
 /// in a block.
 #[inline(always)]
 fn add_lit(sums: &mut [u64; LANES], words: &[u64], first: usize, pattern: &Pattern) {
     let (begin, shift) = parts(first);
-    let (blocks, _) = pattern.words[1..].as_chunks::<LANES>();
-    for (block, mask) in blocks.iter().take(pattern.blocks).enumerate() {
+    for (block, mask) in pattern.own().iter().enumerate() {
         let words = begun(words, begin + block * LANES, shift);
         for lane in 0..LANES {
             sums[lane] += u64::from((words[lane] & mask[lane]).count_ones());
@@ -129,9 +156,8 @@ on_every_level! {
         // A closure would not be compiled for the level.
         for after in after {
             let (begin, shift) = parts(first.wrapping_add(*after as usize));
-            let (blocks, _) = pattern.words[1..].as_chunks::<LANES>();
             let mut dark = 0;
-            for (block, mask) in blocks.iter().take(pattern.blocks).enumerate() {
+            for (block, mask) in pattern.own().iter().enumerate() {
                 let words = begun(words, begin + block * LANES, shift);
                 for lane in 0..LANES {
                     dark |= mask[lane] & !words[lane];
@@ -315,6 +341,15 @@ mod tests {
                 lit_in_each(&words, first, &after, &pattern, &mut counts);
                 (counts, lit_in_all(&words, first, &after, &pattern))
             });
+            let begins = after.map(|after| first + after as usize);
+            let is_lit = |bit: &&usize| {
+                begins.iter().any(|begin| lit.contains(&(begin + **bit)))
+            };
+            let of_pattern: BTreeSet<usize> = bits.iter().flat_map(|b| *b..b + width).collect();
+            let expected = of_pattern.iter().filter(is_lit).count() as u32;
+            for (level, any) in at_each_level(|| lit_in_any(&words, first, &after, &pattern)) {
+                prop_assert_eq!(any, expected, "{:?}", level);
+            }
             let mut full = words.clone();
             light_up(&mut full, first, &after, &pattern);
             let is_all = first + 700 + bits.last().map_or(0, |last| last + width) <= 64 * words.len();

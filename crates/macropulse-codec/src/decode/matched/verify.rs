@@ -337,11 +337,8 @@ impl Band<'_> {
         if bits < 2 {
             return true;
         }
-        let start = sent.fired[shot] + detection.lag;
-        let lit = self.field.lit();
-        let is_found =
-            |mark: &&u32| sent.lit_from(shot, start).any(|bit| lit.has(bit + i64::from(**mark)));
-        let found = sent.bits(shot).marks.iter().filter(is_found).count() as u32;
+        let (start, lit_bits) = (sent.fired[shot] + detection.lag, sent.bits_that_are(true, shot));
+        let found = self.field.lit().lit_in_any(start, lit_bits, &sent.bits(shot).pattern);
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
         let (word, left_out) = (sent.in_word(shot), (1.0 - share).powi(bits as i32));
         word - found < self.once_thresholds.least(word, left_out)
