@@ -28,6 +28,8 @@ pub(super) struct Field<'a> {
     begin: i64,
     /// Ticks of the list before each cell, and before their end.
     before: Vec<u32>,
+    /// Ticks of the residual in each cell, or [`UNKNOWN`].
+    left: Vec<u32>,
     seen: Timeline,
     lit: Timeline,
     residual: Timeline,
@@ -74,6 +76,9 @@ impl Picture {
     }
 }
 
+/// Of a cell in which ticks were cancelled since they were counted.
+const UNKNOWN: u32 = u32::MAX;
+
 /// Which ticks are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Source {
@@ -107,8 +112,21 @@ impl<'a> Field<'a> {
         seen.begin(begin, length);
         residual.begin(begin, length);
         lit.begin(begin, if width > 1 { length } else { 0 });
-        let before = vec![laid as u32];
-        Self { ticks, laid, width, cell, cell_bits, begin, before, seen, lit, residual, picture }
+        let (before, left) = (vec![laid as u32], Vec::new());
+        Self {
+            ticks,
+            laid,
+            width,
+            cell,
+            cell_bits,
+            begin,
+            before,
+            left,
+            seen,
+            lit,
+            residual,
+            picture,
+        }
     }
 
     /// Gives its memory back.
@@ -136,14 +154,14 @@ impl<'a> Field<'a> {
             let end = from + cells * self.cell;
             let laid = self.seen.lay_anew(&self.ticks[self.laid..], from..end);
             let words = self.seen.words(&(from..end));
-            let known = self.before.len();
-            self.before.resize(known + cells as usize, 0);
-            count_each(words, (self.cell / 64) as usize, &mut self.before[known..]);
+            let known = self.left.len();
+            self.left.resize(known + cells as usize, 0);
+            count_each(words, (self.cell / 64) as usize, &mut self.left[known..]);
             let mut before = self.laid as u32;
-            for count in &mut self.before[known..] {
+            self.before.extend(self.left[known..].iter().map(|count| {
                 before += *count;
-                *count = before;
-            }
+                before
+            }));
             self.laid += laid;
             self.residual.words_mut(&(from..end)).copy_from_slice(words);
             if self.width > 1 {
@@ -160,12 +178,14 @@ impl<'a> Field<'a> {
         if self.end() > origin {
             let passed = ((origin - self.begin) / self.cell) as usize;
             self.before.drain(..passed);
+            self.left.drain(..passed);
         } else {
             // Ticks between are asked for by nobody.
             let ticks = &self.ticks[self.laid..];
             self.laid += ticks.partition_point(|&tick| i64::from(tick) < origin);
             self.before.clear();
             self.before.push(self.laid as u32);
+            self.left.clear();
         }
         self.begin = origin;
     }
@@ -205,6 +225,11 @@ impl<'a> Field<'a> {
     /// Cancels the ticks of `pattern`, begun so many ticks `after` `start`, for each of these, ascending.
     pub fn cancel(&mut self, start: i64, after: &[u32], pattern: &Pattern) {
         self.residual.put_out(start, after, pattern);
+        if let (Some(first), Some(last)) = (after.first(), after.last()) {
+            let end = start + i64::from(*last) + 64 * pattern.reach() as i64;
+            let cells = self.cells(&(start + i64::from(*first)..end));
+            self.left[cells].fill(UNKNOWN);
+        }
     }
 
     /// Where marks count as found in the `source`, for all of `span`; made in `memory` where need be.
@@ -251,17 +276,22 @@ impl<'a> Field<'a> {
         (f64::from(self.width) * f64::from(all.saturating_sub(ticks)) / places).min(1.0)
     }
 
-    /// Makes `counts` the residual ticks in each cell about `span`, and tells where the first one begins.
-    pub fn residual_cells(&self, span: &Range<i64>, counts: &mut Vec<u32>) -> i64 {
+    /// The residual ticks in each cell about `span`, and where the first one begins.
+    pub fn residual_cells(&mut self, span: &Range<i64>) -> (&[u32], i64) {
         let cells = self.cells(span);
         let at = |cell: usize| self.begin + self.cell * cell as i64;
-        let begin = at(cells.start).max(self.residual.origin());
-        let words = self.residual.words(&(begin..at(cells.end)));
-        let each = (self.cell / 64) as usize;
-        counts.clear();
-        counts.resize(words.len() / each, 0);
-        count_each(words, each, counts);
-        begin
+        let mut end = cells.start;
+        for known in self.left[cells.clone()]
+            .chunk_by_mut(|one, next| (*one == UNKNOWN) == (*next == UNKNOWN))
+        {
+            let first = end;
+            end += known.len();
+            if known[0] == UNKNOWN {
+                let words = self.residual.words(&(at(first)..at(end)));
+                count_each(words, (self.cell / 64) as usize, known);
+            }
+        }
+        (&self.left[cells.clone()], at(cells.start))
     }
 
     /// All that is at hand.

@@ -273,8 +273,6 @@ pub(super) struct Leftover<'a> {
     together: usize,
     /// Of every [`PER_GROUP`] stretches.
     groups: Vec<Group>,
-    /// Memory for cells that are counted anew.
-    counts: Vec<u32>,
 }
 
 /// A search takes hardly any time if so many blocks of lags, each with all its marks, are counted: at
@@ -290,25 +288,26 @@ const UNEVEN: f64 = 9.0;
 
 impl<'a> Leftover<'a> {
     /// Of the ticks at hand from tick `first` on.
-    pub fn new(sent: &'a Sent<'a>, field: &Field, first: i64) -> Self {
-        let mut cells = Vec::new();
-        let begin = field.residual_cells(&(first..field.extent().end), &mut cells);
+    pub fn new(sent: &'a Sent<'a>, field: &mut Field, first: i64) -> Self {
+        let all = first..field.extent().end;
+        let (cells, begin) = field.residual_cells(&all);
+        let cells = cells.to_vec();
         let together = field.stretch(sent.length() + i64::from(sent.width));
         let stretches = vec![0; cells.len()];
         let (all, groups) = (0..cells.len(), vec![Group::NONE; cells.len().div_ceil(PER_GROUP)]);
-        let (cell, counts) = (field.cell(), Vec::new());
-        let mut leftover = Self { sent, cells, stretches, groups, begin, cell, together, counts };
+        let cell = field.cell();
+        let mut leftover = Self { sent, cells, stretches, groups, begin, cell, together };
         leftover.sum(all);
         leftover
     }
 
     /// Counts anew what is left in `light`.
-    pub fn renew(&mut self, field: &Field, light: &Range<i64>) {
-        let begin = field.residual_cells(light, &mut self.counts);
+    pub fn renew(&mut self, field: &mut Field, light: &Range<i64>) {
+        let (counts, begin) = field.residual_cells(light);
         let first = ((begin - self.begin) / self.cell) as usize;
         let known = self.cells.get_mut(first..).unwrap_or_default();
-        let end = first + self.counts.len().min(known.len());
-        known.iter_mut().zip(&self.counts).for_each(|(known, count)| *known = *count);
+        let end = first + counts.len().min(known.len());
+        known.iter_mut().zip(counts).for_each(|(known, count)| *known = *count);
         self.sum((first + 1).saturating_sub(self.together)..end);
     }
 

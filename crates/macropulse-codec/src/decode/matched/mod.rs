@@ -373,14 +373,14 @@ impl<'a> Band<'a> {
         let lit_bits = self.sent.bits_that_are(true, shot);
         self.field.cancel(start, lit_bits, &self.sent.bits(shot).cancelled);
         if let Some(leftover) = &mut self.leftover {
-            leftover.renew(&self.field, &self.sent.light(shot, lag));
+            leftover.renew(&mut self.field, &self.sent.light(shot, lag));
         }
     }
 
     /// What is left over of the ticks at hand.
     fn leftover(&mut self) -> &mut Leftover<'a> {
         let first = self.at_hand.start;
-        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &self.field, first))
+        self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &mut self.field, first))
     }
 
     /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of
