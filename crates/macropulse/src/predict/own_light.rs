@@ -85,13 +85,14 @@ impl OwnLight {
         marks: impl Fn(usize) -> Vec<i64>,
     ) -> Self {
         let period = design.scan.shortest_period();
-        let lasts = |marks: Vec<i64>| {
+        let lasts = |marks: &Vec<i64>| {
             marks.last().zip(marks.first()).map_or(0, |(last, first)| last - first)
         };
-        let longest = (0..SHOTS).map(|shot| lasts(marks(shot))).max().unwrap_or(0);
+        let mut shots: Vec<Vec<i64>> = (0..SHOTS).map(&marks).collect();
+        let longest = shots.iter().map(lasts).max().unwrap_or(0);
         let macropulse = s_from_fs(longest * design.tdc.tick_fs);
         let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
-        let mut shots: Vec<Vec<i64>> = (0..SHOTS + 2 * around).map(marks).collect();
+        shots.extend((SHOTS..SHOTS + 2 * around).map(marks));
         let over = blind.map_or(1, |blind| blind.behind + 1);
         let mut marks: Vec<i64> = shots.iter().flatten().copied().collect();
         marks.sort_unstable();

@@ -33,7 +33,7 @@ pub struct Score {
     /// judged against all surfaces along its beam.
     #[serde(default)]
     pub further: [u64; 6],
-    /// Wrong and false returns that light of other lidars has made, as [`ghosts`] has it.
+    /// Wrong and false returns that light of other lidars has made, as [`ghosts()`] has it.
     pub ghosts: u64,
 }
 
