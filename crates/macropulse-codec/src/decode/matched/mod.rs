@@ -192,11 +192,15 @@ impl<'a> Band<'a> {
                 None => wanted,
             });
         let cell = (sent.length() / CELLS).max(64);
-        let fewest = fewest_ticks(sent, cell, &mut thresholds);
         let open = match &cancelled {
             Some(cancelled) if cancelled.residual.is_empty() => Open::None,
             Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
             None => Open::All,
+        };
+        let fewest = match open {
+            // Nobody asks.
+            Open::None => 1,
+            _ => fewest_ticks(sent, cell, &mut thresholds),
         };
         let Cancelled { detections: mut found, again: further, .. } = cancelled.unwrap_or_default();
         found.resize(sent.fired.len(), None);
