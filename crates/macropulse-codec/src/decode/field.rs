@@ -65,9 +65,8 @@ impl Picture {
             }
             let begin = segment * SEGMENT;
             coarse(words.get(COARSE * begin..).unwrap_or_default(), 0, &mut self.fine);
-            let (made, [next]) = (&self.fine[..SEGMENT], [self.fine[SEGMENT]]);
-            look_ahead(made, &mut self.words[begin..begin + SEGMENT], 1);
-            self.words[begin + SEGMENT - 1] |= next << 63;
+            look_ahead(&self.fine[..SEGMENT], &mut self.words[begin..begin + SEGMENT], 1);
+            self.words[begin + SEGMENT - 1] |= self.fine[SEGMENT] << 63;
         }
     }
 
@@ -105,8 +104,7 @@ impl<'a> Field<'a> {
         let cell = 1 << cell_bits;
         let begin = (begin - MARGIN).div_euclid(cell) * cell;
         let laid = ticks.partition_point(|&tick| i64::from(tick) < begin);
-        let ([mut seen, mut lit, mut residual], mut picture) = memory;
-        picture.forget();
+        let ([mut seen, mut lit, mut residual], picture) = memory;
         // Twice as long as need be, so that it is moved less often.
         let length = 2 * (length + 3 * MARGIN + 2 * cell + i64::from(width));
         seen.begin(begin, length);
@@ -137,6 +135,15 @@ impl<'a> Field<'a> {
     /// Where the ticks that are laid down end.
     fn end(&self) -> i64 {
         self.begin + self.cell * (self.before.len() as i64 - 1)
+    }
+
+    /// Whether so many `ticks`, one at least, come in a shorter time than `within` anywhere in `span`, be it laid
+    /// down or not.
+    pub fn come_together(&self, ticks: usize, span: &Range<i64>, within: i64) -> bool {
+        let before = |end: i64| self.ticks.partition_point(|tick| i64::from(*tick) < end);
+        let last = ticks - 1;
+        let is_short = |some: &[u32]| i64::from(some[last] - some[0]) < within;
+        self.ticks[before(span.start)..before(span.end)].windows(ticks).any(is_short)
     }
 
     /// Lays down the ticks of `span`, and forgets what was before. A span never begins before the one
@@ -206,9 +213,10 @@ impl<'a> Field<'a> {
     /// The picture of where marks count as found, from tick `from` to `to` at least, and the tick of its first bit.
     pub fn picture(&mut self, from: i64, to: i64) -> (&[u64], i64) {
         let extent = self.extent();
-        let lit = if self.width == 1 { &self.seen } else { &self.lit };
         let bit = |tick: i64| (tick - extent.start).max(0) as usize / COARSE;
-        self.picture.make(lit.words(&extent), (bit(from), bit(to)));
+        let mut picture = std::mem::take(&mut self.picture);
+        picture.make(self.lit().words(&extent), (bit(from), bit(to)));
+        self.picture = picture;
         (&self.picture.words, extent.start)
     }
 

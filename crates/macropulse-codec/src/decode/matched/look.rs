@@ -109,9 +109,20 @@ impl Band<'_> {
 
     /// Notes that none of a block of shots can be found.
     pub(super) fn pass_by(&mut self, block: Range<usize>) {
+        self.look_along(block, |_, _, _| false);
+    }
+
+    /// Does for each shot of a block that is sought what `finds` it, and notes whether it did where the shot was
+    /// due to be searched for.
+    fn look_along(
+        &mut self,
+        block: Range<usize>,
+        finds: impl Fn(&mut Self, usize, Option<Pass>) -> bool,
+    ) {
         for shot in block {
-            let is_found = !self.is_sought(shot);
-            if is_found || self.searched.is_due(shot) {
+            let pass = self.searched.is_due(shot).then_some(Pass::First);
+            let is_found = !self.is_sought(shot) || finds(self, shot, pass);
+            if is_found || pass.is_some() {
                 self.searched.note(shot, is_found, 1.0);
             }
         }
@@ -120,13 +131,7 @@ impl Band<'_> {
     /// Tracks the shots of a block from both sides, and acquires those that are no fainter than the
     /// others but were not expected where they are.
     fn look_where_expected(&mut self, block: Range<usize>) {
-        for shot in block.clone() {
-            let pass = self.searched.is_due(shot).then_some(Pass::First);
-            let is_found = !self.is_sought(shot) || self.track_or_acquire(shot, pass);
-            if is_found || pass.is_some() {
-                self.searched.note(shot, is_found, 1.0);
-            }
-        }
+        self.look_along(block.clone(), Self::track_or_acquire);
         for shot in block.clone().rev() {
             if self.is_sought(shot) {
                 self.track_or_acquire(shot, None);

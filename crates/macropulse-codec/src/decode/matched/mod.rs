@@ -145,8 +145,7 @@ struct Band<'a> {
     usual: Usual,
     /// The time of which all light is at hand.
     at_hand: Range<i64>,
-    /// All ticks of the band, sorted, and fewest that make a return.
-    ticks: &'a [u32],
+    /// Fewest ticks that make a return.
     fewest: usize,
     /// What is left over of it, once that is asked for.
     leftover: Option<Leftover<'a>>,
@@ -191,16 +190,10 @@ impl<'a> Band<'a> {
                 Some(known) => remembered.swap_remove(known),
                 None => wanted,
             });
-        let cell = (sent.length() / CELLS).max(64);
         let open = match &cancelled {
             Some(cancelled) if cancelled.residual.is_empty() => Open::None,
             Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
             None => Open::All,
-        };
-        let fewest = match open {
-            // Nobody asks.
-            Open::None => 1,
-            _ => fewest_ticks(sent, cell, &mut thresholds),
         };
         let Cancelled { detections: mut found, again: further, .. } = cancelled.unwrap_or_default();
         found.resize(sent.fired.len(), None);
@@ -212,14 +205,20 @@ impl<'a> Band<'a> {
         let (extent, above, left) = match open {
             Open::None => ((0, 0), vec![], vec![]),
             _ => (
-                (begin, (GATES_PER_BLOCK + 2) * light + 4 * sent.length()),
+                (begin, (GATES_PER_BLOCK + 2) * light + 3 * sent.length()),
                 last_beside(columns, rows),
                 last_beside(rows, columns),
             ),
         };
+        let field = Field::new(ticks, sent.width, extent, sent.length() / CELLS, memory.field);
+        let fewest = match open {
+            // Nobody asks.
+            Open::None => 1,
+            _ => fewest_ticks(sent, field.cell(), &mut thresholds),
+        };
         memory.search.forget();
         Self {
-            field: Field::new(ticks, sent.width, extent, cell, memory.field),
+            field,
             open,
             above,
             left,
@@ -233,7 +232,6 @@ impl<'a> Band<'a> {
             word_thresholds,
             usual: Usual::new(),
             at_hand: 0..0,
-            ticks,
             fewest,
             leftover: None,
             rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
@@ -304,12 +302,8 @@ impl<'a> Band<'a> {
 
     /// Whether no macropulse of the time at hand can have as many ticks as the fewest that are believed.
     fn is_too_dark(&self) -> bool {
-        let before = |end: i64| self.ticks.partition_point(|tick| i64::from(*tick) < end);
-        let ticks = &self.ticks[before(self.at_hand.start)..before(self.at_hand.end)];
         let light = self.sent.light(0, 0);
-        let is_long =
-            |some: &[u32]| i64::from(some[some.len() - 1] - some[0]) >= light.end - light.start;
-        ticks.windows(self.fewest).all(is_long)
+        !self.field.come_together(self.fewest, &self.at_hand, light.end - light.start)
     }
 
     /// The end of the block of shots that begins with `first`.
@@ -325,7 +319,7 @@ impl<'a> Band<'a> {
         let first = sent.arrival(block.start);
         // Shots that are settled with the block are as old as the light of its first one, and their
         // light is compared with bits a macropulse before it, and one behind it.
-        first.start - (first.end - first.start) - sent.length()..last.end + 2 * sent.length()
+        first.start - (first.end - first.start) - sent.length()..last.end + sent.length()
     }
 
     /// The first shot of which light may still come when that of `shot` does.
@@ -467,7 +461,7 @@ impl<'a> Band<'a> {
 const CELLS: i64 = 4;
 
 /// Fewest ticks in which a shot may be believed to be: those of the lightest one, alone in its gate. Ticks are
-/// counted in stretches no longer than `cell`.
+/// counted `cell` by cell.
 fn fewest_ticks(sent: &Sent, cell: i64, thresholds: &mut Thresholds) -> usize {
     let Some(weight) = sent.lightest() else { return 1 };
     // No stretch of cells about a gate is longer.

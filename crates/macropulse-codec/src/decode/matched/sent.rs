@@ -62,8 +62,8 @@ pub(super) struct Words {
     /// Ticks from the start of a macropulse to each bit of it that is dark, and to each that is lit, by
     /// label; as above.
     of_label: Vec<OnceCell<[Vec<u32>; 2]>>,
-    /// Most marks of any that one tick may count for.
-    per_tick: u32,
+    /// Most marks of each that one tick may count for.
+    per_tick: Vec<u32>,
 }
 
 impl Words {
@@ -89,7 +89,7 @@ impl Words {
             let of_label = vec![OnceCell::new(); labels as usize];
             let crowding = (0..words)
                 .map(|word| crowding(codebook.word(word as u16), width.div_ceil(scale.max(1))));
-            let per_tick = crowding.max().unwrap_or(1);
+            let per_tick = crowding.collect();
             self = Self { of, first, first_bits, ticks, bits: Vec::new(), of_label, per_tick };
             self.bits.resize_with(words, OnceCell::new);
         }
@@ -111,8 +111,6 @@ pub(super) struct Bits {
     /// The first marks and the last ones, no farther apart than the lags beside a block, and how many
     /// these are.
     pub ends: [(u32, Pattern); 2],
-    /// Most marks that one tick may count for.
-    pub per_tick: u32,
     /// Marks that a tick may count for besides an earlier one.
     pub shared: u32,
     /// How far other marks of the word are from a mark, and from what share of them, as far as their
@@ -186,7 +184,6 @@ impl<'a> Sent<'a> {
                 of_end(&|mark| last.is_some_and(|last| i64::from(last - mark) < NEAREST_SIDE)),
             ];
             Bits {
-                per_tick: crowding(self.codebook.word(word), chips),
                 shared: shared(self.codebook.word(word), chips),
                 ends,
                 pattern: pattern(1),
@@ -307,9 +304,10 @@ impl<'a> Sent<'a> {
 
     /// Fewest ticks that can be so many marks of `shot`.
     pub fn ticks_of(&self, shot: usize, marks: u32) -> u32 {
-        let bits = self.bits(shot);
-        let alone = marks.saturating_sub(bits.shared * self.lit_bits(shot).len() as u32);
-        alone.max(marks.div_ceil(bits.per_tick))
+        let (shared, per_tick) =
+            (self.bits(shot).shared, self.words.per_tick[usize::from(self.log.word[shot])]);
+        let alone = marks.saturating_sub(shared * self.lit_bits(shot).len() as u32);
+        alone.max(marks.div_ceil(per_tick))
     }
 
     /// Fewest marks of a shot that has any.
@@ -319,7 +317,8 @@ impl<'a> Sent<'a> {
 
     /// Fewest ticks that can be so many marks of any shot.
     pub fn ticks_of_any(&self, marks: u32) -> u32 {
-        marks.div_ceil(self.words.per_tick.max(1))
+        let per_tick = self.words.per_tick.iter().copied().max();
+        marks.div_ceil(per_tick.unwrap_or(1).max(1))
     }
 
     /// Whether every shot is searched for in all of its gate.

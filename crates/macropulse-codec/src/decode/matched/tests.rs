@@ -172,6 +172,42 @@ impl Sensor {
     }
 }
 
+/// Twelve shots through rough air at a crowded sensor, and the receiver that looks at them.
+struct Crowd {
+    sensor: Sensor,
+    log: ShotLog,
+    ticks: Ticks,
+    surfaces: Vec<Vec<u32>>,
+    receiver: Receiver,
+}
+
+impl Crowd {
+    fn new(
+        book: usize,
+        (missed, false_ticks): (u32, u32),
+        (jitter, scale): (f64, u32),
+        seed: u64,
+    ) -> Self {
+        let sensor = Sensor::crowded(books().remove(book));
+        let log = sensor.log(12);
+        let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
+        let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
+        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
+        Self { sensor, log, ticks, surfaces, receiver }
+    }
+
+    fn sent(&self) -> Sent<'_> {
+        Sent::new(&self.receiver, (&self.sensor.book, &self.log), (0, Words::default()))
+    }
+
+    /// With all ticks at hand.
+    fn band<'a>(&'a self, sent: &'a Sent<'a>) -> Band<'a> {
+        let mut band = Band::new(sent, (&self.ticks.tick, None), Memory::default());
+        band.field.cover(Band::span(sent, 0..12));
+        band
+    }
+}
+
 /// The lit chips of `shot`.
 fn marks_of<'a>(sent: &Sent<'a>, shot: usize) -> &'a [u16] {
     sent.codebook.marks(sent.log.label[shot], sent.log.word[shot])
@@ -250,14 +286,9 @@ proptest! {
         from in 0..3000_i64,
         seed in 0..u64::MAX,
     ) {
-        let sensor = Sensor::crowded(books().remove(book));
-        let log = sensor.log(12);
-        let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
-        let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
-        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
-        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
-        let mut band = Band::new(&sent, (&ticks.tick, None), Memory::default());
-        band.field.cover(Band::span(&sent, 0..12));
+        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, scale), seed);
+        let (Crowd { sensor, ticks, surfaces, .. }, sent) = (&crowd, crowd.sent());
+        let mut band = crowd.band(&sent);
         for shot in 4..8 {
             let lags = from..from + 2500;
             let (lag, count) = exhaustive(&sent, &ticks.tick, shot, lags.clone());

@@ -19,14 +19,9 @@ proptest! {
         middle in 100..4900_i64,
         seed in 0..u64::MAX,
     ) {
-        let sensor = Sensor::crowded(books().remove(book));
-        let log = sensor.log(12);
-        let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
-        let (ticks, _) = sensor.ticks(&log, weather, seed);
-        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
-        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
-        let mut band = Band::new(&sent, (&ticks.tick, None), Memory::default());
-        band.field.cover(Band::span(&sent, 0..12));
+        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, scale), seed);
+        let (ticks, sent) = (&crowd.ticks, crowd.sent());
+        let mut band = crowd.band(&sent);
         for shot in 4..8 {
             let marks = counter(&sent, &ticks.tick, shot);
             let sides = (1..4).take_while(|side| side * BLOCK - BLOCK / 2 < sent.bit_length());
