@@ -455,6 +455,46 @@ fn clear_light_is_cancelled_whatever_was_sent_before() {
     }
 }
 
+/// Of a shot in the word of another one, whole bits behind that, all marks of the first bit may be those of
+/// the other. N = 98 pairs of labels of which both fit at one lag alone, and are woven.
+#[test]
+fn a_macropulse_that_begins_under_another_one_is_cancelled() {
+    let sensor = Sensor { period: 10, ..Sensor::crowded(codebook()) };
+    let (receiver, mut log) = (sensor.receiver(0.0), sensor.log(2));
+    log.word = vec![1, 1];
+    let mut cases = 0;
+    for case in 0..15 * 15 * 4 {
+        log.label = vec![1 + case / 60, 1 + case / 4 % 15];
+        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let lags = [900, 890 + u32::from(case % 4) * sent.bit_length() as u32];
+        let mut chance = ChaCha8Rng::seed_from_u64(1);
+        let ticks = sensor.ticks_of(&log, &lags.map(|lag| vec![lag]), CLEAR, &mut chance).tick;
+        let places = |shot: usize| {
+            let start = sent.fired[shot] as u32 + lags[shot];
+            marks_of(&sent, shot).iter().map(move |mark| start + u32::from(*mark))
+        };
+        let theirs: Vec<u32> = places(0).collect();
+        let is_hidden = |tick: &u32| theirs.contains(tick);
+        let is_first_bit_hidden =
+            places(1).take(sent.in_word(1) as usize).all(|tick| is_hidden(&tick));
+        let free: Vec<u32> = places(1).filter(|tick| !is_hidden(tick)).collect();
+        let is_woven = free.first() < theirs.last();
+        let fits_once = |shot: usize| {
+            let count = counter(&sent, &ticks, shot);
+            sent.reach().filter(|lag| count(*lag) == sent.weight(shot)).count() == 1
+        };
+        if free.len() < 8 || !is_first_bit_hidden || !is_woven || !fits_once(0) || !fits_once(1) {
+            continue;
+        }
+        cases += 1;
+        let cancelled = cancel(&sent, &ticks).unwrap();
+        assert_eq!(cancelled.residual, [0; 0], "{case}");
+        let found = cancelled.detections.iter().map(|found| found.map(|found| found.lag));
+        assert_eq!(found.collect::<Vec<_>>(), lags.map(|lag| Some(i64::from(lag))), "{case}");
+    }
+    assert_eq!(cases, 98);
+}
+
 /// A lidar that waits long between shots, as one pixel of a flash does.
 #[test]
 fn shots_far_apart_are_found() {
