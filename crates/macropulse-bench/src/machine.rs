@@ -9,13 +9,20 @@ use macropulse::processor::thread_seconds;
 pub fn words() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let processors = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = processors.lines().find_map(|line| {
-        line.strip_prefix("model name").map(|rest| rest.trim_start_matches([' ', '\t', ':']))
-    });
+    let field = |name: &str| {
+        processors.lines().find_map(|line| {
+            let value = line.strip_prefix(name)?.trim_start().strip_prefix(':')?;
+            Some(value.trim())
+        })
+    };
+    // Processors of one name may be years apart.
+    let made = field("cpu family").zip(field("model"));
+    let made = made.map(|(family, model)| format!(" (family {family}, model {model})"));
     format!(
-        "Macropulse {} on {}, {threads} threads, {} kernels.",
+        "Macropulse {} on {}{}, {threads} threads, {} kernels.",
         env!("CARGO_PKG_VERSION"),
-        model.unwrap_or(std::env::consts::ARCH),
+        field("model name").unwrap_or(std::env::consts::ARCH),
+        made.unwrap_or_default(),
         Level::here().name()
     )
 }
