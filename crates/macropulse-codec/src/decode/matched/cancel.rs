@@ -321,13 +321,16 @@ impl Canceller<'_> {
         None
     }
 
-    /// Finds the shot of which `tick`, left like as many others before it as are a [`CLUE`], is any mark:
-    /// all of its first ones may lie under others. Cancels its marks, and tells when its light ends.
+    /// Finds the shot of which `tick`, the last one left, is any mark, whenever [`CLUE`] more were left in the
+    /// time of a macropulse: all of its first marks may lie under others. Cancels its marks, and tells when its
+    /// light ends.
     fn hidden(&mut self, tick: i64) -> Option<i64> {
         let sent = self.sent;
-        let clue =
-            self.left.rchunks_exact(CLUE).next().filter(|_| self.left.len().is_multiple_of(CLUE));
-        clue.filter(|clue| tick - i64::from(clue[0]) < sent.length())?;
+        let (clues, more) = self.left.as_chunks::<CLUE>();
+        let clue = clues.last().filter(|_| more.is_empty())?;
+        if tick - i64::from(clue[0]) >= sent.length() {
+            return None;
+        }
         let mut in_flight = self.in_flight(tick).filter(|shot| sent.weight(*shot) >= self.least);
         let (shot, start) =
             in_flight.find_map(|shot| Some((shot, self.start_of_any(shot, tick)?)))?;
@@ -398,7 +401,7 @@ impl Canceller<'_> {
 /// Ticks that are left in the time of a macropulse before any mark of any shot is looked for there. With 4 to 64
 /// a `street` takes as long, clean and with 10⁷ dark counts a second; with 2 this takes a sixth longer, with 1
 /// twice as long; without it a clean one takes a third longer, as some macropulses of each pane begin under others.
-const CLUE: usize = 8;
+pub(super) const CLUE: usize = 8;
 
 /// Macropulses that fit into the stretch of time that is laid down where they overlap: it is moved on
 /// as often as light comes, and 16 of the longest word take 32 MB.

@@ -7,7 +7,7 @@ use proptest::test_runner::RngSeed;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::cancel::cancel;
+use super::cancel::{CLUE, cancel};
 use super::sent::{Sent, Words};
 use super::{Band, Memory, decode};
 use crate::code::{Codebook, Crc, Family, Keying, Payload, Sparse};
@@ -483,7 +483,8 @@ fn a_macropulse_that_begins_under_another_one_is_cancelled() {
             let count = counter(&sent, &ticks, shot);
             sent.reach().filter(|lag| count(*lag) == sent.weight(shot)).count() == 1
         };
-        if free.len() < 8 || !is_first_bit_hidden || !is_woven || !fits_once(0) || !fits_once(1) {
+        if free.len() < CLUE || !is_first_bit_hidden || !is_woven || !fits_once(0) || !fits_once(1)
+        {
             continue;
         }
         cases += 1;
