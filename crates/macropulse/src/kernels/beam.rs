@@ -2,16 +2,9 @@
 //! around all of them, and only at a leaf is it asked which rays enter.
 
 use super::packet::{Lanes, Leaves, Packet};
-use super::single::put_off;
+use super::single::{PutOff, put_off};
 use super::tree::{Child, Eight, SLACK, Tree, across, inverse, narrow_above, narrow_below};
-use super::wide::{LANES, Registers, SIDE, Wide};
-
-/// A box: which node, and which of its eight.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Place {
-    eight: u32,
-    slot: u32,
-}
+use super::wide::{LANES, Registers, SIDE, Wide, fetch};
 
 /// Rays are neighbours if their directions differ by no more than this for each of them, summed over
 /// the axes.
@@ -63,9 +56,9 @@ impl Aims {
 
     /// Whether the rays of `set` are neighbours.
     #[inline(always)]
-    pub fn are_neighbours(&self, set: u32) -> bool {
+    pub fn are_neighbours<R: Registers>(&self, set: u32) -> bool {
         let [x, y, z] = &self.direction;
-        let [x, y, z] = [extremes(x, set), extremes(y, set), extremes(z, set)];
+        let [x, y, z] = [extremes::<R>(x, set), extremes::<R>(y, set), extremes::<R>(z, set)];
         let apart = (x[1] - x[0]) + (y[1] - y[0]) + (z[1] - z[0]);
         apart <= NEIGHBOURS * set.count_ones() as f32
     }
@@ -73,7 +66,7 @@ impl Aims {
     /// The rays of `among` that point into the same octant as the first of them, and have the same
     /// main axis.
     #[inline(always)]
-    pub fn beam(&self, among: u32) -> Beam {
+    pub fn beam<R: Registers>(&self, among: u32) -> Beam {
         let first = among.trailing_zeros();
         let like_first = |of: u32| if of >> first & 1 == 1 { of } else { !of };
         let [x, y, z] = self.backward;
@@ -86,7 +79,7 @@ impl Aims {
             set,
             backward: [is_first(x), is_first(y), is_first(z)],
             along: is_first(along_y) + 2 * is_first(along_z),
-            inverse: [extremes(in_x, set), extremes(in_y, set), extremes(in_z, set)],
+            inverse: [extremes::<R>(in_x, set), extremes::<R>(in_y, set), extremes::<R>(in_z, set)],
         }
     }
 }
@@ -157,23 +150,8 @@ fn length<R: Registers>(slopes: &Lanes<f32>) -> R::Rays {
 
 /// The least and the greatest of the lanes in `set`.
 #[inline(always)]
-fn extremes(values: &Lanes<f32>, set: u32) -> [f32; 2] {
-    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-    for lane in 0..LANES {
-        let of_set = set >> lane & 1 == 1;
-        low[lane] = if of_set { values[lane] } else { f32::INFINITY };
-        high[lane] = if of_set { values[lane] } else { f32::NEG_INFINITY };
-    }
-    let mut half = LANES / 2;
-    while half > 0 {
-        for lane in 0..half {
-            low[lane] = if low[lane] < low[lane + half] { low[lane] } else { low[lane + half] };
-            high[lane] =
-                if high[lane] > high[lane + half] { high[lane] } else { high[lane + half] };
-        }
-        half /= 2;
-    }
-    [low[0], high[0]]
+fn extremes<R: Registers>(values: &Lanes<f32>, set: u32) -> [f32; 2] {
+    R::extremes(R::Rays::load(values), set)
 }
 
 /// Behind which nothing matters, by ray.
@@ -246,9 +224,9 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
             shear: [R::Rays::load(&shear[0]), R::Rays::load(&shear[1])],
             margin,
             start: R::Rays::load(&starts),
-            soonest: extremes(&starts, beam.set)[0],
+            soonest: extremes::<R>(&starts, beam.set)[0],
             limit: R::Rays::load(&limits),
-            latest: extremes(&limits, beam.set)[1],
+            latest: extremes::<R>(&limits, beam.set)[1],
             set: beam.set,
         }
     }
@@ -258,7 +236,7 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
     fn shorten(&mut self, packet: &Packet) {
         let limits = limits(packet, self.margin);
         self.limit = R::Rays::load(&limits);
-        self.latest = extremes(&limits, self.set)[1];
+        self.latest = extremes::<R>(&limits, self.set)[1];
     }
 
     /// A coordinate on an axis, from the start of the rays.
@@ -291,17 +269,18 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
         [near.times(least).least(near.times(most)), far.times(least).most(far.times(most))]
     }
 
-    /// Where each ray crosses a plane of a box, by axis; the low one or the high one.
+    /// Where each ray crosses a plane of box `box_at`, by axis; the low one or the high one. A box has
+    /// [`SIDE`] times the number of its node, and its place in it.
     #[inline(always)]
-    fn reached(&self, Place { eight, slot }: Place, axis: usize, bound: usize) -> R::Rays {
-        let bounds = &self.eights[eight as usize].bounds;
-        let plane = R::Rays::splat(bounds[axis][bound & 1][slot as usize % SIDE]);
+    fn reached(&self, box_at: u32, axis: usize, bound: usize) -> R::Rays {
+        let bounds = &self.eights[box_at as usize / SIDE].bounds;
+        let plane = R::Rays::splat(bounds[axis][bound & 1][box_at as usize % SIDE]);
         self.shifted(axis, plane).times(self.inverse[axis])
     }
 
     /// Rays that enter a box.
     #[inline(always)]
-    fn entering(&self, box_at: Place) -> u32 {
+    fn entering(&self, box_at: u32) -> u32 {
         let [x, y, z] = self.backward;
         let enter = self.reached(box_at, 0, x).most(self.reached(box_at, 1, y));
         let enter = enter.most(self.reached(box_at, 2, z).most(self.start));
@@ -311,28 +290,28 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
     }
 
     #[inline(always)]
-    pub fn run(
-        &mut self,
-        packet: &mut Packet,
-        stack: &mut [(f32, Place)],
-        leaves: &mut impl Leaves,
-    ) {
-        let (mut waiting, mut child, mut place) = (0, Child::eight(0), Place::default());
+    pub fn run(&mut self, packet: &mut Packet, stack: &mut [PutOff], leaves: &mut impl Leaves) {
+        let (mut waiting, mut child, mut place) = (0, Child::eight(0), 0);
         loop {
             match child.index() {
                 Err(index) => {
                     let eight = &self.eights[index];
                     let (entered, enter) = self.may_enter(eight.planes::<R>());
+                    let first = (index * SIDE) as u32;
                     if entered.is_power_of_two() {
-                        place = Place { eight: index as u32, slot: entered.trailing_zeros() };
-                        child = eight.child[place.slot as usize % SIDE];
+                        place = first + entered.trailing_zeros();
+                        child = eight.child[place as usize % SIDE];
                         continue;
                     }
                     let mut enters = [0.0; SIDE];
                     enter.store(&mut enters);
-                    let mut places = [Place { eight: index as u32, slot: 0 }; SIDE];
-                    (0..).zip(&mut places).for_each(|(slot, place)| place.slot = slot);
-                    waiting = put_off(stack, waiting, (entered, &enters), &places);
+                    waiting = put_off(stack, waiting, (entered, &enters), |slot| {
+                        match eight.child[slot].index() {
+                            Err(index) => fetch(self.eights, index),
+                            Ok(leaf) => leaves.fetch(leaf),
+                        }
+                        first + slot as u32
+                    });
                 }
                 Ok(leaf) => {
                     let set = self.entering(place);
@@ -347,9 +326,9 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
                     return;
                 }
                 waiting -= 1;
-                let (enter, place) = stack[waiting];
+                let (enter, place) = stack[waiting].parts();
                 if enter <= self.latest {
-                    let child = self.eights[place.eight as usize].child[place.slot as usize % SIDE];
+                    let child = self.eights[place as usize / SIDE].child[place as usize % SIDE];
                     break (child, place);
                 }
             };

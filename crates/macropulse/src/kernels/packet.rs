@@ -5,11 +5,11 @@
 //! other, and so do rays that are no neighbours, each alone. Each ray meets what it would have met
 //! alone, to the last bit.
 
-use super::beam::{Aims, Descent, Place};
-use super::single::Along;
+use super::beam::{Aims, Descent};
+use super::single::{Along, PutOff};
 use super::tree::Tree;
 use super::triangles::{Nearest, Triangles};
-use super::wide::{LANES, Registers, SIDE, Task, on_level};
+use super::wide::{LANES, Registers, SIDE, Task, fetch, on_level};
 
 /// One number for each ray of a packet.
 pub(crate) type Lanes<T> = [T; LANES];
@@ -33,7 +33,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// Boxes that wait during a descent, and where the beam enters them; kept between packets.
 #[derive(Debug, Default)]
-pub(crate) struct Waiting(Vec<(f32, Place)>);
+pub(crate) struct Waiting(Vec<PutOff>);
 
 impl Packet {
     /// No rays yet, from `origin`.
@@ -90,6 +90,10 @@ pub(super) trait Leaves {
         false
     }
 
+    /// Notes that a leaf may soon be met.
+    #[inline(always)]
+    fn fetch(&self, _leaf: u32) {}
+
     /// Lets the rays of `set` meet `leaf`; whether the range of any was shortened.
     fn meet<R: Registers, const FROM_CENTRE: bool>(
         &mut self,
@@ -136,11 +140,11 @@ impl<L: Leaves> Task for Together<'_, L> {
         if rest == 0 {
             return;
         }
-        if !aims.are_neighbours(rest) && leaves.meet_alone::<R>(packet, rest) {
+        if !aims.are_neighbours::<R>(rest) && leaves.meet_alone::<R>(packet, rest) {
             return;
         }
         while rest != 0 {
-            let beam = aims.beam(rest);
+            let beam = aims.beam::<R>(rest);
             rest &= !beam.set;
             if waiting.0.len() < tree.room {
                 waiting.0.resize(tree.room, Default::default());
@@ -171,6 +175,11 @@ impl Leaves for &Triangles {
         true
     }
 
+    #[inline(always)]
+    fn fetch(&self, leaf: u32) {
+        fetch(&self.blocks, leaf as usize);
+    }
+
     /// Solves for the range of those that pass, and keeps what is nearer than before.
     #[inline(always)]
     fn meet<R: Registers, const FROM_CENTRE: bool>(
@@ -183,6 +192,11 @@ impl Leaves for &Triangles {
         let block = &self.blocks[leaf as usize];
         let (near, _) = descent.may_enter(block.planes::<R>());
         let mut near = near & block.all();
+        let mut soon = near;
+        while soon != 0 {
+            fetch(&self.corners, (block.first + soon.trailing_zeros()) as usize);
+            soon &= soon - 1;
+        }
         let mut changed = false;
         while near != 0 {
             let slot = near.trailing_zeros() as usize % SIDE;

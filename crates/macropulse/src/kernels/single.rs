@@ -3,7 +3,7 @@
 use super::tree::{
     Child, Eight, SLACK, Tree, across, inverse, main_axis, narrow_above, narrow_below,
 };
-use super::wide::{Registers, SIDE, Task, Wide, on_level};
+use super::wide::{Registers, SIDE, Task, Wide, fetch, on_level};
 
 /// Deep enough for the hierarchies of most meshes; the others get a stack on the heap.
 const STACK: usize = 64;
@@ -29,6 +29,10 @@ pub(super) struct Aim<const FROM_CENTRE: bool> {
 
 /// What the leaves of a hierarchy are, for a ray that comes by.
 pub(super) trait RayLeaves {
+    /// Notes that a leaf may soon be met.
+    #[inline(always)]
+    fn fetch(&self, _leaf: u32) {}
+
     /// Lets the ray meet a leaf; the distance behind which nothing matters any more.
     fn meet<R: Registers, const FROM_CENTRE: bool>(
         &mut self,
@@ -95,9 +99,9 @@ impl<L: RayLeaves> Along<'_, L> {
         let start = narrow_below(self.between.0, margin);
         let Some(aim) = Aim::<FROM_CENTRE>::of(origin, self.ray.1, (start, margin)) else { return };
         if self.tree.room <= STACK {
-            self.descend::<R, FROM_CENTRE>(&aim, &mut [(0.0, Child::eight(0)); STACK]);
+            self.descend::<R, FROM_CENTRE>(&aim, &mut [PutOff::default(); STACK]);
         } else {
-            self.descend::<R, FROM_CENTRE>(&aim, &mut vec![(0.0, Child::eight(0)); self.tree.room]);
+            self.descend::<R, FROM_CENTRE>(&aim, &mut vec![PutOff::default(); self.tree.room]);
         }
     }
 
@@ -107,7 +111,7 @@ impl<L: RayLeaves> Along<'_, L> {
     fn descend<R: Registers, const FROM_CENTRE: bool>(
         &mut self,
         aim: &Aim<FROM_CENTRE>,
-        stack: &mut [(f32, Child)],
+        stack: &mut [PutOff],
     ) {
         let eights = &self.tree.eights[..];
         let mut limit = narrow_above(self.between.1, aim.margin);
@@ -121,7 +125,13 @@ impl<L: RayLeaves> Along<'_, L> {
                         child = eight.child[entered.trailing_zeros() as usize % SIDE];
                         continue;
                     }
-                    waiting = put_off(stack, waiting, (entered, &enters), &eight.child);
+                    waiting = put_off(stack, waiting, (entered, &enters), |slot| {
+                        match eight.child[slot].index() {
+                            Err(index) => fetch(eights, index),
+                            Ok(leaf) => self.leaves.fetch(leaf),
+                        }
+                        eight.child[slot].bits()
+                    });
                 }
                 Ok(leaf) => {
                     limit = narrow_above(self.leaves.meet::<R, FROM_CENTRE>(leaf, aim), aim.margin);
@@ -133,33 +143,52 @@ impl<L: RayLeaves> Along<'_, L> {
                     return;
                 }
                 waiting -= 1;
-                let (enter, child) = stack[waiting];
+                let (enter, child) = stack[waiting].parts();
                 if enter <= limit {
-                    break child;
+                    break Child::of(child);
                 }
             };
         }
     }
 }
 
+/// A box that waits during a descent: where it is entered, not below zero, in the upper half as bits, whose
+/// order is that of the numbers; and which it is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PutOff(u64);
+
+impl PutOff {
+    #[inline(always)]
+    fn new(enter: f32, what: u32) -> Self {
+        Self(u64::from(enter.to_bits()) << 32 | u64::from(what))
+    }
+
+    /// Where it is entered, and which it is.
+    #[inline(always)]
+    pub(super) fn parts(self) -> (f32, u32) {
+        (f32::from_bits((self.0 >> 32) as u32), self.0 as u32)
+    }
+}
+
 /// Adds boxes to those that wait, the nearest last; how many wait then.
 #[inline(always)]
-pub(super) fn put_off<T: Copy>(
-    stack: &mut [(f32, T)],
+pub(super) fn put_off(
+    stack: &mut [PutOff],
     waiting: usize,
     (mut entered, enters): (u32, &[f32; SIDE]),
-    what: &[T; SIDE],
+    what: impl Fn(usize) -> u32,
 ) -> usize {
     let mut end = waiting;
     while entered != 0 {
         let slot = entered.trailing_zeros() as usize % SIDE;
         entered &= entered - 1;
+        let put = PutOff::new(enters[slot], what(slot));
         let mut place = end;
-        while place > waiting && stack[place - 1].0 < enters[slot] {
+        while place > waiting && stack[place - 1] < put {
             stack[place] = stack[place - 1];
             place -= 1;
         }
-        stack[place] = (enters[slot], what[slot]);
+        stack[place] = put;
         end += 1;
     }
     end

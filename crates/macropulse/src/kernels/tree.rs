@@ -80,6 +80,14 @@ impl Child {
         Self(index as u32 | Self::LEAF)
     }
 
+    pub(super) fn of(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    pub(super) fn bits(self) -> u32 {
+        self.0
+    }
+
     /// Which leaf, or else which node.
     #[inline(always)]
     pub(super) fn index(self) -> Result<u32, usize> {

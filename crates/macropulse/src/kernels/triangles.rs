@@ -13,7 +13,7 @@ use super::build::Built;
 use super::packet::{Lanes, NONE, Packet};
 use super::single::{Aim, Along, RayLeaves};
 use super::tree::{Bounds, FARTHEST, Tree};
-use super::wide::{LANES, Registers, SIDE, Wide, on_level};
+use super::wide::{LANES, Registers, SIDE, Wide, fetch, on_level};
 use macropulse_codec::on_every_level;
 
 /// The corners of a triangle, m.
@@ -156,6 +156,11 @@ impl<'a> Nearest<'a> {
 }
 
 impl RayLeaves for Nearest<'_> {
+    #[inline(always)]
+    fn fetch(&self, leaf: u32) {
+        fetch(&self.triangles.blocks, leaf as usize);
+    }
+
     #[inline(always)]
     fn meet<R: Registers, const FROM_CENTRE: bool>(
         &mut self,

@@ -35,6 +35,29 @@ pub(super) trait Registers {
     type Rays: Wide<LANES>;
     /// One for each box of a node.
     type Boxes: Wide<SIDE>;
+
+    /// The least and the greatest of the lanes in `set`, none of them NaN.
+    #[inline(always)]
+    fn extremes(rays: Self::Rays, set: u32) -> [f32; 2] {
+        let mut lanes = [0.0; LANES];
+        rays.store(&mut lanes);
+        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let of_set = set >> lane & 1 == 1;
+            low[lane] = if of_set { lanes[lane] } else { f32::INFINITY };
+            high[lane] = if of_set { lanes[lane] } else { f32::NEG_INFINITY };
+        }
+        let mut half = LANES / 2;
+        while half > 0 {
+            for lane in 0..half {
+                low[lane] = if low[lane] < low[lane + half] { low[lane] } else { low[lane + half] };
+                high[lane] =
+                    if high[lane] > high[lane + half] { high[lane] } else { high[lane + half] };
+            }
+            half /= 2;
+        }
+        [low[0], high[0]]
+    }
 }
 
 /// What is done with the widest registers there are.
@@ -68,6 +91,22 @@ pub(super) fn on_level<T: Task>(mut task: T) {
         Level::Avx2 => unsafe { avx2(&mut task) },
         _ => task.run::<Any>(),
     }
+}
+
+/// Has an element brought into the nearest cache that is asked for soon; nothing else happens.
+#[inline(always)]
+pub(super) fn fetch<T>(values: &[T], index: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(value) = values.get(index) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let first: *const i8 = std::ptr::from_ref(value).cast();
+        // SAFETY: nothing is read; and all of this is within the element.
+        let fetch = |offset| unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(offset)) };
+        (0..size_of::<T>()).step_by(64).for_each(fetch);
+        fetch(size_of::<T>().saturating_sub(1));
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (values, index);
 }
 
 /// What any processor can do.
@@ -161,6 +200,25 @@ mod x86 {
     impl Registers for Avx2 {
         type Rays = Twice;
         type Boxes = Eight;
+
+        #[inline(always)]
+        fn extremes(Twice(one, other): Twice, set: u32) -> [f32; 2] {
+            let (of_one, of_other) = (mask(set), mask(set >> SIDE));
+            let (none, least) = (Eight::splat(f32::NEG_INFINITY), Eight::splat(f32::INFINITY));
+            let low = one.where_set(of_one, least).least(other.where_set(of_other, least));
+            let high = one.where_set(of_one, none).most(other.where_set(of_other, none));
+            [low.least_lane(), high.greatest_lane()]
+        }
+    }
+
+    /// All bits of each lane in `set`.
+    #[inline(always)]
+    fn mask(set: u32) -> __m256 {
+        unsafe {
+            let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let of_set = _mm256_and_si256(_mm256_set1_epi32(set as i32), lanes);
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(of_set, lanes))
+        }
     }
 
     /// The registers of AVX-512.
@@ -169,6 +227,17 @@ mod x86 {
     impl Registers for Avx512 {
         type Rays = Sixteen;
         type Boxes = Eight;
+
+        #[inline(always)]
+        fn extremes(rays: Sixteen, set: u32) -> [f32; 2] {
+            let set = set as u16;
+            unsafe {
+                let low = _mm512_mask_blend_ps(set, _mm512_set1_ps(f32::INFINITY), rays.0);
+                let high = _mm512_mask_blend_ps(set, _mm512_set1_ps(f32::NEG_INFINITY), rays.0);
+                let (low, high) = (Sixteen(low).halves(), Sixteen(high).halves());
+                [low.0.least(low.1).least_lane(), high.0.most(high.1).greatest_lane()]
+            }
+        }
     }
 
     /// A register of AVX2. Only for functions that are compiled for it, as the two below.
@@ -188,6 +257,34 @@ mod x86 {
     // stay within an array of as many numbers and ask for no alignment.
 
     const _: () = assert!(SIDE == 8 && LANES == 16);
+
+    impl Eight {
+        /// Its lanes where all bits of a mask are set, those of the other where none is.
+        #[inline(always)]
+        fn where_set(self, mask: __m256, other: Self) -> Self {
+            Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask) })
+        }
+
+        #[inline(always)]
+        fn least_lane(self) -> f32 {
+            unsafe {
+                let four =
+                    _mm_min_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+                _mm_cvtss_f32(_mm_min_ss(two, _mm_movehdup_ps(two)))
+            }
+        }
+
+        #[inline(always)]
+        fn greatest_lane(self) -> f32 {
+            unsafe {
+                let four =
+                    _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let two = _mm_max_ps(four, _mm_movehl_ps(four, four));
+                _mm_cvtss_f32(_mm_max_ss(two, _mm_movehdup_ps(two)))
+            }
+        }
+    }
 
     impl Wide<SIDE> for Eight {
         #[inline(always)]
@@ -289,6 +386,17 @@ mod x86 {
         }
     }
 
+    impl Sixteen {
+        #[inline(always)]
+        fn halves(self) -> Twice {
+            unsafe {
+                let (low, high) =
+                    (_mm512_castps512_ps256(self.0), _mm512_extractf32x8_ps::<1>(self.0));
+                Twice(Eight(low), Eight(high))
+            }
+        }
+    }
+
     impl Wide<LANES> for Sixteen {
         #[inline(always)]
         fn splat(value: f32) -> Self {
@@ -333,6 +441,46 @@ mod x86 {
         #[inline(always)]
         fn below(self, other: Self) -> u32 {
             u32::from(unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use macropulse_codec::level::forced::at_each_level;
+    use proptest::prelude::*;
+
+    /// Asks for the extremes of some lanes.
+    struct Extremes<'a> {
+        values: [f32; LANES],
+        set: u32,
+        found: &'a mut [f32; 2],
+    }
+
+    impl Task for Extremes<'_> {
+        #[inline(always)]
+        fn run<R: Registers>(&mut self) {
+            *self.found = R::extremes(R::Rays::load(&self.values), self.set);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_level_tells_the_least_and_the_greatest_of_a_set(
+            values in proptest::array::uniform16(-1e3..1e3_f32),
+            set in 0..1_u32 << LANES,
+        ) {
+            let of_set = || (0..LANES).filter(|lane| set >> lane & 1 == 1).map(|lane| values[lane]);
+            let least = of_set().fold(f32::INFINITY, f32::min);
+            let greatest = of_set().fold(f32::NEG_INFINITY, f32::max);
+            for (level, found) in at_each_level(|| {
+                let mut found = [0.0; 2];
+                on_level(Extremes { values, set, found: &mut found });
+                found
+            }) {
+                prop_assert_eq!(found, [least, greatest], "{:?}", level);
+            }
         }
     }
 }
