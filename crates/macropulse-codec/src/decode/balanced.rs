@@ -14,7 +14,7 @@
 mod chance;
 mod grid;
 
-use super::timing::{self, Known};
+use super::timing::{self, Histogram, Known};
 use super::{Energy, GATES_PER_BLOCK, MIDDLE, Receiver, Reject, Return, Returns, window};
 use crate::ShotLog;
 use crate::Ticks;
@@ -190,7 +190,8 @@ impl<'a> Band<'a> {
             let late = self.ticks[first..].iter().map(|&tick| (i64::from(tick) - from) as usize);
             late.take_while(|late| *late < room).for_each(|late| counts[late] += 1);
         }
-        let (counts, first) = timing::about(width, self.receiver.jitter(), |place| {
+        let mut histogram = Histogram::default();
+        histogram.count(width, self.receiver.jitter(), |place| {
             counts.get((place - places.start) as usize).copied().unwrap_or(0)
         });
         let known = Known {
@@ -199,7 +200,7 @@ impl<'a> Band<'a> {
             others: others / f64::from(width),
             neighbours: &timing::neighbours(&marks, places.end - places.start),
         };
-        timing::late_by(&counts, first, &known)
+        histogram.late_by(&known)
     }
 }
 

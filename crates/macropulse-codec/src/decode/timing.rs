@@ -23,7 +23,6 @@
 //! neighbouring marks by theirs, and, where jitter is below a third of a tick, to the middle of the
 //! tick by rounding.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -66,40 +65,91 @@ pub(super) fn lateness(width: u32) -> Range<i64> {
     -width - 2..2 * width + 3
 }
 
-/// The ticks about the marks of a macropulse that is found at the earliest of `width` ticks which hold
-/// them, and how late the first ones are. `count` tells how many are so many ticks late.
-///
-/// They are counted 2 σ and half a tick to both sides of the fullest places, as many to one as to the
-/// other: a jitter less than is known then draws to neither. Strong light may light places farther
-/// away: as long as a quarter as many ticks as in the fullest place are in the last ones, more are
-/// counted.
-pub(super) fn about(width: u32, sigma: f64, count: impl Fn(i64) -> u32) -> (Vec<u32>, i64) {
-    let found: Vec<u32> = (0..i64::from(width)).map(&count).collect();
-    let together = (1 + 2 * sigma.round() as usize).min(found.len());
-    let sum = |window: &[u32]| window.iter().sum::<u32>();
-    let windows = found.windows(together).enumerate().rev();
-    let fullest = windows.max_by_key(|(_, window)| sum(window)).map_or(0, |(begin, _)| begin);
-    let middle = (fullest + together / 2) as i64;
-    let reach = (2.0 * sigma + 0.5).ceil() as i64;
-    let counted = |place: i64| {
-        let known = usize::try_from(place).ok().and_then(|place| found.get(place)).copied();
-        known.unwrap_or_else(|| count(place))
-    };
-    let mut counts: VecDeque<u32> = (middle - reach..=middle + reach).map(counted).collect();
-    let (mut first, farthest) = (middle - reach, lateness(width));
-    let mut end = middle + reach + 1;
-    while first > farthest.start && end < farthest.end {
-        let highest = counts.iter().copied().max().unwrap_or(0);
-        let at_ends = [counts.front(), counts.back()].into_iter().flatten().max();
-        if at_ends.is_none_or(|at_end| 4 * at_end <= highest) {
-            break;
+/// The ticks about the marks of a macropulse, counted by how late they are.
+#[derive(Debug, Default)]
+pub(super) struct Histogram {
+    /// Ticks that are `first`, `first` + 1, … ticks late.
+    counts: Vec<u32>,
+    first: i64,
+    /// Memory for the counts of the places that hold the marks, and for what is expected in each place.
+    found: Vec<u32>,
+    expected: Vec<(f64, f64)>,
+}
+
+impl Histogram {
+    /// Makes it that of a macropulse which is found at the earliest of `width` ticks that hold its marks.
+    /// `count` tells how many are so many ticks late.
+    ///
+    /// They are counted 2 σ and half a tick to both sides of the fullest places, as many to one as to the
+    /// other: a jitter less than is known then draws to neither. Strong light may light places farther
+    /// away: as long as a quarter as many ticks as in the fullest place are in the last ones, more are
+    /// counted.
+    pub fn count(&mut self, width: u32, sigma: f64, count: impl Fn(i64) -> u32) {
+        let Self { counts, found, .. } = self;
+        found.clear();
+        found.extend((0..i64::from(width)).map(&count));
+        let together = (1 + 2 * sigma.round() as usize).min(found.len());
+        let sum = |window: &[u32]| window.iter().sum::<u32>();
+        let windows = found.windows(together).enumerate().rev();
+        let fullest = windows.max_by_key(|(_, window)| sum(window)).map_or(0, |(begin, _)| begin);
+        let middle = (fullest + together / 2) as i64;
+        let reach = (2.0 * sigma + 0.5).ceil() as i64;
+        let counted = |place: i64| {
+            let known = usize::try_from(place).ok().and_then(|place| found.get(place)).copied();
+            known.unwrap_or_else(|| count(place))
+        };
+        counts.clear();
+        counts.extend((middle - reach..=middle + reach).map(counted));
+        let (mut first, farthest) = (middle - reach, lateness(width));
+        let mut end = middle + reach + 1;
+        while first > farthest.start && end < farthest.end {
+            let highest = counts.iter().copied().max().unwrap_or(0);
+            let at_ends = [counts.first(), counts.last()].into_iter().flatten().max();
+            if at_ends.is_none_or(|at_end| 4 * at_end <= highest) {
+                break;
+            }
+            first -= 1;
+            counts.insert(0, counted(first));
+            counts.push(counted(end));
+            end += 1;
         }
-        first -= 1;
-        counts.push_front(counted(first));
-        counts.push_back(counted(end));
-        end += 1;
+        self.first = first;
     }
-    (counts.into(), first)
+
+    /// How late the marks are, in ticks: the maximum of the likelihood. In the middle of the fullest tick where
+    /// they tell no more.
+    pub fn late_by(&mut self, known: &Known) -> f64 {
+        let Self { counts, first, expected, .. } = self;
+        let first = *first;
+        let others = known.marks * known.others.clamp(FEWEST_OTHERS, 1.0);
+        let mut late = fullest(counts, first, known);
+        let all: u32 = counts.iter().sum();
+        let own = f64::from(all) - others * counts.len() as f64;
+        expected.resize(counts.len(), (0.0, 0.0));
+        for _ in 0..MOST_STEPS {
+            expect(expected, first as f64 - late, known);
+            // One mark at least was found, and none is seen twice.
+            let seen: f64 = expected.iter().map(|(probability, _)| probability).sum();
+            let share = (own / seen.max(1e-3)).clamp(1.0, known.marks);
+            let (mut score, mut information) = (0.0, 0.0);
+            for ((probability, slope), count) in expected.iter().zip(&*counts) {
+                let (mean, slope) = (others + share * probability, share * slope);
+                let weight = slope / mean;
+                score += (f64::from(*count) - mean) * weight;
+                information += slope * weight;
+            }
+            if information < LEAST_INFORMATION {
+                break;
+            }
+            let farthest = known.sigma.max(0.25);
+            let step = (score / information).clamp(-farthest, farthest);
+            late += step;
+            if step.abs() < SHORT {
+                break;
+            }
+        }
+        late.clamp(first as f64, (first + counts.len() as i64) as f64)
+    }
 }
 
 /// The `width` ticks in which `receiver` looks for what a mark makes, if its light is `late` ticks behind
@@ -140,39 +190,6 @@ pub(super) fn neighbours(marks: &[i64], reach: i64) -> Vec<(i64, f64)> {
         .iter()
         .flat_map(|&(distance, count)| [-distance, distance].map(|d| (d, count / all)))
         .collect()
-}
-
-/// How late the marks are, in ticks: the maximum of the likelihood of `counts`, the ticks that are
-/// `first`, `first` + 1, … ticks late. In the middle of the fullest tick where they tell no more.
-pub(super) fn late_by(counts: &[u32], first: i64, known: &Known) -> f64 {
-    let others = known.marks * known.others.clamp(FEWEST_OTHERS, 1.0);
-    let mut late = fullest(counts, first, known);
-    let all: u32 = counts.iter().sum();
-    let own = f64::from(all) - others * counts.len() as f64;
-    let mut expected = vec![(0.0, 0.0); counts.len()];
-    for _ in 0..MOST_STEPS {
-        expect(&mut expected, first as f64 - late, known);
-        // One mark at least was found, and none is seen twice.
-        let seen: f64 = expected.iter().map(|(probability, _)| probability).sum();
-        let share = (own / seen.max(1e-3)).clamp(1.0, known.marks);
-        let (mut score, mut information) = (0.0, 0.0);
-        for ((probability, slope), count) in expected.iter().zip(counts) {
-            let (mean, slope) = (others + share * probability, share * slope);
-            let weight = slope / mean;
-            score += (f64::from(*count) - mean) * weight;
-            information += slope * weight;
-        }
-        if information < LEAST_INFORMATION {
-            break;
-        }
-        let farthest = known.sigma.max(0.25);
-        let step = (score / information).clamp(-farthest, farthest);
-        late += step;
-        if step.abs() < SHORT {
-            break;
-        }
-    }
-    late.clamp(first as f64, (first + counts.len() as i64) as f64)
 }
 
 /// Where most ticks are within ±σ, or in two places side by side: their mean, in the middle of ticks.
@@ -286,9 +303,8 @@ mod tests {
         others: f64,
     }
 
-    /// The ticks about `marks` that are `late`, counted, and how late a receiver with its window says
-    /// that they are.
-    fn counted(marks: &[i64], late: f64, sky: Sky, chance: &mut Chance) -> (Vec<u32>, i64, u32) {
+    /// The ticks about `marks` that are `late`, counted as by a receiver, and its window.
+    fn counted(marks: &[i64], late: f64, sky: Sky, chance: &mut Chance) -> (Histogram, u32) {
         let end = marks[marks.len() - 1] + 200;
         let mut lit = vec![false; end as usize + 200];
         for mark in marks {
@@ -310,8 +326,10 @@ mod tests {
             let lit = marks.iter().filter(|mark| lit[(100 + *mark + start + place) as usize]);
             lit.count() as u32
         };
-        let (counts, first) = about(width as u32, sky.sigma, count);
-        (counts, start + first, width as u32)
+        let mut histogram = Histogram::default();
+        histogram.count(width as u32, sky.sigma, count);
+        histogram.first += start;
+        (histogram, width as u32)
     }
 
     /// The mean error of so many macropulses of `marks`, and its standard error, at each of ten
@@ -323,17 +341,18 @@ mod tests {
             let late = 2.0 + f64::from(phase) / 10.0;
             let mut sums = [(0.0, 0.0); 2];
             for _ in 0..MACROPULSES {
-                let (counts, first, width) = counted(marks, late, sky, &mut chance);
+                let (mut histogram, width) = counted(marks, late, sky, &mut chance);
                 let known = Known {
                     sigma: sky.sigma,
                     marks: marks.len() as f64,
                     others: sky.others,
                     neighbours: &neighbours(marks, 3 * i64::from(width) + 5),
                 };
+                let Histogram { counts, first, .. } = &histogram;
                 let all: u32 = counts.iter().sum();
-                let moments = (first..).zip(&counts).map(|(k, count)| k as f64 * f64::from(*count));
+                let moments = (*first..).zip(counts).map(|(k, count)| k as f64 * f64::from(*count));
                 let mean = moments.sum::<f64>() / f64::from(all.max(1)) + 0.5;
-                for (sum, found) in sums.iter_mut().zip([late_by(&counts, first, &known), mean]) {
+                for (sum, found) in sums.iter_mut().zip([histogram.late_by(&known), mean]) {
                     let error = found - late;
                     *sum = (sum.0 + error, sum.1 + error * error);
                 }
@@ -381,6 +400,9 @@ mod tests {
     #[test]
     fn one_place_alone_is_its_middle() {
         let known = Known { sigma: 0.1, marks: 100.0, others: 0.0, neighbours: &[] };
+        let late_by = |counts: &[u32], first, known: &Known| {
+            Histogram { counts: counts.to_vec(), first, ..Default::default() }.late_by(known)
+        };
         for sigma in [0.06, 0.1, 0.2] {
             let late = late_by(&[0, 0, 97, 0, 0], -1, &Known { sigma, ..known });
             assert!((late - 1.5).abs() < 0.01, "{sigma}: {late}");

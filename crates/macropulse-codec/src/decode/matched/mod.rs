@@ -34,6 +34,7 @@ use std::ops::Range;
 use super::field::{self, Field};
 use super::threshold::Thresholds;
 use super::timeline::Timeline;
+use super::timing::Histogram;
 use super::{GATES_PER_BLOCK, Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
@@ -166,9 +167,20 @@ struct Band<'a> {
     bounding: Counts<NARROW>,
     search: Search,
     photons: Photons,
-    /// Memory for the residual of a macropulse, and for the marks found in each of its bits.
+    histogram: Histogram,
+    /// Memory for the residual of a macropulse, for the marks found in each of its bits and in those about it,
+    /// and for the places that others claim and its own.
     residual: Timeline,
     found_in_bits: Vec<u32>,
+    words: WordsAbout,
+    places: [Timeline; 2],
+}
+
+/// Marks of a word that are found in each bit about a macropulse, and their sums for the bits of a label.
+#[derive(Debug, Default)]
+struct WordsAbout {
+    found: Vec<u32>,
+    sums: Vec<u32>,
 }
 
 impl<'a> Band<'a> {
@@ -245,8 +257,11 @@ impl<'a> Band<'a> {
             bounding: Counts::default(),
             search: memory.search,
             photons: memory.photons,
+            histogram: Histogram::default(),
             residual: Timeline::default(),
             found_in_bits: Vec::new(),
+            words: WordsAbout::default(),
+            places: Default::default(),
             sent,
         }
     }

@@ -24,6 +24,12 @@ pub(super) struct Sent<'a> {
     reach: Range<i64>,
     /// Number of marks of each shot.
     weights: Vec<u32>,
+    /// Bits of a payload, and the length of each, in ticks.
+    bits: i64,
+    bit_length: i64,
+    /// Ticks from as many bits before the start of a macropulse as a payload has, to each bit until as many
+    /// behind its end.
+    bits_about: Vec<u32>,
     /// Length of the stretch in which a mark may be found, in ticks.
     pub width: u32,
     pub words: Words,
@@ -135,12 +141,28 @@ impl<'a> Sent<'a> {
             codebook.lit_bits(*label).len() as u32 * in_words[usize::from(*word)]
         };
         let weights = log.label.iter().zip(&log.word).map(weight).collect();
+        let bits = codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
         let length = i64::from(codebook.chips()) * i64::from(receiver.ticks_per_chip);
+        let bit_length = length / bits;
+        let bits_about = (0..3 * bits).map(|bit| (bit * bit_length) as u32).collect();
         let (nearest, farthest) = receiver.gate_ticks;
         let light = i64::from(receiver.light_ticks);
         let end = light.max(i64::from(farthest) + length) + 1;
         let reach = (i64::from(nearest) - length).max(0)..end;
-        Self { reach, receiver, codebook, log, epoch, fired, weights, width, words }
+        Self {
+            reach,
+            receiver,
+            codebook,
+            log,
+            epoch,
+            fired,
+            weights,
+            bits,
+            bit_length,
+            bits_about,
+            width,
+            words,
+        }
     }
 
     /// The first marks of the word of `shot`.
@@ -229,18 +251,18 @@ impl<'a> Sent<'a> {
         self.lit_bits(shot).iter().map(move |&bit| start + scale * i64::from(bit))
     }
 
-    /// The sums of `found` over the lit bits of `shot`, where that has a number for each bit from as many before
-    /// its first one as a payload has, to as many behind its last one: if it begins that many bits earlier,
-    /// one fewer, and so on, until as many later.
-    pub fn in_bits(&self, shot: usize, found: &[u32]) -> Vec<u32> {
+    /// The `sums` of `found` over the lit bits of `shot`, where that has a number for each of the
+    /// [`Self::bits_about`] it: if it begins as many bits earlier as a payload has, one fewer, and so on, until as
+    /// many later.
+    pub fn in_bits(&self, shot: usize, found: &[u32], sums: &mut Vec<u32>) {
         let bits = self.bits_of_payload() as usize;
         let length = self.codebook.chips() / bits as u32;
-        let mut sums = vec![0; 2 * bits + 1];
+        sums.clear();
+        sums.resize(2 * bits + 1, 0);
         for bit in self.lit_bits(shot) {
             let found = found.get((bit / length) as usize..).unwrap_or_default();
             sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
         }
-        sums
     }
 
     /// Ticks from the start of a macropulse of `shot` to each bit of it that is lit, or dark.
@@ -264,17 +286,23 @@ impl<'a> Sent<'a> {
 
     /// Length of a macropulse, in ticks.
     pub fn length(&self) -> i64 {
-        i64::from(self.codebook.chips()) * self.scale()
+        self.bits * self.bit_length
     }
 
     /// Length of one bit of it, in ticks.
     pub fn bit_length(&self) -> i64 {
-        self.length() / self.bits_of_payload()
+        self.bit_length
     }
 
     /// Bits of a payload.
     pub fn bits_of_payload(&self) -> i64 {
-        self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()))
+        self.bits
+    }
+
+    /// Ticks from as many bits before the start of a macropulse as a payload has, to each bit until as many
+    /// behind its end.
+    pub fn bits_about(&self) -> &[u32] {
+        &self.bits_about
     }
 
     /// The lags at which a return is accepted.
@@ -299,7 +327,12 @@ impl<'a> Sent<'a> {
     /// The time that light of `shot` takes up if it comes after `lag`.
     pub fn light(&self, shot: usize, lag: i64) -> Range<i64> {
         let start = self.fired[shot] + lag;
-        start..start + self.length() + i64::from(self.width) - 1
+        start..start + self.takes_up()
+    }
+
+    /// Ticks that the light of a shot takes up.
+    pub fn takes_up(&self) -> i64 {
+        self.length() + i64::from(self.width) - 1
     }
 
     /// Fewest ticks that can be so many marks of `shot`.

@@ -171,13 +171,16 @@ impl Band<'_> {
         if bits == 1 {
             return None;
         }
-        let words = self.words_about(shot, sent.fired[shot] + detection.lag);
-        let (counts, reach) = (sent.in_bits(shot, &words), sent.reach());
-        let lags =
-            (-bits..).zip(counts).map(|(away, count)| (count, detection.lag + away * length));
+        let mut words = std::mem::take(&mut self.words);
+        self.words_about(shot, sent.fired[shot] + detection.lag, &mut words.found);
+        sent.in_bits(shot, &words.found, &mut words.sums);
+        let reach = sent.reach();
+        let lags = (-bits..).zip(&words.sums);
+        let lags = lags.map(|(away, count)| (*count, detection.lag + away * length));
         let higher = lags.filter(|(count, lag)| *count > detection.count && reach.contains(lag));
-        let (_, lag) = higher.max_by_key(|(count, lag)| (*count, -lag))?;
-        self.best_in_block(shot, lag)
+        let highest = higher.max_by_key(|(count, lag)| (*count, -lag));
+        self.words = words;
+        self.best_in_block(shot, highest?.1)
     }
 
     /// The highest peak in the [`BLOCK`] around `middle`.

@@ -6,7 +6,6 @@ use std::ops::Range;
 use super::track::{BLOCK, NEAREST_SIDE, WIDEST_GAP, lit};
 use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
-use crate::decode::timeline::Timeline;
 use crate::decode::timing::{self, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
 use crate::kernels::parted;
@@ -260,31 +259,27 @@ impl Band<'_> {
             return false;
         }
         let light = sent.light(shot, detection.lag);
+        let mut claiming = self.light_from_beyond(shot, light.start, detection.count);
+        let is_supposed = !claiming.is_empty();
+        claiming.extend(self.overlapping(&light).filter(|found| {
+            let is_itself = found.0 == shot && found.1.lag == detection.lag;
+            !is_itself && self.claims(*found, (shot, detection))
+        }));
+        if claiming.is_empty() {
+            return true;
+        }
         let stretch = light.start.div_euclid(64) * 64..light.end.div_euclid(64) * 64 + 64;
-        let mut claimed = Timeline::default();
         // Words of others may begin before it.
         let before = (sent.bit_length() + 4 * i64::from(sent.width)).div_euclid(64) * 64 + 64;
+        let [claimed, own] = &mut self.places;
         claimed.clear_all(stretch.start - before, stretch.end - stretch.start + before);
-        let mut is_claimed = false;
-        let fuller = self.overlapping(light.clone());
-        let is_itself =
-            |found: &(usize, Detection)| found.0 == shot && found.1.lag == detection.lag;
-        let fuller =
-            fuller.filter(|found| !is_itself(found) && self.claims(*found, (shot, detection)));
-        let beyond = self.light_from_beyond(shot, light.start, detection.count);
-        let is_supposed = !beyond.is_empty();
-        for (other, theirs) in fuller.chain(beyond) {
-            is_claimed = true;
+        for (other, theirs) in claiming {
             let bits = sent.bits(other);
             let before = 2 * sent.farther() + i64::from(sent.width - 1);
             let start = sent.fired[other] + theirs.lag - before;
             claimed.light_up(start, sent.bits_that_are(true, other), &bits.claimed);
         }
-        if !is_claimed {
-            return true;
-        }
         // Where its own marks are found tells nothing of the free places.
-        let mut own = Timeline::default();
         own.clear_all(claimed.origin(), stretch.end - claimed.origin());
         let pattern = &sent.bits(shot).cancelled;
         let start = light.start - sent.farther();
@@ -346,36 +341,42 @@ impl Band<'_> {
 
     /// What earlier shots in the word of `shot`, found with `count` marks, would be found with if their
     /// light came from beyond the gate at tick `start`, or whole bits beside it: those with more marks.
-    fn light_from_beyond(&self, shot: usize, start: i64, count: u32) -> Vec<(usize, Detection)> {
+    fn light_from_beyond(
+        &mut self,
+        shot: usize,
+        start: i64,
+        count: u32,
+    ) -> Vec<(usize, Detection)> {
         let beyond = self.sent.gate().end..i64::from(self.sent.receiver.light_ticks) + 1;
-        let mut found = self.in_the_same_word(shot, start, beyond);
-        found.retain(|(other, theirs)| *other < shot && theirs.count > count);
-        found
+        self.in_the_same_word(shot, start, beyond, |other, found| other < shot && found > count)
     }
 
     /// Whether light of `shot` that seems to come from beyond the gate is rather that of a later shot
     /// from within: one in the same word with as many marks there, or whole bits beside it, and as
     /// large a share of all its marks but for chance.
-    pub(super) fn is_of_a_later_shot(&self, shot: usize, detection: Detection) -> bool {
+    pub(super) fn is_of_a_later_shot(&mut self, shot: usize, detection: Detection) -> bool {
         let (sent, gate) = (self.sent, self.sent.gate());
         if detection.lag < gate.end + sent.length() {
             return false;
         }
-        let found = self.in_the_same_word(shot, sent.fired[shot] + detection.lag, gate);
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
-        found.iter().any(|(other, theirs)| {
-            let least = super::look::usual(share, sent.weight(*other)).max(detection.count);
-            *other > shot && theirs.count >= least
-        })
+        let start = sent.fired[shot] + detection.lag;
+        let is_one = |other, found| {
+            let least = super::look::usual(share, sent.weight(other)).max(detection.count);
+            other > shot && found >= least
+        };
+        !self.in_the_same_word(shot, start, gate, is_one).is_empty()
     }
 
     /// The marks of other shots in the word of `shot` that begin at tick `start`, or whole bits beside
-    /// it, after one of the `lags`: there, a part of their lit bits falls upon its lit bits.
+    /// it, after one of the `lags`: there, a part of their lit bits falls upon its lit bits. Those shots, found
+    /// with so many marks, that are `wanted`.
     fn in_the_same_word(
-        &self,
+        &mut self,
         shot: usize,
         start: i64,
         lags: Range<i64>,
+        wanted: impl Fn(usize, u32) -> bool,
     ) -> Vec<(usize, Detection)> {
         let sent = self.sent;
         let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
@@ -385,42 +386,52 @@ impl Band<'_> {
         let is_alike = |other: &usize| sent.log.word[*other] == sent.log.word[shot];
         let mut alike = (first..end.max(first)).filter(is_alike).filter(|other| *other != shot);
         let Some(one) = alike.next() else { return Vec::new() };
-        let words = self.words_about(shot, start);
+        let mut words = std::mem::take(&mut self.words);
+        self.words_about(shot, start, &mut words.found);
         let mut found = Vec::new();
         for other in std::iter::once(one).chain(alike) {
-            for (away, count) in (-bits..).zip(sent.in_bits(other, &words)) {
+            sent.in_bits(other, &words.found, &mut words.sums);
+            for (away, count) in (-bits..).zip(&words.sums) {
                 let lag = start + away * length - sent.fired[other];
-                if away.abs() < bits && lags.contains(&lag) {
-                    found.push((other, Detection::at(lag, count)));
+                if away.abs() < bits && lags.contains(&lag) && wanted(other, *count) {
+                    found.push((other, Detection::at(lag, *count)));
                 }
             }
         }
+        self.words = words;
         found
     }
 
-    /// The marks of the word of `shot` that are found where each bit would be from as many bits before
+    /// The marks of the word of `shot` that are `found` where each bit would be from as many bits before
     /// tick `start` on as a payload has, to twice as many behind it.
-    pub(super) fn words_about(&self, shot: usize, start: i64) -> Vec<u32> {
+    pub(super) fn words_about(&self, shot: usize, start: i64, found: &mut Vec<u32>) {
         let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
-        let after: Vec<u32> = (0..3 * bits).map(|bit| (bit * length) as u32).collect();
-        let (pattern, mut found) = (&self.sent.bits(shot).pattern, Vec::new());
-        self.field.lit().lit_in_each(start - bits * length, &after, pattern, &mut found);
-        found
+        let (after, pattern) = (self.sent.bits_about(), &self.sent.bits(shot).pattern);
+        self.field.lit().lit_in_each(start - bits * length, after, pattern, found);
     }
 
     /// The returns found so far of which light overlaps with `light`.
-    fn overlapping(&self, light: Range<i64>) -> impl Iterator<Item = (usize, Detection)> + use<'_> {
+    fn overlapping(
+        &self,
+        light: &Range<i64>,
+    ) -> impl Iterator<Item = (usize, Detection)> + use<'_> {
         let sent = self.sent;
         let reach = sent.reach();
         let oldest = light.start - reach.end - sent.length();
         let first = sent.fired.partition_point(|fired| *fired < oldest);
-        let end = sent.fired.partition_point(|fired| fired + reach.start < light.end);
-        let further = self.further.iter().copied();
-        let primary = (first..end.max(first)).filter_map(|shot| Some((shot, self.found[shot]?)));
-        primary.chain(further).filter(move |(shot, detection)| {
-            let theirs = sent.light(*shot, detection.lag);
-            theirs.start < light.end && light.start < theirs.end
-        })
+        let end_of_others = sent.fired.partition_point(|fired| fired + reach.start < light.end);
+        let (from, end) = (light.start - sent.takes_up() + 1, light.end);
+        let range = first..end_of_others.max(first);
+        let others = range.clone().zip(&sent.fired[range.clone()]).zip(&self.found[range]);
+        let primary = others.filter_map(move |((shot, fired), found)| {
+            let found = found.as_ref()?;
+            (from..end).contains(&(fired + found.lag)).then_some((shot, *found))
+        });
+        let further = self
+            .further
+            .iter()
+            .filter(move |(shot, found)| (from..end).contains(&(sent.fired[*shot] + found.lag)));
+        primary.chain(further.copied())
     }
 
     /// What is measured of `shot` at `detection`.
@@ -519,7 +530,7 @@ impl Band<'_> {
         let lit_bits = sent.bits_that_are(true, shot);
         let count =
             |place: i64| self.field.seen().lit_in_all(light.start + place, lit_bits, &bits.pattern);
-        let (counts, first) = timing::about(sent.width, sent.receiver.jitter(), count);
+        self.histogram.count(sent.width, sent.receiver.jitter(), count);
         let beside = self.field.density_without(&light, detection.count, 0);
         let known = Known {
             sigma: sent.receiver.jitter(),
@@ -527,7 +538,7 @@ impl Band<'_> {
             others: beside / f64::from(sent.width),
             neighbours: &bits.neighbours,
         };
-        timing::late_by(&counts, first, &known)
+        self.histogram.late_by(&known)
     }
 }
 
