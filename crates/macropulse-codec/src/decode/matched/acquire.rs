@@ -251,6 +251,12 @@ impl Group {
         })
     }
 
+    /// Whether light stands out in a stretch.
+    fn stands_out(&self) -> bool {
+        let root = |ticks: u32| 2.0 * f64::from(ticks).sqrt();
+        root(self.most) - root(self.least) > UNEVEN
+    }
+
     fn with(self, other: Self) -> Self {
         Self {
             least: self.least.min(other.least),
@@ -273,6 +279,8 @@ pub(super) struct Leftover<'a> {
     together: usize,
     /// Of every [`PER_GROUP`] stretches.
     groups: Vec<Group>,
+    /// Nothing stands out of the stretches before this one, once that is asked for.
+    even_to: Option<usize>,
 }
 
 /// A search takes hardly any time if so many blocks of lags, each with all its marks, are counted: at
@@ -296,9 +304,15 @@ impl<'a> Leftover<'a> {
         let stretches = vec![0; cells.len()];
         let (all, groups) = (0..cells.len(), vec![Group::NONE; cells.len().div_ceil(PER_GROUP)]);
         let cell = field.cell();
-        let mut leftover = Self { sent, cells, stretches, groups, begin, cell, together };
+        let even_to = None;
+        let mut leftover = Self { sent, cells, stretches, groups, begin, cell, together, even_to };
         leftover.sum(all);
         leftover
+    }
+
+    /// Ticks of the cells that a macropulse may touch.
+    pub fn takes_up(&self) -> i64 {
+        self.cell * self.together as i64
     }
 
     /// Counts anew what is left in `light`.
@@ -320,6 +334,7 @@ impl<'a> Leftover<'a> {
             let next = self.cells.get(cell + self.together).copied().unwrap_or(0);
             sum = sum + next - self.cells[cell];
         }
+        self.even_to = None;
         let groups = self.groups.iter_mut().zip(self.stretches.chunks(PER_GROUP));
         let changed = stretches.start / PER_GROUP..stretches.end.div_ceil(PER_GROUP);
         for (group, stretches) in groups.take(changed.end).skip(changed.start) {
@@ -343,6 +358,31 @@ impl<'a> Leftover<'a> {
         let cells = self.cells(self.sent.fired[shot], lags);
         let groups = cells.start / PER_GROUP..cells.end.div_ceil(PER_GROUP);
         self.groups[groups].iter().any(|group| group.most >= ticks)
+    }
+
+    /// Whether light of `shot` is looked for after the `lags` only where it stands out: what is soon searched
+    /// need not.
+    pub fn must_stand_out(&self, shot: usize, lags: &Range<i64>) -> bool {
+        let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
+        blocks * i64::from(self.sent.weight(shot)) > SOON && !self.sent.is_thorough()
+    }
+
+    /// Whether it is told at once that there are no [`Self::lags`] for `shot` among these unless light is looked
+    /// for that does not stand out: none does, from the first stretch to the last of theirs.
+    pub fn is_even(&mut self, shot: usize, lags: &Range<i64>) -> bool {
+        if !self.must_stand_out(shot, lags) {
+            return false;
+        }
+        let groups = &self.groups;
+        let even_to = *self.even_to.get_or_insert_with(|| {
+            let mut all = Group::NONE;
+            let is_even = |group: &&Group| {
+                all = all.with(**group);
+                !all.stands_out()
+            };
+            PER_GROUP * groups.iter().take_while(is_even).count()
+        });
+        self.cells(self.sent.fired[shot], lags).end <= even_to
     }
 
     /// The cells in which light of `shot` begins that comes after the `lags`.
@@ -378,15 +418,10 @@ impl<'a> Leftover<'a> {
         }
         let cells = self.cells(fired, &lags);
         let all = self.group(cells.clone());
-        // What is soon searched need not stand out.
-        let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
-        let is_long = blocks * i64::from(sent.weight(shot)) > SOON && !sent.is_thorough();
-        let root = |ticks: u32| 2.0 * f64::from(ticks).sqrt();
-        let stands_out = root(all.most) - root(all.least) > UNEVEN;
         // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one where
         // not all of them overlap with what is sought.
         let enough = enough + if cells.len() > 2 * self.together { all.least } else { 0 };
-        if is_long && !stands_out && !is_even {
+        if self.must_stand_out(shot, &lags) && !all.stands_out() && !is_even {
             return places;
         }
         let at = |cell: usize| self.begin + self.cell * cell as i64 - fired;

@@ -224,12 +224,13 @@ impl Band<'_> {
         let is_expected = |shot| (0..7).any(|way| self.expected(shot, 1, way).is_some());
         self.is_dark_around =
             self.found[around].iter().all(Option::is_none) && !shots.clone().any(is_expected);
+        self.look_beside(shots.clone(), at_hand);
         for shot in shots.clone() {
-            if self.is_open(shot) {
+            if self.is_open(shot) && self.bright(shot).is_none() {
                 // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
                 for _ in 0..=SURFACES {
-                    let Some(lag) = self.look_for_leftover(shot) else { break };
-                    self.follow(shot + 1..at_hand, lag);
+                    let Some(found) = self.look_for_leftover(shot) else { break };
+                    self.follow((shot, found), shot + 1..at_hand);
                 }
             }
         }
@@ -240,12 +241,79 @@ impl Band<'_> {
         }
     }
 
-    /// Looks for light of `shot` that is left over, and tells after which lag there is some.
-    fn look_for_leftover(&mut self, shot: usize) -> Option<i64> {
-        if self.found[shot].is_none() && self.track_leftover(shot) {
-            return self.found[shot].map(|found| found.lag);
+    /// Looks for surfaces that stand out beside those found, of the shots until `at_hand`, of which all light is
+    /// known that overlaps with that of the `closed` ones.
+    ///
+    /// The last shots come first: most light is near, and until that of a later shot is found it is searched for
+    /// in vain in the gates of all that were in flight before.
+    fn look_beside(&mut self, closed: Range<usize>, at_hand: usize) {
+        let gate = self.sent.gate();
+        let next = self.sent.fired.get(at_hand).map_or(i64::MAX, |fired| fired + gate.start);
+        let known_to = next.saturating_sub(self.leftover().takes_up());
+        for shot in (closed.start..at_hand).rev() {
+            let is_closed = closed.contains(&shot);
+            let known = known_to.saturating_sub(self.sent.fired[shot]);
+            let lags = gate.start..if is_closed { gate.end } else { gate.end.min(known) };
+            if !is_closed && !self.leftover().must_stand_out(shot, &lags) {
+                continue;
+            }
+            for _ in 0..=SURFACES {
+                let Some(found) = self.find_beside(shot, &lags, is_closed) else { break };
+                self.follow((shot, found), (closed.start..shot).rev());
+                self.follow((shot, found), shot + 1..at_hand);
+            }
         }
-        let (known, gate, weight) = (self.found[shot], self.sent.gate(), self.sent.weight(shot));
+    }
+
+    /// What was found of `shot` and stands out, if no surface but a stronger one is wanted.
+    fn bright(&self, shot: usize) -> Option<Detection> {
+        let (sent, gate) = (self.sent, self.sent.gate());
+        let is_bright = |known: &Detection| known.stands_out && gate.contains(&known.lag);
+        self.found[shot].filter(is_bright).filter(|_| !sent.wants_further() && self.is_open(shot))
+    }
+
+    /// Finds one more surface of a bright `shot`, of light that stands out and comes after the `lags`.
+    fn find_beside(
+        &mut self,
+        shot: usize,
+        lags: &Range<i64>,
+        is_closed: bool,
+    ) -> Option<Detection> {
+        let known = self.bright(shot)?;
+        if self.leftover().is_even(shot, lags) {
+            return None;
+        }
+        let visible = known.count - known.count / 4;
+        let lags = self.leftover().lags(shot, lags.clone(), visible, false);
+        let (lag, count) = self.most_left(shot, &lags, visible)?;
+        let found = self.found_at(shot, lag);
+        let taken = self.take_surface(shot, found);
+        if taken.is_none() && is_closed {
+            // It is not looked at again.
+            self.cancel(shot, lag);
+            return Some(Detection::at(lag, count));
+        }
+        taken
+    }
+
+    /// The lag with most marks of `shot` that are left over, of the `lags` given, at least so many and more than
+    /// chance leaves.
+    fn most_left(&mut self, shot: usize, lags: &[Range<i64>], least: u32) -> Option<(i64, u32)> {
+        if lags.is_empty() {
+            return None;
+        }
+        let reach = self.sent.reach();
+        let left = self.leftover().density(shot, &reach);
+        let least = self.thresholds.least(self.sent.weight(shot), left).max(least);
+        self.maximum(shot, Source::Residual, lags, least)
+    }
+
+    /// Looks for light of `shot` that is left over, and tells after which lag there is some.
+    fn look_for_leftover(&mut self, shot: usize) -> Option<Detection> {
+        if self.found[shot].is_none() && self.track_leftover(shot) {
+            return self.found[shot];
+        }
+        let (known, gate) = (self.found[shot], self.sent.gate());
         // Half of the marks may lie under ticks that are cancelled already, or a quarter of those that
         // must replace another return.
         let (least, visible) = match known {
@@ -274,13 +342,10 @@ impl Band<'_> {
             self.note_search(shot, may_be_even, share);
             return None;
         }
-        let reach = self.sent.reach();
-        let left = self.leftover().density(shot, &reach);
-        let visible = self.thresholds.least(weight, left).max(visible);
-        let most = self.maximum(shot, Source::Residual, &lags, visible);
+        let most = self.most_left(shot, &lags, visible);
         let is_dense = 2 * self.search.counted() > gate.end - gate.start;
         self.note_search(shot, may_be_even, if is_dense { DENSE * share } else { share });
-        let (lag, _) = most?;
+        let (lag, count) = most?;
         // What was found already may be higher, and near enough to be climbed to.
         let found = match known {
             None => self.climb(shot, lag, least).filter(|found| self.stands_alone(shot, *found)),
@@ -291,7 +356,7 @@ impl Band<'_> {
             // It is not looked at again.
             self.cancel(shot, lag);
         }
-        Some(taken.unwrap_or(lag))
+        Some(taken.unwrap_or(Detection::at(lag, count)))
     }
 
     /// Notes that in such a `share` of the gate of `shot` nothing was found but what was known.
@@ -306,8 +371,8 @@ impl Band<'_> {
     }
 
     /// Takes what was `found` of `shot` for one of its surfaces, if it is new and to be believed, cancels
-    /// it, and tells at which lag.
-    fn take_surface(&mut self, shot: usize, found: Option<Detection>) -> Option<i64> {
+    /// it, and gives it back.
+    fn take_surface(&mut self, shot: usize, found: Option<Detection>) -> Option<Detection> {
         let found = found.filter(|found| !self.is_known(shot, found.lag));
         let found = found.and_then(|found| self.believed(shot, found))?;
         self.cancel(shot, found.lag);
@@ -316,7 +381,7 @@ impl Band<'_> {
             None => self.even.note(shot, true, 0.0),
         }
         self.add_surface(shot, found);
-        Some(found.lag)
+        Some(found)
     }
 
     /// Finds one more surface of `shot`, found at `lag`, that neither chance nor light of other shots gives,
@@ -346,15 +411,17 @@ impl Band<'_> {
         true
     }
 
-    /// Follows a surface that stands beside others, as behind a pane of glass, along the `shots`, the
-    /// first of which is expected to have it about `lag`: to search for each of them alone takes long.
-    fn follow(&mut self, shots: Range<usize>, mut lag: i64) {
-        let mut step = None;
+    /// Follows a `surface` that stands beside others, as behind a pane of glass, from a shot along the `shots` next
+    /// to it, as long as it is no fainter: to search for each of them alone takes long.
+    fn follow(&mut self, (shot, surface): (usize, Detection), shots: impl Iterator<Item = usize>) {
+        let (mut lag, mut step) = (surface.lag, None);
+        let mut share = f64::from(surface.count) / f64::from(self.sent.weight(shot));
         for shot in shots {
             if self.found[shot].is_none() || !self.is_open(shot) {
                 return;
             }
-            let usual = self.usual.least(self.sent.weight(shot));
+            let weight = self.sent.weight(shot);
+            let usual = self.usual.least(weight).min(usual(share, weight));
             let expected = lag + step.unwrap_or(0);
             let mut found = self.climb(shot, expected, usual);
             if found.is_none() && step.is_none() {
@@ -362,8 +429,9 @@ impl Band<'_> {
                 found = self.beside(shot, expected, Detection::at(lag, usual.saturating_sub(1)));
             }
             let Some(taken) = self.take_surface(shot, found) else { return };
-            step = Some(taken - lag);
-            lag = taken;
+            share = f64::from(taken.count) / f64::from(weight);
+            step = Some(taken.lag - lag);
+            lag = taken.lag;
         }
     }
 
