@@ -21,6 +21,9 @@ pub(crate) fn coarse(words: &[u64], shift: usize, picture: &mut [u64]) {
         // eight.
         #[cfg(target_arch = "x86_64")]
         Level::Avx512 => unsafe { avx512::coarse_within(words, shift, inner) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 => unsafe { avx2::coarse_within(words, shift, inner) },
         _ => plain(words, shift, inner),
     }
     let behind = &words[COARSE * whole..];
@@ -54,6 +57,41 @@ fn plain(words: &[u64], shift: usize, picture: &mut [u64]) {
             any |= any >> 2;
             any = (any | any >> 1) & 0x0101_0101_0101_0101;
             *out |= any.wrapping_mul(0x0102_0408_1020_4080) >> 56 << (8 * lane);
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::COARSE;
+    use std::arch::x86_64::{
+        _mm_cvtsi64_si128, _mm256_cmpeq_epi8, _mm256_loadu_si256, _mm256_movemask_epi8,
+        _mm256_or_si256, _mm256_setzero_si256, _mm256_sll_epi64, _mm256_srl_epi64,
+    };
+
+    /// # Safety
+    ///
+    /// The processor must have AVX2, and `words` must be one more than eight for each word of the picture.
+    #[target_feature(enable = "avx2")]
+    pub(super) unsafe fn coarse_within(words: &[u64], shift: usize, picture: &mut [u64]) {
+        // A shift by 64 gives 0.
+        let back = _mm_cvtsi64_si128(64 - shift as i64);
+        let shift = _mm_cvtsi64_si128(shift as i64);
+        for (index, out) in picture.iter_mut().enumerate() {
+            let dark_bytes = |word: usize| {
+                // SAFETY: the caller answers for the words.
+                let (low, high) = unsafe {
+                    let low = words.as_ptr().add(word);
+                    (_mm256_loadu_si256(low.cast()), _mm256_loadu_si256(low.add(1).cast()))
+                };
+                let bits =
+                    _mm256_or_si256(_mm256_srl_epi64(low, shift), _mm256_sll_epi64(high, back));
+                let dark = _mm256_cmpeq_epi8(bits, _mm256_setzero_si256());
+                _mm256_movemask_epi8(dark) as u32
+            };
+            let half = COARSE / 2;
+            let [low, high] = [0, half].map(|word| u64::from(dark_bytes(COARSE * index + word)));
+            *out = !(low | high << 32);
         }
     }
 }

@@ -6,7 +6,8 @@
 //! where it is expected is seen in the shorter one, and all of a gate is passed in the longer one.
 
 use super::coarse::COARSE;
-use super::level::Level;
+#[cfg(target_arch = "x86_64")]
+use super::registers;
 use crate::on_every_level;
 
 /// Machine words of a block of the lags about one that is expected.
@@ -16,13 +17,10 @@ pub(crate) const NARROW: usize = 4;
 pub(crate) const WIDE: usize = 8;
 
 /// Planes of a count; a macropulse has at most 65535 marks.
-const PLANES: usize = 16;
+pub(super) const PLANES: usize = 16;
 
-/// The lowest planes, to which marks are added one by one, and those above them: for up to 255 marks few,
-/// which stay in registers.
-const LOW: usize = 4;
-const FEW: usize = 4;
-const MANY: usize = PLANES - LOW;
+/// The lowest planes, to which marks are added one by one.
+pub(super) const LOW: usize = 4;
 
 /// Counts of a block of 64 · W lags, in bit planes: plane p has weight 2^p. W is [`NARROW`] or
 /// [`WIDE`].
@@ -62,22 +60,15 @@ impl<const W: usize> Counts<W> {
         self.counted = places.len();
         self.used = ((usize::BITS - self.counted.leading_zeros()) as usize).clamp(LOW, PLANES);
         let planes = self.planes.as_flattened_mut();
-        // SAFETY: the processor has what this level asks for, every mark lies so that its block ends within
-        // the words, a place fits into 32 bits, and there is a plane for each bit of the highest count.
         #[cfg(target_arch = "x86_64")]
-        if Level::here() == Level::Avx512 && words.len() < 1 << 26 {
-            return match (W, self.used > LOW + FEW) {
-                (NARROW, false) => unsafe { avx512::narrow::<FEW>(words, first, places, planes) },
-                (NARROW, true) => unsafe { avx512::narrow::<MANY>(words, first, places, planes) },
-                (_, false) => unsafe { avx512::wide::<FEW>(words, first, places, planes) },
-                (_, true) => unsafe { avx512::wide::<MANY>(words, first, places, planes) },
-            };
+        if let Some(count) = registers::counter::<W>(self.used)
+            && words.len() < 1 << 26
+        {
+            // SAFETY: the processor has what this level asks for, every mark lies so that its block ends within
+            // the words, a place fits into 32 bits, and there is a plane for each bit of the highest count.
+            return unsafe { count(words, first, places, planes) };
         }
-        let planes = &mut planes[..W * self.used];
-        match W {
-            NARROW => narrow(words, first, places, planes),
-            _ => wide(words, first, places, planes),
-        }
+        count_within::<W>(words, first, places, &mut planes[..W * self.used]);
     }
 
     /// The highest count among the lags of `allowed`, and the first lag that has it; `None` where
@@ -135,20 +126,6 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// [`Counts::count`] in blocks of [`NARROW`], where none reaches beyond the end.
-    fn narrow(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
-        count_within::<NARROW>(words, first, places, planes);
-    }
-}
-
-on_every_level! {
-    /// [`Counts::count`] in blocks of [`WIDE`], where none reaches beyond the end.
-    fn wide(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
-        count_within::<WIDE>(words, first, places, planes);
-    }
-}
-
-on_every_level! {
     /// [`Counts::highest`] of blocks of [`NARROW`].
     fn highest_narrow(planes: &[u64], allowed: &[u64]) -> Option<(u32, u32)> {
         highest_of::<NARROW>(planes, allowed)
@@ -178,7 +155,7 @@ fn highest_of<const W: usize>(planes: &[u64], allowed: &[u64]) -> Option<(u32, u
     Some((64 * lane as u32 + allowed[lane].trailing_zeros(), count))
 }
 
-#[inline(always)]
+/// [`Counts::count`] where no block reaches beyond the end.
 fn count_within<const W: usize>(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
     let (planes, _) = planes.as_chunks_mut::<W>();
     planes.fill([0; W]);
@@ -217,140 +194,6 @@ fn count_within<const W: usize>(words: &[u64], first: u32, places: &[u32], plane
     }
 }
 
-/// The same where a block is one register, and one instruction cuts it out of two.
-#[cfg(target_arch = "x86_64")]
-mod avx512 {
-    use super::{LOW, NARROW, WIDE};
-    use std::arch::x86_64::*;
-
-    /// Marks that are added up before anything is carried beyond the fourth plane.
-    const SIXTEEN: usize = 16;
-
-    macro_rules! counter {
-        (
-            $name:ident, $lanes:ident, $register:ty, $dark:ident, $load:ident, $store:ident,
-            $cut:ident, $shift:ident, $logic:ident, $and:ident, $xor:ident
-        ) => {
-            /// # Safety
-            ///
-            /// The processor must have AVX-512 F, VL and VBMI2, and `words`, fewer than 2^26, must
-            /// reach a block and one word beyond the one in which the bit `first + place` lies, for
-            /// each of `places`. These must be fewer than 16 · 2^`HIGH`, and there must be as many more
-            /// `planes` than [`LOW`].
-            #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
-            pub(super) unsafe fn $name<const HIGH: usize>(
-                words: &[u64],
-                first: u32,
-                places: &[u32],
-                planes: &mut [u64],
-            ) {
-                let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
-                let mut high = [$dark(); HIGH];
-                // Three bits are summed in each lag, and carried to the next plane.
-                macro_rules! add {
-                    ($a:expr, $b:expr, $c:expr) => {{
-                        let (a, b, c) = ($a, $b, $c);
-                        ($logic::<0x96>(a, b, c), $logic::<0xE8>(a, b, c))
-                    }};
-                }
-                macro_rules! bits {
-                    ($place:expr) => {{
-                        let bit = first.wrapping_add($place);
-                        let word = bit as usize / 64;
-                        debug_assert!(word + $lanes < words.len());
-                        // SAFETY: the caller answers for the places.
-                        let (low, high) = unsafe {
-                            let low = words.as_ptr().add(word);
-                            ($load(low.cast()), $load(low.add(1).cast()))
-                        };
-                        // Only the six lowest bits of the count matter.
-                        $cut(low, high, $shift(i64::from(bit)))
-                    }};
-                }
-                // The blocks of eight marks are added, and one is carried to the fourth plane.
-                macro_rules! eight_from {
-                    ($first:literal, $block:ident) => {{
-                        let (sum, a) = add!(ones, $block!($first), $block!($first + 1));
-                        let (sum, b) = add!(sum, $block!($first + 2), $block!($first + 3));
-                        let (sum_of_twos, c) = add!(twos, a, b);
-                        let (sum, a) = add!(sum, $block!($first + 4), $block!($first + 5));
-                        let (sum, b) = add!(sum, $block!($first + 6), $block!($first + 7));
-                        ones = sum;
-                        let (sum, d) = add!(sum_of_twos, a, b);
-                        twos = sum;
-                        let (sum, carried) = add!(fours, c, d);
-                        fours = sum;
-                        carried
-                    }};
-                }
-                macro_rules! sixteen_from {
-                    ($block:ident) => {{
-                        let a = eight_from!(0, $block);
-                        let b = eight_from!(8, $block);
-                        let mut carried;
-                        (eights, carried) = add!(eights, a, b);
-                        for plane in &mut high {
-                            (*plane, carried) = ($xor(*plane, carried), $and(*plane, carried));
-                        }
-                    }};
-                }
-                let (whole, rest) = places.as_chunks::<SIXTEEN>();
-                for places in whole {
-                    macro_rules! block {
-                        ($at:expr) => {
-                            bits!(places[$at])
-                        };
-                    }
-                    sixteen_from!(block);
-                }
-                if !rest.is_empty() {
-                    macro_rules! block_or_dark {
-                        ($at:expr) => {
-                            match rest.get($at) {
-                                Some(place) => bits!(*place),
-                                None => $dark(),
-                            }
-                        };
-                    }
-                    sixteen_from!(block_or_dark);
-                }
-                let sums = [ones, twos, fours, eights].into_iter().chain(high);
-                for (plane, sum) in planes.chunks_exact_mut($lanes).zip(sums) {
-                    // SAFETY: a plane is as long as a register.
-                    unsafe { $store(plane.as_mut_ptr().cast(), sum) };
-                }
-            }
-        };
-    }
-
-    counter!(
-        narrow,
-        NARROW,
-        __m256i,
-        _mm256_setzero_si256,
-        _mm256_loadu_si256,
-        _mm256_storeu_si256,
-        _mm256_shrdv_epi64,
-        _mm256_set1_epi64x,
-        _mm256_ternarylogic_epi64,
-        _mm256_and_si256,
-        _mm256_xor_si256
-    );
-    counter!(
-        wide,
-        WIDE,
-        __m512i,
-        _mm512_setzero_si512,
-        _mm512_loadu_si512,
-        _mm512_storeu_si512,
-        _mm512_shrdv_epi64,
-        _mm512_set1_epi64,
-        _mm512_ternarylogic_epi64,
-        _mm512_and_si512,
-        _mm512_xor_si512
-    );
-}
-
 // Whole lanes in, whole lanes out: compilers keep these in registers.
 
 macro_rules! on_lanes {
@@ -372,7 +215,7 @@ on_lanes!(or, |=);
 /// The sum of three bits, in each lag, and what is carried to the next plane.
 #[inline(always)]
 fn add<const W: usize>(a: [u64; W], b: [u64; W], c: [u64; W]) -> ([u64; W], [u64; W]) {
-    (xor(xor(a, b), c), or(and(a, b), and(c, or(a, b))))
+    (xor(xor(a, b), c), or(and(a, b), and(c, xor(a, b))))
 }
 
 /// The block of bits that begins with bit `first`; dark where it does not end within the words.

@@ -19,6 +19,8 @@ mod lay;
 pub mod level;
 mod marks;
 mod pattern;
+#[cfg(target_arch = "x86_64")]
+mod registers;
 mod waveform;
 
 pub(crate) use ascend::ascends;

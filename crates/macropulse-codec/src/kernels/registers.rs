@@ -1,0 +1,297 @@
+//! Marks counted in registers, where a processor has them as long as a block of lags or half of one.
+
+use super::correlate::{LOW, NARROW, PLANES, WIDE};
+use super::level::Level;
+
+/// Planes above the lowest ones: for up to 255 marks few, which stay in registers.
+const FEW: usize = 4;
+const MANY: usize = PLANES - LOW;
+
+/// Counts the marks at `places` from bit `first` of the words on, into planes.
+pub(super) type Counter = unsafe fn(&[u64], u32, &[u32], &mut [u64]);
+
+/// What counts in blocks of `W` machine words on this level, into so many planes; `None` where that has no
+/// registers as long as the shorter block.
+///
+/// # Safety
+///
+/// To be called, it asks for `words`, fewer than 2^26, that reach a block and one word beyond the one in which
+/// the bit `first + place` lies, for each of the places; for fewer of these than 2^`planes`; and for all planes.
+pub(super) fn counter<const W: usize>(planes: usize) -> Option<Counter> {
+    Some(match (Level::here(), planes > LOW + FEW) {
+        (Level::Avx512, false) => avx512::count::<W, FEW>,
+        (Level::Avx512, true) => avx512::count::<W, MANY>,
+        (Level::Avx2, false) => avx2::count::<W, FEW>,
+        (Level::Avx2, true) => avx2::count::<W, MANY>,
+        (Level::Plain, _) => return None,
+    })
+}
+
+/// Marks that are added up before anything is carried beyond the fourth plane.
+const SIXTEEN: usize = 16;
+
+/// Counts in a register of so many lanes: how it is stored, how a block that begins at a bit of the words is
+/// read, and how three bits are summed in each lag, and carried.
+macro_rules! counter {
+    (
+        $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
+        $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
+    ) => {
+        /// # Safety
+        ///
+        /// The processor must have the features, and `words`, fewer than 2^26, must reach a register and one
+        /// word beyond the one in which the bit `first + place` lies, for each of `places`. These must be fewer
+        /// than 16 · 2^`HIGH`, and there must be as many more `planes` than [`LOW`], one every `stride` words.
+        #[target_feature(enable = $features)]
+        unsafe fn $name<const HIGH: usize>(
+            words: &[u64],
+            first: u32,
+            places: &[u32],
+            planes: &mut [u64],
+            stride: usize,
+        ) {
+            let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
+            let mut high = [$dark(); HIGH];
+            // Three bits are summed in each lag, and carried to the next plane.
+            macro_rules! add {
+                ($a:expr, $b:expr, $c:expr) => {{
+                    let (a, b, c) = ($a, $b, $c);
+                    ($sum(a, b, c), $carry(a, b, c))
+                }};
+            }
+            macro_rules! bits {
+                ($place:expr) => {{
+                    let bit = first.wrapping_add($place);
+                    debug_assert!(bit as usize / 64 + $lanes < words.len());
+                    // SAFETY: the caller answers for the places.
+                    unsafe { $cut(words.as_ptr(), bit) }
+                }};
+            }
+            // The blocks of eight marks are added, and one is carried to the fourth plane.
+            macro_rules! eight_from {
+                ($first:literal, $block:ident) => {{
+                    let (sum, a) = add!(ones, $block!($first), $block!($first + 1));
+                    let (sum, b) = add!(sum, $block!($first + 2), $block!($first + 3));
+                    let (sum_of_twos, c) = add!(twos, a, b);
+                    let (sum, a) = add!(sum, $block!($first + 4), $block!($first + 5));
+                    let (sum, b) = add!(sum, $block!($first + 6), $block!($first + 7));
+                    ones = sum;
+                    let (sum, d) = add!(sum_of_twos, a, b);
+                    twos = sum;
+                    let (sum, carried) = add!(fours, c, d);
+                    fours = sum;
+                    carried
+                }};
+            }
+            macro_rules! sixteen_from {
+                ($block:ident) => {{
+                    let a = eight_from!(0, $block);
+                    let b = eight_from!(8, $block);
+                    let mut carried;
+                    (eights, carried) = add!(eights, a, b);
+                    for plane in &mut high {
+                        (*plane, carried) = ($xor(*plane, carried), $and(*plane, carried));
+                    }
+                }};
+            }
+            let (whole, rest) = places.as_chunks::<SIXTEEN>();
+            for places in whole {
+                macro_rules! block {
+                    ($at:expr) => {
+                        bits!(places[$at])
+                    };
+                }
+                sixteen_from!(block);
+            }
+            if !rest.is_empty() {
+                macro_rules! block_or_dark {
+                    ($at:expr) => {
+                        match rest.get($at) {
+                            Some(place) => bits!(*place),
+                            None => $dark(),
+                        }
+                    };
+                }
+                sixteen_from!(block_or_dark);
+            }
+            let sums = [ones, twos, fours, eights].into_iter().chain(high);
+            for (plane, sum) in planes.chunks_mut(stride).zip(sums) {
+                // SAFETY: a plane is as long as a register.
+                unsafe { $store(plane.as_mut_ptr().cast(), sum) };
+            }
+        }
+    };
+}
+
+/// A block is one register, and one instruction cuts it out of two.
+mod avx512 {
+    use super::{LOW, NARROW, SIXTEEN, WIDE};
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    ///
+    /// As of the counters for each width.
+    #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
+    pub(super) unsafe fn count<const W: usize, const HIGH: usize>(
+        words: &[u64],
+        first: u32,
+        places: &[u32],
+        planes: &mut [u64],
+    ) {
+        // SAFETY: the caller answers for it.
+        match W {
+            NARROW => unsafe { narrow::<HIGH>(words, first, places, planes, W) },
+            _ => unsafe { wide::<HIGH>(words, first, places, planes, W) },
+        }
+    }
+
+    macro_rules! on_registers {
+        (
+            $kind:ident, $cut:ident, $sum:ident, $carry:ident, $load:ident, $by:ident, $at:ident,
+            $logic:ident
+        ) => {
+            /// # Safety
+            ///
+            /// From the word of `bit` on there must be a register and one word.
+            #[inline]
+            #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
+            unsafe fn $cut(words: *const u64, bit: u32) -> $kind {
+                // SAFETY: the caller answers for the words.
+                let (low, high) = unsafe {
+                    let low = words.add(bit as usize / 64);
+                    ($load(low.cast()), $load(low.add(1).cast()))
+                };
+                // Only the six lowest bits of the count matter.
+                $by(low, high, $at(i64::from(bit)))
+            }
+
+            #[inline]
+            #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
+            fn $sum(a: $kind, b: $kind, c: $kind) -> $kind {
+                $logic::<0x96>(a, b, c)
+            }
+
+            #[inline]
+            #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
+            fn $carry(a: $kind, b: $kind, c: $kind) -> $kind {
+                $logic::<0xE8>(a, b, c)
+            }
+        };
+    }
+
+    on_registers!(
+        __m256i,
+        cut_narrow,
+        sum_narrow,
+        carry_narrow,
+        _mm256_loadu_si256,
+        _mm256_shrdv_epi64,
+        _mm256_set1_epi64x,
+        _mm256_ternarylogic_epi64
+    );
+    on_registers!(
+        __m512i,
+        cut_wide,
+        sum_wide,
+        carry_wide,
+        _mm512_loadu_si512,
+        _mm512_shrdv_epi64,
+        _mm512_set1_epi64,
+        _mm512_ternarylogic_epi64
+    );
+    counter!(
+        "avx512f,avx512vl,avx512vbmi2",
+        narrow,
+        NARROW,
+        _mm256_setzero_si256,
+        _mm256_storeu_si256,
+        cut_narrow,
+        sum_narrow,
+        carry_narrow,
+        _mm256_and_si256,
+        _mm256_xor_si256
+    );
+    counter!(
+        "avx512f,avx512vl,avx512vbmi2",
+        wide,
+        WIDE,
+        _mm512_setzero_si512,
+        _mm512_storeu_si512,
+        cut_wide,
+        sum_wide,
+        carry_wide,
+        _mm512_and_si512,
+        _mm512_xor_si512
+    );
+}
+
+/// A register is half as long as the longer block.
+mod avx2 {
+    use super::{LOW, NARROW, SIXTEEN};
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    ///
+    /// As of the counter.
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) unsafe fn count<const W: usize, const HIGH: usize>(
+        words: &[u64],
+        first: u32,
+        places: &[u32],
+        planes: &mut [u64],
+    ) {
+        for half in (0..W).step_by(NARROW) {
+            // SAFETY: the caller answers for it.
+            unsafe { narrow::<HIGH>(&words[half..], first, places, &mut planes[half..], W) };
+        }
+    }
+
+    /// Bits to shift by to the right where a block begins so many bits behind the beginning of a byte, and
+    /// to the left in the bytes behind that one; each in the lower half of a register.
+    static RIGHT: [u64; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 0];
+    static LEFT: [u64; 9] = [8, 7, 6, 5, 4, 3, 2, 1, 0];
+
+    /// # Safety
+    ///
+    /// From the word of `bit` on there must be a register and one word.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    unsafe fn cut(words: *const u64, bit: u32) -> __m256i {
+        let behind = (bit & 7) as usize;
+        // SAFETY: the caller answers for the words, and the tables are a half register longer.
+        unsafe {
+            let low = words.cast::<u8>().add(bit as usize / 8);
+            let (low, high) =
+                (_mm256_loadu_si256(low.cast()), _mm256_loadu_si256(low.add(1).cast()));
+            let right = _mm_loadu_si128(RIGHT.as_ptr().add(behind).cast());
+            let left = _mm_loadu_si128(LEFT.as_ptr().add(behind).cast());
+            _mm256_or_si256(_mm256_srl_epi64(low, right), _mm256_sll_epi64(high, left))
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn sum(a: __m256i, b: __m256i, c: __m256i) -> __m256i {
+        _mm256_xor_si256(_mm256_xor_si256(a, b), c)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn carry(a: __m256i, b: __m256i, c: __m256i) -> __m256i {
+        // The sum has the last of these, too.
+        _mm256_or_si256(_mm256_and_si256(a, b), _mm256_and_si256(c, _mm256_xor_si256(a, b)))
+    }
+
+    counter!(
+        "avx2,bmi1,bmi2,lzcnt,popcnt",
+        narrow,
+        NARROW,
+        _mm256_setzero_si256,
+        _mm256_storeu_si256,
+        cut,
+        sum,
+        carry,
+        _mm256_and_si256,
+        _mm256_xor_si256
+    );
+}
