@@ -1,4 +1,4 @@
-//! Ticks laid down as bits, and bits counted.
+//! Ticks laid down as bits, bits counted, and counts summed up.
 
 use crate::on_every_level;
 
@@ -74,6 +74,32 @@ on_every_level! {
     }
 }
 
+on_every_level! {
+    /// Makes each of `sums` that of so many of the `numbers` `together`, from the same place on.
+    pub(crate) fn sum_along(numbers: &[u32], together: usize, sums: &mut [u32]) {
+        sums.fill(0);
+        for away in 0..together {
+            let later = numbers.get(away..).unwrap_or_default();
+            for (sum, number) in sums.iter_mut().zip(later) {
+                *sum += number;
+            }
+        }
+    }
+}
+
+on_every_level! {
+    /// The least of the `numbers`, the most, and their sum; `u32::MAX` and 0 where there are none.
+    pub(crate) fn least_most_and_sum(numbers: &[u32]) -> (u32, u32, u64) {
+        let (mut least, mut most, mut sum) = (u32::MAX, 0, 0);
+        for number in numbers {
+            least = least.min(*number);
+            most = most.max(*number);
+            sum += u64::from(*number);
+        }
+        (least, most, sum)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::level::forced::at_each_level;
@@ -98,6 +124,27 @@ mod tests {
                     let expected = gaps.get(at).is_some_and(|gap| is_lit(*gap));
                     prop_assert_eq!(lit >> at & 1 == 1, expected, "{:?} {}", level, at);
                 }
+            }
+        }
+
+        #[test]
+        fn every_level_sums_up(
+            numbers in proptest::collection::vec(0..1_000_000_u32, 0..60),
+            together in 0..9_usize,
+        ) {
+            let some = |from: usize| numbers.iter().skip(from).take(together).sum::<u32>();
+            let expected: Vec<u32> = (0..numbers.len() + 2).map(some).collect();
+            let summed = at_each_level(|| {
+                let mut sums = vec![7; numbers.len() + 2];
+                sum_along(&numbers, together, &mut sums);
+                (sums, least_most_and_sum(&numbers))
+            });
+            let least = numbers.iter().copied().min().unwrap_or(u32::MAX);
+            let most = numbers.iter().copied().max().unwrap_or(0);
+            let sum = numbers.iter().map(|number| u64::from(*number)).sum::<u64>();
+            for (level, (sums, of_all)) in summed {
+                prop_assert_eq!(&sums, &expected, "{:?}", level);
+                prop_assert_eq!(of_all, (least, most, sum), "{:?}", level);
             }
         }
 

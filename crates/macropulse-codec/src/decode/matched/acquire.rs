@@ -18,7 +18,10 @@ use super::sent::Sent;
 use super::track::below;
 use crate::decode::field::{Field, Source};
 use crate::decode::timeline::Timeline;
-use crate::kernels::{COARSE, Counts, WIDE, and, any_behind, coarse, in_pictures, is_dark};
+use crate::kernels::{
+    COARSE, Counts, WIDE, and, any_behind, coarse, in_pictures, is_dark, least_most_and_sum,
+    sum_along,
+};
 
 /// Lags that are counted at once.
 const BLOCK: i64 = 64 * WIDE as i64;
@@ -246,9 +249,8 @@ impl Group {
     const NONE: Self = Self { least: u32::MAX, most: 0, sum: 0 };
 
     fn of(stretches: &[u32]) -> Self {
-        stretches.iter().fold(Self::NONE, |group, &ticks| {
-            group.with(Self { least: ticks, most: ticks, sum: u64::from(ticks) })
-        })
+        let (least, most, sum) = least_most_and_sum(stretches);
+        Self { least, most, sum }
     }
 
     /// Whether light stands out in a stretch.
@@ -327,13 +329,8 @@ impl<'a> Leftover<'a> {
 
     /// Sums up the cells of each of the `stretches`.
     fn sum(&mut self, stretches: Range<usize>) {
-        let from = |cell: usize| self.cells.get(cell..).unwrap_or_default();
-        let mut sum: u32 = from(stretches.start).iter().take(self.together).sum();
-        for cell in stretches.clone() {
-            self.stretches[cell] = sum;
-            let next = self.cells.get(cell + self.together).copied().unwrap_or(0);
-            sum = sum + next - self.cells[cell];
-        }
+        let cells = self.cells.get(stretches.start..).unwrap_or_default();
+        sum_along(cells, self.together, &mut self.stretches[stretches.clone()]);
         self.even_to = None;
         let groups = self.groups.iter_mut().zip(self.stretches.chunks(PER_GROUP));
         let changed = stretches.start / PER_GROUP..stretches.end.div_ceil(PER_GROUP);
