@@ -14,6 +14,7 @@ mod embree;
 mod floor;
 mod generate;
 mod goals;
+mod levels;
 mod machine;
 mod meshes;
 mod page;
@@ -26,8 +27,9 @@ mod scans;
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// The sections that are written, in the order in which they are measured.
-const SECTIONS: [&str; 9] =
-    ["rays", "generate", "decode", "floor", "effort", "plain", "growth", "scans", "goals"];
+const SECTIONS: [&str; 10] = [
+    "rays", "generate", "decode", "levels", "floor", "effort", "plain", "growth", "scans", "goals",
+];
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -43,8 +45,9 @@ fn main() -> ExitCode {
 
 fn run(words: &[&str]) -> Fallible<()> {
     match words {
-        // What this program has processes of its own do, whose memory is measured.
+        // What this program has processes of its own do: their memory is measured, or they use fewer instructions.
         ["load", folder] => println!("{}", rays::load(Path::new(folder))?),
+        ["speeds"] => print!("{}", levels::speeds()?),
         ["sixty"] => {
             scans::sixty()?;
             println!("{}", 1e-6 * rays::peak());
@@ -61,6 +64,7 @@ fn section(name: &str) -> Fallible<()> {
         "rays" => rays::measure()?.text(),
         "generate" => generate::measure()?.text(),
         "decode" => decode::measure()?.text(),
+        "levels" => levels::text()?,
         "floor" => floor::text()?,
         "effort" => effort::measure()?.text(),
         "plain" => plain::text()?,
@@ -80,6 +84,7 @@ fn everything() -> Fallible<()> {
     write("generate", &generating.text())?;
     let decoding = decode::measure()?;
     write("decode", &decoding.text())?;
+    section("levels")?;
     section("floor")?;
     let efforts = effort::measure()?;
     write("effort", &efforts.text())?;

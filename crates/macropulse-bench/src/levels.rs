@@ -1,0 +1,46 @@
+//! How fast processors without the widest instructions decode, as far as this one can tell: with fewer of
+//! its own.
+
+use std::hint::black_box;
+use std::process::Command;
+
+use macropulse::codec::level::{Level, VARIABLE};
+
+use crate::Fallible;
+use crate::goals;
+use crate::machine::least_seconds;
+use crate::page;
+use crate::sample::Sample;
+
+/// One band in so many is decoded.
+const EVERY: usize = 24;
+
+/// What a process that uses the instructions of one level prints: how fast it decodes what there are goals
+/// of, one to a line.
+pub fn speeds() -> Fallible<String> {
+    let speed = |goal: goals::Decode| -> Fallible<String> {
+        let sample = Sample::of(goal.condition.design()?, goal.scene, EVERY)?;
+        let given = sample.given();
+        let seconds = least_seconds(|| drop(black_box(sample.decode(&given))));
+        Ok(format!("{}\n", sample.speed(seconds)))
+    };
+    goals::decoding().map(speed).collect()
+}
+
+/// The table.
+pub fn text() -> Fallible<String> {
+    let levels: Vec<Level> =
+        Level::ALL.into_iter().filter(|level| *level <= Level::here()).collect();
+    let mut rows: Vec<Vec<String>> =
+        goals::decoding().map(|goal| vec![format!("`{}`, {}", goal.scene, goal.name)]).collect();
+    for level in &levels {
+        let program = std::env::current_exe()?;
+        let output = Command::new(program).arg("speeds").env(VARIABLE, level.name()).output()?;
+        let printed = String::from_utf8(output.stdout)?;
+        for (row, speed) in rows.iter_mut().zip(printed.lines()) {
+            row.push(page::speed(speed.parse()?));
+        }
+    }
+    let names = levels.iter().map(|level| level.name());
+    Ok(page::table(&["decoding"].into_iter().chain(names).collect::<Vec<_>>(), &rows))
+}
