@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::machine::printed;
 use crate::meshes::{Direction, EYE};
 
 /// What the program prints of one mesh.
@@ -55,15 +56,6 @@ impl Embree {
             command.arg(file);
         }
         read(&printed(&mut command)?).ok_or_else(|| "peers/embree.c prints another form".into())
-    }
-}
-
-/// What a command prints, or why it failed.
-fn printed(command: &mut Command) -> Result<String, String> {
-    let output = command.output().map_err(|why| why.to_string())?;
-    match output.status.success() {
-        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
-        false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
     }
 }
 

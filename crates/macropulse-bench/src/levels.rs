@@ -8,7 +8,7 @@ use macropulse::codec::level::{Level, VARIABLE};
 
 use crate::Fallible;
 use crate::goals;
-use crate::machine::least_seconds;
+use crate::machine::{least_seconds, printed};
 use crate::page;
 use crate::sample::Sample;
 
@@ -35,9 +35,8 @@ pub fn text() -> Fallible<String> {
         goals::decoding().map(|goal| vec![format!("`{}`, {}", goal.scene, goal.name)]).collect();
     for level in &levels {
         let program = std::env::current_exe()?;
-        let output = Command::new(program).arg("speeds").env(VARIABLE, level.name()).output()?;
-        let printed = String::from_utf8(output.stdout)?;
-        for (row, speed) in rows.iter_mut().zip(printed.lines()) {
+        let speeds = printed(Command::new(program).arg("speeds").env(VARIABLE, level.name()))?;
+        for (row, speed) in rows.iter_mut().zip(speeds.lines()) {
             row.push(page::speed(speed.parse()?));
         }
     }

@@ -1,6 +1,7 @@
-//! The machine, in words, and how often to measure on it.
+//! The machine, in words, how often to measure on it, and what its programs print.
 
 use std::fs;
+use std::process::Command;
 
 use macropulse::codec::level::Level;
 use macropulse::processor::thread_seconds;
@@ -38,4 +39,13 @@ pub fn least_seconds(mut run: impl FnMut()) -> f64 {
         (least, sum) = (seconds.min(least), sum + seconds);
     }
     least
+}
+
+/// What a command prints, or why it failed.
+pub fn printed(command: &mut Command) -> Result<String, String> {
+    let output = command.output().map_err(|why| why.to_string())?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+    }
 }

@@ -281,7 +281,7 @@ pub(super) struct Leftover<'a> {
     together: usize,
     /// Of every [`PER_GROUP`] stretches.
     groups: Vec<Group>,
-    /// Nothing stands out of the stretches before this one, once that is asked for.
+    /// Among the stretches before this one no light stands out; `None` until that is asked for.
     even_to: Option<usize>,
 }
 
@@ -312,8 +312,8 @@ impl<'a> Leftover<'a> {
         leftover
     }
 
-    /// Ticks of the cells that a macropulse may touch.
-    pub fn takes_up(&self) -> i64 {
+    /// Ticks of a stretch.
+    pub fn stretch_length(&self) -> i64 {
         self.cell * self.together as i64
     }
 
@@ -364,8 +364,8 @@ impl<'a> Leftover<'a> {
         blocks * i64::from(self.sent.weight(shot)) > SOON && !self.sent.is_thorough()
     }
 
-    /// Whether it is told at once that there are no [`Self::lags`] for `shot` among these unless light is looked
-    /// for that does not stand out: none does, from the first stretch to the last of theirs.
+    /// Whether no light stands out before the end of the `lags` of `shot`, so that [`Self::lags`] has none where
+    /// only what stands out is looked for. Up to which stretch that is so is found once, and remembered.
     pub fn is_even(&mut self, shot: usize, lags: &Range<i64>) -> bool {
         if !self.must_stand_out(shot, lags) {
             return false;

@@ -98,6 +98,12 @@ fn below_mean(share: f64, weight: u32, deviations: f64) -> u32 {
     (mean - deviations * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
 }
 
+/// Fewest marks that are left over of a surface that replaces the one that is `known`: a quarter of as many may lie
+/// under ticks that are cancelled already.
+fn left_of_another(known: Detection) -> u32 {
+    known.count - known.count / 4
+}
+
 impl Band<'_> {
     /// Finds what can be found of a block of shots.
     pub(super) fn look_for(&mut self, block: Range<usize>) {
@@ -249,7 +255,7 @@ impl Band<'_> {
     fn look_beside(&mut self, closed: Range<usize>, at_hand: usize) {
         let gate = self.sent.gate();
         let next = self.sent.fired.get(at_hand).map_or(i64::MAX, |fired| fired + gate.start);
-        let known_to = next.saturating_sub(self.leftover().takes_up());
+        let known_to = next.saturating_sub(self.leftover().stretch_length());
         for shot in (closed.start..at_hand).rev() {
             let is_closed = closed.contains(&shot);
             let known = known_to.saturating_sub(self.sent.fired[shot]);
@@ -283,17 +289,14 @@ impl Band<'_> {
         if self.leftover().is_even(shot, lags) {
             return None;
         }
-        let visible = known.count - known.count / 4;
+        let visible = left_of_another(known);
         let lags = self.leftover().lags(shot, lags.clone(), visible, false);
-        let (lag, count) = self.most_left(shot, &lags, visible)?;
-        let found = self.found_at(shot, lag);
-        let taken = self.take_surface(shot, found);
-        if taken.is_none() && is_closed {
-            // It is not looked at again.
-            self.cancel(shot, lag);
-            return Some(Detection::at(lag, count));
+        let most = self.most_left(shot, &lags, visible)?;
+        let found = self.found_at(shot, most.0);
+        match is_closed {
+            true => Some(self.take_or_cancel(shot, found, most)),
+            false => self.take_surface(shot, found),
         }
-        taken
     }
 
     /// The lag with most marks of `shot` that are left over, of the `lags` given, at least so many and more than
@@ -314,14 +317,13 @@ impl Band<'_> {
             return self.found[shot];
         }
         let (known, gate) = (self.found[shot], self.sent.gate());
-        // Half of the marks may lie under ticks that are cancelled already, or a quarter of those that
-        // must replace another return.
+        // Half of the marks may lie under ticks that are cancelled already.
         let (least, visible) = match known {
             Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
                 if !known.stands_out && !self.again.is_due(shot) {
                     return None;
                 }
-                (known.count, known.count - known.count / 4)
+                (known.count, left_of_another(known))
             }
             // Of light from beyond the gate no more is wanted.
             _ => {
@@ -351,12 +353,21 @@ impl Band<'_> {
             None => self.climb(shot, lag, least).filter(|found| self.stands_alone(shot, *found)),
             Some(_) => self.found_at(shot, lag),
         };
-        let taken = self.take_surface(shot, found);
-        if taken.is_none() {
-            // It is not looked at again.
+        Some(self.take_or_cancel(shot, found, (lag, count)))
+    }
+
+    /// Takes what was `found` of `shot` for one of its surfaces, or else cancels the marks that led to it,
+    /// so that they are not looked at again; tells where that was.
+    fn take_or_cancel(
+        &mut self,
+        shot: usize,
+        found: Option<Detection>,
+        (lag, count): (i64, u32),
+    ) -> Detection {
+        self.take_surface(shot, found).unwrap_or_else(|| {
             self.cancel(shot, lag);
-        }
-        Some(taken.unwrap_or(Detection::at(lag, count)))
+            Detection::at(lag, count)
+        })
     }
 
     /// Notes that in such a `share` of the gate of `shot` nothing was found but what was known.
