@@ -1,4 +1,5 @@
-//! A quick receiver beside a thorough one where panes of glass stand before walls.
+//! A quick receiver beside a thorough one: where panes of glass stand before walls, and where the ground is so
+//! far that few shots see it.
 
 #![allow(clippy::unwrap_used)]
 
@@ -15,13 +16,11 @@ use macropulse::random::Chance;
 use macropulse::scene::Scene;
 use macropulse::tdc::{self, Wanted};
 
-/// What a receiver is given of the only band of the second scan of `street` in which a pane and what is
-/// behind it are so far apart that light of the one falls upon dark bits of the other.
-fn given(design: &Design) -> (ShotLog, Ticks) {
-    const BAND: usize = 144;
-    let scene = Scene::open("street").unwrap();
+/// What a receiver is given of a band of the second scan of `scene`.
+fn given(design: &Design, scene: &str, band: usize) -> (ShotLog, Ticks) {
+    let scene = Scene::open(scene).unwrap();
     let operating = Operating::of(design, &Environment::vacuum_dark()).unwrap();
-    let band = bands(design, 1).nth(BAND).unwrap();
+    let band = bands(design, 1).nth(band).unwrap();
     let log = band.shot_log(design);
     let finishes = scene.finishes(design.light.wavelength);
     let hits = scene.trace(design, &log).middle;
@@ -39,6 +38,28 @@ fn ranges(returns: &Returns) -> BTreeSet<(u32, u64)> {
     returns.shot.iter().copied().zip(returns.tof.iter().map(|tof| tof.to_bits())).collect()
 }
 
+/// How many shots there are of which they do not give the same ranges.
+fn differ(one: &Returns, other: &Returns) -> usize {
+    let (one, other) = (ranges(one), ranges(other));
+    one.symmetric_difference(&other).map(|(shot, _)| shot).collect::<BTreeSet<_>>().len()
+}
+
+/// N = 1696 shots as declared, seed 20160913, of which one in ten sees ground 91 or 95 m away: a quick receiver finds
+/// otherwise one in 50 at most. Of a whole scan of 240 bands, nine of which are so faint, that is one in 1300.
+/// Control: one that believes nothing as faint finds more otherwise.
+#[test]
+fn far_ground_is_found_that_few_shots_see() {
+    let design = Design::open("kim-park-2016", &[]).unwrap();
+    let (log, ticks) = given(&design, "car-50m", 132);
+    let decode =
+        |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
+    let quick = decode(&design.receiver);
+    let thorough = decode(&Receiver { effort: Effort::Thorough, ..design.receiver.clone() });
+    assert!(50 * differ(&quick, &thorough) <= log.owned.len(), "{}", differ(&quick, &thorough));
+    let blind = decode(&Receiver { false_alarm: 1e-12, ..design.receiver.clone() });
+    assert!(50 * differ(&blind, &thorough) > log.owned.len(), "{}", differ(&blind, &thorough));
+}
+
 /// N = 1696 shots without noise, and as many as declared, seed 20160913: no shot is refused for its label, and
 /// a quick receiver gives the ranges that a thorough one gives. Control: a receiver that believes nothing
 /// faint does not.
@@ -54,7 +75,9 @@ fn light_of_another_surface_does_not_pass_for_another_label() {
     let perfect = perfect.map(|(key, value)| (key.to_owned(), value.to_owned()));
     for keys in [&perfect[..], &[]] {
         let design = Design::open("kim-park-2016", keys).unwrap();
-        let (log, ticks) = given(&design);
+        // The only band in which a pane and what is behind it are so far apart that light of the one falls upon dark
+        // bits of the other.
+        let (log, ticks) = given(&design, "street", 144);
         let decode =
             |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
         let quick = decode(&design.receiver);
