@@ -340,21 +340,17 @@ impl Band<'_> {
             return None;
         }
         let may_be_even = known.is_none() && self.even.is_due(shot);
-        let wants_further = self.sent.wants_further();
-        let mut lags = self.leftover().lags(shot, gate.clone(), visible, wants_further);
+        let is_even = self.sent.wants_further();
+        let mut lags = self.leftover().lags(shot, gate.clone(), visible, is_even);
         if lags.is_empty() && may_be_even {
             // Little is cancelled where no light stands out: all of it is to be seen.
             lags = self.leftover().lags(shot, gate.clone(), least, true);
         }
         let searched: i64 = lags.iter().map(|lags| lags.end - lags.start).sum();
         let share = searched as f64 / (gate.end - gate.start) as f64;
-        if lags.is_empty() {
-            self.note_search(shot, may_be_even, (0.0, 1.0));
-            return None;
-        }
         let most = self.most_left(shot, &lags, visible);
         let is_dense = 2 * self.search.counted() > gate.end - gate.start;
-        self.note_search(shot, may_be_even, (share, if is_dense { DENSE } else { 1.0 }));
+        self.note_search(shot, may_be_even, share, if is_dense { DENSE } else { 1.0 });
         let (lag, count) = most?;
         // What was found already may be higher, and near enough to be climbed to.
         let found = match known {
@@ -380,7 +376,7 @@ impl Band<'_> {
 
     /// Notes that in such a `share` of the gate of `shot`, so many `times` as hard to search, nothing was found
     /// but what was known.
-    fn note_search(&mut self, shot: usize, may_be_even: bool, (share, times): (f64, f64)) {
+    fn note_search(&mut self, shot: usize, may_be_even: bool, share: f64, times: f64) {
         match self.found[shot] {
             // Faint ones are looked at again now and then. If none is, 28 of 74 519 shots of `street` as
             // declared are found at a fainter surface; a quarter of the pause finds what a half does.
