@@ -45,7 +45,7 @@ fn differ(one: &Returns, other: &Returns) -> usize {
 }
 
 /// N = 1696 shots as declared, seed 20160913, of which one in ten sees ground 91 or 95 m away: a quick receiver finds
-/// otherwise one in 50 at most. Of a whole scan of 240 bands, nine of which are so faint, that is one in 1300.
+/// otherwise one in 200 at most. Of a whole scan of 240 bands, nine of which are so faint, that is one in 5000.
 /// Control: one that believes nothing as faint finds more otherwise.
 #[test]
 fn far_ground_is_found_that_few_shots_see() {
@@ -55,7 +55,7 @@ fn far_ground_is_found_that_few_shots_see() {
         |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
     let quick = decode(&design.receiver);
     let thorough = decode(&Receiver { effort: Effort::Thorough, ..design.receiver.clone() });
-    assert!(50 * differ(&quick, &thorough) <= log.owned.len(), "{}", differ(&quick, &thorough));
+    assert!(200 * differ(&quick, &thorough) <= log.owned.len(), "{}", differ(&quick, &thorough));
     let blind = decode(&Receiver { false_alarm: 1e-12, ..design.receiver.clone() });
     assert!(50 * differ(&blind, &thorough) > log.owned.len(), "{}", differ(&blind, &thorough));
 }

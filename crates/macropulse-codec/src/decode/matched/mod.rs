@@ -10,7 +10,8 @@
 //! 2. [`track`]: neighbouring pixels see neighbouring ranges. About them the exact maximum is taken;
 //!    it is believed at once if as large a share of the marks is found as of the shots before.
 //! 3. [`acquire`]: the exact maximum over the gate, of shots that no neighbour predicts and of those
-//!    fainter than their neighbours; and, where light is left over, of further surfaces.
+//!    fainter than their neighbours; and, where light is left over, of further surfaces, if it fits no
+//!    other shot as well.
 //! 4. [`verify`]: returns that light of other returns accounts for are excluded, and those of which
 //!    a bit is lit that should be dark, or dark that should be lit.
 //!
