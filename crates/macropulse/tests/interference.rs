@@ -36,16 +36,21 @@ fn scenario(name: &str) -> Scene {
 const LINES: [u64; 4] = [138, 200, 248, 320];
 
 fn chosen(design: &Design, scan: u64) -> Vec<Band> {
+    at_lines(design, scan, LINES)
+}
+
+/// The bands that begin with these lines.
+fn at_lines(design: &Design, scan: u64, lines: [u64; 4]) -> Vec<Band> {
     let line = |band: &Band| band.first / u64::from(design.scan.columns);
-    bands(design, scan).filter(|band| LINES.contains(&line(band))).collect()
+    let part: Vec<Band> = bands(design, scan).filter(|band| lines.contains(&line(band))).collect();
+    assert_eq!(part.len(), lines.len());
+    part
 }
 
 /// What the coded lidar measures in four bands, N = 6784 shots, of scan number `scan`.
 fn part(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Scan {
     let design = open("kim-park-2016-fixed", keys);
-    let part = chosen(&design, scan);
-    assert_eq!(part.len(), LINES.len());
-    sim::scan_part(&design, &scenario(scenario_name), SEED, &part).unwrap()
+    sim::scan_part(&design, &scenario(scenario_name), SEED, &chosen(&design, scan)).unwrap()
 }
 
 fn score(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Score {
@@ -120,10 +125,7 @@ fn an_identical_lidar_in_phase_deceives_every_receiver() {
 fn light_that_fits_another_shot_is_not_taken() {
     let wrong = |effort: &str| {
         let design = open("kim-park-2016-fixed", &[HALF, ("receiver.effort", effort)]);
-        let line = |band: &Band| band.first / u64::from(design.scan.columns);
-        let far = |band: &Band| [276, 294, 298, 300].contains(&line(band));
-        let part: Vec<Band> = bands(&design, 0).filter(far).collect();
-        assert_eq!(part.len(), 4);
+        let part = at_lines(&design, 0, [276, 294, 298, 300]);
         let scan = sim::scan_part(&design, &scenario("none"), SEED, &part).unwrap();
         scan.score.count(Outcome::Wrong)
     };

@@ -324,6 +324,13 @@ impl<'a> Sent<'a> {
         fired + reach.start..fired + reach.end - 1 + self.length() + i64::from(self.width)
     }
 
+    /// The shots of which light may begin in the `time` if it comes after one of the `lags`.
+    pub fn that_begin_in(&self, time: &Range<i64>, lags: &Range<i64>) -> Range<usize> {
+        let first = self.fired.partition_point(|fired| fired + lags.end < time.start);
+        let end = self.fired.partition_point(|fired| fired + lags.start < time.end);
+        first..end.max(first)
+    }
+
     /// The time that light of `shot` takes up if it comes after `lag`.
     pub fn light(&self, shot: usize, lag: i64) -> Range<i64> {
         let start = self.fired[shot] + lag;

@@ -380,11 +380,10 @@ impl Band<'_> {
     ) -> Vec<(usize, Detection)> {
         let sent = self.sent;
         let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
-        let from = start - bits * length - lags.end;
-        let first = sent.fired.partition_point(|fired| *fired < from);
-        let end = sent.fired.partition_point(|fired| *fired <= start + bits * length - lags.start);
+        let about = start - bits * length..start + bits * length + 1;
         let is_alike = |other: &usize| sent.log.word[*other] == sent.log.word[shot];
-        let mut alike = (first..end.max(first)).filter(is_alike).filter(|other| *other != shot);
+        let mut alike =
+            sent.that_begin_in(&about, &lags).filter(is_alike).filter(|other| *other != shot);
         let Some(one) = alike.next() else { return Vec::new() };
         let mut words = std::mem::take(&mut self.words);
         self.words_about(shot, start, &mut words.found);
@@ -417,11 +416,8 @@ impl Band<'_> {
     ) -> impl Iterator<Item = (usize, Detection)> + use<'_> {
         let sent = self.sent;
         let reach = sent.reach();
-        let oldest = light.start - reach.end - sent.length();
-        let first = sent.fired.partition_point(|fired| *fired < oldest);
-        let end_of_others = sent.fired.partition_point(|fired| fired + reach.start < light.end);
+        let range = sent.that_begin_in(&(light.start - sent.length()..light.end), &reach);
         let (from, end) = (light.start - sent.takes_up() + 1, light.end);
-        let range = first..end_of_others.max(first);
         let others = range.clone().zip(&sent.fired[range.clone()]).zip(&self.found[range]);
         let primary = others.filter_map(move |((shot, fired), found)| {
             let found = found.as_ref()?;
