@@ -386,9 +386,8 @@ impl Canceller<'_> {
     /// found again.
     fn keep(&mut self, shot: usize, start: i64) {
         let sent = self.sent;
-        let (label, word) = (sent.log.label[shot], sent.log.word[shot]);
         let (lag, count) = (start - sent.fired[shot], sent.weight(shot));
-        let margin = count - u32::from(sent.codebook.sidelobe(label, word));
+        let margin = count - sent.sidelobe(shot);
         let detection = Detection { lag, count, margin, stands_out: true, is_sure: true };
         if self.detections[shot].get_or_insert(detection).lag != lag {
             self.again.push((shot, detection));

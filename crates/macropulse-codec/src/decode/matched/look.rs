@@ -48,6 +48,11 @@ impl Paced {
         shot >= self.next
     }
 
+    /// The next one is due at once, and then fewer and fewer.
+    fn restart(&mut self, shot: usize) {
+        *self = Self { next: shot, pause: 1.0 };
+    }
+
     /// `shot` was found, or else searched for in such a `share` of its gate.
     fn note(&mut self, shot: usize, is_found: bool, share: f64) {
         self.next = shot + 1 + if is_found { 0 } else { (self.pause * share) as usize };
@@ -333,8 +338,13 @@ impl Band<'_> {
         // Half of the marks may lie under ticks that are cancelled already.
         let (least, visible) = match known {
             Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
-                if !known.stands_out && !self.again.is_due(shot) {
-                    return None;
+                if !known.stands_out {
+                    if self.is_first_that_is_faint(shot) {
+                        self.again.restart(shot);
+                    }
+                    if !self.again.is_due(shot) {
+                        return None;
+                    }
                 }
                 (known.count, left_of_another(known))
             }
@@ -379,8 +389,21 @@ impl Band<'_> {
         Some(self.take_or_cancel(shot, found, (lag, count)))
     }
 
+    /// Whether light of the shot to the left of `shot` stood out or was not found: what makes this one faint, as
+    /// a pane with a wall behind it, begins here. Of 407 040 shots of `street` as declared 60 are found otherwise than
+    /// by a thorough receiver where nothing is made of that, else 33.
+    fn is_first_that_is_faint(&self, shot: usize) -> bool {
+        let left = self.left[shot].and_then(|left| self.found[left as usize]);
+        left.is_none_or(|left| left.stands_out)
+    }
+
     /// Whether so many marks of another shot are left over anywhere where its light would overlap with that of
-    /// `shot` at `detection`: what was found may be light of that one.
+    /// `shot` at `detection`, and may account for it: they do if both are in the same word, as then a part of
+    /// them is found for any label.
+    ///
+    /// If shots in the same word are asked as all others are, 365 of 289 198 shots with half of the words of
+    /// `kim-park-2016` are wrong instead of 116; if all are taken for as alike, twice as many of `street` as
+    /// declared are found otherwise than by a thorough receiver.
     fn is_contested(&mut self, shot: usize, detection: Detection, marks: u32) -> bool {
         let (sent, gate) = (self.sent, self.sent.gate());
         let light = sent.light(shot, detection.lag);
@@ -389,7 +412,12 @@ impl Band<'_> {
             let fired = sent.fired[other];
             let lags = (about.start - fired).max(gate.start)..(about.end - fired).min(gate.end);
             let lags = self.leftover().lags(other, lags, marks, true);
-            self.maximum(other, Source::Residual, &lags, marks).is_some()
+            let most = self.maximum(other, Source::Residual, &lags, marks);
+            most.is_some_and(|(lag, count)| {
+                let supposed = (other, Detection::at(lag, count));
+                let is_alike = sent.log.word[other] == sent.log.word[shot];
+                is_alike || !self.is_its_own_beside(shot, detection, Some(supposed))
+            })
         })
     }
 

@@ -229,6 +229,11 @@ impl<'a> Sent<'a> {
         i64::from(self.width / 2)
     }
 
+    /// Most marks of the macropulse of `shot` that are met by itself, moved by less than a code word.
+    pub fn sidelobe(&self, shot: usize) -> u32 {
+        u32::from(self.codebook.sidelobe(self.log.label[shot], self.log.word[shot]))
+    }
+
     /// Number of marks of `shot`.
     pub fn weight(&self, shot: usize) -> u32 {
         self.weights[shot]

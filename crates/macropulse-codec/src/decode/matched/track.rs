@@ -94,12 +94,12 @@ impl Band<'_> {
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
     /// unless as many marks as usual are there, and marks at both of its ends; or where it was to be
-    /// expected as many as of most.
+    /// expected as many as of most, and more than a sidelobe of all its marks has.
     pub(super) fn climb(&mut self, shot: usize, lag: i64, at_least: u32) -> Option<Detection> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
         let usual = self.usual.least(weight).max(weight.div_ceil(2));
-        let of_most = self.usual.of_most(weight);
+        let of_most = self.usual.of_most(weight).max(self.sent.sidelobe(shot) + 1);
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {

@@ -247,12 +247,23 @@ impl Band<'_> {
     /// return, all that are found may be among its own. Light from beyond the gate is only supposed, by just
     /// those marks: there those beside tell alone.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
+        self.is_its_own_beside(shot, detection, None)
+    }
+
+    /// As [`Self::is_its_own`], if there were a `supposed` return of another shot as well.
+    pub(super) fn is_its_own_beside(
+        &mut self,
+        shot: usize,
+        detection: Detection,
+        supposed: Option<(usize, Detection)>,
+    ) -> bool {
         let sent = self.sent;
         let weight = sent.weight(shot);
         let is_other = |found: &Detection| found.lag != detection.lag;
         let of_shot = self.found[shot].is_some_and(|found| is_other(&found))
             || self.further.iter().any(|(other, found)| *other == shot && is_other(found));
-        if !of_shot && detection.stands_out && self.is_usual(shot, detection) {
+        let is_asked = of_shot || supposed.is_some();
+        if !is_asked && detection.stands_out && self.is_usual(shot, detection) {
             return true;
         }
         if !self.is_spread(shot, detection) {
@@ -260,7 +271,8 @@ impl Band<'_> {
         }
         let light = sent.light(shot, detection.lag);
         let mut claiming = self.light_from_beyond(shot, light.start, detection.count);
-        let is_supposed = !claiming.is_empty();
+        let is_beyond = !claiming.is_empty();
+        claiming.extend(supposed);
         claiming.extend(self.overlapping(&light).filter(|found| {
             let is_itself = found.0 == shot && found.1.lag == detection.lag;
             !is_itself && self.claims(*found, (shot, detection))
@@ -293,7 +305,7 @@ impl Band<'_> {
         let share = |lit: u32, all: u32| f64::from(lit) / f64::from(all.max(1));
         let [[all, lit], [all_claimed, lit_claimed], [all_shared, lit_shared]] = places;
         let beside = share(lit_claimed, all_claimed);
-        let claimed = match is_supposed {
+        let claimed = match is_beyond {
             true => beside,
             false => beside.max(share(lit_claimed + lit_shared, all_claimed + all_shared)),
         };
