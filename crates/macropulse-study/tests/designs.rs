@@ -108,8 +108,7 @@ fn what_is_found_does_and_is_found_again() {
         let wanted = Wanted { reflectance: 0.5, ..usual(&design) };
         let figures = Figures::of(&design, sky, wanted).unwrap();
         assert!(figures.closes(), "{}", figures.text());
-        let limits = &design.budget.as_ref().unwrap().limits;
-        let allowed = macropulse::design::safety::strictest(limits).unwrap().energy;
+        let allowed = macropulse::design::safety::strictest(design.eye_limits()).unwrap().energy;
         assert!((best.candidate.energy / allowed - 0.9).abs() < 1e-6);
         for counts in best.counts {
             assert!(counts.pd() >= 0.9 && counts.rms() < 0.03, "{}", first.text());

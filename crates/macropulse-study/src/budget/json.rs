@@ -16,8 +16,10 @@ impl Figures<'_> {
         let marks = self.design.coding.codebook.mean_weight();
         let class = Class1::at(self.design.light.wavelength);
         let alone = |limit: &&Limit| limit.rule == Rule::SingleShot;
-        let single = budget
-            .and_then(|budget| budget.limits.iter().find(alone))
+        let limits = self.design.eye_limits();
+        let single = limits
+            .iter()
+            .find(alone)
             .zip(class)
             .map(|(limit, class)| class.single_exposure(limit.duration) * 1e9);
         json!({
@@ -32,7 +34,7 @@ impl Figures<'_> {
             "background_photons_per_chip": budget.map(|_| self.background_per_chip()),
             "single_pulse_ael_nj": single,
             "cw_ael_mw": class.map(|class| class.continuous() * 1e3),
-            "limits": budget.map(|budget| budget.limits.iter().map(|limit| json!({
+            "limits": budget.map(|_| limits.iter().map(|limit| json!({
                 "rule": limit.rule.name(),
                 "distance_mm": limit.distance * 1e3,
                 "shots": limit.shots,

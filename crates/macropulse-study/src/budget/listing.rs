@@ -107,8 +107,7 @@ impl Figures<'_> {
 
     fn eyes(&self) -> Columns {
         let mut columns = Columns::default();
-        let Some(budget) = &self.design.budget else { return columns };
-        for limit in &budget.limits {
+        for limit in self.design.eye_limits() {
             let bright = match short(limit.brightness).as_str() {
                 "1" => String::new(),
                 times => format!(", {times} times as bright as the mean"),

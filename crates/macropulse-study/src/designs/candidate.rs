@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use macropulse::codec::code::Separated;
-use macropulse::design::{Design, Detector, Pattern, Polygon};
+use macropulse::design::{Design, Detector, Effect, Pattern, Polygon};
 use toml::{Table, Value};
 
 use super::Error;
@@ -81,6 +81,12 @@ impl Candidate {
         self.built(required, Built::Whole, &[])
     }
 
+    /// As [`Candidate::design`], but whatever energy eyes allow it: what that is, is only worked out when asked for.
+    pub(super) fn unlimited(&self, required: &Requirements) -> Result<Design, Error> {
+        let changes = |table: &mut Table| idealise(table, Effect::EyeSafety);
+        self.stepped(required, Built::Whole, changes)
+    }
+
     /// As [`Candidate::design`], or a part of it, with some keys of the sensor changed.
     pub(super) fn built(
         &self,
@@ -88,21 +94,35 @@ impl Candidate {
         built: Built,
         changes: &[(String, Value)],
     ) -> Result<Design, Error> {
-        let of = |step: f64| -> Result<Design, Error> {
+        self.stepped(required, built, |table| {
+            changes.iter().for_each(|(path, value)| put(table, path, value.clone()));
+        })
+    }
+
+    /// The sensor of which the table was `changed`, with the step of its converter that goes with its noise.
+    fn stepped(
+        &self,
+        required: &Requirements,
+        built: Built,
+        changed: impl Fn(&mut Table),
+    ) -> Result<Design, Error> {
+        let table = |step: f64| {
             let mut table = self.table(required, built, step);
-            changes.iter().for_each(|(path, value)| put(&mut table, path, value.clone()));
-            Ok(Design::from_table(&table, &self.name(), &required.folder, &[])?)
+            changed(&mut table);
+            table
         };
-        // The step of the converter follows from a noise that is known only of a design.
-        let coarse = of(1.0)?;
+        let of = |table: &Table| Design::from_table(table, &self.name(), &required.folder, &[]);
+        // The noise is known only of a design; what eyes allow does not matter for it.
+        let mut coarse = table(1.0);
+        idealise(&mut coarse, Effect::EyeSafety);
+        let coarse = of(&coarse)?;
         let Detector::Sampled(detector) = &coarse.detector else {
             return Err(Error::Asked(format!(
                 "{}: has no sampled detector",
                 required.parts.sensor
             )));
         };
-        let step = detector.rms_noise(0.0) / STEPS;
-        of(step)
+        Ok(of(&table(detector.rms_noise(0.0) / STEPS))?)
     }
 
     /// The sensor as the keys of its file.
@@ -237,6 +257,15 @@ pub(super) fn put(table: &mut Table, path: &str, value: Value) {
                 put(below, inner, value);
             }
         }
+    }
+}
+
+/// Leaves an `effect` out.
+fn idealise(table: &mut Table, effect: Effect) {
+    let list = table.entry("idealised").or_insert_with(|| Value::Array(Vec::new()));
+    let name = Value::from(effect.name());
+    if let Some(list) = list.as_array_mut().filter(|list| !list.contains(&name)) {
+        list.push(name);
     }
 }
 

@@ -56,8 +56,7 @@ pub struct Worst {
 
 /// Energy, J, that laser class 1 allows to a shot of the sensor, the share wanted of it.
 pub(super) fn energy(design: &Design, required: &Requirements) -> Option<f64> {
-    let limits = &design.budget.as_ref()?.limits;
-    strictest(limits).map(|limit| required.parts.energy_share * limit.energy)
+    strictest(design.eye_limits()).map(|limit| required.parts.energy_share * limit.energy)
 }
 
 /// Energy of a shot, J, of which it is only asked how much more eyes allow.
@@ -66,7 +65,7 @@ pub(super) const DIM: f64 = 1e-12;
 /// As bright as eyes allow.
 pub(super) fn brightest(required: &Requirements, dim: Candidate) -> Result<Candidate, Error> {
     // Class 1 asks for no energy but that of the shots beside each other.
-    let energy = energy(&dim.design(required)?, required).ok_or_else(|| {
+    let energy = energy(&dim.unlimited(required)?, required).ok_or_else(|| {
         Error::Asked(format!("no limit of class 1 is known at {} nm", dim.part.wavelength_nm))
     })?;
     Ok(Candidate { energy, ..dim })
@@ -246,7 +245,7 @@ impl CostFunction for Cost<'_> {
         if over > 1.0 {
             return Ok(MOST.ln() + beside + over);
         }
-        let design = candidate.design(required)?;
+        let design = candidate.unlimited(required)?;
         let forecaster = Forecaster::new(&design, &required.environment)?;
         let period = design.scan.shortest_period();
         let range = required.wanted.range_m;

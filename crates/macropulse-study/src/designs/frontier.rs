@@ -110,7 +110,7 @@ fn reach(
     let faster = with(Wanted { scans_per_s, ..required.wanted });
     // As dim as can be: at a faster rate eyes would not allow what it has.
     let dim = Candidate { energy: DIM, ..candidate.clone() };
-    let allowed = energy(&dim.design(&faster)?, required).unwrap_or(candidate.energy);
+    let allowed = energy(&dim.unlimited(&faster)?, required).unwrap_or(candidate.energy);
     let beyond = required.wanted.clutter_m / required.wanted.range_m;
     let does = |reflectance: f64, range_m: f64| -> Result<bool, Error> {
         let clutter_m = beyond * range_m;

@@ -130,7 +130,7 @@ fn assess_beams(required: &Requirements, part: &Part, marks: u32) -> Result<Vec<
     let words = None;
     let dim = Candidate { part, marks, beams: most, pulse, bandwidth, energy, aperture, words };
     let dim = required.with_shortest_words(dim)?;
-    let sample = sample(&dim.design(required)?);
+    let sample = sample(&dim.unlimited(required)?);
     let time = |beams: u32| required.shortest_period(beams);
     let listens = tof_from_range(required.wanted.range_m);
     // How long the shortest words of such marks last does not depend on the beams.

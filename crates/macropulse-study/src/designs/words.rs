@@ -68,7 +68,7 @@ impl Requirements {
             return Ok(bare);
         }
         // When a channel is blind does not depend on what it sends.
-        let design = bare.design(self)?;
+        let design = bare.unlimited(self)?;
         let blind = design.receiver.sampling.as_ref().and_then(Blind::at_most);
         let chips = |time: f64| (time / self.chip() * (1.0 - 1e-12)).ceil() as u32;
         // Of a Gaussian low-pass 0.312 over its bandwidth (full width at half maximum).
@@ -94,7 +94,7 @@ impl Requirements {
     /// aslant lets them be, with those of which fewest are lost at the worst range.
     pub(super) fn with_best_words(&self, candidate: &Candidate) -> Result<Candidate, Error> {
         let Some(shortest) = candidate.words else { return Ok(candidate.clone()) };
-        let design = candidate.design(self)?;
+        let design = candidate.unlimited(self)?;
         let period = self.shortest_period(candidate.beams);
         let longest = ((LONGEST * period / self.chip()) as u32).max(shortest.length);
         let mut best: Option<(Lost, Separated)> = None;
@@ -115,7 +115,7 @@ impl Requirements {
             let Some(found) = of_length.filter(is_better) else { continue };
             // The mirror moves on during a word, and smears it on a surface aslant.
             let worded = Candidate { words: Some(found.1), ..candidate.clone() };
-            let smeared = slant(&worded.design(self)?, self.wanted.range_m);
+            let smeared = slant(&worded.unlimited(self)?, self.wanted.range_m);
             if best.is_some() && smeared.is_some_and(|check| check.shortfall > 1.0) {
                 break;
             }
@@ -181,7 +181,7 @@ mod tests {
             let best = required.with_best_words(&short).unwrap();
             let lost = |it: &Candidate| {
                 let words = Family::separated(it.words.unwrap()).unwrap().words();
-                required.lost(&it.design(&required).unwrap(), &words).at_worst
+                required.lost(&it.unlimited(&required).unwrap(), &words).at_worst
             };
             assert_eq!(best.words.unwrap().gap, 22);
             let most = LONGEST * required.shortest_period(beams);

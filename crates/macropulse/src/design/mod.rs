@@ -152,6 +152,14 @@ impl Design {
         self.directions.get_or_init(|| self.scan.model().directions())
     }
 
+    /// What laser class 1 allows to a shot; empty where no rule fits the wavelength or the scan, or where
+    /// the detector is declared by its sensitivity. Where eye safety is idealised it is worked out when
+    /// first asked for.
+    pub fn eye_limits(&self) -> &[safety::Limit] {
+        let Self { scan, light, coding, .. } = self;
+        self.budget.as_ref().map_or(&[], |budget| budget.limits(scan, light, coding))
+    }
+
     /// Duration of one scan, s.
     pub fn scan_period(&self) -> f64 {
         self.scan.period()

@@ -16,6 +16,9 @@ use crate::design::detector::{BASELINE_BLOCK, Sampled};
 /// Ticks of a block.
 const BLOCK: usize = BASELINE_BLOCK as usize;
 
+/// Blocks that are gone through side by side: each tick of one has to wait for the tick before.
+const LANES: usize = 8;
+
 /// The coupling of an amplifier.
 #[derive(Debug)]
 pub(super) struct Baseline {
@@ -46,18 +49,48 @@ impl Baseline {
         debug_assert_eq!(first.rem_euclid(BASELINE_BLOCK), 0);
         let over_block = libm::exp(libm::log(self.keeps) * BASELINE_BLOCK as f64);
         // What each block alone makes of a baseline at zero.
-        let made: Vec<f64> = level
-            .chunks_exact(BLOCK)
-            .map(|block| block.iter().fold(0.0, |baseline, level| self.next(baseline, *level)))
-            .collect();
-        for (number, block) in level.chunks_mut(BLOCK).enumerate().skip(self.blocks) {
+        let mut made = vec![0.0; level.len() / BLOCK];
+        self.follow(level, &mut made, |_, _| {});
+        let at = |number: usize| {
             let before = &made[number - self.blocks..number];
-            let mut baseline =
-                before.iter().fold(0.0, |baseline, made| baseline * over_block + made);
-            for level in block {
-                let now = f64::from(*level) - baseline;
-                baseline = self.next(baseline, *level);
-                *level = now as f32;
+            before.iter().fold(0.0, |baseline, made| baseline * over_block + made)
+        };
+        let mut baselines: Vec<f64> = (self.blocks..=made.len()).map(at).collect();
+        let known = level.get_mut(self.blocks * BLOCK..).unwrap_or_default();
+        self.follow(known, &mut baselines, |level, baseline| {
+            *level = (f64::from(*level) - baseline) as f32;
+        });
+    }
+
+    /// Follows the baseline through each block of `level` for which there is one in `baselines`: from there, and
+    /// what it is behind the block is put there. Does `to_each` with every value and the baseline under it.
+    fn follow(&self, level: &mut [f32], baselines: &mut [f64], to_each: impl Fn(&mut f32, f64)) {
+        for (level, baselines) in level.chunks_mut(LANES * BLOCK).zip(baselines.chunks_mut(LANES)) {
+            match baselines.first_chunk_mut::<LANES>() {
+                Some(baselines) if level.len() == LANES * BLOCK => {
+                    self.side_by_side(level, baselines, &to_each);
+                }
+                _ => level.chunks_mut(BLOCK).zip(baselines).for_each(|(level, baseline)| {
+                    self.side_by_side(level, std::array::from_mut(baseline), &to_each);
+                }),
+            }
+        }
+    }
+
+    /// The same of so many blocks of one length.
+    fn side_by_side<const N: usize>(
+        &self,
+        level: &mut [f32],
+        baselines: &mut [f64; N],
+        to_each: impl Fn(&mut f32, f64),
+    ) {
+        let length = level.len() / N;
+        for at in 0..length {
+            for (lane, baseline) in baselines.iter_mut().enumerate() {
+                let level = &mut level[lane * length + at];
+                let before = *baseline;
+                *baseline = self.next(before, *level);
+                to_each(level, before);
             }
         }
     }

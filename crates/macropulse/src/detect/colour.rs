@@ -1,5 +1,7 @@
 //! Noise with a given covariance: independent numbers behind a filter.
 
+use macropulse_codec::on_every_level;
+
 use crate::kernels::GROUP;
 use crate::random::{Address, Chance, Stage};
 
@@ -14,6 +16,9 @@ const BLOCK: usize = GROUP / 2;
 
 /// Samples whose noise is worked out together, so that it stays in the cache.
 const RUN: usize = 4096;
+
+/// Samples that are smoothed side by side.
+const LANES: usize = 64;
 
 /// Noise of a covariance and a skewness.
 #[derive(Debug)]
@@ -59,7 +64,6 @@ impl Colour {
     /// The normal numbers are how many of 64 random bits are set, less 32, over 4: their mean is 0, their
     /// variance 1 and their excess −1/32, of which the smoothing leaves a tenth.
     pub fn add(&self, (chance, part): (&Chance, u32), first: i64, level: &mut [f32]) {
-        let (linear, quadratic) = self.mixture;
         let block = BLOCK as i64;
         let (mut white, mut numbers): (Vec<f32>, _) = (Vec::new(), Vec::new());
         for (run, level) in level.chunks_mut(RUN).enumerate() {
@@ -70,27 +74,94 @@ impl Colour {
                 let address = Address { stage: Stage::Amplifier, index: index as u64, part };
                 let numbers = chance.draw(address, GROUP, &mut numbers);
                 let (low, high) = numbers.split_at(BLOCK);
-                let set =
-                    low.iter().zip(high).map(|(low, high)| low.count_ones() + high.count_ones());
-                white.extend(set.take(BLOCK).map(|set| {
-                    let normal = (set as f32 - 32.0) / 4.0;
-                    linear * normal + quadratic * (normal * normal - 1.0)
-                }));
+                let known = white.len();
+                white.resize(known + BLOCK, 0.0);
+                mixed(low, high, self.mixture, &mut white[known..]);
             }
             let skipped = from.rem_euclid(block) as usize;
-            for (at, weight) in self.weights.iter().enumerate() {
-                let white = &white[skipped + at..skipped + at + level.len()];
-                for (level, white) in level.iter_mut().zip(white) {
-                    *level += weight * white;
+            smoothed(&white[skipped..], &self.weights, level);
+        }
+    }
+}
+
+on_every_level! {
+    /// Puts a·g + c·(g² − 1), of which a and c are the `mixture`, into `mixed` for the normal number g of each two
+    /// words of random bits.
+    fn mixed(low: &[u32], high: &[u32], mixture: (f32, f32), mixed: &mut [f32]) {
+        let (linear, quadratic) = mixture;
+        for ((mixed, low), high) in mixed.iter_mut().zip(low).zip(high) {
+            let set = low.count_ones() + high.count_ones();
+            let normal = (set as f32 - 32.0) / 4.0;
+            *mixed = linear * normal + quadratic * (normal * normal - 1.0);
+        }
+    }
+}
+
+on_every_level! {
+    /// Adds to each of `level` the sum of the values of `white` from its place on, each times its weight.
+    fn smoothed(white: &[f32], weights: &[f32], level: &mut [f32]) {
+        for (level, first) in level.chunks_mut(LANES).zip((0..).step_by(LANES)) {
+            let here = level.len();
+            let mut sums = [0.0; LANES];
+            sums[..here].copy_from_slice(level);
+            let white = &white[first..];
+            for (at, weight) in weights.iter().enumerate() {
+                match white[at..].first_chunk::<LANES>() {
+                    Some(white) => {
+                        for lane in 0..LANES {
+                            sums[lane] += weight * white[lane];
+                        }
+                    }
+                    None => {
+                        for (sum, white) in sums.iter_mut().zip(&white[at..]) {
+                            *sum += weight * white;
+                        }
+                    }
                 }
             }
+            level.copy_from_slice(&sums[..here]);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use macropulse_codec::level::forced::at_each_level;
+
     use super::*;
+
+    /// The plain sums, sample by sample, on every level.
+    #[test]
+    fn every_level_smooths_the_same() {
+        let colour = Colour::new(|apart| libm::exp(-(apart as f64).powi(2) / 3.0), 0.5);
+        let white: Vec<f32> = (0..1000_u32).map(|at| (at * at % 977) as f32 - 488.0).collect();
+        for length in [1, 63, 64, 65, 640, 952] {
+            let sum = |at: usize| {
+                colour
+                    .weights
+                    .iter()
+                    .zip(&white[at..])
+                    .fold(7.0, |sum, (weight, white)| sum + weight * white)
+            };
+            let expected: Vec<f32> = (0..length).map(sum).collect();
+            let smooth = || {
+                let mut level = vec![7.0; length];
+                smoothed(&white, &colour.weights, &mut level);
+                level
+            };
+            for (level, found) in at_each_level(smooth) {
+                assert_eq!(found, expected, "{level:?}, {length}");
+            }
+        }
+        let noise = || {
+            let mut level = vec![0.0; 10_000];
+            colour.add((&Chance::new(5), 0), 3, &mut level);
+            level
+        };
+        for (level, found) in at_each_level(noise) {
+            assert_eq!(found, noise(), "{level:?}");
+        }
+    }
 
     /// H0: variance, covariance and third cumulant are those asked for. N = 4·10⁶, seed 3; bounds are some
     /// five standard errors. Control: those of white noise are not.

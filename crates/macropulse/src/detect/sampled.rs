@@ -17,7 +17,7 @@
 
 use std::ops::Range;
 
-use macropulse_codec::{Samples, ShotLog};
+use macropulse_codec::{Samples, ShotLog, on_every_level};
 use rand_distr::{Distribution, Gamma, Poisson, StandardNormal};
 
 use super::baseline::Baseline;
@@ -109,7 +109,7 @@ impl Sampler {
             let part = u32::from(channel.number) << PART_BITS;
             self.colour.add((chance, part), signal.first, &mut signal.level);
             samples.channel.push(channel.number);
-            self.limit(&mut signal.level);
+            self.limit(&mut signal.level, &mut signal.codes);
             if let Some(baseline) = &self.baseline {
                 baseline.take_from(&mut signal.level[self.before as usize..], known);
             }
@@ -197,14 +197,16 @@ impl Sampler {
     }
 
     /// Holds the signal at the limit where it is more than the converter has codes for, and behind that until
-    /// the amplifier has recovered.
-    fn limit(&self, level: &mut [f32]) {
+    /// the amplifier has recovered. The `codes` serve as memory.
+    fn limit(&self, level: &mut [f32], codes: &mut Vec<i16>) {
         let (recovery, limit) = (self.sampled.held_ticks(), self.sampled.limit() as f32);
         let highest = self.sampled.codes.1;
+        codes.clear();
+        self.convert(level, codes);
         let mut held = 0;
-        for level in level {
+        for (level, code) in level.iter_mut().zip(codes) {
             let is_held = held > 0;
-            let is_clipped = self.code(*level) == highest;
+            let is_clipped = *code == highest;
             held = if is_clipped { recovery } else { held.saturating_sub(1) };
             if is_clipped || is_held {
                 *level = limit;
@@ -214,14 +216,20 @@ impl Sampler {
 
     /// Appends the codes of a signal.
     fn convert(&self, level: &[f32], codes: &mut Vec<i16>) {
-        codes.extend(level.iter().map(|level| self.code(*level)));
+        let known = codes.len();
+        codes.resize(known + level.len(), 0);
+        let between = [self.sampled.codes.0, self.sampled.codes.1].map(f32::from);
+        rounded(level, (1.0 / self.sampled.step) as f32, between, &mut codes[known..]);
     }
+}
 
-    /// The code of a signal of so many photons.
-    fn code(&self, level: f32) -> i16 {
-        let [low, high] = [self.sampled.codes.0, self.sampled.codes.1].map(f32::from);
-        let steps = (1.0 / self.sampled.step) as f32;
-        libm::rintf((level * steps).clamp(low, high)) as i16
+on_every_level! {
+    /// The nearest codes to signals of so many photons, `steps` to each.
+    fn rounded(level: &[f32], steps: f32, between: [f32; 2], codes: &mut [i16]) {
+        let [low, high] = between;
+        for (code, level) in codes.iter_mut().zip(level) {
+            *code = (level * steps).clamp(low, high).round_ties_even() as i16;
+        }
     }
 }
 
@@ -231,6 +239,8 @@ struct Signal {
     /// The absolute tick of the first one.
     first: i64,
     level: Vec<f32>,
+    /// Memory.
+    codes: Vec<i16>,
 }
 
 impl Signal {
@@ -262,6 +272,27 @@ impl Signal {
             }
             value *= grows;
             grows *= shrinks;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use macropulse_codec::level::forced::at_each_level;
+
+    use super::*;
+
+    /// Halves go to the even code, and what is beyond the codes to the last one.
+    #[test]
+    fn every_level_rounds_the_same() {
+        let level = [-9.0, -1.25, -0.75, -0.5, -0.2, 0.0, 0.25, 0.26, 0.75, 1.25, 3.9, 4.0, 1e9];
+        let expected = [-4, -2, -2, -1, 0, 0, 0, 1, 2, 2, 7, 7, 7];
+        for (at, codes) in at_each_level(|| {
+            let mut codes = [0; 13];
+            rounded(&level, 2.0, [-4.0, 7.0], &mut codes);
+            codes
+        }) {
+            assert_eq!(codes, expected, "{at:?}");
         }
     }
 }

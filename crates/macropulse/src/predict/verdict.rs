@@ -89,7 +89,7 @@ pub fn mark_by_mark(forecaster: &Forecaster, wanted: &Wanted) -> Option<f64> {
 
 fn eyes(design: &Design) -> Option<Check> {
     let budget = design.budget.as_ref()?;
-    let limit = strictest(&budget.limits)?;
+    let limit = strictest(design.eye_limits())?;
     Some(Check {
         name: "eye safety",
         shortfall: budget.energy / limit.energy * (1.0 - 1e-12),

@@ -1,17 +1,16 @@
 //! Energy, optics and eyes.
 
 use std::f64::consts::FRAC_PI_4;
+use std::sync::OnceLock;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Budget, CoScanned, Field, solid_angle};
+use super::{Budget, CoScanned, Eye, Field, solid_angle};
 use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
 use crate::design::limits::Check;
-use crate::design::safety::{
-    Class1, Condition, Limit, Sender, exposure, limits, strictest, strictest_of_each,
-};
+use crate::design::safety::{Limit, strictest};
 use crate::design::{Coding, Effect, Error, Light, Scan};
 use crate::units::tof_from_range;
 
@@ -111,11 +110,18 @@ impl Check<'_> {
             return self.refuse(path, "is needed where the link budget is not idealised");
         };
         let wavelength = parts.light.wavelength;
-        let limits = self.limits(safety, parts)?;
-        let energy = self.energy(file.energy, &limits, off(Effect::EyeSafety))?;
+        let distance = self.within("safety.distance_mm", safety.distance_mm, 1.0, 1e5)? * 1e-3;
+        let eye = Eye { distance, count_groups: safety.count_lines };
+        let limits = OnceLock::new();
+        let allowed = || {
+            let Parts { scan, light, coding, .. } = parts;
+            limits.get_or_init(|| eye.limits(scan, light, coding)).as_slice()
+        };
+        let energy = self.energy(file.energy, allowed, off(Effect::EyeSafety))?;
         Ok(Some(Budget {
             wavelength,
             energy,
+            eye,
             limits,
             aperture: self.within("optics.aperture_mm", optics.aperture_mm, 0.01, 1e4)? * 1e-3,
             transmission: self.within("optics.transmission", optics.transmission, 1e-6, 1.0)?,
@@ -125,15 +131,15 @@ impl Check<'_> {
         }))
     }
 
-    fn energy(
+    /// The energy of a shot, J: as typed, or the most that class 1 allows.
+    fn energy<'l>(
         &self,
         typed: Option<EnergyFile>,
-        limits: &[Limit],
+        limits: impl FnOnce() -> &'l [Limit],
         any_energy: bool,
     ) -> Result<f64, Error> {
         let path = "light.energy";
-        let strictest = strictest(limits);
-        let energy = match typed {
+        let typed = match typed {
             None => {
                 return self.refuse(
                     path,
@@ -142,7 +148,7 @@ impl Check<'_> {
                 );
             }
             Some(EnergyFile::ShotNj(shot)) => {
-                self.within("light.energy.shot_nj", shot, 1e-9, 1e12)? * 1e-9
+                Some(self.within("light.energy.shot_nj", shot, 1e-9, 1e12)? * 1e-9)
             }
             Some(EnergyFile::Class1) if any_energy => {
                 return self.refuse(
@@ -151,39 +157,24 @@ impl Check<'_> {
                      the list",
                 );
             }
-            Some(EnergyFile::Class1) => match strictest {
-                Some(limit) => limit.energy,
-                None => return self.refuse(path, NO_LIMIT),
-            },
+            Some(EnergyFile::Class1) => None,
         };
-        match strictest {
-            _ if any_energy => Ok(energy),
-            None => self.refuse(path, NO_LIMIT),
-            Some(limit) if energy > limit.energy => {
-                let message = format!(
-                    "is {:.4} nJ a shot, but class 1 allows {:.4} nJ ({}); \"eye-safety\" in the \
-                     list `idealised` lets it pass",
-                    energy * 1e9,
-                    limit.energy * 1e9,
-                    limit.rule.name()
-                );
-                self.refuse(path, message)
-            }
-            Some(_) => Ok(energy),
+        if let Some(energy) = typed.filter(|_| any_energy) {
+            return Ok(energy);
         }
-    }
-
-    /// What class 1 allows; empty where we know no rule.
-    fn limits(&self, safety: &SafetyFile, parts: &Parts) -> Result<Vec<Limit>, Error> {
-        let distance = self.within("safety.distance_mm", safety.distance_mm, 1.0, 1e5)? * 1e-3;
-        let Some(class) = Class1::at(parts.light.wavelength) else { return Ok(Vec::new()) };
-        let Parts { scan, light, coding, .. } = parts;
-        let count_groups = safety.count_lines;
-        let all = [Condition::bare_eye(distance), class.telescope()].map(|condition| {
-            let sender = Sender { scan, light, coding, condition, count_groups };
-            limits(&class, &exposure(&class, &sender))
-        });
-        Ok(strictest_of_each(&all.concat()))
+        let Some(limit) = strictest(limits()) else { return self.refuse(path, NO_LIMIT) };
+        let energy = typed.unwrap_or(limit.energy);
+        if energy <= limit.energy {
+            return Ok(energy);
+        }
+        let message = format!(
+            "is {:.4} nJ a shot, but class 1 allows {:.4} nJ ({}); \"eye-safety\" in the \
+             list `idealised` lets it pass",
+            energy * 1e9,
+            limit.energy * 1e9,
+            limit.rule.name()
+        );
+        self.refuse(path, message)
     }
 
     /// What each detector looks at: of a raster as the file says, of several detectors the cell of

@@ -3,21 +3,25 @@
 mod check;
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 pub(in crate::design) use check::{BudgetFile, OpticsFile, Parts, SafetyFile};
 
-use super::safety::Limit;
+use super::safety::{Class1, Condition, Limit, Sender, exposure, limits, strictest_of_each};
+use super::{Coding, Light, Scan};
 use crate::units::{PLANCK, SPEED_OF_LIGHT};
 
 /// What an honest link is made of. SI units.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Budget {
     /// Wavelength, m.
     pub wavelength: f64,
     /// Energy of a shot, J, the mean over its labels: every mark has the same.
     pub energy: f64,
-    /// What class 1 allows to a shot; empty where no rule fits the wavelength or the scan.
-    pub limits: Vec<Limit>,
+    /// Where an eye is, and what counts there.
+    eye: Eye,
+    /// What class 1 allows to a shot, worked out when first asked for.
+    limits: OnceLock<Vec<Limit>>,
     /// Diameter of the receiving aperture, m.
     pub aperture: f64,
     /// Transmission of the optics, both ways together.
@@ -28,6 +32,15 @@ pub struct Budget {
     pub field: Field,
     /// Detections per photon.
     pub efficiency: f64,
+}
+
+/// Where an eye is that looks into the beams, and what counts there.
+#[derive(Debug, Clone, Copy)]
+struct Eye {
+    /// How far away it is, m.
+    distance: f64,
+    /// Whether groups of shots that cross it count as repeated exposures.
+    count_groups: bool,
 }
 
 /// What a detector looks at.
@@ -49,6 +62,11 @@ pub struct CoScanned {
 }
 
 impl Budget {
+    /// What class 1 allows to a shot; empty where no rule fits the wavelength or the scan.
+    pub(super) fn limits(&self, scan: &Scan, light: &Light, coding: &Coding) -> &[Limit] {
+        self.limits.get_or_init(|| self.eye.limits(scan, light, coding))
+    }
+
     /// Area of the aperture, m².
     pub fn area(&self) -> f64 {
         PI * self.aperture.powi(2) / 4.0
@@ -82,6 +100,19 @@ impl Budget {
             * self.field.solid_angle
             * self.transmission;
         power / self.photon_energy()
+    }
+}
+
+impl Eye {
+    /// What class 1 allows to a shot before the bare eye, and before one behind a telescope.
+    fn limits(self, scan: &Scan, light: &Light, coding: &Coding) -> Vec<Limit> {
+        let Some(class) = Class1::at(light.wavelength) else { return Vec::new() };
+        let Self { distance, count_groups } = self;
+        let all = [Condition::bare_eye(distance), class.telescope()].map(|condition| {
+            let sender = Sender { scan, light, coding, condition, count_groups };
+            limits(&class, &exposure(&class, &sender))
+        });
+        strictest_of_each(&all.concat())
     }
 }
 
