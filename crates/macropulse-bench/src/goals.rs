@@ -8,6 +8,7 @@ use crate::Fallible;
 use crate::decode::{self, Decoding};
 use crate::effort::Efforts;
 use crate::generate::Generating;
+use crate::machine::printed;
 use crate::page::{self, grouped, speed, three};
 use crate::rays::{LEAKED_OF, Rays};
 use crate::sample::Condition;
@@ -182,8 +183,8 @@ fn scans(scans: &WholeScans) -> Vec<Goal> {
 }
 
 fn sizes() -> Fallible<Vec<Goal>> {
-    let output = Command::new(std::env::current_exe()?).arg("sixty").output()?;
-    let megabytes = String::from_utf8(output.stdout)?.trim().parse::<f64>().ok();
+    let text = printed(Command::new(std::env::current_exe()?).arg("sixty"))?;
+    let megabytes = text.trim().parse::<f64>().ok();
     let memory = "memory of 60 clean scans of `car-50m`, MB";
     let lines = lines(&Path::new(SOURCES).join("decode/matched"))?;
     let lines = Some(lines as f64);

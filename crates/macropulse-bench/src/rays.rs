@@ -20,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::Fallible;
 use crate::embree::{self, Embree};
+use crate::machine::printed;
 use crate::meshes::{self, Corners, Direction, EYE};
 use crate::page::{self, three};
 
@@ -173,8 +174,7 @@ pub fn measure() -> Fallible<Rays> {
 
 /// Loads the scene in `folder` in a process of its own, and says what that took.
 fn load_apart(folder: &Path) -> Fallible<(f64, f64)> {
-    let output = Command::new(std::env::current_exe()?).arg("load").arg(folder).output()?;
-    let text = String::from_utf8(output.stdout)?;
+    let text = printed(Command::new(std::env::current_exe()?).arg("load").arg(folder))?;
     let (seconds, peak) = text.trim().split_once(' ').ok_or("loading a mesh failed")?;
     Ok((seconds.parse()?, peak.parse()?))
 }

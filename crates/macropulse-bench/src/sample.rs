@@ -100,6 +100,10 @@ pub struct Echo {
     pub start: usize,
     /// Ticks from there to each of its marks.
     pub marks: Vec<u32>,
+    /// Number of its code word.
+    pub word: u16,
+    /// Its label.
+    pub label: u16,
 }
 
 /// What the receiver is given of a band.
@@ -178,10 +182,11 @@ impl Sample {
                 let shot = *shot as usize;
                 let arrives =
                     log.fired_at_fs[shot] + units::fs_from_s(units::tof_from_range(*range));
-                let marks = coding.codebook.marks(log.label[shot], log.word[shot]);
+                let (label, word) = (log.label[shot], log.word[shot]);
+                let marks = coding.codebook.marks(label, word);
                 let start = arrives.div_euclid(tdc.tick_fs) - epoch;
                 let marks = marks.iter().map(|mark| scale * u32::from(*mark)).collect();
-                Echo { start: start.max(0) as usize, marks }
+                Echo { start: start.max(0) as usize, marks, word, label }
             };
             let mut echoes: Vec<Echo> = within.map(echo).collect();
             echoes.sort_by_key(|echo| echo.start);

@@ -1,6 +1,6 @@
 //! Some steps of the matched receiver by themselves, for who wants to time or to study them.
 
-use crate::kernels::{self, Counts, NARROW};
+use crate::kernels::{self, Counts, NARROW, Pattern};
 
 /// Lags at which [`most`] counts.
 pub const LAGS: usize = 64 * NARROW;
@@ -30,4 +30,23 @@ pub fn most(words: &[u64], first: u32, marks: &[u32]) -> u32 {
     let mut counts = Counts::<NARROW>::default();
     counts.count(words, first, marks, marks.iter().copied().max().unwrap_or(0));
     counts.highest([u64::MAX; NARROW]).map_or(0, |(_, count)| count)
+}
+
+/// The marks of a code word, as bits that are looked at together.
+#[derive(Debug, Clone)]
+pub struct WordMarks(Pattern);
+
+impl WordMarks {
+    /// Of a word with these `marks`, bits from its beginning on.
+    pub fn new(marks: &[u32]) -> Self {
+        Self(Pattern::new(marks.iter().map(|mark| *mark as usize), 1))
+    }
+
+    /// Puts into `found` how many of the marks are lit in `words` where the word begins so many bits `after` bit
+    /// `first`, for each of these. Bits beyond the end are dark.
+    pub fn found_in_each(&self, words: &[u64], first: u32, after: &[u32], found: &mut Vec<u32>) {
+        found.clear();
+        found.resize(after.len(), 0);
+        kernels::lit_in_each(words, first as usize, after, &self.0, found);
+    }
 }

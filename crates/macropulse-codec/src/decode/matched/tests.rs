@@ -1,18 +1,19 @@
 //! The matched receiver against plain code: every lag, every mark, one by one.
 
+mod cancelled;
 mod shortcuts;
+mod surfaces;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::cancel::{CLUE, cancel};
 use super::sent::{Sent, Words};
 use super::{Band, Memory, decode};
 use crate::code::{Codebook, Crc, Family, Keying, Payload, Sparse};
 use crate::decode::field::Source;
-use crate::decode::{Effort, Pick, Receiver, Returns};
+use crate::decode::{Effort, Receiver, Returns};
 use crate::{ShotLog, Ticks};
 
 /// A sensor of one tick a chip.
@@ -434,68 +435,6 @@ fn shots_in_flight_do_not_hide_each_others_maximum() {
     assert!(wrong == 0 && returns.len() * 100 > lit * 98, "{wrong} of {} of {lit}", returns.len());
 }
 
-/// Ticks of a band begin while light of shots is under way that its log does not know.
-#[test]
-fn clear_light_is_cancelled_whatever_was_sent_before() {
-    let sensor = Sensor::crowded(codebook());
-    let all = sensor.log(60);
-    let (ticks, _) = sensor.ticks(&all, CLEAR, 3);
-    let log = ShotLog { owned: 12..32, ..all.part(8..60) };
-    let receiver = sensor.receiver(0.0);
-    let sent = Sent::new(&receiver, (&sensor.book, &log), (ticks.epoch, Words::default()));
-    let left = |ticks: &[u32]| cancel(&sent, ticks).map(|cancelled| cancelled.residual);
-    assert_eq!(left(&ticks.tick), Some(vec![]));
-    // A tick more is left where owned light may be, and passed by before.
-    let (before, among) = (ticks.tick[0] + 1, sent.fired[15] as u32 + 17);
-    for (more, expected) in [(before, vec![]), (among, vec![among])] {
-        let mut ticks = ticks.tick.clone();
-        let place = ticks.binary_search(&more).expect_err("lit already");
-        ticks.insert(place, more);
-        assert_eq!(left(&ticks), Some(expected));
-    }
-}
-
-/// Of a shot in the word of another one, whole bits behind that, all marks of the first bit may be those of
-/// the other. N = 98 pairs of labels of which both fit at one lag alone, and are woven.
-#[test]
-fn a_macropulse_that_begins_under_another_one_is_cancelled() {
-    let sensor = Sensor { period: 10, ..Sensor::crowded(codebook()) };
-    let (receiver, mut log) = (sensor.receiver(0.0), sensor.log(2));
-    log.word = vec![1, 1];
-    let mut cases = 0;
-    for case in 0..15 * 15 * 4 {
-        log.label = vec![1 + case / 60, 1 + case / 4 % 15];
-        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
-        let lags = [900, 890 + u32::from(case % 4) * sent.bit_length() as u32];
-        let mut chance = ChaCha8Rng::seed_from_u64(1);
-        let ticks = sensor.ticks_of(&log, &lags.map(|lag| vec![lag]), CLEAR, &mut chance).tick;
-        let places = |shot: usize| {
-            let start = sent.fired[shot] as u32 + lags[shot];
-            marks_of(&sent, shot).iter().map(move |mark| start + u32::from(*mark))
-        };
-        let theirs: Vec<u32> = places(0).collect();
-        let is_hidden = |tick: &u32| theirs.contains(tick);
-        let is_first_bit_hidden =
-            places(1).take(sent.in_word(1) as usize).all(|tick| is_hidden(&tick));
-        let free: Vec<u32> = places(1).filter(|tick| !is_hidden(tick)).collect();
-        let is_woven = free.first() < theirs.last();
-        let fits_once = |shot: usize| {
-            let count = counter(&sent, &ticks, shot);
-            sent.reach().filter(|lag| count(*lag) == sent.weight(shot)).count() == 1
-        };
-        if free.len() < CLUE || !is_first_bit_hidden || !is_woven || !fits_once(0) || !fits_once(1)
-        {
-            continue;
-        }
-        cases += 1;
-        let cancelled = cancel(&sent, &ticks).unwrap();
-        assert_eq!(cancelled.residual, [0; 0], "{case}");
-        let found = cancelled.detections.iter().map(|found| found.map(|found| found.lag));
-        assert_eq!(found.collect::<Vec<_>>(), lags.map(|lag| Some(i64::from(lag))), "{case}");
-    }
-    assert_eq!(cases, 98);
-}
-
 /// A lidar that waits long between shots, as one pixel of a flash does.
 #[test]
 fn shots_far_apart_are_found() {
@@ -516,78 +455,6 @@ fn shots_far_apart_are_found() {
         let returns = sensor.decode(&receiver, &log, &ticks);
         let lit = surfaces.iter().filter(|lags| !lags.is_empty()).count();
         assert!(returns.len() + 1 >= lit, "{scale}: {} of {lit}", returns.len());
-    }
-}
-
-fn several(sensor: &Sensor, jitter: f64) -> Receiver {
-    Receiver { returns: 2, false_alarm: 1e-4, ..sensor.receiver(jitter) }
-}
-
-#[test]
-fn two_surfaces_are_two_returns_in_clear_air_and_in_poor_light() {
-    // N = 1000. With jitter a mark counts in any of three ticks, and light of others lies in one place
-    // of five: of a shot with few lit bits chance gives nearly as many marks.
-    let weathers = [((0, 0, 0), 0.0, 0.97), ((20, 4, 0), 0.0, 0.97), ((20, 4, 15), 0.3, 0.65)];
-    let sensor = Sensor::crowded(codebook());
-    let log = sensor.log(1000);
-    for ((missed, false_ticks, late), jitter, least) in weathers {
-        let weather = Weather { missed, false_ticks, late, ..CLEAR };
-        let (ticks, surfaces) = sensor.behind_glass(&log, 1, weather, 1);
-        let receiver = several(&sensor, jitter);
-        let found = sensor.decode(&receiver, &log, &ticks);
-        let panes = surfaces.iter().filter(|lags| lags.len() == 2).count() as f64;
-        let seconds = found.number.iter().filter(|&&number| number == 2).count() as f64;
-        assert!(seconds > least * panes, "{seconds} of {panes}, {missed} %, jitter {jitter}");
-        // Word 1 is nearly the same twelve chips on: with a few of its marks missed the two are alike.
-        let lag = |tof: f64| tof / 2.5e-12 - 0.5 - f64::from(late) / 100.0;
-        let is_off = |&(&shot, &tof): &(&u32, &f64)| {
-            let mut lags = surfaces[shot as usize].iter();
-            lags.all(|&expected| (lag(tof) - f64::from(expected)).abs() > 0.5)
-        };
-        let off = found.shot.iter().zip(&found.tof).filter(is_off).count();
-        assert!(off < 50, "{off} of {}, {missed} % missed", found.len());
-        let one = sensor.decode(&Receiver { returns: 1, ..receiver.clone() }, &log, &ticks);
-        assert!(one.number.iter().all(|&number| number == 1) && one.len() as f64 > 0.97 * panes);
-        let last = Receiver { returns: 1, pick: Pick::Last, ..receiver.clone() };
-        let last = sensor.decode(&last, &log, &ticks);
-        let behind = |(&shot, &tof): (&u32, &f64)| {
-            surfaces[shot as usize]
-                .get(1)
-                .is_some_and(|&second| lag(tof) > f64::from(second) - 100.0)
-        };
-        let behind = last.shot.iter().zip(&last.tof).filter(|found| behind(*found)).count() as f64;
-        assert!(behind > least * panes, "{behind} of {panes}");
-    }
-}
-
-/// H₀: a shot that met one surface has a second return with probability α = 10⁻⁴ at most, the
-/// false alarm accepted. N = 24 000 shots, seeds 1 to 6, in clear air and with 30 % of the
-/// marks missed in stray light; rejected where so many have a chance below 10⁻³. Negative
-/// control: one shot in 500 with a second surface is noticed.
-#[test]
-fn one_surface_is_one_return() {
-    let poor = Weather { missed: 30, false_ticks: 5, ..CLEAR };
-    let jittery = Weather { missed: 10, false_ticks: 2, late: 20, ..CLEAR };
-    let sensor = Sensor::crowded(codebook());
-    let log = sensor.log(4000);
-    for (weather, jitter) in [(CLEAR, 0.0), (poor, 0.0), (jittery, 0.3)] {
-        let count = |panes: usize| -> (usize, usize) {
-            let each = (1..=6).map(|seed| {
-                let (ticks, _) = sensor.behind_glass(&log, panes, weather, seed);
-                sensor.decode(&several(&sensor, jitter), &log, &ticks)
-            });
-            each.fold((0, 0), |(shots, seconds), found| {
-                let more = found.number.iter().filter(|&&number| number > 1).count();
-                (shots + found.len() - more, seconds + more)
-            })
-        };
-        let is_rejected = |(shots, seconds): (usize, usize)| {
-            crate::statistics::binomial_tail(shots, 1e-4, seconds) < 1e-3
-        };
-        let alone = count(0);
-        assert!(alone.0 > 23_000, "{alone:?}");
-        assert!(!is_rejected(alone), "{alone:?}");
-        assert!(is_rejected(count(500)));
     }
 }
 

@@ -1,0 +1,66 @@
+//! Of macropulses without a gap all light is cancelled.
+
+use super::*;
+use crate::decode::matched::cancel::{CLUE, cancel};
+
+/// Ticks of a band begin while light of shots is under way that its log does not know.
+#[test]
+fn clear_light_is_cancelled_whatever_was_sent_before() {
+    let sensor = Sensor::crowded(codebook());
+    let all = sensor.log(60);
+    let (ticks, _) = sensor.ticks(&all, CLEAR, 3);
+    let log = ShotLog { owned: 12..32, ..all.part(8..60) };
+    let receiver = sensor.receiver(0.0);
+    let sent = Sent::new(&receiver, (&sensor.book, &log), (ticks.epoch, Words::default()));
+    let left = |ticks: &[u32]| cancel(&sent, ticks).map(|cancelled| cancelled.residual);
+    assert_eq!(left(&ticks.tick), Some(vec![]));
+    // A tick more is left where owned light may be, and passed by before.
+    let (before, among) = (ticks.tick[0] + 1, sent.fired[15] as u32 + 17);
+    for (more, expected) in [(before, vec![]), (among, vec![among])] {
+        let mut ticks = ticks.tick.clone();
+        let place = ticks.binary_search(&more).expect_err("lit already");
+        ticks.insert(place, more);
+        assert_eq!(left(&ticks), Some(expected));
+    }
+}
+
+/// Of a shot in the word of another one, whole bits behind that, all marks of the first bit may be those of
+/// the other. N = 98 pairs of labels of which both fit at one lag alone, and are woven.
+#[test]
+fn a_macropulse_that_begins_under_another_one_is_cancelled() {
+    let sensor = Sensor { period: 10, ..Sensor::crowded(codebook()) };
+    let (receiver, mut log) = (sensor.receiver(0.0), sensor.log(2));
+    log.word = vec![1, 1];
+    let mut cases = 0;
+    for case in 0..15 * 15 * 4 {
+        log.label = vec![1 + case / 60, 1 + case / 4 % 15];
+        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let lags = [900, 890 + u32::from(case % 4) * sent.bit_length() as u32];
+        let mut chance = ChaCha8Rng::seed_from_u64(1);
+        let ticks = sensor.ticks_of(&log, &lags.map(|lag| vec![lag]), CLEAR, &mut chance).tick;
+        let places = |shot: usize| {
+            let start = sent.fired[shot] as u32 + lags[shot];
+            marks_of(&sent, shot).iter().map(move |mark| start + u32::from(*mark))
+        };
+        let theirs: Vec<u32> = places(0).collect();
+        let is_hidden = |tick: &u32| theirs.contains(tick);
+        let is_first_bit_hidden =
+            places(1).take(sent.in_word(1) as usize).all(|tick| is_hidden(&tick));
+        let free: Vec<u32> = places(1).filter(|tick| !is_hidden(tick)).collect();
+        let is_woven = free.first() < theirs.last();
+        let fits_once = |shot: usize| {
+            let count = counter(&sent, &ticks, shot);
+            sent.reach().filter(|lag| count(*lag) == sent.weight(shot)).count() == 1
+        };
+        if free.len() < CLUE || !is_first_bit_hidden || !is_woven || !fits_once(0) || !fits_once(1)
+        {
+            continue;
+        }
+        cases += 1;
+        let cancelled = cancel(&sent, &ticks).unwrap();
+        assert_eq!(cancelled.residual, [0; 0], "{case}");
+        let found = cancelled.detections.iter().map(|found| found.map(|found| found.lag));
+        assert_eq!(found.collect::<Vec<_>>(), lags.map(|lag| Some(i64::from(lag))), "{case}");
+    }
+    assert_eq!(cases, 98);
+}
