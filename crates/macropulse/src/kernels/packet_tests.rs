@@ -130,3 +130,31 @@ proptest! {
         }
     }
 }
+
+/// A ray in the plane of a triangle that it only touches, at a corner √33 m away, meets it there or not at all, and
+/// no nearer: what lies before is still met first.
+#[test]
+fn a_triangle_seen_edge_on_is_met_where_it_is() {
+    let (origin, corner) = ([2.0, 4.0, -4.0], [4.0, 2.0, 1.0]);
+    let edge_on = [[-1.0, -2.0, -5.0], corner, [3.0, -6.0, 5.0]];
+    let before = [[0.0, 5.0, 5.0], [5.0, 5.0, -6.0], [-4.0, -1.0, -6.0]];
+    let far = 33.0_f64.sqrt();
+    let toward = [0, 1, 2].map(|axis| (corner[axis] - origin[axis]) / far);
+    let mut packet = Packet::from(origin);
+    (0..LANES).for_each(|lane| packet.set(lane, toward, f64::INFINITY));
+    for centre in [[0.0; 3], origin, [-0.919_474_606_377_013_6, -3.790_429_229_934_757, 1.68]] {
+        let ranges = |corners: Vec<Corners>| {
+            let (triangles, _) = Triangles::new(corners, centre);
+            let alone = triangles.nearest((origin, toward), (0.0, f64::INFINITY));
+            let mut packet = packet.clone();
+            packet.cast(&triangles, &mut Waiting::default());
+            let alone = alone.map_or(f64::INFINITY, |hit| hit.range);
+            assert!(packet.range.iter().all(|range| *range == alone), "{:?}", packet.range);
+            alone
+        };
+        let touched = ranges(vec![edge_on]);
+        assert!(touched.is_infinite() || (touched - far).abs() < 1e-6, "{touched}, not {far}");
+        let nearer = ranges(vec![before]);
+        assert!(nearer < 0.5 && ranges(vec![edge_on, before]) == nearer);
+    }
+}

@@ -115,9 +115,18 @@ impl Triangles {
     pub(super) fn shorten(&self, packet: &mut Packet, leaf: u32, passing: u32) -> bool {
         let plane = Plane::new(&self.corners[leaf as usize], packet.origin);
         let Packet { direction: [x, y, z], nearest, range: ranges, leaf: leaves, .. } = packet;
+        let mut found = [0.0; LANES];
+        for lane in 0..LANES {
+            found[lane] = plane.crossing([x[lane], y[lane], z[lane]]);
+        }
+        if plane.is_edge_on {
+            for lane in 0..LANES {
+                found[lane] = plane.within_box([x[lane], y[lane], z[lane]], found[lane]);
+            }
+        }
         let mut changed = false;
         for lane in 0..LANES {
-            let range = plane.range([x[lane], y[lane], z[lane]]);
+            let range = found[lane];
             let (before, holder) = (ranges[lane], leaves[lane]);
             let first = (range == before) & (holder != NONE) & (leaf < holder);
             let nearer = (range < before) | first;
@@ -348,25 +357,60 @@ struct Plane {
     corners: [DVec3; 3],
     /// n·(a−o)
     height: f64,
+    /// Whether the place is so near to the plane, for how far the corners are, that where a ray from there meets
+    /// it is lost in rounding.
+    is_edge_on: bool,
 }
+
+/// A place is near to a plane if they are apart by no more than this share of how far the corners are: that
+/// is 10⁸ times what rounding makes of it, and what it makes of a range is then less than boxes are widened by.
+const EDGE_ON: f64 = 1e-8;
 
 impl Plane {
     #[inline(always)]
     fn new(corners: &Corners, origin: [f64; 3]) -> Self {
         let [a, b, c] = corners;
         let (a, b, c) = (DVec3::from(*a), DVec3::from(*b), DVec3::from(*c));
-        let normal = (b - a).cross(c - a);
+        let (one, other) = (b - a, c - a);
+        let normal = one.cross(other);
         let origin = DVec3::from(origin);
         let corners = [a - origin, b - origin, c - origin];
-        Self { normal, corners, height: normal.dot(corners[0]) }
+        let height = normal.dot(corners[0]);
+        // Of a needle the normal is lost in rounding as well: the sides tell what it may be.
+        let (one, other) = (one.length_squared(), other.length_squared());
+        let reach = corners[0].length_squared() + one + other;
+        let is_edge_on = height * height <= EDGE_ON * EDGE_ON * one * other * reach;
+        Self { normal, corners, height, is_edge_on }
+    }
+
+    /// Where a ray from the place that passes through the triangle meets it.
+    #[inline(always)]
+    fn range(&self, direction: [f64; 3]) -> f64 {
+        let range = self.crossing(direction);
+        if self.is_edge_on { self.within_box(direction, range) } else { range }
+    }
+
+    /// `range`, kept to where a ray from the place is in the box around the triangle; where it enters, if `range`
+    /// is NaN.
+    #[cold]
+    #[inline(never)]
+    fn within_box(&self, direction: [f64; 3], range: f64) -> f64 {
+        let [a, b, c] = &self.corners;
+        let (low, high) = (a.min(*b).min(*c).to_array(), a.max(*b).max(*c).to_array());
+        let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in (0..3).filter(|axis| direction[*axis] != 0.0) {
+            let [one, other] = [low, high].map(|bound| bound[axis] / direction[axis]);
+            enter = enter.max(one.min(other));
+            leave = leave.min(one.max(other));
+        }
+        range.max(enter).min(leave)
     }
 
     /// Where a ray from the place meets the plane; NaN if that is nowhere.
     ///
-    /// `t = n·(a−o) / n·d`, kept within the depths of the three corners: a needle seen edge-on
-    /// has no better answer.
+    /// `t = n·(a−o) / n·d`, kept within the depths of the three corners.
     #[inline(always)]
-    fn range(&self, direction: [f64; 3]) -> f64 {
+    fn crossing(&self, direction: [f64; 3]) -> f64 {
         let along = DVec3::from(direction);
         let [a, b, c] = &self.corners;
         let (a, b, c) = (a.dot(along), b.dot(along), c.dot(along));
