@@ -81,7 +81,8 @@ impl Candidate {
         self.built(required, Built::Whole, &[])
     }
 
-    /// As [`Candidate::design`], but whatever energy eyes allow it: what that is, is only worked out when asked for.
+    /// As [`Candidate::design`], with eye safety idealised: its energy is not held against what class 1 allows, which
+    /// takes longer to work out than all else.
     pub(super) fn unlimited(&self, required: &Requirements) -> Result<Design, Error> {
         let changes = |table: &mut Table| idealise(table, Effect::EyeSafety);
         self.stepped(required, Built::Whole, changes)

@@ -17,7 +17,7 @@
 
 use std::ops::Range;
 
-use macropulse_codec::{Samples, ShotLog, on_every_level};
+use macropulse_codec::{Samples, ShotLog};
 use rand_distr::{Distribution, Gamma, Poisson, StandardNormal};
 
 use super::baseline::Baseline;
@@ -29,6 +29,7 @@ use super::noise::PART_BITS;
 use crate::channel::Light;
 use crate::design::Design;
 use crate::design::detector::Sampled;
+use crate::kernels::rounded;
 use crate::random::{Address, Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, s_from_fs};
 
@@ -223,23 +224,13 @@ impl Sampler {
     }
 }
 
-on_every_level! {
-    /// The nearest codes to signals of so many photons, `steps` to each.
-    fn rounded(level: &[f32], steps: f32, between: [f32; 2], codes: &mut [i16]) {
-        let [low, high] = between;
-        for (code, level) in codes.iter_mut().zip(level) {
-            *code = (level * steps).clamp(low, high).round_ties_even() as i16;
-        }
-    }
-}
-
 /// The signal of one channel in ticks, in detected photons.
 #[derive(Debug, Default)]
 struct Signal {
     /// The absolute tick of the first one.
     first: i64,
     level: Vec<f32>,
-    /// Memory.
+    /// Memory for its codes before it is held at the limit.
     codes: Vec<i16>,
 }
 
