@@ -13,6 +13,9 @@ import macropulse as mp
 import numpy as np
 import pytest
 
+# A program that is started in the background, as tests may be, is told to ignore Ctrl-C, and so are those it starts.
+HEARS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+
 GOES_ON = """
 import sys
 import macropulse as mp
@@ -37,7 +40,10 @@ while True:
 def interrupted(source, after):
     """Exit code, what it printed, and seconds from the signal to the end."""
     child = subprocess.Popen(
-        [sys.executable, "-c", source], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", HEARS + source],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert child.stdout.readline() == "ready\n"
     time.sleep(after)
