@@ -16,6 +16,9 @@ import pytest
 # A program that is started in the background, as tests may be, is told to ignore Ctrl-C, and so are those it starts.
 HEARS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 
+# What a thorough receiver takes for this is minutes: a scan that ends sooner was interrupted.
+LONG = {"receiver.effort": "thorough", "detector.photon-counting.dark_counts_hz": 1e10}
+
 GOES_ON = """
 import sys
 import macropulse as mp
@@ -28,17 +31,17 @@ except KeyboardInterrupt:
     sys.exit(7)
 """
 
-ENDS = """
-import sys
+ENDS = f"""
 import macropulse as mp
+sensor = mp.Sensor("kim-park-2016-fixed", {LONG})
 print("ready", flush=True)
-while True:
-    mp.simulate("kim-park-2016-fixed", "street", threads=1)
+mp.simulate(sensor, "street", threads=1)
+print("over", flush=True)
 """
 
 
 def interrupted(source, after):
-    """Exit code, what it printed, and seconds from the signal to the end."""
+    """Exit code, and what it printed."""
     child = subprocess.Popen(
         [sys.executable, "-c", HEARS + source],
         stdout=subprocess.PIPE,
@@ -48,43 +51,39 @@ def interrupted(source, after):
     assert child.stdout.readline() == "ready\n"
     time.sleep(after)
     assert child.poll() is None, "it was over before the signal came"
-    began = time.monotonic()
     child.send_signal(signal.SIGINT)
     out, err = child.communicate(timeout=60)
-    return child.returncode, out + err, time.monotonic() - began
+    return child.returncode, out + err
 
 
 def test_ctrl_c_in_the_middle_of_a_scan_is_a_keyboard_interrupt():
-    code, printed, took = interrupted(ENDS, 0.4)
-    assert "KeyboardInterrupt" in printed
-    assert code != 0 and took < 1.0, (code, took)
+    code, printed = interrupted(ENDS, 0.4)
+    assert "KeyboardInterrupt" in printed and "over" not in printed
+    assert code != 0
 
 
 def test_a_program_may_go_on_after_ctrl_c():
-    code, printed, took = interrupted(GOES_ON, 0.7)
-    assert (code, printed) == (7, "interrupted\n") and took < 1.0, took
+    assert interrupted(GOES_ON, 0.7) == (7, "interrupted\n")
 
 
 def test_other_threads_run_meanwhile():
-    counted, stop = [0], threading.Event()
+    sensor = mp.Sensor("kim-park-2016-fixed", LONG)
+    heard = signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    def count():
-        while not stop.is_set():
-            counted[0] += 1
+    def interrupt():
+        for _ in range(100):
             time.sleep(0.001)
+        signal.raise_signal(signal.SIGINT)
 
-    thread = threading.Thread(target=count)
-    thread.start()
+    thread = threading.Thread(target=interrupt)
     try:
-        began = time.monotonic()
-        before = counted[0]
-        mp.simulate("kim-park-2016-fixed", "street", threads=1)
-        took, ran = time.monotonic() - began, counted[0] - before
+        # Were a lock held, the signal would not come before the scan is over.
+        with pytest.raises(KeyboardInterrupt):
+            thread.start()
+            mp.simulate(sensor, "street", threads=1)
     finally:
-        stop.set()
         thread.join()
-    # A lock held would let it count some times in all.
-    assert took > 0.05 and ran > 50 * took, (took, ran)
+        signal.signal(signal.SIGINT, heard)
 
 
 def test_several_threads_may_simulate_at_once(sensor, scan):

@@ -3,8 +3,8 @@
 use std::iter;
 use std::ops::Range;
 
-use super::track::WIDEST_GAP;
-use super::{Band, Detection, SURFACES};
+use super::track::{WAYS, WIDEST_GAP};
+use super::{Band, Detection, HARDLY_EVER, NEIGHBOURS, SURFACES};
 use crate::decode::field::Source;
 
 /// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
@@ -73,11 +73,8 @@ impl Usual {
         Self { share: 0.5, shots: 0.0 }
     }
 
-    /// Shots that the mean runs over: 32 lose 3 of 9099 shots of `street` as declared; 2 find as many.
-    const RUNS_OVER: f64 = 8.0;
-
     pub(super) fn learn(&mut self, count: u32, weight: u32) {
-        self.shots = (self.shots + 1.0).min(Self::RUNS_OVER);
+        self.shots = (self.shots + 1.0).min(NEIGHBOURS as f64);
         self.share += (f64::from(count) / f64::from(weight) - self.share) / self.shots;
     }
 
@@ -85,32 +82,19 @@ impl Usual {
     pub(super) fn least(&self, weight: u32) -> u32 {
         usual(self.share, weight)
     }
-
-    /// Fewest of `weight` marks that most have: one standard deviation below the mean. Of 18 494 shots of
-    /// `street` with 40 % missed three are taken for sidelobes that their neighbours let expect where as many
-    /// as usual are enough, one with this, none with the mean, which takes a tenth longer.
-    pub(super) fn of_most(&self, weight: u32) -> u32 {
-        below_mean(self.share, weight, 1.0)
-    }
 }
 
-/// Fewest of `weight` marks that are usual where a `share` of them is found: three standard deviations
-/// below the mean.
+/// Fewest of `weight` marks that are usual where a `share` of them is found: fewer are found hardly ever, by the
+/// standard deviation of the binomial and of a mark.
 pub(super) fn usual(share: f64, weight: u32) -> u32 {
-    below_mean(share, weight, 3.0)
-}
-
-/// So many standard deviations, of the binomial and of a mark, below the mean of `weight` marks of which a
-/// `share` is found.
-fn below_mean(share: f64, weight: u32, deviations: f64) -> u32 {
     let mean = share * f64::from(weight);
-    (mean - deviations * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
+    (mean - HARDLY_EVER * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
 }
 
-/// Fewest marks that are left over of a surface that replaces the one that is `known`: a quarter of as many may lie
-/// under ticks that are cancelled already.
-fn left_of_another(known: Detection) -> u32 {
-    known.count - known.count / 4
+/// Fewest of so many `marks` that are left over: a quarter may lie under ticks that are cancelled already. With a
+/// third 51 of the 407 040 shots of `street` as declared are found otherwise than by a thorough receiver.
+fn left_over(marks: u32) -> u32 {
+    marks - marks / 4
 }
 
 /// Fewest marks of another shot that make `count` marks of a faint one doubtful: two thirds of them, as chance may
@@ -244,7 +228,7 @@ impl Band<'_> {
         let first = shots.start.saturating_sub(WIDEST_GAP);
         let around = first..(shots.end + WIDEST_GAP).min(self.found.len());
         // Rows above count, too.
-        let is_expected = |shot| (0..7).any(|way| self.expected(shot, 1, way).is_some());
+        let is_expected = |shot| (0..WAYS).any(|way| self.expected(shot, 1, way).is_some());
         self.is_dark_around =
             self.found[around].iter().all(Option::is_none) && !shots.clone().any(is_expected);
         self.look_beside(shots.clone(), at_hand);
@@ -281,7 +265,7 @@ impl Band<'_> {
                 continue;
             }
             for _ in 0..=SURFACES {
-                let Some(found) = self.find_beside(shot, &lags, is_closed) else { break };
+                let Some(found) = self.find_beside(shot, &lags) else { break };
                 self.follow((shot, found), (closed.start..shot).rev());
                 self.follow((shot, found), shot + 1..at_hand);
             }
@@ -296,24 +280,16 @@ impl Band<'_> {
     }
 
     /// Finds one more surface of a bright `shot`, of light that stands out and comes after the `lags`.
-    fn find_beside(
-        &mut self,
-        shot: usize,
-        lags: &Range<i64>,
-        is_closed: bool,
-    ) -> Option<Detection> {
+    fn find_beside(&mut self, shot: usize, lags: &Range<i64>) -> Option<Detection> {
         let known = self.bright(shot)?;
         if self.leftover().is_even(shot, lags) {
             return None;
         }
-        let visible = left_of_another(known);
+        let visible = left_over(known.count);
         let lags = self.leftover().lags(shot, lags.clone(), visible, false);
         let most = self.most_left(shot, &lags, visible)?;
         let found = self.found_at(shot, most.0);
         let found = found.and_then(|found| self.another_surface(shot, found));
-        if found.is_none() && !is_closed {
-            return None;
-        }
         Some(self.take_or_cancel(shot, found, most))
     }
 
@@ -335,8 +311,7 @@ impl Band<'_> {
             return self.found[shot];
         }
         let (known, gate) = (self.found[shot], self.sent.gate());
-        // Half of the marks may lie under ticks that are cancelled already.
-        let (least, visible) = match known {
+        let least = match known {
             Some(known) if !self.sent.wants_further() && gate.contains(&known.lag) => {
                 if !known.stands_out {
                     if self.is_first_that_is_faint(shot) {
@@ -346,14 +321,12 @@ impl Band<'_> {
                         return None;
                     }
                 }
-                (known.count, left_of_another(known))
+                known.count
             }
             // Of light from beyond the gate no more is wanted.
-            _ => {
-                let least = self.least_in_gate(shot);
-                (least, least.div_ceil(2))
-            }
+            _ => self.least_in_gate(shot),
         };
+        let visible = left_over(least);
         let ticks = self.sent.ticks_of(shot, visible);
         if !self.leftover().may_hold(shot, &gate, ticks) {
             return None;
@@ -391,7 +364,7 @@ impl Band<'_> {
 
     /// Whether light of the shot to the left of `shot` stood out or was not found: what makes this one faint, as
     /// a pane with a wall behind it, begins here. Of 407 040 shots of `street` as declared 60 are found otherwise than
-    /// by a thorough receiver where nothing is made of that, else 33.
+    /// by a thorough receiver where nothing is made of that, else 34.
     fn is_first_that_is_faint(&self, shot: usize) -> bool {
         let left = self.left[shot].and_then(|left| self.found[left as usize]);
         left.is_none_or(|left| left.stands_out)
@@ -442,8 +415,8 @@ impl Band<'_> {
     fn note_search(&mut self, shot: usize, may_be_even: bool, share: f64, times: f64) {
         match self.found[shot] {
             // Faint ones are looked at again now and then. If none is, 28 of 74 519 shots of `street` as
-            // declared are found at a fainter surface; a quarter of the pause finds what a half does.
-            Some(known) if !known.stands_out => self.again.note(shot, false, times * share / 2.0),
+            // declared are found at a fainter surface; a quarter of the pause finds what all of it does.
+            Some(known) if !known.stands_out => self.again.note(shot, false, times * share),
             None if may_be_even => self.even.note(shot, false, times * share * share),
             _ => {}
         }
@@ -472,8 +445,7 @@ impl Band<'_> {
     pub(super) fn finds_another_surface(&mut self, shot: usize, lag: i64) -> bool {
         let gate = self.sent.gate();
         let left = self.leftover().density(shot, &gate);
-        // Half of its marks may lie under ticks that are cancelled already.
-        let least = self.least_in_gate(shot).div_ceil(2);
+        let least = left_over(self.least_in_gate(shot));
         let least = self.thresholds.least(self.sent.weight(shot), left).max(least);
         let lags = self.leftover().lags(shot, gate, least, true);
         let most = self.maximum(shot, Source::Residual, &lags, least);

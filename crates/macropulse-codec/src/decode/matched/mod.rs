@@ -64,13 +64,22 @@ const SURFACES: usize = 3;
 /// Returns of a shot that this receiver can give at most.
 pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
-/// How often chance may leave out as many marks of a code word in all of its bits as are missing.
+/// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
 const BY_CHANCE: f64 = 1e-3;
+
+/// A normal variable exceeds it as often as that.
+const HARDLY_EVER: f64 = 3.0902;
 
 /// How often chance may light an end of a macropulse where there is none: of the four marks of an end of
 /// `street` it then takes two to tell. At 1e-3 it takes three, which one end in five lacks where one mark in
 /// five is missed, and finds the same shots.
 const AT_AN_END: f64 = 1e-2;
+
+/// Shots next to one that tell what is to be expected of it: the share of its marks of those before, the lag of
+/// a doubtful one of those to a side. Of 9099 shots of `street` as declared a mean over 32 loses 3, over 2 none. Of
+/// 25 898 shots of a room of which one in three is seen 0.52 % are taken for a sidelobe with 3 to a side, as one
+/// mistake leads to the next, 0.30 % with 5, 0.21 % with 8 and with 12.
+const NEIGHBOURS: usize = 8;
 
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
@@ -95,7 +104,7 @@ struct Detection {
     count: u32,
     /// The same less those at the best other lag that was looked at.
     margin: u32,
-    /// Whether that is half of all marks, and twice what chance gives: chance finds most where
+    /// Whether that is half of all marks, and half of that more than chance gives: chance finds most where
     /// macropulses overlap, but not as many.
     stands_out: bool,
     /// Whether it stands out, and no fewer marks are found than of the shots before, as many in each
@@ -465,7 +474,7 @@ impl<'a> Band<'a> {
         let gate = self.density_in_gate(shot, own);
         let beside = self.field.density_without(&light, own, places);
         let ticks = (light.end - light.start) as f64 / f64::from(sent.width);
-        match (beside - gate) * ticks > 3.0 * (gate * ticks + 1.0).sqrt() {
+        match (beside - gate) * ticks > HARDLY_EVER * (gate * ticks + 1.0).sqrt() {
             true => beside,
             false => gate,
         }

@@ -7,22 +7,18 @@ use crate::kernels::{COARSE, NARROW, and, is_dark, or, places_of};
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
 
-/// Blocks to each side of a peak in which a higher one is looked for: with the one of the peak they
-/// hold all sidelobes of words of up to 892 ticks. Of 190 824 shots of `car-50m` as declared 3 find 122
-/// more than 1; none at all lose one in 200 in good light, too.
-const SIDES: i64 = 3;
+/// Blocks to each side of a peak in which a higher one is looked for: as many as the picture bounds at once.
+/// With the one of the peak they hold all sidelobes of words of up to 892 ticks. Of 190 824 shots of `car-50m`
+/// as declared 3 find 122 more than 1; none at all lose one in 200 in good light, too.
+const SIDES: i64 = (COARSE as i64 - 1) / 2;
 
 /// The lags to both sides of a peak that are always seen with it.
-pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - SAME;
+pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - OFF;
 
-/// A peak so near to where it was expected is hardly ever a sidelobe of one elsewhere. In the standard
-/// scenes 1 to 16 find the same shots in the same time.
-const SAME: i64 = 4;
-
-/// A peak farther than this from the middle of its block, of which half are then seen to a side of it, is
-/// looked at again in the middle of one. At [`SAME`] one shot in three of `street` is counted twice, and
-/// one in 40 000 found better.
-const OFF: i64 = BLOCK / 4;
+/// A peak farther than this from the middle of its block is looked at again in the middle of one. At an eighth of
+/// that one shot in three of `street` is counted twice; at twice that fewer lags are seen to both sides, so that
+/// fewer marks at the ends of a macropulse tell that it is no sidelobe: a noisy scan takes a seventh longer.
+const OFF: i64 = BLOCK / 8;
 
 /// Where light is faint, a shot is looked for near one that was found so many shots away: as many as are
 /// passed by between two searches, so that none between is out of reach. Of 1884 shots of a room in which
@@ -30,8 +26,11 @@ const OFF: i64 = BLOCK / 4;
 /// 336, both others 100.
 pub(super) const WIDEST_GAP: usize = LONGEST_PAUSE as usize;
 
+/// Ways in which the lag of a shot is to be expected.
+pub(super) const WAYS: usize = 5;
+
 impl Band<'_> {
-    /// The lag at which `shot` is to be expected after its neighbours, in so many ways: on the lines
+    /// The lag at which `shot` is to be expected after its neighbours, in one of [`WAYS`]: on the line
     /// through two of them and the plane through three, and at the lag of one, which may be `gap`
     /// shots away.
     pub(super) fn expected(&self, shot: usize, gap: usize, way: usize) -> Option<i64> {
@@ -49,9 +48,7 @@ impl Band<'_> {
             1 => left().or_else(|| (1..=gap).find_map(|away| at(shot.checked_sub(away)))),
             2 => Some(left()? + above()? - at(over(left_of(here)))?),
             3 => above(),
-            4 => (1..=gap).find_map(|away| at(Some(shot + away))),
-            5 => Some(2 * at(Some(shot + 1))? - at(Some(shot + 2))?),
-            _ => Some(2 * above()? - at(over(over(here)))?),
+            _ => (1..=gap).find_map(|away| at(Some(shot + away))),
         }
     }
 
@@ -63,10 +60,10 @@ impl Band<'_> {
         let usual = self.usual.least(weight);
         let mut least = 0;
         let mut best: Option<Detection> = None;
-        let mut tried = [i64::MIN; 7];
-        for way in 0..tried.len() {
+        let mut tried = [i64::MIN; WAYS];
+        for way in 0..WAYS {
             let Some(lag) = self.expected(shot, gap, way) else { continue };
-            if tried[..way].iter().any(|other| lag.abs_diff(*other) < BLOCK as u64 / 4) {
+            if tried[..way].iter().any(|other| lag.abs_diff(*other) < OFF as u64) {
                 continue;
             }
             tried[way] = lag;
@@ -93,13 +90,11 @@ impl Band<'_> {
     ///
     /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
     /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
-    /// unless as many marks as usual are there, and marks at both of its ends; or where it was to be
-    /// expected as many as of most, and more than a sidelobe of all its marks has.
+    /// unless as many marks as usual are there, and marks at both of its ends.
     pub(super) fn climb(&mut self, shot: usize, lag: i64, at_least: u32) -> Option<Detection> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
         let usual = self.usual.least(weight).max(weight.div_ceil(2));
-        let of_most = self.usual.of_most(weight).max(self.sent.sidelobe(shot) + 1);
         let mut best = self.best_in_block(shot, lag).filter(|best| best.count >= at_least)?;
         let mut middle = lag;
         for _ in 0..STEPS {
@@ -108,10 +103,8 @@ impl Band<'_> {
                 best = self.best_in_block(shot, middle)?;
                 continue;
             }
-            let is_expected = best.lag.abs_diff(lag) <= SAME as u64 && best.count >= of_most;
-            let is_certain =
-                best.count >= usual && (is_expected || self.both_ends_are_lit(shot, best.lag));
-            if best.count == weight || is_certain {
+            let is_whole = best.count == weight;
+            if is_whole || best.count >= usual && self.both_ends_are_lit(shot, best.lag) {
                 break;
             }
             let higher = self.whole_bits_away(shot, best);

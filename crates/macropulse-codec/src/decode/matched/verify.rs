@@ -3,17 +3,13 @@
 use std::cmp::Reverse;
 use std::ops::Range;
 
-use super::track::{BLOCK, NEAREST_SIDE, WIDEST_GAP, lit};
-use super::{Band, Detection, SURFACES};
+use super::look::usual;
+use super::track::{BLOCK, NEAREST_SIDE, WAYS, WIDEST_GAP, lit};
+use super::{Band, Detection, NEIGHBOURS, SURFACES};
 use crate::decode::field::Source;
 use crate::decode::timing::{self, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
 use crate::kernels::parted;
-
-/// Shots to a side of a doubtful one that tell where it is to be expected. Of 25 898 shots of a room of
-/// which one in three is seen 0.52 % are taken for a sidelobe with 3, as one mistake leads to the next,
-/// 0.30 % with 5, 0.21 % with 8 and with 12; `street` and `car-50m` are the same with all of them.
-const NEIGHBOURS: usize = 8;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
@@ -135,9 +131,7 @@ impl Band<'_> {
         if is_alone && likely.is_none_or(|likely| is_near(likely, found.lag)) {
             return;
         }
-        // Of a bright one that has no equal the nearest tell whether it is.
-        let is_bright = is_alone && found.stands_out;
-        let expected = self.expected_lags(shot, if is_bright { 1 } else { NEIGHBOURS });
+        let expected = self.expected_lags(shot);
         let mut middles = vec![found.lag];
         for lag in &expected {
             if !middles.iter().any(|middle| is_near(*middle, *lag)) {
@@ -182,17 +176,17 @@ impl Band<'_> {
 
     /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
     /// behind it that is not as doubtful; after any where few are settled.
-    fn expected_lags(&self, shot: usize, neighbours: usize) -> Vec<i64> {
+    fn expected_lags(&self, shot: usize) -> Vec<i64> {
         let found = |shot: usize| *self.found.get(shot)?;
         let before = (0..shot).rev().take(WIDEST_GAP).filter_map(found);
-        let before: Vec<i64> = before.map(|found| found.lag).take(neighbours).collect();
-        let most = if before.len() < neighbours { neighbours } else { 1 };
+        let before: Vec<i64> = before.map(|found| found.lag).take(NEIGHBOURS).collect();
+        let most = if before.len() < NEIGHBOURS { NEIGHBOURS } else { 1 };
         let behind = (shot + 1..).take(WIDEST_GAP).filter_map(found);
         let behind = behind.filter(|found| found.margin > 0 || most > 1);
         let behind: Vec<i64> = behind.map(|found| found.lag).take(most).collect();
         let sides = before.first().zip(behind.first());
         let middle = sides.map(|(before, behind)| i64::midpoint(*before, *behind));
-        let lines = [0, 2, 3, 6].into_iter().filter_map(|way| self.expected(shot, 1, way));
+        let lines = [0, 2, 3].into_iter().filter_map(|way| self.expected(shot, 1, way));
         lines.chain(middle).chain(before).chain(behind).collect()
     }
 
@@ -241,11 +235,10 @@ impl Band<'_> {
     /// one is gone: light is rather near than far. Of the places that are claimed about the macropulse a
     /// share c is lit, of the others a share d. If n of its N marks are claimed, chance finds each with
     /// the mean probability (n·c + (N − n)·d) / N; it must not find as many at any lag of the gate. Of a
-    /// shot with as many marks as usual, half of them, and twice what chance gives, this is not asked.
+    /// shot that stands out, with as many marks as usual, this is not asked.
     ///
     /// c is that of the places beside its own marks, or of all if that is more: of few marks of another
-    /// return, all that are found may be among its own. Light from beyond the gate is only supposed, by just
-    /// those marks: there those beside tell alone.
+    /// return, all that are found may be among its own.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         self.is_its_own_beside(shot, detection, None)
     }
@@ -270,9 +263,7 @@ impl Band<'_> {
             return false;
         }
         let light = sent.light(shot, detection.lag);
-        let mut claiming = self.light_from_beyond(shot, light.start, detection.count);
-        let is_beyond = !claiming.is_empty();
-        claiming.extend(supposed);
+        let mut claiming = Vec::from_iter(supposed);
         claiming.extend(self.overlapping(&light).filter(|found| {
             let is_itself = found.0 == shot && found.1.lag == detection.lag;
             !is_itself && self.claims(*found, (shot, detection))
@@ -305,10 +296,7 @@ impl Band<'_> {
         let share = |lit: u32, all: u32| f64::from(lit) / f64::from(all.max(1));
         let [[all, lit], [all_claimed, lit_claimed], [all_shared, lit_shared]] = places;
         let beside = share(lit_claimed, all_claimed);
-        let claimed = match is_beyond {
-            true => beside,
-            false => beside.max(share(lit_claimed + lit_shared, all_claimed + all_shared)),
-        };
+        let claimed = beside.max(share(lit_claimed + lit_shared, all_claimed + all_shared));
         let by_chance = f64::from(free) * share(lit, all) + f64::from(taken) * claimed;
         let gate = self.density_in_gate(shot, detection.count);
         let density = gate.max(by_chance / f64::from(weight)).min(1.0);
@@ -329,7 +317,7 @@ impl Band<'_> {
     /// Whether `shot` is to be expected about `lag` after any of its neighbours.
     fn is_expected(&self, shot: usize, lag: i64) -> bool {
         let is_near = |expected: i64| expected.abs_diff(lag) < NEAREST_SIDE as u64;
-        (0..7).any(|way| self.expected(shot, WIDEST_GAP, way).is_some_and(is_near))
+        (0..WAYS).any(|way| self.expected(shot, WIDEST_GAP, way).is_some_and(is_near))
     }
 
     /// Whether the marks found are spread over the code word. Light of another word meets the same one
@@ -351,21 +339,9 @@ impl Band<'_> {
         word - found < self.once_thresholds.least(word, left_out)
     }
 
-    /// What earlier shots in the word of `shot`, found with `count` marks, would be found with if their
-    /// light came from beyond the gate at tick `start`, or whole bits beside it: those with more marks.
-    fn light_from_beyond(
-        &mut self,
-        shot: usize,
-        start: i64,
-        count: u32,
-    ) -> Vec<(usize, Detection)> {
-        let beyond = self.sent.gate().end..i64::from(self.sent.receiver.light_ticks) + 1;
-        self.in_the_same_word(shot, start, beyond, |other, found| other < shot && found > count)
-    }
-
     /// Whether light of `shot` that seems to come from beyond the gate is rather that of a later shot
-    /// from within: one in the same word with as many marks there, or whole bits beside it, and as
-    /// large a share of all its marks but for chance.
+    /// from within: one in the same word with as many marks there, or whole bits beside it, where a part of
+    /// its lit bits falls upon lit bits, and as large a share of all its marks but for chance.
     pub(super) fn is_of_a_later_shot(&mut self, shot: usize, detection: Detection) -> bool {
         let (sent, gate) = (self.sent, self.sent.gate());
         if detection.lag < gate.end + sent.length() {
@@ -373,44 +349,26 @@ impl Band<'_> {
         }
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
         let start = sent.fired[shot] + detection.lag;
-        let is_one = |other, found| {
-            let least = super::look::usual(share, sent.weight(other)).max(detection.count);
-            other > shot && found >= least
-        };
-        !self.in_the_same_word(shot, start, gate, is_one).is_empty()
-    }
-
-    /// The marks of other shots in the word of `shot` that begin at tick `start`, or whole bits beside
-    /// it, after one of the `lags`: there, a part of their lit bits falls upon its lit bits. Those shots, found
-    /// with so many marks, that are `wanted`.
-    fn in_the_same_word(
-        &mut self,
-        shot: usize,
-        start: i64,
-        lags: Range<i64>,
-        wanted: impl Fn(usize, u32) -> bool,
-    ) -> Vec<(usize, Detection)> {
-        let sent = self.sent;
         let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
         let about = start - bits * length..start + bits * length + 1;
-        let is_alike = |other: &usize| sent.log.word[*other] == sent.log.word[shot];
-        let mut alike =
-            sent.that_begin_in(&about, &lags).filter(is_alike).filter(|other| *other != shot);
-        let Some(one) = alike.next() else { return Vec::new() };
+        let is_alike =
+            |other: &usize| *other > shot && sent.log.word[*other] == sent.log.word[shot];
+        let mut later = sent.that_begin_in(&about, &gate).filter(is_alike).peekable();
+        if later.peek().is_none() {
+            return false;
+        }
         let mut words = std::mem::take(&mut self.words);
         self.words_about(shot, start, &mut words.found);
-        let mut found = Vec::new();
-        for other in std::iter::once(one).chain(alike) {
+        let is_another = later.any(|other| {
+            let least = usual(share, sent.weight(other)).max(detection.count);
             sent.in_bits(other, &words.found, &mut words.sums);
-            for (away, count) in (-bits..).zip(&words.sums) {
+            (-bits..).zip(&words.sums).any(|(away, count)| {
                 let lag = start + away * length - sent.fired[other];
-                if away.abs() < bits && lags.contains(&lag) && wanted(other, *count) {
-                    found.push((other, Detection::at(lag, *count)));
-                }
-            }
-        }
+                away.abs() < bits && gate.contains(&lag) && *count >= least
+            })
+        });
         self.words = words;
-        found
+        is_another
     }
 
     /// The marks of the word of `shot` that are `found` where each bit would be from as many bits before
