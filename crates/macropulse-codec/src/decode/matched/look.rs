@@ -3,18 +3,10 @@
 use std::iter;
 use std::ops::Range;
 
+use super::pace::usual;
 use super::track::{WAYS, WIDEST_GAP};
-use super::{Band, Detection, HARDLY_EVER, NEIGHBOURS, SURFACES};
+use super::{Band, Detection, SURFACES};
 use crate::decode::field::Source;
-
-/// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
-/// searched for, and fewer after a part of it. With 256 a whole scan of `kim-park-2016-fixed` in `car-50m`
-/// has 400 of 190 000 points less; it takes half as long in the dark with 10¹⁰ dark counts a second.
-///
-/// Where no light stands out it is the square of the part, so that what can be in a few places only is searched
-/// for in nearly every shot. By the part itself whole rows of far ground are missed: 710 of the 407 040 shots
-/// of `car-50m` as declared are found otherwise than by a thorough receiver, instead of 142.
-pub(super) const LONGEST_PAUSE: f64 = 64.0;
 
 /// So many times as many are passed by where light is so dense that lag after lag of half of the gate
 /// must be counted: a search takes 290 µs then instead of 6. Of 37 268 shots of `car-50m` and 74 519 of `street`
@@ -28,67 +20,6 @@ enum Pass {
     First,
     /// Those that were passed by, where all that is bright is known but them.
     Second,
-}
-
-/// Shots of which one in so many is searched for, fewer and fewer as long as none is found.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Paced {
-    next: usize,
-    pause: f64,
-}
-
-impl Default for Paced {
-    fn default() -> Self {
-        Self { next: 0, pause: LONGEST_PAUSE }
-    }
-}
-
-impl Paced {
-    fn is_due(&self, shot: usize) -> bool {
-        shot >= self.next
-    }
-
-    /// The next one is due at once, and then fewer and fewer.
-    fn restart(&mut self, shot: usize) {
-        *self = Self { next: shot, pause: 1.0 };
-    }
-
-    /// `shot` was found, or else searched for in such a `share` of its gate.
-    fn note(&mut self, shot: usize, is_found: bool, share: f64) {
-        self.next = shot + 1 + if is_found { 0 } else { (self.pause * share) as usize };
-        self.pause = if is_found { 1.0 } else { (2.0 * self.pause).min(LONGEST_PAUSE) };
-    }
-}
-
-/// The share of their marks that was found of the shots before: a running mean.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Usual {
-    share: f64,
-    shots: f64,
-}
-
-impl Usual {
-    /// Nothing is known: half of them.
-    pub(super) fn new() -> Self {
-        Self { share: 0.5, shots: 0.0 }
-    }
-
-    pub(super) fn learn(&mut self, count: u32, weight: u32) {
-        self.shots = (self.shots + 1.0).min(NEIGHBOURS as f64);
-        self.share += (f64::from(count) / f64::from(weight) - self.share) / self.shots;
-    }
-
-    /// Fewest of `weight` marks that are usual.
-    pub(super) fn least(&self, weight: u32) -> u32 {
-        usual(self.share, weight)
-    }
-}
-
-/// Fewest of `weight` marks that are usual where a `share` of them is found: fewer are found hardly ever, by the
-/// standard deviation of the binomial and of a mark.
-pub(super) fn usual(share: f64, weight: u32) -> u32 {
-    let mean = share * f64::from(weight);
-    (mean - HARDLY_EVER * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
 }
 
 /// Fewest of so many `marks` that are left over: a quarter may lie under ticks that are cancelled already. With a

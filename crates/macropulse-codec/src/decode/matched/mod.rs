@@ -23,6 +23,8 @@
 mod acquire;
 mod cancel;
 mod look;
+mod measure;
+mod pace;
 mod sent;
 #[cfg(test)]
 mod tests;
@@ -44,9 +46,9 @@ use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
 use acquire::{Leftover, Search};
 use cancel::Cancelled;
-use look::{Paced, Usual};
+use measure::Photons;
+use pace::{Paced, Usual};
 use sent::{Sent, Words};
-use verify::Photons;
 
 /// Decodes one band.
 pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {

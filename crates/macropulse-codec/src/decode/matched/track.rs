@@ -1,6 +1,6 @@
 //! Tracking: the exact maximum about the lags at which the neighbours of a shot were found.
 
-use super::look::LONGEST_PAUSE;
+use super::pace::LONGEST_PAUSE;
 use super::{Band, Detection};
 use crate::kernels::{COARSE, NARROW, and, is_dark, or, places_of};
 

@@ -1,14 +1,13 @@
-//! Exclusion and verification: what becomes of a shot that was found, and what is measured of it.
+//! Exclusion and verification: what becomes of a shot that was found.
 
 use std::cmp::Reverse;
 use std::ops::Range;
 
-use super::look::usual;
+use super::pace::usual;
 use super::track::{BLOCK, NEAREST_SIDE, WAYS, WIDEST_GAP, lit};
 use super::{Band, Detection, NEIGHBOURS, SURFACES};
 use crate::decode::field::Source;
-use crate::decode::timing::{self, Known};
-use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Strength, Window};
+use crate::decode::{MIDDLE, Reject, Returns, Strength};
 use crate::kernels::parted;
 
 impl Band<'_> {
@@ -400,35 +399,6 @@ impl Band<'_> {
         primary.chain(further.copied())
     }
 
-    /// What is measured of `shot` at `detection`.
-    fn measured(&mut self, shot: usize, detection: Detection) -> Return {
-        let marks = self.sent.weight(shot);
-        let light = self.sent.light(shot, detection.lag);
-        let (peak, margin) = (detection.count as u16, detection.margin as u16);
-        let sent = self.sent;
-        let start = light.start + sent.epoch;
-        let late = self.late(shot, detection);
-        let Energy { photons, saturated } = match detection.count == marks {
-            true => self.photons.of_all(marks),
-            false => {
-                let density = self.density_beside(shot, detection);
-                Energy::of(
-                    (detection.count, marks),
-                    density,
-                    timing::window(self.sent.receiver, self.sent.width, late),
-                )
-            }
-        };
-        let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start, late);
-        Return { shot, tof, peak, marks: marks as u16, margin, photons, saturated }
-    }
-
-    /// Share of lit places around a shot found at `detection`, its own marks apart.
-    fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
-        let places = self.sent.weight(shot) * self.sent.width;
-        self.field.density_without(&self.sent.light(shot, detection.lag), detection.count, places)
-    }
-
     /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
     ///
     /// Only the residual counts, as other shots may well shine there; and so may another surface of this one,
@@ -484,43 +454,6 @@ impl Band<'_> {
         let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
         let squares: f64 = found.iter().map(square).sum();
         squares <= chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word)
-    }
-
-    /// How late the marks of `shot` are, in ticks, if it is found at `detection`.
-    fn late(&mut self, shot: usize, detection: Detection) -> f64 {
-        let sent = self.sent;
-        if sent.width == 1 {
-            return MIDDLE;
-        }
-        let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
-        let lit_bits = sent.bits_that_are(true, shot);
-        let count =
-            |place: i64| self.field.seen().lit_in_all(light.start + place, lit_bits, &bits.pattern);
-        self.histogram.count(sent.width, sent.receiver.jitter(), count);
-        let beside = self.field.density_without(&light, detection.count, 0);
-        let known = Known {
-            sigma: sent.receiver.jitter(),
-            marks: f64::from(sent.weight(shot)),
-            others: beside / f64::from(sent.width),
-            neighbours: &bits.neighbours,
-        };
-        self.histogram.late_by(&known)
-    }
-}
-
-/// The energy of returns of which all marks were found, by their number: in clear weather a logarithm
-/// for each shot would take longer than the rest.
-#[derive(Debug, Default)]
-pub(super) struct Photons {
-    all_found: Vec<Energy>,
-}
-
-impl Photons {
-    fn of_all(&mut self, marks: u32) -> Energy {
-        let known = self.all_found.len() as u32;
-        self.all_found
-            .extend((known..=marks).map(|marks| Energy::of((marks, marks), 0.0, Window::WHOLE)));
-        self.all_found[marks as usize]
     }
 }
 
