@@ -72,7 +72,7 @@ const BY_CHANCE: f64 = 1e-3;
 /// A normal variable exceeds it as often as that.
 const HARDLY_EVER: f64 = 3.0902;
 
-/// How often chance may light an end of a macropulse where there is none: of the four marks of an end of
+/// How often chance may light an end of a macropulse where there is none: of the three or four marks of an end of
 /// `street` it then takes two to tell. At 1e-3 it takes three, which one end in five lacks where one mark in
 /// five is missed, and finds the same shots.
 const AT_AN_END: f64 = 1e-2;
