@@ -293,11 +293,12 @@ pub(super) struct Leftover<'a> {
 const SOON: i64 = 1000;
 
 /// Light stands out where twice the root of the most ticks in a stretch and of the fewest are so far apart: so far
-/// that chance makes it so in a gate of `stretches` at most as often as `false_alarm`.
+/// that chance makes it so in a gate of `stretches` about as often as `false_alarm`.
 ///
 /// Twice the root of a count that chance makes has a variance of about 1 \[Ans48\], be light dense or sparse, and
 /// the difference of two has √2 times that deviation. Of fewer than n² pairs, none exceeds √2·Q⁻¹(α/n²) but with
-/// probability α.
+/// probability α. Of 200 000 gates of 136 stretches, with α = 0.1 %, 0.09 % have one of 400 ticks on average, 0.13 % of
+/// 40, and 0.9 % of ten, where the root is less even: these are searched for nothing.
 fn uneven(stretches: f64, false_alarm: f64) -> f64 {
     -std::f64::consts::SQRT_2 * normal_quantile(false_alarm / (stretches * stretches))
 }
