@@ -13,9 +13,9 @@
 
 use std::ops::Range;
 
+use super::Band;
 use super::sent::Sent;
 use super::track::below;
-use super::{BY_CHANCE, Band};
 use crate::decode::field::{Field, Source};
 use crate::decode::timeline::Timeline;
 use crate::kernels::{
@@ -323,7 +323,7 @@ impl<'a> Leftover<'a> {
             together,
             groups,
             even_to: None,
-            uneven: uneven(in_gate as f64, sent.receiver.false_alarm.min(BY_CHANCE)),
+            uneven: uneven(in_gate as f64, sent.accepted()),
         };
         leftover.sum(all);
         leftover

@@ -258,7 +258,7 @@ impl<'a> Band<'a> {
             at_hand: 0..0,
             fewest,
             leftover: None,
-            rare: normal_quantile(1.0 - false_alarm.min(BY_CHANCE)),
+            rare: normal_quantile(1.0 - sent.accepted()),
             searched: Paced::default(),
             even: Paced::default(),
             again: Paced::default(),

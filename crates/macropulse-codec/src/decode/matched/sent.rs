@@ -3,8 +3,8 @@
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use super::Detection;
 use super::track::NEAREST_SIDE;
+use super::{BY_CHANCE, Detection};
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timing;
@@ -364,6 +364,11 @@ impl<'a> Sent<'a> {
     pub fn ticks_of_any(&self, marks: u32) -> u32 {
         let per_tick = self.words.per_tick.iter().copied().max();
         marks.div_ceil(per_tick.unwrap_or(1).max(1))
+    }
+
+    /// How often chance may be taken for light: as often as false returns are accepted, but hardly ever.
+    pub fn accepted(&self) -> f64 {
+        self.receiver.false_alarm.min(BY_CHANCE)
     }
 
     /// Whether every shot is searched for in all of its gate.
