@@ -22,6 +22,9 @@ pub(super) const PLANES: usize = 16;
 /// The lowest planes, to which marks are added one by one.
 pub(super) const LOW: usize = 4;
 
+/// Marks that are added up in registers before anything is carried beyond the lowest planes: fewer take as long.
+pub(crate) const SIXTEEN: usize = 16;
+
 /// Counts of a block of 64 · W lags, in bit planes: plane p has weight 2^p. W is [`NARROW`] or
 /// [`WIDE`].
 #[derive(Debug, Clone, Copy)]
@@ -45,20 +48,10 @@ impl<const W: usize> Counts<W> {
     /// 65535 marks can be counted, none behind the `farthest` place.
     pub(crate) fn count(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
         debug_assert!(places.iter().all(|place| *place <= farthest));
-        // Nothing before the first lag is looked at.
-        let words = words.get(first as usize / 64..).unwrap_or_default();
-        let first = first % 64;
-        let reach = (farthest + first) as usize / 64 + W + 1;
         let mut longer = Vec::new();
-        let words = if reach <= words.len() {
-            words
-        } else {
-            longer.extend_from_slice(words);
-            longer.resize(reach, 0);
-            &longer
-        };
+        let (words, first) = reached(words, first, farthest as usize + 64 * W, &mut longer);
         self.counted = places.len();
-        self.used = ((usize::BITS - self.counted.leading_zeros()) as usize).clamp(LOW, PLANES);
+        self.used = planes_for(self.counted);
         let planes = self.planes.as_flattened_mut();
         #[cfg(target_arch = "x86_64")]
         if let Some(count) = registers::counter::<W>(self.used)
@@ -103,6 +96,60 @@ impl<const W: usize> Counts<W> {
         let planes = self.planes[..self.used].iter().enumerate();
         planes.map(|(weight, plane)| ((plane[lane] >> bit & 1) as u32) << weight).sum()
     }
+}
+
+/// Tells for each lag whether `least` of the marks are lit, where [`Counts::count`] would count them: one bit of
+/// `enough` for each, which is some blocks of W machine words.
+pub(crate) fn with_enough<const W: usize>(
+    words: &[u64],
+    first: u32,
+    (places, farthest): (&[u32], u32),
+    least: u32,
+    enough: &mut [u64],
+) {
+    let mut longer = Vec::new();
+    let reach = farthest as usize + 64 * enough.len();
+    let (words, first) = reached(words, first, reach, &mut longer);
+    if least as usize > places.len() {
+        return enough.fill(0);
+    }
+    #[cfg(target_arch = "x86_64")]
+    if let Some(tell) = registers::enough::<W>(planes_for(places.len()))
+        && words.len() < 1 << 26
+    {
+        // SAFETY: as where they are counted.
+        return unsafe { tell(words, first, places, least, enough) };
+    }
+    let mut counts = Counts::<W>::default();
+    for (block, enough) in enough.chunks_exact_mut(W).enumerate() {
+        counts.count(words, first + 64 * (W * block) as u32, places, farthest);
+        enough.copy_from_slice(&counts.at_least(least));
+    }
+}
+
+/// The `words` from that of bit `first` on, and which bit that is of them; as many at least as are looked at where
+/// blocks end so many bits farther, some of them dark and in `longer` memory.
+fn reached<'a>(
+    words: &'a [u64],
+    first: u32,
+    farther: usize,
+    longer: &'a mut Vec<u64>,
+) -> (&'a [u64], u32) {
+    // Nothing before the first lag is looked at.
+    let words = words.get(first as usize / 64..).unwrap_or_default();
+    let first = first % 64;
+    let reach = (farther + first as usize) / 64 + 1;
+    if reach <= words.len() {
+        return (words, first);
+    }
+    longer.extend_from_slice(words);
+    longer.resize(reach, 0);
+    (longer, first)
+}
+
+/// Planes for the counts of so many marks.
+fn planes_for(marks: usize) -> usize {
+    ((usize::BITS - marks.leading_zeros()) as usize).clamp(LOW, PLANES)
 }
 
 /// Whether no bit is lit.
@@ -306,6 +353,17 @@ mod tests {
             }
             let expected = highest.map(|lag| (lag as u32, expected[lag]));
             prop_assert_eq!(counts.highest(allowed), expected);
+        }
+        let told = at_each_level(|| {
+            let mut told = vec![7; 3 * W];
+            with_enough::<W>(&words, first, (places, 6500), least, &mut told);
+            told
+        });
+        for (level, told) in told {
+            for lag in 0..3 * 64 * W as u32 {
+                let is_told = told[lag as usize / 64] >> (lag % 64) & 1 == 1;
+                prop_assert_eq!(is_told, found(lag) >= least, "{:?}", level);
+            }
         }
         Ok(())
     }

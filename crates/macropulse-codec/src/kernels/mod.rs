@@ -26,7 +26,9 @@ mod waveform;
 pub(crate) use ascend::ascends;
 pub(crate) use balance::{Balance, Chips, best_balance};
 pub(crate) use coarse::{COARSE, coarse, in_pictures};
-pub(crate) use correlate::{Counts, NARROW, WIDE, and, any_behind, is_dark, or};
+pub(crate) use correlate::{
+    Counts, NARROW, SIXTEEN, WIDE, and, any_behind, is_dark, or, with_enough,
+};
 pub(crate) use lay::{count_each, dark_before, lay, least_most_and_sum, lit_after, sum_along};
 pub(crate) use marks::{WordTicks, begin_with, places_of};
 pub(crate) use pattern::{

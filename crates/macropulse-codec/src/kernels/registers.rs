@@ -1,6 +1,6 @@
 //! Marks counted in registers, where a processor has them as long as a block of lags or half of one.
 
-use super::correlate::{LOW, NARROW, PLANES, WIDE};
+use super::correlate::{LOW, NARROW, PLANES, SIXTEEN, WIDE};
 use super::level::Level;
 
 /// Planes above the lowest ones: for up to 255 marks few, which stay in registers.
@@ -27,97 +27,133 @@ pub(super) fn counter<const W: usize>(planes: usize) -> Option<Counter> {
     })
 }
 
-/// Marks that are added up before anything is carried beyond the fourth plane.
-const SIXTEEN: usize = 16;
+/// Tells from which bits of the words on there are so many marks at `places`, behind them, from bit `first` on.
+pub(super) type Enough = unsafe fn(&[u64], u32, &[u32], u32, &mut [u64]);
+
+/// What tells that on this level, with counts of so many planes; `None` as above.
+///
+/// # Safety
+///
+/// As of the [`counter`], for each block of `W` words of what is told.
+pub(super) fn enough<const W: usize>(planes: usize) -> Option<Enough> {
+    Some(match (Level::here(), planes > LOW + FEW) {
+        (Level::Avx512, false) => avx512::enough::<W, FEW>,
+        (Level::Avx512, true) => avx512::enough::<W, MANY>,
+        (Level::Avx2, false) => avx2::enough::<FEW>,
+        (Level::Avx2, true) => avx2::enough::<MANY>,
+        (Level::Plain, _) => return None,
+    })
+}
 
 /// Counts in a register of so many lanes: how it is stored, how a block that begins at a bit of the words is
 /// read, and how three bits are summed in each lag, and carried.
 macro_rules! counter {
     (
-        $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
-        $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
+        $features:literal, $name:ident, $lanes:ident, $dark:ident, $lit:ident,
+        $store:ident, $cut:ident, $sum:ident, $carry:ident, $and:ident, $or:ident, $xor:ident
     ) => {
+        /// Counts in one register, or `tells` where there are `least` marks in one after another. What it stores is
+        /// a plane every `stride` words of `out`; or one bit for each lag, in all of it.
+        ///
         /// # Safety
         ///
         /// The processor must have the features, and `words`, fewer than 2^26, must reach a register and one
-        /// word beyond the one in which the bit `first + place` lies, for each of `places`. These must be fewer
-        /// than 16 · 2^`HIGH`, and there must be as many more `planes` than [`LOW`], one every `stride` words.
+        /// word beyond the one in which the bit `first + place` lies, for each of `places`, and of those of the last
+        /// register. These must be fewer than 16 · 2^`HIGH`, and `out` must have as many more planes than [`LOW`],
+        /// or whole registers.
         #[target_feature(enable = $features)]
-        unsafe fn $name<const HIGH: usize>(
+        unsafe fn $name<const HIGH: usize, const TELLS: bool>(
             words: &[u64],
             first: u32,
             places: &[u32],
-            planes: &mut [u64],
+            least: u32,
+            out: &mut [u64],
             stride: usize,
         ) {
-            let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
-            let mut high = [$dark(); HIGH];
-            // Three bits are summed in each lag, and carried to the next plane.
-            macro_rules! add {
-                ($a:expr, $b:expr, $c:expr) => {{
-                    let (a, b, c) = ($a, $b, $c);
-                    ($sum(a, b, c), $carry(a, b, c))
-                }};
-            }
-            macro_rules! bits {
-                ($place:expr) => {{
-                    let bit = first.wrapping_add($place);
-                    debug_assert!(bit as usize / 64 + $lanes < words.len());
-                    // SAFETY: the caller answers for the places.
-                    unsafe { $cut(words.as_ptr(), bit) }
-                }};
-            }
-            // The blocks of eight marks are added, and one is carried to the fourth plane.
-            macro_rules! eight_from {
-                ($first:literal, $block:ident) => {{
-                    let (sum, a) = add!(ones, $block!($first), $block!($first + 1));
-                    let (sum, b) = add!(sum, $block!($first + 2), $block!($first + 3));
-                    let (sum_of_twos, c) = add!(twos, a, b);
-                    let (sum, a) = add!(sum, $block!($first + 4), $block!($first + 5));
-                    let (sum, b) = add!(sum, $block!($first + 6), $block!($first + 7));
-                    ones = sum;
-                    let (sum, d) = add!(sum_of_twos, a, b);
-                    twos = sum;
-                    let (sum, carried) = add!(fours, c, d);
-                    fours = sum;
-                    carried
-                }};
-            }
-            macro_rules! sixteen_from {
-                ($block:ident) => {{
-                    let a = eight_from!(0, $block);
-                    let b = eight_from!(8, $block);
-                    let mut carried;
-                    (eights, carried) = add!(eights, a, b);
-                    for plane in &mut high {
-                        (*plane, carried) = ($xor(*plane, carried), $and(*plane, carried));
-                    }
-                }};
-            }
-            let (whole, rest) = places.as_chunks::<SIXTEEN>();
-            for places in whole {
-                macro_rules! block {
-                    ($at:expr) => {
-                        bits!(places[$at])
-                    };
+            let blocks = if TELLS { out.len() / $lanes } else { 1 };
+            for block in 0..blocks {
+                let words = &words[$lanes * block..];
+                let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
+                let mut high = [$dark(); HIGH];
+                // Three bits are summed in each lag, and carried to the next plane.
+                macro_rules! add {
+                    ($a:expr, $b:expr, $c:expr) => {{
+                        let (a, b, c) = ($a, $b, $c);
+                        ($sum(a, b, c), $carry(a, b, c))
+                    }};
                 }
-                sixteen_from!(block);
-            }
-            if !rest.is_empty() {
-                macro_rules! block_or_dark {
-                    ($at:expr) => {
-                        match rest.get($at) {
-                            Some(place) => bits!(*place),
-                            None => $dark(),
+                macro_rules! bits {
+                    ($place:expr) => {{
+                        let bit = first.wrapping_add($place);
+                        debug_assert!(bit as usize / 64 + $lanes < words.len());
+                        // SAFETY: the caller answers for the places.
+                        unsafe { $cut(words.as_ptr(), bit) }
+                    }};
+                }
+                // The blocks of eight marks are added, and one is carried to the fourth plane.
+                macro_rules! eight_from {
+                    ($first:literal, $block:ident) => {{
+                        let (sum, a) = add!(ones, $block!($first), $block!($first + 1));
+                        let (sum, b) = add!(sum, $block!($first + 2), $block!($first + 3));
+                        let (sum_of_twos, c) = add!(twos, a, b);
+                        let (sum, a) = add!(sum, $block!($first + 4), $block!($first + 5));
+                        let (sum, b) = add!(sum, $block!($first + 6), $block!($first + 7));
+                        ones = sum;
+                        let (sum, d) = add!(sum_of_twos, a, b);
+                        twos = sum;
+                        let (sum, carried) = add!(fours, c, d);
+                        fours = sum;
+                        carried
+                    }};
+                }
+                macro_rules! sixteen_from {
+                    ($block:ident) => {{
+                        let a = eight_from!(0, $block);
+                        let b = eight_from!(8, $block);
+                        let mut carried;
+                        (eights, carried) = add!(eights, a, b);
+                        for plane in &mut high {
+                            (*plane, carried) = ($xor(*plane, carried), $and(*plane, carried));
                         }
-                    };
+                    }};
                 }
-                sixteen_from!(block_or_dark);
-            }
-            let sums = [ones, twos, fours, eights].into_iter().chain(high);
-            for (plane, sum) in planes.chunks_mut(stride).zip(sums) {
-                // SAFETY: a plane is as long as a register.
-                unsafe { $store(plane.as_mut_ptr().cast(), sum) };
+                let (whole, rest) = places.as_chunks::<SIXTEEN>();
+                for places in whole {
+                    macro_rules! block {
+                        ($at:expr) => {
+                            bits!(places[$at])
+                        };
+                    }
+                    sixteen_from!(block);
+                }
+                if !rest.is_empty() {
+                    macro_rules! block_or_dark {
+                        ($at:expr) => {
+                            match rest.get($at) {
+                                Some(place) => bits!(*place),
+                                None => $dark(),
+                            }
+                        };
+                    }
+                    sixteen_from!(block_or_dark);
+                }
+                let planes = [ones, twos, fours, eights].into_iter().chain(high);
+                if TELLS {
+                    let mut all = $lit(-1);
+                    for (weight, plane) in planes.enumerate() {
+                        all = match least >> weight & 1 == 1 {
+                            true => $and(plane, all),
+                            false => $or(plane, all),
+                        };
+                    }
+                    // SAFETY: a block is as long as a register.
+                    unsafe { $store(out.as_mut_ptr().add($lanes * block).cast(), all) };
+                } else {
+                    for (place, plane) in out.chunks_mut(stride).zip(planes) {
+                        // SAFETY: a plane is as long as a register.
+                        unsafe { $store(place.as_mut_ptr().cast(), plane) };
+                    }
+                }
             }
         }
     };
@@ -140,8 +176,26 @@ mod avx512 {
     ) {
         // SAFETY: the caller answers for it.
         match W {
-            NARROW => unsafe { narrow::<HIGH>(words, first, places, planes, W) },
-            _ => unsafe { wide::<HIGH>(words, first, places, planes, W) },
+            NARROW => unsafe { narrow::<HIGH, false>(words, first, places, 0, planes, W) },
+            _ => unsafe { wide::<HIGH, false>(words, first, places, 0, planes, W) },
+        }
+    }
+
+    /// # Safety
+    ///
+    /// As of the counters for each width.
+    #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
+    pub(super) unsafe fn enough<const W: usize, const HIGH: usize>(
+        words: &[u64],
+        first: u32,
+        places: &[u32],
+        least: u32,
+        enough: &mut [u64],
+    ) {
+        // SAFETY: the caller answers for it.
+        match W {
+            NARROW => unsafe { narrow::<HIGH, true>(words, first, places, least, enough, W) },
+            _ => unsafe { wide::<HIGH, true>(words, first, places, least, enough, W) },
         }
     }
 
@@ -204,11 +258,13 @@ mod avx512 {
         narrow,
         NARROW,
         _mm256_setzero_si256,
+        _mm256_set1_epi64x,
         _mm256_storeu_si256,
         cut_narrow,
         sum_narrow,
         carry_narrow,
         _mm256_and_si256,
+        _mm256_or_si256,
         _mm256_xor_si256
     );
     counter!(
@@ -216,11 +272,13 @@ mod avx512 {
         wide,
         WIDE,
         _mm512_setzero_si512,
+        _mm512_set1_epi64,
         _mm512_storeu_si512,
         cut_wide,
         sum_wide,
         carry_wide,
         _mm512_and_si512,
+        _mm512_or_si512,
         _mm512_xor_si512
     );
 }
@@ -242,8 +300,25 @@ mod avx2 {
     ) {
         for half in (0..W).step_by(NARROW) {
             // SAFETY: the caller answers for it.
-            unsafe { narrow::<HIGH>(&words[half..], first, places, &mut planes[half..], W) };
+            unsafe {
+                narrow::<HIGH, false>(&words[half..], first, places, 0, &mut planes[half..], W);
+            }
         }
+    }
+
+    /// # Safety
+    ///
+    /// As of the counter.
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) unsafe fn enough<const HIGH: usize>(
+        words: &[u64],
+        first: u32,
+        places: &[u32],
+        least: u32,
+        enough: &mut [u64],
+    ) {
+        // SAFETY: the caller answers for it.
+        unsafe { narrow::<HIGH, true>(words, first, places, least, enough, NARROW) }
     }
 
     /// Bits to shift by to the right where a block begins so many bits behind the beginning of a byte, and
@@ -287,11 +362,13 @@ mod avx2 {
         narrow,
         NARROW,
         _mm256_setzero_si256,
+        _mm256_set1_epi64x,
         _mm256_storeu_si256,
         cut,
         sum,
         carry,
         _mm256_and_si256,
+        _mm256_or_si256,
         _mm256_xor_si256
     );
 }

@@ -19,13 +19,13 @@ use super::track::below;
 use crate::decode::field::{Field, Source};
 use crate::decode::timeline::Timeline;
 use crate::kernels::{
-    COARSE, Counts, WIDE, and, any_behind, coarse, in_pictures, is_dark, least_most_and_sum,
-    sum_along,
+    COARSE, Counts, SIXTEEN, WIDE, and, any_behind, coarse, in_pictures, is_dark,
+    least_most_and_sum, sum_along, with_enough,
 };
 use crate::statistics::normal_quantile;
 
 /// Lags that are counted at once.
-const BLOCK: i64 = 64 * WIDE as i64;
+pub(super) const BLOCK: i64 = 64 * WIDE as i64;
 
 /// Memory kept from search to search.
 #[derive(Debug, Default)]
@@ -55,6 +55,12 @@ impl Marks {
     fn set(&mut self, ticks: &[u32], stride: u32) {
         in_pictures(ticks, stride, &mut self.places);
         self.farthest = self.places.iter().copied().max().unwrap_or(0);
+    }
+
+    /// Tells from which bits of the `pictures` on, the first one being `first`, so many may be there.
+    fn find(&self, pictures: &Pictures, first: u32, needed: u32, enough: &mut [u64]) {
+        let marks = (&*self.places, self.farthest);
+        with_enough::<WIDE>(&pictures.words, first, marks, needed, enough);
     }
 }
 
@@ -112,6 +118,10 @@ impl Pictures {
     }
 }
 
+/// The share of blocks in which chance may light as much of a code word as is asked for. There all marks are counted,
+/// a few hundred: in so few blocks that adds two to each, of at least sixteen.
+pub(super) const IN_VAIN: f64 = 0.01;
+
 /// Ticks that a machine word of a picture stands for.
 const PER_WORD: i64 = 64 * COARSE as i64;
 
@@ -127,27 +137,22 @@ impl Search {
     }
 
     /// The bits from bit `first` of the pictures on that may have `needed` marks.
-    fn bounded(&mut self, first: u32, needed: u32) -> [u64; WIDE] {
-        let marks = &self.places;
-        self.counts.count(&self.pictures.words, first, &marks.places, marks.farthest);
-        self.counts.at_least(needed)
+    fn bounded(&self, first: u32, needed: u32) -> [u64; WIDE] {
+        let mut enough = [0; WIDE];
+        self.places.find(&self.pictures, first, needed, &mut enough);
+        enough
     }
 
     /// Notes where `needed` marks of the code word may be, in so many `bits` of the pictures from bit
     /// `first` on, and tells whether they may be anywhere.
     fn note_words(&mut self, first: u32, bits: u32, needed: u32) -> bool {
-        self.words.clear();
-        let mut any = false;
-        for block in (first..first + bits).step_by(BLOCK as usize) {
-            let marks = &self.word;
-            self.counts.count(&self.pictures.words, block, &marks.places, marks.farthest);
-            let noted = self.counts.at_least(needed);
-            any |= !is_dark(&noted);
-            self.words.extend(noted);
-        }
+        let blocks = bits.div_ceil(BLOCK as u32) as usize;
         // Blocks are read from anywhere.
-        self.words.extend([0; WIDE + 1]);
-        any
+        self.words.resize(WIDE * (blocks + 1) + 1, 0);
+        let (noted, behind) = self.words.split_at_mut(WIDE * blocks);
+        self.word.find(&self.pictures, first, needed, noted);
+        behind.fill(0);
+        noted.iter().any(|word| *word != 0)
     }
 }
 
@@ -180,24 +185,27 @@ impl Band<'_> {
         search.places.set(&self.marks, stride);
         let bits = sent.lit_bits(shot).len() as u32;
         let (lit, in_word) = (1.0 - (1.0 - density).powi(COARSE as i32), sent.in_word(shot));
-        let word_tells =
-            bits > 1 && least.div_ceil(bits) >= self.word_thresholds.least(in_word, lit);
-        search.word.set(&sent.bits(shot).marks, stride);
+        // Of a bit that has enough marks any so many have all but those that it may lack.
+        let lacking = in_word.saturating_sub(least.div_ceil(bits));
+        let tell = |marks: &u32| *marks >= lacking + self.word_thresholds.least(*marks, lit);
+        let few = (SIXTEEN as u32..in_word).step_by(SIXTEEN).chain([in_word]).find(tell);
+        let of_word = few.filter(|_| bits > 1).unwrap_or(0);
+        search.word.set(&sent.bits(shot).marks[..of_word as usize], stride);
         let bit_of = |lag: i64| (fired + lag - origin) / COARSE as i64;
         let mut best = None;
         let mut needed = least.max(1);
         for lags in lags {
             let (first, last) = (bit_of(lags.start), bit_of(lags.end - 1));
-            if word_tells {
+            if of_word > 0 {
                 let behind = last + 1 - first + sent.length() / COARSE as i64 + 1;
-                let in_one = needed.div_ceil(bits);
+                let in_one = (needed.div_ceil(bits) + of_word).saturating_sub(in_word);
                 if !self.search.note_words(first as u32, behind as u32, in_one) {
                     continue;
                 }
             }
             for block in (first..=last).step_by(BLOCK as usize) {
                 let mut hits = below(last + 1 - block, [u64::MAX; WIDE], true);
-                if word_tells {
+                if of_word > 0 {
                     // Eight lags are, so many ticks later, met by two neighbouring bits.
                     let (words, behind) = (&self.search.words, sent.bits_that_are(true, shot));
                     hits = and(hits, any_behind(words, (block - first) as usize, behind));

@@ -121,9 +121,13 @@ impl Band<'_> {
         // What comes from beyond must stand out, and is bright where it first does: to search for it in the
         // second pass, too, finds nothing more in the standard scenes and takes a twentieth of the time.
         let beyond = (pass == Pass::First).then(|| (closes.max(reach.start)..reach.end, false));
+        // Few lags may have as many marks as usual: where one has, no other need be looked at.
+        let usual = Some(self.usual.least(weight)).filter(|usual| *usual > least);
         let found = iter::once(within).chain(beyond).find_map(|(part, is_even)| {
-            let lags = self.leftover().lags(shot, part, least, is_even);
-            let (lag, _) = self.maximum(shot, Source::Residual, &lags, least)?;
+            let (lag, _) = usual.into_iter().chain([least]).find_map(|least| {
+                let lags = self.leftover().lags(shot, part.clone(), least, is_even);
+                self.maximum(shot, Source::Residual, &lags, least)
+            })?;
             self.climb(shot, lag, 1)
         });
         let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);

@@ -44,7 +44,7 @@ use crate::Ticks;
 use crate::code::Codebook;
 use crate::kernels::{Counts, NARROW};
 use crate::statistics::normal_quantile;
-use acquire::{Leftover, Search};
+use acquire::{IN_VAIN, Leftover, Search};
 use cancel::Cancelled;
 use measure::Photons;
 use pace::{Paced, Usual};
@@ -153,7 +153,7 @@ struct Band<'a> {
     once_thresholds: Thresholds,
     /// For both ends of a macropulse.
     end_thresholds: Thresholds,
-    /// For the places of a code word in the pictures that are told by one machine word.
+    /// For the places of a code word in the pictures that a block of lags is met by.
     word_thresholds: Thresholds,
     usual: Usual,
     /// The time of which all light is at hand.
@@ -174,9 +174,8 @@ struct Band<'a> {
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
     marks: Vec<u32>,
     marks_of: Option<usize>,
-    /// Where these are in the picture, and how many of them may be found.
+    /// Where these are in the picture.
     in_picture: Vec<u32>,
-    bounding: Counts<NARROW>,
     search: Search,
     photons: Photons,
     histogram: Histogram,
@@ -205,9 +204,10 @@ impl<'a> Band<'a> {
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
         let bits = sent.bits_of_payload() as f64;
         let (of_lags, of_bits) = ((lags, false_alarm), (bits, false_alarm));
-        let wanted =
-            [of_lags, of_bits, (1.0, BY_CHANCE), (1.0, AT_AN_END), (2.0 * 64.0 * bits, 0.5)]
-                .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
+        // Eight lags are met by two bits of each code word.
+        let of_words = (2.0 * acquire::BLOCK as f64 * bits, IN_VAIN);
+        let wanted = [of_lags, of_bits, (1.0, BY_CHANCE), (1.0, AT_AN_END), of_words]
+            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
         let mut remembered = memory.thresholds;
         let [mut thresholds, bit_thresholds, once_thresholds, end_thresholds, word_thresholds] =
             wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
@@ -266,7 +266,6 @@ impl<'a> Band<'a> {
             marks: Vec::new(),
             marks_of: None,
             in_picture: Vec::new(),
-            bounding: Counts::default(),
             search: memory.search,
             photons: memory.photons,
             histogram: Histogram::default(),

@@ -2,7 +2,7 @@
 
 use super::pace::LONGEST_PAUSE;
 use super::{Band, Detection};
-use crate::kernels::{COARSE, NARROW, and, is_dark, or, places_of};
+use crate::kernels::{COARSE, NARROW, and, is_dark, or, places_of, with_enough};
 
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
@@ -152,8 +152,9 @@ impl Band<'_> {
         self.in_picture.clear();
         self.in_picture.extend(self.marks.iter().map(|mark| mark / COARSE as u32));
         let farthest = self.in_picture.last().copied().unwrap_or(0);
-        self.bounding.count(picture, bit as u32, &self.in_picture, farthest);
-        (self.bounding.at_least(least), origin + COARSE as i64 * bit - fired)
+        let (mut enough, marks) = ([0; NARROW], (&*self.in_picture, farthest));
+        with_enough::<NARROW>(picture, bit as u32, marks, least, &mut enough);
+        (enough, origin + COARSE as i64 * bit - fired)
     }
 
     /// The best peak at which more marks of `shot` are found than at `detection`, some of its bits

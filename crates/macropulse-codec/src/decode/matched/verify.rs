@@ -146,9 +146,13 @@ impl Band<'_> {
         let (reach, mut most) = (self.sent.reach(), found.count);
         let mut lags = Vec::from_iter(is_alone.then_some(found.lag));
         for middle in middles.into_iter().skip(lags.len()) {
+            let enough = least.max(most.saturating_sub(twice));
+            if !self.may_have(shot, middle, enough) {
+                continue;
+            }
             let Some(best) = self.best_in_block(shot, middle) else { continue };
             most = most.max(best.count);
-            let as_many = self.counts.at_least(least.max(most.saturating_sub(twice)));
+            let as_many = self.counts.at_least(enough.max(most.saturating_sub(twice)));
             lags.extend(lit(as_many).map(|at| middle - BLOCK / 2 + at));
         }
         if lags == [found.lag] {
@@ -171,6 +175,13 @@ impl Band<'_> {
             self.cancel(shot, lag);
             self.found[shot] = Some(Detection { lag, count, is_sure: false, ..found });
         }
+    }
+
+    /// Whether there are as many ticks as so many `marks` of `shot` have where it may be in the block around `middle`.
+    fn may_have(&self, shot: usize, middle: i64, marks: u32) -> bool {
+        let first = self.sent.fired[shot] + middle - BLOCK / 2;
+        let (ticks, _) = self.field.ticks_about(&(first..first + BLOCK + self.sent.takes_up()));
+        ticks >= self.sent.ticks_of(shot, marks)
     }
 
     /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
