@@ -2,6 +2,7 @@
 
 use crate::design::{Design, Field};
 use crate::environment::Environment;
+use crate::kernels::photons_from;
 use crate::scene::{Finish, Hits};
 use crate::units::tof_from_range;
 
@@ -68,12 +69,21 @@ impl Link {
         self.photons_at_one_metre * reflectance * self.transmission(way) / (back * back)
     }
 
+    /// Adds to `photons` the mean photons detected per mark of what each ray of `hits` has met in a scene of
+    /// materials with these `finishes`.
+    pub(super) fn add_echoes(&self, finishes: &[Finish], hits: &Hits, photons: &mut Vec<f64>) {
+        let from = photons.len();
+        photons.extend((0..hits.shot.len()).map(|i| reflectance(finishes, hits, i)));
+        let (photons, ranges) = (&mut photons[from..], &hits.range);
+        if self.extinction == 0.0 && self.field.is_none() {
+            return photons_from(self.photons_at_one_metre, ranges, photons);
+        }
+        photons.iter_mut().zip(ranges).for_each(|(it, range)| *it = self.photons(*it, *range));
+    }
+
     /// Mean photons detected per mark of what ray `i` of `hits` has met in a scene of materials with these `finishes`.
-    #[inline]
     pub(super) fn echo(&self, finishes: &[Finish], hits: &Hits, i: usize) -> f64 {
-        let finish = &finishes[usize::from(hits.material[i])];
-        let reflectance = finish.backscatter(f64::from(hits.cosine[i]));
-        self.photons(reflectance * f64::from(hits.weight[i]), hits.range[i])
+        self.photons(reflectance(finishes, hits, i), hits.range[i])
     }
 
     /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which
@@ -87,6 +97,13 @@ impl Link {
         let light = self.photons_at_one_metre * reflectance * share;
         light * self.transmission(range).powi(2) / range.powi(2)
     }
+}
+
+/// Effective reflectance of what ray `i` of `hits` has met, of its share of the light.
+#[inline]
+fn reflectance(finishes: &[Finish], hits: &Hits, i: usize) -> f64 {
+    let finish = &finishes[usize::from(hits.material[i])];
+    finish.backscatter(f64::from(hits.cosine[i])) * f64::from(hits.weight[i])
 }
 
 /// Mean photons that a sensor detects per mark from white at one metre, in clear air.

@@ -111,7 +111,7 @@ pub fn echoes(
 ) {
     let delay_fs = tof_fs_from_ranges(&hits.range);
     let from = trains.photons.len();
-    trains.photons.extend((0..hits.shot.len()).map(|i| link.echo(finishes, hits, i)));
+    link.add_echoes(finishes, hits, &mut trains.photons);
     if let Some(speckled) = &speckled {
         let echoes = trains.photons[from..].iter_mut();
         echoes.zip(factors(speckled, log, hits)).for_each(|(photons, factor)| *photons *= factor);

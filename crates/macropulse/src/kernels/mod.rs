@@ -14,6 +14,7 @@
 mod beam;
 mod build;
 mod delay;
+mod link;
 mod merge;
 mod pack;
 mod packet;
@@ -35,6 +36,7 @@ mod words;
 
 pub(crate) use build::Built;
 pub(crate) use delay::Amounts;
+pub(crate) use link::photons_from;
 pub(crate) use merge::{PAD, merge};
 pub(crate) use pack::{distinct, keep_below};
 pub(crate) use packet::{Lanes, NONE, Packet, Waiting};
