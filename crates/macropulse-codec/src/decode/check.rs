@@ -1,5 +1,7 @@
 //! What a receiver must be given; all else is refused before it is looked at.
 
+use std::ops::Range;
+
 use super::{Coupling, Error, MOST_RETURNS, Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};
 use crate::code::Codebook;
 use crate::kernels::ascends;
@@ -22,7 +24,8 @@ const SLACK: i128 = 1 << 13;
 /// Ticks of a pulse that is sampled, at most: its filter is half as long.
 const LONGEST_PULSE: usize = 1 << 10;
 
-/// Refuses what cannot be decoded. All ticks are read once; nothing else is as long as they are.
+/// Refuses what cannot be decoded, but for ticks out of order where the receiver sees to it itself. All other ticks
+/// are read once; nothing else is as long as they are.
 pub(super) fn check(
     receiver: &Receiver,
     (codebook, log): (&Codebook, &ShotLog),
@@ -37,7 +40,7 @@ pub(super) fn check(
         Record::Samples(_) if receiver.kind != ReceiverKind::Sampled => {
             return Err(Error::Record { wants: "ticks", given: "samples" });
         }
-        Record::Ticks(ticks) => of_ticks(ticks)?,
+        Record::Ticks(ticks) => of_ticks(receiver, ticks)?,
         Record::Samples(samples) => of_samples(samples)?,
     }
     in_codebook(log, codebook)?;
@@ -175,7 +178,7 @@ fn of_log(log: &ShotLog) -> Result<(), Error> {
     Err(Error::ShotsDoNotAscend { shot: before + 1 })
 }
 
-fn of_ticks(ticks: &Ticks) -> Result<(), Error> {
+fn of_ticks(receiver: &Receiver, ticks: &Ticks) -> Result<(), Error> {
     let events = ticks.tick.len();
     let of_ticks = [("channel", ticks.channel.len()), ("amplitude", ticks.amplitude.len())];
     let is_uneven = |(_, length): &(_, usize)| *length != events && *length != 0;
@@ -188,21 +191,31 @@ fn of_ticks(ticks: &Ticks) -> Result<(), Error> {
         let (before, channel, place) = (channels[before], channels[before + 1], before + 1);
         return Err(Error::ChannelsDoNotAscend { place, channel, before });
     }
-    let mut begin = 0;
-    while begin < ticks.tick.len() {
-        let end = match channels.get(begin) {
-            Some(channel) => channels.partition_point(|other| other <= channel),
-            None => ticks.tick.len(),
+    if channels.is_empty() {
+        // The matched receiver sees to it as it goes: macropulses without a gap are in order.
+        return match receiver.kind {
+            ReceiverKind::Matched => Ok(()),
+            _ => in_order(&ticks.tick, 0..events),
         };
-        let of_channel = &ticks.tick[begin..end];
-        if !ascends(of_channel) {
-            let falls = of_channel.windows(2).position(|pair| pair[1] <= pair[0]).unwrap_or(0);
-            let (before, place) = (ticks.tick[begin + falls], begin + falls + 1);
-            return Err(Error::TicksDoNotAscend { place, tick: ticks.tick[place], before });
-        }
+    }
+    let mut begin = 0;
+    while begin < events {
+        let end = channels.partition_point(|other| *other <= channels[begin]);
+        in_order(&ticks.tick, begin..end)?;
         begin = end;
     }
     Ok(())
+}
+
+/// Refuses `ticks` of which those at some `places` do not ascend.
+pub(super) fn in_order(ticks: &[u32], places: Range<usize>) -> Result<(), Error> {
+    let (begin, some) = (places.start, &ticks[places]);
+    if ascends(some) {
+        return Ok(());
+    }
+    let falls = some.windows(2).position(|pair| pair[1] <= pair[0]).unwrap_or(0);
+    let (before, place) = (some[falls], begin + falls + 1);
+    Err(Error::TicksDoNotAscend { place, tick: ticks[place], before })
 }
 
 fn of_samples(samples: &Samples) -> Result<(), Error> {

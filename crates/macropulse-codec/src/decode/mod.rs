@@ -167,27 +167,33 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let record = record.into();
         check::check(self, (codebook, log), record)?;
-        Ok(match (record, &self.sampling) {
+        match (record, &self.sampling) {
             (Record::Ticks(ticks), _) => self.decode_checked(codebook, log, ticks),
             (Record::Samples(samples), Some(sampling)) if !samples.is_empty() => {
-                sampled::decode(self, codebook, (log, samples), sampling)
+                Ok(sampled::decode(self, codebook, (log, samples), sampling))
             }
-            (Record::Samples(_), _) => self.nothing_of(log.owned.len()),
-        })
+            (Record::Samples(_), _) => Ok(self.nothing_of(log.owned.len())),
+        }
     }
 
-    /// The returns, of what was checked.
-    fn decode_checked(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+    /// The returns, of what was checked but for the order of what the matched receiver is given.
+    fn decode_checked(
+        &self,
+        codebook: &Codebook,
+        log: &ShotLog,
+        ticks: &Ticks,
+    ) -> Result<Returns, Error> {
         if ticks.tick.is_empty() || log.is_empty() {
-            return self.nothing_of(log.owned.len());
+            check::in_order(&ticks.tick, 0..ticks.tick.len())?;
+            return Ok(self.nothing_of(log.owned.len()));
         }
         if self.kind != ReceiverKind::Direct && !ticks.channel.is_empty() {
             return self.decode_each_channel(codebook, log, ticks);
         }
-        match self.kind {
+        Ok(match self.kind {
             ReceiverKind::Direct => direct::decode(self, log, ticks),
             ReceiverKind::Sampled => self.nothing_of(log.owned.len()),
-            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks),
+            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks)?,
             ReceiverKind::Balanced => self.balance(codebook, log, ticks),
             ReceiverKind::Literal => {
                 bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
@@ -195,7 +201,7 @@ impl Receiver {
             ReceiverKind::Blind => {
                 bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::AnyBit))
             }
-        }
+        })
     }
 
     /// What comes of so many owned shots where it is dark. A receiver that goes from tick to tick
@@ -209,7 +215,12 @@ impl Receiver {
     }
 
     /// The returns of a sensor whose shots do not all have the same detector.
-    fn decode_each_channel(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
+    fn decode_each_channel(
+        &self,
+        codebook: &Codebook,
+        log: &ShotLog,
+        ticks: &Ticks,
+    ) -> Result<Returns, Error> {
         let mut found: Vec<Return> = Vec::new();
         let mut returns = Returns::default();
         for (shots, log) in log.each_channel() {
@@ -222,14 +233,14 @@ impl Receiver {
                 channel: Vec::new(),
                 amplitude: ticks.amplitude.get(from..to).map(<[f32]>::to_vec).unwrap_or_default(),
             };
-            let of_channel = self.decode_checked(codebook, &log, &seen);
+            let of_channel = self.decode_checked(codebook, &log, &seen)?;
             found.extend(of_channel.each().map(|one| Return { shot: shots[one.shot], ..one }));
             returns.add_rejects(&of_channel);
         }
         // Stable: the returns of a shot stay in their order.
         found.sort_by_key(|one| one.shot);
         found.into_iter().for_each(|one| returns.push(one));
-        returns
+        Ok(returns)
     }
 
     /// The returns of the balanced receiver.

@@ -38,7 +38,7 @@ use super::field::{self, Field};
 use super::threshold::Thresholds;
 use super::timeline::Timeline;
 use super::timing::Histogram;
-use super::{GATES_PER_BLOCK, Receiver, Returns};
+use super::{Error, GATES_PER_BLOCK, Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -51,13 +51,20 @@ use pace::{Paced, Usual};
 use sent::{Sent, Words};
 
 /// Decodes one band.
-pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
+///
+/// # Errors
+/// If the ticks do not ascend.
+pub(super) fn decode(
+    receiver: &Receiver,
+    sent: (&Codebook, &ShotLog),
+    ticks: &Ticks,
+) -> Result<Returns, Error> {
     let mut memory = MEMORY.take();
     let sent = Sent::new(receiver, sent, (ticks.epoch, std::mem::take(&mut memory.words)));
-    let cancelled = cancel::cancel(&sent, &ticks.tick);
+    let cancelled = cancel::cancel(&sent, &ticks.tick)?;
     let (returns, memory) = Band::new(&sent, (&ticks.tick, cancelled), memory).decode();
     MEMORY.set(Memory { words: sent.words, ..memory });
-    returns
+    Ok(returns)
 }
 
 /// Surfaces that light of a shot may come from beside the one that is taken for its range.

@@ -169,7 +169,7 @@ impl Sensor {
     }
 
     fn decode(&self, receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Returns {
-        decode(receiver, (&self.book, log), ticks)
+        decode(receiver, (&self.book, log), ticks).unwrap()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Of macropulses without a gap all light is cancelled.
 
 use super::*;
+use crate::decode::Error;
 use crate::decode::matched::cancel::{CLUE, cancel};
 
 /// Ticks of a band begin while light of shots is under way that its log does not know.
@@ -12,7 +13,7 @@ fn clear_light_is_cancelled_whatever_was_sent_before() {
     let log = ShotLog { owned: 12..32, ..all.part(8..60) };
     let receiver = sensor.receiver(0.0);
     let sent = Sent::new(&receiver, (&sensor.book, &log), (ticks.epoch, Words::default()));
-    let left = |ticks: &[u32]| cancel(&sent, ticks).map(|cancelled| cancelled.residual);
+    let left = |ticks: &[u32]| cancel(&sent, ticks).unwrap().map(|cancelled| cancelled.residual);
     assert_eq!(left(&ticks.tick), Some(vec![]));
     // A tick more is left where owned light may be, and passed by before.
     let (before, among) = (ticks.tick[0] + 1, sent.fired[15] as u32 + 17);
@@ -57,10 +58,60 @@ fn a_macropulse_that_begins_under_another_one_is_cancelled() {
             continue;
         }
         cases += 1;
-        let cancelled = cancel(&sent, &ticks).unwrap();
+        let cancelled = cancel(&sent, &ticks).unwrap().unwrap();
         assert_eq!(cancelled.residual, [0; 0], "{case}");
         let found = cancelled.detections.iter().map(|found| found.map(|found| found.lag));
         assert_eq!(found.collect::<Vec<_>>(), lags.map(|lag| Some(i64::from(lag))), "{case}");
     }
     assert_eq!(cases, 98);
+}
+
+/// Three bands of 40 shots, on a wall, scattered, and with false ticks, in which one tick in five is as early as the
+/// one before it, earlier, first of all, or last: what is found in a row is not asked for its order, and must not
+/// hide one.
+#[test]
+fn a_tick_out_of_order_is_refused_wherever_it_is() {
+    let sensor = Sensor::crowded(codebook());
+    let (receiver, log) = (sensor.receiver(0.0), ShotLog { owned: 8..32, ..sensor.log(40) });
+    let fall = |ticks: &Ticks| match receiver.decode(&sensor.book, &log, ticks) {
+        Err(Error::TicksDoNotAscend { place, .. }) => Some(place),
+        other => other.map(|_| None).unwrap(),
+    };
+    for (roughness, false_ticks) in [(2, 0), (300, 0), (300, 1)] {
+        let weather = Weather { roughness, false_ticks, ..CLEAR };
+        let (ticks, _) = sensor.ticks(&log, weather, 5);
+        assert_eq!(fall(&ticks), None);
+        for place in (1..ticks.tick.len() - 1).step_by(5) {
+            let before = ticks.tick[place - 1];
+            for wrong in [before, before - 1, 0, u32::MAX] {
+                let mut ticks = ticks.clone();
+                ticks.tick[place] = wrong;
+                assert_eq!(fall(&ticks), Some(place + usize::from(wrong > before)));
+            }
+        }
+    }
+}
+
+/// Bands in which counting begins anew within the light of the last shots, wherever that is: farther from the first
+/// tick shots are refused.
+#[test]
+fn ticks_that_are_counted_beyond_the_end_are_out_of_order() {
+    let sensor = Sensor::crowded(codebook());
+    let (receiver, log) = (sensor.receiver(0.0), ShotLog { owned: 8..40, ..sensor.log(40) });
+    let (ticks, _) = sensor.ticks(&log, CLEAR, 5);
+    let fired = 39 * sensor.period;
+    let first = ticks.tick.partition_point(|tick| *tick < fired) + 1;
+    assert!(first + 40 < ticks.tick.len());
+    for place in first..ticks.tick.len() {
+        let later = u32::MAX - ticks.tick[place - 1];
+        let late = |tick: &u32| tick.wrapping_add(later);
+        let anew = Ticks {
+            epoch: -i64::from(later),
+            tick: ticks.tick.iter().map(late).collect(),
+            ..Ticks::default()
+        };
+        let refused = receiver.decode(&sensor.book, &log, &anew).unwrap_err();
+        let is_there = matches!(refused, Error::TicksDoNotAscend { place: at, .. } if at == place);
+        assert!(is_there, "{place}: {refused}");
+    }
 }
