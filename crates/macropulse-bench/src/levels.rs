@@ -1,14 +1,13 @@
 //! How fast processors without the widest instructions decode, as far as this one can tell: with fewer of
 //! its own.
 
-use std::hint::black_box;
 use std::process::Command;
 
 use macropulse::codec::level::{Level, VARIABLE};
 
 use crate::Fallible;
 use crate::goals;
-use crate::machine::{least_seconds, printed};
+use crate::machine::printed;
 use crate::page;
 use crate::sample::Sample;
 
@@ -20,9 +19,7 @@ const EVERY: usize = 24;
 pub fn speeds() -> Fallible<String> {
     let speed = |goal: goals::Decode| -> Fallible<String> {
         let sample = Sample::of(goal.condition.design()?, goal.scene, EVERY)?;
-        let given = sample.given();
-        let seconds = least_seconds(|| drop(black_box(sample.decode(&given))));
-        Ok(format!("{}\n", sample.speed(seconds)))
+        Ok(format!("{}\n", sample.speed(sample.decoding_seconds())))
     };
     goals::decoding().map(speed).collect()
 }

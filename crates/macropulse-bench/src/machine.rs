@@ -31,14 +31,24 @@ pub fn words() -> String {
 /// Seconds of this thread for `run`: the least of the rounds that add up to a second. What
 /// takes longer is run once.
 pub fn least_seconds(mut run: impl FnMut()) -> f64 {
+    least_of_rounds(|| seconds(&mut run))
+}
+
+/// The least of the seconds that `round` gives, of rounds that add up to a second.
+pub fn least_of_rounds(mut round: impl FnMut() -> f64) -> f64 {
     let (mut least, mut sum) = (f64::INFINITY, 0.0);
     while sum < 1.0 {
-        let began = thread_seconds();
-        run();
-        let seconds = thread_seconds() - began;
+        let seconds = round();
         (least, sum) = (seconds.min(least), sum + seconds);
     }
     least
+}
+
+/// Seconds of this thread for `run`.
+pub fn seconds(run: impl FnOnce()) -> f64 {
+    let began = thread_seconds();
+    run();
+    thread_seconds() - began
 }
 
 /// What a command prints, or why it failed.

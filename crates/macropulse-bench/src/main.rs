@@ -78,12 +78,13 @@ fn section(name: &str) -> Fallible<()> {
 
 /// Measures and writes all sections.
 fn everything() -> Fallible<()> {
-    let rays = rays::measure()?;
-    write("rays", &rays.text())?;
+    // Before what fills the memory of this process and leaves it in pieces.
     let generating = generate::measure()?;
     write("generate", &generating.text())?;
     let decoding = decode::measure()?;
     write("decode", &decoding.text())?;
+    let rays = rays::measure()?;
+    write("rays", &rays.text())?;
     section("levels")?;
     section("floor")?;
     let efforts = effort::measure()?;

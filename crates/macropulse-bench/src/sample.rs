@@ -1,6 +1,9 @@
 //! What is measured: bands spread over a scan of `kim-park-2016`, with what they meet and the
 //! ticks of it, under detectors of every quality.
 
+use std::hint::black_box;
+use std::slice;
+
 use macropulse::channel::{self, Operating, light_of_echoes};
 use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::{ShotLog, Ticks};
@@ -15,6 +18,7 @@ use macropulse::units;
 use rand::RngExt;
 
 use crate::Fallible;
+use crate::machine::{least_of_rounds, seconds};
 use crate::page;
 
 /// Seed of all that is drawn.
@@ -206,6 +210,20 @@ impl Sample {
     pub fn decode(&self, given: &[Given]) -> Result<Vec<Returns>, decode::Error> {
         let Design { receiver, coding, .. } = &self.design;
         given.iter().map(|(log, ticks)| receiver.decode(&coding.codebook, log, ticks)).collect()
+    }
+
+    /// The least seconds for that where each band is decoded as soon as its ticks are there, as in a whole scan: of
+    /// ticks made long ago a clean one takes longer, as they have to be fetched from memory.
+    pub fn decoding_seconds(&self) -> f64 {
+        let detectors = self.detectors();
+        least_of_rounds(|| {
+            let mut sum = 0.0;
+            self.ticks(&detectors, |memory, given| {
+                sum += seconds(|| drop(black_box(self.decode(slice::from_ref(&given)))));
+                memory.take_back(given.1.tick);
+            });
+            sum
+        })
     }
 
     /// How it did.
