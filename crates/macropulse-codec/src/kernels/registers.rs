@@ -53,7 +53,7 @@ macro_rules! counter {
         $store:ident, $cut:ident, $sum:ident, $carry:ident, $and:ident, $or:ident, $xor:ident
     ) => {
         /// Counts in one register, or `tells` where there are `least` marks in one after another. What it stores is
-        /// a plane every `stride` words of `out`; or one bit for each lag, in all of it.
+        /// a plane every `W` words of `out`; or one bit for each lag, in all of it.
         ///
         /// # Safety
         ///
@@ -62,13 +62,12 @@ macro_rules! counter {
         /// register. These must be fewer than 16 · 2^`HIGH`, and `out` must have as many more planes than [`LOW`],
         /// or whole registers.
         #[target_feature(enable = $features)]
-        unsafe fn $name<const HIGH: usize, const TELLS: bool>(
+        unsafe fn $name<const W: usize, const HIGH: usize, const TELLS: bool>(
             words: &[u64],
             first: u32,
             places: &[u32],
             least: u32,
             out: &mut [u64],
-            stride: usize,
         ) {
             let blocks = if TELLS { out.len() / $lanes } else { 1 };
             for block in 0..blocks {
@@ -149,7 +148,7 @@ macro_rules! counter {
                     // SAFETY: a block is as long as a register.
                     unsafe { $store(out.as_mut_ptr().add($lanes * block).cast(), all) };
                 } else {
-                    for (place, plane) in out.chunks_mut(stride).zip(planes) {
+                    for (place, plane) in out.chunks_mut(W).zip(planes) {
                         // SAFETY: a plane is as long as a register.
                         unsafe { $store(place.as_mut_ptr().cast(), plane) };
                     }
@@ -176,8 +175,8 @@ mod avx512 {
     ) {
         // SAFETY: the caller answers for it.
         match W {
-            NARROW => unsafe { narrow::<HIGH, false>(words, first, places, 0, planes, W) },
-            _ => unsafe { wide::<HIGH, false>(words, first, places, 0, planes, W) },
+            NARROW => unsafe { narrow::<W, HIGH, false>(words, first, places, 0, planes) },
+            _ => unsafe { wide::<W, HIGH, false>(words, first, places, 0, planes) },
         }
     }
 
@@ -194,8 +193,8 @@ mod avx512 {
     ) {
         // SAFETY: the caller answers for it.
         match W {
-            NARROW => unsafe { narrow::<HIGH, true>(words, first, places, least, enough, W) },
-            _ => unsafe { wide::<HIGH, true>(words, first, places, least, enough, W) },
+            NARROW => unsafe { narrow::<W, HIGH, true>(words, first, places, least, enough) },
+            _ => unsafe { wide::<W, HIGH, true>(words, first, places, least, enough) },
         }
     }
 
@@ -301,7 +300,7 @@ mod avx2 {
         for half in (0..W).step_by(NARROW) {
             // SAFETY: the caller answers for it.
             unsafe {
-                narrow::<HIGH, false>(&words[half..], first, places, 0, &mut planes[half..], W);
+                narrow::<W, HIGH, false>(&words[half..], first, places, 0, &mut planes[half..]);
             }
         }
     }
@@ -318,7 +317,7 @@ mod avx2 {
         enough: &mut [u64],
     ) {
         // SAFETY: the caller answers for it.
-        unsafe { narrow::<HIGH, true>(words, first, places, least, enough, NARROW) }
+        unsafe { narrow::<NARROW, HIGH, true>(words, first, places, least, enough) }
     }
 
     /// Bits to shift by to the right where a block begins so many bits behind the beginning of a byte, and
