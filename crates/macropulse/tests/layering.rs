@@ -135,7 +135,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "channel",
-            may_name: &["design", "emit", "environment", "random", "scene", "units"],
+            may_name: &["design", "emit", "environment", "kernels", "random", "scene", "units"],
             because: "light arrives whether or not it is detected; how bright, speckle makes random",
         },
         Rule {
