@@ -117,7 +117,7 @@ pub(crate) fn with_enough<const W: usize>(
     if let Some(tell) = registers::enough::<W>(planes_for(places.len()))
         && words.len() < 1 << 26
     {
-        // SAFETY: as where they are counted.
+        // SAFETY: as in `count`; and the words reach to the end of the last block of `enough`, and one farther.
         return unsafe { tell(words, first, places, least, enough) };
     }
     let mut counts = Counts::<W>::default();

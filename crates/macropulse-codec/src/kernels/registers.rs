@@ -52,8 +52,8 @@ macro_rules! counter {
         $features:literal, $name:ident, $lanes:ident, $dark:ident, $lit:ident,
         $store:ident, $cut:ident, $sum:ident, $carry:ident, $and:ident, $or:ident, $xor:ident
     ) => {
-        /// Counts in one register, or `tells` where there are `least` marks in one after another. What it stores is
-        /// a plane every `W` words of `out`; or one bit for each lag, in all of it.
+        /// Counts the marks for the lags of one register, and puts a plane of the counts into every `W`th word of `out`
+        /// and those behind it. Or it `TELLS` for as many lags as `out` has bits whether there are `least` marks.
         ///
         /// # Safety
         ///

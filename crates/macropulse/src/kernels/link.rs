@@ -3,9 +3,8 @@
 use macropulse_codec::on_every_level;
 
 on_every_level! {
-    /// Makes of each of `photons`, which is an effective reflectance, the photons from a target at one of the
-    /// `ranges`, m, of so many that one of reflectance 1 gives `at_one_metre`: N = N₁·ρ/R², none where either is not
-    /// positive.
+    /// Turns the effective reflectances that `photons` holds into mean photons per mark, N = N₁·ρ/R²: N₁ are those
+    /// `at_one_metre` from a target of reflectance 1, R are the `ranges`, m. None come where ρ or R is not positive.
     pub(crate) fn photons_from(at_one_metre: f64, ranges: &[f64], photons: &mut [f64]) {
         let count = ranges.len().min(photons.len());
         let (ranges, photons) = (&ranges[..count], &mut photons[..count]);
