@@ -15,6 +15,10 @@ pub(super) struct Timeline {
     words: Vec<u64>,
 }
 
+/// Machine words that are asked one after another for something lit, before many are at once: where macropulses
+/// overlap it is mostly there.
+const NEAR: usize = 4;
+
 impl Timeline {
     /// The tick of the first bit.
     pub fn origin(&self) -> i64 {
@@ -92,7 +96,10 @@ impl Timeline {
         let (word, end) = ((first / 64) as usize, (last as usize).div_ceil(64));
         let words = &self.words[word..end];
         let head = words[0] & u64::MAX << (first & 63);
-        let lit = if head == 0 { 1 + dark_before(&words[1..]) } else { 0 };
+        let (near, far) = words[1..].split_at(NEAR.min(words.len() - 1));
+        let is_lit = |word: &u64| *word != 0;
+        let dark = || near.iter().position(is_lit).unwrap_or_else(|| near.len() + dark_before(far));
+        let lit = if head == 0 { 1 + dark() } else { 0 };
         let bits = if lit == 0 { head } else { *words.get(lit)? };
         let bit = 64 * (word + lit) as i64 + i64::from(bits.trailing_zeros());
         (bit < last).then_some(self.origin + bit)
@@ -143,6 +150,9 @@ impl Timeline {
     /// The bit of `tick`, modulo 2⁶⁴, and those so many ticks `after` it, ascending, that are not before all.
     fn begun<'b>(&self, tick: i64, after: &'b [u32]) -> (usize, &'b [u32]) {
         let first = tick - self.origin;
+        if first >= 0 {
+            return (first as usize, after);
+        }
         let before = after.partition_point(|after| first + i64::from(*after) < 0);
         (first as usize, &after[before..])
     }

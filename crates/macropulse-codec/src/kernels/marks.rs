@@ -30,17 +30,16 @@ impl WordTicks {
 }
 
 on_every_level! {
-    /// Makes `places` the marks of `word`, begun at `scale` · bit for each of `bits`.
-    pub(crate) fn places_of(word: &WordTicks, bits: &[u32], scale: u32, places: &mut Vec<u32>) {
+    /// Makes `places` the marks of `word`, begun at each of `bits`.
+    pub(crate) fn places_of(word: &WordTicks, bits: &[u32], places: &mut Vec<u32>) {
         // The filling of a word is written over by the next one.
         let all = bits.len() * word.marks;
         places.resize(all + word.ticks.len(), 0);
         let mut rest = &mut places[..];
         let (blocks, _) = word.ticks.as_chunks::<LANES>();
-        for &bit in bits {
-            let begin = scale * bit;
+        for bit in bits {
             for (block, marks) in rest.as_chunks_mut::<LANES>().0.iter_mut().zip(blocks) {
-                *block = marks.map(|mark| begin + mark);
+                *block = marks.map(|mark| bit + mark);
             }
             rest = &mut rest[word.marks..];
         }
@@ -48,36 +47,34 @@ on_every_level! {
     }
 }
 
-/// Whether the first ticks are the marks of `word`, begun at `begun.0 + begun.1 · bit` for
-/// each of `bits`, with no tick between them. `false` where there are too few ticks.
-pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], begun: (u32, u32)) -> bool {
+/// Whether the first ticks are the marks of `word`, begun so many ticks behind `start` as each of `bits`
+/// tells, with no tick between them. `false` where there are too few ticks.
+pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], start: u32) -> bool {
     let marks = &word.ticks[..word.marks];
     let Some(ticks) = ticks.get(..bits.len() * marks.len()) else { return false };
-    let (start, scale) = begun;
     // Where another macropulse lies over it this tells.
-    let last = bits.last().zip(marks.last());
-    let last =
-        last.map(|(bit, mark)| start.wrapping_add(scale.wrapping_mul(*bit)).wrapping_add(*mark));
-    if ticks.last().copied() != last {
+    let (Some(tick), Some(bit), Some(mark)) = (ticks.last(), bits.last(), marks.last()) else {
+        return true;
+    };
+    if *tick != start.wrapping_add(*bit).wrapping_add(*mark) {
         return false;
     }
     match Level::here() {
         // SAFETY: the processor has what this level asks for, and there are as many ticks as marks.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { avx512::are_marks(ticks, marks, bits, begun) },
+        Level::Avx512 => unsafe { avx512::are_marks(ticks, marks, bits, start) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => unsafe { avx2::are_marks(ticks, marks, bits, begun) },
-        _ => are_marks(ticks, marks, bits, begun),
+        Level::Avx2 => unsafe { avx2::are_marks(ticks, marks, bits, start) },
+        _ => are_marks(ticks, marks, bits, start),
     }
 }
 
 on_every_level! {
     /// The same of as many ticks as there are marks.
-    fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], begun: (u32, u32)) -> bool {
-        let (start, scale) = begun;
+    fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], start: u32) -> bool {
         bits.iter().zip(ticks.chunks_exact(marks.len().max(1))).all(|(bit, ticks)| {
-            let begin = start.wrapping_add(scale.wrapping_mul(*bit));
+            let begin = start.wrapping_add(*bit);
             let pairs = ticks.iter().zip(marks);
             pairs.fold(0, |wrong, (tick, mark)| wrong | tick ^ begin.wrapping_add(*mark)) == 0
         })
@@ -97,18 +94,13 @@ mod avx2 {
     ///
     /// The processor must have AVX2, and there must be as many `ticks` as marks in all bits.
     #[target_feature(enable = "avx2")]
-    pub(super) unsafe fn are_marks(
-        ticks: &[u32],
-        marks: &[u32],
-        bits: &[u32],
-        (start, scale): (u32, u32),
-    ) -> bool {
+    pub(super) unsafe fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], start: u32) -> bool {
         let Some(last) = marks.len().checked_sub(HALF) else {
-            return super::are_marks(ticks, marks, bits, (start, scale));
+            return super::are_marks(ticks, marks, bits, start);
         };
         let mut wrong = _mm256_setzero_si256();
         for (index, bit) in bits.iter().enumerate() {
-            let begin = _mm256_set1_epi32(start.wrapping_add(scale.wrapping_mul(*bit)) as i32);
+            let begin = _mm256_set1_epi32(start.wrapping_add(*bit) as i32);
             let mut first = 0;
             // The last marks are compared together with some of those before them.
             while first < marks.len() {
@@ -148,12 +140,7 @@ mod avx512 {
     ///
     /// The processor must have AVX-512 F, and there must be as many `ticks` as marks in all bits.
     #[target_feature(enable = "avx512f")]
-    pub(super) unsafe fn are_marks(
-        ticks: &[u32],
-        marks: &[u32],
-        bits: &[u32],
-        (start, scale): (u32, u32),
-    ) -> bool {
+    pub(super) unsafe fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], start: u32) -> bool {
         let start = _mm512_set1_epi32(start as i32);
         for (pass, of_pass) in marks.chunks(BLOCKS * LANES).enumerate() {
             let used: [__mmask16; BLOCKS] = std::array::from_fn(|block| {
@@ -167,7 +154,7 @@ mod avx512 {
             });
             let mut wrong = [_mm512_setzero_si512(); BLOCKS];
             for (index, bit) in bits.iter().enumerate() {
-                let begin = _mm512_set1_epi32(scale.wrapping_mul(*bit) as i32);
+                let begin = _mm512_set1_epi32(*bit as i32);
                 let of_bit =
                     ticks.as_ptr().wrapping_add(index * marks.len() + pass * BLOCKS * LANES);
                 for block in 0..BLOCKS {
@@ -212,9 +199,10 @@ mod tests {
             more in 0..20_u32,
         ) {
             let marks: Vec<u16> = marks.into_iter().collect();
-            let bits: Vec<u32> = bits.into_iter().map(|bit| 500 * bit).collect();
-            let all = bits.iter().flat_map(|bit| marks.iter().map(move |m| bit + u32::from(*m)));
-            let mut ticks: Vec<u32> = all.map(|chip| start + scale * chip).collect();
+            let bits: Vec<u32> = bits.into_iter().map(|bit| 500 * scale * bit).collect();
+            let expected: Vec<u32> =
+                bits.iter().flat_map(|bit| marks.iter().map(move |m| bit + scale * u32::from(*m))).collect();
+            let mut ticks: Vec<u32> = expected.iter().map(|tick| start + tick).collect();
             if let Some((place, by)) = wrong {
                 let place = (place * ticks.len() as f64) as usize;
                 ticks[place] += by;
@@ -222,21 +210,19 @@ mod tests {
             let last = ticks[ticks.len() - 1];
             ticks.extend((0..more).map(|tick| last + 7 * tick));
             let word = WordTicks::new(&marks, scale);
-            for (level, fits) in at_each_level(|| begin_with(&ticks, &word, &bits, (start, scale))) {
+            for (level, fits) in at_each_level(|| begin_with(&ticks, &word, &bits, start)) {
                 prop_assert_eq!(fits, wrong.is_none(), "{:?}", level);
             }
-            let expected: Vec<u32> =
-                bits.iter().flat_map(|bit| marks.iter().map(move |m| scale * (bit + u32::from(*m)))).collect();
             let places = at_each_level(|| {
                 let mut places = vec![7; more as usize];
-                places_of(&word, &bits, scale, &mut places);
+                places_of(&word, &bits, &mut places);
                 places
             });
             for (level, places) in places {
                 prop_assert_eq!(&places, &expected, "{:?}", level);
             }
             let few = &ticks[..marks.len() * bits.len() - 1];
-            prop_assert!(!begin_with(few, &word, &bits, (start, scale)));
+            prop_assert!(!begin_with(few, &word, &bits, start));
         }
     }
 }

@@ -207,7 +207,7 @@ impl Band<'_> {
                 let mut hits = below(last + 1 - block, [u64::MAX; WIDE], true);
                 if of_word > 0 {
                     // Eight lags are, so many ticks later, met by two neighbouring bits.
-                    let (words, behind) = (&self.search.words, sent.bits_that_are(true, shot));
+                    let (words, behind) = (&self.search.words, sent.lit_bits(shot));
                     hits = and(hits, any_behind(words, (block - first) as usize, behind));
                 }
                 if is_dark(&hits) {

@@ -35,35 +35,64 @@ use crate::kernels::{begin_with, lit_after};
 const PATIENCE: (usize, usize) = (16, 2);
 
 /// Ticks that are asked for their order at once where some are laid down: read one after another they are at hand then.
-/// With a sixteenth of these clean random ranges take 2 % longer, others as long.
-const AT_ONCE: usize = 4096;
+/// With four times as many a clean `street`, where few are, takes 1.5 % longer, with half of them as long; with a
+/// quarter clean random ranges take 2 % longer.
+const AT_ONCE: usize = 1024;
+
+/// The lag of a shot that was not found.
+pub(super) const NOWHERE: i64 = i64::MIN;
 
 /// What was found without a gap, and the residual.
 #[derive(Debug, Default)]
 pub(super) struct Cancelled {
-    /// The lag of each shot that was found.
-    pub detections: Vec<Option<Detection>>,
+    /// The lag at which each shot was found, or [`NOWHERE`].
+    pub lags: Vec<i64>,
     /// Shots that were found once more, behind their first lag, and where.
-    pub again: Vec<(usize, Detection)>,
+    pub again: Vec<(usize, i64)>,
     /// Ticks that are not cancelled, in order.
     pub residual: Vec<u32>,
 }
 
-/// Cancels the complete macropulses of the shots `sent` in `ticks`; `None` where that was given up.
+impl Cancelled {
+    /// Whether that is all light, and of one surface of each shot at most.
+    pub fn is_clear(&self) -> bool {
+        self.again.is_empty() && self.residual.is_empty()
+    }
+
+    /// The same of each shot, and of those that were found once more, as the steps that follow have it.
+    pub fn detections(&self, sent: &Sent) -> (Vec<Option<Detection>>, Vec<(usize, Detection)>) {
+        let at = |shot: usize, lag: i64| {
+            let (count, margin) = (sent.weight(shot), sent.complete_margin(shot));
+            Detection { lag, count, margin, stands_out: true, is_sure: true }
+        };
+        let lags = self.lags.iter().enumerate();
+        (
+            lags.map(|(shot, lag)| (*lag != NOWHERE).then(|| at(shot, *lag))).collect(),
+            self.again.iter().map(|(shot, lag)| (*shot, at(*shot, *lag))).collect(),
+        )
+    }
+}
+
+/// Cancels the complete macropulses of the shots `sent` in `ticks`; `None` where that was given up. Of the timelines
+/// only the memory is used.
 ///
 /// What is found in a row ascends. Other ticks are held against those before them, so that all are when this is
 /// done.
 ///
 /// # Errors
 /// If the ticks do not ascend.
-pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Result<Option<Cancelled>, Error> {
+pub(super) fn cancel(
+    sent: &Sent,
+    ticks: &[u32],
+    [seen, residual]: &mut [Timeline; 2],
+) -> Result<Option<Cancelled>, Error> {
     let owned = owned_light(sent);
     let mut place = begin(ticks, owned.start, sent.length())?;
     let mut canceller = Canceller {
         sent,
         ticks,
         least: fewest_without_a_gap(sent, ticks),
-        detections: vec![None; sent.fired.len()],
+        lags: vec![NOWHERE; sent.fired.len()],
         again: Vec::new(),
         left: Vec::new(),
         // Marks that jitter are not where they should be.
@@ -73,9 +102,10 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Result<Option<Cancelled>, Er
         // None: where all shots have one word, light of any would pass for that of the first.
         next: sent.fired.len(),
         owned,
+        gaps_of: 0..0,
         gaps: Default::default(),
-        seen: Timeline::default(),
-        residual: Timeline::default(),
+        seen,
+        residual,
         in_order_to: 0,
     };
     let end = ticks.partition_point(|tick| i64::from(*tick) < canceller.owned.end);
@@ -94,8 +124,8 @@ pub(super) fn cancel(sent: &Sent, ticks: &[u32]) -> Result<Option<Cancelled>, Er
         // done.
         return Ok(None);
     }
-    let Canceller { detections, again, left, .. } = canceller;
-    Ok(Some(Cancelled { detections, again, residual: left }))
+    let Canceller { lags, again, left, .. } = canceller;
+    Ok(Some(Cancelled { lags, again, residual: left }))
 }
 
 /// Marks that chance does not put there all together, at none of the lags of a gate: the least N
@@ -137,8 +167,8 @@ struct Canceller<'a> {
     /// Fewest marks with which a shot can be told from chance.
     least: u32,
     /// As [`Cancelled`] has them.
-    detections: Vec<Option<Detection>>,
-    again: Vec<(usize, Detection)>,
+    lags: Vec<i64>,
+    again: Vec<(usize, i64)>,
     /// Ticks of which no macropulse without a gap can begin, in order.
     left: Vec<u32>,
     patience: usize,
@@ -151,11 +181,12 @@ struct Canceller<'a> {
     end: usize,
     /// The shot after the last one found.
     next: usize,
-    /// Of each shot, the ticks from each of its first marks to the next one, or 64 where these are more.
+    /// Of each of these shots, the ticks from each of its first marks to the next one, or 64 where these are more.
+    gaps_of: Range<usize>,
     gaps: [Vec<u8>; FIRST],
     /// The ticks where macropulses overlap, and those of them that are not cancelled.
-    seen: Timeline,
-    residual: Timeline,
+    seen: &'a mut Timeline,
+    residual: &'a mut Timeline,
     /// The ticks before this place ascend, from those on that are laid down.
     in_order_to: usize,
 }
@@ -189,12 +220,11 @@ impl Canceller<'_> {
         let tick = i64::from(self.ticks[place]);
         let Some(start) = self.start(shot, tick, (0, &lags)) else { return 0 };
         let (word, bits) = (self.sent.word(shot), self.sent.lit_bits(shot));
-        let scale = self.sent.receiver.ticks_per_chip;
         // One that reaches beyond what is counted has marks that seem to come first.
         if start + self.sent.length() > i64::from(u32::MAX) {
             return 0;
         }
-        if !begin_with(&self.ticks[place..], word, bits, (start as u32, scale)) {
+        if !begin_with(&self.ticks[place..], word, bits, start as u32) {
             return 0;
         }
         self.keep(shot, start);
@@ -203,6 +233,7 @@ impl Canceller<'_> {
 
     /// The tick in which the macropulse of `shot` begins if `tick` is its first mark but for those
     /// `hidden`, comes after one of the `lags`, and could be told from chance.
+    #[inline(always)]
     fn start(&self, shot: usize, tick: i64, (hidden, lags): (usize, &Range<i64>)) -> Option<i64> {
         let sent = self.sent;
         let fired = sent.fired.get(shot)?;
@@ -232,13 +263,12 @@ impl Canceller<'_> {
     fn woven(&mut self, place: usize) -> Result<usize, Error> {
         let (sent, ticks) = (self.sent, self.ticks);
         let first = i64::from(ticks[place]);
-        self.know_gaps();
         // Macropulses may have begun under one that was cancelled.
         let begin = (first - sent.bit_length()).div_euclid(64) * 64;
         let before = ticks[..place].iter().rev().take_while(|tick| i64::from(**tick) >= begin);
         let mut laid = place - before.count();
         let room = ROOM * sent.length().max(64) + 128;
-        for timeline in [&mut self.seen, &mut self.residual] {
+        for timeline in [&mut *self.seen, &mut *self.residual] {
             timeline.begin(begin, room);
         }
         let (mut end, mut last, mut tick) = (begin, first, first);
@@ -251,7 +281,7 @@ impl Canceller<'_> {
                     self.seen.slide(origin);
                     self.residual.slide(origin);
                 }
-                let to = (reach + sent.length() + 63).div_euclid(64) * 64;
+                let to = (reach + sent.length() / MORE + 63).div_euclid(64) * 64;
                 let to = to.min(self.seen.end());
                 self.in_order(laid, to)?;
                 let known = &ticks[laid..self.in_order_to];
@@ -309,29 +339,35 @@ impl Canceller<'_> {
         Ok(())
     }
 
-    /// Looks up the gaps of all shots, once.
-    fn know_gaps(&mut self) {
-        let sent = self.sent;
-        for (hidden, gaps) in self.gaps.iter_mut().enumerate() {
-            let shots = gaps.len()..sent.fired.len();
-            let gap = |shot: usize| sent.first_marks(shot)[hidden].gap.min(64) as u8;
-            gaps.extend(shots.map(gap));
+    /// Has the gaps of the `shots` at hand, none of which is before those asked for last.
+    fn know_gaps(&mut self, shots: &Range<usize>) {
+        if shots.start >= self.gaps_of.end {
+            self.gaps_of = shots.start..shots.start;
+            self.gaps.iter_mut().for_each(Vec::clear);
         }
+        let (sent, more) = (self.sent, self.gaps_of.end..shots.end);
+        for (hidden, gaps) in self.gaps.iter_mut().enumerate() {
+            let gap = |shot: usize| sent.first_marks(shot)[hidden].gap.min(64) as u8;
+            gaps.extend(more.clone().map(gap));
+        }
+        self.gaps_of.end = self.gaps_of.end.max(shots.end);
     }
 
     /// Finds the shot of which `tick` is the first mark that is not cancelled, cancels its marks, and
     /// tells when its light ends.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
         let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
+        self.know_gaps(&in_flight);
         // Of ticks that may belong to no known shot only what is likely is asked.
         let (parts, most_hidden) = if self.owned.contains(&tick) { (2, FIRST) } else { (1, 1) };
-        let next = self.next..self.detections.len().min(self.next + 1);
         for lags in self.nearest_first().into_iter().take(parts) {
             for hidden in 0..most_hidden {
-                for shots in [next.clone(), in_flight.clone()] {
-                    if let Some(found) = self.first_of(shots, (tick, ahead), (hidden, &lags)) {
-                        return Some(found);
-                    }
+                let wanted = (hidden, &lags);
+                let found = self.found_at(self.next, tick, wanted);
+                let found =
+                    found.or_else(|| self.first_of(in_flight.clone(), (tick, ahead), wanted));
+                if found.is_some() {
+                    return found;
                 }
             }
         }
@@ -348,18 +384,15 @@ impl Canceller<'_> {
     ) -> Option<i64> {
         for from in shots.clone().step_by(64) {
             // Nearly every shot is refused here: its second mark is not there.
-            let gaps = &self.gaps[hidden][from..shots.end.min(from + 64)];
-            let mut may_be = lit_after(gaps, ahead);
+            let known = self.gaps_of.start;
+            let gaps = from - known..shots.end.min(from + 64) - known;
+            let mut may_be = lit_after(&self.gaps[hidden][gaps], ahead);
             while may_be != 0 {
                 let shot = from + may_be.trailing_zeros() as usize;
                 may_be &= may_be - 1;
-                let gap = self.sent.first_marks(shot)[hidden].gap;
-                if gap >= 64 && !self.seen.has(tick + i64::from(gap)) {
-                    continue;
-                }
-                if let Some(start) = self.fits(shot, tick, (hidden, lags)) {
-                    self.keep(shot, start);
-                    return Some(start + self.sent.length());
+                let found = self.found_at(shot, tick, (hidden, lags));
+                if found.is_some() {
+                    return found;
                 }
             }
         }
@@ -379,8 +412,7 @@ impl Canceller<'_> {
         let mut in_flight = self.in_flight(tick).filter(|shot| sent.weight(*shot) >= self.least);
         let (shot, start) =
             in_flight.find_map(|shot| Some((shot, self.start_of_any(shot, tick)?)))?;
-        let (Bits { marks, pattern, .. }, lit_bits) =
-            (sent.bits(shot), sent.bits_that_are(true, shot));
+        let (Bits { marks, pattern, .. }, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
         self.residual.put_out(start, lit_bits, pattern);
         let is_mark = |after: i64| {
             let in_bit = lit_bits.iter().map(|bit| after - i64::from(*bit));
@@ -393,7 +425,7 @@ impl Canceller<'_> {
 
     /// Where the macropulse of `shot` begins earliest, if all its marks are there and `tick` is any of them.
     fn start_of_any(&self, shot: usize, tick: i64) -> Option<i64> {
-        let (sent, lit_bits) = (self.sent, self.sent.bits_that_are(true, shot));
+        let (sent, lit_bits) = (self.sent, self.sent.lit_bits(shot));
         let Bits { marks, pattern, .. } = sent.bits(shot);
         let lags = sent.gate().start..sent.reach().end;
         let next = marks.iter().skip(1).chain(marks.last());
@@ -409,33 +441,35 @@ impl Canceller<'_> {
             .min()
     }
 
-    /// Where the macropulse of `shot` begins, if all its marks are there and `tick` is the first of them
-    /// that is not `hidden`; they are cancelled then.
-    fn fits(
+    /// Finds `shot` as [`Self::shot_at`] does, with so many marks `hidden` and after one of the `lags`.
+    fn found_at(
         &mut self,
         shot: usize,
         tick: i64,
         (hidden, lags): (usize, &Range<i64>),
     ) -> Option<i64> {
-        let start = self.start(shot, tick, (hidden, lags))?;
-        let (lit_bits, pattern) =
-            (self.sent.bits_that_are(true, shot), &self.sent.bits(shot).pattern);
+        let (sent, start) = (self.sent, self.start(shot, tick, (hidden, lags))?);
+        if !self.seen.has(tick + i64::from(sent.first_marks(shot)[hidden].gap)) {
+            return None;
+        }
+        let (lit_bits, pattern) = (sent.lit_bits(shot), &sent.bits(shot).pattern);
         if !self.seen.are_lit(start, lit_bits, pattern) {
             return None;
         }
         self.residual.put_out(start, lit_bits, pattern);
-        Some(start)
+        self.keep(shot, start);
+        Some(start + sent.length())
     }
 
     /// Keeps `shot`, which begins at `start`: of several surfaces the first one counts, the others are
     /// found again.
+    #[inline]
     fn keep(&mut self, shot: usize, start: i64) {
-        let sent = self.sent;
-        let (lag, count) = (start - sent.fired[shot], sent.weight(shot));
-        let margin = count - sent.sidelobe(shot);
-        let detection = Detection { lag, count, margin, stands_out: true, is_sure: true };
-        if self.detections[shot].get_or_insert(detection).lag != lag {
-            self.again.push((shot, detection));
+        let (first, lag) = (&mut self.lags[shot], start - self.sent.fired[shot]);
+        if *first == NOWHERE {
+            *first = lag;
+        } else if *first != lag {
+            self.again.push((shot, lag));
         }
         self.next = shot + 1;
         self.patience += PATIENCE.1;
@@ -446,6 +480,10 @@ impl Canceller<'_> {
 /// a `street` takes as long, clean and with 10⁷ dark counts a second; with 2 this takes a sixth longer, with 1
 /// twice as long; without it a clean one takes a third longer, as some macropulses of each pane begin under others.
 pub(super) const CLUE: usize = 8;
+
+/// Where macropulses overlap ticks are laid down as far as one reaches, and as far again as this part of one. With a
+/// whole one a clean `street` takes 1 % longer, as many overlap with one other alone; with a tenth as long.
+const MORE: i64 = 4;
 
 /// Macropulses that fit into the stretch of time that is laid down where they overlap: it is moved on
 /// as often as light comes, and 16 of the longest word take 32 MB.

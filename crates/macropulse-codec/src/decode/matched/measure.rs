@@ -1,8 +1,10 @@
 //! Measurement: the time of a return, and its energy.
 
+use super::cancel::NOWHERE;
+use super::sent::Sent;
 use super::{Band, Detection};
 use crate::decode::timing::{self, Known};
-use crate::decode::{Energy, MIDDLE, Return, Window};
+use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Window};
 
 impl Band<'_> {
     /// What is measured of `shot` at `detection`.
@@ -41,7 +43,7 @@ impl Band<'_> {
             return MIDDLE;
         }
         let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
-        let lit_bits = sent.bits_that_are(true, shot);
+        let lit_bits = sent.lit_bits(shot);
         let count =
             |place: i64| self.field.seen().lit_in_all(light.start + place, lit_bits, &bits.pattern);
         self.histogram.count(sent.width, sent.receiver.jitter(), count);
@@ -56,6 +58,49 @@ impl Band<'_> {
     }
 }
 
+impl Sent<'_> {
+    /// What becomes of all shots of a band if all light was cancelled, one surface of each at most, found after
+    /// these `lags`: nothing is to be asked of them but whether they lie in the gate.
+    pub(super) fn settle_clear(&self, lags: &[i64], photons: &mut Photons, returns: &mut Returns) {
+        let (gate, owned) = (self.gate(), self.log.owned.clone());
+        let mut clear = Vec::with_capacity(owned.len());
+        for (shot, lag) in owned.clone().zip(&lags[owned]) {
+            match *lag {
+                NOWHERE => returns.reject(Reject::NoPeak),
+                lag if gate.contains(&lag) => clear.push((shot as u32, lag)),
+                _ => returns.reject(Reject::OutsideGate),
+            }
+        }
+        self.measure_clear(&mut clear, photons, returns);
+    }
+
+    /// Drains shots found without a gap, and their lags, into returns behind those there are.
+    pub(super) fn measure_clear(
+        &self,
+        clear: &mut Vec<(u32, i64)>,
+        photons: &mut Photons,
+        returns: &mut Returns,
+    ) {
+        let (first, all) = (returns.len(), returns.len() + clear.len());
+        // Column by column: entry by entry takes twice as long.
+        returns.shot.extend(clear.iter().map(|(shot, _)| *shot));
+        let tof = self.receiver.tofs(MIDDLE);
+        returns.tof.extend(clear.drain(..).map(|(shot, lag)| {
+            let start = self.fired[shot as usize] + lag + self.epoch;
+            tof(self.log.fired_at_fs[shot as usize], start)
+        }));
+        let shots = returns.shot[first..].iter().map(|shot| *shot as usize);
+        returns.margin.extend(shots.clone().map(|shot| self.complete_margin(shot) as u16));
+        returns.peak.extend(shots.map(|shot| self.weight(shot) as u16));
+        returns.marks.extend_from_slice(&returns.peak[first..]);
+        let known = photons.up_to(returns.peak[first..].iter().copied().max().unwrap_or(0).into());
+        let energy = |marks: &u16| known[usize::from(*marks)].photons;
+        returns.photons.extend(returns.peak[first..].iter().map(energy));
+        returns.saturated.resize(all, true);
+        returns.number.resize(all, 1);
+    }
+}
+
 /// The energy of returns of which all marks were found, by their number: in clear weather a logarithm
 /// for each shot would take longer than the rest.
 #[derive(Debug, Default)]
@@ -64,10 +109,16 @@ pub(super) struct Photons {
 }
 
 impl Photons {
-    pub(super) fn of_all(&mut self, marks: u32) -> Energy {
+    /// That of so many marks.
+    fn of_all(&mut self, marks: u32) -> Energy {
+        self.up_to(marks)[marks as usize]
+    }
+
+    /// Those of no mark, one, and so on, to so many.
+    fn up_to(&mut self, marks: u32) -> &[Energy] {
         let known = self.all_found.len() as u32;
         self.all_found
             .extend((known..=marks).map(|marks| Energy::of((marks, marks), 0.0, Window::WHOLE)));
-        self.all_found[marks as usize]
+        &self.all_found
     }
 }

@@ -61,8 +61,15 @@ pub(super) fn decode(
 ) -> Result<Returns, Error> {
     let mut memory = MEMORY.take();
     let sent = Sent::new(receiver, sent, (ticks.epoch, std::mem::take(&mut memory.words)));
-    let cancelled = cancel::cancel(&sent, &ticks.tick)?;
-    let (returns, memory) = Band::new(&sent, (&ticks.tick, cancelled), memory).decode();
+    let mut returns = Returns::with_capacity(sent.log.owned.len());
+    let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.woven)?;
+    let memory = match cancelled {
+        Some(cancelled) if cancelled.is_clear() => {
+            sent.settle_clear(&cancelled.lags, &mut memory.photons, &mut returns);
+            memory
+        }
+        _ => Band::new(&sent, (&ticks.tick, cancelled), memory).decode(&mut returns),
+    };
     MEMORY.set(Memory { words: sent.words, ..memory });
     Ok(returns)
 }
@@ -99,6 +106,7 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     words: Words,
+    woven: [Timeline; 2],
     field: field::Memory,
     search: Search,
     thresholds: Vec<Thresholds>,
@@ -185,6 +193,8 @@ struct Band<'a> {
     in_picture: Vec<u32>,
     search: Search,
     photons: Photons,
+    /// Memory for the shots without a gap that are settled next, and their lags.
+    clear: Vec<(u32, i64)>,
     histogram: Histogram,
     /// Memory for the residual of a macropulse, for the marks found in each of its bits and in those about it,
     /// and for the places that others claim and its own.
@@ -226,7 +236,7 @@ impl<'a> Band<'a> {
             Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
             None => Open::All,
         };
-        let Cancelled { detections: mut found, again: further, .. } = cancelled.unwrap_or_default();
+        let (mut found, further) = cancelled.unwrap_or_default().detections(sent);
         found.resize(sent.fired.len(), None);
         let reach = sent.reach();
         let light = reach.end - reach.start + sent.length() + i64::from(sent.width);
@@ -275,24 +285,21 @@ impl<'a> Band<'a> {
             in_picture: Vec::new(),
             search: memory.search,
             photons: memory.photons,
+            clear: Vec::new(),
             histogram: Histogram::default(),
             residual: Timeline::default(),
             found_in_bits: Vec::new(),
             words: WordsAbout::default(),
-            places: Default::default(),
+            places: memory.woven,
             sent,
         }
     }
 
-    /// All steps for all shots; and the memory back.
-    fn decode(mut self) -> (Returns, Memory) {
-        let mut returns = Returns::with_capacity(self.sent.log.owned.len());
+    /// All steps for all shots, into `returns`; and the memory back.
+    fn decode(mut self, returns: &mut Returns) -> Memory {
         let (shots, mut first, mut settled) = (self.found.len(), 0, 0);
         if matches!(self.open, Open::None) {
-            match self.further.is_empty() {
-                true => self.settle_clear(&mut returns),
-                false => self.settle(0..shots, &mut returns),
-            }
+            self.settle(0..shots, returns);
             first = shots;
         }
         while first < shots {
@@ -315,10 +322,11 @@ impl<'a> Band<'a> {
                     self.look_for_leftovers(closed.clone(), first);
                 }
             }
-            self.settle(closed, &mut returns);
+            self.settle(closed, returns);
         }
-        let memory = Memory {
+        Memory {
             words: Words::default(),
+            woven: self.places,
             field: self.field.into_memory(),
             search: self.search,
             photons: self.photons,
@@ -329,8 +337,7 @@ impl<'a> Band<'a> {
                 self.end_thresholds,
                 self.word_thresholds,
             ],
-        };
-        (returns, memory)
+        }
     }
 
     /// Whether no macropulse of the time at hand can have as many ticks as the fewest that are believed.
@@ -401,7 +408,7 @@ impl<'a> Band<'a> {
     /// Cancels the ticks of `shot` at `lag`.
     fn cancel(&mut self, shot: usize, lag: i64) {
         let start = self.sent.fired[shot] + lag - self.sent.farther();
-        let lit_bits = self.sent.bits_that_are(true, shot);
+        let lit_bits = self.sent.lit_bits(shot);
         self.field.cancel(start, lit_bits, &self.sent.bits(shot).cancelled);
         if let Some(leftover) = &mut self.leftover {
             leftover.renew(&mut self.field, &self.sent.light(shot, lag));
@@ -469,7 +476,7 @@ impl<'a> Band<'a> {
         // A long pulse makes several ticks of a mark.
         let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
         let start = self.sent.fired[shot] + detection.lag - farther;
-        let own = self.field.seen().lit_in_all(start, self.sent.bits_that_are(true, shot), pattern);
+        let own = self.field.seen().lit_in_all(start, self.sent.lit_bits(shot), pattern);
         let density = self.density_about(shot, detection, own);
         self.thresholds.least(weight, density)
     }

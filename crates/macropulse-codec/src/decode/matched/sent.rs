@@ -50,56 +50,84 @@ pub(super) struct First {
     exists: bool,
 }
 
-/// The code words of a family, each made when it is first needed: one pixel of a flash has a single
-/// word; and the bits of each label.
+/// The code words of a family and the bits of all labels, in ticks. Kept from band to band: there are hundreds.
 #[derive(Default)]
 pub(super) struct Words {
     /// Of which family and labels, with so many ticks to a chip and places to a mark.
     of: Option<(Family, Option<Payload>, u32, u32, u32)>,
-    /// The first marks of each, in ticks, and from each of them to the next one; 0 where there is none.
-    first: Vec<[First; FIRST]>,
-    /// Ticks from the start of a macropulse to the first bit of it that is lit, by label; none where all
-    /// are dark.
-    first_bits: Vec<Option<u32>>,
-    /// In ticks.
-    ticks: Vec<OnceCell<WordTicks>>,
-    /// The same as bits, needed only where light is not clear.
-    bits: Vec<OnceCell<Bits>>,
-    /// Ticks from the start of a macropulse to each bit of it that is dark, and to each that is lit, by
-    /// label; as above.
-    of_label: Vec<OnceCell<[Vec<u32>; 2]>>,
-    /// Most marks of each that one tick may count for.
-    per_tick: Vec<u32>,
+    words: Vec<Word>,
+    labels: Vec<Label>,
+    /// Ticks from the start of a macropulse to each of its bits, label by label.
+    bits: Vec<u32>,
+}
+
+/// A code word.
+struct Word {
+    first: [First; FIRST],
+    /// How many marks it has.
+    marks: u32,
+    /// Most of them that one tick may count for.
+    per_tick: u32,
+    /// Its marks as ticks, and as bits, each made when it is first needed: one pixel of a flash has a single word,
+    /// and clear light needs no bits.
+    ticks: OnceCell<WordTicks>,
+    bits: OnceCell<Bits>,
+}
+
+impl Word {
+    /// A word with marks in these `chips`, `scale` ticks a chip, any of which lights `places` of them.
+    fn new(word: &CodeWord, scale: u32, places: u32) -> Self {
+        let marks = &word.marks;
+        let first = std::array::from_fn(|mark| {
+            let pair = marks.get(mark).zip(marks.get(mark + 1));
+            let gap = pair.map_or(0, |(mark, next)| scale * u32::from(next - mark));
+            let mark = marks.get(mark).map(|mark| scale * u32::from(*mark));
+            First { mark: mark.unwrap_or(0), gap, exists: mark.is_some() }
+        });
+        let per_tick = crowding(word, places);
+        let (ticks, bits) = (OnceCell::new(), OnceCell::new());
+        Self { first, marks: marks.len() as u32, per_tick, ticks, bits }
+    }
+}
+
+/// Which of the bits of [`Words`] are those of a label: the lit ones, and behind them the dark ones.
+struct Label {
+    lit: u32,
+    dark: u32,
+    end: u32,
 }
 
 impl Words {
-    /// Makes them those of the `codebook`. Kept from band to band: there are hundreds.
-    fn of(mut self, codebook: &Codebook, scale: u32, width: u32) -> Self {
+    /// Makes them those of the `codebook`.
+    fn of(self, codebook: &Codebook, scale: u32, width: u32) -> Self {
         let (payload, labels) = (codebook.payload().copied(), codebook.labels());
         let of = Some((codebook.family().clone(), payload, labels, scale, width));
-        if self.of != of {
-            let words = codebook.words();
-            let first = (0..words).map(|word| {
-                let marks = &codebook.word(word as u16).marks;
-                std::array::from_fn(|mark| {
-                    let pair = marks.get(mark).zip(marks.get(mark + 1));
-                    let gap = pair.map_or(0, |(mark, next)| scale * u32::from(next - mark));
-                    let mark = marks.get(mark).map(|mark| scale * u32::from(*mark));
-                    First { mark: mark.unwrap_or(0), gap, exists: mark.is_some() }
-                })
-            });
-            let first = first.collect();
-            let lit = (0..labels).map(|label| codebook.lit_bits(label as u16).first());
-            let first_bits = lit.map(|bit| bit.map(|bit| scale * bit)).collect();
-            let ticks = vec![OnceCell::new(); words];
-            let of_label = vec![OnceCell::new(); labels as usize];
-            let crowding = (0..words)
-                .map(|word| crowding(codebook.word(word as u16), width.div_ceil(scale.max(1))));
-            let per_tick = crowding.collect();
-            self = Self { of, first, first_bits, ticks, bits: Vec::new(), of_label, per_tick };
-            self.bits.resize_with(words, OnceCell::new);
+        if self.of == of {
+            return self;
         }
-        self
+        let places = width.div_ceil(scale.max(1));
+        let words = (0..codebook.words()).map(|word| codebook.word(word as u16));
+        let words = words.map(|word| Word::new(word, scale, places)).collect();
+        let length = codebook.chips() / payload.map_or(1, |payload| payload.bits());
+        let all = (0..codebook.chips()).step_by(length.max(1) as usize);
+        let mut bits = Vec::new();
+        let of_label = |label: u32| {
+            let (chips, lit) = (codebook.lit_bits(label as u16), bits.len() as u32);
+            bits.extend(chips.iter().map(|chip| scale * chip));
+            let dark = bits.len() as u32;
+            let is_dark = |chip: &u32| chips.binary_search(chip).is_err();
+            bits.extend(all.clone().filter(is_dark).map(|chip| scale * chip));
+            Label { lit, dark, end: bits.len() as u32 }
+        };
+        let labels = (0..labels).map(of_label).collect();
+        Self { of, words, labels, bits }
+    }
+
+    /// Ticks from the start of a macropulse with this `label` to each bit of it that is lit.
+    #[inline]
+    fn lit(&self, label: u16) -> &[u32] {
+        let Label { lit, dark, .. } = self.labels[usize::from(label)];
+        &self.bits[lit as usize..dark as usize]
     }
 }
 
@@ -134,11 +162,8 @@ impl<'a> Sent<'a> {
         let fired = receiver.fired_since(log, epoch);
         let width = window(receiver.jitter());
         let words = words.of(codebook, receiver.ticks_per_chip, width);
-        let in_words: Vec<u32> = (0..codebook.words())
-            .map(|word| codebook.word(word as u16).marks.len() as u32)
-            .collect();
         let weight = |(label, word): (&u16, &u16)| {
-            codebook.lit_bits(*label).len() as u32 * in_words[usize::from(*word)]
+            words.lit(*label).len() as u32 * words.words[usize::from(*word)].marks
         };
         let weights = log.label.iter().zip(&log.word).map(weight).collect();
         let bits = codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
@@ -165,33 +190,39 @@ impl<'a> Sent<'a> {
         }
     }
 
+    #[inline]
+    fn code_word(&self, shot: usize) -> &Word {
+        &self.words.words[usize::from(self.log.word[shot])]
+    }
+
     /// The first marks of the word of `shot`.
+    #[inline]
     pub fn first_marks(&self, shot: usize) -> &[First; FIRST] {
-        &self.words.first[usize::from(self.log.word[shot])]
+        &self.code_word(shot).first
     }
 
     /// Ticks from the start of the macropulse of `shot` to its first mark but for those `hidden`.
+    #[inline(always)]
     pub fn first_mark(&self, shot: usize, hidden: usize) -> Option<i64> {
-        let bit = self.words.first_bits[usize::from(self.log.label[shot])]?;
+        let bit = self.lit_bits(shot).first()?;
         let first = self.first_marks(shot)[hidden];
-        first.exists.then_some(i64::from(bit) + i64::from(first.mark))
+        first.exists.then_some(i64::from(*bit) + i64::from(first.mark))
     }
 
     /// The code word of `shot`, as ticks in a row.
+    #[inline]
     pub fn word(&self, shot: usize) -> &WordTicks {
-        let word = self.log.word[shot];
-        self.words.ticks[usize::from(word)].get_or_init(|| {
-            WordTicks::new(&self.codebook.word(word).marks, self.receiver.ticks_per_chip)
-        })
+        let marks = || &self.codebook.word(self.log.word[shot]).marks;
+        let ticks = &self.code_word(shot).ticks;
+        ticks.get_or_init(|| WordTicks::new(marks(), self.receiver.ticks_per_chip))
     }
 
     /// The code word of `shot`, as bits.
     pub fn bits(&self, shot: usize) -> &Bits {
-        let word = self.log.word[shot];
-        self.words.bits[usize::from(word)].get_or_init(|| {
-            let chips = self.codebook.word(word).marks.iter();
+        self.code_word(shot).bits.get_or_init(|| {
+            let word = self.codebook.word(self.log.word[shot]);
             let scale = self.receiver.ticks_per_chip;
-            let marks: Vec<u32> = chips.map(|&mark| scale * u32::from(mark)).collect();
+            let marks: Vec<u32> = word.marks.iter().map(|&mark| scale * u32::from(mark)).collect();
             let pattern =
                 |width: u32| Pattern::new(marks.iter().map(|&mark| mark as usize), width as usize);
             let cancelled = self.width + 2 * self.farther() as u32;
@@ -206,7 +237,7 @@ impl<'a> Sent<'a> {
                 of_end(&|mark| last.is_some_and(|last| i64::from(last - mark) < NEAREST_SIDE)),
             ];
             Bits {
-                shared: shared(self.codebook.word(word), chips),
+                shared: shared(word, chips),
                 ends,
                 pattern: pattern(1),
                 cancelled: pattern(cancelled),
@@ -229,64 +260,48 @@ impl<'a> Sent<'a> {
         i64::from(self.width / 2)
     }
 
-    /// Most marks of the macropulse of `shot` that are met by itself, moved by less than a code word.
-    pub fn sidelobe(&self, shot: usize) -> u32 {
-        u32::from(self.codebook.sidelobe(self.log.label[shot], self.log.word[shot]))
+    /// Marks that the macropulse of `shot` has more, without a gap, than are met by itself, moved by less than a
+    /// code word.
+    #[inline]
+    pub fn complete_margin(&self, shot: usize) -> u32 {
+        let sidelobe = self.codebook.sidelobe(self.log.label[shot], self.log.word[shot]);
+        self.weight(shot) - u32::from(sidelobe)
     }
 
     /// Number of marks of `shot`.
+    #[inline]
     pub fn weight(&self, shot: usize) -> u32 {
         self.weights[shot]
     }
 
     /// Marks of the code word of `shot`.
     pub fn in_word(&self, shot: usize) -> u32 {
-        self.codebook.word(self.log.word[shot]).marks.len() as u32
+        self.code_word(shot).marks
     }
 
-    /// The first chip of each lit bit of `shot`.
+    /// Ticks from the start of the macropulse of `shot` to each bit of it that is lit.
     #[inline]
-    pub fn lit_bits(&self, shot: usize) -> &'a [u32] {
-        self.codebook.lit_bits(self.log.label[shot])
+    pub fn lit_bits(&self, shot: usize) -> &[u32] {
+        self.words.lit(self.log.label[shot])
     }
 
-    /// The first tick of each lit bit of `shot`, if it begins at tick `start`.
-    pub fn lit_from(&self, shot: usize, start: i64) -> impl Iterator<Item = i64> + use<'a> {
-        let scale = self.scale();
-        self.lit_bits(shot).iter().map(move |&bit| start + scale * i64::from(bit))
+    /// The same of those that are dark.
+    pub fn dark_bits(&self, shot: usize) -> &[u32] {
+        let Label { dark, end, .. } = self.words.labels[usize::from(self.log.label[shot])];
+        &self.words.bits[dark as usize..end as usize]
     }
 
     /// The `sums` of `found` over the lit bits of `shot`, where that has a number for each of the
     /// [`Self::bits_about`] it: if it begins as many bits earlier as a payload has, one fewer, and so on, until as
     /// many later.
     pub fn in_bits(&self, shot: usize, found: &[u32], sums: &mut Vec<u32>) {
-        let bits = self.bits_of_payload() as usize;
-        let length = self.codebook.chips() / bits as u32;
         sums.clear();
-        sums.resize(2 * bits + 1, 0);
+        sums.resize(2 * self.bits as usize + 1, 0);
         for bit in self.lit_bits(shot) {
-            let found = found.get((bit / length) as usize..).unwrap_or_default();
+            let bit = i64::from(*bit) / self.bit_length;
+            let found = found.get(bit as usize..).unwrap_or_default();
             sums.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
         }
-    }
-
-    /// Ticks from the start of a macropulse of `shot` to each bit of it that is lit, or dark.
-    pub fn bits_that_are(&self, is_lit: bool, shot: usize) -> &[u32] {
-        let label = self.log.label[shot];
-        let both = self.words.of_label[usize::from(label)].get_or_init(|| {
-            let (scale, lit) = (self.receiver.ticks_per_chip, self.codebook.lit_bits(label));
-            let bits = self.bits_of_payload() as u32;
-            let chips = self.codebook.chips() / bits;
-            let all = (0..bits).map(|bit| bit * chips);
-            let dark = all.filter(|bit| lit.binary_search(bit).is_err()).map(|bit| scale * bit);
-            [dark.collect(), lit.iter().map(|bit| scale * bit).collect()]
-        });
-        &both[usize::from(is_lit)]
-    }
-
-    /// Ticks per chip.
-    pub fn scale(&self) -> i64 {
-        i64::from(self.receiver.ticks_per_chip)
     }
 
     /// Length of a macropulse, in ticks.
@@ -349,8 +364,7 @@ impl<'a> Sent<'a> {
 
     /// Fewest ticks that can be so many marks of `shot`.
     pub fn ticks_of(&self, shot: usize, marks: u32) -> u32 {
-        let (shared, per_tick) =
-            (self.bits(shot).shared, self.words.per_tick[usize::from(self.log.word[shot])]);
+        let (shared, per_tick) = (self.bits(shot).shared, self.code_word(shot).per_tick);
         let alone = marks.saturating_sub(shared * self.lit_bits(shot).len() as u32);
         alone.max(marks.div_ceil(per_tick))
     }
@@ -362,7 +376,7 @@ impl<'a> Sent<'a> {
 
     /// Fewest ticks that can be so many marks of any shot.
     pub fn ticks_of_any(&self, marks: u32) -> u32 {
-        let per_tick = self.words.per_tick.iter().copied().max();
+        let per_tick = self.words.words.iter().map(|word| word.per_tick).max();
         marks.div_ceil(per_tick.unwrap_or(1).max(1))
     }
 

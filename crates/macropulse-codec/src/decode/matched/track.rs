@@ -192,8 +192,7 @@ impl Band<'_> {
     /// Has the marks of `shot` at hand.
     pub(super) fn lay_out(&mut self, shot: usize) {
         if self.marks_of != Some(shot) {
-            let (sent, scale) = (self.sent, self.sent.receiver.ticks_per_chip);
-            places_of(sent.word(shot), sent.lit_bits(shot), scale, &mut self.marks);
+            places_of(self.sent.word(shot), self.sent.lit_bits(shot), &mut self.marks);
             self.marks_of = Some(shot);
         }
     }
@@ -224,13 +223,11 @@ impl Band<'_> {
     /// have nothing to fall upon, and only chance could light them.
     fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
         let sent = self.sent;
-        let start = sent.fired[shot] + lag;
-        let mut bits = sent.lit_from(shot, start);
-        let Some(first) = bits.next() else { return false };
-        let last = bits.last().unwrap_or(first);
+        let (start, bits) = (sent.fired[shot] + lag, sent.lit_bits(shot));
+        let (Some(first), Some(last)) = (bits.first(), bits.last()) else { return false };
         let density = self.field.density_without(&sent.light(shot, lag), 0, 0);
         [first, last].into_iter().zip(&sent.bits(shot).ends).all(|(bit, (marks, pattern))| {
-            let found = self.field.lit().lit_in(bit, pattern);
+            let found = self.field.lit().lit_in(start + i64::from(*bit), pattern);
             found >= self.end_thresholds.least(*marks, density)
         })
     }

@@ -7,68 +7,43 @@ use super::pace::usual;
 use super::track::{BLOCK, NEAREST_SIDE, WAYS, WIDEST_GAP, lit};
 use super::{Band, Detection, NEIGHBOURS, SURFACES};
 use crate::decode::field::Source;
-use crate::decode::{MIDDLE, Reject, Returns, Strength};
+use crate::decode::{Reject, Returns, Strength};
 use crate::kernels::parted;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns.
     pub(super) fn settle(&mut self, shots: Range<usize>, returns: &mut Returns) {
         let owned = self.sent.log.owned.clone();
-        let mut surfaces = Vec::new();
+        let (mut clear, mut surfaces) = (std::mem::take(&mut self.clear), Vec::new());
         self.further.sort_by_key(|(shot, _)| *shot);
         let mut further = 0;
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
             let before = |other: &&(usize, Detection)| other.0 < shot;
             further += self.further[further..].iter().take_while(before).count();
             let is_alone = self.further.get(further).is_none_or(|(other, _)| *other > shot);
-            let clear = self.found[shot].filter(|found| is_alone && self.is_clear(shot, *found));
-            match clear {
-                Some(found) => surfaces.push(found),
-                None => {
-                    if let Err(why) = self.verify(shot, further, &mut surfaces) {
-                        returns.reject(why);
-                    }
-                }
+            if let Some(found) = self.found[shot].filter(|_| is_alone)
+                && self.is_clear(shot, found)
+            {
+                clear.push((shot as u32, found.lag));
+                continue;
             }
+            if let Err(why) = self.verify(shot, further, &mut surfaces) {
+                returns.reject(why);
+                continue;
+            }
+            self.sent.measure_clear(&mut clear, &mut self.photons, returns);
             for surface in surfaces.drain(..) {
                 returns.push(self.measured(shot, surface));
             }
         }
+        self.sent.measure_clear(&mut clear, &mut self.photons, returns);
+        self.clear = clear;
         if self.further.is_empty() {
             return;
         }
         // Older light overlaps with nothing that is still to come.
         let oldest = self.in_flight_before(shots.end);
         self.further.retain(|(shot, _)| *shot >= oldest);
-    }
-
-    /// As [`Self::settle`], of all shots of a band of which all light was cancelled, one surface of a shot at
-    /// most, into `returns` without any yet: nothing is to be asked of them but whether they lie in the gate.
-    pub(super) fn settle_clear(&mut self, returns: &mut Returns) {
-        let (sent, gate) = (self.sent, self.sent.gate());
-        let mut clear: Vec<u32> = Vec::with_capacity(sent.log.owned.len());
-        for shot in sent.log.owned.clone() {
-            match self.found[shot] {
-                Some(found) if gate.contains(&found.lag) => clear.push(shot as u32),
-                Some(_) => returns.reject(Reject::OutsideGate),
-                None => returns.reject(Reject::NoPeak),
-            }
-        }
-        // Column by column: entry by entry takes twice as long.
-        let tof = sent.receiver.tofs(MIDDLE);
-        let found = |shot: u32| self.found[shot as usize].unwrap_or(Detection::at(0, 0));
-        returns.tof.extend(clear.iter().map(|&shot| {
-            let start = sent.fired[shot as usize] + found(shot).lag + sent.epoch;
-            tof(sent.log.fired_at_fs[shot as usize], start)
-        }));
-        returns.margin.extend(clear.iter().map(|shot| found(*shot).margin as u16));
-        returns.peak.extend(clear.iter().map(|shot| sent.weight(*shot as usize) as u16));
-        returns.marks.extend_from_slice(&returns.peak);
-        let energy = |marks: &u16| self.photons.of_all(u32::from(*marks));
-        returns.photons.extend(returns.peak.iter().map(energy).map(|energy| energy.photons));
-        returns.saturated.resize(clear.len(), true);
-        returns.number.resize(clear.len(), 1);
-        returns.shot = clear;
     }
 
     /// Puts those surfaces of `shot` that give returns into `surfaces`, by their lag; its further ones are those
@@ -290,17 +265,17 @@ impl Band<'_> {
             let bits = sent.bits(other);
             let before = 2 * sent.farther() + i64::from(sent.width - 1);
             let start = sent.fired[other] + theirs.lag - before;
-            claimed.light_up(start, sent.bits_that_are(true, other), &bits.claimed);
+            claimed.light_up(start, sent.lit_bits(other), &bits.claimed);
         }
         // Where its own marks are found tells nothing of the free places.
         own.clear_all(claimed.origin(), stretch.end - claimed.origin());
         let pattern = &sent.bits(shot).cancelled;
         let start = light.start - sent.farther();
-        own.light_up(start, sent.bits_that_are(true, shot), pattern);
+        own.light_up(start, sent.lit_bits(shot), pattern);
         let lit = self.field.lit();
         // Free places, claimed ones, and claimed ones of its own: all of them, and those lit.
         let places = parted(claimed.words(&stretch), own.words(&stretch), lit.words(&stretch));
-        let lit_bits = sent.bits_that_are(true, shot);
+        let lit_bits = sent.lit_bits(shot);
         let taken = claimed.lit_in_all(light.start, lit_bits, &sent.bits(shot).pattern);
         let free = weight - taken;
         let share = |lit: u32, all: u32| f64::from(lit) / f64::from(all.max(1));
@@ -342,7 +317,7 @@ impl Band<'_> {
         if bits < 2 {
             return true;
         }
-        let (start, lit_bits) = (sent.fired[shot] + detection.lag, sent.bits_that_are(true, shot));
+        let (start, lit_bits) = (sent.fired[shot] + detection.lag, sent.lit_bits(shot));
         let found = self.field.lit().lit_in_any(start, lit_bits, &sent.bits(shot).pattern);
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
         let (word, left_out) = (sent.in_word(shot), (1.0 - share).powi(bits as i32));
@@ -439,7 +414,7 @@ impl Band<'_> {
         let light = sent.light(shot, detection.lag);
         let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
         let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
-        residual.lit_in_each(light.start, sent.bits_that_are(false, shot), pattern, found);
+        residual.lit_in_each(light.start, sent.dark_bits(shot), pattern, found);
         let most = found.iter().copied().max().unwrap_or(0);
         2 * most * (sent.lit_bits(shot).len() as u32) >= detection.count && {
             let density = self.density_beside(shot, detection);
@@ -461,7 +436,7 @@ impl Band<'_> {
         let (in_word, lit) = (f64::from(sent.in_word(shot)), sent.lit_bits(shot).len() as f64);
         let mean = f64::from(detection.count) / lit;
         let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
-        self.field.lit().lit_in_each(start, sent.bits_that_are(true, shot), pattern, found);
+        self.field.lit().lit_in_each(start, sent.lit_bits(shot), pattern, found);
         let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
         let squares: f64 = found.iter().map(square).sum();
         squares <= chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word)
