@@ -24,9 +24,10 @@ pub(super) struct Sent<'a> {
     reach: Range<i64>,
     /// Number of marks of each shot.
     weights: Vec<u32>,
-    /// Bits of a payload, and the length of each, in ticks.
+    /// Bits of a payload, the length of each, and of all, in ticks.
     bits: i64,
     bit_length: i64,
+    length: i64,
     /// Ticks from as many bits before the start of a macropulse as a payload has, to each bit until as many
     /// behind its end.
     bits_about: Vec<u32>,
@@ -68,9 +69,10 @@ struct Word {
     marks: u32,
     /// Most of them that one tick may count for.
     per_tick: u32,
-    /// Its marks as ticks, and as bits, each made when it is first needed: one pixel of a flash has a single word,
-    /// and clear light needs no bits.
-    ticks: OnceCell<WordTicks>,
+    /// Its marks as ticks.
+    ticks: WordTicks,
+    /// The same as bits, made when they are first needed: one pixel of a flash has a single word, and clear light
+    /// needs none.
     bits: OnceCell<Bits>,
 }
 
@@ -84,9 +86,8 @@ impl Word {
             let mark = marks.get(mark).map(|mark| scale * u32::from(*mark));
             First { mark: mark.unwrap_or(0), gap, exists: mark.is_some() }
         });
-        let per_tick = crowding(word, places);
-        let (ticks, bits) = (OnceCell::new(), OnceCell::new());
-        Self { first, marks: marks.len() as u32, per_tick, ticks, bits }
+        let (ticks, per_tick) = (WordTicks::new(marks, scale), crowding(word, places));
+        Self { first, marks: marks.len() as u32, per_tick, ticks, bits: OnceCell::new() }
     }
 }
 
@@ -184,6 +185,7 @@ impl<'a> Sent<'a> {
             weights,
             bits,
             bit_length,
+            length: bits * bit_length,
             bits_about,
             width,
             words,
@@ -212,9 +214,7 @@ impl<'a> Sent<'a> {
     /// The code word of `shot`, as ticks in a row.
     #[inline]
     pub fn word(&self, shot: usize) -> &WordTicks {
-        let marks = || &self.codebook.word(self.log.word[shot]).marks;
-        let ticks = &self.code_word(shot).ticks;
-        ticks.get_or_init(|| WordTicks::new(marks(), self.receiver.ticks_per_chip))
+        &self.code_word(shot).ticks
     }
 
     /// The code word of `shot`, as bits.
@@ -306,7 +306,7 @@ impl<'a> Sent<'a> {
 
     /// Length of a macropulse, in ticks.
     pub fn length(&self) -> i64 {
-        self.bits * self.bit_length
+        self.length
     }
 
     /// Length of one bit of it, in ticks.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::decode::Error;
-use crate::decode::matched::cancel::{CLUE, cancel};
+use crate::decode::matched::cancel::{CLUE, NOWHERE, cancel};
 
 /// Ticks of a band begin while light of shots is under way that its log does not know.
 #[test]
@@ -65,6 +65,30 @@ fn a_macropulse_that_begins_under_another_one_is_cancelled() {
         assert_eq!(cancelled.lags, lags.map(i64::from), "{case}");
     }
     assert_eq!(cases, 98);
+}
+
+/// Two pairs of shots of which the later one comes first and the earlier one before it ends, all others dark: neither is
+/// the shot after the last one found. N = 35 distances between the pairs, from within the light in flight to many times
+/// as far.
+#[test]
+fn overlapping_light_is_cancelled_however_far_from_other_light_it_is() {
+    let sensor = Sensor::crowded(codebook());
+    let (receiver, log) = (sensor.receiver(0.0), sensor.log(120));
+    let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+    for away in (4..109).step_by(3) {
+        let mut surfaces = vec![vec![]; 120];
+        for first in [3, 3 + away] {
+            surfaces[first] = vec![3500];
+            surfaces[first + 2] = vec![900];
+        }
+        let mut chance = ChaCha8Rng::seed_from_u64(1);
+        let ticks = sensor.ticks_of(&log, &surfaces, CLEAR, &mut chance).tick;
+        let cancelled = cancel(&sent, &ticks, &mut Default::default()).unwrap().unwrap();
+        assert_eq!(cancelled.residual, [0; 0], "{away}");
+        let expected =
+            surfaces.iter().map(|lags| lags.first().map_or(NOWHERE, |lag| i64::from(*lag)));
+        assert!(cancelled.lags.iter().copied().eq(expected), "{away}");
+    }
 }
 
 /// Three bands of 40 shots, on a wall, scattered, and with false ticks, in which one tick in five is as early as the

@@ -44,6 +44,25 @@ fn two_surfaces_are_two_returns_in_clear_air_and_in_poor_light() {
     }
 }
 
+/// One shot in seven behind glass, in clear air, between shots that are settled together.
+#[test]
+fn returns_come_in_the_order_of_shots_and_their_surfaces() {
+    let sensor = Sensor::crowded(codebook());
+    let log = ShotLog { owned: 10..390, ..sensor.log(400) };
+    let (ticks, surfaces) = sensor.behind_glass(&log, 7, CLEAR, 1);
+    let found = sensor.decode(&several(&sensor, 0.0), &log, &ticks);
+    let each = |shot: u32| (1..=surfaces[shot as usize].len() as u8).map(move |n| (shot, n));
+    let expected: Vec<(u32, u8)> = (10..390).flat_map(each).collect();
+    assert!(found.shot.iter().copied().zip(found.number.iter().copied()).eq(expected));
+    let lag = |tof: f64| (tof / 2.5e-12 - 0.5).round() as u32;
+    let lags = surfaces[10..390].iter().flatten().copied();
+    assert!(found.tof.iter().map(|tof| lag(*tof)).eq(lags));
+    let weights = found.shot.iter().map(|&shot| {
+        sensor.book.marks(log.label[shot as usize], log.word[shot as usize]).len() as u16
+    });
+    assert!(found.marks.iter().copied().eq(weights) && found.peak == found.marks);
+}
+
 /// H₀: a shot that met one surface has a second return with probability α = 10⁻⁴ at most, the
 /// false alarm accepted. N = 24 000 shots, seeds 1 to 6, in clear air and with 30 % of the
 /// marks missed in stray light; rejected where so many have a chance below 10⁻³. Negative
