@@ -363,9 +363,9 @@ impl Canceller<'_> {
         for lags in self.nearest_first().into_iter().take(parts) {
             for hidden in 0..most_hidden {
                 let wanted = (hidden, &lags);
-                let found = self.found_at(self.next, tick, wanted);
-                let found =
-                    found.or_else(|| self.first_of(in_flight.clone(), (tick, ahead), wanted));
+                let found = self
+                    .found_at(self.next, tick, wanted)
+                    .or_else(|| self.first_of(in_flight.clone(), (tick, ahead), wanted));
                 if found.is_some() {
                     return found;
                 }

@@ -62,7 +62,7 @@ pub(super) fn decode(
     let mut memory = MEMORY.take();
     let sent = Sent::new(receiver, sent, (ticks.epoch, std::mem::take(&mut memory.words)));
     let mut returns = Returns::with_capacity(sent.log.owned.len());
-    let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.woven)?;
+    let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.timelines)?;
     let memory = match cancelled {
         Some(cancelled) if cancelled.is_clear() => {
             sent.settle_clear(&cancelled.lags, &mut memory.photons, &mut returns);
@@ -106,7 +106,8 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     words: Words,
-    woven: [Timeline; 2],
+    /// Of the light that overlaps while it is cancelled, then of [`Band::places`].
+    timelines: [Timeline; 2],
     field: field::Memory,
     search: Search,
     thresholds: Vec<Thresholds>,
@@ -193,8 +194,6 @@ struct Band<'a> {
     in_picture: Vec<u32>,
     search: Search,
     photons: Photons,
-    /// Memory for the shots without a gap that are settled next, and their lags.
-    clear: Vec<(u32, i64)>,
     histogram: Histogram,
     /// Memory for the residual of a macropulse, for the marks found in each of its bits and in those about it,
     /// and for the places that others claim and its own.
@@ -285,12 +284,11 @@ impl<'a> Band<'a> {
             in_picture: Vec::new(),
             search: memory.search,
             photons: memory.photons,
-            clear: Vec::new(),
             histogram: Histogram::default(),
             residual: Timeline::default(),
             found_in_bits: Vec::new(),
             words: WordsAbout::default(),
-            places: memory.woven,
+            places: memory.timelines,
             sent,
         }
     }
@@ -326,7 +324,7 @@ impl<'a> Band<'a> {
         }
         Memory {
             words: Words::default(),
-            woven: self.places,
+            timelines: self.places,
             field: self.field.into_memory(),
             search: self.search,
             photons: self.photons,

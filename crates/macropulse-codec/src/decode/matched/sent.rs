@@ -109,8 +109,9 @@ impl Words {
         let places = width.div_ceil(scale.max(1));
         let words = (0..codebook.words()).map(|word| codebook.word(word as u16));
         let words = words.map(|word| Word::new(word, scale, places)).collect();
-        let length = codebook.chips() / payload.map_or(1, |payload| payload.bits());
-        let all = (0..codebook.chips()).step_by(length.max(1) as usize);
+        let in_payload = payload.map_or(1, |payload| payload.bits());
+        let length = codebook.chips() / in_payload;
+        let all = (0..in_payload).map(|bit| bit * length);
         let mut bits = Vec::new();
         let of_label = |label: u32| {
             let (chips, lit) = (codebook.lit_bits(label as u16), bits.len() as u32);
@@ -192,6 +193,7 @@ impl<'a> Sent<'a> {
         }
     }
 
+    /// The code word of `shot`.
     #[inline]
     fn code_word(&self, shot: usize) -> &Word {
         &self.words.words[usize::from(self.log.word[shot])]

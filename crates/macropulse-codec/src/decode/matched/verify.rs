@@ -11,10 +11,10 @@ use crate::decode::{Reject, Returns, Strength};
 use crate::kernels::parted;
 
 impl Band<'_> {
-    /// Turns what was found of `shots` into returns.
+    /// Turns what was found of `shots` into returns: of those found without a gap, as many in a row together.
     pub(super) fn settle(&mut self, shots: Range<usize>, returns: &mut Returns) {
         let owned = self.sent.log.owned.clone();
-        let (mut clear, mut surfaces) = (std::mem::take(&mut self.clear), Vec::new());
+        let (mut clear, mut surfaces) = (Vec::new(), Vec::new());
         self.further.sort_by_key(|(shot, _)| *shot);
         let mut further = 0;
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
@@ -37,7 +37,6 @@ impl Band<'_> {
             }
         }
         self.sent.measure_clear(&mut clear, &mut self.photons, returns);
-        self.clear = clear;
         if self.further.is_empty() {
             return;
         }
