@@ -366,9 +366,13 @@ impl<'a> Sent<'a> {
 
     /// Fewest ticks that can be so many marks of `shot`.
     pub fn ticks_of(&self, shot: usize, marks: u32) -> u32 {
-        let (shared, per_tick) = (self.bits(shot).shared, self.code_word(shot).per_tick);
-        let alone = marks.saturating_sub(shared * self.lit_bits(shot).len() as u32);
-        alone.max(marks.div_ceil(per_tick))
+        let alone = marks.saturating_sub(self.bits(shot).shared * self.lit_bits(shot).len() as u32);
+        alone.max(self.ticks_in_bit(shot, marks))
+    }
+
+    /// The same of any bits of its payload.
+    pub fn ticks_in_bit(&self, shot: usize, marks: u32) -> u32 {
+        marks.div_ceil(self.code_word(shot).per_tick)
     }
 
     /// Fewest marks of a shot that has any.

@@ -408,14 +408,22 @@ impl Band<'_> {
 
     /// Whether a bit of `shot` that should be dark has half the marks of a lit one in the residual, and more
     /// than chance gives it.
-    fn is_lit_where_dark(&mut self, shot: usize, detection: Detection) -> bool {
+    pub(super) fn is_lit_where_dark(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let light = sent.light(shot, detection.lag);
+        let half = detection.count.div_ceil(2 * sent.lit_bits(shot).len() as u32);
+        if sent.width > 1 {
+            // To widen the residual takes longer than to see that too few ticks are left for any bit.
+            let together = self.field.stretch(sent.bit_length() + i64::from(sent.width));
+            if self.field.most_left(&light, together) < sent.ticks_in_bit(shot, half) {
+                return false;
+            }
+        }
         let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
         let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
         residual.lit_in_each(light.start, sent.dark_bits(shot), pattern, found);
         let most = found.iter().copied().max().unwrap_or(0);
-        2 * most * (sent.lit_bits(shot).len() as u32) >= detection.count && {
+        most >= half && {
             let density = self.density_beside(shot, detection);
             most >= self.bit_thresholds.least(sent.in_word(shot), density)
         }

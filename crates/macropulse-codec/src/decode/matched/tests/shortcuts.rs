@@ -36,6 +36,48 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(2), ..ProptestConfig::with_cases(500) })]
+
+    /// Whether a dark bit has half as many marks as a lit one, and more than chance gives it, is told as where each
+    /// place of each bit is asked for, whatever is refused for the number of ticks.
+    #[test]
+    fn light_in_a_dark_bit_is_noticed_as_mark_by_mark(
+        book in 0..8_usize,
+        missed in 0..80_u32,
+        false_ticks in prop_oneof![Just(0), 1..120_u32],
+        jitter in prop_oneof![Just(0.0), 0.1..3.0_f64],
+        count in 1..80_u32,
+        bits_away in -3..4_i64,
+        seed in 0..u64::MAX,
+    ) {
+        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, 1), seed);
+        let sent = crowd.sent();
+        let mut band = crowd.band(&sent);
+        for shot in 4..8 {
+            let Some(lag) = crowd.surfaces[shot].first() else { continue };
+            // There, light of its lit bits lies in dark ones.
+            let lag = i64::from(*lag) + bits_away * sent.bit_length();
+            let start = sent.fired[shot] + lag;
+            let is_lit = |place: i64| {
+                (place..place + i64::from(sent.width))
+                    .any(|tick| crowd.ticks.tick.binary_search(&(tick as u32)).is_ok())
+            };
+            let in_bit = |bit: &u32| {
+                let marks = sent.bits(shot).marks.iter();
+                marks.filter(|mark| is_lit(start + i64::from(*bit + **mark))).count() as u32
+            };
+            let most = sent.dark_bits(shot).iter().map(in_bit).max().unwrap_or(0);
+            let detection = Detection::at(lag, count);
+            let density = band.density_beside(shot, detection);
+            let by_chance = band.bit_thresholds.least(sent.in_word(shot), density);
+            let lit_bits = sent.lit_bits(shot).len() as u32;
+            let expected = 2 * most * lit_bits >= count && most >= by_chance;
+            prop_assert_eq!(band.is_lit_where_dark(shot, detection), expected);
+        }
+    }
+}
+
 /// A receiver that passes nothing by gives the same returns: N = 96 000 shots, seeds 1 to 1000, of which 19 in
 /// 20 marks are missed or more, with few false ticks or none. Negative control: one that asks for two
 /// ticks more than the fewest that are believed passes some by.
