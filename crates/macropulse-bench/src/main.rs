@@ -1,8 +1,8 @@
 //! The benchmarks of Macropulse: measures how fast it is and writes the tables of
 //! docs/performance.md.
 //!
-//! `cargo run --release -p macropulse-bench` measures everything, in less than ten minutes;
-//! `… -- rays decode` measures and writes these sections alone.
+//! `cargo run --release -p macropulse-bench` measures everything, in less than ten minutes, but how scans grow
+//! with threads; `… -- rays decode` measures and writes these sections alone.
 
 use std::error::Error;
 use std::path::Path;
@@ -27,8 +27,9 @@ mod scans;
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// The sections that are written, in the order in which they are measured.
-const SECTIONS: [&str; 10] = [
-    "rays", "generate", "decode", "levels", "floor", "effort", "plain", "growth", "scans", "goals",
+const SECTIONS: [&str; 11] = [
+    "rays", "generate", "decode", "levels", "floor", "effort", "plain", "growth", "scans",
+    "threads", "goals",
 ];
 
 fn main() -> ExitCode {
@@ -70,13 +71,14 @@ fn section(name: &str) -> Fallible<()> {
         "plain" => plain::text()?,
         "growth" => decode::growth()?,
         "scans" => scans::measure()?.text(),
+        "threads" => scans::on_threads()?,
         "goals" => return Err("goals needs all sections: name none".into()),
         _ => return Err(format!("{name} is none of: {}", SECTIONS.join(", ")).into()),
     };
     write(name, &text)
 }
 
-/// Measures and writes all sections.
+/// Measures and writes all sections but `threads`, which tells more on a machine that has many.
 fn everything() -> Fallible<()> {
     // Before what fills the memory of this process and leaves it in pieces.
     let generating = generate::measure()?;

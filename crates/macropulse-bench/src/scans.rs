@@ -11,7 +11,15 @@ use crate::page::{self, three};
 use crate::sample::{Condition, SEED};
 
 /// Scans are made for so long, s, and two at least.
-const ENOUGH: f64 = 6.0;
+const ENOUGH: f64 = 4.0;
+
+/// What is scanned whole.
+const WHOLE: [(&str, Condition); 4] = [
+    ("car-50m", Condition::CLEAN),
+    ("car-50m", Condition::Declared),
+    ("street", Condition::CLEAN),
+    ("street", Condition::Declared),
+];
 
 const UNWATCHED: Watch<'static> = Watch { done: &|_| {}, stop: &|| false };
 
@@ -31,12 +39,10 @@ pub struct WholeScans(Vec<Measured>);
 /// Measures them.
 pub fn measure() -> Fallible<WholeScans> {
     let mut all = Vec::new();
-    for scene in ["car-50m", "street"] {
-        for condition in [Condition::CLEAN, Condition::Declared] {
-            let (one, stages) = run(scene, condition, 1)?;
-            let (two, _) = run(scene, condition, 2)?;
-            all.push(Measured { scene, condition, per_second: [one, two], stages });
-        }
+    for (scene, condition) in WHOLE {
+        let (one, stages) = run(scene, condition, 1)?;
+        let (two, _) = run(scene, condition, 2)?;
+        all.push(Measured { scene, condition, per_second: [one, two], stages });
     }
     Ok(WholeScans(all))
 }
@@ -66,6 +72,12 @@ fn run(
     Ok(measured?)
 }
 
+/// What a row is of.
+fn name(scene: &str, condition: Condition) -> String {
+    let condition = if condition == Condition::Declared { "declared" } else { "clean" };
+    format!("`{scene}` {condition}")
+}
+
 impl WholeScans {
     /// Scans per second with two threads.
     pub fn on_two_threads(&self, scene: &str, condition: Condition) -> Option<f64> {
@@ -77,8 +89,7 @@ impl WholeScans {
     pub fn text(&self) -> String {
         let head = [&["scene", "one thread", "two threads"][..], &Tally::STAGES].concat();
         let rows = self.0.iter().map(|one| {
-            let condition = if one.condition == Condition::Declared { "declared" } else { "clean" };
-            let name = format!("`{}` {condition}", one.scene);
+            let name = name(one.scene, one.condition);
             let rates = one.per_second.iter().map(|rate| three(*rate));
             let stages = one.stages.iter().map(|seconds| three(1e3 * seconds));
             std::iter::once(name).chain(rates).chain(stages).collect()
@@ -89,6 +100,32 @@ impl WholeScans {
             page::table(&head, &rows.collect::<Vec<_>>())
         )
     }
+}
+
+/// The table of scans per second as threads are added, each time as many again, up to all there are.
+pub fn on_threads() -> Fallible<String> {
+    const ROUNDS: usize = 2;
+    let all = std::thread::available_parallelism()?.get();
+    let doubled = std::iter::successors(Some(1), |count| Some(2 * count));
+    let counts: Vec<usize> = doubled.take_while(|count| *count <= all).collect();
+    let mut rows = Vec::new();
+    for (scene, condition) in WHOLE {
+        let mut rates = vec![0.0_f64; counts.len()];
+        // By turns, so that what else the machine does slows all of them down.
+        for _ in 0..ROUNDS {
+            for (rate, count) in rates.iter_mut().zip(&counts) {
+                *rate = rate.max(run(scene, condition, *count)?.0);
+            }
+        }
+        let rates = rates.iter().map(|rate| three(*rate));
+        rows.push(std::iter::once(name(scene, condition)).chain(rates).collect());
+    }
+    let named =
+        |count: &usize| format!("{count} {}", if *count == 1 { "thread" } else { "threads" });
+    let head: Vec<String> =
+        std::iter::once("scene".to_owned()).chain(counts.iter().map(named)).collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    Ok(format!("Scans per second of wall time.\n\n{}", page::table(&head, &rows)))
 }
 
 /// Sixty clean scans of the car: for a process of which the memory is looked at afterwards.
