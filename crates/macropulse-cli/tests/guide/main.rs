@@ -28,6 +28,7 @@ pages! {
     readme: "README.md",
     introduction: "docs/README.md",
     codes: "docs/codes.md",
+    decoding: "docs/decoding.md",
     formats: "docs/formats.md",
     glossary: "docs/glossary.md",
     hardening: "docs/hardening.md",
@@ -74,6 +75,28 @@ fn every_page_is_tried() {
     let mut tried: Vec<_> = PAGES.to_vec();
     tried.sort_unstable();
     assert_eq!(tried, there);
+}
+
+/// The table of constants on the page about decoding has the values of the code.
+#[test]
+fn constants_of_the_receiver_are_those_of_the_code() {
+    let page = fs::read_to_string(root().join("docs/decoding.md")).unwrap();
+    let table = page.split("| constant | value | where |").nth(1).unwrap();
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let cells = |row: &str| -> Vec<String> {
+        row.split('|').map(|cell| cell.trim().trim_matches('`').to_owned()).collect()
+    };
+    let mut held = 0;
+    for row in rows.map(cells) {
+        let [_, name, value, file, ..] = &row[..] else { panic!("{row:?}") };
+        let file = root().join("crates/macropulse-codec/src/decode").join(file);
+        let code = fs::read_to_string(file).unwrap();
+        let defined = code.lines().find_map(|line| line.split_once(&format!("const {name}: ")));
+        let (_, defined) = defined.unwrap_or_else(|| panic!("there is no {name}"));
+        assert!(defined.ends_with(&format!(" = {value};")), "{name} is {defined}");
+        held += 1;
+    }
+    assert!(held > 5, "{held}");
 }
 
 /// What a reader has before a page begins. Of the README: ticks recorded of two lines of its sensor.
