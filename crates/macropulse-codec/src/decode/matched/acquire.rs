@@ -118,10 +118,6 @@ impl Pictures {
     }
 }
 
-/// The share of blocks in which chance may light as much of a code word as is asked for. There all marks are counted,
-/// a few hundred: in so few blocks that adds two to each, of at least sixteen.
-pub(super) const IN_VAIN: f64 = 0.01;
-
 /// Ticks that a machine word of a picture stands for.
 const PER_WORD: i64 = 64 * COARSE as i64;
 
@@ -187,7 +183,7 @@ impl Band<'_> {
         let (lit, in_word) = (1.0 - (1.0 - density).powi(COARSE as i32), sent.in_word(shot));
         // Of a bit that has enough marks any so many have all but those that it may lack.
         let lacking = in_word.saturating_sub(least.div_ceil(bits));
-        let tell = |marks: &u32| *marks >= lacking + self.word_thresholds.least(*marks, lit);
+        let tell = |marks: &u32| *marks >= lacking + self.chance.in_words.least(*marks, lit);
         let few = (SIXTEEN as u32..in_word).step_by(SIXTEEN).chain([in_word]).find(tell);
         let of_word = few.filter(|_| bits > 1).unwrap_or(0);
         search.word.set(&sent.bits(shot).marks[..of_word as usize], stride);

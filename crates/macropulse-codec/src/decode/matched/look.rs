@@ -236,7 +236,7 @@ impl Band<'_> {
         }
         let reach = self.sent.reach();
         let left = self.leftover().density(shot, &reach);
-        let least = self.thresholds.least(self.sent.weight(shot), left).max(least);
+        let least = self.chance.in_gate.least(self.sent.weight(shot), left).max(least);
         self.maximum(shot, Source::Residual, lags, least)
     }
 
@@ -381,7 +381,7 @@ impl Band<'_> {
         let gate = self.sent.gate();
         let left = self.leftover().density(shot, &gate);
         let least = left_over(self.least_in_gate(shot));
-        let least = self.thresholds.least(self.sent.weight(shot), left).max(least);
+        let least = self.chance.in_gate.least(self.sent.weight(shot), left).max(least);
         let lags = self.leftover().lags(shot, gate, least, true);
         let most = self.maximum(shot, Source::Residual, &lags, least);
         let found = most.and_then(|(lag, _)| self.found_at(shot, lag));
@@ -493,7 +493,7 @@ impl Band<'_> {
             return true;
         }
         let around = self.field.density_without(&light, 0, 0);
-        detection.count >= self.thresholds.least(weight, around)
+        detection.count >= self.chance.in_gate.least(weight, around)
     }
 
     /// `detection`, if neither chance nor light of other returns gives it.

@@ -30,12 +30,6 @@ impl Band<'_> {
         Return { shot, tof, peak, marks: marks as u16, margin, photons, saturated }
     }
 
-    /// Share of lit places around a shot found at `detection`, its own marks apart.
-    pub(super) fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
-        let places = self.sent.weight(shot) * self.sent.width;
-        self.field.density_without(&self.sent.light(shot, detection.lag), detection.count, places)
-    }
-
     /// How late the marks of `shot` are, in ticks, if it is found at `detection`.
     fn late(&mut self, shot: usize, detection: Detection) -> f64 {
         let sent = self.sent;

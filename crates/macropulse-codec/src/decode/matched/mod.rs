@@ -15,13 +15,13 @@
 //! 4. [`verify`]: returns that light of other returns accounts for are excluded, and those of which
 //!    a bit is lit that should be dark, or dark that should be lit.
 //!
-//! A return is believed if chance would not reach its count of marks at any lag of the gate, see
-//! [`super::threshold`].
+//! A return is believed if chance would not reach its count of marks at any lag of the gate: [`chance`].
 //!
 //! The shots go through these steps in blocks, so that the ticks at hand fit into a cache.
 
 mod acquire;
 mod cancel;
+mod chance;
 mod look;
 mod measure;
 mod pace;
@@ -35,7 +35,6 @@ use std::cell::Cell;
 use std::ops::Range;
 
 use super::field::{self, Field};
-use super::threshold::Thresholds;
 use super::timeline::Timeline;
 use super::timing::Histogram;
 use super::{Error, GATES_PER_BLOCK, Receiver, Returns};
@@ -43,9 +42,9 @@ use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
 use crate::kernels::{Counts, NARROW};
-use crate::statistics::normal_quantile;
-use acquire::{IN_VAIN, Leftover, Search};
+use acquire::{Leftover, Search};
 use cancel::Cancelled;
+use chance::Chance;
 use measure::Photons;
 use pace::{Paced, Usual};
 use sent::{Sent, Words};
@@ -80,17 +79,6 @@ const SURFACES: usize = 3;
 /// Returns of a shot that this receiver can give at most.
 pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
-/// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
-const BY_CHANCE: f64 = 1e-3;
-
-/// A normal variable exceeds it as often as that.
-const HARDLY_EVER: f64 = 3.0902;
-
-/// How often chance may light an end of a macropulse where there is none: of the three or four marks of an end of
-/// `street` it then takes two to tell. At 1e-3 it takes three, which one end in five lacks where one mark in
-/// five is missed, and finds the same shots.
-const AT_AN_END: f64 = 1e-2;
-
 /// Shots next to one that tell what is to be expected of it: the share of its marks of those before, the lag of
 /// a doubtful one of those to a side. Of 9099 shots of `street` as declared a mean over 32 loses 3, over 2 none. Of
 /// 25 898 shots of a room of which one in three is seen 0.52 % are taken for a sidelobe with 3 to a side, as one
@@ -110,7 +98,7 @@ struct Memory {
     timelines: [Timeline; 2],
     field: field::Memory,
     search: Search,
-    thresholds: Vec<Thresholds>,
+    chance: Option<Chance>,
     photons: Photons,
 }
 
@@ -161,16 +149,7 @@ struct Band<'a> {
     is_dark_around: bool,
     /// Other surfaces of the shots at hand.
     further: Vec<(usize, Detection)>,
-    /// For all lags of a gate.
-    thresholds: Thresholds,
-    /// For the bits of one macropulse instead of the lags of a gate.
-    bit_thresholds: Thresholds,
-    /// For what chance may do in a single place.
-    once_thresholds: Thresholds,
-    /// For both ends of a macropulse.
-    end_thresholds: Thresholds,
-    /// For the places of a code word in the pictures that a block of lags is met by.
-    word_thresholds: Thresholds,
+    chance: Chance,
     usual: Usual,
     /// The time of which all light is at hand.
     at_hand: Range<i64>,
@@ -178,8 +157,6 @@ struct Band<'a> {
     fewest: usize,
     /// What is left over of it, once that is asked for.
     leftover: Option<Leftover<'a>>,
-    /// A normal variable exceeds it as rarely as false returns are accepted.
-    rare: f64,
     /// Which shots are searched for that are tracked no more, of which light does not stand out, and
     /// that are found but faint.
     searched: Paced,
@@ -216,20 +193,7 @@ impl<'a> Band<'a> {
         (ticks, cancelled): (&'a [u32], Option<Cancelled>),
         mut memory: Memory,
     ) -> Self {
-        let gate = sent.gate();
-        let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
-        let bits = sent.bits_of_payload() as f64;
-        let (of_lags, of_bits) = ((lags, false_alarm), (bits, false_alarm));
-        // Eight lags are met by two bits of each code word.
-        let of_words = (2.0 * acquire::BLOCK as f64 * bits, IN_VAIN);
-        let wanted = [of_lags, of_bits, (1.0, BY_CHANCE), (1.0, AT_AN_END), of_words]
-            .map(|(places, false_alarm)| Thresholds::new(places, false_alarm));
-        let mut remembered = memory.thresholds;
-        let [mut thresholds, bit_thresholds, once_thresholds, end_thresholds, word_thresholds] =
-            wanted.map(|wanted| match remembered.iter().position(|known| known.is_as(&wanted)) {
-                Some(known) => remembered.swap_remove(known),
-                None => wanted,
-            });
+        let mut chance = Chance::new(sent, memory.chance);
         let open = match &cancelled {
             Some(cancelled) if cancelled.residual.is_empty() => Open::None,
             Some(cancelled) => Open::Left(in_gates(sent, &cancelled.residual)),
@@ -254,7 +218,7 @@ impl<'a> Band<'a> {
         let fewest = match open {
             // Nobody asks.
             Open::None => 1,
-            _ => fewest_ticks(sent, field.cell(), &mut thresholds),
+            _ => chance.fewest_ticks(sent, field.cell()),
         };
         memory.search.forget();
         Self {
@@ -265,16 +229,11 @@ impl<'a> Band<'a> {
             found,
             is_dark_around: false,
             further,
-            thresholds,
-            bit_thresholds,
-            once_thresholds,
-            end_thresholds,
-            word_thresholds,
+            chance,
             usual: Usual::new(),
             at_hand: 0..0,
             fewest,
             leftover: None,
-            rare: normal_quantile(1.0 - sent.accepted()),
             searched: Paced::default(),
             even: Paced::default(),
             again: Paced::default(),
@@ -328,13 +287,7 @@ impl<'a> Band<'a> {
             field: self.field.into_memory(),
             search: self.search,
             photons: self.photons,
-            thresholds: vec![
-                self.thresholds,
-                self.bit_thresholds,
-                self.once_thresholds,
-                self.end_thresholds,
-                self.word_thresholds,
-            ],
+            chance: Some(self.chance),
         }
     }
 
@@ -418,96 +371,11 @@ impl<'a> Band<'a> {
         let first = self.at_hand.start;
         self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &mut self.field, first))
     }
-
-    /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of
-    /// places that each of them lights.
-    fn in_gate(&self, shot: usize) -> (u32, f64) {
-        let (gate, fired) = (self.sent.gate(), self.sent.fired[shot]);
-        let span = fired + gate.start..fired + gate.end + self.sent.length();
-        let (ticks, places) = self.field.ticks_about(&span);
-        (ticks, f64::from(self.sent.width) / places.max(1) as f64)
-    }
-
-    /// Share of places that are lit in the gate of `shot` by other ticks than so many of its marks;
-    /// one more, so that few ticks do not tell that it is darker than can be known.
-    fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
-        let (ticks, share) = self.in_gate(shot);
-        (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
-    }
-
-    /// The fewest marks of `shot` that chance does not reach in what they leave of the light of its
-    /// gate.
-    fn least_in_gate(&mut self, shot: usize) -> u32 {
-        let (ticks, share) = self.in_gate(shot);
-        let weight = self.sent.weight(shot);
-        let mut is_enough = |count: u32| {
-            let density = f64::from(ticks.saturating_sub(count) + 1) * share;
-            self.thresholds.least(weight, density.min(1.0)) <= count
-        };
-        let (mut low, mut high) = (1, weight + 1);
-        while low < high {
-            let middle = low.midpoint(high);
-            match is_enough(middle) {
-                true => high = middle,
-                false => low = middle + 1,
-            }
-        }
-        low
-    }
-
-    /// `detection`, if chance does not give it.
-    fn told_from_chance(&mut self, shot: usize, detection: Detection) -> Option<Detection> {
-        let least = self.by_chance(shot, detection);
-        let stands_out = 2 * detection.count >= self.sent.weight(shot).max(4 * least);
-        (detection.count >= least).then_some(Detection { stands_out, ..detection })
-    }
-
-    /// The marks that chance does not reach where `detection` is, in the density of the gate or of that
-    /// around it, its own marks apart.
-    fn by_chance(&mut self, shot: usize, detection: Detection) -> u32 {
-        let weight = self.sent.weight(shot);
-        let density = self.density_about(shot, detection, detection.count);
-        let least = self.thresholds.least(weight, density);
-        if least <= detection.count {
-            return least;
-        }
-        // A long pulse makes several ticks of a mark.
-        let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
-        let start = self.sent.fired[shot] + detection.lag - farther;
-        let own = self.field.seen().lit_in_all(start, self.sent.lit_bits(shot), pattern);
-        let density = self.density_about(shot, detection, own);
-        self.thresholds.least(weight, density)
-    }
-
-    /// The density that chance has where `detection` is, `own` ticks apart: that of the gate or, if
-    /// that is so much more that chance would hardly make it so, that around it.
-    fn density_about(&self, shot: usize, detection: Detection, own: u32) -> f64 {
-        let sent = self.sent;
-        let (light, places) = (sent.light(shot, detection.lag), sent.weight(shot) * sent.width);
-        let gate = self.density_in_gate(shot, own);
-        let beside = self.field.density_without(&light, own, places);
-        let ticks = (light.end - light.start) as f64 / f64::from(sent.width);
-        match (beside - gate) * ticks > HARDLY_EVER * (gate * ticks + 1.0).sqrt() {
-            true => beside,
-            false => gate,
-        }
-    }
 }
 
 /// Cells in which ticks are counted, to a macropulse: 8 take a tenth more time in noise, 2 as long as 4
 /// or a fifth more.
 const CELLS: i64 = 4;
-
-/// Fewest ticks in which a shot may be believed to be: those of the lightest one, alone in its gate. Ticks are
-/// counted `cell` by cell.
-fn fewest_ticks(sent: &Sent, cell: i64, thresholds: &mut Thresholds) -> usize {
-    let Some(weight) = sent.lightest() else { return 1 };
-    // No stretch of cells about a gate is longer.
-    let gate = sent.gate();
-    let longest = gate.end - gate.start + sent.length() + 2 * cell;
-    let density = f64::from(sent.width) / longest as f64;
-    sent.ticks_of_any(thresholds.least(weight, density)).max(1) as usize
-}
 
 /// For each shot, how many of the sorted `ticks` lie where its light may be.
 fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {

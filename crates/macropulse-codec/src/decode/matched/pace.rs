@@ -1,6 +1,7 @@
 //! What the shots before tell: how many marks are usual, and in which shots it is worth to search.
 
-use super::{HARDLY_EVER, NEIGHBOURS};
+use super::NEIGHBOURS;
+use super::chance::HARDLY_EVER;
 
 /// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
 /// searched for, and fewer after a part of it. With 256 a whole scan of `kim-park-2016-fixed` in `car-50m`

@@ -3,8 +3,9 @@
 use std::cell::OnceCell;
 use std::ops::Range;
 
+use super::Detection;
+use super::chance::BY_CHANCE;
 use super::track::NEAREST_SIDE;
-use super::{BY_CHANCE, Detection};
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timing;

@@ -69,7 +69,7 @@ impl Band<'_> {
             tried[way] = lag;
             if least == 0 {
                 // Fewer are nowhere believed.
-                least = self.thresholds.least(weight, self.density_in_gate(shot, weight));
+                least = self.chance.in_gate.least(weight, self.density_in_gate(shot, weight));
             }
             let Some(peak) = self.climb(shot, lag, least) else { continue };
             let Some(peak) = self.told_from_chance(shot, peak) else { continue };
@@ -228,7 +228,7 @@ impl Band<'_> {
         let density = self.field.density_without(&sent.light(shot, lag), 0, 0);
         [first, last].into_iter().zip(&sent.bits(shot).ends).all(|(bit, (marks, pattern))| {
             let found = self.field.lit().lit_in(start + i64::from(*bit), pattern);
-            found >= self.end_thresholds.least(*marks, density)
+            found >= self.chance.at_end.least(*marks, density)
         })
     }
 }

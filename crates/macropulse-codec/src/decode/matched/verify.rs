@@ -284,7 +284,7 @@ impl Band<'_> {
         let by_chance = f64::from(free) * share(lit, all) + f64::from(taken) * claimed;
         let gate = self.density_in_gate(shot, detection.count);
         let density = gate.max(by_chance / f64::from(weight)).min(1.0);
-        detection.count >= self.thresholds.least(weight, density)
+        detection.count >= self.chance.in_gate.least(weight, density)
     }
 
     /// Whether `theirs`, a return of another shot, may claim places of `ours`: one that is fuller, or as
@@ -320,7 +320,7 @@ impl Band<'_> {
         let found = self.field.lit().lit_in_any(start, lit_bits, &sent.bits(shot).pattern);
         let share = f64::from(detection.count) / f64::from(sent.weight(shot));
         let (word, left_out) = (sent.in_word(shot), (1.0 - share).powi(bits as i32));
-        word - found < self.once_thresholds.least(word, left_out)
+        word - found < self.chance.once.least(word, left_out)
     }
 
     /// Whether light of `shot` that seems to come from beyond the gate is rather that of a later shot
@@ -425,7 +425,7 @@ impl Band<'_> {
         let most = found.iter().copied().max().unwrap_or(0);
         most >= half && {
             let density = self.density_beside(shot, detection);
-            most >= self.bit_thresholds.least(sent.in_word(shot), density)
+            most >= self.chance.in_bits.least(sent.in_word(shot), density)
         }
     }
 
@@ -446,7 +446,7 @@ impl Band<'_> {
         self.field.lit().lit_in_each(start, sent.lit_bits(shot), pattern, found);
         let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
         let squares: f64 = found.iter().map(square).sum();
-        squares <= chi_square(lit - 1.0, self.rare) * mean * (1.0 - mean / in_word)
+        squares <= chi_square(lit - 1.0, self.chance.rare) * mean * (1.0 - mean / in_word)
     }
 }
 

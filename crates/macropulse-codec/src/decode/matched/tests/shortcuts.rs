@@ -70,7 +70,7 @@ proptest! {
             let most = sent.dark_bits(shot).iter().map(in_bit).max().unwrap_or(0);
             let detection = Detection::at(lag, count);
             let density = band.density_beside(shot, detection);
-            let by_chance = band.bit_thresholds.least(sent.in_word(shot), density);
+            let by_chance = band.chance.in_bits.least(sent.in_word(shot), density);
             let lit_bits = sent.lit_bits(shot).len() as u32;
             let expected = 2 * most * lit_bits >= count && most >= by_chance;
             prop_assert_eq!(band.is_lit_where_dark(shot, detection), expected);

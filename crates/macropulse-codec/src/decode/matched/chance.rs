@@ -1,0 +1,157 @@
+//! What chance gives: how dense its light is, and how many marks it may light.
+
+use super::acquire::BLOCK;
+use super::sent::Sent;
+use super::{Band, Detection};
+use crate::decode::threshold::Thresholds;
+use crate::statistics::normal_quantile;
+
+/// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
+pub(super) const BY_CHANCE: f64 = 1e-3;
+
+/// A normal variable exceeds it as often as that.
+pub(super) const HARDLY_EVER: f64 = 3.0902;
+
+/// How often chance may light an end of a macropulse where there is none: of the three or four marks of an end of
+/// `street` it then takes two to tell. At 1e-3 it takes three, which one end in five lacks where one mark in
+/// five is missed, and finds the same shots.
+const AT_AN_END: f64 = 1e-2;
+
+/// The share of blocks in which chance may light as much of a code word as is asked for. There all marks are counted,
+/// a few hundred: in so few blocks that adds two to each, of at least sixteen.
+const IN_VAIN: f64 = 0.01;
+
+/// The fewest marks that chance does not reach, and what else it hardly ever does.
+#[derive(Debug)]
+pub(super) struct Chance {
+    /// At any lag of a gate.
+    pub in_gate: Thresholds,
+    /// In any bit of one macropulse.
+    pub in_bits: Thresholds,
+    /// In a single place.
+    pub once: Thresholds,
+    /// At an end of a macropulse.
+    pub at_end: Thresholds,
+    /// At any place of a code word in the pictures that a block of lags is met by.
+    pub in_words: Thresholds,
+    /// A normal variable exceeds it as rarely as false returns are accepted.
+    pub rare: f64,
+}
+
+impl Chance {
+    /// That of the shots `sent`: what is `known` if that is of such shots.
+    pub fn new(sent: &Sent, known: Option<Self>) -> Self {
+        let gate = sent.gate();
+        let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
+        let bits = sent.bits_of_payload() as f64;
+        let new = Self {
+            in_gate: Thresholds::new(lags, false_alarm),
+            in_bits: Thresholds::new(bits, false_alarm),
+            once: Thresholds::new(1.0, BY_CHANCE),
+            at_end: Thresholds::new(1.0, AT_AN_END),
+            // Eight lags are met by two bits of each code word.
+            in_words: Thresholds::new(2.0 * BLOCK as f64 * bits, IN_VAIN),
+            rare: normal_quantile(1.0 - sent.accepted()),
+        };
+        let is_as_new =
+            |known: &Self| known.in_gate.is_as(&new.in_gate) && known.in_bits.is_as(&new.in_bits);
+        known.filter(is_as_new).unwrap_or(new)
+    }
+
+    /// Fewest ticks in which a shot may be believed to be: those of the lightest one, alone in its gate. Ticks are
+    /// counted `cell` by cell.
+    pub fn fewest_ticks(&mut self, sent: &Sent, cell: i64) -> usize {
+        let Some(weight) = sent.lightest() else { return 1 };
+        // No stretch of cells about a gate is longer.
+        let gate = sent.gate();
+        let longest = gate.end - gate.start + sent.length() + 2 * cell;
+        let density = f64::from(sent.width) / longest as f64;
+        sent.ticks_of_any(self.in_gate.least(weight, density)).max(1) as usize
+    }
+}
+
+impl Band<'_> {
+    /// Ticks about the gate of `shot`, in which marks may be that come from within it, and the share of
+    /// places that each of them lights.
+    fn in_gate(&self, shot: usize) -> (u32, f64) {
+        let (gate, fired) = (self.sent.gate(), self.sent.fired[shot]);
+        let span = fired + gate.start..fired + gate.end + self.sent.length();
+        let (ticks, places) = self.field.ticks_about(&span);
+        (ticks, f64::from(self.sent.width) / places.max(1) as f64)
+    }
+
+    /// Share of places that are lit in the gate of `shot` by other ticks than so many of its marks;
+    /// one more, so that few ticks do not tell that it is darker than can be known.
+    pub(super) fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
+        let (ticks, share) = self.in_gate(shot);
+        (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
+    }
+
+    /// Share of lit places around a shot found at `detection`, its own marks apart.
+    pub(super) fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
+        let places = self.sent.weight(shot) * self.sent.width;
+        self.field.density_without(&self.sent.light(shot, detection.lag), detection.count, places)
+    }
+
+    /// The fewest marks of `shot` that chance does not reach in what they leave of the light of its
+    /// gate.
+    pub(super) fn least_in_gate(&mut self, shot: usize) -> u32 {
+        let (ticks, share) = self.in_gate(shot);
+        let weight = self.sent.weight(shot);
+        let mut is_enough = |count: u32| {
+            let density = f64::from(ticks.saturating_sub(count) + 1) * share;
+            self.chance.in_gate.least(weight, density.min(1.0)) <= count
+        };
+        let (mut low, mut high) = (1, weight + 1);
+        while low < high {
+            let middle = low.midpoint(high);
+            match is_enough(middle) {
+                true => high = middle,
+                false => low = middle + 1,
+            }
+        }
+        low
+    }
+
+    /// `detection`, if chance does not give it.
+    pub(super) fn told_from_chance(
+        &mut self,
+        shot: usize,
+        detection: Detection,
+    ) -> Option<Detection> {
+        let least = self.by_chance(shot, detection);
+        let stands_out = 2 * detection.count >= self.sent.weight(shot).max(4 * least);
+        (detection.count >= least).then_some(Detection { stands_out, ..detection })
+    }
+
+    /// The marks that chance does not reach where `detection` is, in the density of the gate or of that
+    /// around it, its own marks apart.
+    fn by_chance(&mut self, shot: usize, detection: Detection) -> u32 {
+        let weight = self.sent.weight(shot);
+        let density = self.density_about(shot, detection, detection.count);
+        let least = self.chance.in_gate.least(weight, density);
+        if least <= detection.count {
+            return least;
+        }
+        // A long pulse makes several ticks of a mark.
+        let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
+        let start = self.sent.fired[shot] + detection.lag - farther;
+        let own = self.field.seen().lit_in_all(start, self.sent.lit_bits(shot), pattern);
+        let density = self.density_about(shot, detection, own);
+        self.chance.in_gate.least(weight, density)
+    }
+
+    /// The density that chance has where `detection` is, `own` ticks apart: that of the gate or, if
+    /// that is so much more that chance would hardly make it so, that around it.
+    fn density_about(&self, shot: usize, detection: Detection, own: u32) -> f64 {
+        let sent = self.sent;
+        let (light, places) = (sent.light(shot, detection.lag), sent.weight(shot) * sent.width);
+        let gate = self.density_in_gate(shot, own);
+        let beside = self.field.density_without(&light, own, places);
+        let ticks = (light.end - light.start) as f64 / f64::from(sent.width);
+        match (beside - gate) * ticks > HARDLY_EVER * (gate * ticks + 1.0).sqrt() {
+            true => beside,
+            false => gate,
+        }
+    }
+}
