@@ -39,7 +39,7 @@ pub(super) struct Chance {
 }
 
 impl Chance {
-    /// That of the shots `sent`: what is `known` if that is of such shots.
+    /// For the shots `sent`. What is `known` from a band before is kept if it was asked in as many places.
     pub fn new(sent: &Sent, known: Option<Self>) -> Self {
         let gate = sent.gate();
         let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
@@ -53,6 +53,7 @@ impl Chance {
             in_words: Thresholds::new(2.0 * BLOCK as f64 * bits, IN_VAIN),
             rare: normal_quantile(1.0 - sent.accepted()),
         };
+        // The rest follows from the same false alarms and bits.
         let is_as_new =
             |known: &Self| known.in_gate.is_as(&new.in_gate) && known.in_bits.is_as(&new.in_bits);
         known.filter(is_as_new).unwrap_or(new)

@@ -371,7 +371,7 @@ impl<'a> Sent<'a> {
         alone.max(self.ticks_in_bit(shot, marks))
     }
 
-    /// The same of any bits of its payload.
+    /// Fewest ticks that can be so many marks of one bit of `shot`.
     pub fn ticks_in_bit(&self, shot: usize, marks: u32) -> u32 {
         marks.div_ceil(self.code_word(shot).per_tick)
     }
