@@ -1,15 +1,19 @@
 //! Triangles and rays that are alike for every library.
 
-use std::error::Error;
 use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
+use macropulse::codec::ShotLog;
+use macropulse::design::Design;
+use macropulse::emit::logs;
 use macropulse::scene::Scene;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
+
+use crate::Fallible;
 
 /// The corners of a triangle, m.
 pub type Corners = [[f32; 3]; 3];
@@ -133,8 +137,24 @@ pub fn shuffled() -> Vec<Direction> {
     all
 }
 
+/// Those of a scan of `hdl-64e`, of which 64 lasers fire in turn while the head turns: in the order of its shots,
+/// in which neighbours are up to a degree apart; and laser by laser.
+pub fn of_a_turning_head() -> Fallible<[Vec<Direction>; 2]> {
+    let design = Design::open("hdl-64e", &[])?;
+    let directions = design.directions();
+    let of_log = |log: ShotLog| {
+        let direction = |shot| DVec3::from(directions.of_shot(&log, shot)).as_vec3().to_array();
+        (0..log.len()).map(|shot| (log.row[shot], direction(shot))).collect::<Vec<_>>()
+    };
+    let shots = logs(&design, 0..design.shots_per_scan()).flat_map(of_log);
+    let mut shots: Vec<(u16, Direction)> = shots.collect();
+    let in_turn = shots.iter().map(|(_, direction)| *direction).collect();
+    shots.sort_by_key(|(laser, _)| *laser);
+    Ok([in_turn, shots.into_iter().map(|(_, direction)| direction).collect()])
+}
+
 /// Writes `triangles` to `mesh.stl` in the `folder`, and a scene of them to `scene.toml`.
-pub fn write(triangles: &[Corners], folder: &Path) -> Result<(), Box<dyn Error>> {
+pub fn write(triangles: &[Corners], folder: &Path) -> Fallible<()> {
     let mut stl = vec![0; 80];
     stl.extend((triangles.len() as u32).to_le_bytes());
     for corners in triangles {
@@ -152,6 +172,6 @@ pub fn write(triangles: &[Corners], folder: &Path) -> Result<(), Box<dyn Error>>
 }
 
 /// The scene that [`write()`] has written.
-pub fn open(folder: &Path) -> Result<Scene, Box<dyn Error>> {
+pub fn open(folder: &Path) -> Fallible<Scene> {
     Ok(Scene::from_file(&folder.join("scene.toml"))?)
 }

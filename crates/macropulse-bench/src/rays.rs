@@ -24,8 +24,8 @@ use crate::machine::printed;
 use crate::meshes::{self, Corners, Direction, EYE};
 use crate::page::{self, three};
 
-/// The orders in which rays are cast.
-const ORDERS: [&str; 2] = ["rows", "shuffled"];
+/// The orders in which rays are cast: pixels, then the lasers of a turning head.
+const ORDERS: [&str; 4] = ["rows", "shuffled", "lasers in turn", "laser by laser"];
 
 /// The mesh whose loading is measured.
 pub const LARGEST: &str = "4.8 M parked cars";
@@ -129,13 +129,13 @@ const WAYS: [Way; 3] = [
     ("obvhs", Libraries::obvhs),
 ];
 
-/// Millions of rays per second: the best of several rounds, the ways taking turns. The rays that
-/// hit are `hits` by all of them, but for a few that touch an edge.
+/// Millions of rays per second: the best of several rounds of each way, one after another as in the program for
+/// Embree. The rays that hit are `hits` by all of them, but for a few that touch an edge.
 fn rates(libraries: &Libraries, rays: &Directions, hits: Option<usize>) -> Fallible<[f64; 3]> {
     let mut best = [0.0_f64; WAYS.len()];
     let hits = hits.unwrap_or_else(|| libraries.packets(rays));
-    for _ in 0..9 {
-        for ((name, way), best) in WAYS.iter().zip(&mut best) {
+    for ((name, way), best) in WAYS.iter().zip(&mut best) {
+        for _ in 0..9 {
             let began = thread_seconds();
             let found = black_box(way(libraries, rays));
             *best = best.max(1e-6 * rays.wide.len() as f64 / (thread_seconds() - began));
@@ -151,7 +151,8 @@ fn rates(libraries: &Libraries, rays: &Directions, hits: Option<usize>) -> Falli
 pub fn measure() -> Fallible<Rays> {
     let folder = tempfile::tempdir()?;
     let embree = Embree::prepare(folder.path());
-    let orders = [meshes::in_rows(), meshes::shuffled()].map(Directions::new);
+    let [in_turn, by_laser] = meshes::of_a_turning_head()?;
+    let orders = [meshes::in_rows(), meshes::shuffled(), in_turn, by_laser].map(Directions::new);
     let mut measured = Vec::new();
     for (name, make) in MESHES {
         let triangles = make();
@@ -227,9 +228,9 @@ impl Rays {
         self.meshes.iter().find(|mesh| mesh.name == name)
     }
 
-    /// The rate of packets over that of Embree's fastest way, at the city in rows (0) or shuffled
-    /// (1).
-    pub fn beside_embree(&self, order: usize) -> Option<f64> {
+    /// The rate of packets over that of Embree's fastest way, at the city in this order.
+    pub fn beside_embree(&self, order: &str) -> Option<f64> {
+        let order = ORDERS.iter().position(|other| *other == order)?;
         let city = self.mesh(CITY)?;
         let fastest = city.embree.as_ref()?.rates.get(order)?.iter().copied().fold(0.0, f64::max);
         Some(city.rates[order][0] / fastest)

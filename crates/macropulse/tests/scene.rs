@@ -281,18 +281,31 @@ fn objects_share_a_mesh_only_if_it_is_read_the_same_way() {
 fn rays_in_any_order_have_the_ranges_they_have_alone() {
     let scene = Scene::open("car-50m").unwrap();
     let origin = [0.0, 0.0, 2.0];
-    let ray = |index: usize| {
-        let [left, up] = [index * 7919 % 2003, index * 104_729 % 1999];
-        let (azimuth, elevation) = (left as f64 / 2003.0 - 0.5, (up as f64 / 1999.0 - 0.5) * 0.3);
+    let toward = |azimuth: f64, elevation: f64| {
         let level = elevation.cos();
         [level * azimuth.cos(), level * azimuth.sin(), elevation.sin()]
     };
-    let directions: Vec<[f64; 3]> = (0..5000).map(ray).collect();
-    let ranges = scene.cast_all(origin, &directions, 300.0);
+    let scattered = |index: usize| {
+        let [left, up] = [index * 7919 % 2003, index * 104_729 % 1999];
+        toward(left as f64 / 2003.0 - 0.5, (up as f64 / 1999.0 - 0.5) * 0.3)
+    };
+    let in_rows = |index: usize| {
+        toward((index % 100) as f64 * 2e-3 - 0.1, (index / 100) as f64 * 2e-3 - 0.06)
+    };
+    // Lasers in turn, of a head that turns; the last turn is not complete.
+    let in_turn = |index: usize| {
+        toward((index / 11) as f64 * 5e-4 - 0.1, 0.1 * (index % 11) as f64 / 11.0 - 0.08)
+    };
     let alone = |direction: &[f64; 3]| {
         let ray = Ray { origin, direction: *direction };
         scene.cast(&ray, 0.0, 300.0).map_or(f64::INFINITY, |hit| hit.range)
     };
-    assert!(directions.iter().map(alone).eq(ranges.iter().copied()));
-    assert!(ranges.iter().any(|range| range.is_finite()));
+    let orders: [&dyn Fn(usize) -> [f64; 3]; 3] = [&scattered, &in_rows, &in_turn];
+    for order in orders {
+        let directions: Vec<[f64; 3]> = (0..5003).map(order).collect();
+        let ranges = scene.cast_all(origin, &directions, 300.0);
+        assert!(directions.iter().map(alone).eq(ranges.iter().copied()));
+        let hits = ranges.iter().filter(|range| range.is_finite()).count();
+        assert!((500..5000).contains(&hits), "{hits}");
+    }
 }

@@ -54,19 +54,20 @@ impl Aims {
         enter.at_most(leave) & (x | y | z)
     }
 
-    /// Whether the rays of `set` are neighbours.
+    /// How far the rays of `set` are spread.
     #[inline(always)]
-    pub fn are_neighbours<R: Registers>(&self, set: u32) -> bool {
+    pub fn spread<R: Registers>(&self, set: u32) -> Spread {
         let [x, y, z] = &self.direction;
-        let [x, y, z] = [extremes::<R>(x, set), extremes::<R>(y, set), extremes::<R>(z, set)];
-        let apart = (x[1] - x[0]) + (y[1] - y[0]) + (z[1] - z[0]);
-        apart <= NEIGHBOURS * set.count_ones() as f32
+        Spread {
+            set,
+            slopes: [extremes::<R>(x, set), extremes::<R>(y, set), extremes::<R>(z, set)],
+        }
     }
 
     /// The rays of `among` that point into the same octant as the first of them, and have the same
-    /// main axis.
+    /// main axis; it is known how some are `spread`.
     #[inline(always)]
-    pub fn beam<R: Registers>(&self, among: u32) -> Beam {
+    pub fn beam<R: Registers>(&self, among: u32, spread: &Spread) -> Beam {
         let first = among.trailing_zeros();
         let like_first = |of: u32| if of >> first & 1 == 1 { of } else { !of };
         let [x, y, z] = self.backward;
@@ -74,13 +75,33 @@ impl Aims {
         let set = among & like_first(x) & like_first(y) & like_first(z);
         let set = set & like_first(along_x) & like_first(along_y) & like_first(along_z);
         let is_first = |of: u32| (of >> first & 1) as usize;
-        let [in_x, in_y, in_z] = &self.inverse;
+        // Of slopes of one sign the inverses fall as they rise, and rounding keeps them in order.
+        let inverses = |[least, greatest]: [f32; 2]| [inverse(greatest), inverse(least)];
+        let [x_slopes, y_slopes, z_slopes] =
+            if set == spread.set { spread.slopes } else { self.spread::<R>(set).slopes };
         Beam {
             set,
             backward: [is_first(x), is_first(y), is_first(z)],
             along: is_first(along_y) + 2 * is_first(along_z),
-            inverse: [extremes::<R>(in_x, set), extremes::<R>(in_y, set), extremes::<R>(in_z, set)],
+            inverse: [inverses(x_slopes), inverses(y_slopes), inverses(z_slopes)],
         }
+    }
+}
+
+/// How far rays are spread.
+pub(super) struct Spread {
+    set: u32,
+    /// The least and the greatest slope, by axis.
+    slopes: [[f32; 2]; 3],
+}
+
+impl Spread {
+    /// Whether the rays are neighbours.
+    #[inline(always)]
+    pub fn is_narrow(&self) -> bool {
+        let [x, y, z] = self.slopes;
+        let apart = (x[1] - x[0]) + (y[1] - y[0]) + (z[1] - z[0]);
+        apart <= NEIGHBOURS * self.set.count_ones() as f32
     }
 }
 

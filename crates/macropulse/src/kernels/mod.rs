@@ -50,5 +50,5 @@ pub(crate) use tree::{Bounds, Tree};
 pub(crate) use triangles::{Corners, Triangles, cosines, normals};
 pub(crate) use waits::{END, Events};
 pub(crate) use whole::whole;
-pub(crate) use wide::LANES;
+pub(crate) use wide::{LANES, fetch};
 pub(crate) use words::{Macropulse, Words};

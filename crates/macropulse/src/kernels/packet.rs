@@ -77,6 +77,9 @@ impl Packet {
         waiting: &mut Waiting,
         visit: &mut dyn FnMut(&mut Self, u32, u32),
     ) {
+        if tree.eights.is_empty() {
+            return;
+        }
         on_level(Together { packet: self, waiting, tree, leaves: Visits(visit) });
     }
 }
@@ -140,11 +143,12 @@ impl<L: Leaves> Task for Together<'_, L> {
         if rest == 0 {
             return;
         }
-        if !aims.are_neighbours::<R>(rest) && leaves.meet_alone::<R>(packet, rest) {
+        let spread = aims.spread::<R>(rest);
+        if !spread.is_narrow() && leaves.meet_alone::<R>(packet, rest) {
             return;
         }
         while rest != 0 {
-            let beam = aims.beam::<R>(rest);
+            let beam = aims.beam::<R>(rest, &spread);
             rest &= !beam.set;
             if waiting.0.len() < tree.room {
                 waiting.0.resize(tree.room, Default::default());

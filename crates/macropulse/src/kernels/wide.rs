@@ -95,7 +95,7 @@ pub(super) fn on_level<T: Task>(mut task: T) {
 
 /// Has an element brought into the nearest cache that is asked for soon; nothing else happens.
 #[inline(always)]
-pub(super) fn fetch<T>(values: &[T], index: usize) {
+pub(crate) fn fetch<T>(values: &[T], index: usize) {
     #[cfg(target_arch = "x86_64")]
     if let Some(value) = values.get(index) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
