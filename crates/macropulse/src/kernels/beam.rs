@@ -70,20 +70,25 @@ impl Aims {
     pub fn beam<R: Registers>(&self, among: u32, spread: &Spread) -> Beam {
         let first = among.trailing_zeros();
         let like_first = |of: u32| if of >> first & 1 == 1 { of } else { !of };
-        let [x, y, z] = self.backward;
+        let backward = self.backward;
         let [along_x, along_y, along_z] = self.main;
-        let set = among & like_first(x) & like_first(y) & like_first(z);
+        let set = backward.iter().fold(among, |set, axis| set & like_first(*axis));
         let set = set & like_first(along_x) & like_first(along_y) & like_first(along_z);
         let is_first = |of: u32| (of >> first & 1) as usize;
-        // Of slopes of one sign the inverses fall as they rise, and rounding keeps them in order.
-        let inverses = |[least, greatest]: [f32; 2]| [inverse(greatest), inverse(least)];
-        let [x_slopes, y_slopes, z_slopes] =
+        // Of slopes of one sign the inverses fall as they rise, and rounding keeps them in order. Eight are
+        // divided at once.
+        let [x, y, z] =
             if set == spread.set { spread.slopes } else { self.spread::<R>(set).slopes };
+        let mut inverses = [x[1], x[0], y[1], y[0], z[1], z[0], 1.0, 1.0];
+        for slope in &mut inverses {
+            *slope = inverse(*slope);
+        }
+        let [x_least, x_most, y_least, y_most, z_least, z_most, ..] = inverses;
         Beam {
             set,
-            backward: [is_first(x), is_first(y), is_first(z)],
+            backward: backward.map(is_first),
             along: is_first(along_y) + 2 * is_first(along_z),
-            inverse: [inverses(x_slopes), inverses(y_slopes), inverses(z_slopes)],
+            inverse: [[x_least, x_most], [y_least, y_most], [z_least, z_most]],
         }
     }
 }
