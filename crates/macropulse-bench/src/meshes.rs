@@ -137,8 +137,8 @@ pub fn shuffled() -> Vec<Direction> {
     all
 }
 
-/// Those of a scan of `hdl-64e`, of which 64 lasers fire in turn while the head turns: in the order of its shots,
-/// in which neighbours are up to a degree apart; and laser by laser.
+/// Those of a scan of `hdl-64e`, whose 64 lasers fire in turn while the head turns: in the order of its shots, of which
+/// each is of another laser than the one before; and laser by laser.
 pub fn of_a_turning_head() -> Fallible<[Vec<Direction>; 2]> {
     let design = Design::open("hdl-64e", &[])?;
     let directions = design.directions();

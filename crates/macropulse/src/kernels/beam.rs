@@ -65,7 +65,7 @@ impl Aims {
     }
 
     /// The rays of `among` that point into the same octant as the first of them, and have the same
-    /// main axis; it is known how some are `spread`.
+    /// main axis. What is known of the `spread` of some is used if they are the same.
     #[inline(always)]
     pub fn beam<R: Registers>(&self, among: u32, spread: &Spread) -> Beam {
         let first = among.trailing_zeros();
@@ -75,15 +75,12 @@ impl Aims {
         let set = backward.iter().fold(among, |set, axis| set & like_first(*axis));
         let set = set & like_first(along_x) & like_first(along_y) & like_first(along_z);
         let is_first = |of: u32| (of >> first & 1) as usize;
-        // Of slopes of one sign the inverses fall as they rise, and rounding keeps them in order. Eight are
-        // divided at once.
+        // Of slopes of one sign the greatest has the least inverse, and rounding keeps them in order. Eight,
+        // two of them unused, are divided at once.
         let [x, y, z] =
             if set == spread.set { spread.slopes } else { self.spread::<R>(set).slopes };
-        let mut inverses = [x[1], x[0], y[1], y[0], z[1], z[0], 1.0, 1.0];
-        for slope in &mut inverses {
-            *slope = inverse(*slope);
-        }
-        let [x_least, x_most, y_least, y_most, z_least, z_most, ..] = inverses;
+        let [x_least, x_most, y_least, y_most, z_least, z_most, ..] =
+            inverses(&[x[1], x[0], y[1], y[0], z[1], z[0], 1.0, 1.0]);
         Beam {
             set,
             backward: backward.map(is_first),
@@ -131,9 +128,9 @@ fn narrow(values: &Lanes<f64>) -> Lanes<f32> {
 }
 
 #[inline(always)]
-fn inverses(slopes: &Lanes<f32>) -> Lanes<f32> {
-    let mut inverses = [0.0; LANES];
-    for lane in 0..LANES {
+fn inverses<const N: usize>(slopes: &[f32; N]) -> [f32; N] {
+    let mut inverses = [0.0; N];
+    for lane in 0..N {
         inverses[lane] = inverse(slopes[lane]);
     }
     inverses

@@ -16,20 +16,22 @@ use crate::kernels::LANES;
 /// are up to 4 mrad apart, the lasers of a turning head 7 mrad.
 const BESIDE: f64 = 0.005;
 
-/// Pairs of rays that are looked at.
+/// Pairs of rays that are looked at. More would judge a list that is half in order more surely: what is judged
+/// wrongly costs time and nothing else.
 const SAMPLED: usize = 32;
 
-/// The golden ratio less one, in parts of 2⁶⁴: multiples of it are nowhere near whole numbers of steps.
+/// The golden ratio less one, in parts of 2⁶⁴: the fractions of its multiples are spread evenly, and in step with no
+/// length of rows.
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Lasers that take turns, at most.
+/// Lasers that take turns, at most: twice those of the largest turning heads.
 const LASERS: usize = 256;
 
 /// Bits by which a direction is told from others, on each of two axes: 0.5 mrad.
 const BITS: u32 = 12;
 
 /// In which order neighbours among rays follow each other, by their indices.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub(super) enum Order {
     /// As they come.
     AsTheyCome,
@@ -57,7 +59,7 @@ fn neighbour(directions: &[[f64; 3]]) -> Option<usize> {
         let pairs = directions.len() - away;
         let (mut apart, sampled) = (0, pairs.min(SAMPLED));
         (0..sampled).all(|pair| {
-            // Spread evenly, but never in step with rows, the ends of which have no neighbour.
+            // Ends of rows have no neighbour.
             let share = u128::from((pair as u64).wrapping_mul(GOLDEN));
             let at = ((share * pairs as u128) >> 64) as usize;
             apart += usize::from(!are_beside(&directions[at], &directions[at + away]));
@@ -208,7 +210,7 @@ mod tests {
         assert_eq!(neighbour(&rays[..5 * 15]), None);
     }
 
-    /// With a step that is a divisor of the number of rays, all 32 pairs would be at ends of rows in most of these.
+    /// With 32 pairs at equal distances all of them would be at ends of rows whose length is a multiple of 32.
     #[test]
     fn rows_of_any_length_are_seen_to_be_neighbours() {
         for rows in 16..200 {

@@ -65,8 +65,8 @@ use world::{PacketHits, World};
 /// So many rays at most are put in order together.
 const ORDERED: usize = 1 << 20;
 
-/// Of lasers that take turns a ray is brought near so many rays before: as many as sixteen turns of 64 lasers. A
-/// turning head is cast 4 % faster by that.
+/// Directions of lasers that take turns are fetched into the cache so many places ahead: sixteen turns of 64 lasers.
+/// A turning head is cast 4 % faster by that.
 const AHEAD: usize = 1024;
 
 /// Everything the light can meet, and where the sensor stands.
