@@ -13,7 +13,7 @@ use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
 use macropulse::random::{Chance, Stage};
 use macropulse::scene::{Finish, Hits, Material, Scene};
-use macropulse::tdc::{self, Wanted};
+use macropulse::tdc::{self, Converted, Wanted};
 use macropulse::units;
 use rand::RngExt;
 
@@ -151,7 +151,7 @@ impl Sample {
 
     /// From shot log to ticks, band by band.
     pub fn ticks(&self, detectors: &Detectors, mut done: impl FnMut(&mut Memory, Given)) {
-        let mut memory = Memory::default();
+        let (mut memory, mut known_busy) = (Memory::default(), 0);
         for (band, hits) in &self.bands {
             let log = band.shot_log(&self.design);
             let mut light = light_of_echoes(&self.design, &log, []);
@@ -159,10 +159,12 @@ impl Sample {
             channel::echoes(&mut light.trains, surfaces, &log, hits, None);
             let response = detectors.response(&log, &light, &mut memory);
             let span = band.ticks(&self.design).0;
-            let wanted = Wanted { from: span.start, ..Wanted::ALL };
-            let mut ticks = tdc::ticks(&self.design, response, wanted).ticks;
+            let wanted = Wanted { known_busy, from: span.start };
+            let Converted { mut ticks, peak_busy, .. } = tdc::ticks(&self.design, response, wanted);
             ticks.keep(&span);
-            // As in a whole scan: no shot of which only some light is there.
+            // As in a whole scan: how many converters were busy is known of the bands before, and there is no
+            // shot of which only some light is there.
+            known_busy = peak_busy;
             done(&mut memory, (self.design.cut().known(&log), ticks));
         }
     }
