@@ -26,15 +26,32 @@ impl Digest {
     /// Takes in some bytes.
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.waiting.extend_from_slice(bytes);
+        self.hash_what_waits();
+    }
+
+    /// Hashes what waits, if that is enough.
+    #[inline]
+    fn hash_what_waits(&mut self) {
         if self.waiting.len() >= BLOCK {
             self.hasher.update(&self.waiting);
             self.waiting.clear();
         }
     }
 
+    /// Takes in numbers, to their last bit.
+    pub fn numbers(&mut self, values: &[f64]) {
+        for some in values.chunks(BLOCK / size_of::<f64>()) {
+            let from = self.waiting.len();
+            self.waiting.resize(from + size_of_val(some), 0);
+            let places = self.waiting[from..].as_chunks_mut().0;
+            places.iter_mut().zip(some).for_each(|(place, value)| *place = value.to_le_bytes());
+            self.hash_what_waits();
+        }
+    }
+
     /// Takes in a number, to its last bit.
     pub fn number(&mut self, value: f64) {
-        self.bytes(&value.to_bits().to_le_bytes());
+        self.bytes(&value.to_le_bytes());
     }
 
     /// The first 128 bits of the hash as 32 hexadecimal digits.
@@ -70,6 +87,18 @@ mod tests {
         let mut hash = Digest::new();
         bytes.chunks(7).for_each(|part| hash.bytes(part));
         assert_eq!(hash.text(), of(&bytes));
+    }
+
+    #[test]
+    fn numbers_together_are_as_one_by_one() {
+        let values: Vec<f64> = (0..20_001).map(|at| f64::from(at) / 7.0 - 900.0).collect();
+        let (mut together, mut alone) = (Digest::new(), Digest::new());
+        for hash in [&mut together, &mut alone] {
+            hash.bytes(b"abc");
+        }
+        together.numbers(&values);
+        values.iter().for_each(|value| alone.number(*value));
+        assert_eq!(together.text(), alone.text());
     }
 
     #[test]

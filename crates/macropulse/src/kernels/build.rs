@@ -15,6 +15,10 @@ use super::wide::{Any, Registers, SIDE, Task, Wide, on_level};
 /// Places of an axis at which a range may be cut, and one more.
 const BINS: usize = 16;
 
+/// From so many items on they are put into two sets of bins by turns: neighbours are mostly put into the same bin, and one
+/// has to wait for the other. To load 4.8 million triangles takes a twentieth less time, from 32 items on as well.
+const TWO_SETS: usize = 128;
+
 /// Cuts above a range before it is only halved. Boxes that all overlap, as of a fan or of triangles
 /// that coincide, may be cut one by one: this bounds the time and the depth. Real meshes stay below
 /// half of it.
@@ -98,7 +102,7 @@ struct Part {
 /// A hierarchy with its leaves.
 pub(crate) struct Built {
     pub tree: Tree,
-    /// The index that each item had, by leaf.
+    /// The indices of the items, by leaf.
     pub order: Vec<u32>,
     /// Where in that order each leaf ends.
     pub ends: Vec<u32>,
@@ -114,10 +118,10 @@ struct Builder {
 }
 
 impl Built {
-    /// A hierarchy over items with the boxes `bounds`, whose coordinates count from `centre`, with
-    /// up to `most` in a leaf. Without items, no ray enters it.
+    /// A hierarchy over items, each with its index and a box whose coordinates count from `centre`, with up to `most`
+    /// in a leaf. Without items, no ray enters it.
     pub(crate) fn over(
-        bounds: impl Iterator<Item = Bounds>,
+        boxes: impl Iterator<Item = (u32, Bounds)>,
         most: usize,
         centre: [f64; 3],
     ) -> Self {
@@ -127,7 +131,9 @@ impl Built {
             (all, middles) = (all.joined(&bounds), middles.holding(item.middle()));
             item
         };
-        let items: Vec<Item> = (0..).zip(bounds).map(item).collect();
+        // There are hardly ever fewer than there may be.
+        let mut items: Vec<Item> = Vec::with_capacity(boxes.size_hint().1.unwrap_or(0));
+        items.extend(boxes.map(item));
         let mut builder = Builder { items, most, eights: Vec::new(), ends: Vec::new(), depth: 0 };
         if !builder.items.is_empty() {
             let items = 0..builder.items.len();
@@ -248,6 +254,33 @@ struct Bins {
     counts: [[u32; BINS]; 3],
 }
 
+impl Bins {
+    const EMPTY: Self = Self { bounds: [[Growing::NOWHERE; BINS]; 3], counts: [[0; BINS]; 3] };
+
+    /// Adds an item to the bin of each axis in which the middle of its box is.
+    #[inline(always)]
+    fn add<R: Registers>(&mut self, item: &Item, ruler: &Ruler) {
+        let place = (item.middle() - ruler.low) * ruler.scale;
+        for axis in 0..3 {
+            let bin = bin(place[axis]);
+            self.bounds[axis][bin] = self.bounds[axis][bin].joined::<R>(&item.0);
+            self.counts[axis][bin] += 1;
+        }
+    }
+
+    /// Adds what is in the `others`.
+    #[inline(always)]
+    fn join<R: Registers>(&mut self, others: &Self) {
+        for axis in 0..3 {
+            for bin in 0..BINS {
+                let bounds = &mut self.bounds[axis][bin];
+                *bounds = bounds.joined::<R>(&others.bounds[axis][bin]);
+                self.counts[axis][bin] += others.counts[axis][bin];
+            }
+        }
+    }
+}
+
 impl Task for Cut<'_> {
     #[inline(always)]
     fn run<R: Registers>(&mut self) {
@@ -272,16 +305,19 @@ impl Task for Cut<'_> {
 impl Cut<'_> {
     #[inline(always)]
     fn bins<R: Registers>(&self) -> Bins {
-        let mut bins = Bins { bounds: [[Growing::NOWHERE; BINS]; 3], counts: [[0; BINS]; 3] };
-        for item in &*self.items {
-            let place = (item.middle() - self.ruler.low) * self.ruler.scale;
-            for axis in 0..3 {
-                let bin = bin(place[axis]);
-                let bounds = &mut bins.bounds[axis][bin];
-                *bounds = bounds.joined::<R>(&item.0);
-                bins.counts[axis][bin] += 1;
-            }
+        let mut bins = Bins::EMPTY;
+        if self.items.len() < TWO_SETS {
+            self.items.iter().for_each(|item| bins.add::<R>(item, &self.ruler));
+            return bins;
         }
+        let mut others = Bins::EMPTY;
+        let (pairs, last) = self.items.as_chunks();
+        for [one, other] in pairs {
+            bins.add::<R>(one, &self.ruler);
+            others.add::<R>(other, &self.ruler);
+        }
+        last.iter().for_each(|item| bins.add::<R>(item, &self.ruler));
+        bins.join::<R>(&others);
         bins
     }
 
@@ -321,11 +357,18 @@ impl Cut<'_> {
     }
 }
 
-/// The bin at a place, counted in bins. What is no number, on an axis without extent, is in the
-/// first.
+/// The bin at a place, counted in bins; where two meet it may be either. What is no number, on an axis without extent, is
+/// in the first.
+///
+/// From 2²³ on an `f32` is a whole number, sums are rounded to one, and the last bits tell how far from there it is: a
+/// conversion takes longer, 2 % of the time to load a mesh.
 #[inline(always)]
 fn bin(place: f32) -> usize {
-    usize::from(place.clamp(0.0, BINS as f32 - 1.0) as u8) % BINS
+    const WHOLE: f32 = (1 << 23) as f32;
+    let last = BINS as f32 - 1.0;
+    let least = if place > 0.5 { place - 0.5 } else { 0.0 };
+    let whole = if least < last { least } else { last } + WHOLE;
+    whole.to_bits() as usize % BINS
 }
 
 #[cfg(test)]
@@ -375,7 +418,8 @@ mod tests {
             most in 1..=SIDE,
         ) {
             let items = boxes(seed, count, cells);
-            let Built { tree, order, ends } = Built::over(items.iter().copied(), most, [0.0; 3]);
+            let numbered = (0..).zip(items.iter().copied());
+            let Built { tree, order, ends } = Built::over(numbered, most, [0.0; 3]);
             let leaves = leaves(&tree, Child::eight(0), &EVERYWHERE);
             prop_assert_eq!(leaves.len(), ends.len());
             let mut first = 0;
@@ -400,13 +444,28 @@ mod tests {
         fn every_level_builds_the_same(seed in 0..u64::MAX, count in 1..400_usize, cells in 1..40) {
             let items = boxes(seed, count, cells);
             let built = at_each_level(|| {
-                let built = Built::over(items.iter().copied(), SIDE, [0.0; 3]);
+                let built = Built::over((0..).zip(items.iter().copied()), SIDE, [0.0; 3]);
                 format!("{:?} {:?} {:?}", built.tree, built.order, built.ends)
             });
             for (level, one) in &built {
                 prop_assert_eq!(one, &built[0].1, "{:?}", level);
             }
         }
+    }
+
+    #[test]
+    fn a_place_is_in_its_bin() {
+        let (first, last) = (-3..=0, 15..20);
+        for place in first.chain(1..15).chain(last) {
+            let middle = place as f32 + 0.5;
+            assert_eq!(bin(middle), place.clamp(0, 15) as usize);
+            assert!(
+                [place - 1, place]
+                    .map(|bin| bin.clamp(0, 15) as usize)
+                    .contains(&bin(place as f32))
+            );
+        }
+        assert_eq!([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30].map(bin), [0, 15, 0, 15]);
     }
 
     #[test]
@@ -430,7 +489,7 @@ mod tests {
         let doubling = |index: usize| (index as f32 / 80.0 - 125.0).exp2();
         for size in [same, fan, doubling] {
             let bounds = |index| Bounds { low: Vec3A::ZERO, high: Vec3A::splat(size(index)) };
-            let built = Built::over((0..count).map(bounds), SIDE, [0.0; 3]);
+            let built = Built::over((0..).zip((0..count).map(bounds)), SIDE, [0.0; 3]);
             assert!(built.tree.room <= 7 * (CUTS as usize + 15), "{}", built.tree.room);
             assert_eq!(built.order.len(), count);
         }

@@ -53,25 +53,16 @@ impl Triangles {
     /// the index that each leaf had; triangles without area or with a coordinate that is not finite
     /// cannot be hit and are left out.
     pub(crate) fn new(mut corners: Vec<Corners>, centre: [f64; 3]) -> (Self, Vec<u32>) {
-        let (mut index, mut kept) = (0, Vec::with_capacity(corners.len()));
-        corners.retain(|corners| {
-            let is_kept = is_near(corners, centre) && has_area(corners);
-            if is_kept {
-                kept.push(index);
-            }
-            index += 1;
-            is_kept
-        });
-        let bounds = corners.iter().map(|corners| {
+        let can_be_hit =
+            |(_, corners): &(u32, &Corners)| is_near(corners, centre) && has_area(corners);
+        let boxes = (0..).zip(&corners).filter(can_be_hit).map(|(index, corners)| {
             let [a, b, c] = narrow(corners, centre).map(Vec3A::from_array);
-            Bounds { low: a.min(b).min(c), high: a.max(b).max(c) }
+            (index, Bounds { low: a.min(b).min(c), high: a.max(b).max(c) })
         });
-        let Built { tree, mut order, ends } = Built::over(bounds, SIDE, centre);
+        let Built { tree, order, ends } = Built::over(boxes, SIDE, centre);
         // What is in the old order is dropped here: of millions of triangles no list is kept longer
         // than it is needed.
         corners = order.iter().map(|index| corners[*index as usize]).collect();
-        order.iter_mut().for_each(|index| *index = kept[*index as usize]);
-        drop(kept);
         let mut first = 0;
         let block = |end: &u32| {
             let range = first as usize..*end as usize;

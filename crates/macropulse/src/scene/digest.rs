@@ -72,10 +72,12 @@ impl Digest {
 
     /// Takes in a mesh and what it is made of.
     fn model(&mut self, Placed { mesh, material_indices, .. }: &Placed) {
-        mesh.vertices.iter().flatten().for_each(|value| self.number(*value));
+        self.numbers(mesh.vertices.as_flattened());
         for (triangle, material) in mesh.triangles.iter().zip(&mesh.material_of_triangle) {
-            triangle.iter().for_each(|corner| self.bytes(&corner.to_le_bytes()));
-            self.bytes(&material_indices[usize::from(*material)].to_le_bytes());
+            let mut facet = [0; 14];
+            facet[..12].copy_from_slice(triangle.map(u32::to_le_bytes).as_flattened());
+            facet[12..].copy_from_slice(&material_indices[usize::from(*material)].to_le_bytes());
+            self.bytes(&facet);
         }
     }
 

@@ -60,25 +60,22 @@ impl Mesh {
     /// Takes away the vertices that no triangle has, those of lines for example. Every corner must be
     /// there.
     pub(super) fn drop_loose_vertices(&mut self) {
-        const LOOSE: u32 = u32::MAX;
-        let mut places = vec![LOOSE; self.vertices.len()];
+        let mut is_used = vec![false; self.vertices.len()];
         for corner in self.triangles.iter().flatten() {
-            places[*corner as usize] = 0;
+            is_used[*corner as usize] = true;
         }
-        if !places.contains(&LOOSE) {
+        if !is_used.contains(&false) {
             return;
         }
         let mut kept = 0;
-        self.vertices = std::mem::take(&mut self.vertices)
-            .into_iter()
-            .zip(&mut places)
-            .filter(|(_, place)| **place != LOOSE)
-            .map(|(vertex, place)| {
-                *place = kept;
-                kept += 1;
-                vertex
-            })
-            .collect();
+        let place = |is_used: &bool| {
+            let place = kept;
+            kept += u32::from(*is_used);
+            place
+        };
+        let places: Vec<u32> = is_used.iter().map(place).collect();
+        let mut is_used = is_used.into_iter();
+        self.vertices.retain(|_| is_used.next().unwrap_or(true));
         for corner in self.triangles.iter_mut().flatten() {
             *corner = places[*corner as usize];
         }

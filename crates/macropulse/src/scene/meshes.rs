@@ -84,15 +84,18 @@ impl Meshes {
 impl Known {
     /// A mesh as its file has it.
     fn new(origin: Origin, Read { mut mesh, left_out }: Read) -> Self {
-        if let Some((metres, up, forward)) = origin.frame() {
-            let left = up.cross(forward);
-            for vertex in &mut mesh.vertices {
+        let frame = origin.frame();
+        let axes = frame.map(|(metres, up, forward)| (metres, [forward, up.cross(forward), up]));
+        let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY].map(DVec3::splat);
+        for vertex in &mut mesh.vertices {
+            if let Some((metres, axes)) = axes {
                 let place = DVec3::from(*vertex) * metres;
-                *vertex = [place.dot(forward), place.dot(left), place.dot(up)];
+                *vertex = axes.map(|axis| place.dot(axis));
             }
+            let vertex = DVec3::from(*vertex);
+            (low, high) = (low.min(vertex), high.max(vertex));
         }
-        let (low, high) = mesh.bounds().unwrap_or_default();
-        let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let size = (high - low).to_array();
         let mesh = Rc::new(mesh);
         let footing = Footing::of(Rc::clone(&mesh));
         Self { origin, mesh, footing, size, left_out }

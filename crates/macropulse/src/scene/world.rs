@@ -89,7 +89,7 @@ impl World {
         let extents: Vec<Extent> =
             models.iter().map(|model| model.triangles.middle_and_half()).collect();
         let boxes = primitives[first..].iter().map(|one| bounds(one, &extents, centre));
-        let Built { tree, order, .. } = Built::over(boxes, 1, centre);
+        let Built { tree, order, .. } = Built::over((0..).zip(boxes), 1, centre);
         let leaves = order.iter().map(|index| first as u32 + index).collect();
         let facets = Facets::new(facets, centre);
         let movers = Vec::new();

@@ -21,6 +21,9 @@ const HEADER: usize = 84;
 /// Bytes of a facet: its normal and three corners as floats, and two bytes that say anything.
 const FACET: usize = 50;
 
+/// Facets that are read at once.
+const AT_ONCE: usize = 1024;
+
 pub(super) fn read(path: &Path, room: Room) -> Result<Mesh, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut file = open(path)?;
@@ -64,13 +67,17 @@ fn binary(file: &mut impl Read, (path, length): (&Path, u64), room: Room) -> Res
     let mut mesh = Mesh::default();
     mesh.vertices.reserve_exact(3 * count as usize);
     let material = mesh.material("").unwrap_or_default();
-    let mut facet = [0; FACET];
-    for index in 0..count {
-        file.read_exact(&mut facet).map_err(|_| damaged(format!("ends within facet {index}")))?;
-        let numbers = facet[12..48].as_chunks().0;
-        let numbers: [f64; 9] = array::from_fn(|axis| f32::from_le_bytes(numbers[axis]).into());
-        let own = add(&mut mesh, numbers.as_chunks().0).map_err(damaged)?;
-        mesh.fan(&[own.start, own.start + 1, own.start + 2], material);
+    let mut facets = vec![[0; FACET]; AT_ONCE.min(count as usize)];
+    for first in (0..count).step_by(AT_ONCE) {
+        let facets = &mut facets[..AT_ONCE.min((count - first) as usize)];
+        file.read_exact(facets.as_flattened_mut())
+            .map_err(|_| damaged(format!("ends within facet {first} or soon behind it")))?;
+        for facet in facets {
+            let numbers = facet[12..48].as_chunks().0;
+            let numbers: [f64; 9] = array::from_fn(|axis| f32::from_le_bytes(numbers[axis]).into());
+            let own = add(&mut mesh, numbers.as_chunks().0).map_err(damaged)?;
+            mesh.fan(&[own.start, own.start + 1, own.start + 2], material);
+        }
     }
     Ok(mesh)
 }
@@ -144,6 +151,7 @@ impl Text {
 }
 
 /// Adds the corners of a facet, which no other shares; gives their indices.
+#[inline]
 fn add(mesh: &mut Mesh, corners: &[[f64; 3]]) -> Result<Range<u32>, String> {
     let index = |index| u32::try_from(index).map_err(|_| "has more corners than can be counted");
     let count = mesh.vertices.len();
