@@ -10,7 +10,6 @@ use std::process::ExitCode;
 
 mod decode;
 mod effort;
-mod embree;
 mod floor;
 mod generate;
 mod goals;
@@ -18,6 +17,7 @@ mod levels;
 mod machine;
 mod meshes;
 mod page;
+mod peers;
 mod plain;
 mod rays;
 mod sample;
