@@ -85,7 +85,7 @@ impl Records {
 /// What the receiver of a sensor is given of one scan: the log of its shots, and the ticks of its
 /// converters, or of a sampled sensor the samples; nothing of the scene.
 ///
-/// A scan comes in bands of about 1700 shots. Each has guard shots at both ends, whose light overlaps
+/// A scan comes in bands of about 3400 shots. Each has guard shots at both ends, whose light overlaps
 /// with that of its `owned` ones: they are decoded as well, and their returns dropped.
 ///
 /// Args:
@@ -349,7 +349,7 @@ fn shot_log(design: &Design, shots: &Bound<'_, PyDict>) -> PyResult<ShotLog> {
     if first > MOST_SHOTS {
         return Err(wrong(format!("shots: first is {first}; it must be {MOST_SHOTS} at most")));
     }
-    let owned = ("shots", "owned", "two whole numbers, from and until, as (0, 1700)");
+    let owned = ("shots", "owned", "two whole numbers, from and until, as (0, 3400)");
     let owned: (usize, usize) = entry(shots, owned, || (0, row.len()))?;
     let channel: Vec<u16> = column(shots, ("shots", "channel"), Some(vec![0; row.len()]))?;
     check_below(design, ("shots", "channel"), &channel, design.channels())?;

@@ -6,7 +6,7 @@
 use macropulse::channel::Operating;
 use macropulse::codec::decode::Returns;
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, bands, short_bands};
 use macropulse::points::{Outcome, Piece, Scale};
 use macropulse::scene::Scene;
 use macropulse::score::{self, Score};
@@ -27,7 +27,7 @@ fn clean(sensor: &str, receiver: &str, missed: &str) -> Score {
     let design = open(sensor, &[PERFECT, &kind].concat());
     let scene = Scene::open("car-50m").unwrap();
     let car: Vec<Band> =
-        bands(&design, 0).filter(|band| (252..297).contains(&(band.first / 848))).collect();
+        short_bands(&design, 0).filter(|band| (252..297).contains(&(band.first / 848))).collect();
     let score = sim::scan_part(&design, &scene, 3, &car).unwrap().score;
     assert!(score.with_echo() > 10_000 && score.samples_on_target > 500, "{score:?}");
     score

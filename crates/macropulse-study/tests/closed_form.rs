@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::points::PointCloud;
 use macropulse::scene::Scene;
 use macropulse::sim;
@@ -30,7 +30,7 @@ fn clear(name: &str) -> Design {
 
 /// Coded sensors are measured in a few lines around the horizon, the others as a whole.
 fn measure(design: &Design, scene: &Scene) -> PointCloud {
-    let all = bands(design, 0);
+    let all = short_bands(design, 0);
     let around = |band: &Band| {
         let row = band.first / u64::from(design.scan.columns);
         (234..243).contains(&row) || (270..279).contains(&row)

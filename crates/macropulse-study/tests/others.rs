@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::environment::Environment;
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
@@ -51,7 +51,7 @@ struct Seen {
 impl Seen {
     fn new(sensor: &str, scene: &Scene, coded: &[u64]) -> Self {
         let design = Design::open(sensor, &[]).unwrap();
-        let all: Vec<Band> = bands(&design, 0).collect();
+        let all: Vec<Band> = short_bands(&design, 0).collect();
         let part: Vec<Band> = match design.is_coded() {
             true => all
                 .into_iter()

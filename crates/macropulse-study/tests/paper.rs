@@ -14,7 +14,7 @@ use macropulse::channel::Link;
 use macropulse::codec::code::correlation::{aperiodic_sidelobe, periodic_sidelobe};
 use macropulse::design::safety::{Class1, Rule};
 use macropulse::design::{Derived, Design, Pattern};
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::environment::Environment;
 use macropulse::predict::link::{diffraction, spot_depth};
 use macropulse::predict::multiple_access::{mean_overlap, shots_in_flight, word_reuse_range};
@@ -196,7 +196,7 @@ mod timing {
         reported("word-of-pixel", Unsaid, &["pixel mod 29", "178 m"]);
         reported("refresh", Partly, &["2.46 Hz", "178 m"]);
         // One row further the same column would have the word of a shot in flight.
-        let log = bands(&DESIGN, 0).nth(1).unwrap().shot_log(&DESIGN);
+        let log = short_bands(&DESIGN, 0).nth(1).unwrap().shot_log(&DESIGN);
         let (row, column) = (u32::from(log.row[900]), u32::from(log.column[900]));
         assert_eq!(u32::from(log.word[900]), (row * 848 + column) % 29);
     }
@@ -234,7 +234,7 @@ mod timing {
     fn an_ordinary_scene_keeps_about_48_converters_busy() {
         let scene = Scene::open("car-50m").unwrap();
         let is_road = |band: &Band| (306..324).contains(&(band.first / 848));
-        let road: Vec<Band> = bands(&DESIGN, 0).filter(is_road).collect();
+        let road: Vec<Band> = short_bands(&DESIGN, 0).filter(is_road).collect();
         let tally = sim::scan_part(&DESIGN, &scene, 1, &road).unwrap().tally;
         assert!((30..=65).contains(&tally.peak_busy), "{} busy", tally.peak_busy);
         assert_eq!(tally.lost, 0);

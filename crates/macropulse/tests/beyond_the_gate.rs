@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::sim::{self, Scan};
@@ -21,7 +21,7 @@ fn wall(range: f64) -> Scene {
 
 /// Two lines about the middle of the view, where the wall is farther by at most 8 %: N = 1696.
 fn middle(design: &Design, scene: &Scene) -> Scan {
-    let bands: Vec<Band> = bands(design, 1).filter(|band| band.first / 848 == 240).collect();
+    let bands: Vec<Band> = short_bands(design, 1).filter(|band| band.first / 848 == 240).collect();
     assert_eq!(bands.len(), 1);
     sim::scan_part(design, scene, 1, &bands).unwrap()
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use macropulse::design::{Design, Detector};
-use macropulse::emit::bands;
+use macropulse::emit::short_bands;
 use macropulse::environment::Environment;
 use macropulse::predict::Forecaster;
 use macropulse::scene::Scene;
@@ -174,7 +174,7 @@ fn every_combination_is_what_the_table_says() {
             }
             assert_eq!(*cell, "yes", "{which}");
             let design = opened.unwrap_or_else(|error| panic!("{which}: {error}"));
-            let band: Vec<_> = bands(&design, 0).take(1).collect();
+            let band: Vec<_> = short_bands(&design, 0).take(1).collect();
             let scan = sim::scan_part(&design, &scene, 1, &band).unwrap();
             let found = scan.score.right_fraction();
             assert!(found > 0.8, "{which}: {found}");

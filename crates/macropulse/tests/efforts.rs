@@ -10,7 +10,7 @@ use macropulse::codec::decode::{Effort, Receiver, Reject, Returns};
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
-use macropulse::emit::bands;
+use macropulse::emit::short_bands;
 use macropulse::environment::Environment;
 use macropulse::random::Chance;
 use macropulse::scene::Scene;
@@ -20,7 +20,7 @@ use macropulse::tdc::{self, Wanted};
 fn given(design: &Design, scene: &str, band: usize) -> (ShotLog, Ticks) {
     let scene = Scene::open(scene).unwrap();
     let operating = Operating::of(design, &Environment::vacuum_dark()).unwrap();
-    let band = bands(design, 1).nth(band).unwrap();
+    let band = short_bands(design, 1).nth(band).unwrap();
     let log = band.shot_log(design);
     let finishes = scene.finishes(design.light.wavelength);
     let hits = scene.trace(design, &log).middle;

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
@@ -56,7 +56,7 @@ fn dark() -> Scene {
 /// Some stretches of a scan, one in so many.
 fn scan(sensor: &str, keys: &[(String, String)], (scene, every): (&Scene, usize)) -> Score {
     let design = Design::open(sensor, keys).unwrap();
-    let part: Vec<Band> = bands(&design, 0).step_by(every).collect();
+    let part: Vec<Band> = short_bands(&design, 0).step_by(every).collect();
     sim::scan_part(&design, scene, 77, &part).unwrap().score
 }
 

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::points::{Outcome, PointCloud, SATURATED};
 use macropulse::scene::Scene;
 use macropulse::sim;
@@ -84,7 +84,7 @@ fn middle(design: &Design, rows: u32) -> Vec<Band> {
     let columns = u64::from(design.scan.columns);
     let [from, to] = [first, first + rows].map(|row| u64::from(row) * columns);
     let has_part = |band: &Band| band.first < to && from < band.first + band.shots;
-    bands(design, 0).filter(has_part).collect()
+    short_bands(design, 0).filter(has_part).collect()
 }
 
 fn of_cloud(cloud: &PointCloud, within_deg: f32) -> Told {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use macropulse::channel::{self, Operating, Seen};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::points::Outcome;
 use macropulse::predict::interference::{events_per_second, ghost_of_single_pulses, walk_per_scan};
 use macropulse::random::Chance;
@@ -42,7 +42,8 @@ fn chosen(design: &Design, scan: u64) -> Vec<Band> {
 /// The bands that begin with these lines.
 fn at_lines(design: &Design, scan: u64, lines: [u64; 4]) -> Vec<Band> {
     let line = |band: &Band| band.first / u64::from(design.scan.columns);
-    let part: Vec<Band> = bands(design, scan).filter(|band| lines.contains(&line(band))).collect();
+    let part: Vec<Band> =
+        short_bands(design, scan).filter(|band| lines.contains(&line(band))).collect();
     assert_eq!(part.len(), lines.len());
     part
 }
@@ -234,7 +235,7 @@ fn detections_of_interferers_come_at_the_rate_that_theory_says() {
     );
     // Exactly two lines of the other, whatever the phase.
     let lines = 2.0 * design.scan_period() / 480.0 * 1e15 / (1.0 - 11e-6);
-    let times = detections(&design, &scene, &bands(&design, 0).nth(100).unwrap(), true);
+    let times = detections(&design, &scene, &short_bands(&design, 0).nth(100).unwrap(), true);
     let from = times[0] + 64 * 20_000;
     let two_lines = from..from + (lines * 64.0 / 2500.0) as i64;
     assert!(*times.last().unwrap() > two_lines.end);
@@ -304,7 +305,7 @@ fn neighbouring_bands_agree_where_they_overlap() {
     let design = open("kim-park-2016-fixed", &[]);
     for name in ["single-pulse", "drifting"] {
         let scene = scenario(name);
-        let times: Vec<Vec<i64>> = bands(&design, 3)
+        let times: Vec<Vec<i64>> = short_bands(&design, 3)
             .skip(120)
             .take(2)
             .map(|band| detections(&design, &scene, &band, false))

@@ -4,7 +4,7 @@
 use macropulse::channel::Operating;
 use macropulse::codec::decode::Returns;
 use macropulse::design::Design;
-use macropulse::emit::bands;
+use macropulse::emit::short_bands;
 use macropulse::points::{Piece, Scale};
 use macropulse::scene::{Hits, Scene};
 use macropulse::score::{self, Score};
@@ -65,7 +65,7 @@ fn one_surface_is_judged_as_several_are() {
     let scene = Scene::open("car-30m").unwrap();
     let scale = Scale::of(&design, &Operating::of(&design, &scene.environment).unwrap());
     let (mut all, mut different) = (Score::default(), 0);
-    for band in bands(&design, 0).skip(60).step_by(8) {
+    for band in short_bands(&design, 0).skip(60).step_by(8) {
         let log = band.shot_log(&design);
         let hits = scene.trace(&design, &log).middle;
         let returns = returns(&hits, log.owned.clone());

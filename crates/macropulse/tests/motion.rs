@@ -3,7 +3,7 @@
 
 use macropulse::codec::ShotLog;
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands, scan_begins_fs};
+use macropulse::emit::{Band, scan_begins_fs, short_bands};
 use macropulse::formats::{Format, Names, write_cloud};
 use macropulse::points::PointCloud;
 use macropulse::scene::{Hits, Ray, Scene};
@@ -45,7 +45,7 @@ fn plate(velocity: f64) -> Scene {
 
 /// Every `step`-th band of a scan.
 fn some_bands(design: &Design, scan: u64, step: usize) -> Vec<Band> {
-    bands(design, scan).step_by(step).collect()
+    short_bands(design, scan).step_by(step).collect()
 }
 
 /// For each measured row, the time of its leftmost return, s, and how far to the left it lies, m.

@@ -11,7 +11,7 @@ use macropulse::codec::ShotLog;
 use macropulse::design::Design;
 use macropulse::design::detector::Lit;
 use macropulse::detect::{Detectors, Memory};
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::environment::Environment;
 use macropulse::points::Outcome;
 use macropulse::predict::Forecaster;
@@ -52,7 +52,7 @@ fn room(range: f64, reflectance: f64, environment: &str) -> Scene {
 
 /// Some `count` bands of one scan, spread over it.
 fn measure(design: &Design, scene: &Scene, seed: u64, count: usize) -> Scan {
-    let all: Vec<Band> = bands(design, 0).collect();
+    let all: Vec<Band> = short_bands(design, 0).collect();
     let part: Vec<Band> = all.iter().step_by(all.len().div_ceil(count)).copied().collect();
     sim::scan_part(design, scene, seed, &part).unwrap()
 }
@@ -147,7 +147,7 @@ fn in_dense_light_the_forecast_is_right_to_a_quarter() {
 
 /// The first band of a sensor, an echo of `photons` detected per mark from 20 m for every shot.
 fn lit(design: &Design, photons: f64) -> (ShotLog, Light<'_>) {
-    let log = bands(design, 0).next().unwrap().shot_log(design);
+    let log = short_bands(design, 0).next().unwrap().shot_log(design);
     let echo = |shot| Echo { shot, delay_fs: 133_426_000, photons };
     let light = light_of_echoes(design, &log, (0..log.len()).map(echo));
     (log, light)
@@ -215,7 +215,7 @@ fn blind_cells_lose_what_is_predicted() {
         ));
         let mut events = 0;
         let mut seconds = 0.0;
-        for band in bands(&design, 0).take(8) {
+        for band in short_bands(&design, 0).take(8) {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(3));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
@@ -245,7 +245,7 @@ fn a_small_bank_loses_what_erlang_says() {
             ],
         );
         let (mut events, mut lost) = (0, 0);
-        for band in bands(&design, 0).take(4) {
+        for band in short_bands(&design, 0).take(4) {
             let log = band.shot_log(&design);
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(4));
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());

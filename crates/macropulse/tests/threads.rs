@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, bands, short_bands};
 use macropulse::formats::{Format, Names, write_cloud};
 use macropulse::points::{PointCloud, Truth};
 use macropulse::scene::Scene;
@@ -26,10 +26,10 @@ fn scan(sensor: &str, part: Part, (seed, threads): (u64, usize)) -> Scan {
     let scene = Scene::open("car-50m").unwrap();
     let chosen: Vec<Band> = match part {
         Part::Whole => bands(&design, 0).collect(),
-        Part::First(count) => bands(&design, 0).take(count).collect(),
+        Part::First(count) => short_bands(&design, 0).take(count).collect(),
         Part::Road(count) => {
             let lines = 360..360 + 9 * count;
-            bands(&design, 0).filter(|band| lines.contains(&(band.first / 848))).collect()
+            short_bands(&design, 0).filter(|band| lines.contains(&(band.first / 848))).collect()
         }
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::environment::Environment;
 use macropulse::predict::Forecaster;
 use macropulse::scene::Scene;
@@ -63,7 +63,7 @@ fn errors(
     environment: &str,
     (count, shift): (usize, f64),
 ) -> (Vec<Sums>, HashMap<u16, Sums>) {
-    let all: Vec<Band> = bands(design, 0).collect();
+    let all: Vec<Band> = short_bands(design, 0).collect();
     let (mut of_range, mut of_word) = (Vec::new(), HashMap::<u16, Sums>::new());
     let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     for (number, range) in RANGES.into_iter().enumerate() {
@@ -135,7 +135,7 @@ fn coded_sensors_measure_ranges_without_bias() {
 
 /// Errors of range in ticks at each of the ranges, in whole scans, each range with a seed of its own.
 fn errors_of_scans(design: &Design, material: &str, scans: u64) -> [Sums; 10] {
-    let all: Vec<Band> = (0..scans).flat_map(|scan| bands(design, scan)).collect();
+    let all: Vec<Band> = (0..scans).flat_map(|scan| short_bands(design, scan)).collect();
     let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     let mut seed = 0;
     RANGES.map(|range| {
@@ -216,7 +216,7 @@ fn what_is_just_seen_is_neither_nearer_nor_farther() {
     ] {
         let design = Design::open(name, &[]).unwrap();
         let forecaster = Forecaster::new(&design, &Environment::default()).unwrap();
-        let part: Vec<Band> = bands(&design, 0).step_by(12).collect();
+        let part: Vec<Band> = short_bands(&design, 0).step_by(12).collect();
         for (range, wanted) in [44.5155, 100.9695]
             .iter()
             .flat_map(|range| all_wanted.iter().map(move |pd| (*range, *pd)))

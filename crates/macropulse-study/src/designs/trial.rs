@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use macropulse::digest::Digest;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::formats::write_atomically;
 use macropulse::opened;
 use macropulse::points::PointCloud;
@@ -145,7 +145,7 @@ impl Bench<'_> {
             return Ok(Some(known));
         }
         let set = scenery.set(required, rows, self.seed)?;
-        let all: Vec<Band> = bands(&design, 0).collect();
+        let all: Vec<Band> = short_bands(&design, 0).collect();
         let every = (u64::from(rows) * u64::from(wanted.columns) / PIXELS).max(1) as usize;
         let bands: Vec<Band> = all.into_iter().step_by(every).collect();
         let mut scans = Scans::new(&design, &set.scene, self.seed)?;

@@ -2,7 +2,7 @@
 
 use super::Error;
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::points::Outcome;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
@@ -67,7 +67,7 @@ const COMPARED: [&str; 2] = ["kim-park-2016", "kim-park-2016-fixed"];
 
 fn part(design: &Design) -> Vec<Band> {
     let row = |band: &Band| band.first / u64::from(design.scan.columns);
-    bands(design, 0).filter(|band| ROWS.contains(&row(band))).collect()
+    short_bands(design, 0).filter(|band| ROWS.contains(&row(band))).collect()
 }
 
 /// Shots of the whole comparison.

@@ -10,7 +10,7 @@ use super::{Axis, Error, Job};
 use crate::record::{defaults, named, surroundings};
 use macropulse::channel::{Operating, idealised};
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, bands, short_bands};
 use macropulse::formats::{Entries, Named, Surroundings};
 use macropulse::scene::{Changes, Room, Scene, apart};
 
@@ -286,13 +286,15 @@ fn at(axes: &[Axis], values: &[String], message: &str) -> Error {
     Error::Asked(format!("with {}: {message}", keys.collect::<Vec<_>>().join(", ")))
 }
 
-/// As many whole bands of the first scan as it takes for `shots`, evenly over the scan; all of
-/// them if `None`.
+/// As many short bands of the first scan as it takes for `shots`, evenly over the scan; all of it if `None`, or if
+/// it has no more.
 fn spread(design: &Design, shots: Option<u64>) -> Vec<Band> {
-    let all: Vec<Band> = bands(design, 0).collect();
+    let Some(shots) = shots.filter(|shots| *shots < design.shots_per_scan()) else {
+        return bands(design, 0).collect();
+    };
+    let all: Vec<Band> = short_bands(design, 0).collect();
     let longest = all.first().map_or(1, |band| band.shots.max(1));
-    let wanted = shots.map_or(all.len(), |shots| shots.div_ceil(longest).max(1) as usize);
-    let wanted = wanted.min(all.len());
+    let wanted = (shots.div_ceil(longest).max(1) as usize).min(all.len());
     // The middle of each of as many equal parts.
     (0..wanted).map(|part| all[(2 * part + 1) * all.len() / (2 * wanted)]).collect()
 }
@@ -348,9 +350,10 @@ mod tests {
     #[test]
     fn a_part_of_a_scan_is_whole_bands_spread_evenly() {
         let design = Design::open("kim-park-2016", &[]).unwrap();
-        let all: Vec<Band> = bands(&design, 0).collect();
-        assert_eq!(spread(&design, None), all);
-        assert_eq!(spread(&design, Some(u64::MAX)), all);
+        let whole: Vec<Band> = bands(&design, 0).collect();
+        let all: Vec<Band> = short_bands(&design, 0).collect();
+        assert_eq!(spread(&design, None), whole);
+        assert_eq!(spread(&design, Some(u64::MAX)), whole);
         assert_eq!(spread(&design, Some(1)), [all[all.len() / 2]]);
         let four = spread(&design, Some(4 * all[0].shots));
         assert_eq!(four.len(), 4);

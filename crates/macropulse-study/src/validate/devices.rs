@@ -7,7 +7,7 @@ use macropulse::codec::statistics::erlang_b;
 use macropulse::design::Design;
 use macropulse::design::detector::Amplifier;
 use macropulse::design::safety::Class1;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, bands, short_bands};
 use macropulse::environment::Environment;
 use macropulse::predict::Forecaster;
 use macropulse::predict::link::diffraction;
@@ -91,7 +91,7 @@ fn intensities() -> Result<Vec<Figure>, Error> {
              material = \"paint\"\n"
         );
         let scene = Scene::from_toml(&text, sensor, Path::new(""))?;
-        let some: Vec<Band> = bands(&design, 0).take(4).collect();
+        let some: Vec<Band> = short_bands(&design, 0).take(4).collect();
         let cloud = sim::scan_part(&design, &scene, 1, &some)?.cloud();
         let mut told = cloud.intensity;
         told.sort_by(f32::total_cmp);
@@ -196,7 +196,7 @@ pub(super) fn scanners() -> Result<Vec<Figure>, Error> {
 fn vlp_16() -> Result<Vec<Figure>, Error> {
     let mut figures = Figures::of("scanners", "VLP16");
     let design = Design::open("vlp-16", &[])?;
-    let Some(band) = bands(&design, 0).next() else { return Ok(Vec::new()) };
+    let Some(band) = short_bands(&design, 0).next() else { return Ok(Vec::new()) };
     let log = band.shot_log(&design);
     let first = log.owned.start;
     let after = |shot: usize| {

@@ -3,7 +3,7 @@
 
 use macropulse::codec::decode::ReceiverKind;
 use macropulse::design::Design;
-use macropulse::emit::{Band, bands};
+use macropulse::emit::{Band, short_bands};
 use macropulse::environment::Environment;
 use macropulse::points::{Outcome, PointCloud};
 use macropulse::predict::{Forecast, Forecaster};
@@ -137,7 +137,7 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
             shots += band.shots;
             !is_enough
         };
-        let part: Vec<Band> = bands(&design, 0).take_while(few).collect();
+        let part: Vec<Band> = short_bands(&design, 0).take_while(few).collect();
         let phases = PHASES.min(part.len());
         let step = design.derived().tick_range / phases as f64;
         let ranges: Vec<f64> = (0..phases).map(|phase| range + phase as f64 * step).collect();

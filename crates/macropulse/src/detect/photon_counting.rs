@@ -394,7 +394,7 @@ mod tests {
         for rate in ["3e7", "1e9", "1e10"] {
             let design = sensor(&[("dark_counts_hz", rate)]);
             let logs: Vec<ShotLog> =
-                crate::emit::bands(&design, 0).take(2).map(|b| b.shot_log(&design)).collect();
+                crate::emit::short_bands(&design, 0).take(2).map(|b| b.shot_log(&design)).collect();
             let times: Vec<Vec<i64>> = logs
                 .iter()
                 .map(|log| absolute(&detect(&design, log, &Light::default(), 3)))
@@ -413,7 +413,7 @@ mod tests {
     #[test]
     fn neighbouring_bands_see_the_same_marks() {
         let design = sensor(&[("missed_marks", "0.3"), ("dark_counts_hz", "1e8")]);
-        let times: Vec<Vec<i64>> = crate::emit::bands(&design, 0)
+        let times: Vec<Vec<i64>> = crate::emit::short_bands(&design, 0)
             .take(2)
             .map(|band| {
                 let log = band.shot_log(&design);

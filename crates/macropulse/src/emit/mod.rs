@@ -5,7 +5,7 @@ mod clock;
 mod times;
 mod shot;
 
-pub use band::{Band, bands, logs, shots_of_scan};
+pub use band::{Band, bands, logs, short_bands, shots_of_scan};
 pub use clock::Clock;
 pub use shot::{Shot, most_scans, shot_at, shot_of_pixel};
 pub use times::{beam_axes, scan_begins_fs};
