@@ -9,7 +9,7 @@ use crate::sample::{Condition, SCENES, Sample, Score};
 
 /// One band in this many is measured of a scene with surfaces; where every shot has a range of its
 /// own, one in so many.
-const EVERY: [usize; 2] = [10, 24];
+const EVERY: [usize; 2] = [5, 12];
 
 /// What was measured of one scene and detector.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +76,7 @@ pub fn growth() -> Fallible<String> {
     let mut gates = Vec::new();
     for scene in ["street", "random"] {
         for gate in [37.0, 75.0, 150.0] {
-            let sample = Sample::of(Condition::CLEAN.design_to(gate)?, scene, 24)?;
+            let sample = Sample::of(Condition::CLEAN.design_to(gate)?, scene, 12)?;
             let ticks: usize = sample.given().iter().map(|(_, ticks)| ticks.tick.len()).sum();
             let seconds = sample.decoding_seconds();
             let scan = sample.design.shots_per_scan() as f64 / sample.shots();

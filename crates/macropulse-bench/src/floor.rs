@@ -33,7 +33,7 @@ const BEFORE: usize = LAGS / 2;
 pub fn text() -> Fallible<String> {
     let mut rows = Vec::new();
     for goals::Decode { name, scene, condition, least } in goals::decoding() {
-        let sample = Sample::of(condition.design()?, scene, 24)?;
+        let sample = Sample::of(condition.design()?, scene, 12)?;
         let given = sample.given();
         let ticks: usize = given.iter().map(|(_, ticks)| ticks.tick.len()).sum();
         let labels = Labels::of(&sample);

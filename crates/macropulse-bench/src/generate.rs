@@ -7,7 +7,7 @@ use crate::page;
 use crate::sample::{Condition, SCENES, Sample};
 
 /// One band in this many is measured.
-const EVERY: usize = 10;
+const EVERY: usize = 5;
 
 /// Speeds, in the order of [`Condition::all`], of each of [`SCENES`].
 pub struct Generating(Vec<Vec<f64>>);

@@ -12,7 +12,7 @@ use crate::page;
 use crate::sample::Sample;
 
 /// One band in so many is decoded.
-const EVERY: usize = 24;
+const EVERY: usize = 12;
 
 /// What a process that uses the instructions of one level prints: how fast it decodes what there are goals
 /// of, one to a line.

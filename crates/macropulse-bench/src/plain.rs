@@ -121,7 +121,7 @@ impl<'a> Sought<'a> {
 
 /// Measures them on the clean street.
 pub fn text() -> Fallible<String> {
-    let sample = Sample::of(Condition::CLEAN.design()?, "street", 24)?;
+    let sample = Sample::of(Condition::CLEAN.design()?, "street", 12)?;
     let given = sample.given();
     let mut returns = Ok(Vec::new());
     let seconds = least_seconds(|| returns = black_box(sample.decode(&given)));

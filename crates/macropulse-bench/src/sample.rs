@@ -117,7 +117,12 @@ impl Sample {
     /// One band in `every` of a scan of `scene`, where there is neither air nor sunlight. It is
     /// the second scan: its first band has guard shots before it.
     pub fn of(design: Design, scene: &str, every: usize) -> Fallible<Self> {
-        let bands = bands(&design, 1).step_by(every);
+        Self::of_scan(design, scene, every, 1)
+    }
+
+    /// The same of scan number `scan`.
+    pub fn of_scan(design: Design, scene: &str, every: usize, scan: u64) -> Fallible<Self> {
+        let bands = bands(&design, scan).step_by(every);
         let (finishes, bands) = if scene == "random" {
             let met = |band: Band| (band, anywhere(&design, &band.shot_log(&design)));
             (
