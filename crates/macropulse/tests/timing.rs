@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::{Band, short_bands};
+use macropulse::emit::{Band, bands, short_bands};
 use macropulse::environment::Environment;
 use macropulse::predict::Forecaster;
 use macropulse::scene::Scene;
@@ -135,7 +135,7 @@ fn coded_sensors_measure_ranges_without_bias() {
 
 /// Errors of range in ticks at each of the ranges, in whole scans, each range with a seed of its own.
 fn errors_of_scans(design: &Design, material: &str, scans: u64) -> [Sums; 10] {
-    let all: Vec<Band> = (0..scans).flat_map(|scan| short_bands(design, scan)).collect();
+    let all: Vec<Band> = (0..scans).flat_map(|scan| bands(design, scan)).collect();
     let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     let mut seed = 0;
     RANGES.map(|range| {

@@ -196,7 +196,7 @@ pub(super) fn scanners() -> Result<Vec<Figure>, Error> {
 fn vlp_16() -> Result<Vec<Figure>, Error> {
     let mut figures = Figures::of("scanners", "VLP16");
     let design = Design::open("vlp-16", &[])?;
-    let Some(band) = short_bands(&design, 0).next() else { return Ok(Vec::new()) };
+    let Some(band) = bands(&design, 0).next() else { return Ok(Vec::new()) };
     let log = band.shot_log(&design);
     let first = log.owned.start;
     let after = |shot: usize| {

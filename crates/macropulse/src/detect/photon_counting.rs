@@ -394,7 +394,7 @@ mod tests {
         for rate in ["3e7", "1e9", "1e10"] {
             let design = sensor(&[("dark_counts_hz", rate)]);
             let logs: Vec<ShotLog> =
-                crate::emit::short_bands(&design, 0).take(2).map(|b| b.shot_log(&design)).collect();
+                crate::emit::bands(&design, 0).take(2).map(|b| b.shot_log(&design)).collect();
             let times: Vec<Vec<i64>> = logs
                 .iter()
                 .map(|log| absolute(&detect(&design, log, &Light::default(), 3)))

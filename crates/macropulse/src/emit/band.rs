@@ -13,8 +13,8 @@ use macropulse_codec::ShotLog;
 /// A band holds about this many shots, in whole lines: few enough for the detection events of a coded sensor
 /// to stay in a cache, enough for the guard shots, 125 of `kim-park-2016`, to be a small part. With half as many that
 /// takes a twentieth longer, and of 407 040 shots of `street` as declared 75 instead of 62 are near their surface and
-/// not on it (mean of seeds 5, 101, 202, 303), as less is known of their neighbours; with twice as many, or five
-/// times, it takes as long.
+/// not on it (mean of seeds 5, 101, 202, 303), as less is known of their neighbours. These are four of its lines; five
+/// are more than [`Design::longest_band_fs`] allows.
 const SHOTS: u64 = 3400;
 
 /// The same where a few bands stand for a scan: short, so that some thousand shots come from several places.
