@@ -22,26 +22,40 @@ pub(super) struct Aims {
     backward: [u32; 3],
     /// Rays that have it for their main axis: along which they are longest, the first of equals.
     main: [u32; 3],
+    /// By how much limits are stretched.
+    margin: f32,
+    /// Before which nothing matters, and behind which nothing does.
+    starts: Lanes<f32>,
+    limits: Lanes<f32>,
 }
 
 impl Aims {
     #[inline(always)]
-    pub fn of<R: Registers>(packet: &Packet, origin: [f32; 3]) -> Self {
+    pub fn of<R: Registers>(packet: &Packet, tree: &Tree, origin: [f32; 3]) -> Self {
         let [x, y, z] = &packet.direction;
         let direction = [narrow(x), narrow(y), narrow(z)];
         let [x, y, z] = &direction;
         let inverse = [inverses(x), inverses(y), inverses(z)];
         let [x, y, z] = &inverse;
         let backward = [negative::<R>(x), negative::<R>(y), negative::<R>(z)];
-        Self { origin, main: main_axes::<R>(&direction), direction, inverse, backward }
+        let margin = tree.margin(origin);
+        Self {
+            origin,
+            main: main_axes::<R>(&direction),
+            direction,
+            inverse,
+            backward,
+            margin,
+            starts: starts(packet, margin),
+            limits: limits(packet, margin),
+        }
     }
 
     /// Rays that enter the box around all.
     #[inline(always)]
-    pub fn entering<R: Registers>(&self, packet: &Packet, tree: &Tree) -> u32 {
-        let margin = tree.margin(self.origin);
+    pub fn entering<R: Registers>(&self, tree: &Tree) -> u32 {
         let mut enter = R::Rays::splat(0.0);
-        let mut leave = R::Rays::load(&limits(packet, margin));
+        let mut leave = R::Rays::load(&self.limits);
         for axis in 0..3 {
             let inverse = R::Rays::load(&self.inverse[axis]);
             let [low, high] = tree.bounds[axis];
@@ -58,10 +72,13 @@ impl Aims {
     #[inline(always)]
     pub fn spread<R: Registers>(&self, set: u32) -> Spread {
         let [x, y, z] = &self.direction;
-        Spread {
-            set,
-            slopes: [extremes::<R>(x, set), extremes::<R>(y, set), extremes::<R>(z, set)],
-        }
+        let (x, y, z) = (R::Rays::load(x), R::Rays::load(y), R::Rays::load(z));
+        let (starts, limits) = (R::Rays::load(&self.starts), R::Rays::load(&self.limits));
+        // The least is the greatest of the same with the other sign, that of zero as well.
+        let none = R::Rays::splat(-0.0);
+        let numbers =
+            [none.minus(x), x, none.minus(y), y, none.minus(z), z, none.minus(starts), limits];
+        Spread { set, greatest: R::greatest_of_each(&numbers, set) }
     }
 
     /// The rays of `among` that point into the same octant as the first of them, and have the same
@@ -75,17 +92,19 @@ impl Aims {
         let set = backward.iter().fold(among, |set, axis| set & like_first(*axis));
         let set = set & like_first(along_x) & like_first(along_y) & like_first(along_z);
         let is_first = |of: u32| (of >> first & 1) as usize;
+        let greatest =
+            if set == spread.set { spread.greatest } else { self.spread::<R>(set).greatest };
+        let [.., soonest, latest] = greatest;
         // Of slopes of one sign the greatest has the least inverse, and rounding keeps them in order. Eight,
         // two of them unused, are divided at once.
-        let [x, y, z] =
-            if set == spread.set { spread.slopes } else { self.spread::<R>(set).slopes };
-        let [x_least, x_most, y_least, y_most, z_least, z_most, ..] =
-            inverses(&[x[1], x[0], y[1], y[0], z[1], z[0], 1.0, 1.0]);
+        let [x_most, x_least, y_most, y_least, z_most, z_least, ..] = inverses(&greatest);
         Beam {
             set,
             backward: backward.map(is_first),
             along: is_first(along_y) + 2 * is_first(along_z),
-            inverse: [[x_least, x_most], [y_least, y_most], [z_least, z_most]],
+            inverse: [[x_least, -x_most], [y_least, -y_most], [z_least, -z_most]],
+            soonest: -soonest,
+            latest,
         }
     }
 }
@@ -93,16 +112,17 @@ impl Aims {
 /// How far rays are spread.
 pub(super) struct Spread {
     set: u32,
-    /// The least and the greatest slope, by axis.
-    slopes: [[f32; 2]; 3],
+    /// The least slope, with the other sign, and the greatest, by axis; and likewise the least start and the
+    /// greatest limit.
+    greatest: [f32; SIDE],
 }
 
 impl Spread {
     /// Whether the rays are neighbours.
     #[inline(always)]
     pub fn is_narrow(&self) -> bool {
-        let [x, y, z] = self.slopes;
-        let apart = (x[1] - x[0]) + (y[1] - y[0]) + (z[1] - z[0]);
+        let [x_least, x_most, y_least, y_most, z_least, z_most, ..] = self.greatest;
+        let apart = (x_most + x_least) + (y_most + y_least) + (z_most + z_least);
         apart <= NEIGHBOURS * self.set.count_ones() as f32
     }
 }
@@ -116,6 +136,9 @@ pub(super) struct Beam {
     along: usize,
     /// The least and the greatest 1/d, by axis.
     inverse: [[f32; 2]; 3],
+    /// Nothing before it matters to any, and nothing behind it.
+    soonest: f32,
+    latest: f32,
 }
 
 #[inline(always)]
@@ -171,12 +194,6 @@ fn length<R: Registers>(slopes: &Lanes<f32>) -> R::Rays {
     R::Rays::splat(0.0).minus(slopes).most(slopes)
 }
 
-/// The least and the greatest of the lanes in `set`.
-#[inline(always)]
-fn extremes<R: Registers>(values: &Lanes<f32>, set: u32) -> [f32; 2] {
-    R::extremes(R::Rays::load(values), set)
-}
-
 /// Behind which nothing matters, by ray.
 #[inline(always)]
 fn limits(packet: &Packet, margin: f32) -> Lanes<f32> {
@@ -227,14 +244,12 @@ pub(super) struct Descent<'a, R: Registers, const FROM_CENTRE: bool> {
 
 impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
     #[inline(always)]
-    pub fn new(aims: &Aims, tree: &'a Tree, packet: &Packet, beam: &Beam) -> Self {
+    pub fn new(aims: &Aims, tree: &'a Tree, beam: &Beam) -> Self {
         let axes = across(beam.along);
         let [u, v, along] = axes;
         let direction = &aims.direction;
         let shear =
             [ratios(&direction[u], &direction[along]), ratios(&direction[v], &direction[along])];
-        let margin = tree.margin(aims.origin);
-        let (starts, limits) = (starts(packet, margin), limits(packet, margin));
         let [x, y, z] = &aims.inverse;
         let [in_x, in_y, in_z] = beam.inverse;
         Self {
@@ -245,11 +260,11 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
             backward: beam.backward,
             axes,
             shear: [R::Rays::load(&shear[0]), R::Rays::load(&shear[1])],
-            margin,
-            start: R::Rays::load(&starts),
-            soonest: extremes::<R>(&starts, beam.set)[0],
-            limit: R::Rays::load(&limits),
-            latest: extremes::<R>(&limits, beam.set)[1],
+            margin: aims.margin,
+            start: R::Rays::load(&aims.starts),
+            soonest: beam.soonest,
+            limit: R::Rays::load(&aims.limits),
+            latest: beam.latest,
             set: beam.set,
         }
     }
@@ -257,9 +272,8 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
     /// Takes note of ranges that were shortened.
     #[inline(always)]
     fn shorten(&mut self, packet: &Packet) {
-        let limits = limits(packet, self.margin);
-        self.limit = R::Rays::load(&limits);
-        self.latest = extremes::<R>(&limits, self.set)[1];
+        self.limit = R::Rays::load(&limits(packet, self.margin));
+        self.latest = R::greatest(self.limit, self.set);
     }
 
     /// A coordinate on an axis, from the start of the rays.
@@ -338,7 +352,7 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
                 }
                 Ok(leaf) => {
                     let set = self.entering(place);
-                    if set != 0 && leaves.meet(self, packet, leaf, set) {
+                    if set != 0 && leaves.meet(self, packet, leaf, set) && waiting > 0 {
                         self.shorten(packet);
                     }
                 }

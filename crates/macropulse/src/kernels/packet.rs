@@ -138,8 +138,8 @@ impl<L: Leaves> Task for Together<'_, L> {
     fn run<R: Registers>(&mut self) {
         let Self { packet, waiting, tree, leaves } = self;
         let Some(origin) = tree.local(packet.origin) else { return };
-        let aims = Aims::of::<R>(packet, origin);
-        let mut rest = aims.entering::<R>(packet, tree);
+        let aims = Aims::of::<R>(packet, tree, origin);
+        let mut rest = aims.entering::<R>(tree);
         if rest == 0 {
             return;
         }
@@ -156,9 +156,9 @@ impl<L: Leaves> Task for Together<'_, L> {
             let stack = &mut waiting.0[..];
             // From the centre, nothing has to be subtracted from anything.
             if origin == [0.0; 3] {
-                Descent::<R, true>::new(&aims, tree, packet, &beam).run(packet, stack, leaves);
+                Descent::<R, true>::new(&aims, tree, &beam).run(packet, stack, leaves);
             } else {
-                Descent::<R, false>::new(&aims, tree, packet, &beam).run(packet, stack, leaves);
+                Descent::<R, false>::new(&aims, tree, &beam).run(packet, stack, leaves);
             }
         }
     }

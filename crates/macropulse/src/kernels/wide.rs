@@ -36,27 +36,33 @@ pub(super) trait Registers {
     /// One for each box of a node.
     type Boxes: Wide<SIDE>;
 
-    /// The least and the greatest of the lanes in `set`, none of them NaN.
+    /// The greatest of the lanes in `set`, none of them NaN; minus infinity if there are none.
     #[inline(always)]
-    fn extremes(rays: Self::Rays, set: u32) -> [f32; 2] {
+    fn greatest(rays: Self::Rays, set: u32) -> f32 {
         let mut lanes = [0.0; LANES];
         rays.store(&mut lanes);
-        let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            let of_set = set >> lane & 1 == 1;
-            low[lane] = if of_set { lanes[lane] } else { f32::INFINITY };
-            high[lane] = if of_set { lanes[lane] } else { f32::NEG_INFINITY };
+        for (lane, value) in lanes.iter_mut().enumerate() {
+            *value = if set >> lane & 1 == 1 { *value } else { f32::NEG_INFINITY };
         }
         let mut half = LANES / 2;
         while half > 0 {
             for lane in 0..half {
-                low[lane] = if low[lane] < low[lane + half] { low[lane] } else { low[lane + half] };
-                high[lane] =
-                    if high[lane] > high[lane + half] { high[lane] } else { high[lane + half] };
+                let (one, other) = (lanes[lane], lanes[lane + half]);
+                lanes[lane] = if one > other { one } else { other };
             }
             half /= 2;
         }
-        [low[0], high[0]]
+        lanes[0]
+    }
+
+    /// The same of each of some.
+    #[inline(always)]
+    fn greatest_of_each(rays: &[Self::Rays; SIDE], set: u32) -> [f32; SIDE] {
+        let mut greatest = [0.0; SIDE];
+        for (greatest, rays) in greatest.iter_mut().zip(rays) {
+            *greatest = Self::greatest(*rays, set);
+        }
+        greatest
     }
 }
 
@@ -202,12 +208,17 @@ mod x86 {
         type Boxes = Eight;
 
         #[inline(always)]
-        fn extremes(Twice(one, other): Twice, set: u32) -> [f32; 2] {
-            let (of_one, of_other) = (mask(set), mask(set >> SIDE));
-            let (none, least) = (Eight::splat(f32::NEG_INFINITY), Eight::splat(f32::INFINITY));
-            let low = one.where_set(of_one, least).least(other.where_set(of_other, least));
-            let high = one.where_set(of_one, none).most(other.where_set(of_other, none));
-            [low.least_lane(), high.greatest_lane()]
+        fn greatest(rays: Twice, set: u32) -> f32 {
+            rays.greatest_of_halves(set).greatest_lane()
+        }
+
+        #[inline(always)]
+        fn greatest_of_each(rays: &[Twice; SIDE], set: u32) -> [f32; SIDE] {
+            let mut halves = [Eight::splat(0.0); SIDE];
+            for (half, rays) in halves.iter_mut().zip(rays) {
+                *half = rays.greatest_of_halves(set);
+            }
+            greatest_of_each(halves)
         }
     }
 
@@ -229,15 +240,31 @@ mod x86 {
         type Boxes = Eight;
 
         #[inline(always)]
-        fn extremes(rays: Sixteen, set: u32) -> [f32; 2] {
-            let set = set as u16;
-            unsafe {
-                let low = _mm512_mask_blend_ps(set, _mm512_set1_ps(f32::INFINITY), rays.0);
-                let high = _mm512_mask_blend_ps(set, _mm512_set1_ps(f32::NEG_INFINITY), rays.0);
-                let (low, high) = (Sixteen(low).halves(), Sixteen(high).halves());
-                [low.0.least(low.1).least_lane(), high.0.most(high.1).greatest_lane()]
-            }
+        fn greatest(rays: Sixteen, set: u32) -> f32 {
+            rays.greatest_of_halves(set).greatest_lane()
         }
+
+        #[inline(always)]
+        fn greatest_of_each(rays: &[Sixteen; SIDE], set: u32) -> [f32; SIDE] {
+            let mut halves = [Eight::splat(0.0); SIDE];
+            for (half, rays) in halves.iter_mut().zip(rays) {
+                *half = rays.greatest_of_halves(set);
+            }
+            greatest_of_each(halves)
+        }
+    }
+
+    /// The greatest lane of each.
+    #[inline(always)]
+    fn greatest_of_each([a, b, c, d, e, f, g, h]: [Eight; SIDE]) -> [f32; SIDE] {
+        let (low, high) = (a.with(b).and(c.with(d)), e.with(f).and(g.with(h)));
+        let mut greatest = [0.0; SIDE];
+        unsafe {
+            let first = Eight(_mm256_permute2f128_ps::<0x20>(low.0, high.0));
+            let last = Eight(_mm256_permute2f128_ps::<0x31>(low.0, high.0));
+            first.most(last).store(&mut greatest);
+        }
+        greatest
     }
 
     /// A register of AVX2. Only for functions that are compiled for it, as the two below.
@@ -265,13 +292,22 @@ mod x86 {
             Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask) })
         }
 
+        /// In each half the greater ones of two pairs of lanes, those of the other behind each: halves both.
         #[inline(always)]
-        fn least_lane(self) -> f32 {
+        fn with(self, other: Self) -> Self {
             unsafe {
-                let four =
-                    _mm_min_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
-                let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
-                _mm_cvtss_f32(_mm_min_ss(two, _mm_movehdup_ps(two)))
+                let low = Self(_mm256_unpacklo_ps(self.0, other.0));
+                low.most(Self(_mm256_unpackhi_ps(self.0, other.0)))
+            }
+        }
+
+        /// The same of pairs that [`Self::with`] made.
+        #[inline(always)]
+        fn and(self, other: Self) -> Self {
+            unsafe {
+                let (one, other) = (_mm256_castps_pd(self.0), _mm256_castps_pd(other.0));
+                let low = Self(_mm256_castpd_ps(_mm256_unpacklo_pd(one, other)));
+                low.most(Self(_mm256_castpd_ps(_mm256_unpackhi_pd(one, other))))
             }
         }
 
@@ -333,6 +369,16 @@ mod x86 {
         }
     }
 
+    impl Twice {
+        /// The greater of each two lanes of `set` that are eight apart.
+        #[inline(always)]
+        fn greatest_of_halves(self, set: u32) -> Eight {
+            let none = Eight::splat(f32::NEG_INFINITY);
+            let high = self.1.where_set(mask(set >> SIDE), none);
+            self.0.where_set(mask(set), none).most(high)
+        }
+    }
+
     impl Wide<LANES> for Twice {
         #[inline(always)]
         fn splat(value: f32) -> Self {
@@ -387,12 +433,14 @@ mod x86 {
     }
 
     impl Sixteen {
+        /// The greater of each two lanes of `set` that are eight apart.
         #[inline(always)]
-        fn halves(self) -> Twice {
+        fn greatest_of_halves(self, set: u32) -> Eight {
             unsafe {
-                let (low, high) =
-                    (_mm512_castps512_ps256(self.0), _mm512_extractf32x8_ps::<1>(self.0));
-                Twice(Eight(low), Eight(high))
+                let none = _mm512_set1_ps(f32::NEG_INFINITY);
+                let of_set = _mm512_mask_blend_ps(set as u16, none, self.0);
+                let low = Eight(_mm512_castps512_ps256(of_set));
+                low.most(Eight(_mm512_extractf32x8_ps::<1>(of_set)))
             }
         }
     }
@@ -451,35 +499,43 @@ mod tests {
     use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
-    /// Asks for the extremes of some lanes.
-    struct Extremes<'a> {
-        values: [f32; LANES],
+    /// Asks for the greatest of some lanes.
+    struct Greatest<'a> {
+        values: &'a [[f32; LANES]; SIDE],
         set: u32,
-        found: &'a mut [f32; 2],
+        found: &'a mut [[f32; SIDE]; 2],
     }
 
-    impl Task for Extremes<'_> {
+    impl Task for Greatest<'_> {
         #[inline(always)]
         fn run<R: Registers>(&mut self) {
-            *self.found = R::extremes(R::Rays::load(&self.values), self.set);
+            let mut rays = [R::Rays::splat(0.0); SIDE];
+            for ((rays, values), found) in rays.iter_mut().zip(self.values).zip(&mut self.found[0])
+            {
+                *rays = R::Rays::load(values);
+                *found = R::greatest(*rays, self.set);
+            }
+            self.found[1] = R::greatest_of_each(&rays, self.set);
         }
     }
 
     proptest! {
         #[test]
-        fn every_level_tells_the_least_and_the_greatest_of_a_set(
-            values in proptest::array::uniform16(-1e3..1e3_f32),
+        fn every_level_tells_the_greatest_of_a_set(
+            values in proptest::array::uniform8(proptest::array::uniform16(-1e3..1e3_f32)),
             set in 0..1_u32 << LANES,
         ) {
-            let of_set = || (0..LANES).filter(|lane| set >> lane & 1 == 1).map(|lane| values[lane]);
-            let least = of_set().fold(f32::INFINITY, f32::min);
-            let greatest = of_set().fold(f32::NEG_INFINITY, f32::max);
+            let of_set = |values: &[f32; LANES]| {
+                let lanes = (0..LANES).filter(|lane| set >> lane & 1 == 1);
+                lanes.map(|lane| values[lane]).fold(f32::NEG_INFINITY, f32::max)
+            };
+            let expected = values.each_ref().map(of_set);
             for (level, found) in at_each_level(|| {
-                let mut found = [0.0; 2];
-                on_level(Extremes { values, set, found: &mut found });
+                let mut found = [[0.0; SIDE]; 2];
+                on_level(Greatest { values: &values, set, found: &mut found });
                 found
             }) {
-                prop_assert_eq!(found, [least, greatest], "{:?}", level);
+                prop_assert_eq!(found, [expected; 2], "{:?}", level);
             }
         }
     }
