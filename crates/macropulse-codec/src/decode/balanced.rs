@@ -191,8 +191,8 @@ impl<'a> Band<'a> {
             late.take_while(|late| *late < room).for_each(|late| counts[late] += 1);
         }
         let mut histogram = Histogram::default();
-        histogram.count(width, self.receiver.jitter(), |place| {
-            counts.get((place - places.start) as usize).copied().unwrap_or(0)
+        histogram.count(width, self.receiver.jitter(), |place, some| {
+            some.copy_from_slice(&counts[(place - places.start) as usize..][..some.len()]);
         });
         let known = Known {
             sigma: self.receiver.jitter(),

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::kernels::{
     Pattern, are_lit, dark_before, lay, light_up, lit_in, lit_in_all, lit_in_any, lit_in_each,
-    look_ahead, put_out,
+    lit_in_row, look_ahead, put_out,
 };
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
@@ -18,6 +18,9 @@ pub(super) struct Timeline {
 /// Machine words that are asked one after another for something lit, before many are at once: where macropulses
 /// overlap it is mostly there.
 const NEAR: usize = 4;
+
+/// Places that a pattern is moved along at once.
+const ROW: usize = 63;
 
 impl Timeline {
     /// The tick of the first bit.
@@ -185,6 +188,16 @@ impl Timeline {
     pub fn lit_in_all(&self, tick: i64, after: &[u32], pattern: &Pattern) -> u32 {
         let first = usize::try_from(tick - self.origin);
         first.map_or(0, |first| lit_in_all(&self.words, first, after, pattern))
+    }
+
+    /// The same of it begun at `tick`, at the next tick, and so on: one number for each of the `counts`; none if
+    /// `tick` is before all.
+    pub fn lit_in_row(&self, tick: i64, after: &[u32], pattern: &Pattern, counts: &mut [u32]) {
+        counts.fill(0);
+        let Ok(first) = usize::try_from(tick - self.origin) else { return };
+        for (some, counts) in (0..).zip(counts.chunks_mut(ROW)) {
+            lit_in_row(&self.words, first + ROW * some, after, pattern, counts);
+        }
     }
 
     /// How many ticks of `pattern` are lit at one at least of the places so many ticks `after` `tick` where it

@@ -71,37 +71,39 @@ pub(super) struct Histogram {
     /// Ticks that are `first`, `first` + 1, … ticks late.
     counts: Vec<u32>,
     first: i64,
-    /// Memory for the counts of the places that hold the marks, and for what is expected in each place.
-    found: Vec<u32>,
+    /// Memory for the counts of all places that may be among them, and for what is expected in each place.
+    about: Vec<u32>,
     expected: Vec<(f64, f64)>,
 }
 
 impl Histogram {
     /// Makes it that of a macropulse which is found at the earliest of `width` ticks that hold its marks.
-    /// `count` tells how many are so many ticks late.
+    /// `count` tells how many are so many ticks late, and how many one tick later, and so on.
     ///
     /// They are counted 2 σ and half a tick to both sides of the fullest places, as many to one as to the
     /// other: a jitter less than is known then draws to neither. Strong light may light places farther
     /// away: as long as a quarter as many ticks as in the fullest place are in the last ones, more are
     /// counted.
-    pub fn count(&mut self, width: u32, sigma: f64, count: impl Fn(i64) -> u32) {
-        let Self { counts, found, .. } = self;
-        found.clear();
-        found.extend((0..i64::from(width)).map(&count));
-        let together = (1 + 2 * sigma.round() as usize).min(found.len());
+    pub fn count(&mut self, width: u32, sigma: f64, count: impl Fn(i64, &mut [u32])) {
+        let Self { counts, about, .. } = self;
+        let reach = (2.0 * sigma + 0.5).ceil() as usize;
+        let places = width as usize;
+        about.resize(places + 2 * reach, 0);
+        count(-(reach as i64), about);
+        let together = (1 + 2 * sigma.round() as usize).min(places);
         let sum = |window: &[u32]| window.iter().sum::<u32>();
-        let windows = found.windows(together).enumerate().rev();
+        let windows = about[reach..reach + places].windows(together).enumerate().rev();
         let fullest = windows.max_by_key(|(_, window)| sum(window)).map_or(0, |(begin, _)| begin);
-        let middle = (fullest + together / 2) as i64;
-        let reach = (2.0 * sigma + 0.5).ceil() as i64;
-        let counted = |place: i64| {
-            let known = usize::try_from(place).ok().and_then(|place| found.get(place)).copied();
-            known.unwrap_or_else(|| count(place))
-        };
+        let middle = fullest + together / 2;
         counts.clear();
-        counts.extend((middle - reach..=middle + reach).map(counted));
-        let (mut first, farthest) = (middle - reach, lateness(width));
-        let mut end = middle + reach + 1;
+        counts.extend_from_slice(&about[middle..=middle + 2 * reach]);
+        let (mut first, farthest) = (middle as i64 - reach as i64, lateness(width));
+        let mut end = (middle + reach) as i64 + 1;
+        let counted = |place: i64| {
+            let mut one = [0];
+            count(place, &mut one);
+            one[0]
+        };
         while first > farthest.start && end < farthest.end {
             let highest = counts.iter().copied().max().unwrap_or(0);
             let at_ends = [counts.first(), counts.last()].into_iter().flatten().max();
@@ -167,12 +169,13 @@ pub(super) fn window(receiver: &Receiver, width: u32, late: f64) -> Window {
 /// The share of events that `width` ticks hold if they come `late` ticks behind the beginning of the
 /// first, give or take `sigma`.
 fn coverage(width: f64, late: f64, sigma: f64) -> f64 {
-    let (before, behind) = (normal_tail(late / sigma), normal_tail((width - late) / sigma));
-    (1.0 - before - behind).max(f64::MIN_POSITIVE)
+    let table = normal_table();
+    let [to_begin, to_end] = [0.0, width].map(|edge| normal(table, (edge - late) / sigma).0);
+    (to_end - to_begin).max(f64::MIN_POSITIVE)
 }
 
 /// How far, in ticks, other marks are from each of the ascending `marks`, at most `reach`, and from
-/// what share of the marks. Both ways: a mark is as far behind another as that is before it.
+/// what share of the marks. Both ways, as a mark is as far behind another as that is before it; the nearest first.
 pub(super) fn neighbours(marks: &[i64], reach: i64) -> Vec<(i64, f64)> {
     let mut found: Vec<(i64, f64)> = Vec::new();
     for (index, mark) in marks.iter().enumerate() {
@@ -224,7 +227,11 @@ fn expect(expected: &mut [(f64, f64)], begins: f64, known: &Known) {
     expected.fill((0.0, 0.0));
     let of_mark = std::iter::once((0, 1.0));
     let (table, per_tick) = (normal_table(), known.sigma.recip());
-    for (distance, share) in of_mark.chain(known.neighbours.iter().copied()) {
+    // The nearest neighbours are the first ones.
+    let reach = FARTHEST * known.sigma + begins.abs() + expected.len() as f64;
+    let is_near = |(distance, _): &(i64, f64)| distance.unsigned_abs() as f64 <= reach;
+    let neighbours = known.neighbours.iter().copied().take_while(is_near);
+    for (distance, share) in of_mark.chain(neighbours) {
         let from = begins - distance as f64;
         let end = from + expected.len() as f64;
         if from * per_tick > FARTHEST || end * per_tick < -FARTHEST {
@@ -322,9 +329,11 @@ mod tests {
             marks.iter().filter(|mark| is_lit(*mark + start, *mark + start + width)).count()
         };
         let start = (-4..6).rev().max_by_key(|start| found(*start)).unwrap();
-        let count = |place: i64| {
-            let lit = marks.iter().filter(|mark| lit[(100 + *mark + start + place) as usize]);
-            lit.count() as u32
+        let count = |place: i64, counts: &mut [u32]| {
+            for (place, count) in (place..).zip(counts) {
+                let lit = marks.iter().filter(|mark| lit[(100 + *mark + start + place) as usize]);
+                *count = lit.count() as u32;
+            }
         };
         let mut histogram = Histogram::default();
         histogram.count(width as u32, sky.sigma, count);

@@ -74,6 +74,51 @@ on_every_level! {
     }
 }
 
+/// Bits that are summed up together: three planes hold their sum.
+const SUMMED: usize = 7;
+
+on_every_level! {
+    /// What [`lit_in_all`] counts of `pattern` begun at bit `first`, at the next bit, and so on: one number for each
+    /// of the `counts`, fewer than 64.
+    ///
+    /// What is lit is summed up once, as bit planes, and the pattern is moved along the sums.
+    pub(crate) fn lit_in_row(
+        words: &[u64],
+        first: usize,
+        after: &[u32],
+        pattern: &Pattern,
+        counts: &mut [u32],
+    ) {
+        counts.fill(0);
+        for after in after.chunks(SUMMED) {
+            for block in (0..pattern.reach()).step_by(LANES) {
+                let mut planes = [[0; LANES]; 3];
+                for after in after {
+                    let (begin, shift) = parts(first + *after as usize);
+                    let mut carried = begun(words, begin + block, shift);
+                    for plane in &mut planes {
+                        for lane in 0..LANES {
+                            let both = plane[lane] & carried[lane];
+                            plane[lane] ^= carried[lane];
+                            carried[lane] = both;
+                        }
+                    }
+                }
+                for (place, count) in counts.iter_mut().enumerate() {
+                    let mask = shifted(&pattern.words[block..], place);
+                    let mut sums = [0; LANES];
+                    for (weight, plane) in planes.iter().enumerate() {
+                        for lane in 0..LANES {
+                            sums[lane] += u64::from((plane[lane] & mask[lane]).count_ones()) << weight;
+                        }
+                    }
+                    *count += sums.iter().sum::<u64>() as u32;
+                }
+            }
+        }
+    }
+}
+
 on_every_level! {
     /// How many bits of `pattern` are lit in `words` wherever it begins, so many bits `after` bit `first`,
     /// modulo 2⁶⁴: any of these. What reaches beyond the end is dark.
@@ -363,6 +408,18 @@ mod tests {
                 }
             }
             prop_assert!(!is_all || are_lit(&full, first, &after, &pattern));
+            let row = at_each_level(|| {
+                let mut counts = [7; 40];
+                lit_in_row(&words, first, &[0, 70, 70, 71, 72, 130, 131, 700], &pattern, &mut counts);
+                counts
+            });
+            for (level, counts) in row {
+                for (place, count) in counts.into_iter().enumerate() {
+                    let after = [0, 70, 70, 71, 72, 130, 131, 700];
+                    let expected = lit_in_all(&words, first + place, &after, &pattern);
+                    prop_assert_eq!(count, expected, "{:?}, {}", level, place);
+                }
+            }
             for (level, (counts, all)) in each {
                 let one_by_one = after.map(|after| lit_in(&words, first + after as usize, &pattern));
                 prop_assert_eq!(counts, one_by_one, "{:?}", level);

@@ -38,8 +38,10 @@ impl Band<'_> {
         }
         let (light, bits) = (sent.light(shot, detection.lag), sent.bits(shot));
         let lit_bits = sent.lit_bits(shot);
-        let count =
-            |place: i64| self.field.seen().lit_in_all(light.start + place, lit_bits, &bits.pattern);
+        let count = |place: i64, counts: &mut [u32]| {
+            let start = light.start + place;
+            self.field.seen().lit_in_row(start, lit_bits, &bits.pattern, counts);
+        };
         self.histogram.count(sent.width, sent.receiver.jitter(), count);
         let beside = self.field.density_without(&light, detection.count, 0);
         let known = Known {

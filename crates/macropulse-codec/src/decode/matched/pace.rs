@@ -70,5 +70,8 @@ impl Usual {
 /// standard deviation of the binomial and of a mark.
 pub(super) fn usual(share: f64, weight: u32) -> u32 {
     let mean = share * f64::from(weight);
-    (mean - HARDLY_EVER * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0).ceil() as u32
+    let least = (mean - HARDLY_EVER * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0);
+    // To round up is a call on processors of any age.
+    let whole = least as u32;
+    whole + u32::from(f64::from(whole) < least)
 }
