@@ -8,6 +8,7 @@ use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
+mod dear;
 mod decode;
 mod effort;
 mod floor;
@@ -27,8 +28,8 @@ mod scans;
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// The sections that are written, in the order in which they are measured.
-const SECTIONS: [&str; 11] = [
-    "rays", "generate", "decode", "levels", "floor", "effort", "plain", "growth", "scans",
+const SECTIONS: [&str; 12] = [
+    "rays", "generate", "decode", "dear", "levels", "floor", "effort", "plain", "growth", "scans",
     "threads", "goals",
 ];
 
@@ -65,6 +66,7 @@ fn section(name: &str) -> Fallible<()> {
         "rays" => rays::measure()?.text(),
         "generate" => generate::measure()?.text(),
         "decode" => decode::measure()?.text(),
+        "dear" => dear::text()?,
         "levels" => levels::text()?,
         "floor" => floor::text()?,
         "effort" => effort::measure()?.text(),
@@ -87,6 +89,7 @@ fn everything() -> Fallible<()> {
     write("decode", &decoding.text())?;
     let rays = rays::measure()?;
     write("rays", &rays.text())?;
+    section("dear")?;
     section("levels")?;
     section("floor")?;
     let efforts = effort::measure()?;
