@@ -190,11 +190,12 @@ impl Timeline {
         first.map_or(0, |first| lit_in_all(&self.words, first, after, pattern))
     }
 
-    /// The same of it begun at `tick`, at the next tick, and so on: one number for each of the `counts`; none if
-    /// `tick` is before all.
+    /// The same of it begun at `tick`, at the next tick, and so on: one number for each of the `counts`.
     pub fn lit_in_row(&self, tick: i64, after: &[u32], pattern: &Pattern, counts: &mut [u32]) {
-        counts.fill(0);
-        let Ok(first) = usize::try_from(tick - self.origin) else { return };
+        let before = ((self.origin - tick).max(0) as usize).min(counts.len());
+        let (before_all, counts) = counts.split_at_mut(before);
+        before_all.fill(0);
+        let first = (tick - self.origin).max(0) as usize;
         for (some, counts) in (0..).zip(counts.chunks_mut(ROW)) {
             lit_in_row(&self.words, first + ROW * some, after, pattern, counts);
         }
@@ -232,6 +233,25 @@ impl Timeline {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_row_of_places_is_each_of_them_also_before_the_beginning() {
+        let mut timeline = Timeline::default();
+        timeline.clear_all(-100, 400);
+        let ticks: Vec<u32> = (0..60).map(|tick| tick * tick % 251).collect();
+        let ticks: std::collections::BTreeSet<u32> = ticks.into_iter().collect();
+        timeline.lay(&ticks.into_iter().collect::<Vec<u32>>(), 300);
+        let (pattern, after) = (Pattern::new([0, 3, 64, 70].into_iter(), 1), [0, 5, 90]);
+        for tick in [-400, -103, -101, -100, -7, 40] {
+            // More than are counted at once.
+            let mut row = [7; 150];
+            timeline.lit_in_row(tick, &after, &pattern, &mut row);
+            let each: Vec<u32> = (tick..tick + 150)
+                .map(|tick| timeline.lit_in_all(tick, &after, &pattern))
+                .collect();
+            assert_eq!(row[..], each, "from {tick}");
+        }
+    }
 
     #[test]
     fn a_tick_is_where_it_was_put_and_nothing_is_outside() {

@@ -78,7 +78,7 @@ pub(super) struct Histogram {
 
 impl Histogram {
     /// Makes it that of a macropulse which is found at the earliest of `width` ticks that hold its marks.
-    /// `count` tells how many are so many ticks late, and how many one tick later, and so on.
+    /// `count` is given a number of ticks and counts to fill in: of those so late, of those one tick later, and so on.
     ///
     /// They are counted 2 σ and half a tick to both sides of the fullest places, as many to one as to the
     /// other: a jitter less than is known then draws to neither. Strong light may light places farther

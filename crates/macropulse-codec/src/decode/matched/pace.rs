@@ -71,7 +71,7 @@ impl Usual {
 pub(super) fn usual(share: f64, weight: u32) -> u32 {
     let mean = share * f64::from(weight);
     let least = (mean - HARDLY_EVER * (mean * (1.0 - share) + 1.0).sqrt()).max(0.0);
-    // To round up is a call on processors of any age.
+    // Rounded up: `ceil` is a call where a processor may lack the instruction, and this is asked some times a shot.
     let whole = least as u32;
     whole + u32::from(f64::from(whole) < least)
 }
