@@ -3,7 +3,6 @@
 use std::slice;
 
 use macropulse::codec::decode::{self, Returns};
-use macropulse::processor::thread_seconds;
 
 use crate::Fallible;
 use crate::page::{self, three};
@@ -24,20 +23,14 @@ const SHARES: [(&str, f64); 3] =
 struct Decoded {
     seconds: f64,
     shots: f64,
-    /// Shots with a return, their marks, and how many of these are seen.
+    /// Shots with a return: the sensor gives one of each. Their marks, and how many of these are seen.
     found: f64,
     marks: f64,
     seen: f64,
 }
 
 impl Decoded {
-    /// With what is found in it.
-    fn found(self, returns: &Returns) -> Self {
-        let sum = |counts: &[u16]| counts.iter().map(|count| f64::from(*count)).sum::<f64>();
-        let (marks, seen) = (sum(&returns.marks), sum(&returns.peak));
-        Self { found: returns.len() as f64, marks, seen, ..self }
-    }
-
+    /// Both together.
     fn with(self, other: &Self) -> Self {
         Self {
             seconds: self.seconds + other.seconds,
@@ -95,13 +88,17 @@ fn decoded(sample: &Sample) -> Result<Vec<Decoded>, decode::Error> {
 
 /// A band, decoded once.
 fn timed(sample: &Sample, given: &Given) -> Result<Decoded, decode::Error> {
-    let began = thread_seconds();
-    let returns = sample.decode(slice::from_ref(given))?;
-    let seconds = thread_seconds() - began;
-    let shots = given.0.owned.len();
-    Ok(returns
-        .iter()
-        .fold(Decoded { seconds, shots: shots as f64, ..Decoded::default() }, Decoded::found))
+    let (returns, seconds) = sample.decode_timed(slice::from_ref(given))?;
+    let sum = |column: fn(&Returns) -> &[u16]| {
+        returns.iter().flat_map(column).map(|count| f64::from(*count)).sum()
+    };
+    Ok(Decoded {
+        seconds,
+        shots: given.0.owned.len() as f64,
+        found: returns.iter().map(Returns::len).sum::<usize>() as f64,
+        marks: sum(|returns| &returns.marks),
+        seen: sum(|returns| &returns.peak),
+    })
 }
 
 /// What is in each of the [`SHARES`] of sorted `bands`.

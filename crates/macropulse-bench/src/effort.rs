@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use macropulse::codec::decode::{Effort, Receiver, Returns};
-use macropulse::processor::thread_seconds;
 
 use crate::Fallible;
 use crate::page::{self, grouped, three};
@@ -49,9 +48,7 @@ impl Row {
         let given = sample.given();
         let mut decode = |effort| -> Fallible<(Vec<Returns>, f64)> {
             sample.design.receiver = Receiver { effort, ..sample.design.receiver.clone() };
-            let began = thread_seconds();
-            let returns = sample.decode(&given)?;
-            Ok((returns, thread_seconds() - began))
+            Ok(sample.decode_timed(&given)?)
         };
         let (thorough, long) = decode(Effort::Thorough)?;
         let (quick, short) = decode(Effort::Quick)?;

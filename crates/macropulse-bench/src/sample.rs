@@ -11,6 +11,7 @@ use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
 use macropulse::emit::{Band, bands};
 use macropulse::environment::Environment;
+use macropulse::processor::thread_seconds;
 use macropulse::random::{Chance, Stage};
 use macropulse::scene::{Finish, Hits, Material, Scene};
 use macropulse::tdc::{self, Converted, Wanted};
@@ -217,6 +218,13 @@ impl Sample {
     pub fn decode(&self, given: &[Given]) -> Result<Vec<Returns>, decode::Error> {
         let Design { receiver, coding, .. } = &self.design;
         given.iter().map(|(log, ticks)| receiver.decode(&coding.codebook, log, ticks)).collect()
+    }
+
+    /// The same, and the seconds of this thread that it takes.
+    pub fn decode_timed(&self, given: &[Given]) -> Result<(Vec<Returns>, f64), decode::Error> {
+        let began = thread_seconds();
+        let returns = self.decode(given)?;
+        Ok((returns, thread_seconds() - began))
     }
 
     /// The least seconds for that where each band is decoded as soon as its ticks are there, as in a whole scan: of
