@@ -214,11 +214,7 @@ mod x86 {
 
         #[inline(always)]
         fn greatest_of_each(rays: &[Twice; SIDE], set: u32) -> [f32; SIDE] {
-            let mut halves = [Eight::splat(0.0); SIDE];
-            for (half, rays) in halves.iter_mut().zip(rays) {
-                *half = rays.greatest_of_halves(set);
-            }
-            greatest_of_each(halves)
+            greatest_of_each(rays, set)
         }
     }
 
@@ -246,17 +242,24 @@ mod x86 {
 
         #[inline(always)]
         fn greatest_of_each(rays: &[Sixteen; SIDE], set: u32) -> [f32; SIDE] {
-            let mut halves = [Eight::splat(0.0); SIDE];
-            for (half, rays) in halves.iter_mut().zip(rays) {
-                *half = rays.greatest_of_halves(set);
-            }
-            greatest_of_each(halves)
+            greatest_of_each(rays, set)
         }
     }
 
-    /// The greatest lane of each.
+    /// Registers for the rays of a packet, of two halves.
+    trait Halves: Copy {
+        /// The greater of each two lanes of `set` that are [`SIDE`] apart; minus infinity where neither is in it.
+        fn greatest_of_halves(self, set: u32) -> Eight;
+    }
+
+    /// The greatest of the lanes in `set` of each of some.
     #[inline(always)]
-    fn greatest_of_each([a, b, c, d, e, f, g, h]: [Eight; SIDE]) -> [f32; SIDE] {
+    fn greatest_of_each<R: Halves>(rays: &[R; SIDE], set: u32) -> [f32; SIDE] {
+        let mut halves = [Eight::splat(0.0); SIDE];
+        for (half, rays) in halves.iter_mut().zip(rays) {
+            *half = rays.greatest_of_halves(set);
+        }
+        let [a, b, c, d, e, f, g, h] = halves;
         let (low, high) = (a.with(b).and(c.with(d)), e.with(f).and(g.with(h)));
         let mut greatest = [0.0; SIDE];
         unsafe {
@@ -369,8 +372,7 @@ mod x86 {
         }
     }
 
-    impl Twice {
-        /// The greater of each two lanes of `set` that are eight apart.
+    impl Halves for Twice {
         #[inline(always)]
         fn greatest_of_halves(self, set: u32) -> Eight {
             let none = Eight::splat(f32::NEG_INFINITY);
@@ -432,8 +434,7 @@ mod x86 {
         }
     }
 
-    impl Sixteen {
-        /// The greater of each two lanes of `set` that are eight apart.
+    impl Halves for Sixteen {
         #[inline(always)]
         fn greatest_of_halves(self, set: u32) -> Eight {
             unsafe {
