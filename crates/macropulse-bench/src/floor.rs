@@ -12,7 +12,7 @@
 use std::hint::black_box;
 
 use macropulse::codec::on_every_level;
-use macropulse::codec::steps::{LAGS, WordMarks, ascends, lay, most, widen};
+use macropulse::codec::steps::{LAGS, WordMarks, ascends, lay, widen};
 
 use crate::Fallible;
 use crate::goals;
@@ -42,7 +42,7 @@ pub fn text() -> Fallible<String> {
         for _ in 0..ROUNDS {
             let floors = match condition {
                 Condition::CLEAN => [read(&given); 2],
-                _ => [None, Some(&labels)].map(|told| laid_and_counted(&sample, &given, told)),
+                _ => [false, true].map(|told| laid_and_counted(&sample, &given, &labels, told)),
             };
             let receiver = least_seconds(|| {
                 black_box(sample.decode(&given).ok());
@@ -103,10 +103,7 @@ struct Labels {
 impl Labels {
     fn of(sample: &Sample) -> Self {
         let (book, scale) = (&sample.design.coding.codebook, sample.design.receiver.ticks_per_chip);
-        let word = |word: usize| {
-            let marks = book.word(word as u16).marks.iter();
-            WordMarks::new(&marks.map(|mark| scale * u32::from(*mark)).collect::<Vec<_>>())
-        };
+        let word = |word: usize| WordMarks::new(&book.word(word as u16).marks, scale);
         let bits = book.payload().map_or(1, |payload| payload.bits());
         let chips = book.chips() / bits;
         let bits_of = |label: u32| {
@@ -122,9 +119,9 @@ impl Labels {
     }
 }
 
-/// Seconds to lay all ticks down, and to count and put out the marks of all echoes; with `labels` also to count
-/// them bit by bit, and with jitter by their lateness.
-fn laid_and_counted(sample: &Sample, given: &[Given], labels: Option<&Labels>) -> f64 {
+/// Seconds to lay all ticks down, and to count and put out the marks of all echoes; and if they are `told` by their
+/// `labels` also to count them bit by bit, and with jitter by their lateness.
+fn laid_and_counted(sample: &Sample, given: &[Given], labels: &Labels, told: bool) -> f64 {
     let echoes = sample.echoes();
     let width = sample.window();
     let longest = echoes.iter().flatten().filter_map(|echo| echo.marks.last());
@@ -151,12 +148,14 @@ fn laid_and_counted(sample: &Sample, given: &[Given], labels: Option<&Labels>) -
                 for Echo { start, marks, word, label } in &echoes[..here] {
                     // Where the first lag would come before the stretch, it is the first one that does not.
                     let first = start.saturating_sub(begin + BEFORE);
-                    black_box(most(found, first as u32, marks));
-                    let start = start.saturating_sub(begin);
-                    put_out(&mut left, start, marks);
-                    let Some(labels) = labels else { continue };
                     let word = &labels.words[usize::from(*word)];
                     let [dark, bright] = &labels.bits[usize::from(*label)];
+                    black_box(word.most(found, first as u32, bright));
+                    let start = start.saturating_sub(begin);
+                    put_out(&mut left, start, marks);
+                    if !told {
+                        continue;
+                    }
                     let mut count = |words: &[u64], start: usize, bits: &[u32]| {
                         word.found_in_each(words, start as u32, bits, &mut found_in_bits);
                         black_box(&found_in_bits);
@@ -206,14 +205,10 @@ mod tests {
                 echo.start > first && echo.start + last < end
             };
             for Echo { start, marks, word, label } in echoes.iter().filter(is_whole) {
-                found += most(&seen, (start - BEFORE) as u32, marks);
-                let bright = &labels.bits[usize::from(*label)][1];
-                labels.words[usize::from(*word)].found_in_each(
-                    &seen,
-                    *start as u32,
-                    bright,
-                    &mut in_bits,
-                );
+                let (word, bright) =
+                    (&labels.words[usize::from(*word)], &labels.bits[usize::from(*label)][1]);
+                found += word.most(&seen, (start - BEFORE) as u32, bright);
+                word.found_in_each(&seen, *start as u32, bright, &mut in_bits);
                 found_in_bits += in_bits.iter().sum::<u32>();
                 marks_of_all += marks.len() as u32;
                 put_out(&mut seen, *start, marks);

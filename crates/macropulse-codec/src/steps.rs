@@ -1,8 +1,8 @@
 //! Some steps of the matched receiver by themselves, for who wants to time or to study them.
 
-use crate::kernels::{self, Counts, NARROW, Pattern};
+use crate::kernels::{self, Counts, NARROW, Pattern, WordTicks};
 
-/// Lags at which [`most`] counts.
+/// Lags at which [`WordMarks::most`] counts.
 pub const LAGS: usize = 64 * NARROW;
 
 /// Lights, in `words`, of which the first bit is tick `origin`, those of the ascending `ticks` that they have
@@ -23,23 +23,28 @@ pub fn widen(words: &[u64], lit: &mut [u64], width: u32) {
     kernels::look_ahead(words, lit, width.saturating_sub(1) as usize);
 }
 
-/// The most of `marks`, bits from the beginning of a macropulse on, that are lit in `words` where it begins
-/// at bit `first` or up to [`LAGS`] − 1 bits later. Bits beyond the end are dark; there are 65 535 marks at
-/// most.
-pub fn most(words: &[u64], first: u32, marks: &[u32]) -> u32 {
-    let mut counts = Counts::<NARROW>::default();
-    counts.count(words, first, marks, marks.iter().copied().max().unwrap_or(0));
-    counts.highest([u64::MAX; NARROW]).map_or(0, |(_, count)| count)
-}
-
 /// The marks of a code word, as bits that are looked at together.
 #[derive(Debug, Clone)]
-pub struct WordMarks(Pattern);
+pub struct WordMarks {
+    pattern: Pattern,
+    ticks: WordTicks,
+}
 
 impl WordMarks {
-    /// Of a word with these `marks`, bits from its beginning on.
-    pub fn new(marks: &[u32]) -> Self {
-        Self(Pattern::new(marks.iter().map(|mark| *mark as usize), 1))
+    /// Of a word with the ascending `marks`, chips from its beginning on, with `scale` bits to a chip.
+    pub fn new(marks: &[u16], scale: u32) -> Self {
+        let ticks = WordTicks::new(marks, scale);
+        let pattern = Pattern::new(ticks.ticks().iter().map(|mark| *mark as usize), 1);
+        Self { pattern, ticks }
+    }
+
+    /// The most of the marks that are lit in `words` at any of [`LAGS`], in all of the words that begin so many bits
+    /// `after` bit `first`, or up to [`LAGS`] − 1 bits later. Bits beyond the end are dark; there are 65 535 marks
+    /// in all words at most, and `after` ascends.
+    pub fn most(&self, words: &[u64], first: u32, after: &[u32]) -> u32 {
+        let mut counts = Counts::<NARROW>::default();
+        counts.count(words, first, &self.ticks, after);
+        counts.highest([u64::MAX; NARROW]).map_or(0, |(_, count)| count)
     }
 
     /// Puts into `found` how many of the marks are lit in `words` where the word begins so many bits `after` bit
@@ -47,6 +52,6 @@ impl WordMarks {
     pub fn found_in_each(&self, words: &[u64], first: u32, after: &[u32], found: &mut Vec<u32>) {
         found.clear();
         found.resize(after.len(), 0);
-        kernels::lit_in_each(words, first as usize, after, &self.0, found);
+        kernels::lit_in_each(words, first as usize, after, &self.pattern, found);
     }
 }

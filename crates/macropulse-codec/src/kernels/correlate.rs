@@ -6,8 +6,9 @@
 //! where it is expected is seen in the shorter one, and all of a gate is passed in the longer one.
 
 use super::coarse::COARSE;
+use super::marks::{WordTicks, places_of};
 #[cfg(target_arch = "x86_64")]
-use super::registers;
+use super::{fold, registers};
 use crate::on_every_level;
 
 /// Machine words of a block of the lags about one that is expected.
@@ -27,31 +28,55 @@ pub(crate) const SIXTEEN: usize = 16;
 
 /// Counts of a block of 64 · W lags, in bit planes: plane p has weight 2^p. W is [`NARROW`] or
 /// [`WIDE`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Counts<const W: usize> {
     planes: [[u64; W]; PLANES],
     /// Planes that can be lit at all, or [`LOW`].
     used: usize,
     /// Marks that were counted, at most what a count can be.
     counted: usize,
+    /// Memory for the sums of bits, and for the places of marks.
+    sums: Vec<u64>,
+    places: Vec<u32>,
 }
 
 impl<const W: usize> Default for Counts<W> {
     fn default() -> Self {
-        Self { planes: [[0; W]; PLANES], used: LOW, counted: 0 }
+        let (sums, places) = (Vec::new(), Vec::new());
+        Self { planes: [[0; W]; PLANES], used: LOW, counted: 0, sums, places }
     }
 }
 
 impl<const W: usize> Counts<W> {
+    /// Counts, for each lag of the block, how many marks of the `word` are lit in each of the `bits`: bit
+    /// `first + bit + mark + lag` of `words`, the lowest bit first. Bits beyond the end are dark. Marks and bits
+    /// ascend; there are 65535 at most of one in all of the other.
+    pub(crate) fn count(&mut self, words: &[u64], first: u32, word: &WordTicks, bits: &[u32]) {
+        self.expect(word.ticks().len() * bits.len());
+        let planes = self.planes[..self.used].as_flattened_mut();
+        #[cfg(target_arch = "x86_64")]
+        if fold::fold::<W>(words, first, (word.ticks(), bits), &mut self.sums, planes) {
+            return;
+        }
+        let mut places = std::mem::take(&mut self.places);
+        places_of(word, bits, &mut places);
+        self.count_each(words, first, &places, places.last().copied().unwrap_or(0));
+        self.places = places;
+    }
+
+    /// Makes the counts those of so many marks.
+    fn expect(&mut self, marks: usize) {
+        self.counted = marks;
+        self.used = planes_for(marks);
+    }
+
     /// Counts, for each lag of the block, how many of the marks are lit: bit `place + first + lag` of
-    /// `words` for each of `places`, the lowest bit first. Bits beyond the end are dark. At most
-    /// 65535 marks can be counted, none behind the `farthest` place.
-    pub(crate) fn count(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
+    /// `words` for each of `places`, none of them behind the `farthest`.
+    fn count_each(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
         debug_assert!(places.iter().all(|place| *place <= farthest));
         let mut longer = Vec::new();
         let (words, first) = reached(words, first, farthest as usize + 64 * W, &mut longer);
-        self.counted = places.len();
-        self.used = planes_for(self.counted);
+        self.expect(places.len());
         let planes = self.planes.as_flattened_mut();
         #[cfg(target_arch = "x86_64")]
         if let Some(count) = registers::counter::<W>(self.used)
@@ -98,8 +123,8 @@ impl<const W: usize> Counts<W> {
     }
 }
 
-/// Tells for each lag whether `least` of the marks are lit, where [`Counts::count`] would count them: one bit of
-/// `enough` for each, which is some blocks of W machine words.
+/// Tells for each lag whether `least` of the marks at the `places` are lit, none of them behind the `farthest`, from bit
+/// `first` on: one bit of `enough` for each, which is some blocks of W machine words.
 pub(crate) fn with_enough<const W: usize>(
     words: &[u64],
     first: u32,
@@ -117,19 +142,19 @@ pub(crate) fn with_enough<const W: usize>(
     if let Some(tell) = registers::enough::<W>(planes_for(places.len()))
         && words.len() < 1 << 26
     {
-        // SAFETY: as in `count`; and the words reach to the end of the last block of `enough`, and one farther.
+        // SAFETY: as in `count_each`; and the words reach to the end of the last block of `enough`, and one farther.
         return unsafe { tell(words, first, places, least, enough) };
     }
     let mut counts = Counts::<W>::default();
     for (block, enough) in enough.chunks_exact_mut(W).enumerate() {
-        counts.count(words, first + 64 * (W * block) as u32, places, farthest);
+        counts.count_each(words, first + 64 * (W * block) as u32, places, farthest);
         enough.copy_from_slice(&counts.at_least(least));
     }
 }
 
 /// The `words` from that of bit `first` on, and which bit that is of them; as many at least as are looked at where
 /// blocks end so many bits farther, some of them dark and in `longer` memory.
-fn reached<'a>(
+pub(super) fn reached<'a>(
     words: &'a [u64],
     first: u32,
     farther: usize,
@@ -148,7 +173,7 @@ fn reached<'a>(
 }
 
 /// Planes for the counts of so many marks.
-fn planes_for(marks: usize) -> usize {
+pub(super) fn planes_for(marks: usize) -> usize {
     ((usize::BITS - marks.leading_zeros()) as usize).clamp(LOW, PLANES)
 }
 
@@ -202,7 +227,7 @@ fn highest_of<const W: usize>(planes: &[u64], allowed: &[u64]) -> Option<(u32, u
     Some((64 * lane as u32 + allowed[lane].trailing_zeros(), count))
 }
 
-/// [`Counts::count`] where no block reaches beyond the end.
+/// [`Counts::count_each`] where no block reaches beyond the end.
 fn count_within<const W: usize>(words: &[u64], first: u32, places: &[u32], planes: &mut [u64]) {
     let (planes, _) = planes.as_chunks_mut::<W>();
     planes.fill([0; W]);
@@ -319,6 +344,46 @@ mod tests {
             let [a, b, c, d, ..] = allowed;
             counts_what_is_lit::<NARROW>(&lit, &places, (first, least), [a, b, c, d])?;
         }
+
+        #[test]
+        fn every_level_counts_what_is_lit_in_each_bit(
+            lit in proptest::collection::vec(0..6000_usize, 0..3000),
+            word in proptest::collection::btree_set(0..900_u16, 0..70),
+            bits in proptest::collection::btree_set(0..6000_u32, 0..18),
+            first in 0..1000_u32,
+        ) {
+            let bits: Vec<u32> = bits.into_iter().collect();
+            let marks = WordTicks::new(&word.into_iter().collect::<Vec<u16>>(), 1);
+            counts_what_is_lit_in_each_bit::<WIDE>(&lit, &marks, &bits, first)?;
+            counts_what_is_lit_in_each_bit::<NARROW>(&lit, &marks, &bits, first)?;
+        }
+    }
+
+    fn counts_what_is_lit_in_each_bit<const W: usize>(
+        lit: &[usize],
+        word: &WordTicks,
+        bits: &[u32],
+        first: u32,
+    ) -> Result<(), TestCaseError> {
+        let mut words = vec![0_u64; 100];
+        lit.iter().for_each(|bit| words[bit / 64] |= 1 << (bit % 64));
+        let is_lit =
+            |bit: u32| words.get(bit as usize / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1);
+        let marks = bits.iter().flat_map(|bit| word.ticks().iter().map(move |mark| bit + mark));
+        let found = |lag| marks.clone().filter(|mark| is_lit(first + lag + mark)).count() as u32;
+        let expected: Vec<u32> = (0..64 * W as u32).map(found).collect();
+        let counted = at_each_level(|| {
+            let mut counts = Counts::<W>::default();
+            // What was counted before is forgotten.
+            counts.count(&words, 0, &WordTicks::new(&[0, 7, 9, 800], 1), &[0, 1, 2, 500, 900]);
+            counts.count(&words, first, word, bits);
+            counts
+        });
+        for (level, counts) in counted {
+            let found: Vec<u32> = (0..expected.len() as u32).map(|lag| counts.at(lag)).collect();
+            prop_assert_eq!(&found, &expected, "{:?}", level);
+        }
+        Ok(())
     }
 
     fn counts_what_is_lit<const W: usize>(
@@ -338,8 +403,8 @@ mod tests {
         let counted = at_each_level(|| {
             let mut counts = Counts::<W>::default();
             // What was counted before is forgotten.
-            counts.count(&words, 0, &[7; 20], 6500);
-            counts.count(&words, first, places, 6500);
+            counts.count_each(&words, 0, &[7; 20], 6500);
+            counts.count_each(&words, first, places, 6500);
             counts
         });
         let is_allowed = |lag: &usize| allowed[lag / 64] >> (lag % 64) & 1 == 1;

@@ -23,9 +23,9 @@ impl WordTicks {
         Self { marks: marks.len(), ticks }
     }
 
-    /// Number of marks.
-    pub(crate) fn marks(&self) -> usize {
-        self.marks
+    /// The ticks from its start to each mark.
+    pub(crate) fn ticks(&self) -> &[u32] {
+        &self.ticks[..self.marks]
     }
 }
 

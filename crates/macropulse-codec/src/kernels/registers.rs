@@ -45,6 +45,25 @@ pub(super) fn enough<const W: usize>(planes: usize) -> Option<Enough> {
     })
 }
 
+/// Names two macros: one sums three bits in each lag, the other two, and both carry to the next plane.
+macro_rules! adders {
+    ($three:ident, $two:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident) => {
+        macro_rules! $three {
+            ($a:expr, $b:expr, $c:expr) => {{
+                let (a, b, c) = ($a, $b, $c);
+                ($sum(a, b, c), $carry(a, b, c))
+            }};
+        }
+        macro_rules! $two {
+            ($a:expr, $b:expr) => {{
+                let (a, b) = ($a, $b);
+                ($xor(a, b), $and(a, b))
+            }};
+        }
+    };
+}
+pub(super) use adders;
+
 /// Counts in a register of so many lanes: how it is stored, how a block that begins at a bit of the words is
 /// read, and how three bits are summed in each lag, and carried.
 macro_rules! counter {
@@ -74,13 +93,7 @@ macro_rules! counter {
                 let words = &words[$lanes * block..];
                 let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
                 let mut high = [$dark(); HIGH];
-                // Three bits are summed in each lag, and carried to the next plane.
-                macro_rules! add {
-                    ($a:expr, $b:expr, $c:expr) => {{
-                        let (a, b, c) = ($a, $b, $c);
-                        ($sum(a, b, c), $carry(a, b, c))
-                    }};
-                }
+                adders!(add, add_two, $sum, $carry, $and, $xor);
                 macro_rules! bits {
                     ($place:expr) => {{
                         let bit = first.wrapping_add($place);
@@ -112,7 +125,7 @@ macro_rules! counter {
                         let mut carried;
                         (eights, carried) = add!(eights, a, b);
                         for plane in &mut high {
-                            (*plane, carried) = ($xor(*plane, carried), $and(*plane, carried));
+                            (*plane, carried) = add_two!(*plane, carried);
                         }
                     }};
                 }
@@ -159,7 +172,7 @@ macro_rules! counter {
 }
 
 /// A block is one register, and one instruction cuts it out of two.
-mod avx512 {
+pub(super) mod avx512 {
     use super::{LOW, NARROW, SIXTEEN, WIDE};
     use std::arch::x86_64::*;
 
@@ -208,7 +221,7 @@ mod avx512 {
             /// From the word of `bit` on there must be a register and one word.
             #[inline]
             #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
-            unsafe fn $cut(words: *const u64, bit: u32) -> $kind {
+            pub(in super::super) unsafe fn $cut(words: *const u64, bit: u32) -> $kind {
                 // SAFETY: the caller answers for the words.
                 let (low, high) = unsafe {
                     let low = words.add(bit as usize / 64);
@@ -220,13 +233,13 @@ mod avx512 {
 
             #[inline]
             #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
-            fn $sum(a: $kind, b: $kind, c: $kind) -> $kind {
+            pub(in super::super) fn $sum(a: $kind, b: $kind, c: $kind) -> $kind {
                 $logic::<0x96>(a, b, c)
             }
 
             #[inline]
             #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
-            fn $carry(a: $kind, b: $kind, c: $kind) -> $kind {
+            pub(in super::super) fn $carry(a: $kind, b: $kind, c: $kind) -> $kind {
                 $logic::<0xE8>(a, b, c)
             }
         };
@@ -283,7 +296,7 @@ mod avx512 {
 }
 
 /// A register is half as long as the longer block.
-mod avx2 {
+pub(super) mod avx2 {
     use super::{LOW, NARROW, SIXTEEN};
     use std::arch::x86_64::*;
 
@@ -330,7 +343,7 @@ mod avx2 {
     /// From the word of `bit` on there must be a register and one word.
     #[inline]
     #[target_feature(enable = "avx2")]
-    unsafe fn cut(words: *const u64, bit: u32) -> __m256i {
+    pub(in super::super) unsafe fn cut(words: *const u64, bit: u32) -> __m256i {
         let behind = (bit & 7) as usize;
         // SAFETY: the caller answers for the words, and the tables are a half register longer.
         unsafe {
@@ -345,13 +358,13 @@ mod avx2 {
 
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn sum(a: __m256i, b: __m256i, c: __m256i) -> __m256i {
+    pub(in super::super) fn sum(a: __m256i, b: __m256i, c: __m256i) -> __m256i {
         _mm256_xor_si256(_mm256_xor_si256(a, b), c)
     }
 
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn carry(a: __m256i, b: __m256i, c: __m256i) -> __m256i {
+    pub(in super::super) fn carry(a: __m256i, b: __m256i, c: __m256i) -> __m256i {
         // The sum has the last of these, too.
         _mm256_or_si256(_mm256_and_si256(a, b), _mm256_and_si256(c, _mm256_xor_si256(a, b)))
     }

@@ -186,7 +186,7 @@ impl Band<'_> {
         let tell = |marks: &u32| *marks >= lacking + self.chance.in_words.least(*marks, lit);
         let few = (SIXTEEN as u32..in_word).step_by(SIXTEEN).chain([in_word]).find(tell);
         let of_word = few.filter(|_| bits > 1).unwrap_or(0);
-        search.word.set(&sent.bits(shot).marks[..of_word as usize], stride);
+        search.word.set(&sent.word(shot).ticks()[..of_word as usize], stride);
         let bit_of = |lag: i64| (fired + lag - origin) / COARSE as i64;
         let mut best = None;
         let mut needed = least.max(1);
@@ -213,7 +213,7 @@ impl Band<'_> {
                 // A machine word of the picture stands for one block of lags.
                 for lane in (0..WIDE).filter(|lane| hits[*lane] != 0) {
                     let first = origin + COARSE as i64 * (block + 64 * lane as i64) - fired;
-                    let (lag, count) = self.exactly(source, fired + first, lags, first);
+                    let (lag, count) = self.exactly((shot, source), lags, first);
                     if count >= needed {
                         (best, needed) = (Some((lag, count)), count + 1);
                     }
@@ -223,15 +223,20 @@ impl Band<'_> {
         best
     }
 
-    /// The lag with most of the marks at `places` in the `source`, the earliest of several, of those
-    /// `lags` that are in the block that begins with lag `first`, which is tick `start`.
-    fn exactly(&mut self, source: Source, start: i64, lags: &Range<i64>, first: i64) -> (i64, u32) {
+    /// The lag with most marks of a shot in the source, the earliest of several, of those `lags` that are in the
+    /// block that begins with lag `first`.
+    fn exactly(
+        &mut self,
+        (shot, source): (usize, Source),
+        lags: &Range<i64>,
+        first: i64,
+    ) -> (i64, u32) {
+        let start = self.sent.fired[shot] + first;
         let span = start..start + BLOCK + self.sent.length();
         let search = &mut self.search;
         let (words, begin) = self.field.lit_in(source, &span, &mut search.lit).at(start);
-        let farthest = self.marks.last().copied().unwrap_or(0);
         search.counted += BLOCK;
-        search.counts.count(words, begin as u32, &self.marks, farthest);
+        search.counts.count(words, begin as u32, self.sent.word(shot), self.sent.lit_bits(shot));
         let allowed = below(lags.start - first, [u64::MAX; WIDE], false);
         let allowed = below(lags.end - first, allowed, true);
         let highest = search.counts.highest(allowed);

@@ -22,7 +22,7 @@
 use std::ops::Range;
 
 use super::Detection;
-use super::sent::{Bits, FIRST, Sent};
+use super::sent::{FIRST, Sent};
 use crate::decode::Error;
 use crate::decode::check::in_order;
 use crate::decode::timeline::Timeline;
@@ -228,7 +228,7 @@ impl Canceller<'_> {
             return 0;
         }
         self.keep(shot, start);
-        bits.len() * word.marks()
+        bits.len() * word.ticks().len()
     }
 
     /// The tick in which the macropulse of `shot` begins if `tick` is its first mark but for those
@@ -412,8 +412,8 @@ impl Canceller<'_> {
         let mut in_flight = self.in_flight(tick).filter(|shot| sent.weight(*shot) >= self.least);
         let (shot, start) =
             in_flight.find_map(|shot| Some((shot, self.start_of_any(shot, tick)?)))?;
-        let (Bits { marks, pattern, .. }, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
-        self.residual.put_out(start, lit_bits, pattern);
+        let (marks, lit_bits) = (sent.word(shot).ticks(), sent.lit_bits(shot));
+        self.residual.put_out(start, lit_bits, &sent.bits(shot).pattern);
         let is_mark = |after: i64| {
             let in_bit = lit_bits.iter().map(|bit| after - i64::from(*bit));
             in_bit.filter_map(|after| u32::try_from(after).ok()).any(|after| marks.contains(&after))
@@ -426,7 +426,7 @@ impl Canceller<'_> {
     /// Where the macropulse of `shot` begins earliest, if all its marks are there and `tick` is any of them.
     fn start_of_any(&self, shot: usize, tick: i64) -> Option<i64> {
         let (sent, lit_bits) = (self.sent, self.sent.lit_bits(shot));
-        let Bits { marks, pattern, .. } = sent.bits(shot);
+        let (marks, pattern) = (sent.word(shot).ticks(), &sent.bits(shot).pattern);
         let lags = sent.gate().start..sent.reach().end;
         let next = marks.iter().skip(1).chain(marks.last());
         // Nearly every mark is refused here: the next one is not there.

@@ -136,8 +136,6 @@ impl Words {
 
 /// A code word, as bits.
 pub(super) struct Bits {
-    /// Ticks from its start to each mark.
-    pub marks: Vec<u32>,
     /// One bit for each mark.
     pub pattern: Pattern,
     /// The ticks that are cancelled with it, from [`Sent::farther`] before its start on.
@@ -225,7 +223,7 @@ impl<'a> Sent<'a> {
         self.code_word(shot).bits.get_or_init(|| {
             let word = self.codebook.word(self.log.word[shot]);
             let scale = self.receiver.ticks_per_chip;
-            let marks: Vec<u32> = word.marks.iter().map(|&mark| scale * u32::from(mark)).collect();
+            let marks = self.word(shot).ticks();
             let pattern =
                 |width: u32| Pattern::new(marks.iter().map(|&mark| mark as usize), width as usize);
             let cancelled = self.width + 2 * self.farther() as u32;
@@ -245,8 +243,7 @@ impl<'a> Sent<'a> {
                 pattern: pattern(1),
                 cancelled: pattern(cancelled),
                 claimed: pattern(cancelled + self.width - 1),
-                neighbours: self.neighbours(&marks),
-                marks,
+                neighbours: self.neighbours(marks),
             }
         })
     }

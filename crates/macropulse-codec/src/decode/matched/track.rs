@@ -205,10 +205,9 @@ impl Band<'_> {
         if is_dark(&allowed) {
             return None;
         }
-        self.lay_out(shot);
-        let (words, begin) = self.field.lit().at(self.sent.fired[shot] + first);
-        let farthest = self.marks.last().copied().unwrap_or(0);
-        self.counts.count(words, begin as u32, &self.marks, farthest);
+        let sent = self.sent;
+        let (words, begin) = self.field.lit().at(sent.fired[shot] + first);
+        self.counts.count(words, begin as u32, sent.word(shot), sent.lit_bits(shot));
         let (at, count) = self.counts.highest(and(allowed, wanted))?;
         let (at, width) = (i64::from(at), i64::from(self.sent.width));
         let before = below(at - width, allowed, true);

@@ -64,7 +64,7 @@ proptest! {
                     .any(|tick| crowd.ticks.tick.binary_search(&(tick as u32)).is_ok())
             };
             let in_bit = |bit: &u32| {
-                let marks = sent.bits(shot).marks.iter();
+                let marks = sent.word(shot).ticks().iter();
                 marks.filter(|mark| is_lit(start + i64::from(*bit + **mark))).count() as u32
             };
             let most = sent.dark_bits(shot).iter().map(in_bit).max().unwrap_or(0);

@@ -1,0 +1,322 @@
+//! Marks counted where a code word is sent in several bits: the bits are summed first.
+//!
+//! Of a macropulse with B lit bits and W marks in a code word, B·W marks are counted for each lag. But the
+//! same B places are summed for a mark and a lag as for the next mark and a lag as much earlier: so there is
+//! one number of them for each place of the word, in bit planes, and W numbers are added up.
+
+use super::correlate::{NARROW, WIDE, planes_for, reached};
+use super::level::Level;
+
+/// Planes of the sums: for fewer than 16 bits.
+const SUMS: usize = 4;
+
+/// Planes of each of the counts that are added up: for fewer than 64 marks of a word.
+const OF_WORD: usize = 6;
+
+/// Counts the marks of the `word` in each of the `bits`, both ascending, from bit `first` of the `words` on, for the
+/// lags of `W` machine words, into as many `planes` as the highest count has; what is beyond the end is dark.
+/// `sums` is memory. Or tells that this would take longer than to count one mark after another.
+pub(super) fn fold<const W: usize>(
+    words: &[u64],
+    first: u32,
+    (word, bits): (&[u32], &[u32]),
+    sums: &mut Vec<u64>,
+    planes: &mut [u64],
+) -> bool {
+    let (Some(mark), Some(bit)) = (word.last(), bits.last()) else { return false };
+    let Some(fold) = folder::<W>().filter(|_| is_shorter::<W>(word, bits)) else { return false };
+    // Whole registers, and one word more than a block behind the last mark.
+    let length = (*mark as usize / 64 + W + 1).next_multiple_of(WIDE);
+    let mut longer = Vec::new();
+    let reach = *bit as usize + 64 * (length + WIDE);
+    let (words, first) = reached(words, first, reach, &mut longer);
+    if words.len() >= 1 << 26 {
+        return false;
+    }
+    assert_eq!(planes.len(), W * planes_for(word.len() * bits.len()));
+    sums.resize(SUMS * length, 0);
+    // SAFETY: the processor has what this level asks for; the words reach a plane of sums and a register beyond
+    // each bit, and a plane of sums a block and one word beyond each mark; bits and marks are as few as
+    // `is_shorter` asks for, and there is a plane for each bit of the highest count.
+    unsafe { fold(words, first, (word, bits), sums, planes) };
+    true
+}
+
+/// Whether fewer blocks of lags are added up than there are marks: to sum the bits, as long as the word and the lags,
+/// and each plane of the sums for each mark of the word. Of `kim-park-2016` that is so of four bits and more.
+fn is_shorter<const W: usize>(word: &[u32], bits: &[u32]) -> bool {
+    let longest = word.last().map_or(0, |last| *last as usize / (64 * W));
+    let planes = (usize::BITS - bits.len().leading_zeros()) as usize;
+    let folded = bits.len() * (longest + 2) + planes * word.len();
+    (2..=SUMS).contains(&planes) && word.len() < 1 << OF_WORD && folded < bits.len() * word.len()
+}
+
+/// Does what [`fold`] does, if it can.
+type Folder = unsafe fn(&[u64], u32, (&[u32], &[u32]), &mut [u64], &mut [u64]);
+
+/// What does it in blocks of `W` machine words on this level; `None` where that has no registers as long as the
+/// shorter block.
+fn folder<const W: usize>() -> Option<Folder> {
+    match Level::here() {
+        Level::Avx512 => Some(avx512::fold::<W>),
+        Level::Avx2 => Some(avx2::fold::<W>),
+        Level::Plain => None,
+    }
+}
+
+/// Sums bits in registers of so many lanes, with what [`super::registers`] has for them.
+macro_rules! sums {
+    (
+        $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
+        $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
+    ) => {
+        /// Sums, for each place of a code word and of a block of lags, what is lit so many `bits` behind it, into
+        /// [`SUMS`] planes.
+        ///
+        /// # Safety
+        ///
+        /// The processor must have the features, a plane must be whole registers, and `words`, fewer than 2^26, must
+        /// reach a plane and a register beyond the one in which each of the bits lies: fewer of them than 2^[`SUMS`].
+        #[target_feature(enable = $features)]
+        unsafe fn $name(words: &[u64], first: u32, bits: &[u32], planes: &mut [u64]) {
+            adders!(add, add_two, $sum, $carry, $and, $xor);
+            let length = planes.len() / SUMS;
+            let (threes, rest) = bits.as_chunks::<3>();
+            for block in (0..length).step_by($lanes) {
+                let words = &words[block..];
+                macro_rules! bits {
+                    ($bit:expr) => {{
+                        let bit = first.wrapping_add($bit);
+                        debug_assert!(bit as usize / 64 + $lanes < words.len());
+                        // SAFETY: the caller answers for the bits.
+                        unsafe { $cut(words.as_ptr(), bit) }
+                    }};
+                }
+                let mut sums = [$dark(); SUMS];
+                for [a, b, c] in threes {
+                    let (sum, twos) = add!(bits!(*a), bits!(*b), bits!(*c));
+                    let mut carried;
+                    (sums[0], carried) = add_two!(sums[0], sum);
+                    (sums[1], carried) = add!(sums[1], twos, carried);
+                    (sums[2], carried) = add_two!(sums[2], carried);
+                    sums[3] = $xor(sums[3], carried);
+                }
+                for bit in rest {
+                    let mut carried = bits!(*bit);
+                    for plane in 0..SUMS {
+                        (sums[plane], carried) = add_two!(sums[plane], carried);
+                    }
+                }
+                for plane in 0..SUMS {
+                    let place = &mut planes[length * plane + block..];
+                    // SAFETY: a plane is whole registers.
+                    unsafe { $store(place.as_mut_ptr().cast(), sums[plane]) };
+                }
+            }
+        }
+    };
+}
+
+/// Adds up sums in such registers.
+macro_rules! over_word {
+    (
+        $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
+        $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
+    ) => {
+        /// Adds up the sums, of which `USED` planes are lit, over the marks of a `word`, for the lags of `W` machine
+        /// words, into planes.
+        ///
+        /// # Safety
+        ///
+        /// The processor must have the features, and a plane of `sums` must reach a register and one word beyond
+        /// the one in which each mark lies for the last lags: fewer of them than 2^[`OF_WORD`].
+        #[target_feature(enable = $features)]
+        unsafe fn $name<const W: usize, const USED: usize>(
+            sums: &[u64],
+            word: &[u32],
+            planes: &mut [u64],
+        ) {
+            adders!(add, add_two, $sum, $carry, $and, $xor);
+            let length = sums.len() / SUMS;
+            let (sevens, rest) = word.as_chunks::<7>();
+            for block in (0..W).step_by($lanes) {
+                let mut counts = [[$dark(); OF_WORD]; USED];
+                macro_rules! sums {
+                    ($weight:ident, $mark:expr) => {{
+                        debug_assert!(block + $mark as usize / 64 + $lanes < length);
+                        // SAFETY: the caller answers for the marks.
+                        unsafe { $cut(sums.as_ptr().add(length * $weight + block), $mark) }
+                    }};
+                }
+                for [a, b, c, d, e, f, g] in sevens {
+                    for weight in 0..USED {
+                        let counts = &mut counts[weight];
+                        let (sum, x) =
+                            add!(sums!(weight, *a), sums!(weight, *b), sums!(weight, *c));
+                        let (sum, y) = add!(sum, sums!(weight, *d), sums!(weight, *e));
+                        let (sum, z) = add!(sum, sums!(weight, *f), sums!(weight, *g));
+                        let (twos, fours) = add!(x, y, z);
+                        let mut carried;
+                        (counts[0], carried) = add_two!(counts[0], sum);
+                        (counts[1], carried) = add!(counts[1], twos, carried);
+                        (counts[2], carried) = add!(counts[2], fours, carried);
+                        for plane in 3..OF_WORD {
+                            (counts[plane], carried) = add_two!(counts[plane], carried);
+                        }
+                    }
+                }
+                for mark in rest {
+                    for weight in 0..USED {
+                        let mut carried = sums!(weight, *mark);
+                        for plane in 0..OF_WORD {
+                            (counts[weight][plane], carried) =
+                                add_two!(counts[weight][plane], carried);
+                        }
+                    }
+                }
+                let mut total = [$dark(); SUMS + OF_WORD];
+                for weight in 0..USED {
+                    let mut carried = $dark();
+                    for plane in 0..OF_WORD {
+                        let before = total[weight + plane];
+                        (total[weight + plane], carried) =
+                            add!(before, counts[weight][plane], carried);
+                    }
+                    total[weight + OF_WORD] = carried;
+                }
+                for plane in 0..planes.len() / W {
+                    let place = &mut planes[W * plane + block..];
+                    // SAFETY: a plane is whole registers.
+                    unsafe { $store(place.as_mut_ptr().cast(), total[plane]) };
+                }
+            }
+        }
+    };
+}
+
+/// Sums are longer than a block: the wider registers serve for both blocks.
+mod avx512 {
+    use super::super::registers::adders;
+    use super::super::registers::avx512::{
+        carry_narrow, carry_wide, cut_narrow, cut_wide, sum_narrow, sum_wide,
+    };
+    use super::{NARROW, OF_WORD, SUMS, WIDE};
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    ///
+    /// As of the functions that it calls, for two bits and more.
+    #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
+    pub(super) unsafe fn fold<const W: usize>(
+        words: &[u64],
+        first: u32,
+        (word, bits): (&[u32], &[u32]),
+        sums: &mut [u64],
+        planes: &mut [u64],
+    ) {
+        // SAFETY: the caller answers for it.
+        unsafe {
+            sum_up(words, first, bits, sums);
+            match (W, bits.len().ilog2()) {
+                (NARROW, 1) => narrow::<W, 2>(sums, word, planes),
+                (NARROW, 2) => narrow::<W, 3>(sums, word, planes),
+                (NARROW, _) => narrow::<W, SUMS>(sums, word, planes),
+                (_, 1) => wide::<W, 2>(sums, word, planes),
+                (_, 2) => wide::<W, 3>(sums, word, planes),
+                (_, _) => wide::<W, SUMS>(sums, word, planes),
+            }
+        }
+    }
+
+    sums!(
+        "avx512f,avx512vl,avx512vbmi2",
+        sum_up,
+        WIDE,
+        _mm512_setzero_si512,
+        _mm512_storeu_si512,
+        cut_wide,
+        sum_wide,
+        carry_wide,
+        _mm512_and_si512,
+        _mm512_xor_si512
+    );
+    over_word!(
+        "avx512f,avx512vl,avx512vbmi2",
+        narrow,
+        NARROW,
+        _mm256_setzero_si256,
+        _mm256_storeu_si256,
+        cut_narrow,
+        sum_narrow,
+        carry_narrow,
+        _mm256_and_si256,
+        _mm256_xor_si256
+    );
+    over_word!(
+        "avx512f,avx512vl,avx512vbmi2",
+        wide,
+        WIDE,
+        _mm512_setzero_si512,
+        _mm512_storeu_si512,
+        cut_wide,
+        sum_wide,
+        carry_wide,
+        _mm512_and_si512,
+        _mm512_xor_si512
+    );
+}
+
+/// A register is half as long as the longer block.
+mod avx2 {
+    use super::super::registers::adders;
+    use super::super::registers::avx2::{carry, cut, sum};
+    use super::{NARROW, OF_WORD, SUMS};
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    ///
+    /// As of the functions that it calls, for two bits and more.
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) unsafe fn fold<const W: usize>(
+        words: &[u64],
+        first: u32,
+        (word, bits): (&[u32], &[u32]),
+        sums: &mut [u64],
+        planes: &mut [u64],
+    ) {
+        // SAFETY: the caller answers for it.
+        unsafe {
+            sum_up(words, first, bits, sums);
+            match bits.len().ilog2() {
+                1 => narrow::<W, 2>(sums, word, planes),
+                2 => narrow::<W, 3>(sums, word, planes),
+                _ => narrow::<W, SUMS>(sums, word, planes),
+            }
+        }
+    }
+
+    sums!(
+        "avx2,bmi1,bmi2,lzcnt,popcnt",
+        sum_up,
+        NARROW,
+        _mm256_setzero_si256,
+        _mm256_storeu_si256,
+        cut,
+        sum,
+        carry,
+        _mm256_and_si256,
+        _mm256_xor_si256
+    );
+    over_word!(
+        "avx2,bmi1,bmi2,lzcnt,popcnt",
+        narrow,
+        NARROW,
+        _mm256_setzero_si256,
+        _mm256_storeu_si256,
+        cut,
+        sum,
+        carry,
+        _mm256_and_si256,
+        _mm256_xor_si256
+    );
+}
