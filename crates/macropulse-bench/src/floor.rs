@@ -205,8 +205,8 @@ mod tests {
                 echo.start > first && echo.start + last < end
             };
             for Echo { start, marks, word, label } in echoes.iter().filter(is_whole) {
-                let (word, bright) =
-                    (&labels.words[usize::from(*word)], &labels.bits[usize::from(*label)][1]);
+                let word = &labels.words[usize::from(*word)];
+                let bright = &labels.bits[usize::from(*label)][1];
                 found += word.most(&seen, (start - BEFORE) as u32, bright);
                 word.found_in_each(&seen, *start as u32, bright, &mut in_bits);
                 found_in_bits += in_bits.iter().sum::<u32>();

@@ -38,9 +38,9 @@ impl WordMarks {
         Self { pattern, ticks }
     }
 
-    /// The most of the marks that are lit in `words` at any of [`LAGS`], in all of the words that begin so many bits
-    /// `after` bit `first`, or up to [`LAGS`] − 1 bits later. Bits beyond the end are dark; there are 65 535 marks
-    /// in all words at most, and `after` ascends.
+    /// The most marks that are lit in `words` where the word begins so many bits `after` bit `first`, for all of these
+    /// together, or up to [`LAGS`] − 1 bits later. Bits beyond the end are dark. What is `after` it ascends, and there
+    /// are at most 65 535 marks in all.
     pub fn most(&self, words: &[u64], first: u32, after: &[u32]) -> u32 {
         let mut counts = Counts::<NARROW>::default();
         counts.count(words, first, &self.ticks, after);

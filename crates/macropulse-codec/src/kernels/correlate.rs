@@ -6,9 +6,10 @@
 //! where it is expected is seen in the shorter one, and all of a gate is passed in the longer one.
 
 use super::coarse::COARSE;
+use super::fold::fold;
 use super::marks::{WordTicks, places_of};
 #[cfg(target_arch = "x86_64")]
-use super::{fold, registers};
+use super::registers;
 use crate::on_every_level;
 
 /// Machine words of a block of the lags about one that is expected.
@@ -50,12 +51,11 @@ impl<const W: usize> Default for Counts<W> {
 impl<const W: usize> Counts<W> {
     /// Counts, for each lag of the block, how many marks of the `word` are lit in each of the `bits`: bit
     /// `first + bit + mark + lag` of `words`, the lowest bit first. Bits beyond the end are dark. Marks and bits
-    /// ascend; there are 65535 at most of one in all of the other.
+    /// ascend, and there are at most 65535 marks in all.
     pub(crate) fn count(&mut self, words: &[u64], first: u32, word: &WordTicks, bits: &[u32]) {
         self.expect(word.ticks().len() * bits.len());
         let planes = self.planes[..self.used].as_flattened_mut();
-        #[cfg(target_arch = "x86_64")]
-        if fold::fold::<W>(words, first, (word.ticks(), bits), &mut self.sums, planes) {
+        if fold::<W>(words, first, (word.ticks(), bits), &mut self.sums, planes) {
             return;
         }
         let mut places = std::mem::take(&mut self.places);

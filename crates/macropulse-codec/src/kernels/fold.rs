@@ -4,7 +4,7 @@
 //! same B places are summed for a mark and a lag as for the next mark and a lag as much earlier: so there is
 //! one number of them for each place of the word, in bit planes, and W numbers are added up.
 
-use super::correlate::{NARROW, WIDE, planes_for, reached};
+use super::correlate::{WIDE, planes_for, reached};
 use super::level::Level;
 
 /// Planes of the sums: for fewer than 16 bits.
@@ -58,13 +58,16 @@ type Folder = unsafe fn(&[u64], u32, (&[u32], &[u32]), &mut [u64], &mut [u64]);
 /// shorter block.
 fn folder<const W: usize>() -> Option<Folder> {
     match Level::here() {
+        #[cfg(target_arch = "x86_64")]
         Level::Avx512 => Some(avx512::fold::<W>),
+        #[cfg(target_arch = "x86_64")]
         Level::Avx2 => Some(avx2::fold::<W>),
-        Level::Plain => None,
+        _ => None,
     }
 }
 
 /// Sums bits in registers of so many lanes, with what [`super::registers`] has for them.
+#[cfg(target_arch = "x86_64")]
 macro_rules! sums {
     (
         $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
@@ -118,6 +121,7 @@ macro_rules! sums {
 }
 
 /// Adds up sums in such registers.
+#[cfg(target_arch = "x86_64")]
 macro_rules! over_word {
     (
         $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
@@ -195,12 +199,14 @@ macro_rules! over_word {
 }
 
 /// Sums are longer than a block: the wider registers serve for both blocks.
+#[cfg(target_arch = "x86_64")]
 mod avx512 {
+    use super::super::correlate::NARROW;
     use super::super::registers::adders;
     use super::super::registers::avx512::{
         carry_narrow, carry_wide, cut_narrow, cut_wide, sum_narrow, sum_wide,
     };
-    use super::{NARROW, OF_WORD, SUMS, WIDE};
+    use super::{OF_WORD, SUMS, WIDE};
     use std::arch::x86_64::*;
 
     /// # Safety
@@ -267,10 +273,12 @@ mod avx512 {
 }
 
 /// A register is half as long as the longer block.
+#[cfg(target_arch = "x86_64")]
 mod avx2 {
+    use super::super::correlate::NARROW;
     use super::super::registers::adders;
     use super::super::registers::avx2::{carry, cut, sum};
-    use super::{NARROW, OF_WORD, SUMS};
+    use super::{OF_WORD, SUMS};
     use std::arch::x86_64::*;
 
     /// # Safety

@@ -15,7 +15,6 @@ mod ascend;
 mod balance;
 mod coarse;
 mod correlate;
-#[cfg(target_arch = "x86_64")]
 mod fold;
 mod lay;
 pub mod level;
