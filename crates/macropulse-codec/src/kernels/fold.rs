@@ -43,7 +43,7 @@ pub(super) fn fold<const W: usize>(
 }
 
 /// Whether fewer blocks of lags are added up than there are marks: to sum the bits, as long as the word and the lags,
-/// and each plane of the sums for each mark of the word. Of `kim-park-2016` that is so of four bits and more.
+/// and each plane of the sums for each mark of the word. Of `kim-park-2016` that is so of three bits and more.
 fn is_shorter<const W: usize>(word: &[u32], bits: &[u32]) -> bool {
     let longest = word.last().map_or(0, |last| *last as usize / (64 * W));
     let planes = (usize::BITS - bits.len().leading_zeros()) as usize;
@@ -57,22 +57,46 @@ type Folder = unsafe fn(&[u64], u32, (&[u32], &[u32]), &mut [u64], &mut [u64]);
 /// What does it in blocks of `W` machine words on this level; `None` where that has no registers as long as the
 /// shorter block.
 fn folder<const W: usize>() -> Option<Folder> {
-    match Level::here() {
+    match (Level::here(), W) {
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => Some(avx512::fold::<W>),
+        (Level::Avx512, super::correlate::NARROW) => Some(avx512::narrow::<W>),
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => Some(avx2::fold::<W>),
+        (Level::Avx512, _) => Some(avx512::wide::<W>),
+        #[cfg(target_arch = "x86_64")]
+        (Level::Avx2, _) => Some(avx2::narrow::<W>),
         _ => None,
     }
 }
 
-/// Sums bits in registers of so many lanes, with what [`super::registers`] has for them.
+/// [`Folder`] in registers of so many lanes, with what [`super::registers`] has for them: sums, then adds up.
 #[cfg(target_arch = "x86_64")]
-macro_rules! sums {
+macro_rules! folder {
     (
-        $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
-        $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
+        $features:literal, $fold:ident, $sums:ident, $over_word:ident, $lanes:ident, $dark:ident,
+        $store:ident, $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
     ) => {
+        /// # Safety
+        ///
+        /// As of the two functions that it calls, for two bits and more.
+        #[target_feature(enable = $features)]
+        pub(super) unsafe fn $fold<const W: usize>(
+            words: &[u64],
+            first: u32,
+            (word, bits): (&[u32], &[u32]),
+            sums: &mut [u64],
+            planes: &mut [u64],
+        ) {
+            // SAFETY: the caller answers for it.
+            unsafe {
+                $sums(words, first, bits, sums);
+                match bits.len().ilog2() {
+                    1 => $over_word::<W, 2>(sums, word, planes),
+                    2 => $over_word::<W, 3>(sums, word, planes),
+                    _ => $over_word::<W, SUMS>(sums, word, planes),
+                }
+            }
+        }
+
         /// Sums, for each place of a code word and of a block of lags, what is lit so many `bits` behind it, into
         /// [`SUMS`] planes.
         ///
@@ -81,7 +105,7 @@ macro_rules! sums {
         /// The processor must have the features, a plane must be whole registers, and `words`, fewer than 2^26, must
         /// reach a plane and a register beyond the one in which each of the bits lies: fewer of them than 2^[`SUMS`].
         #[target_feature(enable = $features)]
-        unsafe fn $name(words: &[u64], first: u32, bits: &[u32], planes: &mut [u64]) {
+        unsafe fn $sums(words: &[u64], first: u32, bits: &[u32], planes: &mut [u64]) {
             adders!(add, add_two, $sum, $carry, $and, $xor);
             let length = planes.len() / SUMS;
             let (threes, rest) = bits.as_chunks::<3>();
@@ -117,16 +141,7 @@ macro_rules! sums {
                 }
             }
         }
-    };
-}
 
-/// Adds up sums in such registers.
-#[cfg(target_arch = "x86_64")]
-macro_rules! over_word {
-    (
-        $features:literal, $name:ident, $lanes:ident, $dark:ident, $store:ident,
-        $cut:ident, $sum:ident, $carry:ident, $and:ident, $xor:ident
-    ) => {
         /// Adds up the sums, of which `USED` planes are lit, over the marks of a `word`, for the lags of `W` machine
         /// words, into planes.
         ///
@@ -135,7 +150,7 @@ macro_rules! over_word {
         /// The processor must have the features, and a plane of `sums` must reach a register and one word beyond
         /// the one in which each mark lies for the last lags: fewer of them than 2^[`OF_WORD`].
         #[target_feature(enable = $features)]
-        unsafe fn $name<const W: usize, const USED: usize>(
+        unsafe fn $over_word<const W: usize, const USED: usize>(
             sums: &[u64],
             word: &[u32],
             planes: &mut [u64],
@@ -198,57 +213,22 @@ macro_rules! over_word {
     };
 }
 
-/// Sums are longer than a block: the wider registers serve for both blocks.
+/// A block is one register.
 #[cfg(target_arch = "x86_64")]
 mod avx512 {
-    use super::super::correlate::NARROW;
+    use super::super::correlate::{NARROW, WIDE};
     use super::super::registers::adders;
     use super::super::registers::avx512::{
         carry_narrow, carry_wide, cut_narrow, cut_wide, sum_narrow, sum_wide,
     };
-    use super::{OF_WORD, SUMS, WIDE};
+    use super::{OF_WORD, SUMS};
     use std::arch::x86_64::*;
 
-    /// # Safety
-    ///
-    /// As of the functions that it calls, for two bits and more.
-    #[target_feature(enable = "avx512f,avx512vl,avx512vbmi2")]
-    pub(super) unsafe fn fold<const W: usize>(
-        words: &[u64],
-        first: u32,
-        (word, bits): (&[u32], &[u32]),
-        sums: &mut [u64],
-        planes: &mut [u64],
-    ) {
-        // SAFETY: the caller answers for it.
-        unsafe {
-            sum_up(words, first, bits, sums);
-            match (W, bits.len().ilog2()) {
-                (NARROW, 1) => narrow::<W, 2>(sums, word, planes),
-                (NARROW, 2) => narrow::<W, 3>(sums, word, planes),
-                (NARROW, _) => narrow::<W, SUMS>(sums, word, planes),
-                (_, 1) => wide::<W, 2>(sums, word, planes),
-                (_, 2) => wide::<W, 3>(sums, word, planes),
-                (_, _) => wide::<W, SUMS>(sums, word, planes),
-            }
-        }
-    }
-
-    sums!(
-        "avx512f,avx512vl,avx512vbmi2",
-        sum_up,
-        WIDE,
-        _mm512_setzero_si512,
-        _mm512_storeu_si512,
-        cut_wide,
-        sum_wide,
-        carry_wide,
-        _mm512_and_si512,
-        _mm512_xor_si512
-    );
-    over_word!(
+    folder!(
         "avx512f,avx512vl,avx512vbmi2",
         narrow,
+        sums_narrow,
+        narrow_over_word,
         NARROW,
         _mm256_setzero_si256,
         _mm256_storeu_si256,
@@ -258,9 +238,11 @@ mod avx512 {
         _mm256_and_si256,
         _mm256_xor_si256
     );
-    over_word!(
+    folder!(
         "avx512f,avx512vl,avx512vbmi2",
         wide,
+        sums_wide,
+        wide_over_word,
         WIDE,
         _mm512_setzero_si512,
         _mm512_storeu_si512,
@@ -281,43 +263,11 @@ mod avx2 {
     use super::{OF_WORD, SUMS};
     use std::arch::x86_64::*;
 
-    /// # Safety
-    ///
-    /// As of the functions that it calls, for two bits and more.
-    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-    pub(super) unsafe fn fold<const W: usize>(
-        words: &[u64],
-        first: u32,
-        (word, bits): (&[u32], &[u32]),
-        sums: &mut [u64],
-        planes: &mut [u64],
-    ) {
-        // SAFETY: the caller answers for it.
-        unsafe {
-            sum_up(words, first, bits, sums);
-            match bits.len().ilog2() {
-                1 => narrow::<W, 2>(sums, word, planes),
-                2 => narrow::<W, 3>(sums, word, planes),
-                _ => narrow::<W, SUMS>(sums, word, planes),
-            }
-        }
-    }
-
-    sums!(
-        "avx2,bmi1,bmi2,lzcnt,popcnt",
-        sum_up,
-        NARROW,
-        _mm256_setzero_si256,
-        _mm256_storeu_si256,
-        cut,
-        sum,
-        carry,
-        _mm256_and_si256,
-        _mm256_xor_si256
-    );
-    over_word!(
+    folder!(
         "avx2,bmi1,bmi2,lzcnt,popcnt",
         narrow,
+        sums_narrow,
+        narrow_over_word,
         NARROW,
         _mm256_setzero_si256,
         _mm256_storeu_si256,
