@@ -1,8 +1,9 @@
 //! Marks counted where a code word is sent in several bits: the bits are summed first.
 //!
-//! Of a macropulse with B lit bits and W marks in a code word, B·W marks are counted for each lag. But the
-//! same B places are summed for a mark and a lag as for the next mark and a lag as much earlier: so there is
-//! one number of them for each place of the word, in bit planes, and W numbers are added up.
+//! Of a macropulse with B lit bits and W marks in a code word, B·W marks are counted for each lag. Where mark m is
+//! looked for at lag l, the B bits are looked at m + l ticks behind their beginnings, and so they are for every other
+//! mark and lag with the same m + l. So they are summed once for each m + l, in bit planes, and W of these sums are
+//! added up for a lag.
 
 use super::correlate::{WIDE, planes_for, reached};
 use super::level::Level;
