@@ -89,7 +89,7 @@ pub struct PointCloud {
     /// Up, m.
     pub z: Vec<f32>,
     /// Apparent reflectance, 1 = white Lambertian facing the sensor, by range, link and its own
-    /// energy estimate ([`Scale`]); a lower bound where it is `saturated`.
+    /// energy estimate ([`Scale`]), 10⁶ at most; a lower bound where it is `saturated`.
     pub intensity: Vec<f32>,
     /// Whether the detector cannot tell how much light it was: no mark was missed, and no amplitude
     /// is measured.

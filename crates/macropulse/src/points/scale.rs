@@ -25,6 +25,11 @@ const LEAST: f64 = 1e-3;
 /// … on, by so many to a factor of e.
 const PER_E: f64 = 40.0;
 
+/// The scale of intensity ends here. No material of a scene is brighter than 1.2·10⁵: a return of 10⁶ is
+/// light that no surface at its range sent back, for example a dark count at a range at which a field of
+/// view that follows the beam has moved on, and white would bring nothing.
+const BRIGHTEST: f64 = 1e6;
+
 /// What a receiver knows to tell reflectance by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
@@ -69,12 +74,19 @@ impl Scale {
         libm::exp(from + part * (to - from)) as f32
     }
 
-    /// Reflectance of a surface square on at `range` metres of which `photons` per mark are detected;
-    /// 1 for a detector without a photon scale, which never misses.
+    /// Reflectance of a surface square on at `range` metres that brings `photons` per mark, up to
+    /// [`BRIGHTEST`]; 1 for a detector that never misses and so has no photon scale; 0 where the
+    /// return lies at the sensor, which any surface would outshine.
     #[inline]
     pub(super) fn reflectance(&self, photons: f32, range: f64) -> f32 {
         let white = self.link.photons(1.0, range);
-        if white.is_finite() { (f64::from(photons) / white) as f32 } else { 1.0 }
+        if white.is_infinite() {
+            return 1.0;
+        }
+        if photons <= 0.0 || range <= 0.0 {
+            return 0.0;
+        }
+        (f64::from(photons) / white).min(BRIGHTEST) as f32
     }
 }
 
@@ -107,6 +119,7 @@ const MOST: f64 = 12.0;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::environment::Environment;
     use approx::assert_relative_eq;
 
     fn scale(name: &str, set: &[(&str, &str)]) -> (Design, Scale) {
@@ -149,6 +162,21 @@ mod tests {
         // A detector that measures is taken at its word.
         let (_, direct) = self::scale("vlp-16", &[]);
         assert_eq!(direct.detected(1234.5), 1234.5);
+    }
+
+    /// A field of one pixel has moved on from 6.2 m, and fog of 50 m leaves nothing of what goes 5 km and
+    /// back. Control: what white brings nearer is told as 1.
+    #[test]
+    fn intensity_is_finite_where_white_would_bring_nothing() {
+        let (design, blind) = scale("kim-park-2016-physical", &[("optics.field", "descanned")]);
+        assert_eq!(blind.link.photons(1.0, 7.0), 0.0);
+        assert_eq!([0.0, 1.5].map(|photons| blind.reflectance(photons, 7.0)), [0.0, 1e6]);
+        let near = blind.link.photons(1.0, 3.0) as f32;
+        assert_relative_eq!(blind.reflectance(near, 3.0), 1.0, max_relative = 1e-6);
+        assert_eq!([-0.1, 0.0].map(|range| blind.reflectance(1.5, range)), [0.0; 2]);
+        let fog = Environment::named("fog-50m").unwrap();
+        let fog = Scale::of(&design, &Operating::of(&design, &fog).unwrap());
+        assert_eq!(fog.reflectance(1.5, 5000.0), 1e6);
     }
 
     #[test]
