@@ -154,13 +154,18 @@ pub fn hypergeometric_tail((marked, others): (u32, u32), drawn: u32, least: u32)
 /// P(X = 0), P(X = 1) … P(X = n) of X ~ Bin(n, p), n being `trials`; `p` is held within
 /// \[1e-12, 1 − 1e-12\].
 pub fn binomial(trials: usize, p: f64) -> Vec<f64> {
+    binomial_up_to(trials, p, trials)
+}
+
+/// The same up to P(X = `most`).
+pub fn binomial_up_to(trials: usize, p: f64, most: usize) -> Vec<f64> {
     let p = p.clamp(1e-12, 1.0 - 1e-12);
     let all = lgamma(trials as f64 + 1.0);
     let term = |k: usize| {
         let (k, rest) = (k as f64, (trials - k) as f64);
         exp(all - lgamma(k + 1.0) - lgamma(rest + 1.0) + k * log(p) + rest * log1p(-p))
     };
-    (0..=trials).map(term).collect()
+    (0..=trials.min(most)).map(term).collect()
 }
 
 /// P(X = k) of a Poisson variable with the given `mean`, e^(−n)·n^k/k!.
@@ -171,15 +176,22 @@ pub fn poisson(mean: f64, k: f64) -> f64 {
 /// Erlang's B, a^c/c! / Σ_k a^k/k! \[Erl17\]: the share of calls that find all of `servers` busy
 /// where `offered` is the mean number of calls that come within the time one takes. It does not
 /// depend on how the times are distributed.
+///
+/// Summed as 1/B = 1 + c/a + c·(c − 1)/a² + …, of which about as many terms count as the root of a: the sum
+/// ends where terms no longer count, or where it is too large for a number and B is 0.
 pub fn erlang_b(offered: f64, servers: u32) -> f64 {
     if offered <= 0.0 {
         return 0.0;
     }
-    // B(c) = a·B(c − 1)/(c + a·B(c − 1)), B(0) = 1.
-    (1..=servers).fold(1.0, |loss, servers| {
-        let carried = offered * loss;
-        carried / (f64::from(servers) + carried)
-    })
+    let (mut sum, mut term) = (1.0, 1.0);
+    for free in (1..=servers).rev() {
+        term *= f64::from(free) / offered;
+        sum += term;
+        if sum.is_infinite() || f64::from(free) < offered && term < sum * NEGLIGIBLE {
+            break;
+        }
+    }
+    sum.recip()
 }
 
 /// The bound that |t| exceeds with probability 0.05, t of Student's distribution with `degrees` of
@@ -352,5 +364,19 @@ mod tests {
         assert_relative_eq!(erlang_b(1.0, 1), 0.5, max_relative = 1e-12);
         assert_relative_eq!(erlang_b(1e5, 1150), 1.0 - 1150.0 / 1e5, max_relative = 1e-3);
         assert_eq!(erlang_b(0.0, 3), 0.0);
+        // One server more at a time: B(c) = a·B(c − 1)/(c + a·B(c − 1)), B(0) = 1.
+        let one_by_one = |offered: f64, servers: u32| {
+            (1..=servers).fold(1.0, |loss, servers| {
+                let carried = offered * loss;
+                carried / (f64::from(servers) + carried)
+            })
+        };
+        for (offered, servers) in [(20.0, 30), (1150.0, 1150), (1e6, 1_000_000), (1e6, 1_010_000)] {
+            let expected = one_by_one(offered, servers);
+            assert_relative_eq!(erlang_b(offered, servers), expected, max_relative = 1e-12);
+        }
+        for offered in [1e-9, 1e-3, 1.4e7] {
+            assert_eq!(erlang_b(offered, 1 << 24), 0.0);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Coupling, Error, MOST_RETURNS, Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};
+use super::{Coupling, Error, MOST_RETURNS, Receiver, ReceiverKind, Sampling};
 use crate::code::Codebook;
 use crate::kernels::ascends;
 use crate::{Record, Samples, ShotLog, Ticks};
@@ -20,9 +20,6 @@ const COUNTED: i128 = 1 << 32;
 
 /// Ticks that times may be beyond the light of a shot, by rounding and jitter.
 const SLACK: i128 = 1 << 13;
-
-/// Ticks of a pulse that is sampled, at most: its filter is half as long.
-const LONGEST_PULSE: usize = 1 << 10;
 
 /// Refuses what cannot be decoded, but for ticks out of order where the receiver sees to it itself. All other ticks
 /// are read once; nothing else is as long as they are.
@@ -47,7 +44,9 @@ pub(super) fn check(
     in_time(receiver, (codebook, log), record)
 }
 
-fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
+/// Refuses settings outside their limits, and code words that the receiver does not understand or has no memory
+/// for.
+pub(super) fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
     let refuse = |setting: &'static str, value: String, possible: &'static str| {
         Err(Error::Setting { setting, value, possible })
     };
@@ -98,7 +97,7 @@ fn sampling(sampling: Option<&Sampling>) -> Result<(), Error> {
     let Some(Sampling { pulse, excess, full_scale, least_marks, coupling, .. }) = sampling else {
         return refuse("sampling", "missing".into(), "what is known of the signal that is sampled");
     };
-    if pulse.len() % 2 == 0 || pulse.len() > LONGEST_PULSE * STEPS_OF_TICK {
+    if pulse.len() % 2 == 0 || pulse.len() > Sampling::MOST_ENTRIES {
         let entries = format!("{} entries long", pulse.len());
         return refuse("sampling.pulse", entries, "an odd number of entries up to 16383");
     }

@@ -145,6 +145,20 @@ impl Receiver {
         }
     }
 
+    /// Whether it can decode what is sent with `codebook`. [`Receiver::decode`] asks it first; who makes a
+    /// receiver can ask it before there is anything to decode.
+    ///
+    /// # Errors
+    /// If a setting is outside its limits, or the code words are not understood or too long.
+    pub fn check(&self, codebook: &Codebook) -> Result<(), Error> {
+        check::settings(self, codebook)
+    }
+
+    /// For how many ticks from its earliest place on a mark is looked for.
+    pub fn window_ticks(&self) -> u32 {
+        window(self.jitter())
+    }
+
     /// The returns of the owned shots of `log`, out of all the ticks or samples of its band, the
     /// `record`, ordered by shot, those of one shot by range.
     ///

@@ -69,6 +69,9 @@ pub struct Sampling {
 }
 
 impl Sampling {
+    /// Entries of [`Sampling::pulse`] at most: 1024 ticks.
+    pub const MOST_ENTRIES: usize = 1024 * STEPS_OF_TICK - 1;
+
     /// How much more is asked of a word of which a mark is missing, in standard deviations of the sum.
     pub const MORE_IF_MISSING: f64 = MISSING as f64;
 
