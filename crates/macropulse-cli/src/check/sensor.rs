@@ -211,13 +211,18 @@ fn light(design: &Design, derived: &Derived) -> Columns {
         let pulse = short(design.light.pulse * 1e12);
         columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));
     }
-    let photons = short(derived.reference_photons);
+    let sensitivity = match derived.reference_photons {
+        photons if photons.is_finite() => {
+            format!("{} photons per mark from the reference target", short(photons))
+        }
+        _ => "never misses".to_owned(),
+    };
     if let Some(cells) = speckle_cells(design).filter(|_| design.light.linewidth.is_some()) {
         let (varies, range) = (short(100.0 / cells.sqrt()), short(design.scan.rated_range));
         let told = format!("{} cells at {range} m: an echo varies by {varies} %", short(cells));
         columns.push("speckle", told);
     }
-    columns.push("sensitivity", format!("{photons} photons per mark from the reference target"));
+    columns.push("sensitivity", sensitivity);
     columns
 }
 
@@ -262,7 +267,7 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "marks_per_label": design.coding.codebook.weights().map(|(_, most)| most).collect::<Vec<_>>(),
         "marks_per_scan": derived.marks_per_scan,
         "mean_overlap": derived.mean_overlap,
-        "reference_photons": derived.reference_photons,
+        "reference_photons": derived.reference_photons.is_finite().then_some(derived.reference_photons),
         "idealised": design.idealised.iter().map(|effect| effect.name()).collect::<Vec<_>>(),
         "assumptions": assumptions,
         "defaults": defaults(design),

@@ -30,7 +30,7 @@ impl Figures<'_> {
             "energy_per_macropulse_nj": budget.map(|budget| budget.energy * 1e9),
             "photons_per_macropulse": budget.map(|_| there.photons_per_shot),
             "photons_per_micropulse": budget.map(|_| there.photons_per_shot / marks),
-            "detected_per_micropulse": there.detected_per_mark,
+            "detected_per_micropulse": finite(there.detected_per_mark),
             "background_photons_per_chip": budget.map(|_| self.background_per_chip()),
             "single_pulse_ael_nj": single,
             "cw_ael_mw": class.map(|class| class.continuous() * 1e3),
@@ -90,7 +90,7 @@ fn check_json(check: &Check) -> Value {
     })
 }
 
-/// JSON has no infinity: `null` stands for it.
+/// JSON has no infinity: `null` stands for it, as for the photons of a detector that never misses.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

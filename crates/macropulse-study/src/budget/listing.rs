@@ -94,7 +94,15 @@ impl Figures<'_> {
                 );
             }
         }
-        columns.push("detected", format!("{} photons a mark", short(there.detected_per_mark)));
+        columns.push(
+            "detected",
+            match there.detected_per_mark.is_finite() {
+                true => format!("{} photons a mark", short(there.detected_per_mark)),
+                false => {
+                    "every mark: the sensitivity has pd = 1, and so no scale of light".to_owned()
+                }
+            },
+        );
         if let Some(factor) = self.mark_by_mark {
             let more = if factor > 1.0 { "more" } else { "of the" };
             columns.push(
@@ -140,9 +148,9 @@ impl Figures<'_> {
             text += &format!(
                 "  {:>4.0} % {:>9} {:>9} {:>8} {:>8.4} {:>9.1e} {:>10} {:>9} {:>9}\n",
                 reflectance * 100.0,
-                short(there.photons_per_shot),
-                short(there.detected_per_mark),
-                short(there.snr),
+                counted(there.photons_per_shot),
+                counted(there.detected_per_mark),
+                counted(there.snr),
                 there.pd,
                 there.false_per_shot,
                 there.precision.map_or("-".to_owned(), |told| format!("{:.3} mm", told * 1e3)),
@@ -189,6 +197,11 @@ impl Figures<'_> {
 
 /// Returns on a sidelobe that are rarer are not spoken of.
 const RARELY: f64 = 1e-6;
+
+/// A number of the table; a dash where it has no end.
+fn counted(number: f64) -> String {
+    if number.is_finite() { short(number) } else { "-".to_owned() }
+}
 
 /// A duration in the unit that suits it.
 fn time(seconds: f64) -> String {

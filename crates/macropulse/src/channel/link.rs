@@ -66,7 +66,7 @@ impl Link {
         if reflectance <= 0.0 || back <= 0.0 {
             return 0.0;
         }
-        self.photons_at_one_metre * reflectance * self.transmission(way) / (back * back)
+        dimmed(self.photons_at_one_metre * reflectance, self.transmission(way)) / (back * back)
     }
 
     /// Adds to `photons` the mean photons detected per mark of what each ray of `hits` has met in a scene of
@@ -95,8 +95,15 @@ impl Link {
         }
         let share = self.field.map_or(1.0, |field| field.share(tof_from_range(range)));
         let light = self.photons_at_one_metre * reflectance * share;
-        light * self.transmission(range).powi(2) / range.powi(2)
+        dimmed(light, self.transmission(range).powi(2)) / range.powi(2)
     }
+}
+
+/// What a `transmission` leaves of `light`: all of it where there is no end of light, as at a detector that
+/// never misses.
+#[inline]
+fn dimmed(light: f64, transmission: f64) -> f64 {
+    if light.is_infinite() { light } else { light * transmission }
 }
 
 /// Effective reflectance of what ray `i` of `hits` has met, of its share of the light.
@@ -135,5 +142,10 @@ mod tests {
         let design = Design::open("kim-park-2016", &perfect).unwrap();
         assert_eq!(Link::of(&design, &dark()).photons(0.0, 10.0), 0.0);
         assert_eq!(Link::of(&design, &dark()).photons(1e-3, 10.0), f64::INFINITY);
+        // Fog lets nothing through that a number can tell: exp(−782).
+        let fog = Link::of(&design, &Environment::named("fog-50m").unwrap());
+        assert_eq!(fog.transmission(1e4), 0.0);
+        assert_eq!(fog.photons(1e-3, 1e4), f64::INFINITY);
+        assert_eq!(fog.photons_by((2e4, 1e4), 1e-3), f64::INFINITY);
     }
 }

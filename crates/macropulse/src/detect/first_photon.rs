@@ -7,7 +7,7 @@
 
 use macropulse_codec::statistics::normal_quantile;
 
-use super::single_stop::PLENTY;
+use crate::design::detector::PLENTY;
 use crate::units::{FS_PER_S, RMS_OF_FWHM};
 
 /// When the first photon of a long micropulse is seen.

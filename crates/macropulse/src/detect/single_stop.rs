@@ -34,12 +34,9 @@ use rand_distr::{Distribution, Exp1, Gamma, Poisson, StandardNormal};
 use super::channel::Channel;
 use super::noise::{Stretch, stretches};
 use super::{Detections, Kind, Memory};
-use crate::design::detector::SingleStopSetting;
+use crate::design::detector::{PLENTY, SingleStopSetting};
 use crate::random::{Chance, Stage, Stream};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, tof_from_range};
-
-/// A detector that never misses is given this much light.
-pub(super) const PLENTY: f64 = 1e9;
 
 /// Light that the detector adds up: marks of one pulse train within one micropulse of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,7 +13,7 @@ use super::own_light::OwnLight;
 use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
-use crate::design::detector::{Awaited, Lit, Model, Sampled};
+use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
 use crate::design::{Design, Detector, Tdc};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs, tof_from_range};
@@ -71,7 +71,7 @@ pub struct Forecast {
     /// Reflectance of the target.
     pub reflectance: f64,
     /// Photons of a shot that reach the detector, the mean over labels; detected ones where the
-    /// sensor has no link budget.
+    /// sensor has no link budget; infinite, as [`Forecast::detected_per_mark`], where it never misses.
     pub photons_per_shot: f64,
     /// Photons detected per mark.
     pub detected_per_mark: f64,
@@ -82,7 +82,8 @@ pub struct Forecast {
     /// Probability that a place in the gate is lit by something else.
     pub density: f64,
     /// Ratio of the marks expected to the spread of what is there by chance, (p − d)·√N/√(d·(1 − d))
-    /// of a shot with the mean number of marks; without a code, photons to their noise.
+    /// of a shot with the mean number of marks; without a code, photons to their noise, infinite where the
+    /// sensor never misses.
     pub snr: f64,
     /// Probability that a shot which is lit gives a return there.
     pub pd: f64,
@@ -174,7 +175,7 @@ impl<'a> Forecaster<'a> {
         let Some(own) = self.own_light(farthest) else { return worst };
         // Of two ranges at which as many marks are told the farther one has less light.
         let mut looked_at = BTreeSet::new();
-        for (range, told) in own.each_told(self.design.scan.min_range, farthest) {
+        for (range, told) in own.each_change(self.design.scan.min_range, farthest) {
             let mut sorted = told.clone();
             sorted.sort_unstable();
             if looked_at.insert(sorted) {
@@ -231,7 +232,7 @@ impl<'a> Forecaster<'a> {
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
         let detected = self.light * operating.link.photons(reflectance, range);
         let false_rate = self.background * operating.false_rate;
-        let photon_rate = detected * mean_weight / channel_period;
+        let photon_rate = self.falling_of(detected) * mean_weight / channel_period;
         let falling = false_rate + photon_rate;
         let mark = Lit { photons: detected, background: operating.background, falling };
         let false_events = false_rate * detector.ready_share(falling);
@@ -297,6 +298,7 @@ impl<'a> Forecaster<'a> {
             density,
             snr: match design.is_coded() {
                 true => (mark_pd - density) * mean_weight.sqrt() / spread,
+                false if detected.is_infinite() => f64::INFINITY,
                 false => {
                     let noise = detector.noise(operating.background);
                     detected / noise.map_or(detected.sqrt(), |noise| noise.of_mark(detected))
@@ -311,6 +313,16 @@ impl<'a> Forecaster<'a> {
                 .filter(|_| is_seen)
                 .map(|sidelobes| sidelobes.aside(found, at_the_lag)),
             bound: SPEED_OF_LIGHT / 2.0 * timing.spread / photons.sqrt(),
+        }
+    }
+
+    /// Photons that fall on the detector of a mark of which `detected` are on average. Of light without end
+    /// no more than one for each cell makes it fire.
+    fn falling_of(&self, detected: f64) -> f64 {
+        match &self.design.detector {
+            _ if detected.is_finite() => detected,
+            Detector::Geiger(geiger) => f64::from(geiger.cells),
+            _ => PLENTY,
         }
     }
 
@@ -370,8 +382,9 @@ impl<'a> Forecaster<'a> {
     pub fn farthest(&self, pd: f64, reflectance: f64) -> Option<f64> {
         let scan = &self.design.scan;
         // Nearer, a sampled channel is blind with the mark it has just sent.
-        let blank = self.design.receiver.sampling.as_ref().map_or(0, |known| known.blank_ticks + 2);
-        let blind = s_from_fs(i64::from(blank) * self.design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0;
+        let sampling = self.design.receiver.sampling.as_ref();
+        let blank = sampling.map_or(0, |known| i64::from(known.blank_ticks) + 2);
+        let blind = s_from_fs(blank * self.design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0;
         let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
         let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
         match bisect(nearest, farthest, lost) {
@@ -411,6 +424,12 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
         ));
     }
     if let Detector::Sampled(detector) = &design.detector {
+        if design.coding.codebook.max_weight() > sampled::MOST_MARKS {
+            return Some((
+                "sampled words of more than 64 marks",
+                "simulate it, or take a code of fewer marks".to_owned(),
+            ));
+        }
         return sunk(design, detector, operating.background);
     }
     let Detector::Linear(linear) = &design.detector else { return None };

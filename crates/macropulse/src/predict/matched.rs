@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use macropulse_codec::decode::ReceiverKind;
 use macropulse_codec::statistics::{
-    binomial, binomial_tail, normal_quantile, normal_tail, poisson,
+    binomial, binomial_tail, binomial_up_to, normal_quantile, normal_tail, poisson,
 };
 
 use crate::design::Design;
@@ -22,6 +22,10 @@ const HARMONICS: u32 = 16;
 /// Jitter, in ticks, of which hardly any event is farther than a tick from the others: ±½ tick is
 /// ±2 σ.
 const NARROW: f64 = 0.25;
+
+/// Steps in an rms length of a micropulse that are as good as more: a Gaussian in steps of half of it is as
+/// smooth as one without to 10⁻³⁰.
+const FINE: f64 = 64.0;
 
 /// Places in half a tick over which an error is averaged.
 const PHASES: u32 = 12;
@@ -49,8 +53,7 @@ impl Place {
 
     /// Its length in ticks: one where events are exact, else one more than four deviations, rounded up.
     pub fn ticks(design: &Design) -> f64 {
-        let sigma = design.receiver.jitter_ticks;
-        if design.is_coded() && sigma > 0.05 { 1.0 + (4.0 * sigma).ceil() } else { 1.0 }
+        if design.is_coded() { design.receiver.window_ticks().into() } else { 1.0 }
     }
 }
 
@@ -67,7 +70,9 @@ impl Place {
 
 /// Probability that the detector sees anything of a `share` of the photons of a mark.
 fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
-    design.detector.model().mark_pd(&Lit { photons: mark.photons * share, ..*mark })
+    // Light without end times nothing is nothing.
+    let photons = if share > 0.0 { mark.photons * share } else { 0.0 };
+    design.detector.model().mark_pd(&Lit { photons, ..*mark })
 }
 
 /// Ticks that a mark lights on average, each with the share of the light that falls into it.
@@ -77,9 +82,12 @@ pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
     };
     let width = spread / s_from_fs(design.tdc.tick_fs);
     let below = |place: f64| normal_tail(-place / width);
-    let farthest = (4.0 * 2_f64.sqrt() * width).ceil() as i32;
-    let share = |tick: i32| below(f64::from(tick) + 0.5) - below(f64::from(tick) - 0.5);
-    (-farthest..=farthest).map(|tick| pd_of_share(design, mark, share(tick))).sum()
+    let share = |tick: f64| below(tick + 0.5) - below(tick - 0.5);
+    let pd = |tick: f64| pd_of_share(design, mark, share(tick));
+    // Of a pulse of many ticks one in so many stands for those about it.
+    let every = (width / FINE).ceil().max(1.0);
+    let farthest = (4.0 * 2_f64.sqrt() * width / every).ceil() as i32;
+    (-farthest..=farthest).map(|step| pd(f64::from(step) * every)).sum::<f64>() * every
 }
 
 /// What a receiver finds in a gate.
@@ -181,7 +189,8 @@ impl Gate {
             false => vec![1.0],
         };
         let marks_of_others = (of_others / found.seen.max(f64::MIN_POSITIVE)).round() as usize;
-        let found_of_others = binomial(marks_of_others, found.seen);
+        let most = (of_others + 8.0 * of_others.sqrt() + 8.0) as usize;
+        let found_of_others = binomial_up_to(marks_of_others, found.seen, most);
         let mut chances = vec![0.0; of_noise.len() + found_of_others.len()];
         for (noise, chance) in of_noise.iter().enumerate() {
             for (others, of_others) in found_of_others.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! When a channel that is sampled is blind with what it sends itself, and which marks of echoes that hides.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use macropulse_codec::code::CodeWord;
 use macropulse_codec::decode::Sampling;
@@ -123,10 +123,47 @@ impl OwnLight {
         nearest: f64,
         farthest: f64,
     ) -> impl Iterator<Item = (f64, Vec<usize>)> {
+        let lags = self.lags(nearest, farthest);
+        lags.rev().map(move |late| (self.range(late), self.told(late)))
+    }
+
+    /// The same without ticks at which as much is told as at the next one: what is told changes where a blind
+    /// time begins or ends for a mark.
+    pub(super) fn each_change(
+        &self,
+        nearest: f64,
+        farthest: f64,
+    ) -> impl Iterator<Item = (f64, Vec<usize>)> {
+        let lags = self.lags(nearest, farthest);
+        let marks = || self.shots.iter().flatten();
+        let (first, last) = (*lags.start(), *lags.end());
+        let mut changes: Vec<i64> = match (marks().count() * self.blind.len()) as i64 > last - first
+        {
+            true => (first..last).collect(),
+            false => marks()
+                .flat_map(|mark| {
+                    self.blind
+                        .iter()
+                        .flat_map(move |it| [it.start, it.end].map(|end| end - mark - 1))
+                })
+                .filter(|late| (first..last).contains(late))
+                .collect(),
+        };
+        changes.extend((first <= last).then_some(last));
+        changes.sort_unstable();
+        changes.dedup();
+        changes.into_iter().rev().map(move |late| (self.range(late), self.told(late)))
+    }
+
+    /// Ticks at which an echo from `nearest` to `farthest` metres may come.
+    fn lags(&self, nearest: f64, farthest: f64) -> RangeInclusive<i64> {
         let ticks = |range: f64| tof_from_range(range) * self.ticks_per_s;
-        let from = (ticks(nearest).ceil() as i64).max(self.over);
-        let range = |late: i64| range_from_tof(late as f64 / self.ticks_per_s);
-        (from..=ticks(farthest) as i64).rev().map(move |late| (range(late), self.told(late)))
+        (ticks(nearest).ceil() as i64).max(self.over)..=ticks(farthest) as i64
+    }
+
+    /// The range, m, of an echo that comes so many ticks later.
+    fn range(&self, late: i64) -> f64 {
+        range_from_tof(late as f64 / self.ticks_per_s)
     }
 
     /// How many marks of each shot are told of an echo that comes so many ticks later.
@@ -218,5 +255,11 @@ mod tests {
         let own = OwnLight::of_words(&narrow, &words, blind, tof_from_range(150.0));
         let same = OwnLight::of(&narrow, Some(blind), tof_from_range(150.0));
         assert!(own.each_told(1.0, 150.0).eq(same.each_told(1.0, 150.0)));
+        // Where it changes, all that is told comes, each at the farthest range of a stretch.
+        let mut all: Vec<_> = own.each_told(1.0, 150.0).collect();
+        all.dedup_by(|next, before| next.1 == before.1);
+        let mut changes: Vec<_> = own.each_change(1.0, 150.0).collect();
+        changes.dedup_by(|next, before| next.1 == before.1);
+        assert!(all.len() > 10 && all == changes);
     }
 }

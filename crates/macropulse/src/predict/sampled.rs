@@ -17,6 +17,9 @@ use crate::units::RMS_OF_FWHM;
 /// Points of the sum: with four times as many the probability differs by less than 0.001.
 const POINTS: u32 = 2048;
 
+/// Marks of a word at most: for more the sum takes too much memory.
+pub(super) const MOST_MARKS: usize = 64;
+
 /// The lag of a target and those beside it: noise may lift one of them over the threshold.
 const LAGS: usize = 3;
 

@@ -78,13 +78,15 @@ pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Ve
 
 /// The light that a receiver needs which decides mark by mark and must see all, with probability
 /// 0.99, over the light there is from `wanted`, the mean number of marks taken; of a counter
-/// without noise, n = −ln(1 − 0.99^(1/N)) each. `None` where shots are not coded.
+/// without noise, n = −ln(1 − 0.99^(1/N)) each. `None` where shots are not coded, and of a sensor that never
+/// misses.
 pub fn mark_by_mark(forecaster: &Forecaster, wanted: &Wanted) -> Option<f64> {
     let design = forecaster.design();
     let marks = design.coding.codebook.mean_weight();
     let needed = -libm::log1p(-libm::pow(0.99, 1.0 / marks));
     let forecast = forecaster.forecast(wanted.reflectance, wanted.range);
-    design.is_coded().then(|| needed / forecast.detected_per_mark)
+    let is_told = design.is_coded() && forecast.detected_per_mark.is_finite();
+    is_told.then(|| needed / forecast.detected_per_mark)
 }
 
 fn eyes(design: &Design) -> Option<Check> {
@@ -116,13 +118,14 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
         }
         None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
     };
+    let light = match found.photons_per_shot.is_finite() {
+        true => format!("{:.1} photons a shot", found.photons_per_shot),
+        false => "a detector that never misses".to_owned(),
+    };
     Check {
         name: "light",
         shortfall: factor.unwrap_or(f64::INFINITY),
-        finding: format!(
-            "in the dark Pd {:.3} from {:.1} photons a shot, wanted {}",
-            found.pd, found.photons_per_shot, wanted.pd
-        ),
+        finding: format!("in the dark Pd {:.3} from {light}, wanted {}", found.pd, wanted.pd),
         remedy,
     }
 }

@@ -196,11 +196,10 @@ impl Model for Geiger {
     }
 
     fn summary(&self) -> String {
-        let Sensitivity { photons, range, reflectance } = self.sensitivity;
         format!(
-            "{} cells in Geiger mode; {photons:.2} photons a mark from reflectance {reflectance} at \
-             {range} m; dead for {} ns; {:.0e} dark counts/s",
+            "{} cells in Geiger mode; {}; dead for {} ns; {:.0e} dark counts/s",
             self.cells,
+            self.sensitivity.summary(),
             s_from_fs(self.dead_fs) * 1e9,
             self.dark
         )

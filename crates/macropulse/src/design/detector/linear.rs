@@ -313,11 +313,11 @@ impl Model for Linear {
     }
 
     fn summary(&self) -> String {
-        let Sensitivity { photons, range, reflectance } = self.sensitivity;
         format!(
-            "linear; threshold {:.2} times the noise; {photons:.2} photons a mark from reflectance \
-             {reflectance} at {range} m; {:.0e} false alarms/s",
-            self.threshold_over_noise, self.false_alarm
+            "linear; threshold {:.2} times the noise; {}; {:.0e} false alarms/s",
+            self.threshold_over_noise,
+            self.sensitivity.summary(),
+            self.false_alarm
         )
     }
 

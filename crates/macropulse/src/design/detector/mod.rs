@@ -32,7 +32,7 @@ pub use geiger::Geiger;
 pub use linear::{Linear, LinearSetting};
 pub use photon_counting::PhotonCounting;
 pub use sampled::{BASELINE_BLOCK, Sampled};
-pub use single_stop::{SingleStop, SingleStopSetting};
+pub use single_stop::{PLENTY, SingleStop, SingleStopSetting};
 pub(in crate::design) use table::{Before, SensitivityFile, Table};
 
 use super::{Error, Light};
@@ -235,6 +235,22 @@ pub struct Sensitivity {
     pub range: f64,
     /// Reflectance of the reference target.
     pub reflectance: f64,
+}
+
+/// Said of a sensitivity that is declared with the probability 1.
+const NEVER_MISSES: &str = "never misses";
+
+impl Sensitivity {
+    /// How much light it is, in a few words for people.
+    fn summary(&self) -> String {
+        let Self { photons, range, reflectance } = self;
+        match photons.is_finite() {
+            true => {
+                format!("{photons:.2} photons a mark from reflectance {reflectance} at {range} m")
+            }
+            false => NEVER_MISSES.to_owned(),
+        }
+    }
 }
 
 /// Noise of an amplitude, in detected photons.

@@ -134,10 +134,9 @@ impl Model for PhotonCounting {
     }
 
     fn summary(&self) -> String {
-        let Sensitivity { photons, range, reflectance } = self.sensitivity;
         format!(
-            "photon counting; {photons:.2} photons a mark from reflectance {reflectance} at \
-             {range} m; {:.0e} dark counts/s; jitter {} ps",
+            "photon counting; {}; {:.0e} dark counts/s; jitter {} ps",
+            self.sensitivity.summary(),
             self.dark,
             self.jitter * 1e12
         )

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, SLICES, Sensitivity,
-    SensitivityFile, Table, Typed, slices_above,
+    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, NEVER_MISSES, Noise, SLICES,
+    Sensitivity, SensitivityFile, Table, Typed, slices_above,
 };
 use crate::design::{Error, Light};
 use crate::units::RMS_OF_FWHM;
@@ -33,6 +33,9 @@ pub(super) struct File {
     #[schemars(range(min = 0, max = 1e6))]
     jitter_ps: f64,
 }
+
+/// Light without end, of a detector that never misses, is so many photons where a number is needed.
+pub const PLENTY: f64 = 1e9;
 
 /// A detector that fires once, when enough photons of one shot have come.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,7 +152,7 @@ impl SingleStopSetting {
     /// detected on average, with a photons rms of noise: 1 − exp(−n) for m = 1 without noise, else
     /// Q((m − n)/√(n + a²)).
     fn firing(&self, photons: f64) -> f64 {
-        let (needed, noise) = (f64::from(self.needed), self.noise);
+        let (needed, noise, photons) = (f64::from(self.needed), self.noise, photons.min(PLENTY));
         if self.needed == 1 && noise == 0.0 {
             return -libm::expm1(-photons);
         }
@@ -215,9 +218,9 @@ impl Model for SingleStop {
     /// those pulses that have so many, which are normal about the mean.
     fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64 {
         let SingleStopSetting { needed, noise, .. } = self.setting(lit.background);
-        let needed = f64::from(needed);
-        let spread = (lit.photons + noise * noise).sqrt();
-        let squares = slices_above(needed, lit.photons, spread)
+        let (needed, mean) = (f64::from(needed), lit.photons.min(PLENTY));
+        let spread = (mean + noise * noise).sqrt();
+        let squares = slices_above(needed, mean, spread)
             .map(|photons| normal_order(needed, photons).1.powi(2));
         light.pulse * RMS_OF_FWHM * (squares.sum::<f64>() / f64::from(SLICES)).sqrt()
     }
@@ -232,9 +235,12 @@ impl Model for SingleStop {
 
     fn summary(&self) -> String {
         let Sensitivity { photons, range, reflectance } = self.sensitivity;
+        let seen = match photons.is_finite() {
+            true => format!("{photons:.0} from reflectance {reflectance} at {range} m"),
+            false => NEVER_MISSES.to_owned(),
+        };
         format!(
-            "fires at {} photons, {photons:.0} from reflectance {reflectance} at {range} m; noise \
-             {} photons; jitter {} ps",
+            "fires at {} photons, {seen}; noise {} photons; jitter {} ps",
             self.firing_photons,
             self.noise_photons,
             self.jitter * 1e12
