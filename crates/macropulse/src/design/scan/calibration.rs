@@ -17,7 +17,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use serde_saphyr::{Location, Spanned};
+use serde_saphyr::{Error as Yaml, Location, Spanned};
 
 use super::laser::{AZIMUTH, ELEVATION, Laser, Limit, MOST_LASERS, ORIGIN, RANGE_OFFSET};
 use crate::digest::Digest;
@@ -80,26 +80,58 @@ pub(super) fn read(path: &Path) -> Result<Calibration, String> {
     Ok(calibration)
 }
 
-/// What the parser `said`, in words of ours.
-fn in_words(said: &str) -> String {
-    let unknown = said.strip_prefix("unknown field `").and_then(|rest| {
-        let (wrong, known) = rest.split_once("`, expected one of ")?;
-        let known: Vec<&str> = known.split(", ").map(|name| name.trim_matches('`')).collect();
-        Some(told::unknown("key", wrong, &known))
-    });
-    unknown.unwrap_or_else(|| match said {
-        "invalid floating point" | "invalid float" => "must be a number".to_owned(),
-        "expected sequence start" => "a list is wanted here, as `- laser_id: 0`".to_owned(),
-        _ => told::wrong(said, None),
-    })
+/// What is wrong with the YAML of a calibration.
+fn in_words(error: &Yaml) -> String {
+    let wrong = |unexpected: &str, expected: &str| {
+        told::wrong(&format!("invalid type: {unexpected}, expected {expected}"), None)
+    };
+    match error {
+        Yaml::AliasError { error, .. } => in_words(error),
+        Yaml::SerdeUnknownField { field, expected, .. } => told::unknown("key", field, expected),
+        Yaml::SerdeMissingField { field, .. } => format!("the key `{field}` is missing"),
+        Yaml::DuplicateMappingKey { key: Some(key), .. } => {
+            format!("the key `{key}` stands twice: leave one of them out")
+        }
+        Yaml::SerdeInvalidType { unexpected, expected, .. }
+        | Yaml::SerdeInvalidValue { unexpected, expected, .. } => wrong(unexpected, expected),
+        Yaml::InvalidScalar { ty: "boolean", .. } | Yaml::InvalidBooleanStrict { .. } => {
+            "must be true or false".to_owned()
+        }
+        Yaml::InvalidScalar { ty, .. } if ty.starts_with(['u', 'i']) => {
+            "must be a whole number, 0 or more".to_owned()
+        }
+        Yaml::InvalidScalar { .. } | Yaml::NonFiniteFloat { .. } => "must be a number".to_owned(),
+        Yaml::Unexpected { expected: "sequence start", .. } => {
+            "a list is wanted here, as `- laser_id: 0`".to_owned()
+        }
+        Yaml::Unexpected { expected: "mapping start", .. } => {
+            "keys and their values are wanted here: a calibration is the YAML of a Velodyne driver, \
+             which begins with `lasers:`; angles of other sensors are listed under \
+             scan.spinning.lasers"
+                .to_owned()
+        }
+        Yaml::Unexpected { .. } => "a single value is wanted here".to_owned(),
+        Yaml::MultipleDocuments { .. } => {
+            "a second document begins here: a calibration is one".to_owned()
+        }
+        Yaml::Budget { .. }
+        | Yaml::AliasReplayCounterOverflow { .. }
+        | Yaml::AliasReplayLimitExceeded { .. }
+        | Yaml::AliasExpansionLimitExceeded { .. }
+        | Yaml::AliasReplayStackDepthExceeded { .. } => {
+            "repeats or nests more than a calibration of 1024 lasers does".to_owned()
+        }
+        Yaml::Eof { .. } => "the file ends here, before the calibration does".to_owned(),
+        _ => "is no YAML of a calibration: a line says `key: value`, and a list has a line that begins \
+              with `- ` for each entry"
+            .to_owned(),
+    }
 }
 
 /// As [`read`], of a `text`.
 fn parse(text: &str, origin: &str) -> Result<Calibration, String> {
     let file: File = serde_saphyr::from_str(text).map_err(|error| {
-        let said = error.without_snippet().to_string();
-        let said = said.lines().next().unwrap_or_default();
-        let said = in_words(said.split(" at line ").next().unwrap_or(said));
+        let said = in_words(error.without_snippet());
         match error.location() {
             Some(at) => fault(origin, at, &said),
             None => format!("{origin}: {said}"),
@@ -251,6 +283,15 @@ mod tests {
             assert!(message.contains(said), "{wrong}: {message}");
             assert!(!message.contains('\n'), "{message}");
         }
+        let twice =
+            TWO.replace("vert_correction: 0.1,", "vert_correction: 0.1, vert_correction: 0.1,");
+        assert!(
+            told(&twice).contains("the key `vert_correction` stands twice"),
+            "{}",
+            told(&twice)
+        );
+        let table = told("Laser id,Elevation,Azimuth\n1,14.4,3.3\n");
+        assert!(table.contains("a.yaml:1:1: keys and their values are wanted here"), "{table}");
         assert!(told("lasers: []\n").contains("lists 0 lasers"));
         assert!(told("lasers: [").starts_with("a.yaml"));
         assert!(told("").starts_with("a.yaml"));
