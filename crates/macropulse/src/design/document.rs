@@ -272,10 +272,23 @@ fn not_read(name: &str, error: &std::io::Error) -> String {
     }
 }
 
+/// Parts of a dotted key at most.
+const DEEPEST: usize = 16;
+
+/// Letters that are shown of a key that has more of them.
+const SHOWN: usize = 40;
+
 /// `--set a.b=1` as a document. A value that is not TOML is taken as text.
 fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Error> {
     let mut table = Table::new();
     for (path, typed) in overrides {
+        if path.split('.').count() > DEEPEST {
+            let begin: String = path.chars().take(SHOWN).collect();
+            let message = format!(
+                "`{begin}…`: the key has more than {DEEPEST} parts, and no key of a sensor has as many"
+            );
+            return Err(Error::whole(SET, message));
+        }
         let value = toml_value(typed);
         let mut at = &mut table;
         let mut keys = path.split('.').peekable();
@@ -471,6 +484,18 @@ mod tests {
         let set = [("scan.max_range_m".to_owned(), "12".to_owned())];
         let chain = Chain::read("extends = \"hdl-64e\"", "mine.toml", Path::new(""), &set).unwrap();
         assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_integer(), Some(12));
+    }
+
+    #[test]
+    fn a_key_of_ten_thousand_parts_is_refused() {
+        let set = |parts: usize| {
+            let key = vec!["a"; parts].join(".");
+            Chain::read("extends = \"hdl-64e\"", "m.toml", Path::new(""), &[(key, "1".to_owned())])
+        };
+        assert!(set(DEEPEST).is_ok());
+        let told = set(10_000).unwrap_err().to_string();
+        assert!(told.starts_with("--set: `a.a.a") && told.contains("more than 16 parts"), "{told}");
+        assert!(told.len() < 200, "{told}");
     }
 
     #[test]
