@@ -2,6 +2,8 @@
 
 #![allow(unsafe_code)]
 
+use std::borrow::Cow;
+
 use macropulse::points::{Outcome, PointCloud};
 use numpy::ndarray::ArrayView1;
 use numpy::{Element, PyArray1, PyArrayMethods};
@@ -15,6 +17,8 @@ pub struct Computed {
     pub flags: Vec<u8>,
     /// Angle of incidence, rad; NaN where there is no surface. Empty without the truth.
     pub incidence: Vec<f32>,
+    /// Distance of each point from the origin, m; empty where the cloud has ranges.
+    pub distance: Vec<f32>,
 }
 
 impl Computed {
@@ -24,6 +28,10 @@ impl Computed {
         Self {
             flags: (0..cloud.returns()).map(|at| cloud.flags(at)).collect(),
             incidence: cosines.iter().copied().map(angle).collect(),
+            distance: match cloud.distances() {
+                Cow::Borrowed(_) => Vec::new(),
+                Cow::Owned(distances) => distances,
+            },
         }
     }
 }
@@ -71,16 +79,20 @@ pub enum Column<'a> {
 }
 
 impl Scan {
-    /// The column called `name`; `None` if there is none of this name, or the scan has no truth.
+    /// The column called `name`; `None` if there is none of this name, or the scan does not have it.
     pub fn column(&self, name: &str) -> Option<Column<'_>> {
         let (cloud, truth) = (&self.cloud, &self.cloud.truth.returns);
         let has_truth = self.has_truth();
-        Some(match name {
-            "x" => Column::F4(&cloud.x),
-            "y" => Column::F4(&cloud.y),
-            "z" => Column::F4(&cloud.z),
+        let length = |single, exact: &'_ Vec<f64>| match exact.is_empty() {
+            true => Column::F4(single),
+            false => Column::F8(exact),
+        };
+        let column = match name {
+            "x" => length(&cloud.x, &cloud.exact.x),
+            "y" => length(&cloud.y, &cloud.exact.y),
+            "z" => length(&cloud.z, &cloud.exact.z),
             "intensity" => Column::F4(&cloud.intensity),
-            "range" => Column::F4(&cloud.range),
+            "range" => length(&cloud.range, &cloud.exact.range),
             "time_ns" => Column::F8(&cloud.time_ns),
             "row" | "ring" => Column::U2(&cloud.row),
             "column" => Column::U2(&cloud.column),
@@ -89,7 +101,9 @@ impl Scan {
             "margin" => Column::U2(&cloud.margin),
             "return_number" => Column::U1(&cloud.return_number),
             "number_of_returns" => Column::U1(&cloud.number_of_returns),
-            "flags" => Column::U1(&self.computed().flags),
+            "flags" if cloud.has(cloud.marks.len()) || cloud.has(cloud.saturated.len()) => {
+                Column::U1(&self.computed().flags)
+            }
             "photons" => Column::F4(&cloud.photons),
             "true_range" if has_truth => Column::F4(&truth.range),
             "object" if has_truth => Column::U2(&truth.object),
@@ -97,7 +111,20 @@ impl Scan {
             "incidence" if has_truth => Column::F4(&self.computed().incidence),
             "outcome" if has_truth => Column::Outcomes(&truth.outcome),
             _ => return None,
-        })
+        };
+        Some(column).filter(|column| cloud.has(column.len()))
+    }
+}
+
+impl Column<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::F4(entries) => entries.len(),
+            Self::F8(entries) => entries.len(),
+            Self::U1(entries) => entries.len(),
+            Self::U2(entries) => entries.len(),
+            Self::Outcomes(entries) => entries.len(),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use macropulse::design::Design;
 use macropulse::names::nearest;
 use macropulse::points::{Outcome, PointCloud};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyImportError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -70,9 +70,9 @@ impl Scan {
     }
 
     /// Names of all its columns.
-    fn names(&self) -> impl Iterator<Item = &'static str> {
-        let truth = if self.has_truth() { &TRUE[..] } else { &[] };
-        MEASURED.iter().chain(truth).copied()
+    fn names(&self) -> impl Iterator<Item = &'static str> + '_ {
+        let all = MEASURED.iter().chain(&TRUE).copied();
+        all.filter(|name| self.column(name).is_some())
     }
 
     /// The column called `name`.
@@ -86,6 +86,9 @@ impl Scan {
                     "there is no {name}: the scan has no truth beside its points, as one that was \
                      decoded or read from a file without it"
                 ));
+            }
+            if MEASURED.contains(&name) {
+                return wrong(format!("there is no {name}: the file of the scan does not have it"));
             }
             let hint = nearest(name, self.names())
                 .map(|near| format!("did you mean `{near}`? "))
@@ -133,10 +136,12 @@ impl Scan {
         column!(slf, "intensity")
     }
 
-    /// One-way range, m.
+    /// One-way range, m; of a scan whose file has none, the distance of each point from the origin.
     #[getter]
     fn range<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "range")
+        let scan = slf.get();
+        let distance = || Column::F4(&scan.computed().distance);
+        lent(slf, &scan.column("range").unwrap_or_else(distance))
     }
 
     /// Time at which the shot was fired, ns from the beginning of the first scan.
@@ -201,8 +206,7 @@ impl Scan {
         column!(slf, "flags")
     }
 
-    /// Energy as the receiver can tell it, in detected photons per mark; NaN in a scan that was read
-    /// from a file.
+    /// Energy as the receiver can tell it, in detected photons per mark; files do not have it.
     #[getter]
     fn photons<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         column!(slf, "photons")
@@ -240,7 +244,8 @@ impl Scan {
         column!(slf, "outcome")
     }
 
-    /// All columns by name, those of the truth where it is there.
+    /// All columns by name that the scan has: a simulated one all, with the truth; one that was read
+    /// those of its file.
     ///
     /// Returns:
     ///     A dictionary of arrays, as `pandas.DataFrame` and `numpy.savez` take it.
@@ -252,12 +257,18 @@ impl Scan {
         Ok(columns)
     }
 
-    /// The points, shape (n, 3), float32, m: a copy.
-    fn xyz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    /// The points, shape (n, 3), m: a copy. They are float32, or float64 where the file of the scan
+    /// has more digits, as `x` is.
+    fn xyz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let cloud = &self.cloud;
-        let points = cloud.x.iter().zip(&cloud.y).zip(&cloud.z);
-        let flat: Vec<f32> = points.flat_map(|((x, y), z)| [*x, *y, *z]).collect();
-        PyArray1::from_vec(py, flat).reshape([cloud.returns(), 3])
+        let shape = [cloud.returns(), 3];
+        if cloud.exact.x.is_empty() {
+            let points = cloud.x.iter().zip(&cloud.y).zip(&cloud.z);
+            let flat: Vec<f32> = points.flat_map(|((x, y), z)| [*x, *y, *z]).collect();
+            return Ok(PyArray1::from_vec(py, flat).reshape(shape)?.into_any());
+        }
+        let flat: Vec<f64> = (0..cloud.returns()).flat_map(|at| cloud.position(at)).collect();
+        Ok(PyArray1::from_vec(py, flat).reshape(shape)?.into_any())
     }
 
     /// A column as an image, one return of each pixel.
@@ -360,7 +371,7 @@ impl Scan {
     }
 
     /// The scan as a cloud of Open3D: `open3d.t.geometry.PointCloud` with the attributes
-    /// `positions`, `intensity`, `range` and `ring`.
+    /// `positions`, `intensity`, `range` and `ring`, as far as the scan has them.
     fn to_open3d<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
         let open3d = package(py, "open3d", "to_open3d")?;
@@ -371,7 +382,8 @@ impl Scan {
         let columns =
             [("intensity", "float32"), ("range", "float32"), ("ring", "int32")].into_iter();
         for (name, kind) in columns {
-            let column = lent(slf, &slf.get().known(name)?)?;
+            let Some(column) = slf.get().column(name) else { continue };
+            let column = lent(slf, &column)?;
             let column = column.call_method1("astype", (kind,))?;
             let column = column.call_method1("reshape", (-1, 1))?;
             point.set_item(name, tensor.call1((column,))?)?;
@@ -408,8 +420,9 @@ impl Scan {
             _ => format!(", {} x {} pixels", cloud.rows, cloud.columns),
         };
         let fold = |(low, high): (f32, f32), range: &f32| (low.min(*range), high.max(*range));
-        let ranges = cloud.range.iter().fold((f32::INFINITY, f32::NEG_INFINITY), fold);
-        let ranges = match cloud.range.is_empty() {
+        let ranges = cloud.distances();
+        let ranges = ranges.iter().fold((f32::INFINITY, f32::NEG_INFINITY), fold);
+        let ranges = match cloud.returns() == 0 {
             true => String::new(),
             false => format!(", {:.2} to {:.2} m", ranges.0, ranges.1),
         };

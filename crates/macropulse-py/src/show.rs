@@ -30,10 +30,11 @@ pub fn html(cloud: &PointCloud, said: &str, manifest: &Value) -> String {
 
 /// The range image in colours, as PNG; `None` where it cannot be drawn.
 fn picture(cloud: &PointCloud) -> Option<Vec<u8>> {
-    let finite = cloud.range.iter().copied().filter(|range| range.is_finite());
+    let distances = cloud.distances();
+    let finite = distances.iter().copied().filter(|range| range.is_finite());
     let (near, far) =
         finite.fold((f32::INFINITY, 0.0_f32), |(low, high), r| (low.min(r), high.max(r)));
-    let range = cloud.image(cloud.pick).spread(&cloud.range, f32::NAN);
+    let range = cloud.image(cloud.pick).spread(&distances, f32::NAN);
     let mut layout = Layout::new(cloud.rows, cloud.columns);
     let zoom = |pixels: usize, wanted: usize| (wanted / pixels.max(1)).clamp(1, 8);
     let even = zoom(cloud.columns, 800);

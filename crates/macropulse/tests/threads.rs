@@ -59,6 +59,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         x,
         y,
         z,
+        exact: _,
         intensity,
         range,
         time_ns,

@@ -1,7 +1,7 @@
 //! What a file says of a cloud as a whole, as lines of text: for the comments of PLY and PCD, and for
 //! whatever else takes text.
 
-use super::Names;
+use super::{LeftOut, Names};
 use crate::points::{NO_OBJECT, Pick, PointCloud, Viewpoint};
 
 /// Begins the line with the number of the scan.
@@ -22,6 +22,10 @@ pub(super) struct About {
     pub list: Option<List>,
     pub objects: Vec<String>,
     pub materials: Vec<String>,
+    /// What of the file is not in its clouds.
+    pub left_out: LeftOut,
+    /// Whether the file is a driver's, which writes (0, 0, 0) where nothing returned.
+    pub is_of_driver: bool,
 }
 
 /// The image of a list: rows, columns, returns of a shot at most, and which of them is shown.

@@ -17,7 +17,7 @@ pub(super) enum Point {
 }
 
 /// One attribute of a point, in the order of the files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Attribute {
     X,
     Y,
@@ -79,10 +79,33 @@ impl Attribute {
         Self::Outcome,
     ];
 
-    /// What is written of `cloud`: the measurement and, if it is there, the truth.
-    pub fn of(cloud: &PointCloud) -> &'static [Self] {
-        let all: &'static [Self] = &Self::ALL;
-        if has_truth(cloud) { all } else { &all[..MEASURED] }
+    /// What is written of `cloud`: the attributes that it has, the truth at the end.
+    pub fn of(cloud: &PointCloud) -> Vec<Self> {
+        Self::ALL.into_iter().filter(|attribute| attribute.is_in(cloud)).collect()
+    }
+
+    /// Whether `cloud` has it.
+    fn is_in(self, cloud: &PointCloud) -> bool {
+        let has = |entries: usize| cloud.has(entries);
+        match self {
+            Self::X | Self::Y | Self::Z => true,
+            Self::Intensity => has(cloud.intensity.len()),
+            Self::Range => has(cloud.range.len()),
+            Self::TimeNs => has(cloud.time_ns.len()),
+            // A row without a column is the ring of a driver.
+            Self::Row => has(cloud.row.len()) && has(cloud.column.len()),
+            Self::Column => has(cloud.column.len()),
+            Self::Ring => has(cloud.row.len()),
+            Self::Peak => has(cloud.peak.len()),
+            Self::Marks => has(cloud.marks.len()),
+            Self::Margin => has(cloud.margin.len()),
+            Self::ReturnNumber => has(cloud.return_number.len()),
+            Self::NumberOfReturns => has(cloud.number_of_returns.len()),
+            Self::Flags => has(cloud.marks.len()) || has(cloud.saturated.len()),
+            Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
+                has_truth(cloud)
+            }
+        }
     }
 
     /// Whether it is known from the scene alone.
@@ -133,10 +156,12 @@ impl Attribute {
         format!("{}{unit}", self.name())
     }
 
-    /// A value of the attribute's type, to ask its width of, and what stands for no return.
-    pub fn blank(self) -> Value {
+    /// A value of the attribute's type in `cloud`, to ask its width of, and what stands for no return.
+    pub fn blank(self, cloud: &PointCloud) -> Value {
         match self {
-            Self::TimeNs => Value::F8(0.0),
+            Self::X | Self::Y | Self::Z if !cloud.exact.x.is_empty() => Value::F8(f64::NAN),
+            Self::Range if !cloud.exact.range.is_empty() => Value::F8(f64::NAN),
+            Self::TimeNs => Value::F8(f64::NAN),
             Self::Outcome | Self::Flags => Value::U1(0),
             Self::ReturnNumber | Self::NumberOfReturns => Value::U1(0),
             Self::X | Self::Y | Self::Z | Self::Intensity | Self::Range => Value::F4(f32::NAN),
@@ -145,7 +170,7 @@ impl Attribute {
         }
     }
 
-    /// The attribute of `point` in a cloud that passed [`check_even`].
+    /// The attribute, one of [`Attribute::of`], of `point` in a cloud that passed [`check_even`].
     ///
     /// Object and material of a point without a surface are `NO_OBJECT`; the incidence angle is
     /// acos of the cosine, in radians. A pixel without a return has the first surface along its beam.
@@ -157,12 +182,15 @@ impl Attribute {
     }
 
     fn of_return(self, cloud: &PointCloud, at: usize) -> Value {
+        let length = |single: &[f32], exact: &[f64]| {
+            exact.get(at).map_or_else(|| Value::F4(single[at]), |&exact| Value::F8(exact))
+        };
         match self {
-            Self::X => Value::F4(cloud.x[at]),
-            Self::Y => Value::F4(cloud.y[at]),
-            Self::Z => Value::F4(cloud.z[at]),
+            Self::X => length(&cloud.x, &cloud.exact.x),
+            Self::Y => length(&cloud.y, &cloud.exact.y),
+            Self::Z => length(&cloud.z, &cloud.exact.z),
             Self::Intensity => Value::F4(cloud.intensity[at]),
-            Self::Range => Value::F4(cloud.range[at]),
+            Self::Range => length(&cloud.range, &cloud.exact.range),
             Self::TimeNs => Value::F8(cloud.time_ns[at]),
             Self::Row | Self::Ring => Value::U2(cloud.row[at]),
             Self::Column => Value::U2(cloud.column[at]),
@@ -172,19 +200,21 @@ impl Attribute {
             Self::ReturnNumber => Value::U1(cloud.return_number[at]),
             Self::NumberOfReturns => Value::U1(cloud.number_of_returns[at]),
             Self::Flags => Value::U1(cloud.flags(at)),
-            _ => self.of_surface(&cloud.truth.returns.at(at)),
+            Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
+                self.of_surface(&cloud.truth.returns.at(at))
+            }
         }
     }
 
     fn of_unanswered(self, cloud: &PointCloud, pixel: usize) -> Value {
         match self {
-            Self::TimeNs => Value::F8(cloud.fired_ns[pixel]),
+            Self::TimeNs => Value::F8(cloud.fired_ns.get(pixel).copied().unwrap_or(f64::NAN)),
             Self::Row | Self::Ring => Value::U2((pixel / cloud.columns) as u16),
             Self::Column => Value::U2((pixel % cloud.columns) as u16),
             Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
                 self.of_surface(&cloud.truth.pixels.at(pixel))
             }
-            _ => self.blank(),
+            _ => self.blank(cloud),
         }
     }
 
@@ -198,8 +228,7 @@ impl Attribute {
                 let cosine = f64::from(surface.cosine).clamp(0.0, 1.0);
                 Value::F4(libm::acos(cosine) as f32)
             }
-            Self::Outcome => Value::U1(surface.outcome as u8),
-            _ => self.blank(),
+            _ => Value::U1(surface.outcome as u8),
         }
     }
 }
@@ -225,6 +254,11 @@ impl Value {
             Self::F4(value) => f64::from(value),
             Self::F8(value) => value,
         }
+    }
+
+    /// The same with coordinates in 32 bits, for formats that have room for no more.
+    pub fn narrowed(self) -> Self {
+        if let Self::F8(value) = self { Self::F4(value as f32) } else { self }
     }
 
     /// Appends the value, little endian.
@@ -262,13 +296,18 @@ pub(super) fn outcome_from_code(code: u8) -> Option<Outcome> {
     Outcome::ALL.get(usize::from(code)).copied()
 }
 
-/// Refuses a cloud whose columns have not one entry per return or pixel each, or too many pixels to
-/// number: after this, indexing is safe.
+/// Refuses a cloud with a column that is not empty and has not one entry per return or pixel, or with too
+/// many pixels to number: after this, indexing the columns that the cloud has is safe.
 pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
+    let coordinates = [("y", cloud.y.len()), ("z", cloud.z.len())];
+    let exact = [
+        ("exact.x", cloud.exact.x.len()),
+        ("exact.y", cloud.exact.y.len()),
+        ("exact.z", cloud.exact.z.len()),
+    ];
     let of_returns = [
-        ("x", cloud.x.len()),
-        ("y", cloud.y.len()),
-        ("z", cloud.z.len()),
+        ("range", cloud.range.len()),
+        ("exact.range", cloud.exact.range.len()),
         ("intensity", cloud.intensity.len()),
         ("time_ns", cloud.time_ns.len()),
         ("row", cloud.row.len()),
@@ -300,11 +339,15 @@ pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
     if rows.max(columns) > MOST_ROWS {
         return Err(Error::TooLarge { rows, columns });
     }
-    let with_truth = true_returns.iter().chain(&true_pixels).any(|(_, entries)| *entries > 0);
-    let (returns, pixels) = (cloud.range.len(), rows.saturating_mul(columns));
-    let per_return = of_returns.into_iter().chain(true_returns.into_iter().filter(|_| with_truth));
+    let is_there = |(_, entries): &(&str, usize)| *entries > 0;
+    let with_truth = true_returns.iter().chain(&true_pixels).any(is_there);
+    let with_exact = exact.iter().any(is_there);
+    let (returns, pixels) = (cloud.returns(), rows.saturating_mul(columns));
+    let per_return = coordinates.into_iter().chain(of_returns.into_iter().filter(is_there));
+    let per_return = per_return.chain(exact.into_iter().filter(|_| with_exact));
+    let per_return = per_return.chain(true_returns.into_iter().filter(|_| with_truth));
     let per_pixel = true_pixels.into_iter().filter(|_| with_truth);
-    let per_pixel = per_pixel.chain([("fired_ns", cloud.fired_ns.len())]);
+    let per_pixel = per_pixel.chain(Some(("fired_ns", cloud.fired_ns.len())).filter(is_there));
     let wanted = per_return.map(|column| (column, returns, "returns"));
     let mut wanted = wanted.chain(per_pixel.map(|column| (column, pixels, "pixels")));
     match wanted.find(|((_, found), needed, _)| found != needed) {
@@ -322,9 +365,9 @@ mod tests {
     #[test]
     fn blank_has_the_type_of_every_value() {
         let cloud = sample_cloud();
-        for &attribute in Attribute::of(&cloud) {
+        for attribute in Attribute::of(&cloud) {
             for point in [Point::Return(0), Point::Unanswered(2)] {
-                let [blank, value] = [attribute.blank(), attribute.value(&cloud, point)];
+                let [blank, value] = [attribute.blank(&cloud), attribute.value(&cloud, point)];
                 assert_eq!(std::mem::discriminant(&blank), std::mem::discriminant(&value));
             }
         }

@@ -3,7 +3,7 @@
 use super::about::About;
 use super::mcap::Messages;
 use super::{
-    Error, Format, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader, ply_reader,
+    Error, Format, LeftOut, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader, ply_reader,
 };
 use crate::opened;
 use crate::points::PointCloud;
@@ -25,9 +25,10 @@ impl Clouds {
     /// Opens the file at `path`, whose ending says what it is: `pcd`, `ply`, `las`, `laz`, `e57`,
     /// `npy`, `csv`, `bin` (KITTI) or `mcap` (`PointCloud2` of ROS 2).
     ///
-    /// Attributes that the file lacks are NaN or 0, except that the range is then the length of
-    /// (x, y, z), and a point the first return of one. Truth is read if the file has the outcome. A
-    /// file that does not tell its rows and columns has those of its highest ones, or no image.
+    /// Attributes that the file lacks are absent in the cloud; [`Clouds::left_out`] names those that a
+    /// cloud has no column for, and counts points that are none. Truth is read if the file has the
+    /// outcome. A file that does not tell its rows and columns has those of its highest ones, or no
+    /// image.
     ///
     /// # Errors
     /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is not what its ending
@@ -57,12 +58,21 @@ impl Clouds {
         Ok(Self(Source::One { cloud: Some(Box::new(cloud)), about }))
     }
 
-    /// The names of objects and materials, as far as the file was read and tells them.
-    pub fn names(&self) -> Names<'_> {
-        let about = match &self.0 {
+    /// What of the file, as far as it was read, is not in its clouds.
+    pub fn left_out(&self) -> &LeftOut {
+        &self.about().left_out
+    }
+
+    fn about(&self) -> &About {
+        match &self.0 {
             Source::One { about, .. } => about,
             Source::Many(messages) => messages.about(),
-        };
+        }
+    }
+
+    /// The names of objects and materials, as far as the file was read and tells them.
+    pub fn names(&self) -> Names<'_> {
+        let about = self.about();
         Names { objects: &about.objects, materials: &about.materials }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::about::About;
 use super::attributes::Attribute;
-use super::table::{Gathered, Record, check_coordinates};
+use super::table::{Digits, Gathered, Record, check_coordinates};
 use crate::points::{NO_OBJECT, Outcome, PointCloud};
 use std::borrow::Cow;
 
@@ -23,7 +23,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
         )
     })?;
     let mut about = About::default();
-    let mut gathered = Gathered::new(&about, &attributes)?;
+    let mut gathered = Gathered::new(&about, &attributes, Digits::AsWritten)?;
     for (at, line) in lines.enumerate() {
         if line.is_empty() {
             continue;
@@ -45,7 +45,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
         }
         gathered.add(record);
     }
-    Ok((gathered.cloud()?, about))
+    for name in header.split(',').map(|name| name.trim().trim_matches('"')) {
+        if Attribute::named(name).is_none() {
+            about.left_out.field(name);
+        }
+    }
+    Ok((gathered.cloud(&mut about)?, about))
 }
 
 /// Takes a cell off the line, without the quotes around it.
@@ -136,6 +141,18 @@ mod tests {
     #[test]
     fn a_file_of_another_program_needs_x_y_and_z_alone() {
         let (read, _) = parse(b"z,name,y,x\n12,a,4,3\n\n").unwrap();
-        assert_eq!((read.range.as_slice(), read.rows), (&[13.0][..], 0));
+        assert_eq!((&*read.distances(), read.rows), (&[13.0][..], 0));
+        assert!(read.range.is_empty() && read.time_ns.is_empty() && read.intensity.is_empty());
+    }
+
+    #[test]
+    fn digits_beyond_those_of_a_float_are_kept() {
+        let far = b"x,y,z,range_m\n494428.61,4877455.58,123.456,30.02\n1,2,3,4\n";
+        let (read, about) = parse(far).unwrap();
+        assert_eq!(read.position(0), [494_428.61, 4_877_455.58, 123.456]);
+        assert!(read.exact.range.is_empty() && about.left_out.is_empty());
+        let (read, _) = parse(b"x,y,z\n0.1,30.02,-5e-3\n").unwrap();
+        assert!(read.exact.x.is_empty());
+        assert_eq!((read.x[0], read.y[0], read.z[0]), (0.1, 30.02, -5e-3));
     }
 }

@@ -4,7 +4,7 @@
 use super::Names;
 use super::about::{About, list_line, name_lines, scan_line};
 use super::attributes::{Attribute, Value, returns};
-use super::table::{Gathered, Record as Point, check_coordinates};
+use super::table::{Digits, Gathered, Record as Point, check_coordinates};
 use crate::points::{PointCloud, Viewpoint};
 use e57::{
     E57Reader, E57Writer, Extension, Quaternion, RawValues, Record, RecordDataType, RecordName,
@@ -23,17 +23,16 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
 }
 
 fn encode(cloud: &PointCloud, names: &Names) -> e57::Result<Vec<u8>> {
-    let attributes: Vec<Attribute> = Attribute::of(cloud)
-        .iter()
-        .copied()
-        // The ring is the row.
-        .filter(|attribute| *attribute != Attribute::Ring)
-        .collect();
+    let mut attributes = Attribute::of(cloud);
+    // The ring is the row.
+    if attributes.contains(&Attribute::Row) {
+        attributes.retain(|attribute| *attribute != Attribute::Ring);
+    }
     let mut file = Cursor::new(Vec::new());
     let scan = cloud.scan;
     let mut writer = E57Writer::new(&mut file, &format!("macropulse-file-{scan}"))?;
     writer.register_extension(Extension::new(NAMESPACE, NAMESPACE_URL))?;
-    let records = attributes.iter().map(|attribute| record(*attribute)).collect();
+    let records = attributes.iter().map(|attribute| record(*attribute, cloud)).collect();
     let mut points = writer.add_pointcloud(&format!("macropulse-scan-{scan}"), records)?;
     points.set_name(Some(format!("scan {scan}")));
     let lines = [scan_line(cloud), list_line(cloud)].into_iter().chain(name_lines(names));
@@ -58,7 +57,7 @@ fn name(attribute: Attribute) -> RecordName {
         Attribute::Z => RecordName::CartesianZ,
         Attribute::Intensity => RecordName::Intensity,
         Attribute::TimeNs => RecordName::TimeStamp,
-        Attribute::Row => RecordName::RowIndex,
+        Attribute::Row | Attribute::Ring => RecordName::RowIndex,
         Attribute::Column => RecordName::ColumnIndex,
         Attribute::ReturnNumber => RecordName::ReturnIndex,
         Attribute::NumberOfReturns => RecordName::ReturnCount,
@@ -66,8 +65,8 @@ fn name(attribute: Attribute) -> RecordName {
     }
 }
 
-fn record(attribute: Attribute) -> Record {
-    let data_type = match attribute.blank() {
+fn record(attribute: Attribute, cloud: &PointCloud) -> Record {
+    let data_type = match attribute.blank(cloud) {
         Value::F4(_) => RecordDataType::F32,
         Value::F8(_) => RecordDataType::F64,
         Value::U1(_) => RecordDataType::Integer { min: 0, max: 255 },
@@ -144,7 +143,14 @@ fn read(bytes: Vec<u8>) -> Result<(PointCloud, About), Fault> {
     let columns: Vec<Option<Attribute>> = scan.prototype.iter().map(known).collect();
     let attributes: Vec<Attribute> = columns.iter().flatten().copied().collect();
     check_coordinates(&attributes)?;
-    let mut gathered = Gathered::new(&about, &attributes)?;
+    let is_single = |record: &Record| matches!(record.data_type, RecordDataType::Single { .. });
+    let coordinates = scan.prototype.iter().filter(|record| {
+        use RecordName::{CartesianX, CartesianY, CartesianZ};
+        matches!(record.name, CartesianX | CartesianY | CartesianZ)
+    });
+    let digits =
+        if coordinates.into_iter().all(is_single) { Digits::Single } else { Digits::Double };
+    let mut gathered = Gathered::new(&about, &attributes, digits)?;
     for (at, values) in reader.pointcloud_raw(scan)?.enumerate() {
         let mut point = Point::default();
         for ((column, record), value) in columns.iter().zip(&scan.prototype).zip(&values?) {
@@ -153,7 +159,7 @@ fn read(bytes: Vec<u8>) -> Result<(PointCloud, About), Fault> {
         }
         gathered.add(point);
     }
-    Ok((gathered.cloud()?, about))
+    Ok((gathered.cloud(&mut about)?, about))
 }
 
 /// The number of a value of the file, in our units.

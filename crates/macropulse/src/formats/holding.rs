@@ -53,8 +53,8 @@ impl Further {
 impl Format {
     /// What of `cloud` and its `names` is left out when it is written in this format, in words.
     pub fn leaves_out(self, cloud: &PointCloud, names: &Names) -> Vec<&'static str> {
-        let left_out = |attribute: &&Attribute| self.holds(**attribute) == Holding::Not;
-        let attributes = Attribute::of(cloud).iter().filter(left_out);
+        let left_out = |attribute: &Attribute| self.holds(*attribute) == Holding::Not;
+        let attributes = Attribute::of(cloud).into_iter().filter(left_out);
         let further = Further::of(cloud, names).filter(|further| !self.holds_further(*further));
         attributes.map(|attribute| attribute.name()).chain(further.map(Further::name)).collect()
     }

@@ -14,10 +14,17 @@ pub(super) const ATTRIBUTES: [Attribute; 4] =
 
 /// Writes the returns of a cloud whose columns are even.
 pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
+    let has = Attribute::of(cloud);
+    let value = |attribute: Attribute, point| match has.contains(&attribute) {
+        true => attribute.value(cloud, point),
+        // Each point has room for a reflectance.
+        false => attribute.blank(cloud),
+    };
     let mut bytes = Vec::with_capacity(16);
     for point in returns(cloud) {
         bytes.clear();
-        ATTRIBUTES.iter().for_each(|attribute| attribute.value(cloud, point).append_to(&mut bytes));
+        let values = ATTRIBUTES.map(|attribute| value(attribute, point));
+        values.into_iter().for_each(|value| value.narrowed().append_to(&mut bytes));
         out.write_all(&bytes)?;
     }
     Ok(())
@@ -34,8 +41,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
         let length = bytes.len();
         return Err(format!("it has {length} bytes, and 16 to a point; the file was cut short"));
     }
-    let about = About::default();
-    let cloud = table::list(&about, &layout, bytes, points)?;
+    let mut about = About { is_of_driver: true, ..About::default() };
+    let cloud = table::list(&mut about, &layout, bytes, points)?;
     Ok((cloud, about))
 }
 

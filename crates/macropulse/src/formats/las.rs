@@ -2,7 +2,7 @@
 
 use super::Names;
 use super::about::all_lines;
-use super::attributes::{Attribute, Value, returns};
+use super::attributes::{Attribute, returns};
 use super::number::Kind;
 use crate::points::PointCloud;
 use las::{Builder, Point, Transform, Vector, Version, Vlr, Writer};
@@ -57,8 +57,7 @@ pub(super) fn write(
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let extra: Vec<Attribute> = Attribute::of(cloud)
-        .iter()
-        .copied()
+        .into_iter()
         .filter(|attribute| extra_name(*attribute).is_some())
         .collect();
     let header = builder(cloud, names, &extra, compress)?.into_header();
@@ -83,11 +82,11 @@ fn builder(
     builder.system_identifier = "SIMULATION".to_owned();
     builder.point_format = las::point::Format::new(6).map_err(io::Error::other)?;
     builder.point_format.is_compressed = compress;
-    let size = extra.iter().map(|attribute| attribute.blank().kind().size()).sum::<usize>();
+    let size = extra.iter().map(|attribute| attribute.blank(cloud).kind().size()).sum::<usize>();
     builder.point_format.extra_bytes = size as u16;
     let transform = Transform { scale: step(cloud), offset: 0.0 };
     builder.transforms = Vector { x: transform, y: transform, z: transform };
-    let described = extra.iter().flat_map(|attribute| description(*attribute)).collect();
+    let described = extra.iter().flat_map(|attribute| description(*attribute, cloud)).collect();
     let lines: Vec<String> = all_lines(cloud, names).collect();
     builder.vlrs.push(record(EXTRA_BYTES, "extra bytes", described));
     let text = record(TEXT, "scan, image, pose, names", lines.join("\n").into_bytes());
@@ -101,7 +100,7 @@ fn record((user, number): (&str, u16), description: &str, data: Vec<u8>) -> Vlr 
 }
 
 /// The description of a dimension of the extra bytes.
-fn description(attribute: Attribute) -> [u8; DESCRIPTION] {
+fn description(attribute: Attribute, cloud: &PointCloud) -> [u8; DESCRIPTION] {
     let mut bytes = [0; DESCRIPTION];
     let mut put = |at: usize, text: &str| {
         let text = &text.as_bytes()[..text.len().min(31)];
@@ -109,7 +108,7 @@ fn description(attribute: Attribute) -> [u8; DESCRIPTION] {
     };
     put(4, extra_name(attribute).unwrap_or_default());
     put(160, attribute.unit());
-    let kind = attribute.blank().kind();
+    let kind = attribute.blank(cloud).kind();
     bytes[2] = KINDS.iter().position(|known| *known == kind).map_or(0, |at| at as u8 + 1);
     bytes
 }
@@ -126,16 +125,19 @@ fn step(cloud: &PointCloud) -> f64 {
 }
 
 fn point_of(cloud: &PointCloud, at: usize, extra_bytes: Vec<u8>) -> Point {
-    let grey = (f64::from(cloud.intensity[at]) * WHITE).round().clamp(0.0, 65_535.0);
+    let [x, y, z] = cloud.position(at);
+    let white = cloud.intensity.get(at).map_or(0.0, |&intensity| f64::from(intensity) * WHITE);
+    // A number of 0 says that nothing is known.
+    let number = |column: &[u8]| column.get(at).map_or(0, |&number| number.min(15));
     Point {
-        x: f64::from(cloud.x[at]),
-        y: f64::from(cloud.y[at]),
-        z: f64::from(cloud.z[at]),
-        intensity: grey as u16,
-        return_number: cloud.return_number[at].min(15),
-        number_of_returns: cloud.number_of_returns[at].min(15),
-        user_data: u8::try_from(cloud.row[at]).unwrap_or(0),
-        gps_time: Some(cloud.time_ns[at] * 1e-9),
+        x,
+        y,
+        z,
+        intensity: white.round().clamp(0.0, 65_535.0) as u16,
+        return_number: number(&cloud.return_number),
+        number_of_returns: number(&cloud.number_of_returns),
+        user_data: cloud.row.get(at).and_then(|&row| u8::try_from(row).ok()).unwrap_or(0),
+        gps_time: Some(cloud.time_ns.get(at).map_or(0.0, |time| time * 1e-9)),
         extra_bytes,
         ..Point::default()
     }
@@ -144,11 +146,11 @@ fn point_of(cloud: &PointCloud, at: usize, extra_bytes: Vec<u8>) -> Point {
 impl Attribute {
     /// Its unit, for the descriptions of fields; nothing where it has none.
     fn unit(self) -> &'static str {
-        match (self, self.blank()) {
-            (Self::TimeNs, _) => "ns",
-            (Self::Incidence, _) => "rad",
-            (Self::Intensity, _) => "1 = white Lambertian",
-            (_, Value::F4(_)) => "m",
+        match self {
+            Self::X | Self::Y | Self::Z | Self::Range | Self::TrueRange => "m",
+            Self::TimeNs => "ns",
+            Self::Incidence => "rad",
+            Self::Intensity => "1 = white Lambertian",
             _ => "",
         }
     }
@@ -169,10 +171,10 @@ mod tests {
 
     #[test]
     fn the_description_of_extra_bytes_is_laid_out_as_las_has_it() {
-        let bytes = description(Attribute::Row);
+        let bytes = description(Attribute::Row, &sample_cloud());
         assert_eq!(bytes[2], 3, "unsigned short");
         assert_eq!(&bytes[4..8], b"row\0");
-        let bytes = description(Attribute::Intensity);
+        let bytes = description(Attribute::Intensity, &sample_cloud());
         assert_eq!((bytes[2], &bytes[4..15]), (9, &b"reflectance"[..]));
     }
 

@@ -5,7 +5,7 @@ use super::attributes::Attribute;
 use super::contained::contained;
 use super::las::{DESCRIPTION, EXTRA_BYTES, KINDS, TEXT, WHITE, extra_name};
 use super::number::Kind;
-use super::table::{Gathered, Record};
+use super::table::{Digits, Gathered, Record};
 use crate::points::PointCloud;
 use las::{Header, Point, Reader};
 use std::io::Cursor;
@@ -33,9 +33,9 @@ fn parse_checked(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
     let header = Header::new(Cursor::new(&bytes)).map_err(|error| error.to_string())?;
     check_layers(&bytes, &header)?;
     let mut reader = Reader::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
-    let about = about(reader.header())?;
+    let mut about = about(reader.header())?;
     let extra = extra(reader.header());
-    let mut gathered = Gathered::new(&about, &attributes(&extra))?;
+    let mut gathered = Gathered::new(&about, &attributes(&extra), Digits::Double)?;
     let points = reader.header().number_of_points();
     let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
     let together = (AT_A_TIME / u64::from(header.point_format().len()).max(1)).max(1);
@@ -52,7 +52,9 @@ fn parse_checked(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
             at += 1;
         }
     }
-    Ok((gathered.cloud()?, about))
+    let mut cloud = gathered.cloud(&mut about)?;
+    forget_blank(&mut cloud, &extra);
+    Ok((cloud, about))
 }
 
 /// Refuses sizes in the header that reach beyond the file, before any memory is spent on them.
@@ -190,8 +192,28 @@ fn extra(header: &Header) -> Vec<Extra> {
     found
 }
 
+/// What the points of a file have. Fields that LAS always has are told apart by [`forget_blank`].
 fn attributes(extra: &[Extra]) -> Vec<Attribute> {
-    extra.iter().map(|extra| extra.attribute).collect()
+    let always = [Attribute::Intensity, Attribute::ReturnNumber, Attribute::NumberOfReturns];
+    let extra = extra.iter().map(|extra| extra.attribute);
+    always.into_iter().chain([Attribute::TimeNs]).chain(extra).collect()
+}
+
+/// Empties columns that are 0 throughout: LAS has no other way to say that nothing is known.
+fn forget_blank(cloud: &mut PointCloud, extra: &[Extra]) {
+    let is_extra = extra.iter().any(|extra| extra.attribute == Attribute::Intensity);
+    if !is_extra && cloud.intensity.iter().all(|intensity| *intensity == 0.0) {
+        cloud.intensity.clear();
+    }
+    for numbers in [&mut cloud.return_number, &mut cloud.number_of_returns] {
+        if numbers.iter().all(|number| *number == 0) {
+            numbers.clear();
+        }
+    }
+    if cloud.time_ns.iter().all(|time| *time == 0.0) {
+        cloud.time_ns.clear();
+        cloud.fired_ns.clear();
+    }
 }
 
 fn record(point: &Point, extra: &[Extra], at: usize) -> Result<Record, String> {

@@ -17,6 +17,7 @@ mod holding;
 mod kitti;
 mod las;
 mod las_reader;
+mod left_out;
 mod manifest;
 mod mcap;
 mod npy;
@@ -37,6 +38,7 @@ pub use contained::is_contained;
 pub use csv::quoted;
 pub use error::Error;
 pub use format::Format;
+pub use left_out::{LeftOut, NoPoint};
 pub use manifest::{
     Begun, Entries, Manifest, Named, SCHEMA_VERSION, State, Surroundings, versioned, write_manifest,
 };
@@ -107,7 +109,7 @@ pub fn write_csv_lines(
 /// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.
 #[cfg(test)]
 fn sample_cloud() -> PointCloud {
-    use crate::points::{NO_OBJECT, Outcome, Pick, Surfaces, Truth, Viewpoint};
+    use crate::points::{Exact, NO_OBJECT, Outcome, Pick, Surfaces, Truth, Viewpoint};
     let nan = f32::NAN;
     let fired_ns = vec![0.0, 40.946_5, 81.893, 122.84, 163.786, 204.732_5];
     PointCloud {
@@ -130,6 +132,7 @@ fn sample_cloud() -> PointCloud {
         peak: vec![174, 170, 60, 174, 58],
         marks: vec![174, 174, 174, 174, 58],
         margin: vec![80, 70, 3, 81, 20],
+        exact: Exact::default(),
         photons: vec![nan; 5],
         saturated: vec![false; 5],
         fired_ns,

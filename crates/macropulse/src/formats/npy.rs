@@ -15,13 +15,13 @@ pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
     let fields: Vec<String> = attributes
         .iter()
-        .map(|attribute| format!("('{}', '{}')", attribute.name(), descr(*attribute)))
+        .map(|attribute| format!("('{}', '{}')", attribute.name(), descr(*attribute, cloud)))
         .collect();
     write_header(&format!("[{}]", fields.join(", ")), &format!("({},)", cloud.returns()), out)?;
     let mut bytes = Vec::new();
     for point in returns(cloud) {
         bytes.clear();
-        for attribute in attributes {
+        for attribute in &attributes {
             attribute.value(cloud, point).append_to(&mut bytes);
         }
         out.write_all(&bytes)?;
@@ -36,14 +36,14 @@ pub(super) fn write_range(cloud: &PointCloud, out: &mut dyn Write) -> io::Result
         return Err(io::Error::other("an image needs at least one row and one column"));
     }
     write_header("'<f4'", &format!("({}, {})", cloud.rows, cloud.columns), out)?;
-    for range in cloud.image(cloud.pick).spread(&cloud.range, f32::NAN) {
+    for range in cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN) {
         out.write_all(&range.to_le_bytes())?;
     }
     Ok(())
 }
 
-fn descr(attribute: Attribute) -> String {
-    let kind = attribute.blank().kind();
+fn descr(attribute: Attribute, cloud: &PointCloud) -> String {
+    let kind = attribute.blank(cloud).kind();
     let order = if kind.size() == 1 { "|" } else { "<" };
     format!("{order}{}{}", kind.letter().to_lowercase(), kind.size())
 }
@@ -76,8 +76,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let points = shape(header).ok_or(
         "its shape is not that of one list of points, a structured array with fields x, y and z",
     )?;
-    let about = About::default();
-    let cloud = table::list(&about, &layout(header)?, body, points)?;
+    let mut about = About::default();
+    let cloud = table::list(&mut about, &layout(header)?, body, points)?;
     Ok((cloud, about))
 }
 

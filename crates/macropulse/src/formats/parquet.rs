@@ -27,7 +27,7 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
 fn encode(cloud: &PointCloud, names: &Names) -> Result<Vec<u8>> {
     let attributes = Attribute::of(cloud);
     let fields: Result<Vec<TypePtr>> =
-        attributes.iter().map(|attribute| field(*attribute)).collect();
+        attributes.iter().map(|attribute| field(*attribute, cloud)).collect();
     let schema = Type::group_type_builder("points").with_fields(fields?).build()?;
     let lines = all_lines(cloud, names).collect::<Vec<_>>().join("\n");
     let properties = WriterProperties::builder()
@@ -40,7 +40,7 @@ fn encode(cloud: &PointCloud, names: &Names) -> Result<Vec<u8>> {
     for attribute in attributes {
         let Some(mut column) = rows.next_column()? else { break };
         let values = returns(cloud).map(|point| attribute.value(cloud, point));
-        match attribute.blank().kind() {
+        match attribute.blank(cloud).kind() {
             Kind::F4 => put::<FloatType>(&mut column, values.map(|value| value.number() as f32)),
             Kind::F8 => put::<DoubleType>(&mut column, values.map(Value::number)),
             _ => put::<Int32Type>(&mut column, values.map(|value| value.number() as i32)),
@@ -59,9 +59,9 @@ fn put<T: DataType>(
     column.typed::<T>().write_batch(&values, None, None).map(|_| ())
 }
 
-fn field(attribute: Attribute) -> Result<TypePtr> {
+fn field(attribute: Attribute, cloud: &PointCloud) -> Result<TypePtr> {
     let unsigned = |bit_width| Some(LogicalType::integer(bit_width, false));
-    let (physical, logical) = match attribute.blank().kind() {
+    let (physical, logical) = match attribute.blank(cloud).kind() {
         Kind::F4 => (Physical::FLOAT, None),
         Kind::F8 => (Physical::DOUBLE, None),
         Kind::U1 => (Physical::INT32, unsigned(8)),

@@ -11,12 +11,12 @@ use std::io::{self, Write};
 /// several, and where there are no pixels, the returns as a list: `HEIGHT` is 1.
 pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
-    write_header(cloud, attributes, names, out)?;
+    write_header(cloud, &attributes, names, out)?;
     let mut bytes = Vec::new();
     let points = if is_list(cloud) { returns(cloud).collect() } else { pixels(cloud) };
     for point in points {
         bytes.clear();
-        for attribute in attributes {
+        for attribute in &attributes {
             attribute.value(cloud, point).append_to(&mut bytes);
         }
         out.write_all(&bytes)?;
@@ -26,7 +26,8 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
 
 /// Whether the points are a list and no image.
 pub(super) fn is_list(cloud: &PointCloud) -> bool {
-    cloud.returns_per_shot > 1 || cloud.rows * cloud.columns == 0
+    let has_pixels = cloud.has(cloud.row.len()) && cloud.has(cloud.column.len());
+    cloud.returns_per_shot > 1 || cloud.rows * cloud.columns == 0 || !has_pixels
 }
 
 fn write_header(
@@ -50,8 +51,8 @@ fn write_header(
     }
     writeln!(out, "VERSION 0.7")?;
     writeln!(out, "FIELDS {}", row(&|attribute| attribute.name().to_owned()))?;
-    writeln!(out, "SIZE {}", row(&|attribute| attribute.blank().kind().size().to_string()))?;
-    writeln!(out, "TYPE {}", row(&|attribute| attribute.blank().kind().letter().to_owned()))?;
+    writeln!(out, "SIZE {}", row(&|attribute| attribute.blank(cloud).kind().size().to_string()))?;
+    writeln!(out, "TYPE {}", row(&|attribute| attribute.blank(cloud).kind().letter().to_owned()))?;
     writeln!(out, "COUNT {}", row(&|_| "1".to_owned()))?;
     writeln!(out, "WIDTH {columns}\nHEIGHT {rows}")?;
     writeln!(out, "VIEWPOINT {}", viewpoint_text(&cloud.viewpoint))?;
@@ -67,7 +68,7 @@ mod tests {
 
     fn header(cloud: &PointCloud, names: &Names) -> String {
         let mut bytes = Vec::new();
-        write_header(cloud, Attribute::of(cloud), names, &mut bytes).unwrap();
+        write_header(cloud, &Attribute::of(cloud), names, &mut bytes).unwrap();
         String::from_utf8(bytes).unwrap()
     }
 

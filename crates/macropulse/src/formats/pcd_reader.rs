@@ -21,14 +21,13 @@ struct Header {
 /// The cloud of a binary PCD file, and what it says beside it. Points without x, y and z are pixels
 /// that had no return.
 ///
-/// Fields we do not know are skipped. Of ours, x, y and z must be there; the others are NaN or 0
-/// where the file lacks them, except that the range is then the length of (x, y, z), and a point the
-/// first return of one. Truth is read if the file has the outcome.
+/// Fields we do not know are skipped and named. Of ours, x, y and z must be there. Truth is read if
+/// the file has the outcome.
 ///
 /// An organised file has an image, with a pixel for each of its points. A list has the image of which
 /// its header tells; a list of another program has no image: no rows, no columns.
 pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-    let (header, body) = parse_header(bytes)?;
+    let (mut header, body) = parse_header(bytes)?;
     let columns = header.columns.ok_or("the header has no WIDTH")?;
     let rows = header.rows.ok_or("the header has no HEIGHT")?;
     let points = rows.checked_mul(columns).ok_or("WIDTH × HEIGHT is beyond all bounds")?;
@@ -38,8 +37,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let layout = layout(&header)?;
     let is_list = header.about.list.is_some() || rows == 1 && !layout.has(Attribute::Column);
     let cloud = match is_list {
-        true => table::list(&header.about, &layout, body, points),
-        false => table::image(&header.about, &layout, body, [rows, columns]),
+        true => table::list(&mut header.about, &layout, body, points),
+        false => table::image(&mut header.about, &layout, body, [rows, columns]),
     };
     Ok((cloud?, header.about))
 }
@@ -136,8 +135,9 @@ mod tests {
     fn a_stranger_s_file_is_read_without_the_fields_it_lacks() {
         let cloud = read(&foreign(XYZ_RGB, 2)).unwrap();
         assert_eq!((cloud.rows, cloud.columns, cloud.returns()), (0, 0, 2));
-        assert_eq!(cloud.range, [13.0, 13.0]);
-        assert!(cloud.intensity[0].is_nan());
+        assert_eq!(*cloud.distances(), [13.0, 13.0]);
+        assert!(cloud.range.is_empty() && cloud.intensity.is_empty() && cloud.marks.is_empty());
+        assert_eq!(cloud.flags(0), 0);
         assert!(cloud.truth.returns.outcome.is_empty());
     }
 

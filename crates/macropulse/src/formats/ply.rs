@@ -39,8 +39,8 @@ pub(super) fn write(
         writeln!(out, "comment {line}")?;
     }
     writeln!(out, "element vertex {}", cloud.returns())?;
-    for attribute in attributes {
-        let kind = match attribute.blank() {
+    for attribute in &attributes {
+        let kind = match attribute.blank(cloud) {
             Value::U1(_) => "uchar",
             Value::U2(_) | Value::U4(_) => "int",
             Value::F4(_) => "float",
@@ -55,7 +55,7 @@ pub(super) fn write(
     let mut bytes = Vec::new();
     for point in returns(cloud) {
         bytes.clear();
-        for attribute in attributes {
+        for attribute in &attributes {
             match attribute.value(cloud, point) {
                 Value::U2(value) => bytes.extend(i32::from(value).to_le_bytes()),
                 value => value.append_to(&mut bytes),

@@ -5,7 +5,7 @@ use super::about::About;
 use super::attributes::Attribute;
 use super::number::Kind;
 use super::ply;
-use super::table::{self, Gathered, Layout, Record};
+use super::table::{self, Digits, Gathered, Layout, Record};
 use crate::points::PointCloud;
 
 /// How the points are stored.
@@ -29,11 +29,11 @@ struct Header {
 
 /// The cloud of a PLY file, and what it says beside it.
 pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-    let (header, body) = parse_header(bytes)?;
+    let (mut header, body) = parse_header(bytes)?;
     let points = header.points.ok_or("it has no element `vertex`")?;
     let cloud = match header.stored {
-        Some(Stored::Binary) => table::list(&header.about, &header.layout, body, points),
-        Some(Stored::Text) => text(&header, body, points),
+        Some(Stored::Binary) => table::list(&mut header.about, &header.layout, body, points),
+        Some(Stored::Text) => text(&mut header, body, points),
         None => Err("its header has no line `format`".to_owned()),
     };
     Ok((cloud?, header.about))
@@ -114,11 +114,11 @@ fn kind_of(name: &str) -> Option<Kind> {
 }
 
 /// Points that are lines of text.
-fn text(header: &Header, body: &[u8], points: usize) -> Result<PointCloud, String> {
+fn text(header: &mut Header, body: &[u8], points: usize) -> Result<PointCloud, String> {
     let text = std::str::from_utf8(body).map_err(|_| "its points are not text")?;
     let attributes: Vec<Attribute> = header.words.iter().flatten().copied().collect();
     table::check_coordinates(&attributes)?;
-    let mut gathered = Gathered::new(&header.about, &attributes)?;
+    let mut gathered = Gathered::new(&header.about, &attributes, Digits::AsWritten)?;
     let mut lines = text.lines();
     for at in 0..points {
         let line = lines.next().ok_or_else(|| {
@@ -135,7 +135,8 @@ fn text(header: &Header, body: &[u8], points: usize) -> Result<PointCloud, Strin
         }
         gathered.add(record);
     }
-    gathered.cloud()
+    header.layout.unknown.iter().for_each(|name| header.about.left_out.field(name));
+    gathered.cloud(&mut header.about)
 }
 
 #[cfg(test)]
@@ -174,7 +175,7 @@ mod tests {
                     property double z\nproperty uchar red\nelement face 0\n\
                     property list uchar int vertex_indices\nend_header\n3 4 12 255\n0 0 2.5 0\n";
         let (read, _) = parse(file.as_bytes()).unwrap();
-        assert_eq!(read.range, [13.0, 2.5]);
+        assert_eq!(*read.distances(), [13.0, 2.5]);
         assert_eq!((read.rows, read.columns), (0, 0));
         let short = file.replace("0 0 2.5 0\n", "");
         assert!(parse(short.as_bytes()).unwrap_err().contains("ends after 1 of 2 points"));

@@ -40,7 +40,7 @@ pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
     encoder.add_text_chunk(KEYWORD.into(), DECLARATION.into())?;
-    let image = cloud.image(cloud.pick).spread(&cloud.range, f32::NAN);
+    let image = cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN);
     let grey: Vec<u8> =
         image.into_iter().flat_map(|range| grey_from_range(range).to_be_bytes()).collect();
     let mut writer = encoder.write_header()?;
@@ -114,7 +114,7 @@ mod tests {
         write(&cloud, &mut bytes).unwrap();
         let image = decode(Cursor::new(bytes)).unwrap();
         assert_eq!((image.rows, image.columns), (2, 3));
-        let written = cloud.image(cloud.pick).spread(&cloud.range, f32::NAN);
+        let written = cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN);
         for (read, written) in image.range.iter().zip(&written) {
             assert!(
                 (read - written).abs() <= 0.5 / VALUES_PER_METRE

@@ -2,8 +2,10 @@
 
 use super::about::{About, List};
 use super::attributes::{Attribute, outcome_from_code};
+use super::left_out::NoPoint;
 use super::number::Kind;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Surface, Surfaces, Truth};
+use std::collections::BTreeMap;
 
 /// Pixels that a cloud is given at most, so that a file that lies about its size costs no memory: as
 /// many as a sensor may have.
@@ -26,6 +28,8 @@ struct Field {
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     fields: Vec<Field>,
+    /// Names of the fields that are no attribute of ours.
+    pub unknown: Vec<String>,
     /// Bytes of a record.
     pub stride: usize,
 }
@@ -35,6 +39,10 @@ impl Layout {
     /// from them, if there is one.
     pub fn push(&mut self, name: &str, kind: Kind, count: usize) -> Result<(), String> {
         let attribute = Attribute::named(name).filter(|_| count == 1);
+        // Fields called `_` fill a gap.
+        if attribute.is_none() && name != "_" {
+            self.unknown.push(name.to_owned());
+        }
         self.place(attribute.map(|attribute| (attribute, 1.0)), kind, self.stride);
         let end = kind.size().checked_mul(count).and_then(|size| self.stride.checked_add(size));
         self.stride = end.ok_or("a record is beyond all bounds")?;
@@ -56,6 +64,20 @@ impl Layout {
 
     fn attributes(&self) -> Vec<Attribute> {
         self.fields.iter().map(|field| field.attribute).collect()
+    }
+
+    /// The digits of the coordinates.
+    fn digits(&self) -> Digits {
+        let is_single = |field: &Field| match field.kind {
+            Kind::F4 | Kind::U1 | Kind::I1 | Kind::U2 | Kind::I2 => field.scale == 1.0,
+            Kind::U4 | Kind::I4 | Kind::U8 | Kind::I8 | Kind::F8 => false,
+        };
+        let is_place =
+            |field: &&Field| matches!(field.attribute, Attribute::X | Attribute::Y | Attribute::Z);
+        match self.fields.iter().filter(is_place).all(is_single) {
+            true => Digits::Single,
+            false => Digits::Double,
+        }
     }
 
     /// Refuses records without coordinates, and fields that reach beyond their record.
@@ -94,17 +116,18 @@ pub(super) fn check_coordinates(attributes: &[Attribute]) -> Result<(), String> 
 /// # Errors
 /// What is wrong with the records, or that there are too few.
 pub(super) fn list(
-    about: &About,
+    about: &mut About,
     layout: &Layout,
     body: &[u8],
     points: usize,
 ) -> Result<PointCloud, String> {
     let body = records(layout, body, points)?;
-    let mut gathered = Gathered::new(about, &layout.attributes())?;
+    let mut gathered = Gathered::new(about, &layout.attributes(), layout.digits())?;
     for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
         gathered.add(layout.record(bytes, at)?);
     }
-    gathered.cloud()
+    layout.unknown.iter().for_each(|name| about.left_out.field(name));
+    gathered.cloud(about)
 }
 
 /// The cloud of an image of rows × columns records, row by row. The place tells the pixel; a record
@@ -113,7 +136,7 @@ pub(super) fn list(
 /// # Errors
 /// What is wrong with the records, or that there are too few.
 pub(super) fn image(
-    about: &About,
+    about: &mut About,
     layout: &Layout,
     body: &[u8],
     [rows, columns]: [usize; 2],
@@ -123,20 +146,22 @@ pub(super) fn image(
     if rows.max(columns) > MOST_ROWS {
         return Err(format!("it has {rows} × {columns} pixels; 65536 rows and columns are read"));
     }
+    let mut attributes = layout.attributes();
+    for place in [Attribute::Row, Attribute::Column] {
+        if !layout.has(place) {
+            attributes.push(place);
+        }
+    }
     let list = List { rows, columns, most: 1, pick: Default::default() };
-    let mut gathered = Gathered::of_image(about, &layout.attributes(), list);
+    let mut gathered = Gathered::of_image(about, (&attributes, layout.digits()), list);
     for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
         let mut record = layout.record(bytes, at)?;
-        record.pixel = [Some((at / columns) as u16), Some((at % columns) as u16)];
-        record.number = [1, 1];
-        gathered.cloud.fired_ns.push(record.time_ns);
-        gathered.cloud.truth.pixels.push(record.of_pixel());
-        gathered.add(record);
+        record.set(at, Attribute::Row, (at / columns) as f64)?;
+        record.set(at, Attribute::Column, (at % columns) as f64)?;
+        gathered.add_pixel(record);
     }
-    if !gathered.has_truth {
-        gathered.cloud.truth = Truth::default();
-    }
-    Ok(gathered.cloud)
+    layout.unknown.iter().for_each(|name| about.left_out.field(name));
+    Ok(gathered.finished(about))
 }
 
 /// The bytes of `points` whole records.
@@ -149,41 +174,18 @@ fn records<'a>(layout: &Layout, body: &'a [u8], points: usize) -> Result<&'a [u8
     })
 }
 
-/// One point of a file: a return, or a pixel without one.
+/// One point of a file: a return, or a pixel without one. An attribute that is not set is NaN, or 0
+/// where it is a whole number.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Record {
-    position: [f32; 3],
-    intensity: f32,
-    range: Option<f32>,
-    time_ns: f64,
-    /// Row and column, where the file has them.
-    pixel: [Option<u16>; 2],
-    ring: Option<u16>,
-    number: [u8; 2],
-    peak: u16,
-    marks: u16,
-    margin: u16,
-    saturated: bool,
-    surface: Surface,
-}
+pub(super) struct Record([f64; Attribute::ALL.len()]);
 
 impl Default for Record {
-    /// What a file says of a point that has no attribute at all.
     fn default() -> Self {
-        Self {
-            position: [f32::NAN; 3],
-            intensity: f32::NAN,
-            range: None,
-            time_ns: 0.0,
-            pixel: [None; 2],
-            ring: None,
-            number: [1; 2],
-            peak: 0,
-            marks: 0,
-            margin: 0,
-            saturated: false,
-            surface: Surface::NONE,
+        let mut record = Self([f64::NAN; Attribute::ALL.len()]);
+        for object in [Attribute::Object, Attribute::Material] {
+            record.0[object as usize] = NO_OBJECT.into();
         }
+        record
     }
 }
 
@@ -193,73 +195,68 @@ impl Record {
     /// # Errors
     /// If the number is none that this attribute can have.
     pub fn set(&mut self, at: usize, attribute: Attribute, value: f64) -> Result<(), String> {
-        let small = |most: f64| {
-            if (0.0..=most).contains(&value) && value.fract() == 0.0 {
-                return Ok(value);
-            }
-            let name = attribute.name();
-            Err(format!(
-                "point {at} has the {name} {value}; whole numbers from 0 to {most} are read"
-            ))
+        use Attribute::{Column, Margin, Marks, Material, Object, Outcome, Peak, Ring, Row};
+        let most = match attribute {
+            Row | Column | Ring | Peak | Marks | Margin => 65_535.0,
+            Object | Material if value.is_nan() => return Ok(()),
+            Object | Material => 65_535.0,
+            Attribute::ReturnNumber | Attribute::NumberOfReturns | Outcome => 255.0,
+            _ => f64::INFINITY,
         };
-        let short = || small(65_535.0).map(|value| value as u16);
-        let byte = || small(255.0).map(|value| value as u8);
-        let name = || if value.is_nan() { Ok(NO_OBJECT) } else { short() };
-        match attribute {
-            Attribute::X => self.position[0] = value as f32,
-            Attribute::Y => self.position[1] = value as f32,
-            Attribute::Z => self.position[2] = value as f32,
-            Attribute::Intensity => self.intensity = value as f32,
-            Attribute::Range => self.range = Some(value as f32),
-            Attribute::TimeNs => self.time_ns = value,
-            Attribute::Row => self.pixel[0] = Some(short()?),
-            Attribute::Column => self.pixel[1] = Some(short()?),
-            Attribute::Ring => self.ring = Some(short()?),
-            Attribute::ReturnNumber => self.number[0] = byte()?,
-            Attribute::NumberOfReturns => self.number[1] = byte()?,
-            Attribute::Peak => self.peak = short()?,
-            Attribute::Marks => self.marks = short()?,
-            Attribute::Margin => self.margin = short()?,
-            // The others follow from the columns beside them, and not every writer's are ours.
-            Attribute::Flags => self.saturated = value as u64 & u64::from(SATURATED) != 0,
-            Attribute::TrueRange => self.surface.range = value as f32,
-            Attribute::Object => self.surface.object = name()?,
-            Attribute::Material => self.surface.material = name()?,
-            Attribute::Incidence => self.surface.cosine = libm::cos(value) as f32,
-            Attribute::Outcome => {
-                let code = byte()?;
-                self.surface.outcome = outcome_from_code(code).ok_or_else(|| {
-                    format!("point {at} has the outcome {code}; known are 0 to 5")
-                })?;
-            }
+        let name = attribute.name();
+        if most.is_finite() && !((0.0..=most).contains(&value) && value.fract() == 0.0) {
+            return Err(format!(
+                "point {at} has the {name} {value}; whole numbers from 0 to {most} are read"
+            ));
         }
+        if attribute == Outcome && outcome_from_code(value as u8).is_none() {
+            return Err(format!("point {at} has the outcome {value}; known are 0 to 5"));
+        }
+        self.0[attribute as usize] = value;
         Ok(())
     }
 
-    /// The range, or the length of (x, y, z) where the file has none.
-    fn range(&self) -> f32 {
-        let [x, y, z] = self.position;
-        self.range.unwrap_or_else(|| x.hypot(y).hypot(z))
+    fn get(&self, attribute: Attribute) -> f64 {
+        self.0[attribute as usize]
     }
 
-    /// Whether it is a return, and no pixel without one.
-    fn is_return(&self) -> bool {
-        self.range().is_finite() && self.position.iter().all(|place| place.is_finite())
+    fn position(&self) -> [f64; 3] {
+        [Attribute::X, Attribute::Y, Attribute::Z].map(|place| self.get(place))
     }
 
-    /// What stands beside its pixel.
-    fn of_pixel(&self) -> Surface {
-        match self.is_return() {
-            true => Surface { outcome: self.surface.outcome, ..Surface::NONE },
-            false => self.surface,
+    /// What stands beside it of the truth.
+    fn surface(&self) -> Surface {
+        Surface {
+            range: self.get(Attribute::TrueRange) as f32,
+            object: self.get(Attribute::Object) as u16,
+            material: self.get(Attribute::Material) as u16,
+            cosine: libm::cos(self.get(Attribute::Incidence)) as f32,
+            outcome: outcome_from_code(self.get(Attribute::Outcome) as u8)
+                .unwrap_or(Outcome::Empty),
         }
     }
+}
+
+/// How many digits the coordinates of a file have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Digits {
+    /// Those of 32-bit floats.
+    Single,
+    /// More.
+    Double,
+    /// As many as are written in a text.
+    AsWritten,
 }
 
 /// A cloud that is being read.
 pub(super) struct Gathered {
     cloud: PointCloud,
-    has_truth: bool,
+    /// What the points of the file have.
+    attributes: Vec<Attribute>,
+    digits: Digits,
+    is_of_driver: bool,
+    /// Points that are none.
+    dropped: BTreeMap<NoPoint, u64>,
     /// Whether the list has an image, and whether its size is still to be found.
     list: Option<List>,
     find_size: bool,
@@ -271,19 +268,21 @@ impl Gathered {
     ///
     /// # Errors
     /// If the image is larger than any sensor's.
-    pub fn new(about: &About, attributes: &[Attribute]) -> Result<Self, String> {
+    pub fn new(about: &About, attributes: &[Attribute], digits: Digits) -> Result<Self, String> {
         let has = |attribute| attributes.contains(&attribute);
-        let find_size = about.list.is_none() && has(Attribute::Row) && has(Attribute::Column);
-        if let Some(List { rows, columns, .. }) = about.list
+        let has_pixels = has(Attribute::Row) && has(Attribute::Column);
+        // The size of an image says nothing of points without pixels.
+        let list = about.list.filter(|_| has_pixels);
+        if let Some(List { rows, columns, .. }) = list
             && rows.checked_mul(columns).is_none_or(|pixels| pixels > MOST_PIXELS)
         {
             return Err("its list has more pixels than any sensor".to_owned());
         }
-        let gathered = Self::of_image(about, attributes, about.list.unwrap_or_default());
-        Ok(Self { list: about.list, find_size, ..gathered })
+        let gathered = Self::of_image(about, (attributes, digits), list.unwrap_or_default());
+        Ok(Self { list, find_size: list.is_none() && has_pixels, ..gathered })
     }
 
-    fn of_image(about: &About, attributes: &[Attribute], list: List) -> Self {
+    fn of_image(about: &About, (attributes, digits): (&[Attribute], Digits), list: List) -> Self {
         let cloud = PointCloud {
             scan: about.scan,
             viewpoint: about.viewpoint,
@@ -293,34 +292,115 @@ impl Gathered {
             pick: list.pick,
             ..PointCloud::default()
         };
-        let has_truth = attributes.contains(&Attribute::Outcome);
-        Self { cloud, has_truth, list: None, find_size: false }
+        let has_row = attributes.contains(&Attribute::Row);
+        let mut unique: Vec<Attribute> = Vec::new();
+        for &attribute in attributes {
+            // The ring is the row; where both are there, the row counts.
+            let is_row = attribute == Attribute::Ring && has_row;
+            if !is_row && !unique.contains(&attribute) {
+                unique.push(attribute);
+            }
+        }
+        let (is_of_driver, dropped) = (about.is_of_driver, BTreeMap::new());
+        Self {
+            cloud,
+            attributes: unique,
+            digits,
+            is_of_driver,
+            dropped,
+            list: None,
+            find_size: false,
+        }
     }
 
-    /// Adds a point, unless it is a pixel without a return.
-    pub fn add(&mut self, record: Record) {
-        if !record.is_return() {
-            return;
+    fn has(&self, attribute: Attribute) -> bool {
+        self.attributes.contains(&attribute)
+    }
+
+    /// Why a record is no return, if it is none.
+    fn fault(&self, record: &Record) -> Option<NoPoint> {
+        let position = record.position();
+        let range = if self.has(Attribute::Range) { record.get(Attribute::Range) } else { 0.0 };
+        // A number that a 32-bit float cannot hold is no length.
+        let is_finite = |length: f64| (length as f32).is_finite();
+        if !position.iter().copied().chain([range]).all(is_finite) {
+            return Some(NoPoint::NotFinite);
         }
+        (self.is_of_driver && position == [0.0; 3]).then_some(NoPoint::AtOrigin)
+    }
+
+    /// Counts a point that is none.
+    pub fn drop_point(&mut self, why: NoPoint) {
+        *self.dropped.entry(why).or_default() += 1;
+    }
+
+    /// Adds a point, or counts it where it is none.
+    pub fn add(&mut self, record: Record) {
+        match self.fault(&record) {
+            Some(why) => self.drop_point(why),
+            None => self.push(&record),
+        }
+    }
+
+    fn push(&mut self, record: &Record) {
         let cloud = &mut self.cloud;
-        let [x, y, z] = record.position;
-        cloud.x.push(x);
-        cloud.y.push(y);
-        cloud.z.push(z);
-        cloud.intensity.push(record.intensity);
-        cloud.range.push(record.range());
-        cloud.time_ns.push(record.time_ns);
-        let ([row, column], [number, of]) = (record.pixel, record.number);
-        cloud.row.push(row.or(record.ring).unwrap_or(0));
-        cloud.column.push(column.unwrap_or(0));
-        cloud.return_number.push(number);
-        cloud.number_of_returns.push(of);
-        cloud.peak.push(record.peak);
-        cloud.marks.push(record.marks);
-        cloud.margin.push(record.margin);
-        cloud.photons.push(f32::NAN);
-        cloud.saturated.push(record.saturated);
-        cloud.truth.returns.push(record.surface);
+        let [x, y, z] = record.position();
+        cloud.x.push(x as f32);
+        cloud.y.push(y as f32);
+        cloud.z.push(z as f32);
+        if self.digits != Digits::Single {
+            cloud.exact.x.push(x);
+            cloud.exact.y.push(y);
+            cloud.exact.z.push(z);
+        }
+        for &attribute in &self.attributes {
+            let value = record.get(attribute);
+            match attribute {
+                Attribute::Intensity => cloud.intensity.push(value as f32),
+                Attribute::Range => {
+                    cloud.range.push(value as f32);
+                    cloud.exact.range.push(value);
+                }
+                Attribute::TimeNs => cloud.time_ns.push(value),
+                Attribute::Row | Attribute::Ring => cloud.row.push(value as u16),
+                Attribute::Column => cloud.column.push(value as u16),
+                Attribute::Peak => cloud.peak.push(value as u16),
+                Attribute::Marks => cloud.marks.push(value as u16),
+                Attribute::Margin => cloud.margin.push(value as u16),
+                Attribute::ReturnNumber => cloud.return_number.push(value as u8),
+                Attribute::NumberOfReturns => cloud.number_of_returns.push(value as u8),
+                // The others follow from the columns beside them, and not every writer's are ours.
+                Attribute::Flags => cloud.saturated.push(value as u8 & SATURATED != 0),
+                Attribute::Outcome => cloud.truth.returns.push(record.surface()),
+                Attribute::X | Attribute::Y | Attribute::Z => {}
+                Attribute::TrueRange
+                | Attribute::Object
+                | Attribute::Material
+                | Attribute::Incidence => {}
+            }
+        }
+    }
+
+    /// Adds the pixel of an image, and what stands beside it.
+    fn add_pixel(&mut self, record: Record) {
+        let fault = self.fault(&record);
+        // A pixel without coordinates is one that had no return.
+        if fault == Some(NoPoint::AtOrigin) {
+            self.drop_point(NoPoint::AtOrigin);
+        }
+        if self.has(Attribute::TimeNs) {
+            self.cloud.fired_ns.push(record.get(Attribute::TimeNs));
+        }
+        if self.has(Attribute::Outcome) {
+            let surface = record.surface();
+            self.cloud.truth.pixels.push(match fault {
+                None => Surface { outcome: surface.outcome, ..Surface::NONE },
+                Some(_) => surface,
+            });
+        }
+        if fault.is_none() {
+            self.push(&record);
+        }
     }
 
     /// The list, with the image that it has. Of the pixels without a return it says nothing, of the
@@ -328,7 +408,8 @@ impl Gathered {
     ///
     /// # Errors
     /// If the highest row and column make an image that is larger than any sensor's.
-    pub fn cloud(mut self) -> Result<PointCloud, String> {
+    pub fn cloud(mut self, about: &mut About) -> Result<PointCloud, String> {
+        let has_truth = self.has(Attribute::Outcome);
         let cloud = &mut self.cloud;
         let most = |numbers: &[u8]| numbers.iter().copied().max().unwrap_or(1).max(1);
         if self.list.is_none() {
@@ -342,10 +423,11 @@ impl Gathered {
             }
         }
         let image = cloud.image(cloud.pick);
-        let fired = |at: Option<usize>| at.map_or(f64::NAN, |at| cloud.time_ns[at]);
-        cloud.fired_ns = image.iter().map(fired).collect();
+        if !cloud.time_ns.is_empty() {
+            cloud.fired_ns = image.spread(&cloud.time_ns, f64::NAN);
+        }
         let returns = std::mem::take(&mut cloud.truth.returns);
-        if self.has_truth {
+        if has_truth {
             let mut pixels = Surfaces::default();
             for at in image.iter() {
                 let outcome = at.map_or(Outcome::Empty, |at| returns.outcome[at]);
@@ -353,6 +435,32 @@ impl Gathered {
             }
             cloud.truth = Truth { returns, pixels };
         }
-        Ok(self.cloud)
+        Ok(self.finished(about))
     }
+
+    /// The cloud, with columns of 64 bits only where they have more digits. Points that were dropped are
+    /// told to `about`.
+    fn finished(mut self, about: &mut About) -> PointCloud {
+        for (why, count) in &self.dropped {
+            about.left_out.drop_points(*why, *count);
+        }
+        let exact = &mut self.cloud.exact;
+        let coordinates = [&exact.x, &exact.y, &exact.z];
+        if self.digits == Digits::AsWritten && coordinates.into_iter().all(|all| is_single(all)) {
+            (exact.x, exact.y, exact.z) = Default::default();
+        }
+        if is_single(&exact.range) {
+            exact.range = Vec::new();
+        }
+        self.cloud
+    }
+}
+
+/// Whether the digits by which 32-bit floats are written are those of all `values`.
+fn is_single(values: &[f64]) -> bool {
+    let mut buffer = zmij::Buffer::new();
+    values.iter().all(|&value| {
+        let single = value as f32;
+        f64::from(single) == value || buffer.format(single).parse() == Ok(value)
+    })
 }

@@ -53,9 +53,10 @@ impl Image {
         self.returns.iter().map(|&at| (at != NONE).then_some(at as usize))
     }
 
-    /// A `column` of the list as an image, `none` where there is no return.
+    /// A `column` of the list as an image, `none` where there is no return or no such column.
     pub fn spread<T: Copy>(&self, column: &[T], none: T) -> Vec<T> {
-        self.iter().map(|at| at.map_or(none, |at| column[at])).collect()
+        let value = |at: Option<usize>| at.and_then(|at| column.get(at)).copied().unwrap_or(none);
+        self.iter().map(value).collect()
     }
 
     /// What stands beside `pixel` of `cloud`: the surface of the return it shows or, without one, the

@@ -15,6 +15,7 @@ pub use scale::Scale;
 
 use crate::design::Design;
 use macropulse_codec::decode::Strength;
+use std::borrow::Cow;
 
 /// How a return or a pixel came out, measured against truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -56,7 +57,9 @@ impl Outcome {
 /// nearest first: the order in which they are decoded, so nothing is sorted on the way.
 ///
 /// All columns have one entry per return, except those of pixels, which have `rows` × `columns`
-/// entries, row-major, row 0 at the top and column 0 at the left.
+/// entries, row-major, row 0 at the top and column 0 at the left. A simulated cloud has all columns.
+/// A cloud that was read has those of its file: x, y and z, and of the others each may be absent,
+/// which is an empty column beside points.
 ///
 /// Sensor frame (REP-103): x forward, y left, z up, metres. Each point of a sensor that moves is in
 /// its frame at the time of that point: raw, not deskewed.
@@ -82,19 +85,21 @@ pub struct PointCloud {
     pub return_number: Vec<u8>,
     /// Returns of the shot.
     pub number_of_returns: Vec<u8>,
-    /// Forward, m.
+    /// Forward, m; rounded where [`PointCloud::exact`] has more digits.
     pub x: Vec<f32>,
-    /// Left, m.
+    /// Left, m; rounded like x.
     pub y: Vec<f32>,
-    /// Up, m.
+    /// Up, m; rounded like x.
     pub z: Vec<f32>,
+    /// Coordinates and ranges with all digits, of a cloud whose file has more than 32-bit floats hold.
+    pub exact: Exact,
     /// Apparent reflectance, 1 = white Lambertian facing the sensor, by range, link and its own
     /// energy estimate ([`Scale`]), 10⁶ at most; a lower bound where it is `saturated`.
     pub intensity: Vec<f32>,
     /// Whether the detector cannot tell how much light it was: no mark was missed, and no amplitude
     /// is measured.
     pub saturated: Vec<bool>,
-    /// One-way range, m.
+    /// One-way range, m; rounded where [`PointCloud::exact`] has more digits.
     pub range: Vec<f32>,
     /// Time at which the shot was fired, ns from the beginning of the first scan.
     pub time_ns: Vec<f64>,
@@ -104,14 +109,28 @@ pub struct PointCloud {
     pub marks: Vec<u16>,
     /// Peak minus the best other lag.
     pub margin: Vec<u16>,
-    /// Energy as the receiver can tell it, in detected photons per mark. Not written to files: NaN in
-    /// a cloud read from one.
+    /// Energy as the receiver can tell it, in detected photons per mark. Not written to files, so
+    /// absent in a cloud read from one.
     pub photons: Vec<f32>,
     /// For every pixel, whether it answered or not, the time at which its shot was fired, ns from
     /// the start of the scan; NaN where none was.
     pub fired_ns: Vec<f64>,
     /// What is known from the scene; filled by the score stage, empty without it.
     pub truth: Truth,
+}
+
+/// Coordinates and ranges as 64-bit floats, m. A column is empty where 32-bit floats hold all digits;
+/// x, y and z are there together.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Exact {
+    /// Forward, m.
+    pub x: Vec<f64>,
+    /// Left, m.
+    pub y: Vec<f64>,
+    /// Up, m.
+    pub z: Vec<f64>,
+    /// One-way range, m.
+    pub range: Vec<f64>,
 }
 
 /// Where the sensor was in the world when a scan began.
@@ -263,15 +282,51 @@ impl PointCloud {
 
     /// Number of returns.
     pub fn returns(&self) -> usize {
-        self.range.len()
+        self.x.len()
     }
 
-    /// What is to be known of return `at`, as bits: [`FAINT`], [`AMBIGUOUS`],
-    /// [`SATURATED`]; 0 for a sound one that tells how bright it is.
+    /// Whether a column of returns that has this many entries is there. All columns of a cloud without
+    /// returns are.
+    pub fn has(&self, entries: usize) -> bool {
+        entries > 0 || self.returns() == 0
+    }
+
+    /// Coordinates x, y, z of return `at`, m, with all digits that are known.
+    pub fn position(&self, at: usize) -> [f64; 3] {
+        let Exact { x, y, z, .. } = &self.exact;
+        match (x.get(at), y.get(at), z.get(at)) {
+            (Some(&x), Some(&y), Some(&z)) => [x, y, z],
+            _ => [self.x[at], self.y[at], self.z[at]].map(f64::from),
+        }
+    }
+
+    /// Range of return `at`, m: the measured one or, where the cloud has none, the distance of the
+    /// point from the origin.
+    pub fn distance(&self, at: usize) -> f64 {
+        let measured = self.range.get(at).map(|&range| f64::from(range));
+        self.exact.range.get(at).copied().or(measured).unwrap_or_else(|| {
+            let [x, y, z] = self.position(at);
+            libm::hypot(libm::hypot(x, y), z)
+        })
+    }
+
+    /// Ranges of all returns, m, as [`PointCloud::distance`] has them.
+    pub fn distances(&self) -> Cow<'_, [f32]> {
+        if self.has(self.range.len()) {
+            return Cow::Borrowed(&self.range);
+        }
+        Cow::Owned((0..self.returns()).map(|at| self.distance(at) as f32).collect())
+    }
+
+    /// Marks of return `at` as bits: [`FAINT`], [`AMBIGUOUS`], [`SATURATED`]; 0 for a sound return that
+    /// tells how bright it is. A bit whose columns the cloud lacks is not set: nobody judged the point.
     pub fn flags(&self, at: usize) -> u8 {
-        let faint = 2 * u32::from(self.peak[at]) < u32::from(self.marks[at]);
-        let ambiguous = self.margin[at] == 0;
-        let saturated = self.saturated[at];
+        let faint = match (self.peak.get(at), self.marks.get(at)) {
+            (Some(&peak), Some(&marks)) => 2 * u32::from(peak) < u32::from(marks),
+            _ => false,
+        };
+        let ambiguous = self.margin.get(at) == Some(&0);
+        let saturated = self.saturated.get(at) == Some(&true);
         let bits = [(faint, FAINT), (ambiguous, AMBIGUOUS), (saturated, SATURATED)];
         bits.into_iter().map(|(is_set, bit)| u8::from(is_set) * bit).sum()
     }
@@ -283,9 +338,10 @@ impl PointCloud {
 
     /// What decides whether return `at` is the strongest of its shot.
     pub(crate) fn strength(&self, at: usize) -> Strength {
-        let photons = self.photons[at];
+        let peak = self.peak.get(at).copied().unwrap_or_default();
         // A file keeps no photons, but what follows from them.
-        let light = if photons.is_nan() { self.intensity[at] } else { photons };
-        Strength { peak: self.peak[at], light }
+        let photons = self.photons.get(at).filter(|photons| !photons.is_nan());
+        let light = photons.or(self.intensity.get(at)).copied();
+        Strength { peak, light: light.unwrap_or_default() }
     }
 }

@@ -83,10 +83,10 @@ fn attributes(cloud: &PointCloud, has_image: bool) -> Vec<(Kept, Value<'_>)> {
     let [length, share, whole] = [1e-4, 1e-4, 1.0];
     let kept = |name, unit, step| Kept { name, unit, step };
     let mut list = vec![
-        (kept("x", "m", length), value(&cloud.x)),
-        (kept("y", "m", length), value(&cloud.y)),
-        (kept("z", "m", length), value(&cloud.z)),
-        (kept("range", "m", length), value(&cloud.range)),
+        (kept("x", "m", length), Box::new(|at| cloud.position(at)[0]) as Value),
+        (kept("y", "m", length), Box::new(|at| cloud.position(at)[1])),
+        (kept("z", "m", length), Box::new(|at| cloud.position(at)[2])),
+        (kept("range", "m", length), Box::new(|at| cloud.distance(at))),
         (kept("intensity", "", share), value(&cloud.intensity)),
         (kept("time_ns", "ns", 0.1), value(&cloud.time_ns)),
     ];

@@ -323,20 +323,20 @@ fn identifier(value: u64) -> Option<Identifier> {
 
 /// A return. Its object and what it is are known with the truth alone.
 fn detection(cloud: &PointCloud, at: usize) -> LidarDetection {
-    let [x, y, z] = [&cloud.x, &cloud.y, &cloud.z].map(|column| f64::from(column[at]));
-    let reflectivity = f64::from(cloud.intensity[at]);
+    let [x, y, z] = cloud.position(at);
+    let reflectivity = cloud.intensity.get(at).map(|&intensity| f64::from(intensity));
     let object = cloud.truth.returns.object.get(at).copied();
     LidarDetection {
         object_id: object.and_then(object_id),
         position: Some(Spherical3d {
-            distance: Some(f64::from(cloud.range[at])),
+            distance: Some(cloud.distance(at)),
             azimuth: Some(libm::atan2(y, x)),
             elevation: Some(libm::atan2(z, libm::hypot(x, y))),
         }),
-        intensity: Some((100.0 * reflectivity).clamp(0.0, 100.0)),
+        intensity: reflectivity.map(|reflectivity| (100.0 * reflectivity).clamp(0.0, 100.0)),
         classification: cloud.truth.returns.outcome.get(at).map(classification),
-        reflectivity: Some(reflectivity),
-        beam_id: identifier(cloud.row[at].into()),
+        reflectivity,
+        beam_id: cloud.row.get(at).and_then(|&row| identifier(row.into())),
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) fn encode(profile: Profile, cloud: &PointCloud) -> io::Result<Vec<u8>
     for field in &fields {
         message.text(field.name);
         message.u4(field.offset as u32);
-        message.u1(field.quantity.kind().ros().unwrap_or(0));
+        message.u1(field.quantity.kind(cloud).ros().unwrap_or(0));
         message.u4(1);
     }
     message.u1(0);
@@ -68,7 +68,7 @@ struct Stored<'a> {
 }
 
 /// The cloud of a message: of ours, or of a driver whose fields we know.
-pub(super) fn decode(message: &[u8], about: &About) -> Result<PointCloud, String> {
+pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, String> {
     let mut message = Decoder::new(message)?;
     let seconds = message.u4()?;
     let stamp_ns = f64::from(seconds) * 1e9 + f64::from(message.u4()?);
@@ -91,12 +91,10 @@ pub(super) fn decode(message: &[u8], about: &About) -> Result<PointCloud, String
     message.u4()?;
     let body = message.bytes()?;
     let (layout, time_from_ns) = layout(&fields, stride, stamp_ns);
+    // Our own messages say by NaN that nothing returned.
+    about.is_of_driver = !fields.iter().any(|field| field.name == "time_ns");
     let mut cloud = if height == 1 {
-        // What is known of the image is of use with rows and columns alone.
-        let list = about.list.filter(|_| layout.has(Attribute::Column));
-        let (scan, viewpoint) = (about.scan, about.viewpoint);
-        let about = About { scan, viewpoint, list, ..About::default() };
-        table::list(&about, &layout, body, width)?
+        table::list(about, &layout, body, width)?
     } else {
         let cloud = table::image(about, &layout, body, [height, width])?;
         PointCloud { pick: about.list.map_or(cloud.pick, |list| list.pick), ..cloud }
@@ -131,6 +129,9 @@ fn layout(fields: &[Stored], stride: usize, stamp_ns: f64) -> (Layout, f64) {
             ("timestamp", Kind::F8) if has("tag") => Some((Attribute::TimeNs, 1.0)),
             _ => Attribute::named(name).map(|attribute| (attribute, 1.0)),
         };
+        if known.is_none() && name != "_" {
+            layout.unknown.push(name.to_owned());
+        }
         match name {
             "time" | "t" | "time_stamp" => time_from_ns = stamp_ns - epoch_ns,
             "timestamp" if has("tag") => time_from_ns = -epoch_ns,
@@ -148,7 +149,7 @@ mod tests {
     use crate::points::Truth;
 
     fn read(profile: Profile, cloud: &PointCloud) -> PointCloud {
-        decode(&encode(profile, cloud).unwrap(), &About::default()).unwrap()
+        decode(&encode(profile, cloud).unwrap(), &mut About::default()).unwrap()
     }
 
     #[test]
@@ -167,10 +168,11 @@ mod tests {
         for profile in [Profile::Velodyne, Profile::Ouster, Profile::Livox, Profile::Autoware] {
             let read = read(profile, &cloud);
             assert_eq!((&read.x, &read.row), (&cloud.x, &cloud.row), "{profile:?}");
+            let ranges = read.distances();
             for at in 0..5 {
                 let off = |read: f32, written: f32| (read - written).abs();
                 assert!(off(read.intensity[at], cloud.intensity[at]) <= 0.005, "{profile:?}");
-                assert!(off(read.range[at], cloud.range[at]) <= 0.1, "{profile:?}");
+                assert!(off(ranges[at], cloud.range[at]) <= 0.1, "{profile:?}");
                 assert!((read.time_ns[at] - cloud.time_ns[at]).abs() <= 0.5, "{profile:?}");
             }
         }
@@ -181,7 +183,7 @@ mod tests {
         let whole = encode(Profile::Extended, &sample_cloud()).unwrap();
         // The last byte says only whether there is a return everywhere.
         for length in 0..whole.len() - 1 {
-            assert!(decode(&whole[..length], &About::default()).is_err(), "{length}");
+            assert!(decode(&whole[..length], &mut About::default()).is_err(), "{length}");
         }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct Field {
 pub(super) enum Quantity {
     /// An attribute as it is.
     Of(Attribute),
+    /// A length as a 32-bit float.
+    Float(Attribute),
     /// Apparent reflectance in percent, as a float.
     Percent,
     /// The same, whole, 255 at most, in one byte or two.
@@ -50,9 +52,9 @@ pub(super) enum Quantity {
 /// Name, offset and content of a field.
 type Row = (&'static str, usize, Quantity);
 
-const X: Row = ("x", 0, Quantity::Of(Attribute::X));
-const Y: Row = ("y", 4, Quantity::Of(Attribute::Y));
-const Z: Row = ("z", 8, Quantity::Of(Attribute::Z));
+const X: Row = ("x", 0, Quantity::Float(Attribute::X));
+const Y: Row = ("y", 4, Quantity::Float(Attribute::Y));
+const Z: Row = ("z", 8, Quantity::Float(Attribute::Z));
 
 const VELODYNE: &[Row] = &[
     X,
@@ -94,7 +96,7 @@ const AUTOWARE: &[Row] = &[
     ("channel", 14, Quantity::Of(Attribute::Ring)),
     ("azimuth", 16, Quantity::Azimuth),
     ("elevation", 20, Quantity::Elevation),
-    ("distance", 24, Quantity::Of(Attribute::Range)),
+    ("distance", 24, Quantity::Float(Attribute::Range)),
     ("time_stamp", 28, Quantity::NanosU4),
 ];
 
@@ -109,15 +111,17 @@ pub(super) fn fields(profile: Profile, cloud: &PointCloud) -> (usize, Vec<Field>
             let mut step = 0;
             let place = |attribute: &Attribute| {
                 let offset = step;
-                step += attribute.blank().kind().size();
+                step += attribute.blank(cloud).kind().size();
                 Field { name: attribute.name(), offset, quantity: Quantity::Of(*attribute) }
             };
             let fields = Attribute::of(cloud).iter().map(place).collect();
             return (step, fields);
         }
     };
+    let has = Attribute::of(cloud);
+    let is_there = |(_, _, quantity): &&Row| quantity.needs().iter().all(|need| has.contains(need));
     let field = |&(name, offset, quantity): &Row| Field { name, offset, quantity };
-    (step, rows.iter().map(field).collect())
+    (step, rows.iter().filter(is_there).map(field).collect())
 }
 
 /// How a profile holds an attribute: as it is, in words how else, or not at all.
@@ -146,10 +150,20 @@ impl Profile {
 }
 
 impl Quantity {
-    /// The kind of its numbers.
-    pub fn kind(self) -> Kind {
+    /// The attributes that it follows from.
+    fn needs(self) -> Vec<Attribute> {
+        match (self, self.holds()) {
+            (Self::PercentU2, _) => vec![Attribute::Intensity],
+            (Self::ReturnType, _) => vec![Attribute::ReturnNumber, Attribute::NumberOfReturns],
+            (_, held) => held.map(|(attribute, _)| attribute).into_iter().collect(),
+        }
+    }
+
+    /// The kind of its numbers in messages of `cloud`.
+    pub fn kind(self, cloud: &PointCloud) -> Kind {
         match self {
-            Self::Of(attribute) => attribute.blank().kind(),
+            Self::Of(attribute) => attribute.blank(cloud).kind(),
+            Self::Float(_) => Kind::F4,
             Self::PercentU1 | Self::LineU1 | Self::LivoxTag | Self::ReturnType => Kind::U1,
             Self::PercentU2 | Self::ZeroU2 => Kind::U2,
             Self::NanosU4 | Self::MillimetresU4 => Kind::U4,
@@ -163,7 +177,7 @@ impl Quantity {
     fn holds(self) -> Option<(Attribute, Holding)> {
         use Holding::{Partly, Whole};
         Some(match self {
-            Self::Of(attribute) => (attribute, Whole),
+            Self::Of(attribute) | Self::Float(attribute) => (attribute, Whole),
             Self::Percent => (Attribute::Intensity, Partly("in percent")),
             Self::PercentU1 => (Attribute::Intensity, Partly("whole percent, 255 at most")),
             Self::Livox150 => (Attribute::Intensity, Partly("white is 150, 255 at most")),
@@ -202,6 +216,7 @@ impl<'a> Source<'a> {
         let since = || (number(Attribute::TimeNs) - self.stamp_ns).max(0.0);
         match quantity {
             Quantity::Of(attribute) => attribute.value(self.cloud, point),
+            Quantity::Float(attribute) => attribute.value(self.cloud, point).narrowed(),
             Quantity::Percent => Value::F4(percent() as f32),
             Quantity::PercentU1 => Value::U1(whole(percent(), 255.0) as u8),
             Quantity::PercentU2 => Value::U2(whole(percent(), 255.0) as u16),
@@ -238,8 +253,12 @@ impl<'a> Source<'a> {
         let Point::Return(at) = point else { return 0 };
         let Some(strongest) = &self.strongest else { return 1 };
         let cloud = self.cloud;
-        let pixel = usize::from(cloud.row[at]) * cloud.columns + usize::from(cloud.column[at]);
-        let is_strongest = strongest.get(pixel) == Some(at);
+        let pixel = cloud
+            .row
+            .get(at)
+            .zip(cloud.column.get(at))
+            .map(|(&row, &column)| usize::from(row) * cloud.columns + usize::from(column));
+        let is_strongest = pixel.and_then(|pixel| strongest.get(pixel)) == Some(at);
         match (cloud.number_of_returns[at], cloud.return_number[at], is_strongest) {
             (0 | 1, _, _) => 7,
             (_, 1, true) => 3,
@@ -284,7 +303,7 @@ mod tests {
             let mut end = 0;
             for field in fields {
                 assert!(field.offset >= end, "{profile:?} {}", field.name);
-                let kind = field.quantity.kind();
+                let kind = field.quantity.kind(&cloud);
                 assert_eq!(source.value(field.quantity, Point::Return(0)).kind(), kind);
                 end = field.offset + kind.size();
             }
