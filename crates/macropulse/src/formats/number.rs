@@ -43,6 +43,11 @@ impl Kind {
         }
     }
 
+    /// Whether it is a kind of whole numbers.
+    pub fn is_whole(self) -> bool {
+        !matches!(self, Self::F4 | Self::F8)
+    }
+
     /// Bytes.
     pub fn size(self) -> usize {
         match self {

@@ -1,10 +1,23 @@
-//! Reads PCD files back, ours and those of others that are binary and have x, y and z.
+//! Reads PCD files: ours, and those of PCL and others, of the versions 0.5 to 0.7, stored as text,
+//! binary or compressed.
 
 use super::about::{About, viewpoint};
 use super::attributes::Attribute;
+use super::headings::Meaning;
 use super::number::Kind;
 use super::table::{self, Layout};
+use super::{interleave, lzf};
 use crate::points::PointCloud;
+use std::borrow::Cow;
+use std::iter::repeat_n;
+
+/// How the points are stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Data {
+    Text,
+    Binary,
+    Compressed,
+}
 
 #[derive(Debug, Default)]
 struct Header {
@@ -18,33 +31,41 @@ struct Header {
     points: Option<usize>,
 }
 
-/// The cloud of a binary PCD file, and what it says beside it. Points without x, y and z are pixels
-/// that had no return.
-///
-/// Fields we do not know are skipped and named. Of ours, x, y and z must be there. Truth is read if
-/// the file has the outcome.
+/// A field of a point: `count` numbers of a kind.
+struct Field<'a> {
+    name: &'a str,
+    kind: Kind,
+    count: usize,
+}
+
+/// The cloud of a PCD file, and what it says beside it. Points without x, y and z are pixels that had
+/// no return. Truth is read if the file has the outcome.
 ///
 /// An organised file has an image, with a pixel for each of its points. A list has the image of which
 /// its header tells; a list of another program has no image: no rows, no columns.
 pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-    let (mut header, body) = parse_header(bytes)?;
-    let columns = header.columns.ok_or("the header has no WIDTH")?;
-    let rows = header.rows.ok_or("the header has no HEIGHT")?;
+    let (mut header, data, body) = parse_header(bytes)?;
+    let [rows, columns] = header.shape()?;
     let points = rows.checked_mul(columns).ok_or("WIDTH × HEIGHT is beyond all bounds")?;
     if header.points.is_some_and(|declared| declared != points) {
         return Err(format!("POINTS is not WIDTH × HEIGHT = {points}"));
     }
-    let layout = layout(&header)?;
+    let fields = header.fields()?;
+    let (layout, body) = match data {
+        Data::Binary => (layout(&fields)?, Cow::Borrowed(body)),
+        Data::Compressed => (layout(&fields)?, Cow::Owned(unpacked(&fields, body, points)?)),
+        Data::Text => text(&fields, body, points)?,
+    };
     let is_list = header.about.list.is_some() || rows == 1 && !layout.has(Attribute::Column);
     let cloud = match is_list {
-        true => table::list(&mut header.about, &layout, body, points),
-        false => table::image(&mut header.about, &layout, body, [rows, columns]),
+        true => table::list(&mut header.about, &layout, &body, points),
+        false => table::image(&mut header.about, &layout, &body, [rows, columns]),
     };
     Ok((cloud?, header.about))
 }
 
-/// The header, and the bytes after it.
-fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
+/// The header, how the points are stored, and the bytes after it.
+fn parse_header(bytes: &[u8]) -> Result<(Header, Data, &[u8]), String> {
     let mut header = Header::default();
     let mut rest = bytes;
     while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
@@ -55,24 +76,34 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
         if let Some(comment) = line.strip_prefix("# ") {
             header.about.take(comment)?;
         }
-        let (key, values) = line.split_once(' ').unwrap_or((line, ""));
+        let (key, values) = line.split_once([' ', '\t']).unwrap_or((line, ""));
+        let values = values.trim();
         let words = || values.split_whitespace().map(str::to_owned).collect();
         match key {
-            "VERSION" if values != "0.7" && values != ".7" => {
-                return Err(format!("its version is {values}; only 0.7 is read"));
+            "VERSION" if !is_read(values) => {
+                return Err(format!("its version is {values}; 0.5, 0.6 and 0.7 are read"));
             }
-            "FIELDS" => header.fields = words(),
+            // As the fields were called before version 0.6.
+            "FIELDS" | "COLUMNS" => header.fields = words(),
             "SIZE" => header.sizes = words(),
             "TYPE" => header.types = words(),
             "COUNT" => header.counts = words(),
             "WIDTH" => header.columns = Some(whole_number(key, values)?),
             "HEIGHT" => header.rows = Some(whole_number(key, values)?),
             "POINTS" => header.points = Some(whole_number(key, values)?),
-            "DATA" if values == "binary" => return Ok((header, rest)),
             "DATA" => {
-                return Err(format!(
-                    "its points are stored as `{values}`; only `DATA binary` is read"
-                ));
+                let data = match values {
+                    "ascii" => Data::Text,
+                    "binary" => Data::Binary,
+                    "binary_compressed" => Data::Compressed,
+                    _ => {
+                        return Err(format!(
+                            "its points are stored as `{values}`; ascii, binary and \
+                             binary_compressed are read"
+                        ));
+                    }
+                };
+                return Ok((header, data, rest));
             }
             "VIEWPOINT" => header.about.viewpoint = viewpoint(values)?,
             "VERSION" | "" => {}
@@ -83,28 +114,115 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
     Err("its header has no DATA line".into())
 }
 
+fn is_read(version: &str) -> bool {
+    matches!(version.trim_start_matches('0'), ".5" | ".6" | ".7")
+}
+
 fn whole_number(key: &str, text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("{key} is `{text}`, not a whole number"))
 }
 
-/// Where our fields are.
-fn layout(header: &Header) -> Result<Layout, String> {
-    let names = &header.fields;
-    let ones = vec!["1".to_owned(); names.len()];
-    let counts = if header.counts.is_empty() { &ones } else { &header.counts };
-    if [&header.sizes, &header.types, counts].iter().any(|list| list.len() != names.len()) {
-        return Err("FIELDS, SIZE, TYPE and COUNT have different lengths".into());
+impl Header {
+    /// Rows and columns. Version 0.5 has the number of points alone.
+    fn shape(&self) -> Result<[usize; 2], String> {
+        match (self.rows, self.columns, self.points) {
+            (Some(rows), Some(columns), _) => Ok([rows, columns]),
+            (None, Some(columns), _) => Ok([1, columns]),
+            (None, None, Some(points)) => Ok([1, points]),
+            (_, None, _) => Err("the header has no WIDTH".to_owned()),
+        }
     }
+
+    /// The fields. Those of which the header does not tell size, type and count are single floats.
+    fn fields(&self) -> Result<Vec<Field<'_>>, String> {
+        let names = &self.fields;
+        let lists = [&self.sizes, &self.types, &self.counts];
+        if lists.iter().any(|list| !list.is_empty() && list.len() != names.len()) {
+            return Err("FIELDS, SIZE, TYPE and COUNT have different lengths".to_owned());
+        }
+        let mut fields = Vec::new();
+        for (at, name) in names.iter().enumerate() {
+            let size = self.sizes.get(at).map_or(Ok(4), |size| whole_number("SIZE", size))?;
+            let count = self.counts.get(at).map_or(Ok(1), |count| whole_number("COUNT", count))?;
+            let letter = self.types.get(at).map_or("F", String::as_str);
+            let kind = Kind::from_letter(letter, size).ok_or_else(|| {
+                format!("field `{name}` is of type {letter}{size}, which is none")
+            })?;
+            fields.push(Field { name, kind, count });
+        }
+        Ok(fields)
+    }
+}
+
+/// Where our attributes are in binary points.
+fn layout(fields: &[Field]) -> Result<Layout, String> {
     let mut layout = Layout::default();
-    for (at, name) in names.iter().enumerate() {
-        let size = whole_number("SIZE", &header.sizes[at])?;
-        let count = whole_number("COUNT", &counts[at])?;
-        let letter = &header.types[at];
-        let kind = Kind::from_letter(letter, size)
-            .ok_or_else(|| format!("field `{name}` is of type {letter}{size}, which is none"))?;
-        layout.push(name, kind, count)?;
+    for Field { name, kind, count } in fields {
+        layout.push(name, *kind, *count)?;
     }
     Ok(layout)
+}
+
+/// The points of a compressed body, point by point. They are packed field by field, behind the sizes
+/// of all of it packed and unpacked.
+fn unpacked(fields: &[Field], body: &[u8], points: usize) -> Result<Vec<u8>, String> {
+    let cut_short = "it ends within its compressed points; the file was cut short";
+    let size = |at: usize| {
+        let bytes =
+            body.get(at..at + 4).and_then(|bytes| bytes.try_into().ok()).ok_or(cut_short)?;
+        Ok::<_, &str>(u32::from_le_bytes(bytes) as usize)
+    };
+    let (packed, size) = (size(0)?, size(4)?);
+    let packed = body.get(8..).and_then(|rest| rest.get(..packed)).ok_or(cut_short)?;
+    let width = |field: &Field| field.kind.size().checked_mul(field.count);
+    let widths: Option<Vec<usize>> = fields.iter().map(width).collect();
+    let widths = widths.ok_or("a point is beyond all bounds")?;
+    let stride = widths.iter().try_fold(0_usize, |sum, width| sum.checked_add(*width));
+    let stride = stride.ok_or("a point is beyond all bounds")?;
+    if points.checked_mul(stride) != Some(size) {
+        return Err(format!(
+            "its compressed points are {size} bytes, and {points} points of {stride} bytes are \
+             not; the file is damaged"
+        ));
+    }
+    let columns = lzf::unpack(packed, size).ok_or("its compressed points are damaged")?;
+    Ok(interleave::columns(&columns, &widths, points))
+}
+
+/// Points that are lines of text, as binary ones of the fields that we know.
+fn text(
+    fields: &[Field],
+    body: &[u8],
+    points: usize,
+) -> Result<(Layout, Cow<'static, [u8]>), String> {
+    let text = std::str::from_utf8(body).map_err(|_| "its points are not text")?;
+    let mut layout = Layout { is_text: true, ..Layout::default() };
+    // Whether the words of a field are kept, and how many they are.
+    let mut words_of = Vec::new();
+    for Field { name, kind, count } in fields {
+        let meaning = Meaning::of_heading(name, Some(*kind)).filter(|_| *count == 1);
+        let is_kept = layout.place((name, meaning), Kind::F8, layout.stride);
+        words_of.push((is_kept, *count));
+        layout.stride += if is_kept { Kind::F8.size() } else { 0 };
+    }
+    let mut bytes = Vec::new();
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    for at in 0..points {
+        let line = lines.next().ok_or_else(|| {
+            format!("it ends after {at} of {points} points; the file was cut short")
+        })?;
+        let mut words = line.split_whitespace();
+        let each = words_of.iter().flat_map(|(is_kept, count)| repeat_n(*is_kept, *count));
+        for is_kept in each {
+            let word = words.next().ok_or_else(|| format!("point {at} lacks numbers"))?;
+            if is_kept {
+                let number: f64 =
+                    word.parse().map_err(|_| format!("point {at}: `{word}` is no number"))?;
+                bytes.extend(number.to_le_bytes());
+            }
+        }
+    }
+    Ok((layout, Cow::Owned(bytes)))
 }
 
 #[cfg(test)]
@@ -142,6 +260,72 @@ mod tests {
     }
 
     #[test]
+    fn text_is_read_as_the_field_types_say() {
+        // An organised 2 × 2 image with a pixel that met nothing, a descriptor of three numbers, and a
+        // range in whole millimetres.
+        let file = "# .PCD v.7\r\nVERSION .7\r\nFIELDS X Y Z hist rgb Intensity range\r\n\
+                    SIZE 4 4 4 4 4 4 4\r\nTYPE F F F F F F U\r\nCOUNT 1 1 1 3 1 1 1\r\nWIDTH 2\r\n\
+                    HEIGHT 2\r\nVIEWPOINT 0 0 0 1 0 0 0\r\nPOINTS 4\r\nDATA ascii\r\n\
+                    3 4 12 .1 .2 .3 4.2108e+06 0.5 13001\r\nnan nan nan 0 0 0 0 0 0\r\n\r\n\
+                    0 0 2.5 0 0 0 0 1 2500\r\n1 2 2 0 0 0 0 7e-1 3000\r\n";
+        let cloud = read(file.as_bytes()).unwrap();
+        assert_eq!((cloud.rows, cloud.columns, cloud.returns()), (2, 2, 3));
+        assert_eq!(cloud.range, [13.001, 2.5, 3.0]);
+        assert_eq!(cloud.intensity, [0.5, 1.0, 0.7]);
+        assert_eq!(
+            (cloud.row.as_slice(), cloud.column.as_slice()),
+            (&[0, 1, 1][..], &[0, 0, 1][..])
+        );
+        let fault = |from: &str, to: &str| read(file.replace(from, to).as_bytes()).unwrap_err();
+        assert_eq!(fault("2.5", "far"), "point 2: `far` is no number");
+        assert_eq!(fault(" 3000", ""), "point 3 lacks numbers");
+        assert!(fault("1 2 2 0 0 0 0 7e-1 3000", "").contains("ends after 3 of 4 points"));
+        assert!(
+            fault("1 1 1 3 1 1 1", "1 1 1 99999999999 1 1 1").contains("point 0 lacks numbers")
+        );
+    }
+
+    #[test]
+    fn old_headers_are_read() {
+        let cloud = read(b"# .PCD v.5\nCOLUMNS x y z\nPOINTS 2\nDATA ascii\n3 4 12\n0 0 2\n");
+        assert_eq!(cloud.unwrap().range, [13.0, 2.0]);
+        let file = "VERSION 0.6\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 2\n";
+        assert_eq!(read(file.as_bytes()).unwrap().range, [3.0]);
+        let later = file.replace("0.6", "0.8");
+        assert!(read(later.as_bytes()).unwrap_err().starts_with("its version is 0.8; 0.5, 0.6"));
+    }
+
+    /// Two points of x, y, z and a whole number of 2 bytes, packed field by field as one run.
+    fn compressed() -> Vec<u8> {
+        let mut columns = Vec::new();
+        for column in [[3f32, 0.0], [4.0, 0.0], [12.0, 2.5]] {
+            columns.extend(column.iter().flat_map(|value| value.to_le_bytes()));
+        }
+        columns.extend([7_u16, 9].iter().flat_map(|value| value.to_le_bytes()));
+        let mut file =
+            b"VERSION 0.7\nFIELDS x y z ring\nSIZE 4 4 4 2\nTYPE F F F U\nCOUNT 1 1 1 1\n\
+                         WIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary_compressed\n"
+                .to_vec();
+        file.extend((columns.len() as u32 + 1).to_le_bytes());
+        file.extend((columns.len() as u32).to_le_bytes());
+        file.push(columns.len() as u8 - 1);
+        file.extend(columns);
+        file
+    }
+
+    #[test]
+    fn compressed_points_are_read() {
+        let file = compressed();
+        let cloud = read(&file).unwrap();
+        assert_eq!((cloud.range.as_slice(), cloud.row.as_slice()), (&[13.0, 2.5][..], &[7, 9][..]));
+        assert!(read(&file[..file.len() - 1]).unwrap_err().contains("cut short"));
+        let mut lies = file.clone();
+        let at = lies.len() - 29 - 4;
+        lies[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert!(read(&lies).unwrap_err().contains("compressed points are 4294967295 bytes"));
+    }
+
+    #[test]
     fn faults_are_told_apart() {
         let fault = |file: &[u8]| read(file).unwrap_err();
         let whole = foreign(XYZ_RGB, 2);
@@ -150,8 +334,8 @@ mod tests {
             "it ends after 1 of 2 points; the file was cut short"
         );
         assert_eq!(
-            fault(b"VERSION 0.7\nDATA ascii\n"),
-            "its points are stored as `ascii`; only `DATA binary` is read"
+            fault(b"VERSION 0.7\nDATA braille\n"),
+            "its points are stored as `braille`; ascii, binary and binary_compressed are read"
         );
         assert_eq!(fault(b"ply\n"), "its header has a line that begins with `ply`");
         assert_eq!(fault(b""), "its header has no DATA line");
@@ -186,5 +370,7 @@ mod tests {
     fn absurd_sizes_are_refused_not_allocated() {
         let huge = format!("{XYZ_RGB}\nWIDTH {}\nHEIGHT 9\nDATA binary\n", usize::MAX);
         assert_eq!(read(huge.as_bytes()).unwrap_err(), "WIDTH × HEIGHT is beyond all bounds");
+        let huge = format!("{XYZ_RGB}\nWIDTH {}\nHEIGHT 1\nDATA ascii\n1 2 3 4\n", usize::MAX);
+        assert!(read(huge.as_bytes()).unwrap_err().starts_with("it ends after 1 of"));
     }
 }

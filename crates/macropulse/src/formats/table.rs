@@ -2,6 +2,7 @@
 
 use super::about::{About, List};
 use super::attributes::{Attribute, outcome_from_code};
+use super::headings::Meaning;
 use super::left_out::NoPoint;
 use super::number::Kind;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Surface, Surfaces, Truth};
@@ -17,11 +18,9 @@ const MOST_ROWS: usize = 1 << 16;
 /// Where one of our attributes lies in a record.
 #[derive(Debug, Clone, Copy)]
 struct Field {
-    attribute: Attribute,
+    meaning: Meaning,
     kind: Kind,
     offset: usize,
-    /// What the stored number is multiplied by.
-    scale: f64,
 }
 
 /// How the records of a file are laid out.
@@ -30,50 +29,61 @@ pub(super) struct Layout {
     fields: Vec<Field>,
     /// Names of the fields that are no attribute of ours.
     pub unknown: Vec<String>,
+    /// Whether the numbers were written as text, and have as many digits as that.
+    pub is_text: bool,
     /// Bytes of a record.
     pub stride: usize,
 }
 
 impl Layout {
-    /// Adds `count` numbers behind those that are there. The attribute that is called `name` is read
-    /// from them, if there is one.
+    /// Adds `count` numbers behind those that are there. The attribute that the heading `name` stands
+    /// for is read from them, if there is one.
     pub fn push(&mut self, name: &str, kind: Kind, count: usize) -> Result<(), String> {
-        let attribute = Attribute::named(name).filter(|_| count == 1);
-        // Fields called `_` fill a gap.
-        if attribute.is_none() && name != "_" {
-            self.unknown.push(name.to_owned());
-        }
-        self.place(attribute.map(|attribute| (attribute, 1.0)), kind, self.stride);
+        let meaning = Meaning::of_heading(name, Some(kind)).filter(|_| count == 1);
+        self.place((name, meaning), kind, self.stride);
         let end = kind.size().checked_mul(count).and_then(|size| self.stride.checked_add(size));
         self.stride = end.ok_or("a record is beyond all bounds")?;
         Ok(())
     }
 
-    /// Has an attribute read from `offset`, with the scale of the number that is stored there. The
-    /// first field of an attribute counts.
-    pub fn place(&mut self, what: Option<(Attribute, f64)>, kind: Kind, offset: usize) {
-        let Some((attribute, scale)) = what else { return };
-        if !self.has(attribute) {
-            self.fields.push(Field { attribute, kind, offset, scale });
+    /// Has the attribute that the field `name` stands for read from `offset`, and tells whether it
+    /// is. The first field of an attribute counts; others and those without a meaning are unknown.
+    pub fn place(
+        &mut self,
+        (name, meaning): (&str, Option<Meaning>),
+        kind: Kind,
+        offset: usize,
+    ) -> bool {
+        let meaning = meaning.filter(|meaning| !self.has(meaning.attribute));
+        match meaning {
+            Some(meaning) => self.fields.push(Field { meaning, kind, offset }),
+            // Fields called `_` fill a gap.
+            None if name != "_" => self.unknown.push(name.to_owned()),
+            None => {}
         }
+        meaning.is_some()
     }
 
     pub fn has(&self, attribute: Attribute) -> bool {
-        self.fields.iter().any(|field| field.attribute == attribute)
+        self.fields.iter().any(|field| field.meaning.attribute == attribute)
     }
 
     fn attributes(&self) -> Vec<Attribute> {
-        self.fields.iter().map(|field| field.attribute).collect()
+        self.fields.iter().map(|field| field.meaning.attribute).collect()
     }
 
     /// The digits of the coordinates.
     fn digits(&self) -> Digits {
+        if self.is_text {
+            return Digits::AsWritten;
+        }
         let is_single = |field: &Field| match field.kind {
-            Kind::F4 | Kind::U1 | Kind::I1 | Kind::U2 | Kind::I2 => field.scale == 1.0,
+            Kind::F4 | Kind::U1 | Kind::I1 | Kind::U2 | Kind::I2 => field.meaning.is_as_stored(),
             Kind::U4 | Kind::I4 | Kind::U8 | Kind::I8 | Kind::F8 => false,
         };
-        let is_place =
-            |field: &&Field| matches!(field.attribute, Attribute::X | Attribute::Y | Attribute::Z);
+        let is_place = |field: &&Field| {
+            matches!(field.meaning.attribute, Attribute::X | Attribute::Y | Attribute::Z)
+        };
         match self.fields.iter().filter(is_place).all(is_single) {
             true => Digits::Single,
             false => Digits::Double,
@@ -87,16 +97,18 @@ impl Layout {
             field.offset.checked_add(field.kind.size()).is_none_or(|end| end > self.stride)
         };
         match self.fields.iter().find(beyond) {
-            Some(field) => Err(format!("field `{}` ends beyond its point", field.attribute.name())),
+            Some(field) => {
+                Err(format!("field `{}` ends beyond its point", field.meaning.attribute.name()))
+            }
             None => Ok(()),
         }
     }
 
     fn record(&self, bytes: &[u8], at: usize) -> Result<Record, String> {
         let mut record = Record::default();
-        for field in &self.fields {
-            let bytes = bytes.get(field.offset..).unwrap_or_default();
-            record.set(at, field.attribute, field.kind.read(bytes) * field.scale)?;
+        for Field { meaning, kind, offset } in &self.fields {
+            let bytes = bytes.get(*offset..).unwrap_or_default();
+            record.set(at, meaning.attribute, meaning.number(kind.read(bytes)))?;
         }
         Ok(record)
     }

@@ -2,6 +2,7 @@
 
 use super::super::about::About;
 use super::super::attributes::{Attribute, pixels, returns};
+use super::super::headings::Meaning;
 use super::super::number::Kind;
 use super::super::pcd::is_list;
 use super::super::table::{self, Layout};
@@ -120,24 +121,16 @@ fn layout(fields: &[Stored], stride: usize, stamp_ns: f64) -> (Layout, f64) {
     let mut time_from_ns = 0.0;
     for &Stored { name, offset, kind } in fields {
         let known = match (name, kind) {
-            ("intensity", _) => Some((Attribute::Intensity, 1.0 / white)),
-            ("range", Kind::U4) => Some((Attribute::Range, 1e-3)),
-            ("distance", Kind::F4) => Some((Attribute::Range, 1.0)),
-            ("line", Kind::U1) | ("channel", Kind::U2) => Some((Attribute::Ring, 1.0)),
-            ("time", Kind::F4) => Some((Attribute::TimeNs, 1e9)),
-            ("t" | "time_stamp", Kind::U4) => Some((Attribute::TimeNs, 1.0)),
-            ("timestamp", Kind::F8) if has("tag") => Some((Attribute::TimeNs, 1.0)),
-            _ => Attribute::named(name).map(|attribute| (attribute, 1.0)),
+            ("intensity", _) => Some(Meaning::scaled(Attribute::Intensity, 1.0 / white)),
+            ("timestamp", Kind::F8) if has("tag") => Some(Meaning::of(Attribute::TimeNs)),
+            _ => Meaning::of_heading(name, Some(kind)),
         };
-        if known.is_none() && name != "_" {
-            layout.unknown.push(name.to_owned());
-        }
         match name {
             "time" | "t" | "time_stamp" => time_from_ns = stamp_ns - epoch_ns,
             "timestamp" if has("tag") => time_from_ns = -epoch_ns,
             _ => {}
         }
-        layout.place(known, kind, offset);
+        layout.place((name, known), kind, offset);
     }
     (layout, time_from_ns)
 }
