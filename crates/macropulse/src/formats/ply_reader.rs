@@ -1,42 +1,64 @@
-//! Reads PLY files back, ours and those of others that are binary little endian or text and have
-//! their points first.
+//! Reads PLY files: ours, and those of others, stored as text or binary in either byte order.
 
 use super::about::About;
-use super::attributes::Attribute;
+use super::headings::Meaning;
+use super::interleave;
 use super::number::Kind;
-use super::ply;
 use super::table::{self, Digits, Gathered, Layout, Record};
 use crate::points::PointCloud;
+use std::borrow::Cow;
 
 /// How the points are stored.
 #[derive(Clone, Copy, PartialEq)]
 enum Stored {
-    Binary,
     Text,
+    LittleEndian,
+    BigEndian,
+}
+
+/// Of what an element is made.
+enum Property {
+    Number(Kind),
+    /// A number that says how many follow, and these.
+    List(Kind, Kind),
+}
+
+#[derive(Default)]
+struct Element {
+    count: usize,
+    properties: Vec<Property>,
 }
 
 #[derive(Default)]
 struct Header {
     about: About,
     stored: Option<Stored>,
-    points: Option<usize>,
-    /// Whether another element has begun.
+    /// The elements before the points.
+    before: Vec<Element>,
+    /// The points.
+    vertices: Option<Element>,
+    /// Whether an element behind the points has begun.
     is_over: bool,
+    /// The single numbers of the points.
     layout: Layout,
-    /// What the words of a line of text are.
-    words: Vec<Option<Attribute>>,
+    /// What they mean, in their order.
+    meanings: Vec<Option<Meaning>>,
 }
 
 /// The cloud of a PLY file, and what it says beside it.
 pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let (mut header, body) = parse_header(bytes)?;
-    let points = header.points.ok_or("it has no element `vertex`")?;
+    let mut about = std::mem::take(&mut header.about);
+    let vertices = header.vertices.as_ref().ok_or("it has no element `vertex`")?;
     let cloud = match header.stored {
-        Some(Stored::Binary) => table::list(&mut header.about, &header.layout, body, points),
-        Some(Stored::Text) => text(&mut header, body, points),
+        Some(Stored::Text) => text((&header, vertices), body, &mut about),
+        Some(order) => {
+            let records = records(&header, vertices, body, order)?;
+            table::list(&mut about, &header.layout, &records, vertices.count)
+        }
         None => Err("its header has no line `format`".to_owned()),
     };
-    Ok((cloud?, header.about))
+    Ok((cloud?, about))
 }
 
 /// The header, and the bytes after it.
@@ -68,39 +90,56 @@ impl Header {
         }
         let words: Vec<&str> = line.split_whitespace().collect();
         match *words.as_slice() {
-            ["format", "binary_little_endian", _] => self.stored = Some(Stored::Binary),
+            ["format", "binary_little_endian", _] => self.stored = Some(Stored::LittleEndian),
+            ["format", "binary_big_endian", _] => self.stored = Some(Stored::BigEndian),
             ["format", "ascii", _] => self.stored = Some(Stored::Text),
             ["format", other, ..] => {
                 return Err(format!(
-                    "its format is {other}; binary_little_endian and ascii are read"
+                    "its format is {other}; ascii, binary_little_endian and binary_big_endian \
+                     are read"
                 ));
             }
-            ["element", "vertex", count] => {
-                if self.is_over {
-                    return Err("its points do not come first".to_owned());
+            ["element", name, count] => {
+                let count = count.parse().map_err(|_| format!("`{count}` is no count"))?;
+                let element = Element { count, properties: Vec::new() };
+                if self.vertices.is_some() {
+                    self.is_over = true;
+                } else if name == "vertex" {
+                    self.vertices = Some(element);
+                } else {
+                    self.before.push(element);
                 }
-                let points = count.parse().map_err(|_| format!("`{count}` is no count"))?;
-                self.points = Some(points);
             }
-            ["element", ..] => self.is_over = true,
-            ["property", "list", ..] if !self.is_over => {
-                return Err("a point has a list; single numbers are read".to_owned());
+            ["property", "list", count, item, _] if !self.is_over => {
+                self.add(Property::List(kind_of(count)?, kind_of(item)?));
             }
             ["property", kind, name] if !self.is_over => {
-                // As CloudCompare calls scalar fields.
-                let name = name.strip_prefix(ply::SCALAR).unwrap_or(name);
-                let known = kind_of(kind).ok_or_else(|| format!("`{kind}` is no type"))?;
-                self.words.push(Attribute::named(name));
-                self.layout.push(name, known, 1)?;
+                let kind = kind_of(kind)?;
+                if self.vertices.is_some() {
+                    let meaning = Meaning::of_heading(name, Some(kind));
+                    // The first property of an attribute counts.
+                    let is_new = |meaning: &Meaning| !self.layout.has(meaning.attribute);
+                    self.meanings.push(meaning.filter(is_new));
+                    self.layout.push(name, kind, 1)?;
+                }
+                self.add(Property::Number(kind));
             }
             _ => {}
         }
         Ok(())
     }
+
+    /// Adds a property to the last element.
+    fn add(&mut self, property: Property) {
+        let last = self.vertices.as_mut().or(self.before.last_mut());
+        if let Some(element) = last {
+            element.properties.push(property);
+        }
+    }
 }
 
-fn kind_of(name: &str) -> Option<Kind> {
-    Some(match name {
+fn kind_of(name: &str) -> Result<Kind, String> {
+    Ok(match name {
         "uchar" | "uint8" => Kind::U1,
         "char" | "int8" => Kind::I1,
         "ushort" | "uint16" => Kind::U2,
@@ -109,39 +148,144 @@ fn kind_of(name: &str) -> Option<Kind> {
         "int" | "int32" => Kind::I4,
         "float" | "float32" => Kind::F4,
         "double" | "float64" => Kind::F8,
-        _ => return None,
+        _ => return Err(format!("`{name}` is no type")),
     })
 }
 
+/// The single numbers of all points, with the lowest byte first.
+fn records<'a>(
+    header: &Header,
+    vertices: &Element,
+    body: &'a [u8],
+    order: Stored,
+) -> Result<Cow<'a, [u8]>, String> {
+    let mut rest = body;
+    for element in &header.before {
+        rest = element
+            .behind(rest, order, &mut |_| ())
+            .ok_or("it ends before its points; the file was cut short")?;
+    }
+    let numbers = match vertices.size() {
+        Some(_) => Cow::Borrowed(rest),
+        None => {
+            let mut numbers = Vec::new();
+            // Points that are missing at the end are told of by the table.
+            vertices.behind(rest, order, &mut |number| numbers.extend(number));
+            Cow::Owned(numbers)
+        }
+    };
+    if order == Stored::LittleEndian {
+        return Ok(numbers);
+    }
+    let width = |property: &Property| match property {
+        Property::Number(kind) => Some(kind.size()),
+        Property::List(..) => None,
+    };
+    let widths: Vec<usize> = vertices.properties.iter().filter_map(width).collect();
+    let length = header.layout.stride.saturating_mul(vertices.count).min(numbers.len());
+    let mut numbers = numbers[..length].to_vec();
+    interleave::turn_round(&mut numbers, &widths);
+    Ok(Cow::Owned(numbers))
+}
+
+impl Element {
+    /// Bytes of one such element, if all have as many.
+    fn size(&self) -> Option<usize> {
+        let size = |property: &Property| match property {
+            Property::Number(kind) => Some(kind.size()),
+            Property::List(..) => None,
+        };
+        self.properties.iter().map(size).sum()
+    }
+
+    /// What stands behind all of these elements, if they are whole. `keep` is given each single number.
+    fn behind<'a>(
+        &self,
+        mut rest: &'a [u8],
+        order: Stored,
+        keep: &mut dyn FnMut(&[u8]),
+    ) -> Option<&'a [u8]> {
+        if let Some(size) = self.size() {
+            return rest.get(size.checked_mul(self.count)?..);
+        }
+        for _ in 0..self.count {
+            for property in &self.properties {
+                match property {
+                    Property::Number(kind) => {
+                        let (number, behind) = rest.split_at_checked(kind.size())?;
+                        keep(number);
+                        rest = behind;
+                    }
+                    Property::List(count, item) => {
+                        let (number, behind) = rest.split_at_checked(count.size())?;
+                        let mut number = number.to_vec();
+                        if order == Stored::BigEndian {
+                            number.reverse();
+                        }
+                        let items = count.read(&number) as usize;
+                        rest = behind.get(items.checked_mul(item.size())?..)?;
+                    }
+                }
+            }
+        }
+        Some(rest)
+    }
+}
+
 /// Points that are lines of text.
-fn text(header: &mut Header, body: &[u8], points: usize) -> Result<PointCloud, String> {
+fn text(
+    (header, vertices): (&Header, &Element),
+    body: &[u8],
+    about: &mut About,
+) -> Result<PointCloud, String> {
     let text = std::str::from_utf8(body).map_err(|_| "its points are not text")?;
-    let attributes: Vec<Attribute> = header.words.iter().flatten().copied().collect();
+    let meanings = || header.meanings.iter();
+    let attributes: Vec<_> = meanings().flatten().map(|meaning| meaning.attribute).collect();
     table::check_coordinates(&attributes)?;
-    let mut gathered = Gathered::new(&header.about, &attributes, Digits::AsWritten)?;
+    let mut gathered = Gathered::new(about, &attributes, Digits::AsWritten)?;
     let mut lines = text.lines();
+    for element in &header.before {
+        // An element is a line.
+        if let Some(last) = element.count.checked_sub(1) {
+            lines.nth(last);
+        }
+    }
+    let points = vertices.count;
     for at in 0..points {
         let line = lines.next().ok_or_else(|| {
             format!("it ends after {at} of {points} points; the file was cut short")
         })?;
         let mut words = line.split_whitespace();
-        let mut record = Record::default();
-        for attribute in &header.words {
+        let mut number = || {
             let word = words.next().ok_or_else(|| format!("point {at} lacks numbers"))?;
-            let value = word.parse().map_err(|_| format!("point {at}: `{word}` is no number"))?;
-            if let Some(attribute) = attribute {
-                record.set(at, *attribute, value)?;
+            word.parse::<f64>().map_err(|_| format!("point {at}: `{word}` is no number"))
+        };
+        let mut record = Record::default();
+        let mut meanings = meanings();
+        for property in &vertices.properties {
+            let value = number()?;
+            match property {
+                Property::Number(_) => {
+                    if let Some(Some(meaning)) = meanings.next() {
+                        record.set(at, meaning.attribute, meaning.number(value))?;
+                    }
+                }
+                Property::List(..) => {
+                    for _ in 0..value as usize {
+                        number()?;
+                    }
+                }
             }
         }
         gathered.add(record);
     }
-    header.layout.unknown.iter().for_each(|name| header.about.left_out.field(name));
-    gathered.cloud(&mut header.about)
+    header.layout.unknown.iter().for_each(|name| about.left_out.field(name));
+    gathered.cloud(about)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::ply::Called;
+    use super::super::ply::{self, Called};
     use super::super::{Names, sample_cloud};
     use super::*;
 
@@ -187,10 +331,73 @@ mod tests {
     fn faults_are_told_apart() {
         let fault = |text: &str| parse(text.as_bytes()).unwrap_err();
         assert_eq!(fault("plx\n"), "it has no header from `ply` to `end_header`");
-        assert!(fault("ply\nformat binary_big_endian 1.0\n").contains("line 2: its format is"));
+        assert!(fault("ply\nformat braille 1.0\n").contains("line 2: its format is braille"));
         let start = "ply\nformat ascii 1.0\n";
         assert_eq!(fault(&format!("{start}end_header\n")), "it has no element `vertex`");
         let end = "property float x\nend_header\n";
         assert_eq!(fault(&format!("{start}element vertex 9\n{end}")), "it has no field `y`");
+    }
+
+    const LISTS: &str = "element camera 2\nproperty list uchar short view\nelement pose 1\n\
+                         property double x\nelement vertex 2\nproperty float x\n\
+                         property list uint uchar seen\nproperty double Y\nproperty float z\n\
+                         property uchar Intensity\nelement face 9\n\
+                         property list uchar int vertex_indices\nend_header\n";
+
+    #[test]
+    fn lists_and_elements_before_the_points_are_passed_over() {
+        let check = |file: &[u8]| {
+            let (read, _) = parse(file).unwrap();
+            assert_eq!((&read.x[..], &read.y[..]), (&[3.0, 0.0][..], &[4.0, 0.0][..]));
+            assert_eq!((&read.z[..], &read.intensity[..]), (&[12.0, 2.5][..], &[200.0, 7.0][..]));
+        };
+        check(
+            format!("ply\nformat ascii 1.0\n{LISTS}2 1 2\n0\n99\n3 2 8 9 4 12 200\n0 0 0 2.5 7\n")
+                .as_bytes(),
+        );
+        for is_big in [false, true] {
+            let bytes = |bytes: &[u8]| {
+                let mut bytes = bytes.to_vec();
+                if is_big {
+                    bytes.reverse();
+                }
+                bytes
+            };
+            let name = if is_big { "big" } else { "little" };
+            let mut file = format!("ply\nformat binary_{name}_endian 1.0\n{LISTS}").into_bytes();
+            file.extend([1, 5, 5, 0]);
+            file.extend(bytes(&99_f64.to_le_bytes()));
+            for (x, seen, y, z, intensity) in
+                [(3_f32, &[8, 9][..], 4_f64, 12_f32, 200), (0.0, &[], 0.0, 2.5, 7)]
+            {
+                file.extend(bytes(&x.to_le_bytes()));
+                file.extend(bytes(&(seen.len() as u32).to_le_bytes()));
+                file.extend(seen);
+                file.extend(bytes(&y.to_le_bytes()));
+                file.extend(bytes(&z.to_le_bytes()));
+                file.push(intensity);
+            }
+            check(&file);
+            let told = parse(&file[..file.len() - 1]).unwrap_err();
+            assert_eq!(told, "it ends after 1 of 2 points; the file was cut short");
+            let lies = String::from_utf8_lossy(&file).replace("camera 2", "camera 999999999");
+            assert!(parse(lies.as_bytes()).unwrap_err().contains("ends before its points"));
+        }
+    }
+
+    #[test]
+    fn big_endian_points_are_read() {
+        let mut file = b"ply\r\nformat binary_big_endian 1.0\r\nelement vertex 2\r\nproperty float x\r\n\
+                         property float y\r\nproperty double z\r\nproperty ushort ring\r\nend_header\r\n"
+            .to_vec();
+        for (x, y, z, ring) in [(3_f32, 4_f32, 12_f64, 258_u16), (0.0, 0.0, 2.5, 1)] {
+            file.extend(x.to_be_bytes());
+            file.extend(y.to_be_bytes());
+            file.extend(z.to_be_bytes());
+            file.extend(ring.to_be_bytes());
+        }
+        let (read, _) = parse(&file).unwrap();
+        assert_eq!((&read.range[..], &read.row[..]), (&[13.0, 2.5][..], &[258, 1][..]));
+        assert!(parse(&file[..file.len() - 1]).unwrap_err().contains("ends after 1 of 2"));
     }
 }
