@@ -2,10 +2,13 @@
 
 use super::about::About;
 use super::attributes::{Attribute, returns};
+use super::interleave;
 use super::number::Kind;
 use super::table::{self, Layout};
 use crate::points::PointCloud;
+use std::borrow::Cow;
 use std::io::{self, Write};
+use std::iter::repeat_n;
 
 /// What every file begins with, before the version.
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -59,8 +62,8 @@ fn write_header(descr: &str, shape: &str, out: &mut dyn Write) -> io::Result<()>
     writeln!(out, "{text:width$}", width = length - 1)
 }
 
-/// The cloud of a structured array with fields x, y and z; other fields that we do not know are
-/// skipped.
+/// The cloud of an array: of a structured one with fields x, y and z, or of a plain one with a line per
+/// point, of which the columns are x, y, z and intensity.
 pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("it does not begin as NumPy files do")?;
     let (header, body) = match *rest {
@@ -73,39 +76,113 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     }
     .ok_or("it ends within its header")?;
     let header = std::str::from_utf8(header).map_err(|_| "its header is not text")?;
-    let points = shape(header).ok_or(
-        "its shape is not that of one list of points, a structured array with fields x, y and z",
-    )?;
     let mut about = About::default();
-    let cloud = table::list(&mut about, &layout(header)?, body, points)?;
+    let (fields, points) = fields(header)?;
+    let mut layout = Layout::default();
+    for Stored { name, kind, .. } in &fields {
+        layout.push(name, *kind, 1)?;
+    }
+    let body = little_endian_records(header, &fields, points, body);
+    let cloud = table::list(&mut about, &layout, &body, points)?;
     Ok((cloud, about))
 }
 
-/// Length of a one-dimensional array.
-fn shape(header: &str) -> Option<usize> {
-    let (_, rest) = header.split_once("'shape':")?;
-    let (inner, _) = rest.trim_start().strip_prefix('(')?.split_once(')')?;
-    inner.trim().trim_end_matches(',').trim().parse().ok()
+/// A field of a point as it is stored.
+struct Stored<'a> {
+    name: &'a str,
+    kind: Kind,
+    is_big_endian: bool,
 }
 
-/// Where the fields of a structured array are: `[('x', '<f4'), …]`.
-fn layout(header: &str) -> Result<Layout, String> {
-    let list = header.split_once("'descr':").and_then(|(_, rest)| {
-        let (inner, _) = rest.trim_start().strip_prefix('[')?.split_once(']')?;
-        Some(inner)
-    });
-    let list = list.ok_or("it is no structured array; fields x, y and z are read")?;
-    let mut quoted = list.split('\'').skip(1).step_by(2);
-    let mut layout = Layout::default();
-    while let (Some(name), Some(descr)) = (quoted.next(), quoted.next()) {
-        let fault =
-            || format!("field `{name}` is of type `{descr}`; little-endian numbers are read");
-        let code = descr.strip_prefix(['<', '|', '=']).ok_or_else(fault)?;
+impl<'a> Stored<'a> {
+    fn of(name: &'a str, descr: &str) -> Result<Self, String> {
+        let fault = || {
+            format!("`{name}` is of type `{descr}`; whole and floating numbers are read")
+        };
+        let (order, code) = descr.split_at_checked(1).ok_or_else(fault)?;
+        if !matches!(order, "<" | ">" | "|" | "=") {
+            return Err(fault());
+        }
         let (letter, size) = code.split_at_checked(1).ok_or_else(fault)?;
-        let size = size.parse().map_err(|_| fault())?;
-        layout.push(name, Kind::from_letter(letter, size).ok_or_else(fault)?, 1)?;
+        let kind = size.parse().ok().and_then(|size| Kind::from_letter(letter, size));
+        Ok(Self { name, kind: kind.ok_or_else(fault)?, is_big_endian: order == ">" })
     }
-    Ok(layout)
+}
+
+/// The fields of a point, and how many points there are.
+fn fields(header: &str) -> Result<(Vec<Stored<'_>>, usize), String> {
+    let shape = shape(header).ok_or("its header has no shape")?;
+    let descr = header.split_once("'descr':").map(|(_, rest)| rest.trim_start());
+    let descr = descr.ok_or("its header has no type")?;
+    if let Some((inner, _)) = descr.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+        let points = shape.iter().try_fold(1_usize, |product, side| product.checked_mul(*side));
+        let points = points.ok_or("its shape is beyond all bounds")?;
+        let mut quoted = inner.split('\'').skip(1).step_by(2);
+        let mut fields = Vec::new();
+        while let (Some(name), Some(descr)) = (quoted.next(), quoted.next()) {
+            fields.push(Stored::of(name, descr)?);
+        }
+        return Ok((fields, points));
+    }
+    let descr = descr.split('\'').nth(1).ok_or("its type is none that is read")?;
+    let names = match *shape.as_slice() {
+        [_, columns @ 3..] => PLAIN.get(..columns),
+        _ => None,
+    };
+    let names = names.ok_or_else(|| {
+        let shape = shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" × ");
+        format!(
+            "its shape is {shape}; arrays of N × 3 (x, y, z) and N × 4 (and intensity) are read, \
+             and structured arrays with fields x, y and z"
+        )
+    })?;
+    let fields: Result<Vec<Stored>, String> =
+        names.iter().map(|name| Stored::of(name, descr)).collect();
+    Ok((fields?, shape[0]))
+}
+
+/// Columns of a plain array; the last two are no attribute. More are rather an image.
+const PLAIN: [&str; 6] = ["x", "y", "z", "intensity", "column 5", "column 6"];
+
+/// The numbers of each point in the order of its fields, the lowest byte first.
+fn little_endian_records<'a>(
+    header: &str,
+    fields: &[Stored],
+    points: usize,
+    body: &'a [u8],
+) -> Cow<'a, [u8]> {
+    let sizes: Vec<usize> = fields.iter().map(|field| field.kind.size()).collect();
+    let mut records = Cow::Borrowed(body);
+    let is_by_columns = header
+        .split_once("'fortran_order':")
+        .is_some_and(|(_, rest)| rest.trim_start().starts_with("True"));
+    let size = points.checked_mul(sizes.iter().sum());
+    // Of a list of structures the order is the same either way.
+    let is_plain =
+        fields.iter().all(|field| field.kind == fields[0].kind) && !header.contains("'descr': [");
+    if let Some(columns) = size.filter(|_| is_by_columns && is_plain).and_then(|s| body.get(..s)) {
+        records = Cow::Owned(interleave::columns(columns, &sizes, points));
+    }
+    if fields.iter().any(|field| field.is_big_endian) {
+        let each = fields.iter().zip(&sizes);
+        // A number of the other order is one of single bytes.
+        let widths: Vec<usize> = each
+            .flat_map(|(field, size)| match field.is_big_endian {
+                true => repeat_n(*size, 1),
+                false => repeat_n(1, *size),
+            })
+            .collect();
+        interleave::turn_round(records.to_mut(), &widths);
+    }
+    records
+}
+
+/// The sides of an array.
+fn shape(header: &str) -> Option<Vec<usize>> {
+    let (_, rest) = header.split_once("'shape':")?;
+    let (inner, _) = rest.trim_start().strip_prefix('(')?.split_once(')')?;
+    let sides = inner.split(',').map(str::trim).filter(|side| !side.is_empty());
+    sides.map(|side| side.parse().ok()).collect()
 }
 
 #[cfg(test)]
@@ -144,13 +221,59 @@ mod tests {
         let fault = |bytes: &[u8]| parse(bytes).unwrap_err();
         assert_eq!(fault(b"PK"), "it does not begin as NumPy files do");
         let mut image = Vec::new();
-        write_range(&sample_cloud(), &mut image).unwrap();
-        assert!(fault(&image).starts_with("its shape is not that of one list of points"));
+        let three = PointCloud { rows: 3, columns: 2, ..sample_cloud() };
+        write_range(&three, &mut image).unwrap();
+        assert!(fault(&image).starts_with("its shape is 3 × 2; arrays of N × 3 (x, y, z)"));
         let mut bytes = Vec::new();
         write(&sample_cloud(), &mut bytes).unwrap();
         assert!(fault(&bytes[..40]).contains("ends within its header"));
         assert!(fault(&bytes[..bytes.len() - 1]).contains("ends after 4 of 5 points"));
-        let swapped = String::from_utf8_lossy(&bytes).replace("('x', '<f4')", "('x', '>f4')");
-        assert!(parse(swapped.as_bytes()).is_err());
+        let complex = array("[('x', '<c8')]", "False", "(0,)", []);
+        assert!(fault(&complex).starts_with("`x` is of type `<c8`"));
+    }
+
+    fn array(descr: &str, order: &str, shape: &str, body: impl IntoIterator<Item = u8>) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        write_header(descr, shape, &mut bytes).unwrap();
+        let text = String::from_utf8_lossy(&bytes[10..]).replace("False", order);
+        bytes.truncate(10);
+        bytes.extend(text.bytes());
+        bytes.extend(body);
+        bytes
+    }
+
+    #[test]
+    fn plain_arrays_are_read_in_either_order() {
+        let rows = [3.0, 4.0, 12.0, 0.5, 0.0, 0.0, 2.5, 1.0];
+        let columns = [3.0, 0.0, 4.0, 0.0, 12.0, 2.5, 0.5, 1.0];
+        let float = |number: f64| (number as f32).to_le_bytes();
+        for file in [
+            array("'<f4'", "False", "(2, 4)", rows.into_iter().flat_map(float)),
+            array("'<f4'", "True ", "(2, 4)", columns.into_iter().flat_map(float)),
+            array("'<f8'", "False", "(2, 4)", rows.into_iter().flat_map(f64::to_le_bytes)),
+            array("'>f8'", "False", "(2, 4)", rows.into_iter().flat_map(f64::to_be_bytes)),
+            array("'>f8'", "True ", "(2, 4)", columns.into_iter().flat_map(f64::to_be_bytes)),
+        ] {
+            let (read, _) = parse(&file).unwrap();
+            assert_eq!((&read.range[..], &read.intensity[..]), (&[13.0, 2.5][..], &[0.5, 1.0][..]));
+            assert!(parse(&file[..file.len() - 1]).unwrap_err().contains("ends after 1 of 2"));
+        }
+        let short = rows.iter().take(6).copied().flat_map(float);
+        let (read, _) = parse(&array("'<f4'", "False", "(2, 3)", short)).unwrap();
+        assert_eq!(read.x, [3.0, 0.5]);
+        assert!(read.intensity[0].is_nan());
+        let huge = array("'<f4'", "True ", "(18446744073709551615, 3)", []);
+        assert!(parse(&huge).unwrap_err().contains("beyond all bounds"));
+    }
+
+    #[test]
+    fn structures_of_the_other_byte_order_are_read() {
+        let descr = "[('X', '>f4'), ('Y', '<f4'), ('I', '|u1'), ('Z', '>f8')]";
+        let mut body = 3_f32.to_be_bytes().to_vec();
+        body.extend(4_f32.to_le_bytes());
+        body.push(7);
+        body.extend(12_f64.to_be_bytes());
+        let (read, _) = parse(&array(descr, "False", "(1, 1)", body)).unwrap();
+        assert_eq!((read.range[0], read.intensity[0]), (13.0, 7.0));
     }
 }
