@@ -1,88 +1,230 @@
-//! Reads comma-separated text back: a header with names of ours, then a point a line.
+//! Reads points from text: a point a line, below a line of headings or without one.
 
 use super::about::About;
 use super::attributes::Attribute;
+use super::headings::Meaning;
 use super::table::{Digits, Gathered, Record, check_coordinates};
 use crate::points::{NO_OBJECT, Outcome, PointCloud};
-use std::borrow::Cow;
+use ::csv::{ReaderBuilder, StringRecord};
 
-/// The cloud of a CSV file, and the names in it. Columns whose names we do not know are skipped, and
-/// an empty cell is no value. Objects and materials may be names or numbers; names are numbered in
-/// the order in which they come.
+/// What the columns hold where no line names them. Further columns are not known.
+const WITHOUT_HEADINGS: [Attribute; 4] =
+    [Attribute::X, Attribute::Y, Attribute::Z, Attribute::Intensity];
+
+/// Most columns of a text.
+const MOST_COLUMNS: usize = 4096;
+
+/// The cloud of a text, and the names in it.
+///
+/// Cells are apart by semicolons, tabs, commas or spaces. A cell in quotes may have these, line breaks
+/// and doubled quotes. Lines that begin with `#` or `//` are comments, except for one with headings
+/// before the first point. A first line with one whole number, the count of points, is passed over.
+/// Columns whose headings we do not know are skipped, and an empty cell is no value. Objects and
+/// materials may be names or numbers; names are numbered in the order in which they come.
 pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "it is not text")?;
+    let text = std::str::from_utf8(bytes).map_err(|_| "it is not text in UTF-8")?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut lines = text.lines();
-    let header = lines.next().ok_or("it is empty; its first line names the columns")?;
-    let columns: Vec<Option<Attribute>> =
-        header.split(',').map(|name| Attribute::named(name.trim().trim_matches('"'))).collect();
-    let attributes: Vec<Attribute> = columns.iter().flatten().copied().collect();
-    check_coordinates(&attributes).map_err(|fault| {
-        format!(
-            "{fault}; its first line has the names of columns with commas between, as `x_m,y_m,z_m`"
-        )
-    })?;
-    let mut about = About::default();
-    let mut gathered = Gathered::new(&about, &attributes, Digits::AsWritten)?;
-    for (at, line) in lines.enumerate() {
-        if line.is_empty() {
-            continue;
-        }
-        // The second line of the file is that of point 0.
-        let fault = |fault: String| format!("line {}: {fault}", at + 2);
-        let mut rest = Some(line);
-        let mut record = Record::default();
-        for column in &columns {
-            let cell = next_cell(&mut rest).map_err(fault)?;
-            let Some(attribute) = *column else { continue };
-            let value = value(attribute, &cell, &mut about).map_err(fault)?;
-            if let Some(value) = value {
-                record.set(at, attribute, value).map_err(fault)?;
-            }
-        }
-        if rest.is_some() {
-            return Err(fault("it has more cells than there are columns".to_owned()));
-        }
-        gathered.add(record);
-    }
-    for name in header.split(',').map(|name| name.trim().trim_matches('"')) {
-        if Attribute::named(name).is_none() {
-            about.left_out.field(name);
-        }
-    }
+    let sheet = Sheet::of(text).ok_or("it is empty; its first line names the columns")?;
+    let points = match sheet.separator {
+        Separator::Spaces => sheet.spaced(),
+        Separator::One(byte) => sheet.separated(byte),
+    }?;
+    let Points { gathered, mut about, .. } = points;
     Ok((gathered.cloud(&mut about)?, about))
 }
 
-/// Takes a cell off the line, without the quotes around it.
-fn next_cell<'a>(rest: &mut Option<&'a str>) -> Result<Cow<'a, str>, String> {
-    let line = rest.ok_or("it has fewer cells than there are columns; was the file cut short?")?;
-    let Some(mut inner) = line.strip_prefix('"') else {
-        let (cell, behind) = line.split_once(',').map_or((line, None), |(a, b)| (a, Some(b)));
-        *rest = behind;
-        return Ok(Cow::Borrowed(cell));
-    };
-    let mut cell = String::new();
-    loop {
-        let (part, behind) = inner.split_once('"').ok_or("a quote is not closed")?;
-        cell.push_str(part);
-        match behind.strip_prefix('"') {
-            Some(further) => (cell.push('"'), inner = further).1,
-            None => {
-                *rest = behind.strip_prefix(',');
-                return Ok(Cow::Owned(cell));
+#[derive(Clone, Copy, PartialEq)]
+enum Separator {
+    Spaces,
+    One(u8),
+}
+
+impl Separator {
+    /// The separator of a line: the first of semicolon, tab and comma that stands there twice.
+    fn of(line: &str) -> Self {
+        let is_there = |byte: &u8| line.bytes().filter(|other| other == byte).count() >= 2;
+        b";\t,".iter().copied().find(is_there).map_or(Self::Spaces, Self::One)
+    }
+
+    fn cells(self, line: &str) -> Box<dyn Iterator<Item = &str> + '_> {
+        match self {
+            Self::Spaces => Box::new(line.split_whitespace()),
+            Self::One(byte) => Box::new(line.split(char::from(byte))),
+        }
+    }
+
+    /// The number in a cell, whose decimal sign may be a comma where commas separate nothing.
+    fn number(self, cell: &str) -> Option<f64> {
+        let comma = || match self {
+            Self::One(b',') => None,
+            _ => cell.replacen(',', ".", 1).parse().ok(),
+        };
+        cell.parse().ok().or_else(comma)
+    }
+}
+
+/// Where the points or their headings begin.
+struct Sheet<'a> {
+    text: &'a str,
+    /// Lines before that.
+    before: usize,
+    separator: Separator,
+    has_headings: bool,
+}
+
+impl<'a> Sheet<'a> {
+    fn of(text: &'a str) -> Option<Self> {
+        let mut rest = text;
+        for (before, line) in text.lines().enumerate() {
+            let comment = line.strip_prefix('#').or_else(|| line.strip_prefix("//"));
+            let bare = comment.unwrap_or(line).trim();
+            let separator = Separator::of(bare);
+            let cells = || separator.cells(bare).map(str::trim);
+            let is_number = |cell: &str| cell.is_empty() || separator.number(cell).is_some();
+            let begins = match comment {
+                Some(_) => has_coordinates(cells()),
+                // A count of points is one word.
+                None => !bare.is_empty() && bare.parse::<u64>().is_err(),
+            };
+            if begins {
+                let has_headings = !cells().all(is_number);
+                let text =
+                    if comment.is_some() { rest.trim_start_matches(['#', '/']) } else { rest };
+                return Some(Self { text, before, separator, has_headings });
+            }
+            rest = rest.split_once('\n').map_or("", |(_, behind)| behind);
+        }
+        None
+    }
+
+    /// Points whose cells are apart by spaces, and stand in no quotes.
+    fn spaced(&self) -> Result<Points, String> {
+        let mut lines = self.text.lines().enumerate().filter(|(at, line)| {
+            let is_comment = line.starts_with('#') || line.starts_with("//");
+            *at == 0 || !(is_comment || line.trim().is_empty())
+        });
+        let first = lines.clone().next().map_or("", |(_, line)| line);
+        let mut points = Points::new(first.split_whitespace(), self)?;
+        for (at, line) in lines.by_ref().skip(usize::from(self.has_headings)) {
+            let taken = points.take(line.split_whitespace());
+            taken.map_err(|fault| format!("line {}: {fault}", self.before + at + 1))?;
+        }
+        Ok(points)
+    }
+
+    /// Points whose cells are apart by a sign, and may stand in quotes.
+    fn separated(&self, separator: u8) -> Result<Points, String> {
+        let mut reader = ReaderBuilder::new()
+            .delimiter(separator)
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .from_reader(self.text.as_bytes());
+        let mut record = StringRecord::new();
+        let mut next = |record: &mut StringRecord| {
+            reader.read_record(record).map_err(|_| "it is not text in UTF-8".to_owned())
+        };
+        next(&mut record)?;
+        let mut points = Points::new(record.iter(), self)?;
+        let mut is_there = if self.has_headings { next(&mut record)? } else { true };
+        while is_there {
+            let is_blank = record.iter().all(|cell| cell.trim().is_empty());
+            if !is_blank && !record.get(0).is_some_and(|cell| cell.starts_with("//")) {
+                points.take(record.iter()).map_err(|fault| {
+                    let line = record.position().map_or(0, ::csv::Position::line);
+                    let line = self.before as u64 + line;
+                    // A quote that is not closed takes in all that follows.
+                    match record.iter().any(|cell| cell.contains('\n')) {
+                        true => format!("line {line}: a quote is not closed, or {fault}"),
+                        false => format!("line {line}: {fault}"),
+                    }
+                })?;
+            }
+            is_there = next(&mut record)?;
+        }
+        Ok(points)
+    }
+}
+
+/// Whether these headings name all three coordinates.
+fn has_coordinates<'a>(headings: impl Iterator<Item = &'a str>) -> bool {
+    let known = headings.filter_map(|heading| Meaning::of_heading(heading, None));
+    check_coordinates(&known.map(|meaning| meaning.attribute).collect::<Vec<_>>()).is_ok()
+}
+
+/// Points that are read from cells.
+struct Points {
+    separator: Separator,
+    columns: Vec<Option<Meaning>>,
+    about: About,
+    gathered: Gathered,
+    /// Lines that were taken.
+    taken: usize,
+}
+
+impl Points {
+    /// With the columns that the cells of the first line name, or as many as it has.
+    fn new<'a>(first: impl Iterator<Item = &'a str>, sheet: &Sheet) -> Result<Self, String> {
+        let mut columns: Vec<Option<Meaning>> = Vec::new();
+        let mut attributes = Vec::new();
+        let mut about = About::default();
+        for (at, heading) in first.enumerate() {
+            if at == MOST_COLUMNS {
+                return Err(format!("its first line has more than {MOST_COLUMNS} cells"));
+            }
+            let meaning = match sheet.has_headings {
+                true => Meaning::of_heading(heading.trim_matches('"'), None),
+                false => WITHOUT_HEADINGS.get(at).copied().map(Meaning::of),
+            };
+            // The first column of an attribute counts.
+            let meaning = meaning.filter(|meaning| !attributes.contains(&meaning.attribute));
+            match (meaning, sheet.has_headings) {
+                (Some(meaning), _) => attributes.push(meaning.attribute),
+                (None, true) => about.left_out.field(heading.trim().trim_matches('"')),
+                (None, false) => about.left_out.field(&format!("column {}", at + 1)),
+            }
+            columns.push(meaning);
+        }
+        check_coordinates(&attributes).map_err(|fault| {
+            format!("{fault}; its first line names the columns, as `x,y,z,intensity`")
+        })?;
+        let gathered = Gathered::new(&about, &attributes, Digits::AsWritten)?;
+        Ok(Self { separator: sheet.separator, columns, about, gathered, taken: 0 })
+    }
+
+    /// Takes in the cells of a point.
+    fn take<'a>(&mut self, mut cells: impl Iterator<Item = &'a str>) -> Result<(), String> {
+        let mut record = Record::default();
+        for column in &self.columns {
+            let cell = cells
+                .next()
+                .ok_or("it has fewer cells than there are columns; was the file cut short?")?;
+            let Some(meaning) = *column else { continue };
+            if let Some(value) = value(meaning, cell.trim(), self.separator, &mut self.about)? {
+                record.set(self.taken, meaning.attribute, value)?;
             }
         }
+        if cells.any(|cell| !cell.trim().is_empty()) {
+            return Err("it has more cells than there are columns".to_owned());
+        }
+        self.gathered.add(record);
+        self.taken += 1;
+        Ok(())
     }
 }
 
 /// The number that a cell stands for; none for an empty one.
-fn value(attribute: Attribute, cell: &str, about: &mut About) -> Result<Option<f64>, String> {
-    let cell = cell.trim();
+fn value(
+    meaning: Meaning,
+    cell: &str,
+    separator: Separator,
+    about: &mut About,
+) -> Result<Option<f64>, String> {
     if cell.is_empty() {
         return Ok(None);
     }
-    let number = cell.parse::<f64>().ok();
-    let number = match attribute {
+    let number = separator.number(cell).map(|number| meaning.number(number));
+    let number = match meaning.attribute {
         Attribute::Outcome => {
             let known = Outcome::ALL.into_iter().find(|outcome| outcome.name() == cell);
             known.map(|outcome| f64::from(outcome as u8)).or(number)
@@ -91,7 +233,7 @@ fn value(attribute: Attribute, cell: &str, about: &mut About) -> Result<Option<f
         Attribute::Material => number.or_else(|| numbered(&mut about.materials, cell)),
         _ => number,
     };
-    number.map(Some).ok_or_else(|| format!("`{cell}` is no {}", attribute.name()))
+    number.map(Some).ok_or_else(|| format!("`{cell}` is no {}", meaning.attribute.name()))
 }
 
 /// The number of a name, a new one for a new name.
@@ -130,11 +272,11 @@ mod tests {
     fn faults_have_their_line() {
         let fault = |text: &str| parse(text.as_bytes()).unwrap_err();
         assert_eq!(fault(""), "it is empty; its first line names the columns");
-        assert!(fault("a,b\n1,2\n").starts_with("it has no field `x`; its first line has"));
+        assert!(fault("a,b\n1,2\n").starts_with("it has no field `x`; its first line names"));
         assert_eq!(fault("x,y,z\n1,2,far\n"), "line 2: `far` is no z");
         assert!(fault("x,y,z\n1,2,3\n1,2\n").starts_with("line 3: it has fewer cells"));
         assert!(fault("x,y,z\n1,2,3,4\n").starts_with("line 2: it has more cells"));
-        assert!(fault("x,y,z\n1,2,\"3\n").starts_with("line 2: a quote is not closed"));
+        assert!(fault("x,y,z\n1,2,\"3\n4,5,6\n").starts_with("line 2: a quote is not closed"));
         assert!(fault("x,y,z,row\n1,2,3,-1\n").contains("whole numbers from 0 to 65535"));
     }
 
@@ -154,5 +296,43 @@ mod tests {
         let (read, _) = parse(b"x,y,z\n0.1,30.02,-5e-3\n").unwrap();
         assert!(read.exact.x.is_empty());
         assert_eq!((read.x[0], read.y[0], read.z[0]), (0.1, 30.02, -5e-3));
+    }
+
+    #[test]
+    fn usual_headings_and_separators_are_read() {
+        for text in [
+            "X;Y;Z;I\r\n3;4;12;0,5\r\n\r\n0;0;2,5;1\r\n",
+            "\u{feff}\"x [m]\",\"y [m]\",\"z [m]\",Intensity\n3,4,12,0.5\n0,0,2.5,1,\n",
+            "Points:0\tPoints:1\tPoints:2\tscalar_Intensity\n3\t4\t12\t.5\n0\t0\t2.5\t1\n",
+            "# made by hand\nx,y,z,label,Reflectivity\n# and a comment\n3,4,12,\"a, \"\"b\"\"\nc\",0.5\n\
+             0,0,2.5,,1\n",
+            "//X Y Z R Intensity\n3 4 12 255 0.5\n  0   0 2.5 9 1\n",
+            "// scan\n3 4 12 0.5\n# mark\n0 0 2.5 1\n",
+            "2\n3 4 12 0.5 9 9 9\n0 0 2.5 1 9 9 9\n",
+            "3,4,12,0.5\n// far\n0,0,2.5,1\n",
+        ] {
+            let (read, _) =
+                parse(text.as_bytes()).unwrap_or_else(|fault| panic!("{text}: {fault}"));
+            assert_eq!((&*read.distances(), &read.intensity[..]), (&[13.0, 2.5][..], &[0.5, 1.0][..]));
+        }
+    }
+
+    #[test]
+    fn times_are_in_the_unit_of_their_heading_or_in_seconds() {
+        let time = |heading: &str, cell: &str| {
+            let text = format!("x,y,z,{heading}\n1,2,2,{cell}\n");
+            parse(text.as_bytes()).unwrap().0.time_ns[0]
+        };
+        assert_eq!(time("timestamp", "12.5"), 12.5e9);
+        assert_eq!(time("gps_time", "1.5"), 1.5e9);
+        assert_eq!(time("Time [us]", "1.5"), 1500.0);
+        assert_eq!(time("time_ns", "1.5"), 1.5);
+    }
+
+    #[test]
+    fn a_line_break_in_quotes_keeps_the_count_of_lines() {
+        let text = "name,x,y,z\n\"two\nlines\",1,2,3\n\"more\nof them\",1,2,far\n";
+        let told = parse(text.as_bytes()).unwrap_err();
+        assert!(told.starts_with("line 4: a quote is not closed, or `far` is no z"), "{told}");
     }
 }
