@@ -51,7 +51,7 @@ impl Clouds {
             Format::E57 => e57::parse(read()?),
             Format::Npy => npy::parse(&read()?),
             Format::Csv => csv_reader::parse(&read()?),
-            Format::Kitti => kitti::parse(&read()?),
+            Format::Kitti => kitti::parse(&read()?, kitti::Floats::of_name(path)),
             _ => return Err(Error::unreadable(path)),
         };
         let (cloud, about) = parsed.map_err(|fault| Error::invalid(path, format, fault))?;
