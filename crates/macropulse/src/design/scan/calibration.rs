@@ -1,5 +1,6 @@
-//! The lasers of a turning head from a calibration file: the list `lasers:` of the YAML files that
-//! drivers of Velodyne sensors read \[VelRos\].
+//! The lasers of a turning head from a calibration file: the metadata of an Ouster sensor (`.json`, see
+//! [`ouster`]), or the list `lasers:` of the YAML files that drivers of Velodyne sensors read
+//! \[VelRos\].
 //!
 //! Angles are in radians, lengths in metres. With R the distance a laser measures, d its
 //! `dist_correction`, φ the azimuth of the head, clockwise, and α, ε, h, v its `rot_correction`,
@@ -20,6 +21,7 @@ use serde::Deserialize;
 use serde_saphyr::{Error as Yaml, Location, Spanned};
 
 use super::laser::{AZIMUTH, ELEVATION, Laser, Limit, MOST_LASERS, ORIGIN, RANGE_OFFSET};
+use super::ouster;
 use crate::digest::Digest;
 use crate::told;
 
@@ -73,7 +75,15 @@ pub(super) fn read(path: &Path) -> Result<Calibration, String> {
     let origin = path.display().to_string();
     let bytes = super::table::bytes(path, MOST_BYTES)?;
     let text = std::str::from_utf8(&bytes).map_err(|_| format!("{origin}: is no UTF-8 text"))?;
-    let mut calibration = parse(text, &origin)?;
+    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let mut calibration = match is_json {
+        true => Calibration {
+            lasers: ouster::lasers(text, &origin)?,
+            notes: Vec::new(),
+            digest: String::new(),
+        },
+        false => parse(text, &origin)?,
+    };
     let mut digest = Digest::new();
     digest.bytes(&bytes);
     calibration.digest = digest.text();

@@ -10,6 +10,7 @@ mod flash;
 mod grid;
 mod laser;
 mod model;
+mod ouster;
 mod polygon;
 mod raster;
 mod rosette;

@@ -87,18 +87,23 @@ impl Typed for File {
                 "{origin}: {count} directions; there must be two at least{of_lines}"
             ));
         }
-        let rate = match (times.is_empty(), self.firings_per_s) {
-            (false, None) => match rate(&times, lines as usize, &origin.to_string()) {
+        let has_times = !times.is_empty() && !only_count(&times, lines as usize);
+        let rate = match (has_times, self.firings_per_s) {
+            (true, None) => match rate(&times, lines as usize, &origin.to_string()) {
                 Ok(rate) => rate,
                 Err(message) => return refuse(message),
             },
-            (true, Some(typed)) => check.within("scan.table.firings_per_s", typed, 1.0, 1e9)?,
-            (false, Some(_)) => {
+            (false, Some(typed)) => check.within("scan.table.firings_per_s", typed, 1.0, 1e9)?,
+            (true, Some(_)) => {
                 let message = "has no effect because of `scan.table.file`, which has times";
                 return check.refuse("scan.table.firings_per_s", message);
             }
-            (true, None) => {
-                return refuse(format!("{origin}: has no times: give scan.table.firings_per_s"));
+            (false, None) => {
+                let times = match times.is_empty() {
+                    true => "has no times",
+                    false => "its times only count the entries",
+                };
+                return refuse(format!("{origin}: {times}: give scan.table.firings_per_s"));
             }
         };
         let shots = (rate * period / f64::from(lines)).round();
@@ -240,6 +245,15 @@ fn entries(bytes: &[u8], origin: &str) -> Result<Entries, String> {
         found.directions.push([cos_e * cos_a, cos_e * sin_a, sin_e]);
     }
     Ok(found)
+}
+
+/// Whether the times are whole seconds that only count the entries, or the groups of so many lines.
+fn only_count(times: &[f64], lines: usize) -> bool {
+    let counts = |group: usize| {
+        let expected = |at: usize| times[0] + (at / group) as f64;
+        times.iter().enumerate().all(|(at, time)| *time == expected(at))
+    };
+    times[0].fract() == 0.0 && (counts(1) || counts(lines))
 }
 
 /// Shots a second, which must follow each other evenly, but for lines that fire together.
