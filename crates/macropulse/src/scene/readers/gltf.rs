@@ -17,12 +17,15 @@ use std::collections::HashMap;
 use std::io::{BufRead as _, Read as _};
 use std::path::Path;
 
+use ::gltf::material::AlphaMode;
 use ::gltf::mesh::Mode;
 use ::gltf::scene::Transform;
 use ::gltf::{Document, Material, Node, Primitive, Semantic};
 use glam::{DMat4, DQuat, DVec3};
 
-use super::{DAMAGED, Reach, Read, counted, luminance, no_surfaces, open, too_many_materials};
+use super::{
+    DAMAGED, Reach, Read, counted, luminance, no_surfaces, open, too_many_materials, transparency,
+};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
 use crate::scene::room::Room;
@@ -47,6 +50,9 @@ const TOO_LARGE: &str = "export it in parts or with fewer details";
 pub(super) fn read(path: &Path, (reach, room): (Reach<'_>, Room)) -> Result<Read, Error> {
     let bytes = whole(path)?;
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
+    if document::is_old_container(&bytes) {
+        return Err(document::version_1(path));
+    }
     let [text, binary] = document::container(&bytes).map_err(damaged)?;
     let document = document::document(path, &text)?;
     let bytes = buffers::buffers((path, reach), &document, binary)?;
@@ -109,11 +115,13 @@ struct Told {
     points: usize,
     has_skins: bool,
     has_targets: bool,
+    /// A sentence for each material.
+    transparent: Vec<String>,
 }
 
 impl Told {
     /// What of the `document` is left out.
-    fn left_out(&self, document: &Document) -> Vec<String> {
+    fn left_out(self, document: &Document) -> Vec<String> {
         let mut said = Vec::new();
         if document.scenes().len() > 1 {
             said.push(format!("of its {} scenes one is read", document.scenes().len()));
@@ -132,6 +140,10 @@ impl Told {
         }
         if self.has_targets {
             said.push("its morph targets are left out, as if their weights were 0".to_owned());
+        }
+        said.extend(self.transparent);
+        if document.extensions_used().any(|name| name == document::TRANSMISSION) {
+            said.push("light goes through some of its materials, which is left out".to_owned());
         }
         let names = document.extensions_used().filter(|name| document::adds_shape(name));
         said.extend(names.map(|name| format!("what its extension {name} adds is left out")));
@@ -284,6 +296,10 @@ impl Walk<'_> {
             let [red, green, blue, _] = colour.base_color_factor().map(f64::from);
             luminance([red, green, blue])
         });
+        let covers = colour.base_color_factor()[3] >= 1.0 && colour.base_color_texture().is_none();
+        if own.alpha_mode() != AlphaMode::Opaque && !covers {
+            self.told.transparent.push(transparency(&name));
+        }
         let new = self.mesh.add_material(&name, guess).ok_or(Fault::Materials)?;
         self.materials.insert(own.index(), new);
         Ok(new)

@@ -90,6 +90,12 @@ fn open(path: &Path) -> Result<BufReader<File>, Error> {
     }
 }
 
+/// That light which goes through the material of this `name` is not followed.
+fn transparency(name: &str) -> String {
+    let name = name.escape_debug();
+    format!("its material `{name}` is transparent, which is left out: it is solid")
+}
+
 /// Refuses a file with more materials than can be counted.
 fn too_many_materials(path: &Path) -> Error {
     Error::mesh(path, "has more than 65536 materials", "export it in parts, or with fewer")

@@ -9,12 +9,12 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::lines::{Fault, Lines, numbers};
-use super::{DAMAGED, Reach, Read, WithoutMaterials, no_surfaces, open};
+use super::{DAMAGED, Reach, Read, WithoutMaterials, no_surfaces, open, transparency};
 use crate::scene::error::Error;
 use crate::scene::mesh::Mesh;
 use crate::scene::polygon::{Cutter, Early};
 use crate::scene::room::Room;
-use mtl::Library;
+use mtl::{Library, Looks};
 
 pub(super) fn read(
     path: &Path,
@@ -32,7 +32,7 @@ pub(super) fn read(
         Error::mesh(path, format!("line {number} {problem}"), DAMAGED)
     })?;
     room.check(obj.size(), path)?;
-    let left_out = obj.left_out();
+    let mut left_out = obj.left_out();
     let mut mesh = obj.mesh;
     // Colours are guesses for objects without a material of their own.
     if without == WithoutMaterials::Refused {
@@ -46,7 +46,10 @@ pub(super) fn read(
             }
         }
         for (name, guess) in mesh.material_names.iter().zip(&mut mesh.diffuse_guesses) {
-            *guess = library.get(name).copied().flatten();
+            let Looks { brightness, is_transparent } =
+                library.get(name).copied().unwrap_or_default();
+            *guess = brightness;
+            left_out.extend(is_transparent.then(|| transparency(name)));
         }
     }
     Ok(Read { mesh, left_out })

@@ -1,10 +1,13 @@
 //! The container of a glTF file and its document, checked before the crate `gltf` relies on them.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use ::gltf::json::validation::{Checked, Error as Fault, Validate};
 use ::gltf::json::{Path as Place, Root};
 use ::gltf::{Document, Glb, Semantic};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::super::DAMAGED;
 use super::{Bytes, TOO_LARGE};
@@ -16,6 +19,9 @@ const MOST_VALUES: usize = 1 << 22;
 
 /// An extension by which places may be whole numbers.
 pub(super) const QUANTISED: &str = "KHR_mesh_quantization";
+
+/// An extension by which light goes through a material.
+pub(super) const TRANSMISSION: &str = "KHR_materials_transmission";
 
 /// Beginnings of the names of extensions that do not change where a surface is: they are about looks,
 /// light, or what is known of things.
@@ -55,6 +61,11 @@ pub(super) fn may_begin(bytes: &[u8]) -> bool {
     bytes.starts_with(b"glTF") || text.is_empty() || text.starts_with(b"{")
 }
 
+/// Whether the bytes are a container of glTF 1.0.
+pub(super) fn is_old_container(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"glTF\x01\0\0\0")
+}
+
 /// JSON and binary part of a file: those of a `.glb`, or all of it and nothing.
 ///
 /// # Errors
@@ -89,8 +100,12 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
     let damaged = |problem: String| Error::mesh(path, problem, DAMAGED);
     let stilled = stilled(text);
     let text = stilled.as_deref().unwrap_or(text);
-    let root: Root = ::gltf::json::deserialize::from_slice(text)
-        .map_err(|fault| damaged(format!("is no readable glTF ({fault})")))?;
+    let root: Root = ::gltf::json::deserialize::from_slice(text).map_err(|fault| {
+        match is_of_version_1(text) {
+            true => version_1(path),
+            false => damaged(format!("is no readable glTF ({fault})")),
+        }
+    })?;
     if let Some(extension) = root.extensions_required.iter().find(|name| !is_harmless(name)) {
         return Err(Error::mesh(
             path,
@@ -105,6 +120,22 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
         return Err(Error::mesh(path, problem, "export it with all data in one buffer"));
     }
     Ok(Document::from_json_without_validation(root))
+}
+
+/// Whether `text` is a document of glTF 1.0, where meshes have names in place of numbers.
+fn is_of_version_1(text: &[u8]) -> bool {
+    #[derive(Deserialize)]
+    struct Old {
+        #[serde(rename = "meshes")]
+        _meshes: HashMap<String, IgnoredAny>,
+    }
+    ::gltf::json::deserialize::from_slice::<Old>(text).is_ok()
+}
+
+/// Refuses the file at `path`, which is glTF 1.0.
+pub(super) fn version_1(path: &Path) -> Error {
+    let remedy = "convert it to glTF 2.0, as gltf-pipeline does";
+    Error::mesh(path, "is glTF 1.0, and glTF 2.0 is read", remedy)
 }
 
 /// An extension by which an animation may change anything, also what is no node.

@@ -7,8 +7,17 @@ use super::super::lines::{Lines, numbers};
 use super::super::{Reach, luminance, open};
 use crate::scene::error::Error;
 
-/// What is read of material files: how bright each material looks, from 0 to 1, where that is known.
-pub(super) type Library = HashMap<String, Option<f64>>;
+/// What is read of material files.
+pub(super) type Library = HashMap<String, Looks>;
+
+/// How a material looks.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Looks {
+    /// How bright it is, from 0 to 1, where that is known.
+    pub brightness: Option<f64>,
+    /// Whether light goes through it or through holes in it.
+    pub is_transparent: bool,
+}
 
 /// The files that a line `mtllib` of the mesh at `path` names: several, or one with blanks in its
 /// name. Some programs part folders by `\`.
@@ -69,10 +78,22 @@ fn told(line: &str, name: &mut Option<String>, library: &mut Library) -> Result<
         let new = rest.trim();
         *name = (!library.contains_key(new)).then(|| new.to_owned());
         library.entry(new.to_owned()).or_default();
-    } else if let ("Kd", Some(name)) = (word, name) {
-        library.insert(name.clone(), colour(rest)?);
+    } else if let Some(looks) = name.as_ref().and_then(|name| library.get_mut(name)) {
+        match word {
+            "Kd" => looks.brightness = colour(rest)?,
+            // How much it covers, behind the word `-halo` where it covers less at its rim.
+            "d" => looks.is_transparent |= last_number(rest).is_some_and(|covers| covers < 1.0),
+            "Tr" => looks.is_transparent |= last_number(rest).is_some_and(|clear| clear > 0.0),
+            "map_d" => looks.is_transparent = true,
+            _ => {}
+        }
     }
     Ok(())
+}
+
+/// The number that a line ends with, before its comment.
+fn last_number(told: &str) -> Option<f64> {
+    told.split('#').next()?.split_whitespace().last()?.parse().ok()
 }
 
 /// How bright a colour is, as a line `Kd` tells it: red, green and blue, of which one alone stands for
@@ -118,8 +139,28 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mtl");
         std::fs::write(&path, "Kd 9\nnewmtl a\nKd 0\nnewmtl b\nnewmtl a\nKd 1\n").unwrap();
-        let mut library = Library::from([("b".to_owned(), Some(0.7))]);
+        let looks = |brightness| Looks { brightness: Some(brightness), is_transparent: false };
+        let mut library = Library::from([("b".to_owned(), looks(0.7))]);
         read(&path, &mut library).unwrap();
-        assert_eq!(library, Library::from([("a".into(), Some(0.0)), ("b".into(), Some(0.7))]));
+        assert_eq!(library, Library::from([("a".into(), looks(0.0)), ("b".into(), looks(0.7))]));
+    }
+
+    #[test]
+    fn transparency_is_seen_in_any_of_its_lines() {
+        for (line, expected) in [
+            ("d 0.05", true),
+            ("d -halo 0.5 # glass", true),
+            ("Tr 0.95", true),
+            ("map_d leaf.png", true),
+            ("d 1.0", false),
+            ("Tr 0", false),
+            ("Kd 0.1 0.1 0.1", false),
+        ] {
+            let (mut name, mut library) = (None, Library::new());
+            for line in ["newmtl a", line] {
+                told(line, &mut name, &mut library).unwrap();
+            }
+            assert_eq!(library["a"].is_transparent, expected, "{line}");
+        }
     }
 }
