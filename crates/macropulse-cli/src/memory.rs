@@ -1,9 +1,7 @@
 //! How much memory a run may take, and what this machine has.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
 use clap::Args;
+use macropulse::machine;
 use macropulse::memory::Estimate;
 use macropulse::scene::Room;
 use serde_json::{Value, json};
@@ -44,11 +42,11 @@ impl MemoryLimit {
 
     /// The room that it leaves for the meshes of a scene.
     pub fn room(&self) -> Room {
-        self.bytes(machine()).map_or_else(Room::default, |(bytes, _)| Room::of_bytes(bytes))
+        self.bytes(machine::memory()).map_or_else(Room::default, |(bytes, _)| Room::of_bytes(bytes))
     }
 
     fn allow_with(&self, threads: usize, what: &str, estimated: &Estimate) -> Result<(), Fault> {
-        let Some((limit, whose)) = self.bytes(machine()) else { return Ok(()) };
+        let Some((limit, whose)) = self.bytes(machine::memory()) else { return Ok(()) };
         let needed = estimated.total(threads);
         if needed <= limit {
             return Ok(());
@@ -137,44 +135,6 @@ fn size(typed: &str) -> Result<Size, String> {
     }
 }
 
-/// The memory that this machine lets us have, bytes, where the system tells: what is built in, or
-/// less where we run in a group of programs with a limit of its own.
-fn machine() -> Option<u64> {
-    let built_in = built_in(&fs::read_to_string("/proc/meminfo").ok()?)?;
-    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let limits = limits(&groups, Path::new("/sys/fs/cgroup"));
-    let limits =
-        limits.iter().filter_map(|path| fs::read_to_string(path).ok()?.trim().parse().ok());
-    Some(limits.fold(built_in, u64::min))
-}
-
-/// What `/proc/meminfo` says.
-fn built_in(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
-}
-
-/// The files with the limits of our group and of those around it, by what `/proc/self/cgroup` says;
-/// `root` is where they are found. A group without one says "max", or a number beyond any memory.
-fn limits(groups: &str, root: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for line in groups.lines() {
-        let mut parts = line.splitn(3, ':').skip(1);
-        let (Some(kinds), Some(group)) = (parts.next(), parts.next()) else { continue };
-        let (base, file) = match kinds {
-            "" => (root.to_owned(), "memory.max"),
-            _ if kinds.split(',').any(|kind| kind == "memory") => {
-                (root.join("memory"), "memory.limit_in_bytes")
-            }
-            _ => continue,
-        };
-        // Inside a container its own group may be all that is seen, at the root.
-        let group = Path::new(group.trim_start_matches('/'));
-        files.extend(group.ancestors().map(|group| base.join(group).join(file)));
-    }
-    files
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,22 +176,5 @@ mod tests {
         assert!(told(scene).starts_with("a in b: takes about 50 MB of memory with"));
         assert!(told(scene).contains("fewer triangles, or raise --memory-limit"));
         assert!(limit.allow("c", &Estimate { scan: 4_000_000, ..Estimate::default() }).is_ok());
-    }
-
-    #[test]
-    fn groups_of_programs_may_have_less_than_the_machine() {
-        assert_eq!(built_in("MemFree: 3 kB\nMemTotal:       16 kB\n"), Some(16_384));
-        let found = |groups: &str| limits(groups, Path::new("/c"));
-        let paths = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
-        assert_eq!(
-            found("0::/a/b\n"),
-            paths(&["/c/a/b/memory.max", "/c/a/memory.max", "/c/memory.max"])
-        );
-        let old = found("3:cpu,memory:/d\n1:name=systemd:/x\n");
-        let file = "memory.limit_in_bytes";
-        assert_eq!(
-            old,
-            [format!("/c/memory/d/{file}"), format!("/c/memory/{file}")].map(PathBuf::from)
-        );
     }
 }

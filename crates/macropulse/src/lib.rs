@@ -43,6 +43,7 @@ pub mod units;
 pub mod names;
 pub mod told;
 pub mod opened;
+pub mod machine;
 pub mod digest;
 pub mod processor;
 pub mod schema;

@@ -71,6 +71,7 @@ const SIMULATOR: Layers = Layers {
     modules: &[
         Rule { module: "kernels", may_name: &[], because: "a fast loop knows numbers alone" },
         Rule { module: "digest", may_name: &[], because: "a hash depends on bytes alone" },
+        Rule { module: "machine", may_name: &[], because: "memory is there whatever it is for" },
         Rule { module: "processor", may_name: &[], because: "time passes whatever it is for" },
         Rule {
             module: "names",
