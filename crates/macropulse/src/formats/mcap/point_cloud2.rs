@@ -10,6 +10,7 @@ use super::cdr::{Decoder, Encoder};
 use super::profile::{Source, fields};
 use super::{EPOCH_NS, Profile, stamp_ns};
 use crate::points::PointCloud;
+use std::borrow::Cow;
 use std::io;
 
 /// The frame that points are in.
@@ -21,8 +22,17 @@ pub(super) fn encode(profile: Profile, cloud: &PointCloud) -> io::Result<Vec<u8>
     let stamp = stamp_ns(cloud);
     let source = Source::new(cloud, stamp as f64 - EPOCH_NS as f64);
     let is_list = is_list(cloud) || !profile.is_organised();
-    let [height, width] = if is_list { [1, cloud.returns()] } else { [cloud.rows, cloud.columns] };
-    let points = if is_list { returns(cloud).collect() } else { pixels(cloud) };
+    let (rows, columns) = (cloud.rows, cloud.columns);
+    let ([height, width], points) = match (is_list, profile.is_by_column()) {
+        (true, _) => ([1, cloud.returns()], returns(cloud).collect()),
+        (false, false) => ([rows, columns], pixels(cloud)),
+        (false, true) => {
+            let by_rows = pixels(cloud);
+            let from_below = |column: usize| (0..rows).rev().map(move |row| row * columns + column);
+            let order = (0..columns).flat_map(from_below);
+            ([columns, rows], order.map(|pixel| by_rows[pixel]).collect())
+        }
+    };
     let (step, fields) = fields(profile, cloud);
     let size = points.len().checked_mul(step).filter(|size| u32::try_from(*size).is_ok());
     let size = size.ok_or_else(|| io::Error::other("a message holds 4 GiB of points at most"))?;
@@ -92,19 +102,71 @@ pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, St
     message.u4()?;
     let body = message.bytes()?;
     let (layout, time_from_ns) = layout(&fields, stride, stamp_ns);
+    let (body, height, width) = match by_column(&fields, body, stride, [height, width]) {
+        Some(by_rows) => (Cow::Owned(by_rows), width, height),
+        None => (Cow::Borrowed(body), height, width),
+    };
     // Our own messages say by NaN that nothing returned.
     about.is_of_driver = !fields.iter().any(|field| field.name == "time_ns");
     let mut cloud = if height == 1 {
-        table::list(about, &layout, body, width)?
+        table::list(about, &layout, &body, width)?
     } else {
-        let cloud = table::image(about, &layout, body, [height, width])?;
+        let cloud = table::image(about, &layout, &body, [height, width])?;
         PointCloud { pick: about.list.map_or(cloud.pick, |list| list.pick), ..cloud }
     };
+    if height == 1 && is_of_velodyne(&fields) {
+        let last = lasers(about, &cloud).saturating_sub(1) as u16;
+        cloud.row.iter_mut().for_each(|row| *row = last.saturating_sub(*row));
+    }
     if time_from_ns != 0.0 {
         let times = cloud.time_ns.iter_mut().chain(&mut cloud.fired_ns);
         times.for_each(|time| *time += time_from_ns);
     }
     Ok(cloud)
+}
+
+/// Whether the fields are those that the driver of Velodyne writes, whose ring 0 is the lowest laser.
+fn is_of_velodyne(fields: &[Stored]) -> bool {
+    let known = ["x", "y", "z", "intensity", "ring", "time"];
+    let has_ring = fields.iter().any(|field| field.name == "ring");
+    has_ring && fields.iter().all(|field| known.contains(&field.name))
+}
+
+/// The lasers of the sensor of a list: what is told of it, or as many as the smallest head has that
+/// has all rings of the cloud.
+fn lasers(about: &About, cloud: &PointCloud) -> usize {
+    let rings = cloud.row.iter().max().map_or(0, |ring| usize::from(*ring) + 1);
+    let of_heads = || [16, 32, 64, 128].into_iter().find(|lasers| *lasers >= rings);
+    let told = about.list.map(|list| list.rows).filter(|rows| *rows >= rings);
+    told.or_else(of_heads).unwrap_or(rings)
+}
+
+/// The points of an image of the driver of Velodyne row by row from the top: it has a line for each
+/// column, of which point k is that of ring k. `None` for any other image.
+fn by_column(
+    fields: &[Stored],
+    body: &[u8],
+    stride: usize,
+    [columns, rows]: [usize; 2],
+) -> Option<Vec<u8>> {
+    let ring = fields.iter().find(|field| field.name == "ring")?;
+    let size = columns.checked_mul(rows)?.checked_mul(stride)?;
+    let body = body.get(..size).filter(|_| is_of_velodyne(fields) && columns > 1)?;
+    let points = || body.chunks_exact(stride).enumerate();
+    let is_at_its_ring = |(at, point): (usize, &[u8])| {
+        let ring = point.get(ring.offset..).map(|bytes| ring.kind.read(bytes));
+        ring == Some((at % rows) as f64)
+    };
+    if !points().all(is_at_its_ring) {
+        return None;
+    }
+    let mut by_rows = vec![0; size];
+    for (at, point) in points() {
+        let (column, row) = (at / rows, rows - 1 - at % rows);
+        let to = (row * columns + column) * stride;
+        by_rows[to..to + stride].copy_from_slice(point);
+    }
+    Some(by_rows)
 }
 
 /// Where our attributes are, and what is to be added to their times, ns.
@@ -169,6 +231,24 @@ mod tests {
                 assert!((read.time_ns[at] - cloud.time_ns[at]).abs() <= 0.5, "{profile:?}");
             }
         }
+    }
+
+    /// The driver's image has a line for each firing, which holds the lasers from the lowest one up.
+    #[test]
+    fn an_image_of_velodyne_has_a_line_for_each_column() {
+        let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
+        let message = encode(Profile::Velodyne, &cloud).unwrap();
+        let mut fields = Decoder::new(&message).unwrap();
+        (fields.u4().unwrap(), fields.u4().unwrap(), fields.text().unwrap());
+        assert_eq!((fields.u4().unwrap(), fields.u4().unwrap()), (3, 2));
+        let read = read(Profile::Velodyne, &cloud);
+        assert_eq!((read.rows, read.columns), (2, 3));
+        assert_eq!((&read.row, &read.column), (&cloud.row, &cloud.column));
+        // A list, with a pixel at the top that alone has a return, of a head of 16 lasers.
+        let list = PointCloud { rows: 0, columns: 0, fired_ns: Vec::new(), ..cloud };
+        let message = encode(Profile::Velodyne, &list).unwrap();
+        let rows = decode(&message, &mut About::default()).unwrap().row;
+        assert_eq!(rows, [14, 14, 15, 15, 15]);
     }
 
     #[test]

@@ -37,6 +37,8 @@ pub(super) enum Quantity {
     MillimetresU4,
     /// The row, 255 at most.
     LineU1,
+    /// The laser, counted from the lowest one.
+    RingFromBelow,
     /// Bits 5 and 4 are the number of the return, from 0.
     LivoxTag,
     /// Autoware's number for the kind of return.
@@ -61,7 +63,7 @@ const VELODYNE: &[Row] = &[
     Y,
     Z,
     ("intensity", 12, Quantity::Percent),
-    ("ring", 16, Quantity::Of(Attribute::Ring)),
+    ("ring", 16, Quantity::RingFromBelow),
     ("time", 18, Quantity::SecondsF4),
 ];
 
@@ -143,6 +145,12 @@ pub(in super::super) fn holding(profile: Profile, attribute: Attribute) -> Holdi
 }
 
 impl Profile {
+    /// Whether the image of its driver has a line for each column, which holds the lasers from the
+    /// lowest one up.
+    pub(super) fn is_by_column(self) -> bool {
+        self == Self::Velodyne
+    }
+
     /// Whether its driver gives images, with a point for each pixel.
     pub(in super::super) fn is_organised(self) -> bool {
         !matches!(self, Self::Livox | Self::Autoware)
@@ -165,7 +173,7 @@ impl Quantity {
             Self::Of(attribute) => attribute.blank(cloud).kind(),
             Self::Float(_) => Kind::F4,
             Self::PercentU1 | Self::LineU1 | Self::LivoxTag | Self::ReturnType => Kind::U1,
-            Self::PercentU2 | Self::ZeroU2 => Kind::U2,
+            Self::PercentU2 | Self::RingFromBelow | Self::ZeroU2 => Kind::U2,
             Self::NanosU4 | Self::MillimetresU4 => Kind::U4,
             Self::Percent | Self::Livox150 | Self::SecondsF4 => Kind::F4,
             Self::Azimuth | Self::Elevation => Kind::F4,
@@ -186,6 +194,7 @@ impl Quantity {
             Self::NanosF8 => (Attribute::TimeNs, Partly("ns from the epoch")),
             Self::MillimetresU4 => (Attribute::Range, Partly("whole mm")),
             Self::LineU1 => (Attribute::Ring, Partly("255 at most")),
+            Self::RingFromBelow => (Attribute::Ring, Partly("from the lowest one up")),
             Self::LivoxTag => (Attribute::ReturnNumber, Partly("up to 4")),
             Self::PercentU2 | Self::ReturnType => return None,
             Self::Azimuth | Self::Elevation | Self::ZeroU2 => return None,
@@ -199,13 +208,18 @@ pub(super) struct Source<'a> {
     stamp_ns: f64,
     /// The strongest return of each pixel, where a shot may have several.
     strongest: Option<Image>,
+    /// The lowest row.
+    lowest: u16,
 }
 
 impl<'a> Source<'a> {
     /// The points of a scan whose time is `stamp_ns` from the beginning of the first one.
     pub fn new(cloud: &'a PointCloud, stamp_ns: f64) -> Self {
         let several = cloud.returns_per_shot > 1;
-        Self { cloud, stamp_ns, strongest: several.then(|| cloud.image(Pick::Strongest)) }
+        let strongest = several.then(|| cloud.image(Pick::Strongest));
+        let highest = cloud.row.iter().copied().max().unwrap_or(0);
+        let lowest = cloud.rows.checked_sub(1).map_or(highest, |last| last as u16);
+        Self { cloud, stamp_ns, strongest, lowest }
     }
 
     /// A quantity of a point; coordinates, intensity and range of one without a return are NaN.
@@ -231,6 +245,9 @@ impl<'a> Source<'a> {
                 Value::U4(whole(millimetres, f64::from(u32::MAX)) as u32)
             }
             Quantity::LineU1 => Value::U1(whole(number(Attribute::Ring), 255.0) as u8),
+            Quantity::RingFromBelow => {
+                Value::U2(self.lowest.saturating_sub(number(Attribute::Ring) as u16))
+            }
             Quantity::LivoxTag => {
                 let before = (number(Attribute::ReturnNumber) - 1.0).clamp(0.0, 3.0);
                 Value::U1((before as u8) << 4)
@@ -247,11 +264,13 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Autoware's number: 0 invalid, 1 single, 3 to 6 first or last of several and the strongest of
+    /// Autoware's number: 0 invalid, 1 the only one and 2 the last one of a shot that has no more, 3 to 6 first or last of several and the strongest of
     /// them or not, 7 the only one of a shot that might have had several.
     fn return_type(&self, point: Point) -> u8 {
         let Point::Return(at) = point else { return 0 };
-        let Some(strongest) = &self.strongest else { return 1 };
+        let Some(strongest) = &self.strongest else {
+            return if self.cloud.pick == Pick::Last { 2 } else { 1 };
+        };
         let cloud = self.cloud;
         let pixel = cloud
             .row
@@ -338,6 +357,25 @@ mod tests {
         let kinds = [0, 1, 2].map(|at| value(Quantity::ReturnType, at));
         assert_eq!(kinds, [Value::U1(3), Value::U1(6), Value::U1(7)]);
         assert_eq!(value(Quantity::LivoxTag, 1), Value::U1(0x10));
+    }
+
+    #[test]
+    fn velodyne_counts_rings_from_the_lowest_laser() {
+        let cloud = sample_cloud();
+        let source = Source::new(&cloud, 0.0);
+        let ring = |point| source.value(Quantity::RingFromBelow, point);
+        // Rows 0 and 1 of two, 0 at the top.
+        let rings = [Point::Return(0), Point::Return(4), Point::Unanswered(2)].map(ring);
+        assert_eq!(rings, [Value::U2(1), Value::U2(0), Value::U2(1)]);
+    }
+
+    #[test]
+    fn the_last_return_alone_is_told_from_the_only_one() {
+        let last = PointCloud { pick: Pick::Last, ..sample_cloud() };
+        let kind = |cloud: &PointCloud| {
+            Source::new(cloud, 0.0).value(Quantity::ReturnType, Point::Return(0))
+        };
+        assert_eq!((kind(&sample_cloud()), kind(&last)), (Value::U1(1), Value::U1(2)));
     }
 
     #[test]
