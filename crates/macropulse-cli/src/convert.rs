@@ -4,20 +4,21 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{Clouds, Format, Recording};
+use macropulse::formats::{CloudRoom, Clouds, Format, Recording};
 use macropulse::points::PointCloud;
 
 use crate::fault::{Fault, note, warn};
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
+use crate::memory::MemoryLimit;
 use crate::options::Common;
 use crate::simulate::Formats;
 use crate::text::{counted, print};
 
 /// Convert point clouds to another format
 ///
-/// Read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .bin (KITTI) and .mcap (clouds
-/// of ROS 2, one after the other). What an output cannot hold is said.
+/// Read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .xyz, .txt, .pts, .bin (KITTI,
+/// nuScenes) and .mcap (clouds of ROS 2, one after the other). What an output cannot hold is said.
 #[derive(Args)]
 #[command(after_help = "Examples:
   macropulse convert out/scan-000000.pcd -o car.laz
@@ -39,6 +40,9 @@ pub struct Convert {
                                              unless it ends as the files of the only one do"
     )]
     format: Option<Formats>,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 }
 
 /// Where the clouds go.
@@ -161,6 +165,7 @@ struct Conversion<'a> {
     common: &'a Common,
     folder: Folder,
     recording: Recording,
+    room: CloudRoom,
     /// Number of the scan that comes next at least, where they go into one file.
     next: u64,
     scans: u64,
@@ -177,6 +182,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         common,
         folder: Folder::claim(&target.folder)?,
         recording: Recording::new(&target.folder, &target.formats),
+        room: options.memory.cloud_room(),
         next: 0,
         scans: 0,
         points: 0,
@@ -206,7 +212,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
 
 impl Conversion<'_> {
     fn convert(&mut self, input: &Path, inputs: usize, interrupt: &Interrupt) -> Result<(), Fault> {
-        let mut clouds = Clouds::open(input)?;
+        let mut clouds = Clouds::open_within(input, self.room)?;
         let has_several = input.extension().is_some_and(|ending| ending == "mcap");
         let mut next = clouds.next();
         while let Some(cloud) = next.take() {

@@ -1,6 +1,7 @@
 //! How much memory a run may take, and what this machine has.
 
 use clap::Args;
+use macropulse::formats::CloudRoom;
 use macropulse::machine;
 use macropulse::memory::Estimate;
 use macropulse::scene::Room;
@@ -43,6 +44,12 @@ impl MemoryLimit {
     /// The room that it leaves for the meshes of a scene.
     pub fn room(&self) -> Room {
         self.bytes(machine::memory()).map_or_else(Room::default, |(bytes, _)| Room::of_bytes(bytes))
+    }
+
+    /// The room that it leaves for the clouds of a file.
+    pub fn cloud_room(&self) -> CloudRoom {
+        let limit = self.bytes(machine::memory());
+        limit.map_or_else(CloudRoom::default, |(bytes, _)| CloudRoom::of_bytes(bytes))
     }
 
     fn allow_with(&self, threads: usize, what: &str, estimated: &Estimate) -> Result<(), Fault> {

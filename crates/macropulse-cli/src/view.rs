@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use macropulse::design::preset_text;
-use macropulse::formats::{Clouds, clear_unfinished, write_atomically};
+use macropulse::formats::{CloudRoom, Clouds, clear_unfinished, write_atomically};
 use macropulse::scene::Scene;
 use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
 
 use crate::fault::{Fault, note};
+use crate::memory::MemoryLimit;
 use crate::options::Common;
 use crate::text::print;
 
@@ -30,11 +31,14 @@ pub struct View {
     /// The page [default: index.html in the folder, or the name of the file with .html]
     #[arg(short, long, value_name = "PAGE.html")]
     output: Option<PathBuf>,
+
+    #[command(flatten)]
+    memory: MemoryLimit,
 }
 
 /// Adds the clouds of the file at `path`.
-fn add(page: &mut Explorer, name: &str, path: &Path) -> Result<(), Fault> {
-    let mut clouds = Clouds::open(path)?;
+fn add(page: &mut Explorer, (name, path): (&str, &Path), room: CloudRoom) -> Result<(), Fault> {
+    let mut clouds = Clouds::open_within(path, room)?;
     let mut at = 0;
     while let Some(cloud) = clouds.next() {
         let cloud = cloud?;
@@ -48,13 +52,14 @@ fn add(page: &mut Explorer, name: &str, path: &Path) -> Result<(), Fault> {
 
 pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
     let path = &options.path;
+    let room = options.memory.cloud_room();
     refuse_name(path)?;
     let (page, output) = if path.is_dir() {
         let output = options.output.clone().unwrap_or_else(|| path.join(PAGE));
-        (of_folder((path, &output), common)?, output)
+        (of_folder((path, &output), room, common)?, output)
     } else {
         let output = options.output.clone().unwrap_or_else(|| path.with_extension("html"));
-        (of_file(path, &output)?, output)
+        (of_file((path, &output), room)?, output)
     };
     let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
     if ending.is_none_or(|ending| ending != "html" && ending != "htm") {
@@ -89,15 +94,19 @@ fn refuse_name(path: &Path) -> Result<(), Fault> {
     )))
 }
 
-fn of_file(path: &Path, output: &Path) -> Result<Explorer, Fault> {
+fn of_file((path, output): (&Path, &Path), room: CloudRoom) -> Result<Explorer, Fault> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut page = Explorer::new(&name);
     page.file(&beside(output, path));
-    add(&mut page, &name, path)?;
+    add(&mut page, (&name, path), room)?;
     Ok(page)
 }
 
-fn of_folder((folder, output): (&Path, &Path), common: &Common) -> Result<Explorer, Fault> {
+fn of_folder(
+    (folder, output): (&Path, &Path),
+    room: CloudRoom,
+    common: &Common,
+) -> Result<Explorer, Fault> {
     let left = Left::of(folder)?;
     if left.is_unfinished {
         let folder = folder.display();
@@ -122,7 +131,7 @@ fn of_folder((folder, output): (&Path, &Path), common: &Common) -> Result<Explor
         explain(&mut page, &folder.join(file));
     }
     for file in clouds {
-        add(&mut page, file, &folder.join(file))?;
+        add(&mut page, (file, &folder.join(file)), room)?;
     }
     Ok(page)
 }

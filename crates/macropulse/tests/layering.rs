@@ -168,7 +168,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "formats",
-            may_name: &["names", "opened", "points", "told", "units"],
+            may_name: &["machine", "names", "opened", "points", "told", "units"],
             because: "files hold columns, no physics; of units they know the speed of light, by \
                       which some have a time in place of a range",
         },

@@ -1,7 +1,7 @@
 //! What a file says of a cloud as a whole, as lines of text: for the comments of PLY and PCD, and for
 //! whatever else takes text.
 
-use super::{LeftOut, Names};
+use super::{CloudRoom, LeftOut, Names};
 use crate::points::{NO_OBJECT, Pick, PointCloud, Viewpoint};
 
 /// Begins the line with the number of the scan.
@@ -24,6 +24,8 @@ pub(super) struct About {
     pub materials: Vec<String>,
     /// What of the file is not in its clouds.
     pub left_out: LeftOut,
+    /// The memory that a cloud may take.
+    pub room: CloudRoom,
     /// Whether the file is a driver's, which writes (0, 0, 0) where nothing returned.
     pub is_of_driver: bool,
 }
@@ -78,6 +80,11 @@ pub(super) fn all_lines<'a>(
 }
 
 impl About {
+    /// Of a file whose cloud may take so much memory.
+    pub fn within(room: CloudRoom) -> Self {
+        Self { room, ..Self::default() }
+    }
+
     /// Takes in a line of text. Lines that say nothing of this kind are passed over.
     ///
     /// # Errors

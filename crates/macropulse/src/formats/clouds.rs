@@ -3,7 +3,8 @@
 use super::about::About;
 use super::mcap::Messages;
 use super::{
-    Error, Format, LeftOut, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader, ply_reader,
+    CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader,
+    ply_reader,
 };
 use crate::opened;
 use crate::points::PointCloud;
@@ -23,7 +24,7 @@ enum Source {
 
 impl Clouds {
     /// Opens the file at `path`, whose ending says what it is: `pcd`, `ply`, `las`, `laz`, `e57`,
-    /// `npy`, `csv`, `bin` (KITTI) or `mcap` (`PointCloud2` of ROS 2).
+    /// `npy`, `csv`, `xyz`, `txt`, `pts`, `bin` (KITTI, nuScenes) or `mcap` (`PointCloud2` of ROS 2).
     ///
     /// Attributes that the file lacks are absent in the cloud; [`Clouds::left_out`] names those that a
     /// cloud has no column for, and counts points that are none. Truth is read if the file has the
@@ -34,24 +35,34 @@ impl Clouds {
     /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is not what its ending
     /// says, [`Error::Unreadable`] if no cloud is read from files of that ending.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        let Some(format) = Format::of_extension(ending) else {
+        Self::open_within(path, CloudRoom::default())
+    }
+
+    /// The same, where the clouds may take so much memory in place of four fifths of what the machine
+    /// has.
+    ///
+    /// # Errors
+    /// As [`Clouds::open`], and if they take more.
+    pub fn open_within(path: &Path, room: CloudRoom) -> Result<Self, Error> {
+        let Some(format) = format_of(path) else {
             // A name that is misspelt is no format that is unknown.
             std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?;
             return Err(Error::unreadable(path));
         };
         if let Format::Mcap(_) = format {
-            return Ok(Self(Source::Many(Box::new(Messages::open(path)?))));
+            return Ok(Self(Source::Many(Box::new(Messages::open(path, room)?))));
         }
+        let size = std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?.len();
+        let room = room.beside(size).map_err(|fault| Error::invalid(path, format, fault))?;
         let read = || whole(path, format).map_err(|cause| Error::read(path, cause));
         let parsed = match format {
-            Format::Pcd => pcd_reader::parse(&read()?),
-            Format::Ply => ply_reader::parse(&read()?),
-            Format::Las | Format::Laz => las_reader::parse(read()?),
-            Format::E57 => e57::parse(read()?),
-            Format::Npy => npy::parse(&read()?),
-            Format::Csv => csv_reader::parse(&read()?),
-            Format::Kitti => kitti::parse(&read()?, kitti::Floats::of_name(path)),
+            Format::Pcd => pcd_reader::parse(&read()?, room),
+            Format::Ply => ply_reader::parse(&read()?, room),
+            Format::Las | Format::Laz => las_reader::parse(read()?, room),
+            Format::E57 => e57::parse(read()?, room),
+            Format::Npy => npy::parse(&read()?, room),
+            Format::Csv => csv_reader::parse(&read()?, room),
+            Format::Kitti => kitti::parse(&read()?, kitti::Floats::of_name(path), room),
             _ => return Err(Error::unreadable(path)),
         };
         let (cloud, about) = parsed.map_err(|fault| Error::invalid(path, format, fault))?;
@@ -88,6 +99,15 @@ impl Iterator for Clouds {
     }
 }
 
+/// The format that the file at `path` is read as, by its ending.
+fn format_of(path: &Path) -> Option<Format> {
+    let ending = path.extension()?.to_str()?;
+    match ending.to_ascii_lowercase().as_str() {
+        "xyz" | "txt" | "pts" => Some(Format::Csv),
+        _ => Format::of_extension(ending),
+    }
+}
+
 /// Bytes of a file by which it is told whether it may be of its format.
 const BEGINNING: usize = 4096;
 
@@ -120,12 +140,12 @@ pub fn read_cloud(path: &Path) -> Result<PointCloud, Error> {
     Clouds::open(path)?.next().ok_or_else(no_cloud)?
 }
 
-/// The cloud in the binary PCD file at `path`, whatever its ending.
+/// The cloud in the PCD file at `path`, whatever its ending.
 ///
 /// # Errors
 /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is no such PCD file.
 pub fn read_pcd(path: &Path) -> Result<PointCloud, Error> {
     let bytes = opened::bytes(path, MOST_BYTES).map_err(|cause| Error::read(path, cause))?;
-    let parsed = pcd_reader::parse(&bytes);
+    let parsed = pcd_reader::parse(&bytes, CloudRoom::default());
     parsed.map(|(cloud, _)| cloud).map_err(|fault| Error::invalid(path, Format::Pcd, fault))
 }

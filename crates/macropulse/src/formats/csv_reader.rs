@@ -1,5 +1,6 @@
 //! Reads points from text: a point a line, below a line of headings or without one.
 
+use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
 use super::headings::Meaning;
@@ -21,13 +22,13 @@ const MOST_COLUMNS: usize = 4096;
 /// before the first point. A first line with one whole number, the count of points, is passed over.
 /// Columns whose headings we do not know are skipped, and an empty cell is no value. Objects and
 /// materials may be names or numbers; names are numbered in the order in which they come.
-pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is not text in UTF-8")?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let sheet = Sheet::of(text).ok_or("it is empty; its first line names the columns")?;
     let points = match sheet.separator {
-        Separator::Spaces => sheet.spaced(),
-        Separator::One(byte) => sheet.separated(byte),
+        Separator::Spaces => sheet.spaced(room),
+        Separator::One(byte) => sheet.separated(byte, room),
     }?;
     let Points { gathered, mut about, .. } = points;
     Ok((gathered.cloud(&mut about)?, about))
@@ -98,13 +99,13 @@ impl<'a> Sheet<'a> {
     }
 
     /// Points whose cells are apart by spaces, and stand in no quotes.
-    fn spaced(&self) -> Result<Points, String> {
+    fn spaced(&self, room: CloudRoom) -> Result<Points, String> {
         let mut lines = self.text.lines().enumerate().filter(|(at, line)| {
             let is_comment = line.starts_with('#') || line.starts_with("//");
             *at == 0 || !(is_comment || line.trim().is_empty())
         });
         let first = lines.clone().next().map_or("", |(_, line)| line);
-        let mut points = Points::new(first.split_whitespace(), self)?;
+        let mut points = Points::new(first.split_whitespace(), self, room)?;
         for (at, line) in lines.by_ref().skip(usize::from(self.has_headings)) {
             let taken = points.take(line.split_whitespace());
             taken.map_err(|fault| format!("line {}: {fault}", self.before + at + 1))?;
@@ -113,7 +114,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// Points whose cells are apart by a sign, and may stand in quotes.
-    fn separated(&self, separator: u8) -> Result<Points, String> {
+    fn separated(&self, separator: u8, room: CloudRoom) -> Result<Points, String> {
         let mut reader = ReaderBuilder::new()
             .delimiter(separator)
             .has_headers(false)
@@ -125,7 +126,7 @@ impl<'a> Sheet<'a> {
             reader.read_record(record).map_err(|_| "it is not text in UTF-8".to_owned())
         };
         next(&mut record)?;
-        let mut points = Points::new(record.iter(), self)?;
+        let mut points = Points::new(record.iter(), self, room)?;
         let mut is_there = if self.has_headings { next(&mut record)? } else { true };
         while is_there {
             let is_blank = record.iter().all(|cell| cell.trim().is_empty());
@@ -164,10 +165,14 @@ struct Points {
 
 impl Points {
     /// With the columns that the cells of the first line name, or as many as it has.
-    fn new<'a>(first: impl Iterator<Item = &'a str>, sheet: &Sheet) -> Result<Self, String> {
+    fn new<'a>(
+        first: impl Iterator<Item = &'a str>,
+        sheet: &Sheet,
+        room: CloudRoom,
+    ) -> Result<Self, String> {
         let mut columns: Vec<Option<Meaning>> = Vec::new();
         let mut attributes = Vec::new();
-        let mut about = About::default();
+        let mut about = About::within(room);
         for (at, heading) in first.enumerate() {
             if at == MOST_COLUMNS {
                 return Err(format!("its first line has more than {MOST_COLUMNS} cells"));
@@ -209,7 +214,7 @@ impl Points {
         }
         self.gathered.add(record);
         self.taken += 1;
-        Ok(())
+        self.gathered.expect(self.taken as u64)
     }
 }
 
@@ -252,6 +257,10 @@ fn numbered(names: &mut Vec<String>, name: &str) -> Option<f64> {
 mod tests {
     use super::super::{Names, csv, sample_cloud};
     use super::*;
+
+    fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+        super::parse(bytes, CloudRoom::default())
+    }
 
     #[test]
     fn what_was_written_is_read() {
@@ -313,7 +322,10 @@ mod tests {
         ] {
             let (read, _) =
                 parse(text.as_bytes()).unwrap_or_else(|fault| panic!("{text}: {fault}"));
-            assert_eq!((&*read.distances(), &read.intensity[..]), (&[13.0, 2.5][..], &[0.5, 1.0][..]));
+            assert_eq!(
+                (&*read.distances(), &read.intensity[..]),
+                (&[13.0, 2.5][..], &[0.5, 1.0][..])
+            );
         }
     }
 

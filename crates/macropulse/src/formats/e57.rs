@@ -1,10 +1,10 @@
 //! ASTM E57: the returns as one scan with its pose, and an extension for what the standard has no
 //! field for.
 
-use super::Names;
 use super::about::{About, list_line, name_lines, scan_line};
 use super::attributes::{Attribute, Value, returns};
 use super::table::{Digits, Gathered, Record as Point, check_coordinates};
+use super::{CloudRoom, Names};
 use crate::points::{PointCloud, Viewpoint};
 use e57::{
     E57Reader, E57Writer, Extension, Quaternion, RawValues, Record, RecordDataType, RecordName,
@@ -98,8 +98,8 @@ fn transform(viewpoint: &Viewpoint) -> Transform {
 
 /// The cloud of the first scan of an E57 file, in the frame of the scanner, and what the file says
 /// beside it.
-pub(super) fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
-    read(bytes).map_err(|error| match error {
+pub(super) fn parse(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), String> {
+    read(bytes, room).map_err(|error| match error {
         Fault::File(error) => error.to_string(),
         Fault::Told(sentence) => sentence,
     })
@@ -122,13 +122,14 @@ impl From<String> for Fault {
     }
 }
 
-fn read(bytes: Vec<u8>) -> Result<(PointCloud, About), Fault> {
+fn read(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), Fault> {
+    let size = bytes.len() as u64;
     let mut reader = E57Reader::new(Cursor::new(bytes))?;
     let scans = reader.pointclouds();
     let Some(scan) = scans.first() else {
         return Err("it has no scan".to_owned().into());
     };
-    let mut about = About::default();
+    let mut about = About::within(room);
     for line in scan.description.iter().flat_map(|text| text.lines()) {
         about.take(line)?;
     }
@@ -150,6 +151,8 @@ fn read(bytes: Vec<u8>) -> Result<(PointCloud, About), Fault> {
     });
     let digits =
         if coordinates.into_iter().all(is_single) { Digits::Single } else { Digits::Double };
+    check_size(&scan.prototype, scan.records, size)?;
+    room.check(scan.records)?;
     let mut gathered = Gathered::new(&about, &attributes, digits)?;
     for (at, values) in reader.pointcloud_raw(scan)?.enumerate() {
         let mut point = Point::default();
@@ -160,6 +163,26 @@ fn read(bytes: Vec<u8>) -> Result<(PointCloud, About), Fault> {
         gathered.add(point);
     }
     Ok((gathered.cloud(&mut about)?, about))
+}
+
+/// Refuses so many records of a scan if the `size` of the file, bytes, cannot hold them. Columns whose
+/// numbers are all the same take no bits, so that there is no end to records of them alone.
+fn check_size(prototype: &[Record], records: u64, size: u64) -> Result<(), String> {
+    let bits = |record: &Record| match record.data_type {
+        RecordDataType::Single { .. } => 32,
+        RecordDataType::Double { .. } => 64,
+        RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => {
+            u128::BITS - (i128::from(max) - i128::from(min)).max(0).leading_zeros()
+        }
+    };
+    let bits: u64 = prototype.iter().map(|record| u64::from(bits(record))).sum();
+    if records.saturating_mul(bits.max(1)) > size.saturating_mul(8) {
+        return Err(format!(
+            "it says that it has {records} points of {bits} bits, which its {size} bytes cannot \
+             hold; the file is damaged"
+        ));
+    }
+    Ok(())
 }
 
 /// The number of a value of the file, in our units.
@@ -181,6 +204,27 @@ fn number(attribute: Attribute, value: &RecordValue, stored: &RecordDataType) ->
 mod tests {
     use super::super::sample_cloud;
     use super::*;
+
+    fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
+        super::parse(bytes, CloudRoom::default())
+    }
+
+    #[test]
+    fn records_that_the_file_cannot_hold_are_refused() {
+        let record = |data_type| Record { name: RecordName::CartesianX, data_type };
+        let same = record(RecordDataType::Integer { min: 7, max: 7 });
+        let bit = record(RecordDataType::ScaledInteger { min: 0, max: 1, scale: 1.0, offset: 0.0 });
+        let wide = record(RecordDataType::Integer { min: i64::MIN, max: i64::MAX });
+        for (prototype, most) in [
+            (vec![same.clone(); 3], 8000),
+            (vec![same, bit.clone()], 8000),
+            (vec![bit, wide.clone(), wide], 8000 / 129),
+        ] {
+            check_size(&prototype, most, 1000).unwrap();
+            let told = check_size(&prototype, most + 1, 1000).unwrap_err();
+            assert!(told.contains("which its 1000 bytes cannot hold"), "{told}");
+        }
+    }
 
     #[test]
     fn what_was_written_is_read() {

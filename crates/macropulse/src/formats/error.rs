@@ -61,7 +61,7 @@ pub enum Error {
     },
     /// Clouds are not read from such files.
     #[error(
-        "{}: no point cloud is read from such a file; read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .bin (KITTI) and .mcap (ROS 2)",
+        "{}: no point cloud is read from such a file; read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .xyz, .txt, .pts, .bin (KITTI, nuScenes) and .mcap (ROS 2)",
         path.display()
     )]
     Unreadable {

@@ -1,6 +1,7 @@
 //! Points that are little-endian floats and nothing else: x, y, z and reflectance, as the KITTI data
 //! sets have them, or these and the ring, as nuScenes has them.
 
+use super::CloudRoom;
 use super::about::About;
 use super::attributes::{Attribute, returns};
 use super::number::Kind;
@@ -84,7 +85,11 @@ const MOST_RINGS: f64 = 1024.0;
 
 /// The cloud of a file whose points should have so many floats by its name. It may have the other
 /// number of them, if its points look like those alone.
-pub(super) fn parse(bytes: &[u8], by_name: Floats) -> Result<(PointCloud, About), String> {
+pub(super) fn parse(
+    bytes: &[u8],
+    by_name: Floats,
+    room: CloudRoom,
+) -> Result<(PointCloud, About), String> {
     let other = match by_name {
         Floats::Four => Floats::Five,
         Floats::Five => Floats::Four,
@@ -102,7 +107,7 @@ pub(super) fn parse(bytes: &[u8], by_name: Floats) -> Result<(PointCloud, About)
     for attribute in floats.attributes() {
         layout.push(attribute.name(), Kind::F4, 1)?;
     }
-    let mut about = About { is_of_driver: true, ..About::default() };
+    let mut about = About { is_of_driver: true, ..About::within(room) };
     let points = bytes.len() / layout.stride;
     let cloud = table::list(&mut about, &layout, bytes, points)?;
     Ok((cloud, about))
@@ -112,6 +117,10 @@ pub(super) fn parse(bytes: &[u8], by_name: Floats) -> Result<(PointCloud, About)
 mod tests {
     use super::super::sample_cloud;
     use super::*;
+
+    fn parse(bytes: &[u8], by_name: Floats) -> Result<(PointCloud, About), String> {
+        super::parse(bytes, by_name, CloudRoom::default())
+    }
 
     fn floats(numbers: &[f32]) -> Vec<u8> {
         numbers.iter().flat_map(|number| number.to_le_bytes()).collect()

@@ -1,5 +1,6 @@
 //! Reads LAS and LAZ files, ours and those of others.
 
+use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
 use super::contained::contained;
@@ -23,20 +24,21 @@ struct Extra {
 }
 
 /// The cloud of a LAS or LAZ file, and what it says beside it.
-pub(super) fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
+pub(super) fn parse(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), String> {
     check_sizes(&bytes)?;
-    contained(|| parse_checked(bytes))?
+    contained(|| parse_checked(bytes, room))?
 }
 
 /// The same, of a file that holds what its header promises.
-fn parse_checked(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
+fn parse_checked(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), String> {
     let header = Header::new(Cursor::new(&bytes)).map_err(|error| error.to_string())?;
     check_layers(&bytes, &header)?;
     let mut reader = Reader::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
-    let mut about = about(reader.header())?;
+    let mut about = About { room, ..about(reader.header())? };
     let extra = extra(reader.header());
     let mut gathered = Gathered::new(&about, &attributes(&extra), Digits::Double)?;
     let points = reader.header().number_of_points();
+    room.check(points)?;
     let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
     let together = (AT_A_TIME / u64::from(header.point_format().len()).max(1)).max(1);
     let mut at = 0_usize;
@@ -236,6 +238,10 @@ fn record(point: &Point, extra: &[Extra], at: usize) -> Result<Record, String> {
 mod tests {
     use super::super::{Names, las, sample_cloud};
     use super::*;
+
+    fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
+        super::parse(bytes, CloudRoom::default())
+    }
 
     fn written(compress: bool) -> Vec<u8> {
         let mut bytes = Vec::new();

@@ -33,6 +33,7 @@ mod ply;
 mod ply_reader;
 mod png16;
 mod recording;
+mod room;
 mod table;
 
 pub use atomic::{WholeFile, clear_unfinished, write_atomically};
@@ -48,6 +49,7 @@ pub use manifest::{
 pub use mcap::{Message, Profile};
 pub use png16::{RangeImage, read_range_png};
 pub use recording::Recording;
+pub use room::CloudRoom;
 
 use crate::points::PointCloud;
 use std::path::Path;

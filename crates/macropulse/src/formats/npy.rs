@@ -2,9 +2,9 @@
 
 use super::about::About;
 use super::attributes::{Attribute, returns};
-use super::interleave;
 use super::number::Kind;
 use super::table::{self, Layout};
+use super::{CloudRoom, interleave};
 use crate::points::PointCloud;
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -64,7 +64,7 @@ fn write_header(descr: &str, shape: &str, out: &mut dyn Write) -> io::Result<()>
 
 /// The cloud of an array: of a structured one with fields x, y and z, or of a plain one with a line per
 /// point, of which the columns are x, y, z and intensity.
-pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("it does not begin as NumPy files do")?;
     let (header, body) = match *rest {
         [1, _, a, b, ..] => rest[4..].split_at_checked(usize::from(u16::from_le_bytes([a, b]))),
@@ -76,8 +76,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
     }
     .ok_or("it ends within its header")?;
     let header = std::str::from_utf8(header).map_err(|_| "its header is not text")?;
-    let mut about = About::default();
+    let mut about = About::within(room);
     let (fields, points) = fields(header)?;
+    room.check(points as u64)?;
     let mut layout = Layout::default();
     for Stored { name, kind, .. } in &fields {
         layout.push(name, *kind, 1)?;
@@ -96,9 +97,8 @@ struct Stored<'a> {
 
 impl<'a> Stored<'a> {
     fn of(name: &'a str, descr: &str) -> Result<Self, String> {
-        let fault = || {
-            format!("`{name}` is of type `{descr}`; whole and floating numbers are read")
-        };
+        let fault =
+            || format!("`{name}` is of type `{descr}`; whole and floating numbers are read");
         let (order, code) = descr.split_at_checked(1).ok_or_else(fault)?;
         if !matches!(order, "<" | ">" | "|" | "=") {
             return Err(fault());
@@ -126,7 +126,7 @@ fn fields(header: &str) -> Result<(Vec<Stored<'_>>, usize), String> {
     }
     let descr = descr.split('\'').nth(1).ok_or("its type is none that is read")?;
     let names = match *shape.as_slice() {
-        [_, columns @ 3..] => PLAIN.get(..columns),
+        [_, columns] if columns >= 3 => PLAIN.get(..columns),
         _ => None,
     };
     let names = names.ok_or_else(|| {
@@ -189,6 +189,10 @@ fn shape(header: &str) -> Option<Vec<usize>> {
 mod tests {
     use super::super::sample_cloud;
     use super::*;
+
+    fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+        super::parse(bytes, CloudRoom::default())
+    }
     use crate::points::Truth;
 
     #[test]
@@ -255,15 +259,18 @@ mod tests {
             array("'>f8'", "True ", "(2, 4)", columns.into_iter().flat_map(f64::to_be_bytes)),
         ] {
             let (read, _) = parse(&file).unwrap();
-            assert_eq!((&read.range[..], &read.intensity[..]), (&[13.0, 2.5][..], &[0.5, 1.0][..]));
+            assert_eq!(
+                (&*read.distances(), &read.intensity[..]),
+                (&[13.0, 2.5][..], &[0.5, 1.0][..])
+            );
             assert!(parse(&file[..file.len() - 1]).unwrap_err().contains("ends after 1 of 2"));
         }
         let short = rows.iter().take(6).copied().flat_map(float);
         let (read, _) = parse(&array("'<f4'", "False", "(2, 3)", short)).unwrap();
         assert_eq!(read.x, [3.0, 0.5]);
-        assert!(read.intensity[0].is_nan());
+        assert!(read.intensity.is_empty());
         let huge = array("'<f4'", "True ", "(18446744073709551615, 3)", []);
-        assert!(parse(&huge).unwrap_err().contains("beyond all bounds"));
+        assert!(parse(&huge).unwrap_err().contains("points take about"));
     }
 
     #[test]
@@ -274,6 +281,6 @@ mod tests {
         body.push(7);
         body.extend(12_f64.to_be_bytes());
         let (read, _) = parse(&array(descr, "False", "(1, 1)", body)).unwrap();
-        assert_eq!((read.range[0], read.intensity[0]), (13.0, 7.0));
+        assert_eq!((read.distances()[0], read.intensity[0]), (13.0, 7.0));
     }
 }

@@ -6,7 +6,7 @@ use super::attributes::Attribute;
 use super::headings::Meaning;
 use super::number::Kind;
 use super::table::{self, Layout};
-use super::{interleave, lzf};
+use super::{CloudRoom, interleave, lzf};
 use crate::points::PointCloud;
 use std::borrow::Cow;
 use std::iter::repeat_n;
@@ -43,13 +43,15 @@ struct Field<'a> {
 ///
 /// An organised file has an image, with a pixel for each of its points. A list has the image of which
 /// its header tells; a list of another program has no image: no rows, no columns.
-pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
     let (mut header, data, body) = parse_header(bytes)?;
+    header.about.room = room;
     let [rows, columns] = header.shape()?;
     let points = rows.checked_mul(columns).ok_or("WIDTH × HEIGHT is beyond all bounds")?;
     if header.points.is_some_and(|declared| declared != points) {
         return Err(format!("POINTS is not WIDTH × HEIGHT = {points}"));
     }
+    room.check(points as u64)?;
     let fields = header.fields()?;
     let (layout, body) = match data {
         Data::Binary => (layout(&fields)?, Cow::Borrowed(body)),
@@ -196,7 +198,7 @@ fn text(
     points: usize,
 ) -> Result<(Layout, Cow<'static, [u8]>), String> {
     let text = std::str::from_utf8(body).map_err(|_| "its points are not text")?;
-    let mut layout = Layout { is_text: true, ..Layout::default() };
+    let mut layout = Layout::of_text();
     // Whether the words of a field are kept, and how many they are.
     let mut words_of = Vec::new();
     for Field { name, kind, count } in fields {
@@ -231,7 +233,7 @@ mod tests {
     use crate::points::Viewpoint;
 
     fn read(file: &[u8]) -> Result<PointCloud, String> {
-        parse(file).map(|(cloud, _)| cloud)
+        parse(file, CloudRoom::default()).map(|(cloud, _)| cloud)
     }
 
     fn foreign(fields: &str, points: usize) -> Vec<u8> {
@@ -288,9 +290,9 @@ mod tests {
     #[test]
     fn old_headers_are_read() {
         let cloud = read(b"# .PCD v.5\nCOLUMNS x y z\nPOINTS 2\nDATA ascii\n3 4 12\n0 0 2\n");
-        assert_eq!(cloud.unwrap().range, [13.0, 2.0]);
+        assert_eq!(*cloud.unwrap().distances(), [13.0, 2.0]);
         let file = "VERSION 0.6\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 2\n";
-        assert_eq!(read(file.as_bytes()).unwrap().range, [3.0]);
+        assert_eq!(*read(file.as_bytes()).unwrap().distances(), [3.0]);
         let later = file.replace("0.6", "0.8");
         assert!(read(later.as_bytes()).unwrap_err().starts_with("its version is 0.8; 0.5, 0.6"));
     }
@@ -317,7 +319,7 @@ mod tests {
     fn compressed_points_are_read() {
         let file = compressed();
         let cloud = read(&file).unwrap();
-        assert_eq!((cloud.range.as_slice(), cloud.row.as_slice()), (&[13.0, 2.5][..], &[7, 9][..]));
+        assert_eq!((&*cloud.distances(), cloud.row.as_slice()), (&[13.0, 2.5][..], &[7, 9][..]));
         assert!(read(&file[..file.len() - 1]).unwrap_err().contains("cut short"));
         let mut lies = file.clone();
         let at = lies.len() - 29 - 4;
@@ -371,6 +373,6 @@ mod tests {
         let huge = format!("{XYZ_RGB}\nWIDTH {}\nHEIGHT 9\nDATA binary\n", usize::MAX);
         assert_eq!(read(huge.as_bytes()).unwrap_err(), "WIDTH × HEIGHT is beyond all bounds");
         let huge = format!("{XYZ_RGB}\nWIDTH {}\nHEIGHT 1\nDATA ascii\n1 2 3 4\n", usize::MAX);
-        assert!(read(huge.as_bytes()).unwrap_err().starts_with("it ends after 1 of"));
+        assert!(read(huge.as_bytes()).unwrap_err().contains("points take about"));
     }
 }

@@ -2,9 +2,9 @@
 
 use super::about::About;
 use super::headings::Meaning;
-use super::interleave;
 use super::number::Kind;
 use super::table::{self, Digits, Gathered, Layout, Record};
+use super::{CloudRoom, interleave};
 use crate::points::PointCloud;
 use std::borrow::Cow;
 
@@ -46,10 +46,11 @@ struct Header {
 }
 
 /// The cloud of a PLY file, and what it says beside it.
-pub(super) fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
     let (mut header, body) = parse_header(bytes)?;
-    let mut about = std::mem::take(&mut header.about);
+    let mut about = About { room, ..std::mem::take(&mut header.about) };
     let vertices = header.vertices.as_ref().ok_or("it has no element `vertex`")?;
+    room.check(vertices.count as u64)?;
     let cloud = match header.stored {
         Some(Stored::Text) => text((&header, vertices), body, &mut about),
         Some(order) => {
@@ -289,6 +290,10 @@ mod tests {
     use super::super::{Names, sample_cloud};
     use super::*;
 
+    fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
+        super::parse(bytes, CloudRoom::default())
+    }
+
     #[test]
     fn what_was_written_is_read() {
         let cloud = sample_cloud();
@@ -397,7 +402,7 @@ mod tests {
             file.extend(ring.to_be_bytes());
         }
         let (read, _) = parse(&file).unwrap();
-        assert_eq!((&read.range[..], &read.row[..]), (&[13.0, 2.5][..], &[258, 1][..]));
+        assert_eq!((&*read.distances(), &read.row[..]), (&[13.0, 2.5][..], &[258, 1][..]));
         assert!(parse(&file[..file.len() - 1]).unwrap_err().contains("ends after 1 of 2"));
     }
 }

@@ -5,6 +5,7 @@ use super::attributes::{Attribute, outcome_from_code};
 use super::headings::Meaning;
 use super::left_out::NoPoint;
 use super::number::Kind;
+use super::room::CloudRoom;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Surface, Surfaces, Truth};
 use std::collections::BTreeMap;
 
@@ -30,12 +31,17 @@ pub(super) struct Layout {
     /// Names of the fields that are no attribute of ours.
     pub unknown: Vec<String>,
     /// Whether the numbers were written as text, and have as many digits as that.
-    pub is_text: bool,
+    is_text: bool,
     /// Bytes of a record.
     pub stride: usize,
 }
 
 impl Layout {
+    /// For numbers that were written as text.
+    pub fn of_text() -> Self {
+        Self { is_text: true, ..Self::default() }
+    }
+
     /// Adds `count` numbers behind those that are there. The attribute that the heading `name` stands
     /// for is read from them, if there is one.
     pub fn push(&mut self, name: &str, kind: Kind, count: usize) -> Result<(), String> {
@@ -135,6 +141,7 @@ pub(super) fn list(
 ) -> Result<PointCloud, String> {
     let body = records(layout, body, points)?;
     let mut gathered = Gathered::new(about, &layout.attributes(), layout.digits())?;
+    gathered.expect(points as u64)?;
     for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
         gathered.add(layout.record(bytes, at)?);
     }
@@ -166,6 +173,7 @@ pub(super) fn image(
     }
     let list = List { rows, columns, most: 1, pick: Default::default() };
     let mut gathered = Gathered::of_image(about, (&attributes, layout.digits()), list);
+    gathered.expect(points as u64)?;
     for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
         let mut record = layout.record(bytes, at)?;
         record.set(at, Attribute::Row, (at / columns) as f64)?;
@@ -267,6 +275,9 @@ pub(super) struct Gathered {
     attributes: Vec<Attribute>,
     digits: Digits,
     is_of_driver: bool,
+    room: CloudRoom,
+    /// Whether there are more points than there is memory for.
+    is_full: bool,
     /// Points that are none.
     dropped: BTreeMap<NoPoint, u64>,
     /// Whether the list has an image, and whether its size is still to be found.
@@ -313,12 +324,15 @@ impl Gathered {
                 unique.push(attribute);
             }
         }
-        let (is_of_driver, dropped) = (about.is_of_driver, BTreeMap::new());
+        let About { is_of_driver, room, .. } = *about;
+        let dropped = BTreeMap::new();
         Self {
             cloud,
             attributes: unique,
             digits,
             is_of_driver,
+            room,
+            is_full: false,
             dropped,
             list: None,
             find_size: false,
@@ -327,6 +341,14 @@ impl Gathered {
 
     fn has(&self, attribute: Attribute) -> bool {
         self.attributes.contains(&attribute)
+    }
+
+    /// Refuses so many points in all, if the memory for them is not allowed.
+    ///
+    /// # Errors
+    /// The sentence that says so.
+    pub fn expect(&self, points: u64) -> Result<(), String> {
+        self.room.check(points)
     }
 
     /// Why a record is no return, if it is none.
@@ -355,7 +377,12 @@ impl Gathered {
     }
 
     fn push(&mut self, record: &Record) {
+        // A file that does not tell how many points it has may have too many.
+        if self.is_full {
+            return;
+        }
         let cloud = &mut self.cloud;
+        self.is_full = self.room.check(cloud.x.len() as u64 + 1).is_err();
         let [x, y, z] = record.position();
         cloud.x.push(x as f32);
         cloud.y.push(y as f32);
@@ -419,8 +446,11 @@ impl Gathered {
     /// others what it says of the return they show.
     ///
     /// # Errors
-    /// If the highest row and column make an image that is larger than any sensor's.
+    /// If there is not the memory for all points.
     pub fn cloud(mut self, about: &mut About) -> Result<PointCloud, String> {
+        if self.is_full {
+            self.room.check(self.cloud.x.len() as u64)?;
+        }
         let has_truth = self.has(Attribute::Outcome);
         let cloud = &mut self.cloud;
         let most = |numbers: &[u8]| numbers.iter().copied().max().unwrap_or(1).max(1);

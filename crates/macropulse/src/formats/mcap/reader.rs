@@ -3,7 +3,7 @@
 
 use super::super::about::About;
 use super::super::contained::contained;
-use super::super::{Error, Format};
+use super::super::{CloudRoom, Error, Format};
 use super::{ABOUT, METADATA, Message, Profile, point_cloud2, ros2};
 use crate::opened;
 use crate::points::PointCloud;
@@ -49,10 +49,10 @@ enum Content {
 impl Messages {
     /// # Errors
     /// If the file cannot be opened.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path, room: CloudRoom) -> Result<Self, Error> {
         let file = opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
         let length = file.metadata().map_err(|cause| Error::read(path, cause))?.len();
-        let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST) as usize;
+        let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST).min(room.bytes()) as usize;
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
             .with_validate_chunk_crcs(true)
@@ -63,7 +63,7 @@ impl Messages {
             reader: LinearReader::new_with_options(options),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
-            about: About::default(),
+            about: About::within(room),
             clouds: 0,
             is_over: false,
         })

@@ -1,0 +1,93 @@
+//! How much memory the clouds of a file may take.
+
+use crate::machine;
+
+/// Bytes of a point while a cloud is read and written: `tests/memory.rs` of the program holds what
+/// conversions take against it.
+const PER_POINT: u64 = 200;
+
+/// The program and its threads, bytes.
+const PROGRAM: u64 = 30_000_000;
+
+/// The share of the machine's memory that a cloud may take unless another limit is set.
+const SHARE: f64 = 0.8;
+
+/// The memory that the clouds of a file may take. A file that needs more is refused before it is read,
+/// or while it is if it does not tell how many points it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CloudRoom {
+    bytes: u64,
+}
+
+impl Default for CloudRoom {
+    /// Four fifths of what the machine has; without end where that is not known.
+    fn default() -> Self {
+        let share = |memory: u64| (memory as f64 * SHARE) as u64;
+        machine::memory().map_or(Self { bytes: u64::MAX }, |memory| Self::of_bytes(share(memory)))
+    }
+}
+
+impl CloudRoom {
+    /// What is left of so many bytes beside the program.
+    pub fn of_bytes(bytes: u64) -> Self {
+        Self { bytes: bytes.saturating_sub(PROGRAM) }
+    }
+
+    /// The bytes that may be taken.
+    pub(super) fn bytes(self) -> u64 {
+        self.bytes
+    }
+
+    /// What is left beside the bytes of a file.
+    ///
+    /// # Errors
+    /// The sentence that says so, if these are more.
+    pub(super) fn beside(self, file: u64) -> Result<Self, String> {
+        match self.bytes.checked_sub(file) {
+            Some(bytes) => Ok(Self { bytes }),
+            None => Err(self.refusal("it takes", file)),
+        }
+    }
+
+    /// Refuses so many points if they do not fit.
+    ///
+    /// # Errors
+    /// The sentence that says so.
+    pub(super) fn check(self, points: u64) -> Result<(), String> {
+        let needed = points.saturating_mul(PER_POINT);
+        if needed <= self.bytes {
+            return Ok(());
+        }
+        Err(self.refusal(&format!("its {points} points take"), needed))
+    }
+
+    fn refusal(self, what: &str, needed: u64) -> String {
+        format!(
+            "{what} about {} of memory, and {} are left: allow more memory (--memory-limit)",
+            megabytes(needed),
+            megabytes(self.bytes)
+        )
+    }
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{} MB", bytes.div_ceil(1_000_000))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let room = CloudRoom::of_bytes(PROGRAM + 1_000_000);
+        room.check(5000).unwrap();
+        let told = room.check(5001).unwrap_err();
+        assert!(told.starts_with("its 5001 points take about 2 MB of memory, and 1 MB are left"));
+        assert_eq!(room.beside(400_000).unwrap().check(3000), Ok(()));
+        assert!(room.beside(400_000).unwrap().check(3001).is_err());
+        assert!(room.beside(1_000_001).unwrap_err().starts_with("it takes about 2 MB"));
+        assert!(CloudRoom::of_bytes(5).check(1).is_err());
+        assert!(CloudRoom { bytes: u64::MAX }.check(u64::MAX / PER_POINT).is_ok());
+    }
+}
