@@ -82,6 +82,32 @@ fn a_file_that_was_cut_short_gives_its_finished_scans_and_a_sentence() {
 }
 
 #[test]
+fn files_of_others_are_read_by_their_names_and_their_points() {
+    let desk = Desk::new();
+    desk.put("a.xyz", "// X Y Z I\n3 4 12 7\n0 0 2.5 9\n");
+    desk.put("b.pts", "2\n3 4 12 7\n0 0 2.5 9\n");
+    desk.put("c.txt", "X;Y;Z;Reflectivity\n3;4;12;7\n0;0;2,5;9\n");
+    let points = [[3.0_f32, 4.0, 12.0, 7.0, 0.0], [-0.5, 0.0, 2.5, 9.0, 31.0]];
+    let floats = |of: usize| {
+        points.iter().flat_map(|point| &point[..of]).flat_map(|one| one.to_le_bytes()).collect()
+    };
+    let (five, four): (Vec<u8>, Vec<u8>) = (floats(5), floats(4));
+    fs::write(desk.path().join("d.pcd.bin"), &five).unwrap();
+    fs::write(desk.path().join("e.bin"), &five).unwrap();
+    fs::write(desk.path().join("f.bin"), four).unwrap();
+    let ran = desk.run("convert a.xyz b.pts c.txt d.pcd.bin e.bin f.bin --format pcd -o out");
+    assert!(ran.out.starts_with("6 scans, 12 points, 6 files"), "{}{}", ran.out, ran.err);
+    for name in ["a", "b", "c", "d.pcd", "e", "f"] {
+        let read = read_cloud(&desk.path().join(format!("out/{name}.pcd"))).unwrap();
+        assert_eq!((read.z[1], &read.intensity[..]), (2.5, &[7.0, 9.0][..]), "{name}");
+    }
+    fs::write(desk.path().join("g.bin"), &five[..39]).unwrap();
+    let ran = desk.run("convert g.bin -o g.pcd");
+    assert_eq!(ran.code, Some(2));
+    assert!(ran.err.contains("neither points of four floats") && ran.err.contains(".pcd.bin"));
+}
+
+#[test]
 fn what_makes_no_sense_is_refused() {
     let desk = desk();
     desk.refused("convert in/scan-000000.pcd -o points", &["says no format", "points.ply"]);

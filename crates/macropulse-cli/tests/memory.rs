@@ -148,3 +148,31 @@ fn what_is_estimated_is_told() {
     let sum = part("sensor_bytes") + part("scan_bytes") + 3 * part("band_bytes_per_thread");
     assert_eq!(part("total_bytes"), sum);
 }
+
+/// A compressed cloud is small, whatever it holds: its points are counted before they are read.
+#[test]
+fn a_cloud_is_not_read_beyond_the_limit() {
+    use macropulse::formats::{Format, Names, write_cloud};
+    use macropulse::points::PointCloud;
+
+    const POINTS: usize = 300_000;
+    let desk = Desk::new();
+    let same = || vec![1.0_f32; POINTS];
+    let cloud = PointCloud { x: same(), y: same(), z: same(), ..PointCloud::default() };
+    for (format, name) in [(Format::Laz, "same.laz"), (Format::Npy, "same.npy")] {
+        write_cloud(format, &cloud, &Names::default(), &desk.path().join(name)).unwrap();
+    }
+    let text = "0 0 1\n".repeat(POINTS);
+    desk.put("same.xyz", &text);
+    assert!(std::fs::metadata(desk.path().join("same.laz")).unwrap().len() < 100_000);
+    for name in ["same.laz", "same.npy", "same.xyz"] {
+        for line in [format!("convert {name} -o out.ply"), format!("view {name} -o out.html")] {
+            let ran = desk.run(&format!("{line} --memory-limit 80MB"));
+            assert_eq!(ran.code, Some(2), "{line}: {}", ran.err);
+            assert!(ran.err.contains("points take about"), "{line}: {}", ran.err);
+            assert!(ran.err.contains("allow more memory (--memory-limit)"), "{}", ran.err);
+        }
+        let ran = desk.run(&format!("convert {name} -o {name}.ply --memory-limit 120MB"));
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+    }
+}

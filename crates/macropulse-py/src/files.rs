@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use macropulse::channel::Operating;
 use macropulse::design::Design;
-use macropulse::formats::{Format, Names, write_cloud};
+use macropulse::formats::{CloudRoom, Format, Names, write_cloud};
 use macropulse::points::{PointCloud, Scale, Truth};
 use macropulse_study::decoding::{self, Decoding};
 use macropulse_study::record::{self, CloudsAt};
@@ -168,9 +168,10 @@ impl StoredScans {
     }
 }
 
-fn clouds_at(py: Python<'_>, path: PathBuf) -> PyResult<StoredScans> {
+fn clouds_at(py: Python<'_>, path: PathBuf, limit: Option<u64>) -> PyResult<StoredScans> {
     let name = path.display().to_string();
-    let clouds = work::done(py, 0, move |_| CloudsAt::open(&path))?.or_raise()?;
+    let room = limit.map_or_else(CloudRoom::default, CloudRoom::of_bytes);
+    let clouds = work::done(py, 0, move |_| CloudsAt::open(&path, room))?.or_raise()?;
     Ok(StoredScans::new(Source::Clouds(clouds), name))
 }
 
@@ -179,16 +180,21 @@ fn clouds_at(py: Python<'_>, path: PathBuf) -> PyResult<StoredScans> {
 /// Args:
 ///     path: A file that `Scan.save` or the program has written, its ending says the format; or the
 ///         folder of a run. It holds a single scan; of several, `load_scans` gives one after the other.
+///     memory_limit: Bytes that the program may take; four fifths of what the machine has unless it is
+///         given. A file with more points than fit into them is refused.
 ///
 /// Raises:
-///     Error: If the file is none of a format that can be read, or holds several scans.
+///     Error: If the file is none of a format that can be read, holds several scans, or takes too much
+///         memory.
 ///     OSError: If it cannot be read.
 ///
 /// Example:
 ///     >>> scan = macropulse.load("out/scan-000000.pcd")
 #[pyfunction]
-pub fn load(py: Python<'_>, path: PathBuf) -> PyResult<Scan> {
-    clouds_at(py, path)?.only(py, "iterate over them: `for scan in macropulse.load_scans(path)`")
+#[pyo3(signature = (path, *, memory_limit=None))]
+pub fn load(py: Python<'_>, path: PathBuf, memory_limit: Option<u64>) -> PyResult<Scan> {
+    clouds_at(py, path, memory_limit)?
+        .only(py, "iterate over them: `for scan in macropulse.load_scans(path)`")
 }
 
 /// Reads scan after scan, in the memory of one.
@@ -197,6 +203,7 @@ pub fn load(py: Python<'_>, path: PathBuf) -> PyResult<Scan> {
 ///     path: A file with several scans, as `scans.mcap`; or a folder with files of one scan each, as
 ///         the program leaves it behind `-o`, of which each scan is read once, from the file that
 ///         keeps most.
+///     memory_limit: Bytes that the program may take, as of `load`.
 ///
 /// Returns:
 ///     An iterator of `Scan`.
@@ -209,8 +216,13 @@ pub fn load(py: Python<'_>, path: PathBuf) -> PyResult<Scan> {
 ///     >>> for scan in macropulse.load_scans("out"):
 ///     ...     print(scan.number, len(scan))
 #[pyfunction]
-pub fn load_scans(py: Python<'_>, path: PathBuf) -> PyResult<StoredScans> {
-    clouds_at(py, path)
+#[pyo3(signature = (path, *, memory_limit=None))]
+pub fn load_scans(
+    py: Python<'_>,
+    path: PathBuf,
+    memory_limit: Option<u64>,
+) -> PyResult<StoredScans> {
+    clouds_at(py, path, memory_limit)
 }
 
 /// The decoding of the files at these paths.

@@ -159,6 +159,22 @@ fn a_table_without_times_needs_a_rate() {
     assert_ne!(design.digest(), other.digest());
 }
 
+/// The patterns of Livox sensors in simulators number their entries in a column `Time/s`.
+#[test]
+fn times_that_only_count_the_entries_are_no_times() {
+    let counted = "Time/s,Azimuth/deg,Zenith/deg\n1,0,90\n2,1,90\n3,2,89.5\n4,3,89\n";
+    let told = sensor(counted, "").unwrap_err();
+    assert!(told.contains("its times only count the entries: give scan.table.firings"), "{told}");
+    let design = sensor(counted, "firings_per_s = 200.0").unwrap();
+    assert_eq!((design.scan.rows, design.scan.columns), (1, 10));
+    // Groups of lines may be counted as well; times of another step are times.
+    let groups = "time,azimuth,elevation\n0,0,0\n0,1,0\n1,2,0\n1,3,0\n";
+    assert_eq!(sensor(groups, "lines = 2\nfirings_per_s = 200.0").unwrap().scan.columns, 5);
+    let even = counted.replace("\n4,", "\n5,");
+    let told = sensor(&even, "firings_per_s = 200.0").unwrap_err();
+    assert!(told.contains("has no effect because of `scan.table.file`"), "{told}");
+}
+
 #[test]
 fn what_is_wrong_with_a_table_is_told_with_its_line() {
     let good = table(400);

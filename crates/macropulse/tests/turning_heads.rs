@@ -273,6 +273,39 @@ fn a_calibration_is_a_list_of_lasers() {
     assert!(told.contains("two.yaml: cannot be read"), "{told}");
 }
 
+/// The metadata of an Ouster sensor are a head: of the maker's own files where they are there.
+#[test]
+fn the_metadata_of_an_ouster_sensor_are_a_head() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "version = 1\nname = \"mine\"\nextends = \"vlp-16\"\n\
+                scan.spinning.calibration = \"beams.json\"\n";
+    std::fs::write(folder.path().join("mine.toml"), text).unwrap();
+    let head = |json: &str| {
+        std::fs::write(folder.path().join("beams.json"), json).unwrap();
+        Design::open(&folder.path().join("mine.toml").display().to_string(), &[]).unwrap()
+    };
+    let three = head(
+        "{\"beam_altitude_angles\": [20.0, 0.5, -15.0], \"beam_azimuth_angles\": [3.0, -3.0, 0.0]}",
+    );
+    assert_eq!(three.scan.rows, 3);
+    let [x, y, z] = three.directions().of(0, 0);
+    let [_, ahead, _] = three.directions().of(2, 0);
+    assert!((z - 20_f64.to_radians().sin()).abs() < 1e-12);
+    // Its beam points 3 degrees to the right of that of the last laser.
+    let apart = (y.atan2(x) - ahead.atan2(three.directions().of(2, 0)[0])).to_degrees();
+    assert!((apart.abs() - 3.0).abs() < 0.4, "{apart}");
+    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/recorded/ouster");
+    match std::fs::read_to_string(format!("{shared}/OS-1-128_v2.3.0_1024x10.json")) {
+        Ok(json) => {
+            let design = head(&json);
+            assert_eq!(design.scan.rows, 128);
+            let top = design.directions().of(0, 0)[2].asin().to_degrees();
+            assert!((top - 20.95).abs() < 1e-9, "{top}");
+        }
+        Err(_) => eprintln!("NOT TESTED: no metadata of a sensor in ../shared/data"),
+    }
+}
+
 #[test]
 fn what_a_head_cannot_be_is_told() {
     let told = |keys: &str| {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use macropulse::formats::{Clouds, Names};
+use macropulse::formats::{CloudRoom, Clouds, Names};
 use macropulse::opened;
 use macropulse::points::PointCloud;
 use serde_json::Value;
@@ -122,16 +122,19 @@ pub struct CloudsAt {
     /// Files that are still to be opened, the next one last.
     left: Vec<PathBuf>,
     open: Option<Clouds>,
+    /// The memory that the clouds of a file may take.
+    room: CloudRoom,
 }
 
 impl CloudsAt {
-    /// The clouds at `path`, a file or a folder.
+    /// The clouds at `path`, a file or a folder, where those of a file may take so much memory.
     ///
     /// # Errors
     /// If it cannot be read, or is a folder that holds none.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path, room: CloudRoom) -> Result<Self, Error> {
         if !path.is_dir() {
-            return Ok(Self { left: Vec::new(), open: Some(Clouds::open(path)?) });
+            let open = Some(Clouds::open_within(path, room)?);
+            return Ok(Self { left: Vec::new(), open, room });
         }
         let left = Left::of(path)?;
         let mut files: Vec<PathBuf> = left.clouds().iter().map(|file| path.join(file)).collect();
@@ -139,7 +142,7 @@ impl CloudsAt {
             return Err(Error::NoCloud { folder: path.to_owned() });
         }
         files.reverse();
-        Ok(Self { left: files, open: None })
+        Ok(Self { left: files, open: None, room })
     }
 
     /// The next cloud, with the names of what it has the numbers of.
@@ -150,7 +153,7 @@ impl CloudsAt {
         let mut next = self.open.as_mut().and_then(Iterator::next);
         while next.is_none() {
             let Some(path) = self.left.pop() else { return Ok(None) };
-            next = self.open.insert(Clouds::open(&path)?).next();
+            next = self.open.insert(Clouds::open_within(&path, self.room)?).next();
         }
         let cloud = next.transpose()?;
         Ok(cloud.zip(self.open.as_ref().map(Clouds::names)))
@@ -187,7 +190,7 @@ mod tests {
             write_cloud(Format::Ply, &cloud, &Names::default(), &named(scan)).unwrap();
         }
         let numbers = |path: &Path| -> Result<Vec<u64>, Error> {
-            let mut clouds = CloudsAt::open(path)?;
+            let mut clouds = CloudsAt::open(path, CloudRoom::default())?;
             let mut numbers = Vec::new();
             while let Some((cloud, _)) = clouds.next_cloud()? {
                 numbers.push(cloud.scan);
