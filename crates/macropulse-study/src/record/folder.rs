@@ -127,7 +127,7 @@ pub struct CloudsAt {
 }
 
 impl CloudsAt {
-    /// The clouds at `path`, a file or a folder, where those of a file may take so much memory.
+    /// The clouds at `path`, a file or a folder. Those of a file may take the memory of `room`.
     ///
     /// # Errors
     /// If it cannot be read, or is a folder that holds none.

@@ -80,7 +80,7 @@ pub(super) fn all_lines<'a>(
 }
 
 impl About {
-    /// Of a file whose cloud may take so much memory.
+    /// Of a file whose cloud may take the memory of `room`.
     pub fn within(room: CloudRoom) -> Self {
         Self { room, ..Self::default() }
     }

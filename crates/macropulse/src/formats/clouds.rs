@@ -38,8 +38,7 @@ impl Clouds {
         Self::open_within(path, CloudRoom::default())
     }
 
-    /// The same, where the clouds may take so much memory in place of four fifths of what the machine
-    /// has.
+    /// The same with a limit of memory. [`Clouds::open`] allows four fifths of what the machine has.
     ///
     /// # Errors
     /// As [`Clouds::open`], and if they take more.

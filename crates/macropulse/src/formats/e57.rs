@@ -165,8 +165,8 @@ fn read(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), Fault> {
     Ok((gathered.cloud(&mut about)?, about))
 }
 
-/// Refuses so many records of a scan if the `size` of the file, bytes, cannot hold them. Columns whose
-/// numbers are all the same take no bits, so that there is no end to records of them alone.
+/// Refuses a scan with more records than a file of `size` bytes can hold. A column whose numbers are
+/// all the same takes no bits, so the number of records of such columns has no other bound.
 fn check_size(prototype: &[Record], records: u64, size: u64) -> Result<(), String> {
     let bits = |record: &Record| match record.data_type {
         RecordDataType::Single { .. } => 32,

@@ -4,7 +4,7 @@ use super::attributes::Attribute;
 use super::number::Kind;
 use super::ply;
 
-/// Names of other programs, in lower case with `_` between words, and the attribute they stand for.
+/// Attributes, and what other programs call them: in lower case, with `_` between words.
 const ALIASES: &[(Attribute, &[&str])] = &[
     (Attribute::X, &["points:0", "points_m_xyz:0", "points_0", "cartesian_x", "pos_x"]),
     (Attribute::Y, &["points:1", "points_m_xyz:1", "points_1", "cartesian_y", "pos_y"]),

@@ -42,7 +42,7 @@ pub(super) enum Floats {
 }
 
 impl Floats {
-    /// What the files of this name have.
+    /// The number that the name of a file stands for.
     pub fn of_name(path: &Path) -> Self {
         let name = path.file_name().map(|name| name.to_string_lossy().to_lowercase());
         match name.is_some_and(|name| name.ends_with(".pcd.bin")) {
@@ -60,7 +60,7 @@ impl Floats {
         }
     }
 
-    /// Whether the bytes look like points of so many floats: coordinates on Earth, no negative
+    /// Whether the bytes look like points of this number of floats: coordinates on Earth, no negative
     /// intensity, and rings that are small whole numbers.
     fn fit(self, bytes: &[u8]) -> bool {
         let stride = self.attributes().len() * Kind::F4.size();
@@ -77,14 +77,14 @@ impl Floats {
     }
 }
 
-/// Farther coordinates are of no point on Earth, in any usual frame.
+/// No usual frame on Earth has coordinates beyond this.
 const FARTHEST_M: f64 = 1e8;
 
-/// More rings has no sensor.
+/// No sensor has more rings.
 const MOST_RINGS: f64 = 1024.0;
 
-/// The cloud of a file whose points should have so many floats by its name. It may have the other
-/// number of them, if its points look like those alone.
+/// The cloud of a file whose name stands for this number of floats. If its points look like the other
+/// number alone, they are read as that.
 pub(super) fn parse(
     bytes: &[u8],
     by_name: Floats,

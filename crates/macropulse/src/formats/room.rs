@@ -12,8 +12,8 @@ const PROGRAM: u64 = 30_000_000;
 /// The share of the machine's memory that a cloud may take unless another limit is set.
 const SHARE: f64 = 0.8;
 
-/// The memory that the clouds of a file may take. A file that needs more is refused before it is read,
-/// or while it is if it does not tell how many points it has.
+/// The memory that the clouds of a file may take. A file that needs more is refused before it is read.
+/// A file that does not tell its number of points is refused while it is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CloudRoom {
     bytes: u64,
@@ -28,7 +28,7 @@ impl Default for CloudRoom {
 }
 
 impl CloudRoom {
-    /// What is left of so many bytes beside the program.
+    /// The part of `bytes` that the program itself leaves.
     pub fn of_bytes(bytes: u64) -> Self {
         Self { bytes: bytes.saturating_sub(PROGRAM) }
     }
@@ -38,10 +38,10 @@ impl CloudRoom {
         self.bytes
     }
 
-    /// What is left beside the bytes of a file.
+    /// The room beside a file of this size, bytes.
     ///
     /// # Errors
-    /// The sentence that says so, if these are more.
+    /// A sentence, if the file does not fit.
     pub(super) fn beside(self, file: u64) -> Result<Self, String> {
         match self.bytes.checked_sub(file) {
             Some(bytes) => Ok(Self { bytes }),
@@ -49,10 +49,10 @@ impl CloudRoom {
         }
     }
 
-    /// Refuses so many points if they do not fit.
+    /// Refuses this number of points if they do not fit.
     ///
     /// # Errors
-    /// The sentence that says so.
+    /// A sentence, if they do not.
     pub(super) fn check(self, points: u64) -> Result<(), String> {
         let needed = points.saturating_mul(PER_POINT);
         if needed <= self.bytes {

@@ -343,10 +343,10 @@ impl Gathered {
         self.attributes.contains(&attribute)
     }
 
-    /// Refuses so many points in all, if the memory for them is not allowed.
+    /// Refuses a file with this number of points if they take more memory than allowed.
     ///
     /// # Errors
-    /// The sentence that says so.
+    /// A sentence, if they do.
     pub fn expect(&self, points: u64) -> Result<(), String> {
         self.room.check(points)
     }

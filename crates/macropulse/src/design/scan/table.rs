@@ -247,7 +247,7 @@ fn entries(bytes: &[u8], origin: &str) -> Result<Entries, String> {
     Ok(found)
 }
 
-/// Whether the times are whole seconds that only count the entries, or the groups of so many lines.
+/// Whether the times are whole seconds that only count the entries, or the groups of lines.
 fn only_count(times: &[f64], lines: usize) -> bool {
     let counts = |group: usize| {
         let expected = |at: usize| times[0] + (at / group) as f64;

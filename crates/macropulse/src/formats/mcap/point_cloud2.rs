@@ -183,10 +183,13 @@ fn layout(fields: &[Stored], stride: usize, stamp_ns: f64) -> (Layout, f64) {
     let mut time_from_ns = 0.0;
     for &Stored { name, offset, kind } in fields {
         let known = match (name, kind) {
-            ("intensity", _) => Some(Meaning::scaled(Attribute::Intensity, 1.0 / white)),
             ("timestamp", Kind::F8) if has("tag") => Some(Meaning::of(Attribute::TimeNs)),
             _ => Meaning::of_heading(name, Some(kind)),
         };
+        let known = known.map(|known| match known.attribute {
+            Attribute::Intensity => Meaning::scaled(Attribute::Intensity, 1.0 / white),
+            _ => known,
+        });
         match name {
             "time" | "t" | "time_stamp" => time_from_ns = stamp_ns - epoch_ns,
             "timestamp" if has("tag") => time_from_ns = -epoch_ns,
