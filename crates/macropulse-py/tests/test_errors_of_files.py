@@ -135,9 +135,8 @@ LOADED = [
     ("empty.pcd", b"", ["is not a pcd file", "no DATA line"]),
     ("text.ply", b"hello\n", ["is not a ply file", "no header from `ply`"]),
     ("empty.ply", b"", ["is not a ply file"]),
-    ("names.csv", b"a,b,c\n1,2,3\n", ["no field `x`", "as `x_m,y_m,z_m`"]),
-    ("semicolons.csv", b"x_m;y_m;z_m\n1;2;3\n", ["names of columns with commas between"]),
-    ("headless.csv", b"1,2,3\n4,5,6\n", ["no field `x`", "its first line has the names"]),
+    ("names.csv", b"a,b,c\n1,2,3\n", ["no field `x`", "as `x,y,z,intensity`"]),
+    ("headless.csv", b"1,2\n4,5\n", ["no field `z`", "its first line names the columns"]),
     ("words.csv", b"x_m,y_m,z_m\n1,2,far\n", ["words.csv", "far"]),
     ("short.csv", b"x_m,y_m,z_m\n1,2\n", ["short.csv", "2"]),
     ("empty.csv", b"", ["empty.csv"]),
@@ -145,11 +144,11 @@ LOADED = [
     ("text.laz", b"hello", ["does not begin with LASF"]),
     ("text.e57", b"hello", ["is not a e57 file"]),
     ("text.npy", b"hello", ["does not begin as NumPy files do"]),
-    ("odd.bin", b"12345", ["odd.bin", "16"]),
+    ("odd.bin", b"12345", ["odd.bin", "neither points of four floats", ".pcd.bin"]),
     ("text.mcap", b"hello", ["text.mcap"]),
     ("points.npz", b"PK", ["no point cloud is read from such a file", ".pcd, .ply"]),
-    ("points.xyz", b"1 2 3\n", ["no point cloud is read from such a file"]),
-    ("points.pts", b"1 2 3\n", ["no point cloud is read from such a file"]),
+    ("points.xyz", b"1 2\n", ["points.xyz", "no field `z`"]),
+    ("points.asc", b"1 2 3\n", ["no point cloud is read from such a file"]),
     ("range.png", b"\x89PNG", ["no point cloud is read from such a file"]),
     ("manifest.json", b"{}", ["no point cloud is read from such a file"]),
     ("points", b"1 2 3\n", ["no point cloud is read from such a file"]),
@@ -167,14 +166,22 @@ def test_a_file_that_holds_no_cloud(tmp_path, name, content, words):
 
 
 def test_arrays_that_are_no_clouds(tmp_path, scan):
-    np.save(tmp_path / "plain.npy", np.zeros((5, 3)))
-    with pytest.raises(mp.Error, match="a structured array with fields x, y and z"):
+    np.save(tmp_path / "plain.npy", np.zeros((5, 2)))
+    with pytest.raises(mp.Error, match="structured arrays with fields x, y and z"):
         mp.load(tmp_path / "plain.npy")
     scan.save(tmp_path / "whole.npy")
     whole = (tmp_path / "whole.npy").read_bytes()
     (tmp_path / "cut.npy").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(mp.Error, match="ends after .* points; the file was cut short"):
         mp.load(tmp_path / "cut.npy")
+
+
+def test_a_cloud_is_held_to_a_limit_of_memory(tmp_path):
+    np.save(tmp_path / "points.npy", np.ones((100_000, 3), "f4"))
+    for load in (mp.load, lambda path, **limit: list(mp.load_scans(path, **limit))):
+        with pytest.raises(mp.Error, match="its 100000 points take about 20 MB of memory"):
+            load(tmp_path / "points.npy", memory_limit=40_000_000)
+    assert len(mp.load(tmp_path / "points.npy", memory_limit=80_000_000)) == 100_000
 
 
 def test_what_is_no_path(scan, tmp_path):

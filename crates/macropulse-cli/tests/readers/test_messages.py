@@ -50,7 +50,7 @@ def returns(message, run):
     """The returns of a cloud, in the order of its pixels where it is organised."""
     data = array(message)
     if message.height > 1:
-        assert data.shape == (24, 40) and not message.is_dense
+        assert data.shape in [(24, 40), (40, 24)] and not message.is_dense
         assert np.isnan(data["x"]).any()
     return data[np.isfinite(data["x"])]
 
@@ -86,10 +86,16 @@ def test_stamps(run):
 def test_velodyne(run, scan, points):
     message = clouds(run / "scans-velodyne.mcap")[scan]
     data = returns(message, run)
-    points = ordered(message, points)
+    if message.height > 1:
+        # A line for each firing, with the lasers from the lowest one up.
+        assert message.width == 24
+        assert (array(message)["ring"] == np.arange(24)).all()
+        points = points[np.lexsort((-points["row"].astype(int), points["column"]))]
     assert data.dtype.names == ("x", "y", "z", "intensity", "ring", "time")
     assert message.point_step == 22
-    same(data, points, ["x", "y", "z", "ring"])
+    same(data, points, ["x", "y", "z"])
+    # Ring 0 is the lowest laser, row 0 the highest.
+    np.testing.assert_array_equal(data["ring"], 23 - points["row"])
     np.testing.assert_allclose(data["intensity"], points["intensity"] * 100, rtol=1e-6)
     np.testing.assert_allclose(data["time"] * 1e9, offset(message, points), rtol=1e-6, atol=1e-3)
 
