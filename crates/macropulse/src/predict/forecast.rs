@@ -9,7 +9,7 @@ use std::sync::Arc;
 use macropulse_codec::decode::{ReceiverKind, Sampling};
 
 use super::converters::bank_loss;
-use super::own_light::OwnLight;
+use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
@@ -353,7 +353,10 @@ impl<'a> Forecaster<'a> {
             density: 0.0,
             snr: chances.snr,
             pd: chances.pd,
-            false_per_shot: design.receiver.false_alarm,
+            false_per_shot: match stray_room(design) {
+                Some(room) if room < 1.0 => 1.0,
+                _ => design.receiver.false_alarm,
+            },
             precision: (chances.pd * FEWEST >= 1.0)
                 .then_some(SPEED_OF_LIGHT / 2.0 * chances.timing),
             aside: None,

@@ -15,6 +15,6 @@ mod sidelobes;
 pub mod verdict;
 
 pub use forecast::{Error, Forecast, Forecaster};
-pub use own_light::{Blind, OwnLight};
+pub use own_light::{Blind, OwnLight, stray_room};
 pub use sampled::deepest_baseline;
 pub use sidelobes::Aside;

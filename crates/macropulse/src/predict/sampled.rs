@@ -127,11 +127,9 @@ struct Estimated {
 }
 
 /// When the channels of `design` are blind with what they send, under `background` detections per second: stray
-/// light shows where it is four deviations of the noise high.
+/// light shows where it stands out of the noise.
 pub(super) fn blind(sampled: &Sampled, sampling: &Sampling, background: f64) -> Option<Blind> {
-    let shown = (sampled.stray / (4.0 * sampled.rms_noise(background))).max(1.0);
-    let shows = sampled.front_end.mark_rms() / sampled.sample * (2.0 * libm::log(shown)).sqrt();
-    Blind::of(sampling, shows)
+    Blind::of(sampling, sampled.stray_shows(background) / sampled.sample)
 }
 
 /// What the receiver of `design` finds of marks of so many `photons`, under `background` detections per second, of

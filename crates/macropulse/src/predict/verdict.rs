@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use super::forecast::{Forecast, Forecaster};
 use super::link::spot_depth;
-use super::own_light::Blind;
+use super::own_light::{Blind, stray_room};
 use crate::design::Design;
 use crate::design::safety::strictest;
 use crate::units::{SPEED_OF_LIGHT, s_from_fs};
@@ -59,6 +59,7 @@ pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Ve
     if bright_enough {
         checks.extend(own_light(by_night, wanted));
     }
+    checks.extend(stray_light(day));
     if bright_enough && day.budget.is_some() && by_day.operating().background > 0.0 {
         checks.push(sunlight(by_day, wanted, &forecast));
     }
@@ -153,6 +154,23 @@ fn own_light(night: &Forecaster, wanted: &Wanted) -> Option<Check> {
             worst.pd, worst.range, wanted.pd
         ),
         remedy: "words that lose fewer marks to own light, or more channels".into(),
+    })
+}
+
+/// Stray light of the sensor's own marks that is not over when the channel listens again; `None` where it is.
+fn stray_light(design: &Design) -> Option<Check> {
+    let room = stray_room(design).filter(|room| *room < 1.0)?;
+    Some(Check {
+        name: "stray light",
+        shortfall: 1.0 / room,
+        finding: format!(
+            "stray light of the sensor's own marks is {:.3e} times too strong to be over when the channel \
+             listens again: every shot returns it",
+            1.0 / room
+        ),
+        remedy:
+            "a longer blank_ns of the receiver, more isolation_db, more bandwidth, or less energy"
+                .into(),
     })
 }
 

@@ -34,6 +34,9 @@ const FORGOTTEN: f64 = 1.0 / 16.0;
 /// A baseline that remembers more ticks would take more time to be found than the light it is of.
 const MOST_REMEMBERED: f64 = 16_777_216.0;
 
+/// Light shows where it is so many deviations of the noise high.
+const SHOWS: f64 = 4.0;
+
 /// A pulse is told to the receiver to so many of its rms lengths: there it is 4·10⁻⁶ of its height.
 const REACH: f64 = 5.0;
 
@@ -268,6 +271,24 @@ impl Sampled {
                 self.limit() * clipped
             }
         }
+    }
+
+    /// Time, s, before and behind a mark of stray light in which it shows above the noise: s·√(2·ln(n/v)), with the rms
+    /// length s of the mark, its n photons, and v, [`SHOWS`] deviations of the noise.
+    pub fn stray_shows(&self, background: f64) -> f64 {
+        let over = (self.stray / (SHOWS * self.rms_noise(background))).max(1.0);
+        self.front_end.mark_rms() * (2.0 * libm::log(over)).sqrt()
+    }
+
+    /// The brightest stray light of a mark, in detected photons, that is over `time` seconds behind it: it no longer
+    /// shows above the noise in the dark, nor holds the amplifier at its limit because it was clipped.
+    pub fn most_stray(&self, time: f64) -> f64 {
+        let rms = self.front_end.mark_rms();
+        let falls_to =
+            |level: f64, time: f64| level * libm::exp(0.5 * (time.max(0.0) / rms).powi(2));
+        let shown = falls_to(SHOWS * self.rms_noise(0.0).max(self.step), time);
+        let held = f64::from(self.held_ticks()) * self.sample;
+        shown.min(falls_to(f64::from(self.codes.1) * self.step, time - held))
     }
 
     /// Whole ticks of `time` seconds, rounded up.
