@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use macropulse::codec::decode::MOST_RETURNS;
 use macropulse::digest::Digest;
 use macropulse::emit::{Band, short_bands};
 use macropulse::formats::write_atomically;
@@ -62,6 +63,20 @@ impl Counts {
     /// False returns, and pixels without an echo.
     fn of_empty(&self) -> [u64; 2] {
         [self.false_points, self.pixels - self.echoes]
+    }
+
+    /// Whether they can be those of one scene: a file of them may have been damaged, or written by hand.
+    fn add_up(&self) -> bool {
+        let most = self.pixels.saturating_mul(MOST_RETURNS.into());
+        let returns = [self.wrong, self.false_points, self.right];
+        let [sum, squares] = self.errors;
+        let most_squares = self.right as f64 * squares * (1.0 + 1e-9);
+        self.pixels > 0
+            && self.found <= self.echoes
+            && self.echoes <= self.pixels
+            && returns.iter().all(|returns| *returns <= most)
+            && squares.is_finite()
+            && sum.powi(2) <= most_squares
     }
 
     /// Root of the mean square of the errors of right returns, m; NaN without any.
@@ -139,7 +154,7 @@ impl Bench<'_> {
         let path = folder_of_trials(self.folder).join(format!("{}.json", hash.text()));
         if let Ok(text) = opened::text(&path)
             && let Ok(known) = serde_json::from_str::<Counts>(&text)
-            && known.echoes <= known.pixels
+            && known.add_up()
         {
             (self.watch.done)(known.pixels);
             return Ok(Some(known));
@@ -223,4 +238,34 @@ fn limit(required: &Requirements, counts: &[Counts; 2]) -> Option<(Limit, f64)> 
 fn missed_at_worst(required: &Requirements, worst: Worst) -> Option<(Limit, f64)> {
     let over = missed(worst.pd, required.wanted.pd);
     (over > 1.0).then_some((Limit::Worst, over))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_that_no_scene_has_do_not_add_up() {
+        let sound = Counts {
+            pixels: 10,
+            echoes: 8,
+            found: 7,
+            wrong: 1,
+            false_points: 2,
+            right: 6,
+            errors: [0.06, 0.0012],
+        };
+        assert!(sound.add_up());
+        let wrong = [
+            Counts { pixels: 0, echoes: 0, found: 0, ..sound },
+            Counts { echoes: 11, ..sound },
+            Counts { found: 9, ..sound },
+            Counts { right: u64::MAX, ..sound },
+            Counts { errors: [0.06, -1.0], ..sound },
+            Counts { errors: [1.0, 0.0012], ..sound },
+            Counts { errors: [f64::NAN, 0.0012], ..sound },
+            Counts { errors: [0.0, f64::INFINITY], ..sound },
+        ];
+        assert_eq!(wrong.map(|counts| counts.add_up()), [false; 8]);
+    }
 }
