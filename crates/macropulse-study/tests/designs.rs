@@ -98,6 +98,7 @@ fn what_is_found_does_and_is_found_again() {
     let folder = tempfile::tempdir().unwrap();
     let first = found(&[], folder.path(), 1);
     let [Some(coded), Some(waiting)] = &first.best else { panic!("{}", first.text()) };
+    let [coded, waiting] = [coded, waiting].map(|best| &best.trial);
     assert!(coded.candidate.beams < waiting.candidate.beams, "{}", first.text());
     let names = first.write(folder.path()).unwrap();
     assert!(names.iter().any(|name| name == "index.html"), "{names:?}");
@@ -109,7 +110,7 @@ fn what_is_found_does_and_is_found_again() {
         let figures = Figures::of(&design, sky, wanted).unwrap();
         assert!(figures.closes(), "{}", figures.text());
         let allowed = macropulse::design::safety::strictest(design.eye_limits()).unwrap().energy;
-        assert!((best.candidate.energy / allowed - 0.9).abs() < 1e-6);
+        assert!(best.candidate.energy / allowed < 0.9 + 1e-6);
         for counts in best.counts {
             assert!(counts.pd() >= 0.9 && counts.rms() < 0.03, "{}", first.text());
         }
@@ -122,18 +123,65 @@ fn what_is_found_does_and_is_found_again() {
     assert_eq!(found(&far, folder.path(), 1).best, [None, None]);
 }
 
-/// The next search into a folder takes the results of the last one away before it begins, and nothing else;
-/// from a folder in which none was, nothing.
+/// The next search into a folder takes the results of the last one away before it begins, and nothing else: a file
+/// that no search has written, or that was changed since, is refused and stays.
 #[test]
-fn a_search_leaves_no_results_of_another() {
+fn a_search_removes_what_a_search_has_written_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let of_a_user = ["coded.toml", "index.html", "coded.txt"].map(|name| folder.path().join(name));
     for file in &of_a_user {
         fs::write(file, "mine").unwrap();
     }
-    make_room(folder.path()).unwrap();
+    fs::create_dir(folder.path().join("trials")).unwrap();
+    let refused = make_room(folder.path()).unwrap_err().to_string();
+    assert!(refused.contains("coded.toml: was not written by a search"), "{refused}");
     assert!(of_a_user.iter().all(|file| file.is_file()));
+    fs::remove_file(&of_a_user[0]).unwrap();
+    fs::remove_file(&of_a_user[1]).unwrap();
+    let dark = [("reflectance = 0.5", "reflectance = 0.001"), ("[3, 5, 10, 15, 30]", "[30]")];
+    found(&dark, folder.path(), 1).write(folder.path()).unwrap();
+    let page = &of_a_user[1];
+    assert!(page.is_file());
     make_room(folder.path()).unwrap();
-    let left = of_a_user.map(|file| file.is_file());
-    assert_eq!(left, [false, false, true]);
+    assert!(!page.exists() && of_a_user[2].is_file());
+    found(&dark, folder.path(), 1).write(folder.path()).unwrap();
+    fs::write(page, "edited").unwrap();
+    assert!(make_room(folder.path()).is_err());
+    assert_eq!(fs::read_to_string(page).unwrap(), "edited");
+}
+
+/// Four beams leave 164 ns between shots, in which no word fits that is as long as marks behind a slow amplifier ask
+/// for; the search goes on with the others and says so.
+#[test]
+fn beams_for_which_no_word_fits_are_skipped_and_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let dark = [
+        ("reflectance = 0.5", "reflectance = 0.001"),
+        ("beams = [3, 5, 10, 15, 30]", "beams = [1, 2, 3, 10]"),
+        ("marks = [1, 3]", "marks = [3]"),
+    ];
+    let found = found(&dark, folder.path(), 1);
+    let skipped: Vec<u32> = found.skipped.iter().map(|one| one.beams).collect();
+    assert_eq!(skipped, [1, 2], "{}", found.text());
+    assert!(found.text().contains("inalas, 3 marks, beams 1"), "{}", found.text());
+}
+
+/// Sixteen rows of sixty-four pixels, twenty times a second, to 40 m: eyes would allow some 140 µJ a shot, of which the
+/// stray light alone would blind the receiver for longer than it waits. With less light it is an easy task.
+#[test]
+fn no_more_light_is_sent_than_the_receiver_bears() {
+    let easy = "version = 1\nname = \"easy\"\n[wanted]\nrows = 16\ncolumns = 64\n\
+        horizontal_deg = 43.2\nvertical_deg = 24.3\nscans_per_s = 20.0\nrange_m = 40.0\n\
+        clutter_m = 60.0\nreflectance = 0.1\n[parts]\ndetectors = [\"inalas\"]\nmarks = [1]\n\
+        beams = [16]\n";
+    let required = Requirements::from_toml(easy, "easy.toml", Path::new("")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    make_room(folder.path()).unwrap();
+    let search = Search { required, folder: folder.path(), seed: 1, watch: &UNWATCHED };
+    let found = search.run().unwrap().unwrap();
+    let Some(waiting) = &found.best[1] else { panic!("{}", found.text()) };
+    assert!(waiting.bill.of_class_1 < 0.5, "{}", found.text());
+    for counts in waiting.trial.counts {
+        assert!(counts.pd() > 0.99 && counts.false_share() == 0.0, "{}", found.text());
+    }
 }

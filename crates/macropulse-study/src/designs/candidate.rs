@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use macropulse::codec::code::Separated;
-use macropulse::design::{Design, Detector, Effect, Pattern, Polygon};
+use macropulse::design::{Design, Detector, Effect, Pattern};
 use toml::{Table, Value};
 
 use super::Error;
@@ -33,6 +33,8 @@ pub struct Candidate {
     pub marks: u32,
     /// Beams, each with a detector of its own.
     pub beams: u32,
+    /// Facets of its polygon; `None` if it has none.
+    pub facets: Option<u32>,
     /// Length of a pulse, s, full width at half maximum.
     pub pulse: f64,
     /// Bandwidth of the amplifiers, Hz.
@@ -162,7 +164,7 @@ impl Candidate {
         set("light.energy", energy.into());
         set("light.divergence_mrad", divergence.into());
         set("optics.aperture_mm", (self.aperture * 1e3).into());
-        if let Some(polygon) = required.polygon(self.aperture) {
+        if let Some(polygon) = self.facets.map(|facets| required.polygon(self.aperture, facets)) {
             set(&format!("{POLYGON}.facets"), i64::from(polygon.facets).into());
             set(&format!("{POLYGON}.diameter_mm"), (polygon.diameter * 1e3).into());
         }
@@ -205,15 +207,9 @@ impl Candidate {
 }
 
 impl Requirements {
-    /// Shortest time between the shots of one of so many channels, s.
-    pub(super) fn shortest_period(&self, beams: u32) -> f64 {
-        let share = match self.polygon(self.parts.aperture_mm[1] * 1e-3) {
-            Some(polygon) => {
-                self.wanted.horizontal_deg.to_radians() / Polygon::sweep(polygon.facets)
-            }
-            None => self.burst,
-        };
-        share * self.mean_period(beams)
+    /// Shortest time between the shots of one of so many channels behind a polygon with so many facets, s.
+    pub(super) fn shortest_period(&self, beams: u32, facets: Option<u32>) -> f64 {
+        facets.map_or(self.burst, |facets| self.duty(facets)) * self.mean_period(beams)
     }
 
     /// Mean time between the shots of one of so many channels, s.

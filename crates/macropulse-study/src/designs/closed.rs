@@ -3,10 +3,10 @@
 
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
-use macropulse::design::Design;
 use macropulse::design::safety::strictest;
-use macropulse::predict::Forecaster;
+use macropulse::design::{Design, Detector};
 use macropulse::predict::verdict::slant;
+use macropulse::predict::{Forecaster, stray_room};
 use macropulse::units::{RMS_OF_FWHM, range_from_tof, tof_from_range};
 
 use super::candidate::Candidate;
@@ -31,7 +31,7 @@ const SAMPLES: f64 = 1.0 / 1.5;
 /// What closed forms say of a candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessed {
-    /// The candidate, its energy what eyes allow, its aperture the least that does; the largest allowed
+    /// The candidate, its energy what eyes and its receiver allow, its aperture the least that does; the largest allowed
     /// where none does.
     pub candidate: Candidate,
     /// Time between shots of a channel, s.
@@ -63,7 +63,7 @@ pub(super) fn energy(design: &Design, required: &Requirements) -> Option<f64> {
 pub(super) const DIM: f64 = 1e-12;
 
 /// As bright as eyes allow.
-pub(super) fn brightest(required: &Requirements, dim: Candidate) -> Result<Candidate, Error> {
+pub(super) fn for_eyes(required: &Requirements, dim: Candidate) -> Result<Candidate, Error> {
     // Class 1 asks for no energy but that of the shots beside each other.
     let energy = energy(&dim.unlimited(required)?, required).ok_or_else(|| {
         Error::Asked(format!("no limit of class 1 is known at {} nm", dim.part.wavelength_nm))
@@ -71,7 +71,41 @@ pub(super) fn brightest(required: &Requirements, dim: Candidate) -> Result<Candi
     Ok(Candidate { energy, ..dim })
 }
 
-/// What closed forms say of `candidate`, which is as bright as eyes allow.
+/// As bright as eyes and its own stray light allow.
+pub(super) fn brightest(required: &Requirements, dim: Candidate) -> Result<Candidate, Error> {
+    let bright = for_eyes(required, dim)?;
+    let share = bearable(&bright.unlimited(required)?);
+    Ok(Candidate { energy: share * bright.energy, ..bright })
+}
+
+/// Share of its light with which the stray light of its own marks is over when a channel listens again.
+fn bearable(design: &Design) -> f64 {
+    // A little less, so that no rounding is more.
+    stray_room(design).map_or(1.0, |room| (room * (1.0 - 1e-9)).min(1.0))
+}
+
+/// The target wanted sends back so much of what the converter has codes for at most. More light would find nothing
+/// more, and what is clipped for long near the end of the range gate is lost.
+const SCALE: f64 = 0.5;
+
+/// `candidate`, no brighter than the converter bears with its aperture.
+pub(super) fn within_scale(
+    required: &Requirements,
+    candidate: Candidate,
+) -> Result<Candidate, Error> {
+    let wanted = &required.wanted;
+    let design = candidate.unlimited(required)?;
+    let (Detector::Sampled(detector), Some(budget)) = (&design.detector, &design.budget) else {
+        return Ok(candidate);
+    };
+    let mark = candidate.energy / f64::from(candidate.marks);
+    let sent_back = budget.photons(mark, wanted.reflectance, wanted.range_m) * budget.efficiency;
+    let most = SCALE * f64::from(detector.codes.1) * detector.step;
+    let energy = candidate.energy * (most / sent_back).min(1.0);
+    Ok(Candidate { energy, ..candidate })
+}
+
+/// What closed forms say of `candidate`, which is as bright as eyes and its stray light allow.
 pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<Assessed, Error> {
     let wanted = &required.wanted;
     let design = candidate.design(required)?;
@@ -80,11 +114,13 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     let needed = area(required, &forecaster, period);
     let [least, _] = required.parts.aperture_mm.map(|mm| (mm * 1e-3 / candidate.aperture).powi(2));
     let factor = needed.clamp(least, 1.0);
-    let forecast = with_area(&forecaster, factor).forecast(wanted.reflectance, wanted.range_m);
+    let aperture = candidate.aperture * factor.sqrt();
+    let bright = candidate.energy;
+    let candidate = within_scale(required, Candidate { aperture, ..candidate })?;
+    let forecaster = with_area(&forecaster, factor).with_light(candidate.energy / bright);
+    let forecast = forecaster.forecast(wanted.reflectance, wanted.range_m);
     let listens = tof_from_range(wanted.range_m);
     let smeared = slant(&design, wanted.range_m).map_or(0.0, |check| check.shortfall);
-    let aperture = candidate.aperture * factor.sqrt();
-    let candidate = Candidate { aperture, ..candidate };
     let limit = if candidate.waits() && listens > period {
         Some((Limit::Time, listens / period))
     } else if smeared > 1.0 {
@@ -92,7 +128,7 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     } else if needed > 1.0 {
         Some((Limit::Light, needed))
     } else {
-        required.too_fast(&candidate).map(|factor| (Limit::Mirror, factor))
+        required.beyond_mirror(&candidate).map(|factor| (Limit::Mirror, factor))
     };
     Ok(Assessed { candidate, period, pd: forecast.pd, precision: forecast.precision, limit })
 }
@@ -167,7 +203,7 @@ pub(super) fn shaped(
     let start = bounds.inside([(least * 1.6).ln(), (0.3 / (least * 1.6)).ln()]);
     let simplex =
         vec![start.to_vec(), vec![start[0] + 0.4, start[1]], vec![start[0], start[1] - 0.4]];
-    let bright = brightest(required, bounds.candidate(required, dim, start)?)?;
+    let bright = for_eyes(required, bounds.candidate(required, dim, start)?)?;
     let cost = Cost { required, bright: &bright, bounds };
     let failed = |error: argmin::core::Error| Error::Asked(error.to_string());
     let solver = NelderMead::new(simplex).with_sd_tolerance(0.005).map_err(failed)?;
@@ -247,6 +283,7 @@ impl CostFunction for Cost<'_> {
         }
         let design = candidate.unlimited(required)?;
         let forecaster = Forecaster::new(&design, &required.environment)?;
+        let forecaster = forecaster.with_light(bearable(&design));
         let period = design.scan.shortest_period();
         let range = required.wanted.range_m;
         let smeared = slant(&design, range).map_or(0.0, |check| check.shortfall.max(1.0).ln());

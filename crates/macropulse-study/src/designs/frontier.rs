@@ -38,8 +38,10 @@ pub struct Frontier {
     pub waiting_period: f64,
     /// How far the one that waits sees, over how far light goes and comes in that time.
     pub waiting_share: f64,
-    /// Share of the time of a line in which shots are fired.
-    pub duty: f64,
+    /// Share of the time in which the coded one fires shots, behind its mirror.
+    pub coded_duty: f64,
+    /// The same of the one that waits.
+    pub waiting_duty: f64,
 }
 
 /// A rate.
@@ -72,8 +74,9 @@ impl Frontier {
         let [coded_period, waiting_period] =
             [&designs[0], &designs[1]].map(|design| design.scan.shortest_period());
         let pixels = f64::from(required.wanted.rows) * f64::from(required.wanted.columns);
-        // A channel fires so many times a second on average, in bursts of the share `duty`.
-        let duty = waiting_period * pixels * required.wanted.scans_per_s / f64::from(waiting.beams);
+        let mean_rate = pixels * required.wanted.scans_per_s;
+        let duty = |period: f64, of: &Candidate| period * mean_rate / f64::from(of.beams);
+        let (coded_duty, waiting_duty) = (duty(coded_period, coded), duty(waiting_period, waiting));
         let waiting_share = required.wanted.range_m / range_from_tof(waiting_period);
         let mut rows = Vec::new();
         for rate in RATES {
@@ -82,18 +85,26 @@ impl Frontier {
             let light =
                 |candidate, period| reach(required, candidate, (scans_per_s, period), reflectances);
             let time = CHANNELS.map(|channels| {
-                waiting_share * range_from_tof(f64::from(channels) * duty / pixels_per_s)
+                waiting_share * range_from_tof(f64::from(channels) * waiting_duty / pixels_per_s)
             });
             rows.push(Row {
                 scans_per_s,
                 pixels_per_s,
                 coded: light(coded, coded_period)?,
                 waiting: light(waiting, waiting_period)?,
-                coded_channels: pixels_per_s * coded_period / duty,
+                coded_channels: pixels_per_s * coded_period / coded_duty,
                 time,
             });
         }
-        Ok(Self { reflectances, rows, coded_period, waiting_period, waiting_share, duty })
+        Ok(Self {
+            reflectances,
+            rows,
+            coded_period,
+            waiting_period,
+            waiting_share,
+            coded_duty,
+            waiting_duty,
+        })
     }
 }
 
@@ -110,7 +121,12 @@ fn reach(
     let faster = with(Wanted { scans_per_s, ..required.wanted });
     // As dim as can be: at a faster rate eyes would not allow what it has.
     let dim = Candidate { energy: DIM, ..candidate.clone() };
-    let allowed = energy(&dim.unlimited(&faster)?, required).unwrap_or(candidate.energy);
+    // Words that have no room at that rate with so few channels are asked about as single pulses of the same energy.
+    let asked = dim.unlimited(&faster).or_else(|_| {
+        let single = Candidate { words: None, ..dim.clone() };
+        single.unlimited(&faster)
+    })?;
+    let allowed = energy(&asked, required).unwrap_or(candidate.energy);
     let beyond = required.wanted.clutter_m / required.wanted.range_m;
     let does = |reflectance: f64, range_m: f64| -> Result<bool, Error> {
         let clutter_m = beyond * range_m;

@@ -2,10 +2,11 @@
 
 use serde_json::{Value, json};
 
+use super::listing::ASSUMPTIONS;
 use super::requirements::Requirements;
 use super::scenery::Scenery;
 use super::trial::{Counts, Trial};
-use super::{Candidate, Found, Limit};
+use super::{Best, Bill, Candidate, Found, InFlight, Limit, Mirror, Side};
 
 impl Found {
     /// All of it as one JSON object; the names of its keys end in their units.
@@ -24,12 +25,26 @@ impl Found {
             told
         });
         let of = |it: &Trial| trial(&self.required, it);
+        let best = |it: &Best| {
+            let mut told = of(&it.trial);
+            told["bill"] = bill(&it.bill);
+            told
+        };
         json!({
             "requirements": self.required.name,
             "closed_form": closed.collect::<Vec<_>>(),
             "simulated": self.trials.iter().map(of).collect::<Vec<_>>(),
-            "coded": self.best[0].as_ref().map(of),
-            "waiting": self.best[1].as_ref().map(of),
+            "coded": self.best[0].as_ref().map(best),
+            "waiting": self.best[1].as_ref().map(best),
+            "in_flight": self.in_flight.as_ref().map(|it| in_flight(&self.required, it)),
+            "mirrors": self.mirrors.iter().map(mirror).collect::<Vec<_>>(),
+            "skipped": self.skipped.iter().map(|it| json!({
+                "photodiode": it.part,
+                "marks": it.marks,
+                "channels": it.beams,
+                "why": it.why,
+            })).collect::<Vec<_>>(),
+            "assumptions": ASSUMPTIONS,
             "ablations": ablations.collect::<Vec<_>>(),
             "frontier": self.frontier.as_ref().map(|frontier| json!({
                 "reflectances": frontier.reflectances,
@@ -48,12 +63,59 @@ impl Found {
     }
 }
 
+/// What all channels take together; of what there is not, null.
+fn bill(it: &Bill) -> Value {
+    json!({
+        "converter": it.converter.name(),
+        "gigasamples_per_s": it.samples_per_s * 1e-9,
+        "photodiodes_mm2": it.photodiodes * 1e6,
+        "duty": it.duty,
+        "polygon_mm": it.polygon.map(|(diameter, _)| diameter * 1e3),
+        "tip_m_per_s": it.polygon.map(|(_, speed)| speed),
+        "of_class_1": it.of_class_1,
+        "peak_w": it.peak,
+        "mean_w": it.mean,
+    })
+}
+
+fn in_flight(required: &Requirements, it: &InFlight) -> Value {
+    let mut told = candidate(required, &it.candidate);
+    told["bill"] = bill(&it.bill);
+    told["period_ns"] = json!(it.period * 1e9);
+    told["least_period_ns"] = json!(it.least_period * 1e9);
+    told["hidden"] = json!(it.hidden);
+    told["pulses"] = json!(it.pulses);
+    told["neighbours"] = json!(it.neighbours);
+    told
+}
+
+fn mirror(it: &Mirror) -> Value {
+    let side = |side: Option<Side>| {
+        side.map(|side| {
+            json!({
+                "channels": side.channels,
+                "polygon_mm": side.diameter * 1e3,
+                "tip_m_per_s": side.tip_speed,
+            })
+        })
+    };
+    let [coded, waiting, in_flight] = it.sides.map(side);
+    json!({
+        "facets": it.facets,
+        "duty": it.duty,
+        "coded": coded,
+        "waiting": waiting,
+        "in_flight": in_flight,
+    })
+}
+
 fn candidate(required: &Requirements, it: &Candidate) -> Value {
     json!({
         "name": it.name(),
         "photodiode": it.part.name,
         "marks": it.marks,
         "channels": it.beams,
+        "facets": it.facets,
         "aperture_mm": it.aperture * 1e3,
         "tip_m_per_s": required.tip_speed(it),
         "energy_nj": it.energy * 1e9,

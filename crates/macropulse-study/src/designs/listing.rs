@@ -4,8 +4,8 @@ use super::candidate::SCHEMES;
 use super::frontier::{CHANNELS, Frontier};
 use super::scenery::Scenery;
 use super::trial::{Counts, Trial};
-use super::{Assessed, Found, Limit, Worst};
-use crate::text::{Columns, section, short};
+use super::{Assessed, Best, Bill, Found, Limit, Skipped, Worst};
+use crate::text::{Columns, broken, section, short};
 
 impl Limit {
     /// What stands in the way, in a few words.
@@ -14,7 +14,7 @@ impl Limit {
             Self::Time => "time",
             Self::Slant => "slant",
             Self::Light => "light",
-            Self::Mirror => "speed of the polygon",
+            Self::Mirror => "size or speed of the polygon",
             Self::Missed => "missed targets",
             Self::Worst => "missed targets at the worst range",
             Self::False => "false points",
@@ -52,12 +52,24 @@ impl Found {
         text += &section("Wanted", &self.wanted());
         text += "\nClosed form: the least aperture that does, or what stands in the way\n";
         text += &self.table_of_parts();
+        text += &self.list_of_skipped();
         text += "\nSimulated: a target all around, then tiles at ranges of their own\n";
         for trial in &self.trials {
             text += &trial.lines();
         }
         if let Some(frontier) = &self.frontier {
             text += &frontier.text();
+        }
+        let listed = [
+            ("Side by side", self.side_by_side()),
+            (
+                "Mirrors: channels, diameter in mm, speed of the corners in m/s",
+                self.table_of_mirrors(),
+            ),
+            ("Assumptions", self.assumptions()),
+        ];
+        for (heading, lines) in listed.iter().filter(|(_, lines)| !lines.is_empty()) {
+            text += &format!("\n{heading}\n{lines}");
         }
         text += &section("Verdict", &self.verdict());
         text
@@ -102,10 +114,11 @@ impl Found {
     /// Of each photodiode and number of marks, the fewest beams that do and those with the least aperture.
     fn table_of_parts(&self) -> String {
         let mut text = format!(
-            "  {:<16} {:>5} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>9}  {}\n",
+            "  {:<16} {:>5} {:>6} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>9}  {}\n",
             "photodiode",
             "marks",
             "beams",
+            "facets",
             "period",
             "aperture",
             "corners",
@@ -117,10 +130,11 @@ impl Found {
         for one in self.outstanding() {
             let it = &one.candidate;
             text += &format!(
-                "  {:<16} {:>5} {:>6} {:>6.0} ns {:>6.1} mm {:>8} {:>5.1} nJ {:>5.0} ps {:>5.0} MHz  {}\n",
+                "  {:<16} {:>5} {:>6} {:>6} {:>6.0} ns {:>6.1} mm {:>8} {:>5.1} nJ {:>5.0} ps {:>5.0} MHz  {}\n",
                 it.part.name,
                 it.marks,
                 it.beams,
+                it.facets.map_or("-".to_owned(), |facets| facets.to_string()),
                 one.period * 1e9,
                 it.aperture * 1e3,
                 corners(self.required.tip_speed(it)),
@@ -152,6 +166,109 @@ impl Found {
         outstanding
     }
 
+    /// Combinations that are no lidar: numbers of beams with the same reason stand in one line.
+    fn list_of_skipped(&self) -> String {
+        let mut text = String::new();
+        let same = |one: &Skipped, other: &Skipped| {
+            (&one.part, one.marks, &one.why) == (&other.part, other.marks, &other.why)
+        };
+        for alike in self.skipped.chunk_by(same) {
+            let Some(Skipped { part, marks, why, .. }) = alike.first() else { continue };
+            let beams: Vec<String> = alike.iter().map(|one| one.beams.to_string()).collect();
+            let beams = beams.join(", ");
+            text += &format!("  {part}, {marks} marks, beams {beams}: {why}\n");
+        }
+        match text.is_empty() {
+            true => text,
+            false => format!("\nSkipped: combinations that are no lidar\n{text}"),
+        }
+    }
+
+    /// What the best lidars are made of, a quantity in each line. Empty where none does.
+    pub(super) fn side_by_side(&self) -> String {
+        let [coded, waiting] = &self.best;
+        let named = [
+            ("coded", coded.as_ref().map(|best| &best.bill)),
+            ("waiting", waiting.as_ref().map(|best| &best.bill)),
+            ("in flight *", self.in_flight.as_ref().map(|it| &it.bill)),
+        ];
+        let there: Vec<(&str, &Bill)> =
+            named.into_iter().filter_map(|(name, bill)| Some((name, bill?))).collect();
+        if there.is_empty() {
+            return String::new();
+        }
+        let mut text = String::new();
+        let mut line = |name: &str, cell: &dyn Fn(&(&str, &Bill)) -> String| {
+            text += &format!("  {name:<26}");
+            for one in &there {
+                text += &format!(" {:>18}", cell(one));
+            }
+            text += "\n";
+        };
+        line("", &|(name, _)| (*name).to_owned());
+        line("channels", &|(_, it)| it.channels.to_string());
+        line("each with", &|(_, it)| it.converter.name().to_owned());
+        line("samples, GS/s", &|(_, it)| short(it.samples_per_s * 1e-9));
+        line("photodiodes, mm2 at f/1", &|(_, it)| format!("{:.4}", it.photodiodes * 1e6));
+        line("aperture, mm", &|(_, it)| short(it.aperture * 1e3));
+        line("draws, % of the time", &|(_, it)| format!("{:.0}", it.duty * 100.0));
+        let polygon = |it: &Bill, of: &dyn Fn((f64, f64)) -> f64| {
+            it.polygon.map_or("-".to_owned(), |polygon| format!("{:.0}", of(polygon)))
+        };
+        line("polygon, mm", &|(_, it)| polygon(it, &|(diameter, _)| diameter * 1e3));
+        line("corners, m/s", &|(_, it)| polygon(it, &|(_, speed)| speed));
+        line("energy of a shot, nJ", &|(_, it)| format!("{:.1}", it.energy * 1e9));
+        line("of class 1, %", &|(_, it)| format!("{:.0}", it.of_class_1 * 100.0));
+        line("peak power, all beams, W", &|(_, it)| format!("{:.0}", it.peak));
+        line("mean power, all beams, W", &|(_, it)| format!("{:.2}", it.mean));
+        text
+    }
+
+    /// What each lidar takes behind every polygon; empty where there is none.
+    pub(super) fn table_of_mirrors(&self) -> String {
+        let mut text = String::new();
+        for it in &self.mirrors {
+            text += &format!("  {:>6} {:>6.0} %", it.facets, it.duty * 100.0);
+            for side in &it.sides {
+                text += &match side {
+                    Some(side) => format!(
+                        "  {:>6.1} {:>6.0} {:>6.0}",
+                        side.channels,
+                        side.diameter * 1e3,
+                        side.tip_speed
+                    ),
+                    None => format!("  {:>6} {:>6} {:>6}", "-", "-", "-"),
+                };
+            }
+            text += "\n";
+        }
+        match text.is_empty() {
+            true => text,
+            false => format!(
+                "  {:>6} {:>8}  {:>20}  {:>20}  {:>20}\n{text}",
+                "facets", "draws", "coded", "waiting", "in flight *"
+            ),
+        }
+    }
+
+    /// What the comparison takes for granted, one assumption in a paragraph.
+    pub(super) fn assumptions(&self) -> String {
+        let mut all: Vec<String> = ASSUMPTIONS.map(str::to_owned).to_vec();
+        if let Some(it) = &self.in_flight {
+            all.push(format!(
+                "* In flight: a bound, not simulated. A pulse every {} ns, {} of them in flight; {:.0} % of the \
+                 echoes are hidden by stray light of later pulses. {} neighbours at the same range must agree, so \
+                 surfaces of fewer pixels get no point.",
+                short(it.period * 1e9),
+                it.pulses,
+                it.hidden * 100.0,
+                it.neighbours
+            ));
+        }
+        let lines = all.iter().flat_map(|one| broken(one, 100));
+        lines.map(|line| format!("  {line}\n")).collect()
+    }
+
     /// What the search comes to: a sentence for each answer.
     pub fn verdict(&self) -> Columns {
         let mut columns = Columns::default();
@@ -159,52 +276,69 @@ impl Found {
             columns.push(
                 name,
                 match best {
-                    Some(Trial { candidate, .. }) => format!(
-                        "{} channels do, each with {}, and an aperture of {} mm",
-                        candidate.beams,
-                        candidate.part.name,
-                        short(candidate.aperture * 1e3)
-                    ),
+                    Some(Best { trial: Trial { candidate, .. }, bill }) => {
+                        let mirror = candidate.facets.zip(bill.polygon);
+                        let mirror = mirror.map_or(String::new(), |(facets, (diameter, _))| {
+                            format!(", behind {facets} facets of {} mm", short(diameter * 1e3))
+                        });
+                        format!(
+                            "{} channels do, each with {}, and an aperture of {} mm{mirror}",
+                            candidate.beams,
+                            candidate.part.name,
+                            short(candidate.aperture * 1e3)
+                        )
+                    }
                     None => "nothing does of the parts allowed".to_owned(),
                 },
             );
         }
-        if let ([Some(coded), Some(waiting)], Some(frontier)) = (&self.best, &self.frontier) {
-            let (coded, waiting) = (&coded.candidate, &waiting.candidate);
-            let channels = f64::from(waiting.beams) / f64::from(coded.beams);
-            let light = (coded.aperture / waiting.aperture).powi(2);
+        if let Some(it) = &self.in_flight {
             columns.push(
-                "never waiting",
-                match channels > 1.0 {
-                    true => format!(
-                        "takes {} times fewer channels and {} times the light",
-                        short(channels),
-                        short(light)
-                    ),
-                    false => "wins nothing here: waiting takes no more channels".to_owned(),
-                },
-            );
-            columns.push(
-                "as many waiting",
+                "in flight",
                 format!(
-                    "with {} channels the one that waits makes {} scans a second in place of {}",
-                    coded.beams,
-                    short(self.required.wanted.scans_per_s / channels),
-                    self.required.wanted.scans_per_s
+                    "{} channels of single pulses at least, if {} neighbours tell which pulse an echo is of (a \
+                     bound, not simulated)",
+                    it.candidate.beams, it.neighbours
+                ),
+            );
+        }
+        if let ([Some(coded), Some(waiting)], Some(frontier)) = (&self.best, &self.frontier) {
+            let ratio = |of: &dyn Fn(&Bill) -> f64| short(of(&coded.bill) / of(&waiting.bill));
+            columns.push(
+                "coded : waiting",
+                format!(
+                    "{} of the channels, {} times the light, {} of the peak power, {} of the photodiodes' area; \
+                     each channel with {} in place of {}",
+                    ratio(&|it| f64::from(it.channels)),
+                    ratio(&|it| it.aperture.powi(2) * it.energy),
+                    ratio(&|it| it.peak),
+                    ratio(&|it| it.photodiodes),
+                    coded.bill.converter.name(),
+                    waiting.bill.converter.name()
                 ),
             );
             columns.push(
-                "it wins",
+                "waiting needs",
                 format!(
-                    "where there are fewer channels than {} for each million pixels a second, and more \
-                     light than an echo needs",
-                    short(1e6 * frontier.waiting_period / frontier.duty)
+                    "{} channels for each million pixels a second behind its mirror",
+                    short(1e6 * frontier.waiting_period / frontier.waiting_duty)
                 ),
             );
         }
         columns
     }
 }
+
+/// What every comparison takes for granted.
+pub(super) const ASSUMPTIONS: [&str; 5] = [
+    "Each lidar has a mirror of its own, as large as parts.polygon_mm and as fast as parts.tip_m_per_s allow. How much of \
+     its turn a polygon draws decides how many channels both need.",
+    "Waiting means: until the farthest thing that answers is back, with clutter at wanted.clutter_m.",
+    "A comparator and a TDC would do for single pulses that wait; they are simulated with the samples of an ADC.",
+    "Photodiodes are as large as their field behind a lens of f/1. Each sees a strip of its line, as many pixels as are \
+     fired while light is under way.",
+    "Beams fire at once, so the peak power is that of all of them. Class 1 counts what enters one eye.",
+];
 
 impl Trial {
     fn lines(&self) -> String {

@@ -2,12 +2,15 @@
 //! of them, simulated; and up to where waiting for echoes is better than a code.
 
 mod ablation;
+mod bill;
 mod candidate;
 mod closed;
 mod files;
 mod frontier;
+mod in_flight;
 mod json;
 mod listing;
+mod mirrors;
 mod page;
 mod parts;
 mod polygon;
@@ -18,14 +21,17 @@ mod trial;
 mod words;
 
 pub use ablation::Ablation;
+pub use bill::{Bill, Converter};
 pub use candidate::Candidate;
 pub use closed::{Assessed, Worst};
 pub use files::{PAGE, make_room};
 pub use frontier::{CHANNELS, Frontier, Row};
+pub use in_flight::InFlight;
+pub use mirrors::{Mirror, Side};
 pub use parts::Part;
 pub use requirements::{Parts, Requirements, Wanted, schema};
 pub use scenery::Scenery;
-pub use search::{Found, Search};
+pub use search::{Best, Found, Search, Skipped};
 pub use trial::{Counts, Trial};
 
 /// Why no lidar was searched for. Each message is one sentence.
@@ -63,7 +69,7 @@ pub enum Limit {
     Slant,
     /// Eyes allow too little light for the largest aperture.
     Light,
-    /// The corners of its polygon would be too fast.
+    /// Its polygon would be too large, or the corners too fast.
     Mirror,
     /// Simulated, it misses too many targets.
     Missed,

@@ -31,7 +31,10 @@ impl Found {
                     .figure(Figure::svg(&frontier.chart().svg(), "")),
             );
         }
-        page.section(Section::new("Simulated").table(self.table_of_trials()))
+        page.section(Section::new("Side by side").block(Block::Listing(self.side_by_side())))
+            .section(Section::new("Mirrors").block(Block::Listing(self.table_of_mirrors())))
+            .section(Section::new("Assumptions").block(Block::Listing(self.assumptions())))
+            .section(Section::new("Simulated").table(self.table_of_trials()))
             .section(
                 Section::new("What the coded one hangs on")
                     .paragraph("One thing changed at a time, all else as it is.")
@@ -99,7 +102,7 @@ impl Found {
     fn table_of_ablations(&self) -> Table {
         let mut table = Table::new("", &[("changed", Align::Left)]);
         table.header.extend(header());
-        let unchanged = self.best[0].iter().map(|best| ("nothing", &best.counts));
+        let unchanged = self.best[0].iter().map(|best| ("nothing", &best.trial.counts));
         let changed = self.ablations.iter().map(|one| (one.what.as_str(), &one.counts));
         for (what, counts) in unchanged.chain(changed) {
             let mut cells: Vec<Cell> = vec![what.into()];
@@ -162,7 +165,7 @@ impl Frontier {
             }
             let (label, style, hue) = (String::new(), Style::Joined, Hue::Grey);
             chart.series.push(Series { label, points, style, hue });
-            let most = f64::from(*channels) * self.duty / self.coded_period * 1e-6;
+            let most = f64::from(*channels) * self.coded_duty / self.coded_period * 1e-6;
             if most >= slowest && most <= fastest {
                 chart.lines.push(Line::AtY(most, format!("{channels} channels coded")));
             }

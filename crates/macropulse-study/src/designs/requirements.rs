@@ -98,6 +98,12 @@ pub struct Parts {
     /// Fastest corners of a polygon, m/s; as fast as they must be unless it is given.
     #[serde(default)]
     pub tip_m_per_s: Option<f64>,
+    /// Largest polygon, mm across its corners.
+    #[serde(default = "usual::polygon_mm")]
+    pub polygon_mm: f64,
+    /// Numbers of facets to try for each lidar; all that sweep the field unless they are given.
+    #[serde(default)]
+    pub facets: Vec<u32>,
 }
 
 /// What is taken where a file leaves something open.
@@ -136,6 +142,10 @@ mod usual {
 
     pub(super) fn energy_share() -> f64 {
         0.9
+    }
+
+    pub(super) fn polygon_mm() -> f64 {
+        400.0
     }
 }
 
@@ -229,7 +239,7 @@ impl Requirements {
             let message = format!("must be numbers from 1 to {MOST_MARKS}, one at least");
             return refuse("parts.marks", &message);
         }
-        for list in [&mut parts.beams, &mut parts.marks] {
+        for list in [&mut parts.beams, &mut parts.marks, &mut parts.facets] {
             list.sort_unstable();
             list.dedup();
         }
@@ -251,9 +261,25 @@ impl Requirements {
             folder,
             text: text.to_owned(),
         };
-        if required.parts.tip_m_per_s.is_some() && !required.has_polygon() {
-            let message = format!("has no effect: {} has no polygon", required.parts.sensor);
-            return refuse("parts.tip_m_per_s", &message);
+        if !required.has_polygon() {
+            let given = [
+                ("parts.tip_m_per_s", required.parts.tip_m_per_s.is_some()),
+                ("parts.facets", !required.parts.facets.is_empty()),
+            ];
+            if let Some((key, _)) = given.iter().find(|(_, is_given)| *is_given) {
+                let message = format!("has no effect: {} has no polygon", required.parts.sensor);
+                return refuse(key, &message);
+            }
+        }
+        let sweeps = |facets: u32| facets >= 2 && required.duty(facets) < 1.0;
+        if let Some(facets) = required.parts.facets.iter().find(|facets| !sweeps(**facets)) {
+            let message = format!(
+                "a polygon of {facets} facets does not sweep {} degrees: it takes at least 2 facets, and \
+                 fewer than {:.2}",
+                required.wanted.horizontal_deg,
+                1.0 / required.duty(1)
+            );
+            return refuse("parts.facets", &message);
         }
         Ok(required)
     }
@@ -290,6 +316,7 @@ fn limits(file: &File) -> Vec<(&'static str, f64, f64, f64)> {
     ];
     limits.extend(aperture_mm.map(|value| ("parts.aperture_mm", value, 0.1, 1e3)));
     limits.extend(file.parts.tip_m_per_s.map(|value| ("parts.tip_m_per_s", value, 0.1, 1e4)));
+    limits.push(("parts.polygon_mm", file.parts.polygon_mm, 1.0, 1e4));
     limits.extend(pulse_ps.map(|value| ("parts.pulse_ps", value, 10.0, 1e5)));
     limits
 }

@@ -95,7 +95,7 @@ impl Requirements {
     pub(super) fn with_best_words(&self, candidate: &Candidate) -> Result<Candidate, Error> {
         let Some(shortest) = candidate.words else { return Ok(candidate.clone()) };
         let design = candidate.unlimited(self)?;
-        let period = self.shortest_period(candidate.beams);
+        let period = self.shortest_period(candidate.beams, candidate.facets);
         let longest = ((LONGEST * period / self.chip()) as u32).max(shortest.length);
         let mut best: Option<(Lost, Separated)> = None;
         let mut length = shortest.length;
@@ -176,7 +176,9 @@ mod tests {
             let (pulse, bandwidth, aperture) = (510e-12, 519e6, 0.04);
             let (part, energy, words) = (required.detectors[0].clone(), DIM, None);
             let marks = 3;
-            let bare = Candidate { part, marks, beams, pulse, bandwidth, energy, aperture, words };
+            let facets = required.usual_facets();
+            let bare =
+                Candidate { part, marks, beams, facets, pulse, bandwidth, energy, aperture, words };
             let short = required.with_shortest_words(bare).unwrap();
             let best = required.with_best_words(&short).unwrap();
             let lost = |it: &Candidate| {
@@ -184,7 +186,7 @@ mod tests {
                 required.lost(&it.unlimited(&required).unwrap(), &words).at_worst
             };
             assert_eq!(best.words.unwrap().gap, 22);
-            let most = LONGEST * required.shortest_period(beams);
+            let most = LONGEST * required.shortest_period(beams, facets);
             assert!(required.macropulse(&best) <= most.max(required.macropulse(&short)));
             (lost(&short), lost(&best))
         };

@@ -1,0 +1,107 @@
+//! Single pulses, several of which are in flight: the usual way of laser scanners to fire on without a code.
+//!
+//! The times between pulses are staggered. Of an echo it is not known which of the pulses it belongs to, but only with
+//! the right one do the ranges of neighbours agree \[Rie14\]. No receiver here does that, so what stands here is a bound
+//! in closed form and no design that was simulated.
+
+use macropulse::predict::Blind;
+use macropulse::units::{SPEED_OF_LIGHT, tof_from_range};
+
+use super::Error;
+use super::bill::Bill;
+use super::candidate::Candidate;
+use super::requirements::Requirements;
+
+/// Times between pulses are spread evenly over this share of their mean: from three quarters of it to five.
+const STAGGER: f64 = 0.5;
+
+/// Ranges agree where they differ by so many standard deviations of a difference at most.
+const AGREE: f64 = 3.0;
+
+/// With how few channels single pulses could do if several of them may be in flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InFlight {
+    /// The lidar that waits, with fewer channels.
+    pub candidate: Candidate,
+    /// What it is made of.
+    pub bill: Bill,
+    /// Time between its pulses, s.
+    pub period: f64,
+    /// The least time between pulses, s: the channel is blind about each for the share of misses that is accepted.
+    pub least_period: f64,
+    /// Share of the echoes that come while the channel is blind with a later pulse.
+    pub hidden: f64,
+    /// Pulses in flight to the farthest thing that answers.
+    pub pulses: u32,
+    /// Neighbours that must agree, so that no more than the false and wrong points wanted are found by chance.
+    pub neighbours: u32,
+}
+
+impl InFlight {
+    /// That of the lidar that is `waiting`, behind the best mirror for each number of beams. `None` where none of the
+    /// numbers allowed leaves enough time.
+    pub(super) fn of(required: &Requirements, waiting: &Candidate) -> Result<Option<Self>, Error> {
+        let wanted = &required.wanted;
+        let design = waiting.unlimited(required)?;
+        let Some(blind) = design.receiver.sampling.as_ref().and_then(Blind::at_most) else {
+            return Ok(None);
+        };
+        let blind = f64::from(blind.between_ticks().ticks()) * design.tdc.tick_fs as f64 * 1e-15;
+        let least_period = blind / (1.0 - wanted.pd);
+        let with = |beams: u32| {
+            let holds =
+                |facets: &Option<u32>| required.most_aperture(beams, *facets) >= waiting.aperture;
+            let facets = required.mirrors(beams).into_iter().find(holds)?;
+            let period = required.shortest_period(beams, facets);
+            (period >= least_period).then_some((beams, facets, period))
+        };
+        let Some((beams, facets, period)) = required.parts.beams.iter().copied().find_map(with)
+        else {
+            return Ok(None);
+        };
+        let candidate = Candidate { beams, facets, ..waiting.clone() };
+        let pulses = (tof_from_range(wanted.clutter_m) / period).ceil().max(1.0);
+        let accepted = wanted.false_points.min(wanted.wrong_points);
+        Ok(Some(Self {
+            bill: Bill::of(required, &candidate)?,
+            candidate,
+            period,
+            least_period,
+            hidden: blind / period,
+            pulses: pulses as u32,
+            neighbours: neighbours(pulses, by_chance(wanted.precision_m, period), accepted),
+        }))
+    }
+}
+
+/// Probability that the range of a neighbour agrees by chance with a wrong pulse: the window of ranges that agree, over
+/// the ranges between which staggering spreads them.
+fn by_chance(precision: f64, period: f64) -> f64 {
+    let window = 2.0 * AGREE * std::f64::consts::SQRT_2 * precision;
+    (window / (STAGGER * period * SPEED_OF_LIGHT / 2.0)).min(1.0)
+}
+
+/// Neighbours of which each agrees `by_chance`, so that all of them do for one of so many `pulses` no more often than
+/// is `accepted`; as many as there can be where any number is too few.
+fn neighbours(pulses: f64, by_chance: f64, accepted: f64) -> u32 {
+    match by_chance < 1.0 {
+        true => ((accepted / pulses).ln() / by_chance.ln()).ceil().max(0.0) as u32,
+        false => u32::MAX,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 150 ns between pulses and 14 of them in flight: a window of 0.2546 m of 11.24 m agrees once in 44, and
+    /// 14·0.02265⁴ = 3.7·10⁻⁶ is rare enough, 14·0.02265³ = 1.6·10⁻⁴ is not.
+    #[test]
+    fn wrong_pulses_need_more_neighbours_to_agree_by_chance() {
+        let chance = by_chance(0.03, 150e-9);
+        approx::assert_relative_eq!(chance, 0.022646, max_relative = 1e-3);
+        assert_eq!(neighbours(14.0, chance, 1e-4), 4);
+        assert_eq!(neighbours(14.0, chance, 2e-4), 3);
+        assert_eq!(neighbours(14.0, 1.0, 1e-4), u32::MAX);
+    }
+}
