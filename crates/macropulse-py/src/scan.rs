@@ -238,7 +238,7 @@ impl Scan {
     }
 
     /// Truth: how the return came out, an index into `macropulse.OUTCOMES`: 1 right, 2 near, 3
-    /// wrong, 5 false.
+    /// wrong, 5 false, 6 edge.
     #[getter]
     fn outcome<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         column!(slf, "outcome")

@@ -260,7 +260,7 @@ fn axis(key: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
 ///
 /// Returns:
 ///     A dictionary: `outcomes` of the pixels, `further_outcomes` of second and later returns,
-///     `right_fraction` of the pixels with a surface in the gate, and of the right points `count`,
+///     `right_fraction` of the pixels with a surface in the gate, edges left out, and of the right points `count`,
 ///     `mean_m` and `deviation_m` of the range error.
 ///
 /// Raises:
@@ -282,14 +282,14 @@ pub fn score<'py>(scan: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     }
     let cloud = &this.cloud;
     let image = cloud.image(cloud.pick);
-    let (mut pixels, mut further) = ([0_u64; 6], [0_u64; 6]);
+    let (mut pixels, mut further) = ([0_u64; Outcome::ALL.len()], [0_u64; Outcome::ALL.len()]);
     for pixel in 0..image.len() {
         pixels[image.surface(cloud, pixel).outcome as usize] += 1;
     }
     for (outcome, number) in cloud.truth.returns.outcome.iter().zip(&cloud.return_number) {
         further[*outcome as usize] += u64::from(*number > 1);
     }
-    let named = |counts: [u64; 6]| {
+    let named = |counts: [u64; Outcome::ALL.len()]| {
         let named = Outcome::ALL.iter().map(|one| one.name().to_owned());
         Value::Object(named.zip(counts.map(Value::from)).collect())
     };

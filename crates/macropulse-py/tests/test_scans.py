@@ -114,7 +114,7 @@ def test_images_have_the_shape_of_the_sensor(scan, sensor):
     assert shown.sum() == len(pixels) < image.size
     ints = scan.image("peak", pick="first")
     assert ints.dtype == np.uint16 and (ints[~shown] == 0).all()
-    outcomes = np.bincount(scan.image("outcome").ravel(), minlength=6)
+    outcomes = np.bincount(scan.image("outcome").ravel(), minlength=7)
     told = [scan.score["outcomes"][name] for name in mp.OUTCOMES]
     assert outcomes.tolist() == told
     missed = scan.image("outcome") == mp.OUTCOMES.index("missed")

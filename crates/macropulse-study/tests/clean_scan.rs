@@ -80,9 +80,9 @@ fn samples_on_car(design: &Design, scene: &Scene) -> u64 {
     let scale = Scale::of(design, &Operating::of(design, &scene.environment).unwrap());
     let judged = bands(design, 0).map(|band| {
         let log = band.shot_log(design);
-        let hits = scene.trace(design, &log).middle;
+        let traced = scene.trace(design, &log);
         let mut nothing = Piece::of(design, &scale, &log, &Returns::default());
-        score::judge(&mut nothing, design, scene, &log, &hits).samples_on_target
+        score::judge(&mut nothing, design, scene, &log, &traced).samples_on_target
     });
     judged.sum()
 }

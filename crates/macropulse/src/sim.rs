@@ -15,7 +15,7 @@ use crate::emit::{Band, bands, scan_begins_fs};
 use crate::points::{Piece, PointCloud, Scale, Viewpoint};
 use crate::processor::thread_seconds;
 use crate::random::Chance;
-use crate::scene::{Hits, Pose, Scene};
+use crate::scene::{Pose, Scene, Traced};
 use crate::score::{self, Score};
 use crate::tdc::{Converted, Wanted};
 use crate::{channel, tdc};
@@ -259,7 +259,7 @@ pub struct Record<'a> {
 /// What is kept of a band: the receiver's side, and the truth to judge it by.
 struct Measured<'a> {
     log: ShotLog,
-    hits: Hits,
+    traced: Traced,
     light: Light<'a>,
     given: Given,
     returns: Returns,
@@ -272,7 +272,7 @@ impl Measured<'_> {
         let Seen { design, scene, .. } = *seen;
         let began = Instant::now();
         piece.fill(design, scale, &self.log, &self.returns);
-        let mut score = score::judge(piece, design, scene, &self.log, &self.hits);
+        let mut score = score::judge(piece, design, scene, &self.log, &self.traced);
         score.ghosts = score::ghosts(piece, design, &self.log, &self.light);
         self.tally.seconds[POINTS] += began.elapsed().as_secs_f64();
         (score, self.tally, self.given)
@@ -336,7 +336,7 @@ fn measure<'a>(
     let unknown = (known.first - log.first) as u32;
     returns.shot.iter_mut().for_each(|shot| *shot += unknown);
     lap(&mut tally);
-    let hits = traced.middle;
+    let hits = &traced.middle;
     let gates = design.scan.gates();
     let before = |shot: usize| hits.shot.partition_point(|other| (*other as usize) < shot);
     let met = before(log.owned.start)..before(log.owned.end);
@@ -362,7 +362,7 @@ fn measure<'a>(
         tally.by_number[usize::from(number - 1)] += 1;
     }
     tally.rejects = returns.rejects;
-    Ok(Measured { log, hits, light, given, returns, tally })
+    Ok(Measured { log, traced, light, given, returns, tally })
 }
 
 /// The last stage, after those of a band: its points and their score.

@@ -69,6 +69,7 @@ fn strays(score: &Score) -> [u64; 2] {
         Outcome::Wrong,
         Outcome::False,
         Outcome::Missed,
+        Outcome::Edge,
     ];
     let count = |outcomes: &[Outcome]| outcomes.iter().map(|one| score.count(*one)).sum();
     [count(&[Outcome::Wrong, Outcome::False]), count(&all)]

@@ -20,6 +20,8 @@ pub enum Metric {
     Missed,
     /// Returns where nothing is, per pixel.
     False,
+    /// Returns from a surface beside the pixel, per pixel.
+    Edge,
     /// Samples of the target with a point.
     Target,
     /// Returns of a scan.
@@ -36,13 +38,14 @@ pub enum Metric {
 
 impl Metric {
     /// All of them, in the order in which they are listed to people.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Pd,
         Self::Right,
         Self::Near,
         Self::Wrong,
         Self::Missed,
         Self::False,
+        Self::Edge,
         Self::Target,
         Self::Points,
         Self::Precision,
@@ -60,6 +63,7 @@ impl Metric {
             Self::Wrong => "wrong",
             Self::Missed => "missed",
             Self::False => "false",
+            Self::Edge => "edge",
             Self::Target => "target",
             Self::Points => "points",
             Self::Precision => "precision",
@@ -79,6 +83,7 @@ impl Metric {
             Self::Wrong => "share of the echoes that came out wrong, farther off than near",
             Self::Missed => "share of the echoes that gave no return",
             Self::False => "share of all pixels with a return where nothing is",
+            Self::Edge => "share of all pixels with a return from a surface beside the pixel",
             Self::Target => "share of the rays that meet the target which gave a point on it",
             Self::Points => "returns per scan, or per measured part of it",
             Self::Precision => "standard deviation of the range error of right points, m",
@@ -128,6 +133,9 @@ impl Metric {
         };
         let mean = |of: &dyn Fn(&Counted) -> f64| {
             Estimate::of_mean(&counted.iter().map(of).collect::<Vec<_>>())
+        let per_pixel = |outcome: Outcome| {
+            rate(&|counted| [counted.score.count(outcome), counted.score.pixels.iter().sum()])
+        };
         };
         match self {
             Self::Pd => rate(&|counted| {
@@ -141,15 +149,14 @@ impl Metric {
                 let score = &counted.score;
                 [score.count(Outcome::Missed) - score.dark, score.with_echo()]
             }),
-            Self::False => rate(&|counted| {
-                [counted.score.count(Outcome::False), counted.score.pixels.iter().sum()]
-            }),
+            Self::False => per_pixel(Outcome::False),
+            Self::Edge => per_pixel(Outcome::Edge),
             Self::Target => {
                 rate(&|counted| [counted.score.points_on_target, counted.score.samples_on_target])
             }
             Self::Points => mean(&|counted| {
-                let all = [Outcome::Right, Outcome::Near, Outcome::Wrong, Outcome::False];
-                all.map(|outcome| counted.score.count(outcome)).iter().sum::<u64>() as f64
+                let silent = [Outcome::Empty, Outcome::Missed].map(|one| counted.score.count(one));
+                (counted.score.pixels.iter().sum::<u64>() - silent.iter().sum::<u64>()) as f64
             })
             .at_least(0.0),
             Self::Precision => {
@@ -167,15 +174,15 @@ mod tests {
     use super::*;
     use macropulse::score::{RangeError, Score};
 
-    /// 100 pixels: 10 empty, 60 right, 5 near, 4 wrong, 20 missed (2 of them dark), 1 false.
+    /// 100 pixels: 7 empty, 60 right, 5 near, 4 wrong, 20 missed (2 of them dark), 1 false, 3 edges.
     fn counted() -> Counted {
         let score = Score {
-            pixels: [10, 60, 5, 4, 20, 1],
+            pixels: [7, 60, 5, 4, 20, 1, 3],
             dark: 2,
             samples_on_target: 8,
             points_on_target: 6,
             ghosts: 2,
-            further: [0; 6],
+            further: [0; 7],
         };
         let right = RangeError { count: 60, mean: Some(1e-4), deviation: Some(2e-4) };
         Counted { score, detections: 1000, lost: 5, peak_busy: 7, right, ..Counted::default() }
@@ -191,7 +198,8 @@ mod tests {
             18.0 / 87.0,
             0.01,
             0.75,
-            70.0,
+            73.0,
+            0.03,
             2e-4,
             1e-4,
             0.005,

@@ -438,6 +438,6 @@ mod tests {
         for outcome in Outcome::ALL {
             assert_eq!(outcome_from_code(outcome as u8), Some(outcome));
         }
-        assert_eq!(outcome_from_code(6), None);
+        assert_eq!(outcome_from_code(7), None);
     }
 }

@@ -141,7 +141,7 @@ fn osi(attribute: Attribute) -> Holding {
         Attribute::TimeNs => Partly("of the scan alone"),
         Attribute::TrueRange => Partly("`time_of_flight` of a reflection"),
         Attribute::Object => Partly("`object_id`"),
-        Attribute::Outcome => Partly("`classification`: right and near, wrong, false"),
+        Attribute::Outcome => Partly("`classification`: right, near and edge, wrong, false"),
         _ => Not,
     }
 }

@@ -230,7 +230,8 @@ impl Record {
             ));
         }
         if attribute == Outcome && outcome_from_code(value as u8).is_none() {
-            return Err(format!("point {at} has the outcome {value}; known are 0 to 5"));
+            let last = crate::points::Outcome::ALL.len() - 1;
+            return Err(format!("point {at} has the outcome {value}; known are 0 to {last}"));
         }
         self.0[attribute as usize] = value;
         Ok(())

@@ -33,12 +33,15 @@ pub enum Outcome {
     Missed = 4,
     /// An answer where no surface is.
     False = 5,
+    /// An answer from a surface beside the pixel, which a part of the macropulse met while the
+    /// mirror moved on.
+    Edge = 6,
 }
 
 impl Outcome {
     /// All outcomes, in the order of their numbers.
-    pub const ALL: [Self; 6] =
-        [Self::Empty, Self::Right, Self::Near, Self::Wrong, Self::Missed, Self::False];
+    pub const ALL: [Self; 7] =
+        [Self::Empty, Self::Right, Self::Near, Self::Wrong, Self::Missed, Self::False, Self::Edge];
 
     /// Name used in files and reports.
     pub fn name(self) -> &'static str {
@@ -49,6 +52,7 @@ impl Outcome {
             Self::Wrong => "wrong",
             Self::Missed => "missed",
             Self::False => "false",
+            Self::Edge => "edge",
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Measurement against truth: the only stage that sees both sides.
 
+mod edge;
 mod ghosts;
 mod interval;
 mod range_error;
@@ -10,7 +11,8 @@ pub use range_error::RangeError;
 
 use crate::design::Design;
 use crate::points::{Outcome, Piece, Surface};
-use crate::scene::{Hits, Scene};
+use crate::scene::{Scene, Traced};
+use edge::edge;
 use macropulse_codec::ShotLog;
 
 /// A return this far from the truth still comes from the right macropulse, m: code sidelobes lie
@@ -21,7 +23,7 @@ pub const NEAR: f64 = 0.35;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Score {
     /// Pixels by outcome, in the order of [`Outcome::ALL`].
-    pub pixels: [u64; 6],
+    pub pixels: [u64; Outcome::ALL.len()],
     /// Pixels with a surface whose shot carried no light, because its payload has no 1 bit. They
     /// come out as missed, but there was no echo to decode.
     pub dark: u64,
@@ -32,7 +34,7 @@ pub struct Score {
     /// Second and later returns of all shots by outcome, in the order of [`Outcome::ALL`]; each is
     /// judged against all surfaces along its beam.
     #[serde(default)]
-    pub further: [u64; 6],
+    pub further: [u64; Outcome::ALL.len()],
     /// Wrong and false returns that light of other lidars has made, as [`ghosts()`] has it.
     pub ghosts: u64,
 }
@@ -48,7 +50,8 @@ impl Score {
         self.further[outcome as usize]
     }
 
-    /// Pixels that have an echo: a surface within the range gate, and a shot with light.
+    /// Pixels with an echo of their own: a surface within the range gate, and a shot with light.
+    /// Those that came out as an edge do not count: they are neither right nor wrong.
     pub fn with_echo(&self) -> u64 {
         let with_surface = [Outcome::Right, Outcome::Near, Outcome::Wrong, Outcome::Missed];
         with_surface.map(|outcome| self.count(outcome)).iter().sum::<u64>() - self.dark
@@ -73,16 +76,19 @@ impl Score {
 /// Compares the returns of a band with what its owned shots met, and writes the truth beside them.
 ///
 /// A return is right if any surface along its beam lies within the sensor's tolerance: behind
-/// glass there are several. The truth written is that of the surface the return came from; of the
-/// first one met where none fits. A pixel comes out as the return does that its image shows.
+/// glass there are several. Where the mirror moves during a macropulse, a part of it may meet a
+/// surface that the middle of it misses: a return from there is an edge. The truth written is
+/// that of the surface the return came from; of the first one met where none fits. A pixel comes
+/// out as the return does that its image shows.
 pub fn judge(
     piece: &mut Piece,
     design: &Design,
     scene: &Scene,
     log: &ShotLog,
-    hits: &Hits,
+    traced: &Traced,
 ) -> Score {
     let mut score = Score::default();
+    let hits = &traced.middle;
     let gates = design.scan.gates();
     let mut next = hits.shot.partition_point(|&shot| (shot as usize) < log.owned.start);
     let mut at = 0;
@@ -108,27 +114,23 @@ pub fn judge(
         let met = (first..next).filter(|&i| gate.contains(&hits.range[i]));
         let surface = |i: Option<usize>, outcome: Outcome| match i {
             None => Surface { outcome, ..Surface::NONE },
-            Some(i) => Surface {
-                range: hits.range[i] as f32,
-                object: hits.object[i],
-                material: hits.material[i],
-                cosine: hits.cosine[i],
-                outcome,
-            },
+            Some(i) => edge::surface(hits, i, outcome),
         };
         let on_target = |i: usize| scene.objects[usize::from(hits.object[i])].is_target;
         let pixel = shot - log.owned.start;
         let follows = piece.shot.get(at + 1).is_some_and(|&of| of as usize == shot);
         if next == first + 1 && !is_silent && !follows && gate.contains(&hits.range[first]) {
             // One surface and one return, as nearly always: the steps below come to this.
-            let outcome = outcome(Some(hits.range[first] - f64::from(piece.points.range[at])));
+            let measured = f64::from(piece.points.range[at]);
+            let judged = surface(Some(first), outcome(Some(hits.range[first] - measured)));
+            let judged = edge(judged, traced, shot, (&gate, measured));
             let is_on_target = on_target(first);
-            let answered = matches!(outcome, Outcome::Right | Outcome::Near);
-            piece.points.truth.returns.set(at, surface(Some(first), outcome));
-            piece.points.truth.pixels.outcome[pixel] = outcome;
+            let answered = matches!(judged.outcome, Outcome::Right | Outcome::Near);
+            piece.points.truth.returns.set(at, judged);
+            piece.points.truth.pixels.outcome[pixel] = judged.outcome;
             score.samples_on_target += u64::from(is_on_target);
             score.points_on_target += u64::from(is_on_target && answered);
-            score.pixels[outcome as usize] += 1;
+            score.pixels[judged.outcome as usize] += 1;
             at += 1;
             continue;
         }
@@ -142,7 +144,9 @@ pub fn judge(
             let outcome = outcome(nearest.map(error));
             let answered = matches!(outcome, Outcome::Right | Outcome::Near);
             let source = if answered { nearest } else { met.clone().next() };
-            piece.points.truth.returns.set(at, surface(source, outcome));
+            let judged = edge(surface(source, outcome), traced, shot, (&gate, measured));
+            let outcome = judged.outcome;
+            piece.points.truth.returns.set(at, judged);
             let points = &piece.points;
             let is_further = points.return_number[at] > 1;
             score.further[outcome as usize] += u64::from(is_further);

@@ -343,7 +343,7 @@ fn detection(cloud: &PointCloud, at: usize) -> LidarDetection {
 /// What consumers of detections are to take a return for.
 fn classification(outcome: &Outcome) -> i32 {
     match outcome {
-        Outcome::Right | Outcome::Near => SURFACE,
+        Outcome::Right | Outcome::Near | Outcome::Edge => SURFACE,
         Outcome::Wrong => INVALID,
         Outcome::False | Outcome::Empty | Outcome::Missed => CLUTTER,
     }
