@@ -357,7 +357,7 @@ fn png_is_16_bit_grey_with_its_scale_inside() {
 fn a_name_of_two_lines_is_told_in_one() {
     let (_folder, npy) = write(Format::Npy, &cloud(false));
     let bytes = fs::read(&npy).unwrap();
-    let (plain, odd) = (b"('range', '<f4')", b"('ran\ne', '>f4')");
+    let (plain, odd) = (b"('range', '<f4')", b"('ran\ne', '<c4')");
     let at = bytes.windows(plain.len()).position(|part| part == plain).unwrap();
     let bytes = [&bytes[..at], odd, &bytes[at + plain.len()..]].concat();
     let sentence = refusal(&npy, &bytes, read_cloud);
