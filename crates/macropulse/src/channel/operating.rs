@@ -98,11 +98,11 @@ impl Operating {
         if let Some(why) = detector.refusal(background) {
             return Err(refuse(why));
         }
-        Ok(Self {
-            link: Link::of(design, environment),
-            background,
-            false_rate: detector.false_rate(background),
-        })
+        let false_rate = detector.false_rate(background);
+        if let Some(why) = design.too_many_counts(false_rate) {
+            return Err(refuse(why));
+        }
+        Ok(Self { link: Link::of(design, environment), background, false_rate })
     }
 }
 

@@ -65,13 +65,17 @@ impl Design {
         (most * FS_PER_S as f64).ceil() as i64
     }
 
+    /// For how long guard shots must be known around the shots of a band, on both sides together, fs.
+    pub(super) fn around_fs(&self) -> i64 {
+        let cut = self.cut();
+        cut.history_fs + cut.listening_fs + cut.lead_fs
+    }
+
     /// The longest time from the first to the last shot of a band without its guard shots, fs; negative
     /// where not even one shot has room.
     pub fn longest_band_fs(&self) -> i64 {
         let counted = i64::from(u32::MAX / PARTS_OF_TICK).saturating_mul(self.tdc.tick_fs);
-        let cut = self.cut();
-        // Guard shots on both sides, and the light of the last one.
-        let around = cut.history_fs + cut.listening_fs + cut.lead_fs + self.light_fs();
+        let around = self.around_fs() + self.light_fs();
         // The clock starts at one of its own periods, and jitter goes both ways.
         counted - around - 2 * self.most_jitter_fs() - 2 * self.tdc.clock_fs
     }

@@ -143,6 +143,12 @@ impl Check<'_> {
         let first = self.count("code.word.first", file.word.first, 0, words - modulus)?;
         let codebook = Codebook::new(family, payload, labels, keying)
             .or_else(|error| self.refuse("code", error.to_string()))?;
+        if codebook.max_weight() == 0 {
+            return self.refuse(
+                "code.allow_dark",
+                "no label of this sensor sends any light: set sync_bit = true, or another crc init",
+            );
+        }
         Ok(Coding {
             codebook,
             chip_fs,

@@ -26,6 +26,7 @@ pub mod safety;
 mod scan;
 mod schema;
 mod tdc;
+mod work;
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -46,6 +47,7 @@ pub use scan::{
 };
 pub use schema::schema;
 pub use tdc::Tdc;
+pub use work::SHOTS_OF_BAND;
 
 use crate::digest::Digest;
 use macropulse_codec::decode::Receiver;

@@ -3,12 +3,13 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::band::TOO_FINE;
 use super::detector::{DetectorFile, Sampled};
 use super::limits::Check;
 use super::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
-use macropulse_codec::decode::{Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind, Sampling};
+use macropulse_codec::decode::{
+    self, Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind, Sampling,
+};
 
 /// Marks by which a receiver of samples decides at least if its file does not say: one alone may be that of
 /// any shot.
@@ -113,14 +114,19 @@ impl Check<'_> {
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         let light = ticks(scan.light_range);
         if light >= i64::from(u32::MAX / PARTS_OF_TICK) {
-            return self.refuse("tdc.resolution_ps", TOO_FINE);
+            return self.too_fine(samples);
         }
-        Ok(Receiver {
+        let Ok(ticks_per_chip) = u32::try_from(coding.chip_fs / tdc.tick_fs) else {
+            let most = u32::MAX;
+            let message = format!("is more than {most} ticks: use longer ticks or shorter chips");
+            return self.refuse("code.chip_ps", message);
+        };
+        let receiver = Receiver {
             kind,
             effort: file.effort,
             gate_ticks: (gate.0 as u32, gate.1 as u32),
             light_ticks: light as u32,
-            ticks_per_chip: (coding.chip_fs / tdc.tick_fs) as u32,
+            ticks_per_chip,
             tick_fs: tdc.tick_fs,
             jitter_ticks: timing * 1e15 / tdc.tick_fs as f64,
             photons_apart,
@@ -135,7 +141,19 @@ impl Check<'_> {
             returns,
             pick,
             sampling: self.sampling(file, coding, sampled)?,
-        })
+        };
+        // What the receiver itself asks before it decodes; the keys ask most of it already.
+        match receiver.check(&coding.codebook) {
+            Err(decode::Error::TooLong { what, ticks, possible }) => self.refuse(
+                "code",
+                format!(
+                    "{what} of {ticks} ticks is too long to be kept in memory; up to {possible} are \
+                     possible: use longer ticks, shorter chips or a shorter code"
+                ),
+            ),
+            Err(why) => self.refuse("receiver", why.to_string()),
+            Ok(()) => Ok(receiver),
+        }
     }
 
     /// What a receiver of samples knows of a `sampled` detector.

@@ -4,20 +4,13 @@
 //! the bytes that come out do not depend on it either.
 
 use std::iter::repeat_n;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use super::times::{EqualSteps, fired_at_fs};
-use crate::design::Design;
+use crate::design::{Design, SHOTS_OF_BAND};
 use macropulse_codec::ShotLog;
 
-/// A band holds about this many shots, in whole lines: few enough for the detection events of a coded sensor
-/// to stay in a cache, enough for the guard shots, 125 of `kim-park-2016`, to be a small part. With half as many that
-/// takes a twentieth longer, and of 407 040 shots of `street` as declared 75 instead of 62 are near their surface and
-/// not on it (mean of seeds 5, 101, 202, 303), as less is known of their neighbours. These are four of its lines; five
-/// are more than [`Design::longest_band_fs`] allows.
-const SHOTS: u64 = 3400;
-
-/// The same where a few bands stand for a scan: short, so that some thousand shots come from several places.
+/// About as many shots are in a band where a few bands stand for a scan: so few that some thousand shots come from several places.
 const SHOTS_OF_FEW: u64 = 1700;
 
 /// Shots of a log that are worked out together.
@@ -36,7 +29,7 @@ pub struct Band {
 
 /// The bands of scan number `scan`, in the order of time.
 pub fn bands(design: &Design, scan: u64) -> impl Iterator<Item = Band> {
-    bands_of(design, scan, SHOTS)
+    bands_of(design, scan, SHOTS_OF_BAND)
 }
 
 /// Bands half as long, of which a few are computed where they are to stand for the whole scan.
@@ -48,11 +41,38 @@ pub fn short_bands(design: &Design, scan: u64) -> impl Iterator<Item = Band> {
 fn bands_of(design: &Design, scan: u64, shots: u64) -> impl Iterator<Item = Band> {
     let total = design.shots_per_scan();
     let step = shots_of_band(design, shots);
-    (0..total.div_ceil(step)).map(move |n| Band {
-        scan,
-        first: n * step,
-        shots: step.min(total - n * step),
+    (0..total.div_ceil(step)).flat_map(move |n| {
+        let mut next = n * step;
+        let end = total.min(next + step);
+        std::iter::from_fn(move || {
+            let first = next;
+            next = first + fitting(design, scan, first..end);
+            (first < end).then_some(Band { scan, first, shots: next - first })
+        })
     })
+}
+
+/// How many of these `shots` of a scan, from the first on, the clock of one band counts: all of them, unless
+/// there is a pause between them that is longer.
+fn fitting(design: &Design, scan: u64, shots: Range<u64>) -> u64 {
+    let count = shots.end.saturating_sub(shots.start);
+    let fired = |shot: u64| fired_at_fs(design, scan, shots.start + shot);
+    let room_fs = design.longest_band_fs();
+    let fits = |count: u64| fired(count - 1) - fired(0) <= room_fs;
+    most(1..=count, fits)
+}
+
+/// The last of these `counts` for which `fits` is true, which it is up to there; the first if it never is.
+fn most(counts: RangeInclusive<u64>, fits: impl Fn(u64) -> bool) -> u64 {
+    let (mut low, mut high) = counts.into_inner();
+    if low > high || fits(high) {
+        return high;
+    }
+    while high - low > 1 {
+        let middle = u64::midpoint(low, high);
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    low
 }
 
 /// Shots of every band but the last, about so many `shots`: whole lines, or equal parts of a line where a line
@@ -71,18 +91,23 @@ fn shots_of_band(design: &Design, shots: u64) -> u64 {
     // A mirror that swings is slowest at the ends of a line.
     let lasts_fs =
         |from: u64, to: u64| fired_at_fs(design, 0, to - 1) - fired_at_fs(design, 0, from);
-    let fits = |shots: &u64| lasts_fs(0, *shots).max(lasts_fs(line - shots, line)) <= room_fs;
-    let parts = (2..=line).map(|parts| line.div_ceil(parts));
-    parts.into_iter().find(fits).unwrap_or(1)
+    let fits = |shots: u64| lasts_fs(0, shots).max(lasts_fs(line - shots, line)) <= room_fs;
+    // The fewest parts that are short enough, as equal as they can be.
+    let longest = most(1..=line.div_ceil(2), fits);
+    line.div_ceil(line.div_ceil(longest))
 }
 
 impl Band {
     /// The band that owns `shot`, counted from the first shot of the first scan.
     pub fn of_shot(design: &Design, shot: u64) -> Self {
         let total = design.shots_per_scan();
-        let step = shots_of_band(design, SHOTS);
-        let first = shot % total / step * step;
-        Self { scan: shot / total, first, shots: step.min(total - first) }
+        let step = shots_of_band(design, SHOTS_OF_BAND);
+        let (scan, shot) = (shot / total, shot % total);
+        let mut band = Self::from(design, scan, shot / step * step);
+        while band.first + band.shots <= shot {
+            band = Self::from(design, scan, band.first + band.shots);
+        }
+        band
     }
 
     /// The shot behind its last one, counted from the first shot of the first scan.
@@ -95,7 +120,14 @@ impl Band {
         let first = self.first + self.shots;
         let total = design.shots_per_scan();
         let (scan, first) = if first < total { (self.scan, first) } else { (self.scan + 1, 0) };
-        Self { scan, first, shots: shots_of_band(design, SHOTS).min(total - first) }
+        Self::from(design, scan, first)
+    }
+
+    /// The band that begins with shot `first` of a scan.
+    fn from(design: &Design, scan: u64, first: u64) -> Self {
+        let step = shots_of_band(design, SHOTS_OF_BAND);
+        let end = design.shots_per_scan().min((first / step + 1) * step);
+        Self { scan, first, shots: fitting(design, scan, first..end) }
     }
 
     /// The ticks that the receiver is given of the band, absolute; and those of them that are the

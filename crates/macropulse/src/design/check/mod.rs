@@ -7,7 +7,6 @@ use std::sync::OnceLock;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::band::TOO_FINE;
 use super::budget::{self, BudgetFile, OpticsFile, SafetyFile};
 use super::coding::CodeFile;
 use super::detector::{Before, DetectorFile, Efficiency};
@@ -106,7 +105,9 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         directions: OnceLock::new(),
     };
     let check = Check { chain };
-    faults.keep(check.clock(&design));
+    if faults.keep(check.clock(&design)).is_some() {
+        faults.keep(check.work(&design));
+    }
     faults.keep(check.timing(&mut design));
     faults.keep(check.facets(&design));
     if faults.is_empty() { Ok(design) } else { Err(faults.into_error(chain)) }
@@ -319,7 +320,7 @@ impl Check<'_> {
     /// one go.
     fn clock(&self, design: &Design) -> Result<(), Error> {
         if design.longest_band_fs() < 0 {
-            return self.refuse("tdc.resolution_ps", TOO_FINE);
+            return self.too_fine(design.is_sampled());
         }
         Ok(())
     }

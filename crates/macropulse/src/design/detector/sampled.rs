@@ -37,6 +37,9 @@ const MOST_REMEMBERED: f64 = 16_777_216.0;
 /// Light shows where it is so many deviations of the noise high.
 const SHOWS: f64 = 4.0;
 
+/// A step of more photons is none that a receiver accepts: a photon would be less than 10⁻⁹ codes.
+const COARSEST_STEP: f64 = 1e9;
+
 /// A pulse is told to the receiver to so many of its rms lengths: there it is 4·10⁻⁶ of its height.
 const REACH: f64 = 5.0;
 
@@ -88,7 +91,7 @@ pub(super) struct File {
     #[schemars(range(min = 4, max = 15))]
     bits: u32,
     /// One step of a code, in the height of a mark of so many detected photons.
-    #[schemars(range(min = 1e-6, max = 1e12))]
+    #[schemars(range(min = 1e-6, max = 1e9))]
     step_photons: f64,
 }
 
@@ -161,17 +164,7 @@ impl Typed for File {
             dark_current: within("dark_current_na", self.dark_current_na, 1e6)? * 1e-9,
             pulse: table.before.light.pulse,
         };
-        let sample = table.within("sample_ps", self.sample_ps, 1e-3, 1e9)? * 1e-12;
-        if sample > 1.5 * front_end.mark_rms() {
-            let message = format!(
-                "is {} ps, too long for a mark that is {:.0} ps long (rms) behind the amplifier: take \
-                 {:.0} ps at most, or less bandwidth",
-                self.sample_ps,
-                front_end.mark_rms() * 1e12,
-                1.5e12 * front_end.mark_rms()
-            );
-            return table.refuse_key("sample_ps", message);
-        }
+        let sample = self.sample(table, &front_end)?;
         let bits = table.count("bits", self.bits, 4, 15)?;
         let codes = f64::from(1 << bits);
         let low_cutoff = self.low_cutoff(table, &front_end, (sample, codes))?;
@@ -183,20 +176,62 @@ impl Typed for File {
             front_end,
             jitter: table.jitter(self.jitter_ps)?,
             stray: detected * libm::pow(10.0, -isolation / 10.0),
-            recovery: within("recovery_ns", self.recovery_ns, 1e6)? * 1e-9,
+            recovery: self.recovery(table, sample)?,
             sample,
             codes: ((-(1.0 - ABOVE) * codes) as i16, (ABOVE * codes) as i16),
-            step: table.within("step_photons", self.step_photons, 1e-6, 1e12)?,
+            step: table.within("step_photons", self.step_photons, 1e-6, COARSEST_STEP)?,
             low_cutoff,
         }))
     }
 }
 
 impl File {
+    /// From sample to sample, s. The receiver is told of a mark to [`REACH`] rms lengths, in [`STEPS_OF_TICK`]
+    /// steps a sample, of which it takes no more than [`Sampling::MOST_ENTRIES`].
+    fn sample(&self, table: &Table, front_end: &FrontEnd) -> Result<f64, Error> {
+        let sample = table.within("sample_ps", self.sample_ps, 1e-3, 1e9)? * 1e-12;
+        let rms = front_end.mark_rms();
+        let entries_by_rms = 2.0 * REACH * STEPS_OF_TICK as f64;
+        let shortest = rms * entries_by_rms / (Sampling::MOST_ENTRIES - 3) as f64;
+        let (does_not_fit, remedy) = match () {
+            () if sample > 1.5 * rms => {
+                ("long", format!("{:.0} ps at most, or less bandwidth", 1.5e12 * rms))
+            }
+            () if sample < shortest => (
+                "short",
+                format!("{:.3} ps or more, shorter pulses or more bandwidth", shortest * 1e12),
+            ),
+            () => return Ok(sample),
+        };
+        let message = format!(
+            "is {} ps, too {does_not_fit} for a mark that is {:.0} ps long (rms) behind the amplifier: \
+             take {remedy}",
+            self.sample_ps,
+            rms * 1e12
+        );
+        table.refuse_key("sample_ps", message)
+    }
+
+    /// How long behind a clipped pulse the signal stays at its limit, s.
+    fn recovery(&self, table: &Table, sample: f64) -> Result<f64, Error> {
+        let recovery = table.within("recovery_ns", self.recovery_ns, 0.0, 1e6)? * 1e-9;
+        let most = MOST_REMEMBERED * sample;
+        if recovery <= most {
+            return Ok(recovery);
+        }
+        let message = format!(
+            "is {} ns, more than {MOST_REMEMBERED} samples: take {:.1} ns at most, or longer samples",
+            self.recovery_ns,
+            (most * 1e10).floor() * 0.1
+        );
+        table.refuse_key("recovery_ns", message)
+    }
+
     /// The low cutoff as an angular frequency, 1/s, of a converter with so many `codes`.
     ///
     /// As a hundredth of the bandwidth it takes 2 % away from what follows a mark at once; more, and the pulse
-    /// would no longer be the one that the receiver knows.
+    /// would no longer be the one that the receiver knows. Nor does it know a baseline that comes back within a
+    /// sample.
     fn low_cutoff(
         &self,
         table: &Table,
@@ -208,13 +243,14 @@ impl File {
         if cutoff == 0.0 {
             return Ok(0.0);
         }
-        let highest = front_end.bandwidth / 100.0;
+        let highest = (front_end.bandwidth / 100.0).min(1.0 / (TAU * sample));
         let lowest = remembered(codes) / (TAU * MOST_REMEMBERED * sample);
         if cutoff > highest || cutoff < lowest {
             let message = format!(
                 "is {}, but must be 0 or lie between {:.3} and {:.0}: below, the baseline remembers more \
                  than {MOST_REMEMBERED} samples, and 0 leaves it where it is; above a hundredth of the \
-                 bandwidth pulses are no longer those of `bandwidth_mhz`",
+                 bandwidth, or where it comes back within a sample, pulses are no longer those of \
+                 `bandwidth_mhz`",
                 self.low_cutoff_khz,
                 lowest * 1e-3,
                 highest * 1e-3
@@ -404,14 +440,13 @@ impl Model for Sampled {
     }
 
     fn summary(&self) -> String {
-        let Sensitivity { photons, range, reflectance } = self.sensitivity;
         format!(
-            "sampled every {} ps in {} steps of {} photons; noise {:.1} photons in the dark; \
-             {photons:.2} photons a mark from reflectance {reflectance} at {range} m",
+            "sampled every {} ps in {} steps of {} photons; noise {:.1} photons in the dark; {}",
             fs_from_s(self.sample) as f64 / (FS_PER_S as f64 * 1e-12),
             i32::from(self.codes.1) - i32::from(self.codes.0),
             self.step,
             self.rms_noise(0.0),
+            self.sensitivity.summary(),
         )
     }
 
