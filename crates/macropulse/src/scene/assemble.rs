@@ -26,6 +26,7 @@ use super::pose::Pose;
 use super::readers::{self, Reach, Read, WithoutMaterials};
 use super::room::Room;
 use super::spanned::Spanned;
+use super::typed::{FARTHEST, is_length};
 use super::{Object, Scene};
 use crate::digest::Digest;
 use crate::environment::Environment;
@@ -246,6 +247,13 @@ impl Assembly<'_> {
         let known = self.meshes.of(&origin, || read(&origin, given, (reach, room)))?;
         let mesh = Rc::clone(&known.mesh);
         self.warnings.extend(known.left_out.iter().map(|said| format!("{name}: {said}")));
+        if let Some(path) = written.mesh.as_ref().filter(|_| !reaches_no_farther(&mesh)) {
+            let message = format!(
+                "{name}: its mesh reaches farther than {FARTHEST:e} m from its origin; give it another \
+                 `unit` or `scale`, or export it again"
+            );
+            return Err(self.source.fault(path.span(), message));
+        }
         if origin != Origin::Car {
             let ([x, y, z], count) = (known.size, mesh.triangles.len());
             self.notes.push(format!(
@@ -356,6 +364,12 @@ impl Assembly<'_> {
         self.objects.push(Object { name, is_target });
         Ok(index)
     }
+}
+
+/// Whether all of a mesh lies where coordinates may be.
+fn reaches_no_farther(mesh: &Mesh) -> bool {
+    let ends = mesh.bounds().into_iter().flat_map(|(low, high)| [low, high]);
+    ends.flatten().all(is_length)
 }
 
 /// The mesh of this origin, as its file has it, or as it is `given`.

@@ -68,10 +68,13 @@ pub(super) struct InterfererTyped {
     /// Where it stands, m: x forward, y left, z up.
     pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
+    #[schemars(range(min = -36000, max = 36000))]
     pub yaw_deg: Option<Spanned<f64>>,
     /// Tilt, degrees: positive looks down.
+    #[schemars(range(min = -36000, max = 36000))]
     pub pitch_deg: Option<Spanned<f64>>,
     /// Roll, degrees: positive lifts the left side.
+    #[schemars(range(min = -36000, max = 36000))]
     pub roll_deg: Option<Spanned<f64>>,
     /// Time of ours at which its clock reads 0, ns.
     #[schemars(range(min = -1e12, max = 1e12))]
@@ -101,10 +104,13 @@ pub(super) struct Stand {
     /// Where it stands, m: x forward, y left, z up.
     pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
+    #[schemars(range(min = -36000, max = 36000))]
     pub yaw_deg: Option<Spanned<f64>>,
     /// Tilt, degrees: positive looks down.
+    #[schemars(range(min = -36000, max = 36000))]
     pub pitch_deg: Option<Spanned<f64>>,
     /// Roll, degrees: positive lifts the left side.
+    #[schemars(range(min = -36000, max = 36000))]
     pub roll_deg: Option<Spanned<f64>>,
     /// Motion in the world, m/s; the position is where it is when the first scan begins.
     #[serde(default)]
@@ -182,10 +188,13 @@ pub(super) struct ObjectTyped {
     /// Where it stands, m: x forward, y left, z up.
     pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
+    #[schemars(range(min = -36000, max = 36000))]
     pub yaw_deg: Option<Spanned<f64>>,
     /// Tilt, degrees: positive looks down.
+    #[schemars(range(min = -36000, max = 36000))]
     pub pitch_deg: Option<Spanned<f64>>,
     /// Roll, degrees: positive lifts the left side.
+    #[schemars(range(min = -36000, max = 36000))]
     pub roll_deg: Option<Spanned<f64>>,
     /// Motion in the world, m/s; the position is where it is when the first scan begins.
     #[serde(default)]

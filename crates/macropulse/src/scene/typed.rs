@@ -15,10 +15,13 @@ use super::spanned::{Spanned, Triple};
 /// Coordinates and sizes are no more than this, m: 250 times round the Earth, so that a map
 /// may have its origin anywhere, and small enough for boxes in single precision, of which two sizes are
 /// multiplied.
-const FARTHEST: f64 = 1e10;
+pub(super) const FARTHEST: f64 = 1e10;
+
+/// Angles are no more than this, degrees: a hundred turns.
+const MOST_TURNED: f64 = 36_000.0;
 
 /// Whether `length` is a coordinate or a size that something may have.
-fn is_length(length: f64) -> bool {
+pub(super) fn is_length(length: f64) -> bool {
     length.abs() <= FARTHEST
 }
 
@@ -63,7 +66,12 @@ impl Source<'_> {
             pose.position = position;
         }
         let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
-            Some(typed) => Ok(self.finite(typed, key)?.to_radians()),
+            Some(typed) if typed.get_ref().abs() <= MOST_TURNED => Ok(typed.get_ref().to_radians()),
+            Some(typed) => {
+                let message =
+                    format!("{key} must be a number from -{MOST_TURNED} to {MOST_TURNED}");
+                Err(self.fault(typed.span(), message))
+            }
             None => Ok(0.0),
         };
         pose.yaw = angle(&stand.yaw_deg, "yaw_deg")?;
