@@ -24,13 +24,19 @@ pub struct Common {
 
     /// Threads to compute with; 0 is one per core. The results do not depend on it
     #[arg(short = 'j', long, global = true, value_name = "N", default_value_t = 0)]
-    #[arg(value_parser = clap::value_parser!(u16).range(0..=1024))]
+    #[arg(value_parser = clap::value_parser!(u16).range(0..=MOST_THREADS as i64))]
     pub threads: u16,
 
     /// How progress is shown on stderr
     #[arg(long, global = true, value_name = "HOW", default_value = "auto")]
     pub progress: ProgressKind,
 }
+
+/// Threads at most.
+const MOST_THREADS: u64 = 1024;
+
+/// The variable by which rayon is asked for threads.
+const RAYON_THREADS: &str = "RAYON_NUM_THREADS";
 
 /// How progress is shown.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -44,8 +50,17 @@ pub enum ProgressKind {
 }
 
 impl Common {
-    /// Lets rayon use as many threads as asked for.
+    /// Lets rayon use as many threads as asked for, with `--threads` or, if that is 0, by its own
+    /// RAYON_NUM_THREADS.
     pub fn use_threads(&self) -> Result<(), Fault> {
+        let asked = (self.threads == 0).then(|| std::env::var(RAYON_THREADS).ok()).flatten();
+        if let Some(asked) =
+            asked.filter(|asked| asked.parse().is_ok_and(|n: u64| n > MOST_THREADS))
+        {
+            let message =
+                format!("{RAYON_THREADS} is {asked}; it must be from 0 to {MOST_THREADS}");
+            return Err(Fault::Wrong(message));
+        }
         rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build_global()

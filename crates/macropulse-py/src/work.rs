@@ -22,6 +22,9 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// Most threads that can be asked for.
 const MOST_THREADS: usize = 1024;
 
+/// The variable by which rayon is asked for threads where `threads` is 0.
+const RAYON_THREADS: &str = "RAYON_NUM_THREADS";
+
 /// Whether to stop.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
@@ -52,6 +55,14 @@ static LAST: Mutex<Option<Pool>> = Mutex::new(None);
 fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     if threads > MOST_THREADS {
         return Err(wrong(format!("threads is {threads}; it must be from 0 to {MOST_THREADS}")));
+    }
+    let asked = std::env::var(RAYON_THREADS).ok().filter(|_| threads == 0);
+    if let Some(asked) =
+        asked.filter(|asked| asked.parse().is_ok_and(|n: u64| n > MOST_THREADS as u64))
+    {
+        return Err(wrong(format!(
+            "{RAYON_THREADS} is {asked}; it must be from 0 to {MOST_THREADS}"
+        )));
     }
     let process = std::process::id();
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
