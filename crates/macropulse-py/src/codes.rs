@@ -13,7 +13,7 @@ use pyo3::types::PyList;
 
 use crate::error::{OrRaise, wrong};
 use crate::sensor::Sensor;
-use crate::values::from_json;
+use crate::values::{from_json, whole};
 use crate::work;
 
 /// The macropulse that is sent to a pixel, mark by mark.
@@ -36,7 +36,7 @@ pub fn encode<'py>(
     sensor: &Bound<'py, PyAny>,
     row: i64,
     column: i64,
-    scan: u64,
+    #[pyo3(from_py_with = whole)] scan: u64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = sensor.py();
     let design = Arc::clone(&Sensor::of(sensor)?.get().design);
@@ -127,8 +127,8 @@ pub fn code_words<'py>(py: Python<'py>, family: &str) -> PyResult<Bound<'py, PyA
 pub fn correlation<'py>(
     py: Python<'py>,
     family: &str,
-    word: usize,
-    other: usize,
+    #[pyo3(from_py_with = whole)] word: usize,
+    #[pyo3(from_py_with = whole)] other: usize,
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
     let family = family_from_toml(family).or_raise()?;
     let words = family.words();

@@ -36,7 +36,12 @@ impl Mesh {
         materials: Option<Vec<String>>,
     ) -> PyResult<Self> {
         let py = vertices.py();
-        let given = as_array(vertices, "float64")?;
+        let given = py.import("numpy")?.call_method1("asarray", (vertices,))?;
+        if !["i", "u", "f"].contains(&kind(&given)?.as_str()) {
+            let kind = given.getattr("dtype")?;
+            return Err(wrong(format!("vertices are of type {kind}; they must be numbers")));
+        }
+        let given = as_array(&given, "float64")?;
         let vertices: PyReadonlyArray2<f64> = given.extract().map_err(|_| {
             wrong(format!("vertices has shape {}; it must be (n, 3)", shape(&given)))
         })?;
@@ -45,8 +50,7 @@ impl Mesh {
             return Err(wrong(format!("vertices has shape {}; it must be (n, 3)", shape(&given))));
         }
         let given = py.import("numpy")?.call_method1("asarray", (triangles,))?;
-        let kind: String = given.getattr("dtype")?.getattr("kind")?.extract()?;
-        if kind != "i" && kind != "u" {
+        if !["i", "u"].contains(&kind(&given)?.as_str()) {
             let kind = given.getattr("dtype")?;
             return Err(wrong(format!("triangles are of type {kind}; they must be whole numbers")));
         }
@@ -86,9 +90,11 @@ impl Mesh {
             mesh.material_names = names;
         }
         if let Some(given) = material_of_triangle {
-            let given = as_array(given, "uint16")?;
-            let given: PyReadonlyArray1<u16> = given.extract()?;
-            mesh.material_of_triangle = given.as_array().to_vec();
+            let given = as_array(given, "int64")?;
+            let given: PyReadonlyArray1<i64> = given.extract()?;
+            let indices = given.as_array();
+            let index = |one: &i64| u16::try_from(*one).map_err(|_| no_material(*one, &mesh));
+            mesh.material_of_triangle = indices.iter().map(index).collect::<PyResult<_>>()?;
         }
         let (given, needed) = (mesh.material_of_triangle.len(), mesh.triangles.len());
         if given != needed {
@@ -100,9 +106,7 @@ impl Mesh {
         let names = mesh.material_names.len();
         if let Some(one) = mesh.material_of_triangle.iter().find(|one| usize::from(**one) >= names)
         {
-            return Err(wrong(format!(
-                "material_of_triangle names the material {one}, but `materials` has {names}, from 0"
-            )));
+            return Err(no_material(i64::from(*one), &mesh));
         }
         Ok(Self { mesh })
     }
@@ -159,6 +163,19 @@ impl Mesh {
 /// What is given, as an array of numbers of this kind.
 fn as_array<'py>(given: &Bound<'py, PyAny>, kind: &str) -> PyResult<Bound<'py, PyAny>> {
     given.py().import("numpy")?.call_method1("asarray", (given, kind))
+}
+
+/// The material that a triangle names is none of its mesh.
+fn no_material(index: i64, mesh: &macropulse::scene::Mesh) -> PyErr {
+    let names = mesh.material_names.len();
+    wrong(format!(
+        "material_of_triangle names the material {index}, but `materials` has {names}, from 0"
+    ))
+}
+
+/// The kind of the elements of an array, as a letter: that of NumPy.
+fn kind(array: &Bound<'_, PyAny>) -> PyResult<String> {
+    array.getattr("dtype")?.getattr("kind")?.extract()
 }
 
 fn shape(array: &Bound<'_, PyAny>) -> String {

@@ -20,6 +20,7 @@ use crate::files::{StoredScans, recorded_at};
 use crate::scan::{About, Scan};
 use crate::scene::Scene;
 use crate::sensor::Sensor;
+use crate::values::whole;
 use crate::{values, work};
 
 /// Shots are numbered up to here: more than any sensor fires in its time.
@@ -110,8 +111,8 @@ impl Records {
 pub fn record(
     sensor: &Bound<'_, PyAny>,
     scene: &Bound<'_, PyAny>,
-    seed: u64,
-    scan: u64,
+    #[pyo3(from_py_with = whole)] seed: u64,
+    #[pyo3(from_py_with = whole)] scan: u64,
 ) -> PyResult<Records> {
     let design = Arc::clone(&Sensor::of(sensor)?.get().design);
     let scene = Arc::clone(&Scene::of(scene)?.get().scene);

@@ -7,7 +7,7 @@ use macropulse::design::Design;
 use macropulse::names::nearest;
 use macropulse::points::{Outcome, PointCloud};
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyImportError;
+use pyo3::exceptions::{PyImportError, PyModuleNotFoundError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
@@ -448,8 +448,18 @@ fn some_of<'a>(entries: impl Iterator<Item = (&'a str, &'a Value)>) -> Value {
 
 /// A package that not everybody has.
 fn package<'py>(py: Python<'py>, name: &str, why: &str) -> PyResult<Bound<'py, PyModule>> {
-    py.import(name).map_err(|_| {
-        PyImportError::new_err(format!("{why} needs the package {name}: pip install {name}"))
+    py.import(name).map_err(|cause| {
+        let is_missing = cause.is_instance_of::<PyModuleNotFoundError>(py)
+            && cause
+                .value(py)
+                .getattr("name")
+                .is_ok_and(|missing| missing.eq(name).unwrap_or(false));
+        let error = PyImportError::new_err(match is_missing {
+            true => format!("{why} needs the package {name}: pip install {name}"),
+            false => format!("{why}: the package {name} is there, but cannot be imported: {cause}"),
+        });
+        error.set_cause(py, Some(cause));
+        error
     })
 }
 

@@ -86,6 +86,12 @@ impl Scene {
     #[pyo3(signature = (name_or_path, changes = None))]
     fn new(name_or_path: &Bound<'_, PyAny>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let py = name_or_path.py();
+        if name_or_path.is_instance_of::<Self>() {
+            return Err(pyo3::exceptions::PyTypeError::new_err(
+                "a scene is changed where it is opened: give its name or path to macropulse.Scene, with \
+                 all changes",
+            ));
+        }
         let name = named(name_or_path, ("scene", "Scene"))?;
         let changes = self::changes(changes, true)?;
         let folder = match simulated::Scene::builtin(&name) {

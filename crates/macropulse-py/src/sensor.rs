@@ -21,7 +21,7 @@ pub const DICTIONARY: &str = "the dictionary";
 /// converters and its receiver; checked when it is made.
 ///
 /// Args:
-///     name_or_path: A ready one, as `macropulse.sensors()` lists them, or a TOML file.
+///     name_or_path: A ready one, as `macropulse.sensors()` lists them, a TOML file, or a `Sensor`.
 ///     changes: Values that are changed: dotted keys of the sensor file, as
 ///         `{"scan.raster.rows": 24}`. The keys `"with"` and `"without"` take an effect, or a list
 ///         of them, off the list of those left out, or put it there.
@@ -62,8 +62,17 @@ impl Sensor {
     #[pyo3(signature = (name_or_path, changes = None))]
     fn new(name_or_path: &Bound<'_, PyAny>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let py = name_or_path.py();
-        let name = named(name_or_path, ("sensor", "Sensor"))?;
         let changes = self::changes(changes, false)?;
+        if let Ok(sensor) = name_or_path.cast::<Self>() {
+            let design = Arc::clone(&sensor.get().design);
+            return match changes.is_empty() {
+                true => Ok(Self { design }),
+                false => Self::made(py, move || {
+                    Design::from_toml(&design.text, &design.name, Path::new(""), &changes)
+                }),
+            };
+        }
+        let name = named(name_or_path, ("sensor", "Sensor"))?;
         if preset_text(&name).is_none() {
             check_readable(&name)?;
         }

@@ -17,6 +17,7 @@ use crate::error::{Fault, OrRaise, check_scan, warned, wrong};
 use crate::scan::{About, Scan};
 use crate::scene::Scene;
 use crate::sensor::Sensor;
+use crate::values::whole;
 use crate::work;
 
 /// A sensor in a scene.
@@ -123,9 +124,9 @@ impl Stage {
 pub fn simulate(
     sensor: &Bound<'_, PyAny>,
     scene: &Bound<'_, PyAny>,
-    seed: u64,
-    scan: u64,
-    threads: usize,
+    #[pyo3(from_py_with = whole)] seed: u64,
+    #[pyo3(from_py_with = whole)] scan: u64,
+    #[pyo3(from_py_with = whole)] threads: usize,
 ) -> PyResult<Scan> {
     Stage::of(sensor, scene, (seed, threads))?.scan(sensor.py(), scan)
 }
@@ -189,10 +190,10 @@ impl Scans {
 pub fn scans(
     sensor: &Bound<'_, PyAny>,
     scene: &Bound<'_, PyAny>,
-    n: u64,
-    seed: u64,
-    first: u64,
-    threads: usize,
+    #[pyo3(from_py_with = whole)] n: u64,
+    #[pyo3(from_py_with = whole)] seed: u64,
+    #[pyo3(from_py_with = whole)] first: u64,
+    #[pyo3(from_py_with = whole)] threads: usize,
 ) -> PyResult<Scans> {
     let stage = Stage::of(sensor, scene, (seed, threads))?;
     let end = first.saturating_add(n);

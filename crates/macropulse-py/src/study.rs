@@ -19,7 +19,7 @@ use crate::error::{OrRaise, warned, wrong};
 use crate::scan::Scan;
 use crate::scene::Scene;
 use crate::sensor::{Sensor, named};
-use crate::values::{self, Reader, changes, from_json};
+use crate::values::{self, Reader, changes, from_json, whole, whole_or_none};
 use crate::work;
 
 /// The link budget of a sensor: will it work, how far, and what fails first?
@@ -119,12 +119,12 @@ pub fn sweep<'py>(
     folder: PathBuf,
     changes: Option<&Bound<'py, PyDict>>,
     score: Names,
-    seeds: u64,
-    seed: u64,
-    shots: Option<u64>,
+    #[pyo3(from_py_with = whole)] seeds: u64,
+    #[pyo3(from_py_with = whole)] seed: u64,
+    #[pyo3(from_py_with = whole_or_none)] shots: Option<u64>,
     shard: &str,
     dry: bool,
-    threads: usize,
+    #[pyo3(from_py_with = whole)] threads: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = sensor.py();
     if !(1..=10_000).contains(&seeds) {

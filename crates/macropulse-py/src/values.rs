@@ -3,6 +3,7 @@
 use macropulse::design::{WITH, WITHOUT};
 use macropulse::environment::Environment;
 use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString};
 use toml::{Table, Value};
@@ -92,6 +93,36 @@ impl Reader {
         let remedy = "give a number, a text, a list or a dictionary, or leave the key out";
         Err(wrong(format!("{path}: a value cannot be of type {kind}; {remedy}")))
     }
+}
+
+/// The whole number, 0 or more, that an argument is.
+///
+/// # Errors
+/// If it is negative or too large; `TypeError` if it is no whole number.
+pub fn whole<'py, N>(given: &Bound<'py, PyAny>) -> PyResult<N>
+where
+    N: TryFrom<u64>,
+{
+    let number = given.extract::<u64>().map_err(|error| {
+        match error.is_instance_of::<PyOverflowError>(given.py()) {
+            true => is_not_counted(given),
+            false => error,
+        }
+    })?;
+    N::try_from(number).map_err(|_| is_not_counted(given))
+}
+
+/// [`whole`], or None.
+///
+/// # Errors
+/// As there.
+pub fn whole_or_none(given: &Bound<'_, PyAny>) -> PyResult<Option<u64>> {
+    if given.is_none() { Ok(None) } else { whole(given).map(Some) }
+}
+
+fn is_not_counted(given: &Bound<'_, PyAny>) -> PyErr {
+    let most = u64::MAX;
+    wrong(format!("{given}: seeds, scans, shots and threads are whole numbers from 0 to {most}"))
 }
 
 /// The sun and air that an argument names, the usual ones where it is left out: the name of a ready

@@ -60,6 +60,14 @@ MISTAKES = [
     (lambda: mp.Mesh(CORNERS, [[0, 1, 3]]), "triangles names the corner 3, but there are 3, from 0", ""),
     (lambda: mp.Mesh(CORNERS, [[0, 1, -1]]), "triangles names the corner -1", ""),
     (lambda: mp.Mesh(CORNERS, [[0.0, 1.0, 2.5]]), "triangles are of type float64", "whole numbers"),
+    (lambda: mp.Mesh([["0", "1", "2"]] * 3, [[0, 1, 2]]), "vertices are of type <U1", "numbers"),
+    (lambda: mp.Mesh(CORNERS, [[0, 1, 2]], [-1], ["a"]), "names the material -1", ""),
+    (lambda: mp.Scene.from_mesh([[1e11, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2]]),
+     "its mesh reaches farther than 1e10 m", ""),
+    (lambda: mp.simulate("peregrine", "wall", seed=-1), "-1: seeds, scans, shots and threads are", ""),
+    (lambda: mp.simulate("peregrine", "wall", seed=2**64), "18446744073709551616: seeds, scans,", ""),
+    (lambda: mp.scans("peregrine", "wall", -3), "-3: seeds, scans,", ""),
+    (lambda: mp.Sensor("peregrine", {".".join(["a"] * 10_000): 1}), "the key has more than 16 parts", ""),
     (lambda: mp.Mesh(CORNERS, [[0, 1, 2]], [0, 0]), "material_of_triangle has 2 entries", ""),
     (lambda: mp.Mesh(CORNERS, [[0, 1, 2]], [1], ["a"]), "material_of_triangle names the material 1", ""),
     (lambda: mp.Scene.from_mesh([[np.nan, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2]]),
@@ -178,8 +186,29 @@ def test_arguments_of_a_wrong_kind():
                     lambda: mp.simulate("peregrine"), lambda: mp.Sensor.from_dict("peregrine")):
         with pytest.raises(TypeError):
             mistake()
-    with pytest.raises(OverflowError):
-        mp.simulate("peregrine", "wall", seed=-1)
+    with pytest.raises(TypeError, match="a scene is changed where it is opened"):
+        mp.Scene(mp.Scene("wall"), {"object.wall.position_m.x": 30})
+
+
+def test_a_sensor_is_changed_further():
+    sensor = mp.Sensor("peregrine", {"scan.max_range_m": 30})
+    assert mp.Sensor(sensor) == sensor
+    changed = mp.Sensor(sensor, {"scan.flash.rows": 16})
+    assert changed == mp.Sensor("peregrine", {"scan.max_range_m": 30, "scan.flash.rows": 16})
+    with pytest.raises(mp.Error, match="max_range_m: unknown key"):
+        mp.Sensor(sensor, {"max_range_m": 3})
+
+
+def test_a_package_that_cannot_be_imported_says_why(scan, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "open3d", raising=False)
+    (tmp_path / "open3d.py").write_text('raise OSError("libusb-1.0.so.0: cannot open it")')
+    with pytest.raises(ImportError, match="open3d is there, but cannot be imported: OSError: libusb") as told:
+        scan.to_open3d()
+    assert isinstance(told.value.__cause__, OSError)
+    (tmp_path / "open3d.py").write_text("import no_such_package_of_anybody")
+    with pytest.raises(ImportError, match="no_such_package_of_anybody"):
+        scan.to_open3d()
 
 
 def test_columns_and_images_that_are_not_there(scan):
