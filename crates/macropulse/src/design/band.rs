@@ -16,7 +16,8 @@ pub const MOST_SIGMA: f64 = 9.0;
 
 /// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
 pub(super) const TOO_FINE: &str = "is too fine for so long a range gate: three gates (one, if shots are not coded) with the \
-     jitter must be within 67 million ticks; use longer ticks or a shorter max_range_m";
+     jitter, and what detector and converters remember, four dead times, must be within 67 million ticks; \
+     use longer ticks, a shorter max_range_m or a shorter dead time";
 
 impl Design {
     /// Length of a macropulse, fs.
@@ -40,7 +41,7 @@ impl Design {
 
     /// How a band is cut out of a stream of shots and ticks. Before its first owned shot light must be
     /// known for as long as that of earlier shots is under way when its ticks begin, and for the
-    /// detector to forget the state it is started in.
+    /// detector and the converters to forget the state they are started in.
     pub fn cut(&self) -> Cut {
         let jitter_fs = self.most_jitter_fs();
         // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows.
@@ -53,7 +54,7 @@ impl Design {
             jitter_fs,
             listening_fs: self.listening_fs(),
             lead_fs,
-            history_fs: lead_fs + under_way_fs.max(model.memory_fs()),
+            history_fs: lead_fs + under_way_fs.max(model.memory_fs()).max(self.tdc.memory_fs()),
         }
     }
 
@@ -91,6 +92,24 @@ mod tests {
         assert_eq!(design.listening_fs(), 1_000_692_286 + 10_933 * 2500);
         // Four lines of 848 shots, 139 µs, have room.
         assert_eq!(design.longest_band_fs() / 1_000_000_000, 158);
+    }
+
+    /// What came before the ticks of a band is part of it as long as cells, converters and amplifiers
+    /// remember it.
+    #[test]
+    fn a_band_begins_as_early_as_its_detector_and_converters_remember() {
+        for (name, key, ns) in [
+            ("kim-park-2016", "tdc.dead_time_ns", 10_000),
+            ("coded-32", "detector.sampled.recovery_ns", 10_000),
+        ] {
+            let history_fs = |ns: i64| {
+                let set = [(key.to_owned(), ns.to_string())];
+                let cut = Design::open(name, &set).unwrap().cut();
+                cut.history_fs - cut.lead_fs
+            };
+            assert!(history_fs(ns) >= ns * 1_000_000, "{name}");
+            assert!(history_fs(1) < ns * 1_000_000, "{name}");
+        }
     }
 
     #[test]

@@ -41,10 +41,19 @@ pub struct Tdc {
     pub dead_fs: i64,
 }
 
+/// Converters start so many dead times before the first ticks of a band, as Geiger cells do.
+const DEAD_TIMES: i64 = 4;
+
 impl Tdc {
     /// Ticks for which a converter is busy with one event, rounded up.
     pub fn dead_ticks(&self) -> u32 {
         u32::try_from((self.dead_fs + self.tick_fs - 1) / self.tick_fs).unwrap_or(u32::MAX)
+    }
+
+    /// For how long, fs, the state of the bank depends on the events that it was given. All converters are
+    /// free in the beginning, which they are after each dead time in which few events come.
+    pub(super) fn memory_fs(&self) -> i64 {
+        DEAD_TIMES * self.dead_fs
     }
 }
 

@@ -157,6 +157,21 @@ impl Channel<'_> {
         first..=self.spans.last().map_or(-1, |span| *span.end())
     }
 
+    /// When it must be followed to know its state while it listens: then, and for `memory` parts of a tick
+    /// before, as far as its light is known. Ascending, and apart.
+    pub fn followed(&self, memory: i64) -> Vec<RangeInclusive<i64>> {
+        let known = *self.whole_span().start();
+        let mut followed: Vec<RangeInclusive<i64>> = Vec::with_capacity(self.spans.len());
+        for span in &self.spans {
+            let from = (span.start() - memory).max(known);
+            match followed.last_mut() {
+                Some(last) if from <= *last.end() => *last = *last.start()..=*span.end(),
+                _ => followed.push(from..=*span.end()),
+            }
+        }
+        followed
+    }
+
     /// When the marks of train `index` arrive while it listens, in parts of a tick from the epoch
     /// on, ascending; in `times`, in place of what was there.
     pub fn arrivals<'t>(&self, index: usize, times: &'t mut Vec<i64>) -> &'t [i64] {

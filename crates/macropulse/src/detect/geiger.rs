@@ -6,11 +6,13 @@
 //! 2. In order of time, a photon that meets an armed cell makes it fire; the cell is armed again
 //!    after the dead time, whatever falls on it meanwhile.
 //! 3. Each firing makes an event with Gaussian jitter. All cells of a channel share one output.
-//! 4. When the detector begins to look, a cell is blind with the probability ρ = r·τ/(1 + r·τ) that
-//!    the steady rate r of counts per cell leaves, τ the dead time, and for a time that is even
-//!    between 0 and τ: the stationary state of a cell in steady light. It begins several dead
-//!    times before the ticks of a band ([`Design::cut`](crate::design::Design::cut)), so that by then the state is what the
-//!    light has made of it.
+//! 4. A cell works whether or not the detector is listened to: what fires it between two gates, or in
+//!    the gate before, blinds it in the next one. So cells are followed from several dead times before
+//!    each gate on, through all gates that follow sooner, and the firings while a gate is open are events.
+//! 5. Where that begins, a cell is blind with the probability ρ = r·τ/(1 + r·τ) that the steady rate r of
+//!    counts per cell leaves, τ the dead time, and for a time that is even between 0 and τ: the
+//!    stationary state of a cell in steady light. The guard shots of a band reach as far back
+//!    ([`Design::cut`](crate::design::Design::cut)).
 //!
 //! A single cell with a dead time as long as the range gate is the detector that fires once per
 //! arm time.
@@ -19,9 +21,9 @@ use rand::RngExt;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::channel::Channel;
-use super::noise::{PART_BITS, counts};
+use super::noise::{PART_BITS, counts_in};
 use super::{Detections, Kind, Memory};
-use crate::design::detector::Geiger;
+use crate::design::detector::{Geiger, Model};
 use crate::random::{Address, Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s, s_from_fs};
 
@@ -51,7 +53,8 @@ impl Cells {
 impl Kind for Cells {
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory) {
         let mut photons = self.photons(channel, chance);
-        counts(self.steady(channel), channel, chance, &mut memory.noise);
+        let followed = channel.followed(channel.clock.parts(self.geiger.memory_fs()));
+        counts_in(&followed, self.steady(channel), (channel, chance), &mut memory.noise);
         for &time in &memory.noise {
             let mut stream = chance.stream(self.address(Stage::Cell, channel, time.into()));
             let cell = stream.random_range(0..self.geiger.cells);
@@ -60,14 +63,18 @@ impl Kind for Cells {
         photons.sort_unstable();
         let from = found.time.len();
         let mut rest = photons.as_slice();
-        for span in &channel.spans {
+        let mut gates = channel.spans.iter().peekable();
+        for span in &followed {
+            let before = rest.partition_point(|photon| ((photon >> 32) as i64) < *span.start());
             let end = rest.partition_point(|photon| (photon >> 32) as i64 <= *span.end());
-            let (seen, later) = rest.split_at(end);
             let armed_at = self.armed_at(*span.start(), channel, chance);
-            self.fire(seen, armed_at, channel, |fired| {
-                found.time.push(self.answer(fired, channel, chance));
+            self.fire(&rest[before..end], armed_at, channel, |fired| {
+                while gates.next_if(|gate| *gate.end() < i64::from(fired)).is_some() {}
+                if gates.peek().is_some_and(|gate| gate.contains(&i64::from(fired))) {
+                    found.time.push(self.answer(fired, channel, chance));
+                }
             });
-            rest = later;
+            rest = &rest[end..];
         }
         found.time[from..].sort_unstable();
     }
@@ -224,6 +231,38 @@ mod tests {
         assert!(z(expected).abs() < 3.9, "{early} events, {expected} expected");
         // An armed cell fires within the time with 1 − exp(−1).
         assert!(z(bands as f64 * (1.0 - (-1.0_f64).exp())).abs() > 3.9);
+    }
+
+    /// One cell, dead for longer than the pause between two gates and than its gate, in the dark but for so many
+    /// counts a second.
+    fn gated(dead_ns: f64, rate: f64) -> Design {
+        let text = format!(
+            "version = 1\nname = \"mine\"\nidealised = [\"footprint\", \"mirror-motion\", \
+             \"link-budget\", \"eye-safety\"]\nscan.scans_per_s = 10.0\nscan.max_range_m = 90.0\n\
+             scan.raster = {{ rows = 100, columns = 1000, horizontal_deg = 20.0, vertical_deg = 10.0 }}\n\
+             light = {{ wavelength_nm = 905.0, pulse_ps = 100.0 }}\n[detector.geiger]\n\
+             sensitivity = {{ range_m = 60.0, reflectance = 0.1, pd = 0.15 }}\ncells = 1\n\
+             dead_time_ns = {dead_ns}\ndark_counts_hz = {rate}\njitter_ps = 0.0\n\
+             [tdc]\nresolution_ps = 100.0\nclock_ps = 1000.0\nbits = 10\n\
+             [receiver]\nkind = \"direct\"\n"
+        );
+        Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap()
+    }
+
+    /// Shots 1 us apart have gates of 0.6 us, and a cell is dead for 1.5 us: over two pauses. Control: in the
+    /// pauses alone it would be armed again after 0.3 us.
+    #[test]
+    fn a_cell_that_fires_in_one_gate_is_blind_in_the_next() {
+        let nearest = |dead_ns: f64| {
+            let found = events(&gated(dead_ns, 1e7), 3);
+            assert!(found.iter().all(|times| times.len() > 4));
+            let apart = |times: &Vec<f64>| -> Vec<f64> {
+                times.windows(2).map(|pair| pair[1] - pair[0]).collect()
+            };
+            found.iter().flat_map(apart).fold(f64::MAX, f64::min)
+        };
+        assert!(nearest(1500.0) > 1499e-9, "{}", nearest(1500.0));
+        assert!(nearest(300.0) < 600e-9);
     }
 
     /// A cell fires once in its dead time, however much light there is.

@@ -69,9 +69,14 @@ impl Noise {
         Some(Self::Apart(Waits { mean: (mean * f64::from(1_u32 << shift)) as f32, shift }))
     }
 
-    /// Appends the counts while `channel` listens, ascending.
-    fn times(&self, channel: &Channel, chance: &Chance, times: &mut Vec<u32>) {
-        for span in &channel.spans {
+    /// Appends the counts in the `spans` of a channel, ascending.
+    fn times(
+        &self,
+        (channel, spans): (&Channel, &[RangeInclusive<i64>]),
+        chance: &Chance,
+        times: &mut Vec<u32>,
+    ) {
+        for span in spans {
             let source = Source {
                 clock: &channel.clock,
                 span: span.clone(),
@@ -86,12 +91,23 @@ impl Noise {
     }
 }
 
-/// The counts while `channel` listens, ascending: `steady` ones, per second, and those of the
-/// stretches of background with a rate of their own; in `times`, in place of what was there.
+/// The counts while `channel` listens, as [`counts_in`] has them.
 pub(super) fn counts(steady: f64, channel: &Channel, chance: &Chance, times: &mut Vec<u32>) {
+    counts_in(&channel.spans, steady, (channel, chance), times);
+}
+
+/// The counts in the `spans` of a channel, ascending: `steady` ones, per second, and those of the stretches of
+/// background with a rate of their own, from the first span to the last; in `times`, in place of what was
+/// there.
+pub(super) fn counts_in(
+    spans: &[RangeInclusive<i64>],
+    steady: f64,
+    (channel, chance): (&Channel, &Chance),
+    times: &mut Vec<u32>,
+) {
     times.clear();
     if let Some(steady) = Noise::new(steady, channel.design) {
-        steady.times(channel, chance, times);
+        steady.times((channel, spans), chance, times);
     }
     let from = times.len();
     for stretch in stretches(channel) {

@@ -74,7 +74,7 @@ impl Sampler {
             front_end.third_cumulant(background),
         );
         // A clipped pulse of before may still hold the amplifier.
-        let before = in_ticks(sampled.recovery + 16.0 * front_end.mark_rms());
+        let before = in_ticks(sampled.lingers());
         Self {
             sampled: *sampled,
             colour,

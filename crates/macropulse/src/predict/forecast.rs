@@ -272,6 +272,7 @@ impl<'a> Forecaster<'a> {
                     photons: detected,
                     false_rate,
                     falling,
+                    period: channel_period,
                     mark_pd,
                     converted: 1.0 - loss,
                 };

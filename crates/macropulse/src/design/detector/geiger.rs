@@ -174,21 +174,36 @@ impl Model for Geiger {
         self.armed(falling)
     }
 
-    /// In steady light the age A of a cell's last firing has P(A > t) = 1 − r·a·t up to the dead
-    /// time τ and a·exp(−r·(t − τ)) beyond, r the counts per cell and second; a cell is armed when
-    /// A > τ. So with T since the gate opened N cells are silent with q = P(A > T)^N, and each of
-    /// them is armed with h = P(A > max(T, τ))/P(A > T): the echo is seen with
-    /// q·(1 − (1 − h·(1 − exp(−n/N)))^N).
+    /// A cell is armed at an echo if it has not fired in its dead time τ before: not at one of the echoes
+    /// in that time, k = ⌊τ/P⌋ of them where they come every P, and not by itself. With h = 1 − exp(−n/N), r
+    /// the dark and background counts per cell and second, and a the share of the time in which a cell is
+    /// armed, all of these exclude each other:
+    ///
+    /// * armed at an echo: e = 1 − k·h·e − r·τ·a;
+    /// * armed at any time: a = 1 − (h·e/P + r·a)·τ.
+    ///
+    /// With T since the gate opened N cells are silent with q = A(T)^N, A(T) = 1 − r·a·T up to τ and (1 −
+    /// r·a·τ)·exp(−r·(T − τ)) beyond, and each of them is then armed with g = e/A(T), or 1: the echo is seen
+    /// with q·(1 − (1 − g·(1 − exp(−n/N)))^N).
     fn first_event(&self, awaited: &Awaited) -> FirstEvent {
-        let &Awaited { since, photons, false_rate, falling, converted, .. } = awaited;
+        let &Awaited { since, photons, false_rate, falling, period, converted, .. } = awaited;
         let cells = f64::from(self.cells);
-        let armed = self.armed(falling);
-        let each = false_rate / cells;
         let dead = s_from_fs(self.dead_fs);
-        let long_ago = armed * libm::exp(-each * (since - dead).max(0.0));
-        let older = if since < dead { 1.0 - each * armed * since } else { long_ago };
+        let (each, turns) = (false_rate / cells, dead / period);
+        let blind = each * dead / (1.0 + each * dead);
+        let fires = -libm::expm1(-(falling - false_rate).max(0.0) * period / cells);
+        let at_echo = (1.0 - blind) / (1.0 + fires * (turns.floor() - turns * blind));
+        let at_any_time = (1.0 - turns * fires * at_echo) * (1.0 - blind);
+        let at_opening = 1.0 - each * dead * at_any_time;
+        let older = match since < dead {
+            true => 1.0 - each * at_any_time * since,
+            false => at_opening * libm::exp(-each * (since - dead)),
+        };
         let silent = libm::pow(older.clamp(0.0, 1.0), cells);
-        let armed = if older > 0.0 { (long_ago / older).min(1.0) } else { 0.0 };
+        let armed = match since < dead {
+            true => (at_echo / older.max(f64::MIN_POSITIVE)).min(1.0),
+            false => 1.0,
+        };
         FirstEvent {
             is_false: 1.0 - silent,
             is_echo: silent * self.any_cell(armed, photons) * converted,

@@ -294,6 +294,8 @@ pub struct Awaited {
     pub false_rate: f64,
     /// All that falls on it, 1/s.
     pub falling: f64,
+    /// Time between the echoes of two shots, s.
+    pub period: f64,
     /// Probability that the echo makes a tick, whatever came before it.
     pub mark_pd: f64,
     /// Share of events that find a converter free.

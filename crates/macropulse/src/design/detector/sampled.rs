@@ -332,6 +332,11 @@ impl Sampled {
         libm::ceil(time / self.sample * (1.0 - 1e-12)) as u32
     }
 
+    /// For how long, s, a pulse may hold the amplifier at its limit.
+    pub fn lingers(&self) -> f64 {
+        self.recovery + 16.0 * self.front_end.mark_rms()
+    }
+
     /// For how many ticks behind a clipped pulse the signal stays at its limit.
     pub fn held_ticks(&self) -> u32 {
         self.ticks(self.recovery)
@@ -395,12 +400,14 @@ impl Model for Sampled {
         0
     }
 
-    /// The baseline, with the block in which a band begins and one for pulses that are not over there.
+    /// The baseline, with the block in which a band begins and one for pulses that are not over there, and
+    /// before that a clipped pulse that may still hold the amplifier.
     fn settles_fs(&self) -> i64 {
-        match self.remembered_blocks() {
+        let baseline_fs = match self.remembered_blocks() {
             0 => 0,
             blocks => (blocks + 2) * BASELINE_BLOCK * fs_from_s(self.sample),
-        }
+        };
+        baseline_fs + fs_from_s(self.lingers())
     }
 
     fn refusal(&self, _: f64) -> Option<String> {
