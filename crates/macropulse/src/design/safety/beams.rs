@@ -6,32 +6,8 @@ use std::ops::Range;
 use super::crossing::Energies;
 use super::exposure::Crossing;
 use super::share::Share;
+use super::worst::{Aim, Field, coarse_first};
 use crate::design::Scan;
-
-/// Places along an aperture at which its middle is tried, where many pixels lie in it.
-const STEPS: f64 = 16.0;
-/// How finely the light that passes an aperture is estimated.
-#[derive(Clone, Copy)]
-struct Fineness {
-    /// Places along a line.
-    places: u32,
-    /// Lines.
-    lines: usize,
-}
-/// To find the elevations where there is most.
-const COARSE: Fineness = Fineness { places: 16, lines: 32 };
-/// To refine one.
-const FINE: Fineness = Fineness { places: 64, lines: 256 };
-/// Where so many shots cross, it does not matter whether the middle is on a pixel or between two.
-const MANY: f64 = 400.0;
-/// Elevations that are looked at in all columns.
-const FINALISTS: usize = 3;
-/// Up to so many shots that cross, an aim is refined by their sum, and else by its estimate: at
-/// 5000 shots in a sharp aperture the phase of the pixels still changes the sum by 3 in 1000.
-const FEW: usize = 12_000;
-/// Times the steps are halved by which an aim is refined: elevations to a thousandth of the
-/// aperture.
-const HALVINGS: u32 = 6;
 
 /// Beams in lines, each as far in azimuth from the one before it.
 pub(crate) struct Lines {
@@ -44,6 +20,8 @@ pub(crate) struct Lines {
     /// Lines drawn one after another: all of them where there is one beam, and 1 where all are drawn at
     /// once. More than one are evenly spaced, and alike above and below the horizon.
     pub in_turn: u32,
+    /// Whether every other line is drawn from the right to the left.
+    pub comes_back: bool,
 }
 
 /// A line of beams.
@@ -54,159 +32,140 @@ pub(crate) struct Line {
     pub first: f64,
 }
 
-/// Where the middle of an aperture is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Aim {
-    pub azimuth: f64,
-    pub elevation: f64,
-}
+/// Shots that a search may look at.
+const EFFORT: usize = 600_000;
+/// Elevations that are tried at most.
+const MOST_PLACES: f64 = 4096.0;
+/// Phases of the columns that are tried at most.
+const PHASES: f64 = 32.0;
 
 /// The beams of a scan, line by line, and what they carry.
 pub(super) struct LineBeams<'a> {
-    scan: &'a Scan,
-    energies: &'a Energies,
-    distance: f64,
-    lines: Lines,
+    pub scan: &'a Scan,
+    pub lines: &'a Lines,
+    pub energies: &'a Energies,
+    pub share: &'a Share,
+    /// Of the aperture, m.
+    pub distance: f64,
 }
 
-impl<'a> LineBeams<'a> {
-    /// The beams of `scan` in its `lines`, at the `distance` of an eye, m.
-    pub fn new(scan: &'a Scan, lines: Lines, energies: &'a Energies, distance: f64) -> Self {
-        Self { scan, energies, distance, lines }
-    }
-
-    /// The shots that cross an aperture with its middle at `aim`, in the order of their times.
-    pub fn crossing(&self, share: &Share, aim: Aim) -> Vec<Crossing> {
+impl Field for LineBeams<'_> {
+    fn crossing(&self, aim: Aim) -> Vec<Crossing> {
         let mut shots = Vec::new();
-        self.for_each_crossing(share, aim, |[row, column], share| {
-            let order = self.scan.model().order_of(row as u16, column as u16);
-            let (time, energy) = (self.scan.moment(order), share * self.energies.at(column));
-            shots.push(Crossing { time, share, energy });
-        });
+        let reach = self.reach();
+        let [aim_sine, aim_cosine] = [libm::sin(aim.elevation), libm::cos(aim.elevation)];
+        for number in self.rows_within(aim.elevation, reach) {
+            let row = &self.lines.rows[number];
+            let level = aim_sine * libm::sin(row.elevation);
+            let across = aim_cosine * libm::cos(row.elevation);
+            for column in self.columns_within(row, aim, reach).into_iter().flatten() {
+                let off = row.first - self.lines.step * f64::from(column) - aim.azimuth;
+                let share = self.share.at(self.off(level + across * libm::cos(off)));
+                if share > 0.0 {
+                    let order = self.scan.model().order_of(number as u16, column as u16);
+                    let (time, energy) =
+                        (self.scan.moment(order), share * self.energies.at(column));
+                    shots.push(Crossing { time, share, energy });
+                }
+            }
+        }
         shots.sort_unstable_by(|a, b| a.time.total_cmp(&b.time));
         shots
     }
 
-    /// Calls `visit` with row and column of every shot that crosses an aperture with its middle at
-    /// `aim`, and the share of its light that passes.
-    fn for_each_crossing(&self, share: &Share, aim: Aim, mut visit: impl FnMut([u32; 2], f64)) {
-        let reach = self.reach(share);
-        for number in self.rows_within(aim.elevation, reach) {
-            let row = &self.lines.rows[number];
-            for columns in self.columns_within(row, aim, reach) {
-                for column in columns {
-                    let off = row.first - self.lines.step * f64::from(column) - aim.azimuth;
-                    let share = share.at(self.off(aim.elevation, row.elevation, off));
-                    if share > 0.0 {
-                        visit([number as u32, column], share);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Where an aperture sees most: of a whole scan, and of the shots within `counted` seconds, if
-    /// a scan is longer.
+    /// In the middle of the columns, or where the brightest ones are.
     ///
-    /// Columns stand closer the higher a row lies, cos(elevation) of what they do at the horizon;
-    /// near the edge of the field less of the aperture is lit, but the columns stand closest.
-    pub fn aims(&self, share: &Share, counted: f64) -> Vec<Aim> {
-        let reach = self.reach(share);
-        let mut tried: Vec<(f64, f64)> = self
-            .elevations(reach)
-            .into_iter()
-            .map(|elevation| (self.estimate(share, elevation, COARSE), elevation))
-            .collect();
-        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let most = tried.iter().take(FINALISTS).map(|&(shots, elevation)| {
-            if self.energies.alike && shots > MANY {
-                let azimuth = self.lines.first - self.lines.step * f64::from(self.scan.columns / 2);
-                return (shots, Aim { azimuth, elevation });
-            }
-            let rows = self.rows_within(elevation, reach);
-            self.brightest(&Lit { share, elevation, rows, widest: PI })
-        });
-        let most = most.max_by(|a, b| a.0.total_cmp(&b.0));
-        let mut aims: Vec<Aim> =
-            most.map(|(_, aim)| self.refined(share, aim)).into_iter().collect();
-        if counted >= self.scan.period() {
-            return aims;
-        }
-        // So many columns pass within the time, if that is shorter than a line takes to cross.
-        let line = self.scan.period() / f64::from(self.lines.in_turn);
-        let widest = counted / line * f64::from(self.scan.columns) * self.lines.step / 2.0;
-        for elevation in self.edges(reach) {
-            let number = self.nearest(elevation);
-            let elevation = self.lines.rows[number].elevation;
-            let rows = match self.lines.in_turn as usize == self.lines.rows.len() {
-                true => number..number + 1,
-                false => self.rows_within(elevation, reach),
+    /// Columns stand closer the higher a row lies, cos(elevation) of what they do at the horizon; near the
+    /// edge of the field less of the aperture is lit, but the columns stand closest.
+    fn starts(&self, gap: f64, counted: f64) -> Vec<Aim> {
+        let mut aims = Vec::new();
+        for elevation in self.elevations(gap) {
+            let azimuths = match self.energies.alike {
+                true => self.phases(gap),
+                false => self.brightest_two(elevation, counted),
             };
-            aims.push(self.brightest(&Lit { share, elevation, rows, widest }).1);
+            aims.extend(azimuths.into_iter().map(|azimuth| Aim { azimuth, elevation }));
         }
         aims
     }
 
-    /// The aim at which most light passes near `aim`: from there in steps that are halved, as far
-    /// as it is more. Before, elevations are tried a sixteenth of the aperture apart and azimuths
-    /// half a column.
-    ///
-    /// The sum over a few pixels goes up and down with their phase; that over many is smooth, and
-    /// then it is estimated, and depends on the elevation alone.
-    fn refined(&self, share: &Share, aim: Aim) -> Aim {
-        let mut shots = 0;
-        self.for_each_crossing(share, aim, |_, _| shots += 1);
-        let few = shots <= FEW;
-        let light = |aim: Aim| {
-            if !few {
-                return self.estimate(share, aim.elevation, FINE);
-            }
-            let mut light = 0.0;
-            self.for_each_crossing(share, aim, |[_, column], share| {
-                light += share * self.energies.at(column);
-            });
-            light
-        };
-        let mut best = (light(aim), aim);
-        let mut steps = [self.lines.step / 2.0, 2.0 * self.reach(share) / STEPS];
-        let sides = [[0.0, 1.0], [0.0, -1.0], [1.0, 0.0], [-1.0, 0.0]];
-        for _ in 0..HALVINGS {
-            steps = steps.map(|step| step / 2.0);
-            for [across, up] in sides.into_iter().take(if few { 4 } else { 2 }) {
-                let Aim { azimuth, elevation } = best.1;
-                let aim = Aim {
-                    azimuth: azimuth + across * steps[0],
-                    elevation: elevation + up * steps[1],
-                };
-                let light = light(aim);
-                if light > best.0 {
-                    best = (light, aim);
-                }
-            }
+    /// Near the ends of lines that go to and fro, where the aperture sees the end of one and the beginning
+    /// of the next at once; of a turning head whose columns differ, all.
+    fn across(&self, gap: f64) -> Vec<f64> {
+        let Lines { first, step, .. } = *self.lines;
+        let last = first - step * f64::from(self.scan.columns - 1);
+        if self.lines.comes_back {
+            let ends = (0..16).map(|place| f64::from(place) * gap);
+            let ends: Vec<[f64; 2]> =
+                ends.map(|inwards| [first - inwards, last + inwards]).collect();
+            return coarse_first(&ends).into_iter().flatten().collect();
         }
-        best.1
+        if self.energies.alike || self.lines.in_turn > 1 {
+            return Vec::new();
+        }
+        let stride = (gap / step).max(1.0) as usize;
+        let columns: Vec<u32> = (0..self.scan.columns).step_by(stride).collect();
+        coarse_first(&columns).into_iter().map(|column| first - step * f64::from(column)).collect()
+    }
+
+    fn pitch(&self, gap: f64) -> [f64; 2] {
+        let Lines { step, comes_back, in_turn, .. } = *self.lines;
+        let across = match () {
+            () if comes_back || !self.energies.alike && in_turn == 1 => gap / 2.0,
+            // A step more or less in an aperture makes less than a part in 250.
+            () if step < gap / 16.0 => 0.0,
+            () => step.min(gap) / 2.0,
+        };
+        [across, gap / 2.0]
+    }
+
+    fn effort(&self) -> usize {
+        EFFORT
+    }
+}
+
+impl LineBeams<'_> {
+    /// Azimuths at which the columns stand otherwise in the aperture, about the middle of the field.
+    fn phases(&self, gap: f64) -> Vec<f64> {
+        let Lines { first, step, .. } = *self.lines;
+        let middle = first - step * f64::from(self.scan.columns - 1) / 2.0;
+        let phases = (step / gap).ceil().clamp(1.0, PHASES);
+        (0..phases as u32).map(|phase| middle + step * f64::from(phase) / phases).collect()
+    }
+
+    /// Where, at `elevation`, most light of a whole scan crosses, and most of shots within `counted` seconds.
+    fn brightest_two(&self, elevation: f64, counted: f64) -> Vec<f64> {
+        let reach = self.reach();
+        let rows = self.rows_within(elevation, reach);
+        let mut azimuths = vec![self.brightest(&Lit { elevation, rows: rows.clone(), widest: PI })];
+        if counted < self.scan.period() {
+            // So many columns pass within the time, if that is shorter than a line takes to cross.
+            let line = self.scan.period() / f64::from(self.lines.in_turn);
+            let widest = counted / line * f64::from(self.scan.columns) * self.lines.step / 2.0;
+            let number = self.nearest(elevation);
+            let rows = match self.lines.in_turn as usize == self.lines.rows.len() {
+                true => number..number + 1,
+                false => rows,
+            };
+            azimuths.push(self.brightest(&Lit { elevation, rows, widest }));
+            azimuths.dedup();
+        }
+        azimuths
     }
 
     /// The angle within which a beam meets the aperture, rad.
-    fn reach(&self, share: &Share) -> f64 {
-        libm::atan(share.reach() / self.distance)
+    fn reach(&self) -> f64 {
+        libm::atan(self.share.reach() / self.distance)
     }
 
-    /// Whether it is a raster.
-    fn is_raster(&self) -> bool {
-        self.lines.in_turn > 1
-    }
-
-    /// Distance in the plane of the aperture, m, between its middle and a beam `off` in azimuth.
-    fn off(&self, aim: f64, elevation: f64, off: f64) -> f64 {
-        // Haversines: exact for small angles, too.
-        let half = |angle: f64| libm::sin(angle / 2.0);
-        let [down, across] = [half(aim - elevation), half(off)];
-        let across = across * across * libm::cos(aim) * libm::cos(elevation);
-        let square = (down * down + across).min(1.0);
-        // The tangent of the angle whose half has this sine squared.
-        let [sine, cosine] = [2.0 * (square * (1.0 - square)).sqrt(), 1.0 - 2.0 * square];
-        if cosine > 0.0 { self.distance * sine / cosine } else { f64::INFINITY }
+    /// Distance in the plane of the aperture, m, between its middle and a beam at an angle of this `cosine`.
+    fn off(&self, cosine: f64) -> f64 {
+        match cosine {
+            cosine if cosine > 0.0 => {
+                self.distance * (1.0 - cosine * cosine).max(0.0).sqrt() / cosine
+            }
+            _ => f64::INFINITY,
+        }
     }
 
     fn rows_within(&self, elevation: f64, reach: f64) -> Range<usize> {
@@ -258,88 +217,47 @@ impl<'a> LineBeams<'a> {
         near.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
     }
 
-    /// Elevations of interest to what crosses at once: of a raster the outermost row, the one an
-    /// aperture's radius further in, and the middle; of a turning head every one.
-    fn edges(&self, reach: f64) -> Vec<f64> {
-        match self.lines.rows.first().filter(|_| self.is_raster()) {
-            Some(row) => {
-                let inside = (row.elevation - reach).max(0.0);
-                vec![row.elevation, inside, 0.0]
-            }
-            None => self.elevations(reach),
+    /// Elevations at which the middle of an aperture is tried: at rows and `gap` apart. A raster is alike above
+    /// and below the horizon. Its columns stand closest near its upper edge; at the horizon most rows cross.
+    fn elevations(&self, gap: f64) -> Vec<f64> {
+        let [Some(top), Some(bottom)] = [self.lines.rows.first(), self.lines.rows.last()] else {
+            return Vec::new();
+        };
+        let (top, bottom) = (top.elevation, bottom.elevation);
+        if self.lines.in_turn > 1 {
+            let reach = self.reach();
+            let lowest = (top - 3.0 * reach).max(0.0);
+            let mut all = vec![top, (top - reach).max(0.0), 0.0];
+            all.extend(coarse_first(&places(lowest, top, gap)));
+            return all;
         }
+        let mut all = places(bottom, top, gap);
+        all.extend(self.lines.rows.iter().map(|row| row.elevation));
+        all.sort_by(f64::total_cmp);
+        all.dedup_by(|next, kept| *next - *kept < gap / 4.0);
+        coarse_first(&all)
     }
 
-    /// Elevations at which the middle of an aperture is tried: every row and between rows, thinned
-    /// out where they are many. A raster is alike above and below the horizon.
-    fn elevations(&self, reach: f64) -> Vec<f64> {
-        let raster = self.is_raster();
-        let of_row = |row: &Line| row.elevation;
-        let mut all: Vec<f64> = self.lines.rows.iter().map(of_row).collect();
-        let between: Vec<f64> = all.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0).collect();
-        all.extend(between);
-        all.sort_by(|a, b| b.total_cmp(a));
-        let top = all.first().copied().unwrap_or(0.0);
-        let gap = 2.0 * reach / STEPS;
-        let mut last = f64::INFINITY;
-        all.retain(|&elevation| {
-            let bottom = if raster { (top - 3.0 * reach).max(0.0) } else { -PI };
-            let keep = last - elevation >= gap && elevation >= bottom - gap;
-            last = if keep { elevation } else { last };
-            keep
-        });
-        if raster {
-            all.push(0.0);
-        }
-        all
-    }
-
-    /// About how many shots cross an aperture whose middle is at `elevation`, opposite the middle
-    /// of the columns.
-    fn estimate(&self, share: &Share, elevation: f64, fineness: Fineness) -> f64 {
-        let Fineness { places, lines } = fineness;
-        let reach = self.reach(share);
-        let field = self.lines.step * f64::from(self.scan.columns) / 2.0;
-        let mut sum = 0.0;
-        let rows = &self.lines.rows[self.rows_within(elevation, reach)];
-        let stride = (rows.len() / lines).max(1);
-        for row in rows.iter().step_by(stride) {
-            let Some(half) = self.half_chord(row.elevation, elevation, reach) else { continue };
-            let half = half.min(field);
-            let place = |n: u32| half * (f64::from(n) + 0.5) / f64::from(places);
-            let shares =
-                (0..places).map(|n| share.at(self.off(elevation, row.elevation, place(n))));
-            sum += shares.sum::<f64>() / f64::from(places) * 2.0 * half / self.lines.step;
-        }
-        sum * rows.len() as f64 / rows.len().div_ceil(stride).max(1) as f64
-    }
-
-    /// The azimuth at which most light of these rows passes, and how much; it is on a column or
-    /// between two.
-    fn brightest(&self, lit: &Lit) -> (f64, Aim) {
+    /// The azimuth at which most light of these rows passes, on a column or between two.
+    fn brightest(&self, lit: &Lit) -> f64 {
         let kernel = self.kernel(lit);
         let last = 2 * self.scan.columns - 2;
         let middle = last / 2;
         let stride = (kernel.len() / 128).max(1);
-        let tried: Vec<u32> = match self.energies.alike {
-            true => vec![middle, (middle + 1).min(last)],
-            false => (0..=last).step_by(stride).collect(),
-        };
         let mut best = (f64::NEG_INFINITY, middle);
-        for place in tried {
+        for place in (0..=last).step_by(stride) {
             let light = self.light(&kernel, place);
             if light > best.0 {
                 best = (light, place);
             }
         }
-        let azimuth = self.lines.first - self.lines.step * f64::from(best.1) / 2.0;
-        (best.0, Aim { azimuth, elevation: lit.elevation })
+        self.lines.first - self.lines.step * f64::from(best.1) / 2.0
     }
 
     /// The share of a column's shots that passes, by how many half columns it stands from the
     /// middle of the aperture.
     fn kernel(&self, lit: &Lit) -> Vec<f64> {
-        let reach = self.reach(lit.share);
+        let reach = self.reach();
         let mut kernel = Vec::new();
         for row in &self.lines.rows[lit.rows.clone()] {
             let Some(half) = self.half_chord(row.elevation, lit.elevation, reach) else { continue };
@@ -348,9 +266,11 @@ impl<'a> LineBeams<'a> {
             if kernel.len() < places {
                 kernel.resize(places, 0.0);
             }
+            let level = libm::sin(lit.elevation) * libm::sin(row.elevation);
+            let across = libm::cos(lit.elevation) * libm::cos(row.elevation);
             for (place, sum) in kernel.iter_mut().enumerate().take(places) {
-                let off = place as f64 * self.lines.step / 2.0;
-                *sum += lit.share.at(self.off(lit.elevation, row.elevation, off));
+                let off = libm::cos(place as f64 * self.lines.step / 2.0);
+                *sum += self.share.at(self.off(level + across * off));
             }
         }
         kernel
@@ -374,9 +294,15 @@ impl<'a> LineBeams<'a> {
     }
 }
 
+/// Elevations from `lowest` to `highest`, about `gap` apart.
+fn places(lowest: f64, highest: f64, gap: f64) -> Vec<f64> {
+    let steps = ((highest - lowest) / gap).ceil().clamp(1.0, MOST_PLACES);
+    let place = |step: u32| lowest + (highest - lowest) * f64::from(step) / steps;
+    (0..=steps as u32).map(place).collect()
+}
+
 /// Rows whose light passes an aperture.
-struct Lit<'a> {
-    share: &'a Share,
+struct Lit {
     /// Of the middle of the aperture, rad.
     elevation: f64,
     rows: Range<usize>,

@@ -4,9 +4,10 @@ use std::f64::consts::FRAC_PI_4;
 
 use super::beams::{LineBeams, Lines};
 use super::class1::{Class1, Condition, Opening};
-use super::exposure::{Crossing, Crossings, Exposure};
+use super::exposure::{Crossing, Crossings, Exposure, allowed};
 use super::scattered::Scattered;
 use super::share::Share;
+use super::worst::worst;
 use crate::design::budget::solid_angle;
 use crate::design::{Coding, Light, Scan};
 use crate::units::s_from_fs;
@@ -41,52 +42,46 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
     let Condition { distance, widened } = sender.condition;
     let wide = |one: Opening| Opening { diameter: widened * one.diameter, ..one };
     let openings: Vec<Opening> = class.openings().into_iter().map(wide).collect();
-    let (places, passed, brightest) = match scan.model().beams() {
-        Beams::Flood(sides) => {
-            let flood = |opening| sender.flood(opening, sides, &energies);
-            let places: Vec<Crossings> = openings.iter().map(flood).collect();
-            // A flash has no shot alone.
-            let flash = places.first().and_then(|place| place.shots.first());
-            let (passed, brightest) = flash.map_or((0.0, 0.0), |flash| (flash.share, flash.energy));
-            (places, passed, brightest)
-        }
-        Beams::Scattered(beams) => {
-            let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
-            let scattered = Scattered { scan, beams: &beams, energies: &energies };
-            let at = |(opening, share): (&Opening, &Share)| Crossings {
-                durations: opening.durations,
-                shots: scattered.crossing(share, distance),
-            };
-            let places = openings.iter().zip(&shares).map(at).collect();
-            let passed = shares.first().map_or(1.0, |share| share.at(0.0));
-            (places, passed, passed * energies.most())
-        }
-        Beams::Lines(lines) => {
-            let beams = LineBeams::new(scan, lines, &energies, distance);
-            let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
-            let at = |(opening, share): (&Opening, &Share)| {
-                let aims = beams.aims(share, class.counted_as_one());
-                let cross = |aim| beams.crossing(share, aim);
-                let places = aims.into_iter().map(cross);
-                let durations = opening.durations;
-                places.map(|shots| Crossings { durations, shots }).collect::<Vec<_>>()
-            };
-            let places = openings.iter().zip(&shares).flat_map(at).collect();
-            // One shot alone is judged in the middle of the first aperture.
-            let passed = shares.first().map_or(1.0, |share| share.at(0.0));
-            (places, passed, passed * energies.most())
-        }
-    };
-    Exposure {
+    let shares: Vec<Share> = openings.iter().map(|opening| sender.share(opening)).collect();
+    // One shot alone is judged in the middle of the first aperture.
+    let passed = shares.first().map_or(1.0, |share| share.at(0.0));
+    let mut exposure = Exposure {
         distance,
         scan_period: scan.period(),
         shot: light.pulse.max(s_from_fs(chips * coding.chip_fs)),
         mark: light.pulse,
-        brightest_shot: brightest,
+        brightest_shot: passed * energies.most(),
         brightest_mark: passed / coding.codebook.mean_weight(),
         count_groups: sender.count_groups,
-        places,
+        places: Vec::new(),
+    };
+    let beams = scan.model().beams();
+    for (opening, share) in openings.iter().zip(&shares) {
+        let durations = opening.durations;
+        let judge = |shots: &[Crossing]| allowed(class, &exposure, durations, shots);
+        let how = (libm::atan(share.width() / distance), class.counted_as_one());
+        let places = match &beams {
+            Beams::Flood(sides) => {
+                let flash = sender.flood(opening, *sides, &energies);
+                // A flash has no shot alone.
+                if exposure.places.is_empty() {
+                    exposure.brightest_shot = flash.energy;
+                    exposure.brightest_mark = flash.share / coding.codebook.mean_weight();
+                }
+                vec![vec![flash]]
+            }
+            Beams::Scattered(beams) => {
+                worst(&Scattered::new(scan, (beams, &energies), (share, distance)), how, &judge)
+            }
+            Beams::Lines(lines) => {
+                let energies = &energies;
+                worst(&LineBeams { scan, lines, energies, share, distance }, how, &judge)
+            }
+        };
+        let crossings = places.into_iter().map(|shots| Crossings { durations, shots });
+        exposure.places.extend(crossings);
     }
+    exposure
 }
 
 impl Sender<'_> {
@@ -101,7 +96,7 @@ impl Sender<'_> {
 
     /// All pixels at once, their light spread evenly over a field of these `sides`, rad, at the
     /// distance of the eye; a wide beam widens it.
-    fn flood(&self, opening: &Opening, sides: [f64; 2], energies: &Energies) -> Crossings {
+    fn flood(&self, opening: &Opening, sides: [f64; 2], energies: &Energies) -> Crossing {
         let field = solid_angle(sides[0], sides[1]);
         let wide = 2.0 * self.spot();
         let distance = self.condition.distance;
@@ -112,8 +107,7 @@ impl Sender<'_> {
         let share = (area / lit).min(1.0);
         let pixels = f64::from(self.scan.rows) * f64::from(self.scan.columns);
         let energy = share * f64::from(self.scan.rows) * energies.sum();
-        let flash = Crossing { time: 0.0, share: share * pixels, energy };
-        Crossings { durations: opening.durations, shots: vec![flash] }
+        Crossing { time: 0.0, share: share * pixels, energy }
     }
 }
 

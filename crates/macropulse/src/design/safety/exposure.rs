@@ -1,9 +1,13 @@
 //! What class 1 allows to the shots that cross an eye.
 
 use super::class1::{Class1, LONGEST};
+use super::worst::RULES;
 
 /// Exposures beyond [`LONGEST`] are judged up to this time, s, and then by their mean power.
 const LAST: f64 = 100.0;
+
+/// Places at which a run of shots is cut at each end, to find the part that is allowed least.
+const CUTS: usize = 128;
 
 /// A shot that crosses the aperture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,14 +134,23 @@ pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
         add(Rule::Mark, exposure.brightest_mark, 1.0, exposure.mark);
     }
     add(Rule::SingleShot, 1.0, exposure.brightest_shot, exposure.shot);
-    for crossings in &exposure.places {
-        let train = Train::of(class, exposure, crossings);
-        all.extend(train.group());
-        all.extend(train.within_a_scan());
-        all.extend(train.repeated());
-        all.extend(train.average());
+    for Crossings { durations, shots } in &exposure.places {
+        let train = Train::of(class, exposure, (*durations, shots));
+        all.extend(train.limits().into_iter().flatten());
     }
     strictest_of_each(&all)
+}
+
+/// The energy, J, that each rule about several shots allows a mean shot where these `shots` cross an aperture
+/// that judges such `durations`; infinite where it does not apply.
+pub(super) fn allowed(
+    class: &Class1,
+    exposure: &Exposure,
+    durations: [f64; 2],
+    shots: &[Crossing],
+) -> [f64; RULES] {
+    let limits = Train::of(class, exposure, (durations, shots)).limits();
+    limits.map(|limit| limit.map_or(f64::INFINITY, |limit| limit.energy))
 }
 
 /// The shots that cross an aperture in two scans, and the sums of what they bring.
@@ -153,18 +166,26 @@ struct Train<'a> {
 }
 
 impl<'a> Train<'a> {
-    fn of(class: &'a Class1, exposure: &'a Exposure, crossings: &Crossings) -> Self {
-        let shots = crossings.shots.len();
+    fn of(
+        class: &'a Class1,
+        exposure: &'a Exposure,
+        (durations, crossing): ([f64; 2], &[Crossing]),
+    ) -> Self {
+        let shots = crossing.len();
         let (mut times, mut sums) = (Vec::with_capacity(2 * shots), vec![[0.0; 2]]);
         let mut sum = [0.0; 2];
         for scan in [0.0, exposure.scan_period] {
-            for shot in &crossings.shots {
+            for shot in crossing {
                 times.push(scan + shot.time);
                 sum = [sum[0] + shot.share, sum[1] + shot.energy];
                 sums.push(sum);
             }
         }
-        Self { class, exposure, durations: crossings.durations, shots, times, sums }
+        Self { class, exposure, durations, shots, times, sums }
+    }
+
+    fn limits(&self) -> [Option<Limit>; RULES] {
+        [self.group(), self.within_a_scan(), self.repeated(), self.average()]
     }
 
     /// Whether this aperture judges exposures of `duration` seconds.
@@ -190,22 +211,29 @@ impl<'a> Train<'a> {
         }
     }
 
-    /// The runs of shots that fit into `longest` seconds and into no more, one for each first shot
-    /// of the scan, with the seconds from the first light to the last.
-    fn runs(&self, longest: f64) -> impl Iterator<Item = ([f64; 2], f64)> {
+    /// The runs of shots that fit into `longest` seconds and into no more, one for each first shot of the
+    /// scan: the number of the first and that behind the last.
+    fn runs(&self, longest: f64) -> impl Iterator<Item = [usize; 2]> {
         let mut end = 0;
         (0..self.shots).map(move |first| {
-            let begin = self.times[first];
             // A scan's worth at most: the same shot does not come twice.
             let most = first + self.shots;
             end = end.max(first + 1);
-            let fits = |end: usize| self.times[end] + self.exposure.shot - begin <= longest;
-            while end < most && fits(end) {
+            while end < most && self.duration([first, end + 1]) <= longest {
                 end += 1;
             }
-            let sum = [0, 1].map(|part| self.sums[end][part] - self.sums[first][part]);
-            (sum, self.times[end - 1] + self.exposure.shot - begin)
+            [first, end]
         })
+    }
+
+    /// Shares and energies of a run.
+    fn sum(&self, [first, end]: [usize; 2]) -> [f64; 2] {
+        [0, 1].map(|part| self.sums[end][part] - self.sums[first][part])
+    }
+
+    /// Seconds from the first light of a run to the last.
+    fn duration(&self, [first, end]: [usize; 2]) -> f64 {
+        self.times[end - 1] + self.exposure.shot - self.times[first]
     }
 
     /// The shots within T_i, together one exposure, which C5 reduces where many of them follow.
@@ -217,11 +245,12 @@ impl<'a> Train<'a> {
         let groups = self.groups(longest) as f64 * LONGEST / self.exposure.scan_period;
         let counts = self.exposure.count_groups;
         let factor = if counts { self.class.c5(groups.ceil()) } else { 1.0 };
-        let brightest = self.runs(longest).max_by(|a, b| a.0[1].total_cmp(&b.0[1]));
-        brightest.map(|(sum, duration)| {
+        let runs = self.runs(longest);
+        let brightest = runs.max_by(|a, b| self.sum(*a)[1].total_cmp(&self.sum(*b)[1]));
+        brightest.map(|run| {
             // The duration is for people to read: the limit is that of T_i.
-            let limit = self.limit(Rule::Group, sum, (longest, factor));
-            Limit { duration, ..limit }
+            let limit = self.limit(Rule::Group, self.sum(run), (longest, factor));
+            Limit { duration: self.duration(run), ..limit }
         })
     }
 
@@ -245,16 +274,45 @@ impl<'a> Train<'a> {
         // Shots within T_i have their own rule, unless the scan is over sooner.
         let least = if counted > period { 0.0 } else { counted };
         let mut longest = least.max(self.exposure.shot);
-        let mut limits = Vec::new();
+        let mut best: Option<(f64, [usize; 2])> = None;
         while longest < period {
             longest = (longest * 2.0).min(period);
-            for (sum, duration) in self.runs(longest) {
-                if duration > least && self.judges(duration) {
-                    limits.push(self.limit(Rule::Scan, sum, (duration, 1.0)));
+            let mut strictest: Option<(f64, [usize; 2])> = None;
+            let mut most = (0.0, f64::INFINITY);
+            for run in self.runs(longest) {
+                let (sum, duration) = (self.sum(run)[1], self.duration(run));
+                // Less light in more time is allowed more.
+                if sum <= most.0 && duration >= most.1 || duration <= least {
+                    continue;
+                }
+                most = (sum, duration);
+                self.keep(&mut strictest, run, least);
+            }
+            // A part of it may be allowed less, for a shorter time.
+            for _ in 0..2 {
+                if let Some((_, [first, end])) = strictest {
+                    let ends = (first + 1..end).step_by((end - first).div_ceil(CUTS));
+                    ends.for_each(|end| self.keep(&mut strictest, [first, end], least));
+                }
+                if let Some((_, [first, end])) = strictest {
+                    let firsts = (first..end).step_by((end - first).div_ceil(CUTS));
+                    firsts.for_each(|first| self.keep(&mut strictest, [first, end], least));
                 }
             }
+            best = best.into_iter().chain(strictest).min_by(|a, b| a.0.total_cmp(&b.0));
         }
-        strictest(&limits).copied()
+        best.map(|(_, run)| self.limit(Rule::Scan, self.sum(run), (self.duration(run), 1.0)))
+    }
+
+    /// Keeps the `run` if it is judged, lasts longer than `least` and is allowed less than the `strictest`.
+    fn keep(&self, strictest: &mut Option<(f64, [usize; 2])>, run: [usize; 2], least: f64) {
+        let duration = self.duration(run);
+        if duration > least && self.judges(duration) {
+            let energy = self.class.single_exposure(duration) / self.sum(run)[1];
+            if strictest.is_none_or(|(other, _)| energy < other) {
+                *strictest = Some((energy, run));
+            }
+        }
     }
 
     fn repeated(&self) -> Option<Limit> {

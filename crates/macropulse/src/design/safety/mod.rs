@@ -11,6 +11,7 @@ mod crossing;
 mod exposure;
 mod scattered;
 mod share;
+mod worst;
 
 pub(crate) use beams::{Line, Lines};
 pub use class1::{Class1, Condition, TELESCOPE};
@@ -27,5 +28,7 @@ pub const ASSUMED: &str = "IEC 60825-1:2014 class 1, point source, through the a
     its label; groups of shots within T_i counted as repeated exposures if safety.count_lines; a \
     scan that stops is taken to switch the laser off. Our reading, not a certification";
 
+#[cfg(test)]
+mod brute;
 #[cfg(test)]
 mod tests;

@@ -1,68 +1,127 @@
 //! Beams in no lines that cross an aperture: of a table of directions, or a rosette.
 
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::f64::consts::PI;
+
 use super::crossing::Energies;
 use super::exposure::Crossing;
 use super::share::Share;
+use super::worst::{Aim, Field, coarse_first};
 use crate::design::Scan;
 
-/// Beams at which the middle of an aperture is tried, evenly spread over a scan.
-const TRIED: usize = 2048;
+/// Shots that a search may look at.
+const EFFORT: usize = 3_000_000;
 
 /// The beams of a scan, in the order in which they are sent.
 pub(super) struct Scattered<'a> {
-    pub scan: &'a Scan,
+    scan: &'a Scan,
     /// Unit vectors.
-    pub beams: &'a [[f64; 3]],
-    pub energies: &'a Energies,
+    beams: &'a [[f64; 3]],
+    energies: &'a Energies,
+    share: &'a Share,
+    distance: f64,
+    /// Width of the cells into which the beams are sorted: what meets an aperture is in its cell or beside it.
+    side: f64,
+    cells: HashMap<[i32; 3], Vec<u32>>,
 }
 
-impl Scattered<'_> {
-    /// The shots of the first scan that cross an aperture `distance` metres away whose middle is
-    /// where, of all beams that are tried, most light crosses it.
-    pub fn crossing(&self, share: &Share, distance: f64) -> Vec<Crossing> {
-        let light = |aim: [f64; 3]| {
-            let mut light = 0.0;
-            self.for_each(share, (aim, distance), |shot, share| {
-                light += share * self.energies.at(self.column(shot));
-            });
-            light
-        };
-        let tried = self.beams.iter().step_by(self.beams.len().div_ceil(TRIED).max(1));
-        let brightest = tried.map(|aim| (light(*aim), *aim)).max_by(|a, b| a.0.total_cmp(&b.0));
+impl<'a> Scattered<'a> {
+    /// The `beams` of `scan`, unit vectors, before an aperture `distance` metres away.
+    pub fn new(
+        scan: &'a Scan,
+        (beams, energies): (&'a [[f64; 3]], &'a Energies),
+        (share, distance): (&'a Share, f64),
+    ) -> Self {
+        let side = share.reach() / distance;
+        let mut cells: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
+        for (beam, shot) in beams.iter().zip(0..) {
+            cells.entry(cell(*beam, side)).or_default().push(shot);
+        }
+        Self { scan, beams, energies, share, distance, side, cells }
+    }
+}
+
+/// The cell of a point.
+fn cell(point: [f64; 3], side: f64) -> [i32; 3] {
+    point.map(|along| (along / side).floor() as i32)
+}
+
+impl Field for Scattered<'_> {
+    fn crossing(&self, aim: Aim) -> Vec<Crossing> {
+        let [up, aside] = [aim.elevation, aim.azimuth];
+        let cosine = libm::cos(up);
+        let aim = [cosine * libm::cos(aside), cosine * libm::sin(aside), libm::sin(up)];
+        let middle = cell(aim, self.side);
         let mut shots = Vec::new();
-        let Some((_, aim)) = brightest else { return shots };
-        self.for_each(share, (aim, distance), |shot, share| {
-            let energy = share * self.energies.at(self.column(shot));
-            shots.push(Crossing { time: self.scan.moment(shot as u64), share, energy });
-        });
+        for near in 0..27 {
+            let beside = [near % 3 - 1, near / 3 % 3 - 1, near / 9 - 1];
+            let at = [0, 1, 2].map(|axis| middle[axis] + beside[axis]);
+            for &shot in self.cells.get(&at).into_iter().flatten() {
+                let beam = self.beams[shot as usize];
+                let cosine: f64 = (0..3).map(|axis| aim[axis] * beam[axis]).sum();
+                if cosine <= 0.0 {
+                    continue;
+                }
+                let off = self.distance * (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
+                let share = self.share.at(off);
+                if share > 0.0 {
+                    let order = u64::from(shot);
+                    let column = self.scan.model().pixel(order).1;
+                    let energy = share * self.energies.at(column.into());
+                    shots.push(Crossing { time: self.scan.moment(order), share, energy });
+                }
+            }
+        }
+        shots.sort_unstable_by(|a, b| a.time.total_cmp(&b.time));
         shots
     }
 
-    fn column(&self, shot: usize) -> u32 {
-        self.scan.model().pixel(shot as u64).1.into()
-    }
-
-    /// Calls `visit` with each shot of which light passes an aperture about `aim`, and its share.
-    fn for_each(
-        &self,
-        share: &Share,
-        (aim, distance): ([f64; 3], f64),
-        mut visit: impl FnMut(usize, f64),
-    ) {
-        let reach = share.reach() / distance;
-        // The cosine of the angle within which a beam meets the aperture.
-        let least = 1.0 / (1.0 + reach * reach).sqrt();
-        for (shot, beam) in self.beams.iter().enumerate() {
-            let cosine: f64 = (0..3).map(|axis| aim[axis] * beam[axis]).sum();
-            if cosine < least * (1.0 - 1e-12) {
-                continue;
-            }
-            let off = distance * (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
-            let passed = share.at(off);
-            if passed > 0.0 {
-                visit(shot, passed);
+    /// All places within the width of an aperture of a beam.
+    fn starts(&self, gap: f64, _: f64) -> Vec<Aim> {
+        // As far apart as it takes to look at half the shots that may be.
+        let crossed = PI * self.beams.len() as f64 / (EFFORT / 2) as f64;
+        let gap = (2.0 * gap).max(self.side * crossed.sqrt());
+        // Azimuths of a row of places are as far apart as they are at its elevation.
+        let across = |row: i32| gap / libm::cos(f64::from(row) * gap).max(gap);
+        let place = |[x, y, z]: &[f64; 3]| {
+            let row = (libm::asin(z.clamp(-1.0, 1.0)) / gap).round() as i32;
+            [row, (libm::atan2(*y, *x) / across(row)).round() as i32]
+        };
+        // A place that a beam goes to is tried at that beam.
+        let mut lit: BTreeMap<[i32; 2], &[f64; 3]> = BTreeMap::new();
+        for beam in self.beams {
+            lit.entry(place(beam)).or_insert(beam);
+        }
+        let reach = (self.share.width() / self.distance / gap).ceil() as i32;
+        let mut places = BTreeSet::new();
+        for &[row, column] in lit.keys() {
+            for near in row - reach..=row + reach {
+                let middle = (f64::from(column) * across(row) / across(near)).round() as i32;
+                places.extend((middle - reach..=middle + reach).map(|column| [near, column]));
             }
         }
+        let aim = |place: &[i32; 2]| match lit.get(place) {
+            Some([x, y, z]) => {
+                Aim { elevation: libm::asin(z.clamp(-1.0, 1.0)), azimuth: libm::atan2(*y, *x) }
+            }
+            None => Aim {
+                elevation: f64::from(place[0]) * gap,
+                azimuth: f64::from(place[1]) * across(place[0]),
+            },
+        };
+        coarse_first(&places.iter().map(aim).collect::<Vec<_>>())
+    }
+
+    fn across(&self, _: f64) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn pitch(&self, gap: f64) -> [f64; 2] {
+        [gap; 2]
+    }
+
+    fn effort(&self) -> usize {
+        EFFORT
     }
 }
 

@@ -17,6 +17,8 @@ const REACH: f64 = 2.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Share {
     radius: f64,
+    /// Radius of the beam.
+    beam: f64,
     /// Where the table begins, and how far its places stand apart; none for a beam without width.
     first: f64,
     step: f64,
@@ -27,12 +29,18 @@ impl Share {
     /// Of a beam of radius `beam` through an aperture of radius `radius`, m.
     pub fn new(radius: f64, beam: f64) -> Self {
         if beam < 1e-6 * radius {
-            return Self { radius, first: 0.0, step: 0.0, table: Vec::new() };
+            return Self { radius, beam, first: 0.0, step: 0.0, table: Vec::new() };
         }
         let first = (radius - REACH * beam).max(0.0);
         let step = (radius + REACH * beam - first) / (PLACES - 1) as f64;
         let table = (0..PLACES).map(|place| passed(radius, beam, first + place as f64 * step));
-        Self { radius, first, step, table: table.collect() }
+        Self { radius, beam, first, step, table: table.collect() }
+    }
+
+    /// How far apart, m, places are at which different light passes: the radius of the aperture, and half that
+    /// of a beam.
+    pub fn width(&self) -> f64 {
+        self.radius + self.beam / 2.0
     }
 
     /// Beyond this distance, m, nothing passes.

@@ -296,7 +296,8 @@ impl Model for Raster {
         let step = self.grid.cell()[0];
         let first = (self.grid.horizontal - step) / 2.0;
         let rows = self.grid.elevations().map(|elevation| Line { elevation, first }).collect();
-        Beams::Lines(Lines { rows, step, first, in_turn: self.lines() })
+        let comes_back = self.is_resonant();
+        Beams::Lines(Lines { rows, step, first, in_turn: self.lines(), comes_back })
     }
 }
 

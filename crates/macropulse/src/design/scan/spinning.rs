@@ -407,7 +407,7 @@ impl Model for Spinning {
         let first = |row: usize| PI - step * self.turned(row) + self.lasers[row].azimuth;
         let rows = self.elevations.iter().enumerate();
         let rows = rows.map(|(row, &elevation)| Line { elevation, first: first(row) });
-        Beams::Lines(Lines { rows: rows.collect(), step, first: PI, in_turn: 1 })
+        Beams::Lines(Lines { rows: rows.collect(), step, first: PI, in_turn: 1, comes_back: false })
     }
 
     fn range_offsets(&self) -> &[f64] {

@@ -1,0 +1,198 @@
+//! Where an eye gets most: the places of an aperture at which each rule allows least.
+//!
+//! Each rule has a worst place of its own: the shots that count as one may come from two lasers, the mean
+//! power from all of them. The place is searched for in elevation and azimuth, and at each place every rule
+//! looks for its worst time.
+//!
+//! 1. Places are tried an eighth of the aperture apart, coarse steps first.
+//! 2. The best ones of each rule are refined in steps that are halved.
+//!
+//! What is found is the light at a real place, so the search can only miss light: it may allow more than the
+//! worst place there is, by 2 % at most. `brute.rs` holds it against a grid.
+
+use super::exposure::Crossing;
+
+/// Places tried along the width of the light that passes an aperture, to begin with.
+const STEPS: f64 = 8.0;
+/// Places of each rule that are refined.
+const FINALISTS: usize = 5;
+/// Times the steps are halved by which a place is refined.
+const HALVINGS: u32 = 5;
+/// Moves by steps of one length.
+const MOVES: u32 = 4;
+/// Steps to the right on a way around a place in eighths of a turn, and with two eighths more, upwards.
+const SIDES: [f64; 8] = [0.0, 1.0, 1.0, 1.0, 0.0, -1.0, -1.0, -1.0];
+/// Places that are tried in any case.
+const LEAST: usize = 3;
+/// Rules that depend on the place.
+pub(super) const RULES: usize = 4;
+
+/// Where the middle of an aperture is, rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Aim {
+    pub azimuth: f64,
+    pub elevation: f64,
+}
+
+/// The beams of a scan.
+pub(super) trait Field {
+    /// The shots that cross an aperture with its middle at `aim`, in the order of their times.
+    fn crossing(&self, aim: Aim) -> Vec<Crossing>;
+
+    /// Places to begin with, about `gap` radians apart, the most telling first. Shots within `counted`
+    /// seconds count as one.
+    fn starts(&self, gap: f64, counted: f64) -> Vec<Aim>;
+
+    /// Azimuths to try at the best elevations of these places; empty where they had all of interest.
+    fn across(&self, gap: f64) -> Vec<f64>;
+
+    /// Steps in azimuth and elevation by which places are refined at first, rad; 0 where that makes no
+    /// difference.
+    fn pitch(&self, gap: f64) -> [f64; 2];
+
+    /// Shots that may be looked at. Where more cross, light hardly depends on the place, and fewer places
+    /// are tried.
+    fn effort(&self) -> usize;
+}
+
+/// The shots that cross at the worst place of each rule. Light that passes an aperture is `width` radians wide,
+/// and shots within `counted` seconds count as one. `judge` tells what energy each rule allows to the shots that
+/// cross at one place, infinite where it does not apply.
+pub(super) fn worst(
+    field: &dyn Field,
+    (width, counted): (f64, f64),
+    judge: &dyn Fn(&[Crossing]) -> [f64; RULES],
+) -> Vec<Vec<Crossing>> {
+    let gap = width / STEPS;
+    let pitch = field.pitch(gap);
+    let mut search = Search { field, judge, spent: 0, tried: Vec::new() };
+    for aim in field.starts(gap, counted) {
+        if search.tried.len() >= LEAST && search.spent > field.effort() / 2 {
+            break;
+        }
+        search.at(aim);
+    }
+    let mut elevations: Vec<f64> = Vec::new();
+    for (_, Aim { elevation, .. }) in (0..RULES).filter_map(|rule| search.best(rule)) {
+        if elevations.iter().all(|other| (other - elevation).abs() > pitch[1]) {
+            elevations.push(elevation);
+        }
+    }
+    for azimuth in field.across(gap) {
+        for &elevation in &elevations {
+            if search.spent < field.effort() / 4 * 3 {
+                search.at(Aim { azimuth, elevation });
+            }
+        }
+    }
+    for rule in 0..RULES {
+        for best in search.finalists(rule, pitch) {
+            search.refine(rule, best, pitch);
+        }
+    }
+    let mut aims: Vec<Aim> = Vec::new();
+    for (_, aim) in (0..RULES).filter_map(|rule| search.best(rule)) {
+        if !aims.contains(&aim) {
+            aims.push(aim);
+        }
+    }
+    aims.into_iter().map(|aim| field.crossing(aim)).collect()
+}
+
+/// Places in an order in which any number of the first ones lie about evenly among all of them.
+pub(super) fn coarse_first<T: Copy>(all: &[T]) -> Vec<T> {
+    let level = |place: usize| place.trailing_zeros().min(4);
+    let of_level = |wanted: u32| (0..all.len()).filter(move |place| level(*place) == wanted);
+    (0..=4).rev().flat_map(of_level).map(|place| all[place]).collect()
+}
+
+/// The places tried so far.
+struct Search<'a> {
+    field: &'a dyn Field,
+    judge: &'a dyn Fn(&[Crossing]) -> [f64; RULES],
+    /// Shots looked at.
+    spent: usize,
+    tried: Vec<([f64; RULES], Aim)>,
+}
+
+impl Search<'_> {
+    /// What each rule allows at `aim`.
+    fn at(&mut self, aim: Aim) -> [f64; RULES] {
+        let shots = self.field.crossing(aim);
+        // A place where nothing crosses takes some time, too.
+        self.spent += shots.len() + 10;
+        let allowed = (self.judge)(&shots);
+        self.tried.push((allowed, aim));
+        allowed
+    }
+
+    /// The least that `rule` allows, and where; `None` where it does not apply.
+    fn best(&self, rule: usize) -> Option<(f64, Aim)> {
+        let energies = self.tried.iter().map(|(allowed, aim)| (allowed[rule], *aim));
+        energies.filter(|(energy, _)| energy.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// The places at which `rule` allows least, apart from each other.
+    fn finalists(&self, rule: usize, pitch: [f64; 2]) -> Vec<(f64, Aim)> {
+        let mut all: Vec<(f64, Aim)> =
+            self.tried.iter().map(|(allowed, aim)| (allowed[rule], *aim)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut chosen: Vec<(f64, Aim)> = Vec::new();
+        for (energy, aim) in all {
+            let is_near = |other: &(f64, Aim)| {
+                (other.1.azimuth - aim.azimuth).abs() < 2.5 * pitch[0]
+                    && (other.1.elevation - aim.elevation).abs() < 2.5 * pitch[1]
+            };
+            if chosen.len() == FINALISTS || !energy.is_finite() {
+                break;
+            }
+            if !chosen.iter().any(is_near) {
+                chosen.push((energy, aim));
+            }
+        }
+        chosen
+    }
+
+    /// Goes from a place to neighbours at which `rule` allows less, in steps that are halved.
+    fn refine(&mut self, rule: usize, mut best: (f64, Aim), pitch: [f64; 2]) {
+        let mut steps = pitch;
+        for _ in 0..HALVINGS {
+            for _ in 0..MOVES {
+                let from = best.1;
+                for side in 0..8 {
+                    let [across, up] = [SIDES[side], SIDES[(side + 2) % 8]];
+                    if across != 0.0 && steps[0] <= 0.0 || self.spent > self.field.effort() {
+                        continue;
+                    }
+                    let aim = Aim {
+                        azimuth: from.azimuth + across * steps[0],
+                        elevation: from.elevation + up * steps[1],
+                    };
+                    let energy = self.at(aim)[rule];
+                    if energy < best.0 {
+                        best = (energy, aim);
+                    }
+                }
+                if best.1 == from {
+                    break;
+                }
+            }
+            steps = steps.map(|step| step / 2.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_number_of_first_places_lies_evenly_among_all() {
+        let all: Vec<usize> = (0..100).collect();
+        let order = coarse_first(&all);
+        assert_eq!(order[..7], [0, 16, 32, 48, 64, 80, 96]);
+        let mut sorted = order;
+        sorted.sort_unstable();
+        assert_eq!(sorted, all);
+    }
+}
