@@ -9,7 +9,7 @@ use macropulse::formats::State;
 use macropulse::scene::Scene as Simulated;
 use macropulse::score::Score;
 use macropulse::sim::{self, Tally, Watch};
-use macropulse_study::record::{Run, manifest};
+use macropulse_study::record::{self, Run, manifest};
 use pyo3::prelude::*;
 use serde_json::Value;
 
@@ -70,7 +70,7 @@ impl Stage {
 
     /// What the program writes of a run of this scan.
     fn manifest(&self, number: u64, score: &Score, tally: &Tally) -> Value {
-        let warnings = [&self.design.warnings[..], &self.scene.warnings].concat();
+        let warnings = record::warnings(&self.design, &self.scene);
         let run = Run {
             state: State::Finished,
             design: &self.design,

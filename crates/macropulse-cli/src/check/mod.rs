@@ -9,6 +9,7 @@ use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::formats::versioned;
 use macropulse::memory::Estimate;
+use macropulse::predict::unmodelled;
 use macropulse::scene as scenes;
 use macropulse_study::record::surroundings;
 use serde_json::{Value, json};
@@ -137,6 +138,7 @@ fn scenario(name: &str, scenario: &Scenario, memory: &MemoryLimit) -> Result<Rep
         .iter()
         .flat_map(|design| design.warnings.iter().map(|w| format!("{}: {w}", design.name)))
         .chain(scenario.scene.warnings.iter().cloned())
+        .chain(scenario.designs.iter().flat_map(|design| unmodelled::warnings(design, environment)))
         .collect();
     columns.push_list("warnings", warnings.iter().cloned());
     columns.push_list("assumed", scenario.scene.notes.iter().cloned());

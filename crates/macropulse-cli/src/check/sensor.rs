@@ -7,7 +7,8 @@ use macropulse::design::{Derived, Design, Detector, Polygon};
 use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
 use macropulse::predict::deepest_baseline;
-use macropulse_study::record::{defaults, surroundings};
+use macropulse::predict::unmodelled::{self, LeftOut};
+use macropulse_study::record::{defaults, not_modelled, surroundings};
 use serde_json::{Map, Value, json};
 
 use super::{Report, estimated};
@@ -46,16 +47,24 @@ pub fn report(
         idealised.push("speckle", told);
     }
     text += &section("Idealised", &idealised);
+    let mut left = Columns::default();
+    for LeftOut { effect, size } in unmodelled::of(design, environment)? {
+        left.push(effect.name(), format!("{}; {size}", effect.assumption()));
+    }
+    text += &section("Not modelled", &left);
     let mut defaults = Columns::default();
     for (key, value) in &design.defaults {
         defaults.push(key, value);
     }
     text += &section("Defaults used", &defaults);
     let mut warnings = Columns::default();
-    warnings.push_list("!", design.warnings.iter().cloned());
+    let of_air = unmodelled::warnings(design, environment);
+    warnings.push_list("!", design.warnings.iter().chain(&of_air).cloned());
     text += &section("Warnings", &warnings);
     let mut json = json(design, &derived);
     json["environment"] = json!(surroundings(environment));
+    json["not_modelled"] = json!(not_modelled(design, environment));
+    json["warnings"] = json!([&design.warnings[..], &of_air].concat());
     json["sunlight_hz"] = operating.background.into();
     if let Detector::Sampled(sampled) = &design.detector {
         json["baseline_photons"] = deepest_baseline(design, sampled).into();
@@ -271,6 +280,5 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "idealised": design.idealised.iter().map(|effect| effect.name()).collect::<Vec<_>>(),
         "assumptions": assumptions,
         "defaults": defaults(design),
-        "warnings": design.warnings,
     })
 }

@@ -185,7 +185,7 @@ impl<'a> Run<'a> {
             folder: String::new(),
             files: Vec::new(),
             explained: Vec::new(),
-            warnings: [&design.warnings[..], &scenario.scene.warnings].concat(),
+            warnings: record::warnings(design, &scenario.scene),
         }
     }
 

@@ -32,6 +32,7 @@ pages! {
     formats: "docs/formats.md",
     glossary: "docs/glossary.md",
     hardening: "docs/hardening.md",
+    limits: "docs/limits.md",
     paper: "docs/paper.md",
     performance: "docs/performance.md",
     physics: "docs/physics.md",

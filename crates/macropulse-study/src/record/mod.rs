@@ -19,9 +19,11 @@ use macropulse::formats::{
 };
 use macropulse::names::toml_value;
 use macropulse::points::{Outcome, PointCloud, Truth};
+use macropulse::predict::unmodelled;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim::Tally;
+use serde_json::json;
 
 pub use decoded::Decoded;
 pub use folder::{CloudsAt, Left};
@@ -188,6 +190,7 @@ pub fn manifest(run: &Run) -> Manifest {
             .iter()
             .map(|effect| effect.name.to_owned())
             .collect(),
+        not_modelled: not_modelled(design, &scene.environment),
         assumed: scene.notes.clone(),
         warnings: run.warnings.to_vec(),
         right_fraction: Some(score.right_fraction()).filter(|fraction| fraction.is_finite()),
@@ -243,6 +246,23 @@ pub fn manifest(run: &Run) -> Manifest {
     manifest.times_s.push("write", run.writing);
     manifest.times_s.push("elapsed", run.elapsed);
     manifest
+}
+
+/// What is not modelled of a sensor in an environment, as manifests have it; nothing where the
+/// sensor cannot be simulated.
+pub fn not_modelled(design: &Design, environment: &Environment) -> Entries<serde_json::Value> {
+    let mut entries = Entries::default();
+    for left in unmodelled::of(design, environment).unwrap_or_default() {
+        let effect = left.effect;
+        entries.push(effect.name(), json!({ "assumed": effect.assumption(), "size": left.size }));
+    }
+    entries
+}
+
+/// What a reader should know of a sensor in a scene before it is run.
+pub fn warnings(design: &Design, scene: &Scene) -> Vec<String> {
+    let of_air = unmodelled::warnings(design, &scene.environment);
+    [&design.warnings[..], &scene.warnings, &of_air].concat()
 }
 
 /// A sensor as manifests have it.

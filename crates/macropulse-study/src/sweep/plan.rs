@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Axis, Error, Job};
-use crate::record::{defaults, named, surroundings};
+use crate::record::{defaults, named, not_modelled, surroundings, warnings};
 use macropulse::channel::{Operating, idealised};
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands, short_bands};
@@ -67,6 +67,8 @@ pub struct Point {
     pub environment: Surroundings,
     /// Effects that are left out.
     pub idealised: Vec<String>,
+    /// Effects that are not modelled, with their sizes, by name.
+    pub not_modelled: Entries<Value>,
     /// Values that the file leaves open, by key.
     pub defaults: Entries<Value>,
     /// What was assumed in reading the scene.
@@ -214,8 +216,9 @@ impl Point {
                 .iter()
                 .map(|effect| effect.name.to_owned())
                 .collect(),
+            not_modelled: not_modelled(&design, &scene.environment),
             assumed: scene.notes.clone(),
-            warnings: [&design.warnings[..], &scene.warnings].concat(),
+            warnings: warnings(&design, scene),
             defaults: defaults(&design),
             text: design.text,
             bands,

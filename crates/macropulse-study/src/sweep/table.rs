@@ -123,6 +123,12 @@ impl Plan {
         manifest["environments"] = json!(environments);
         manifest["defaults"] = defaults.into();
         manifest["idealised"] = all(|point| &point.idealised).into();
+        let not_modelled = self.points.iter().flat_map(|point| &point.not_modelled.0);
+        // A size is that of one point.
+        let not_modelled: Map<String, Value> = not_modelled
+            .map(|(name, told)| (name.clone(), json!({ "assumed": told["assumed"] })))
+            .collect();
+        manifest["not_modelled"] = not_modelled.into();
         manifest["assumed"] = all(|point| &point.assumed).into();
         manifest["warnings"] = warnings.into();
         manifest["scores"] = scores.into();

@@ -30,6 +30,24 @@ pub fn rain(mm_per_hour: f64) -> f64 {
     }
 }
 
+/// Extinction over backscatter of water drops, sr: those of fog and rain \[OHI04\].
+const DROPS: f64 = 18.8;
+
+/// Extinction over backscatter of haze, sr: between that over the sea and that of a city \[Mul07\].
+const HAZE: f64 = 50.0;
+
+/// What a unit of volume of air of this `visibility`, m, in rain of `mm_per_hour` sends back,
+/// 1/(m·sr), at a `wavelength` in m.
+pub fn backscatter(visibility: f64, mm_per_hour: f64, wavelength: f64) -> f64 {
+    let ratio = if is_fog(visibility) { DROPS } else { HAZE };
+    haze(visibility, wavelength) / ratio + rain(mm_per_hour) / DROPS
+}
+
+/// Whether air of this `visibility`, m, is fog.
+pub fn is_fog(visibility: f64) -> bool {
+    visibility < 1e3
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -150,6 +150,21 @@ impl Environment {
         }
     }
 
+    /// Backscatter of air, fog and rain in 1/(m·sr) at a `wavelength` in m: what a volume sends back
+    /// to where the light comes from. It is not simulated.
+    pub fn backscatter(&self, wavelength: f64) -> f64 {
+        match self.is_off(Effect::Atmosphere) {
+            true => 0.0,
+            false => air::backscatter(self.visibility, self.rain_mm_h, wavelength),
+        }
+    }
+
+    /// Whether there is fog or rain.
+    pub fn has_drops(&self) -> bool {
+        let drops = air::is_fog(self.visibility) || self.rain_mm_h > 0.0;
+        drops && !self.is_off(Effect::Atmosphere)
+    }
+
     /// Spectral irradiance of the scene at a `wavelength` in m, W/m² per metre of wavelength; `None`
     /// where the table of sunlight does not go.
     ///

@@ -108,6 +108,8 @@ pub struct Manifest {
     pub defaults: Entries<serde_json::Value>,
     /// Effects that are left out.
     pub idealised: Vec<String>,
+    /// Effects that no run models, by name: what is assumed instead, and how large each would be.
+    pub not_modelled: Entries<serde_json::Value>,
     /// What was assumed in reading the scene.
     pub assumed: Vec<String>,
     /// What a reader should be warned of.
@@ -148,6 +150,7 @@ impl Default for Manifest {
             environment: Surroundings::default(),
             defaults: Entries::default(),
             idealised: Vec::new(),
+            not_modelled: Entries::default(),
             assumed: Vec::new(),
             warnings: Vec::new(),
             counts: Entries::default(),

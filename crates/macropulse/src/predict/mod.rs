@@ -12,6 +12,7 @@ mod own_light;
 pub mod ranging;
 mod sampled;
 mod sidelobes;
+pub mod unmodelled;
 pub mod verdict;
 
 pub use forecast::{Error, Forecast, Forecaster};
