@@ -49,7 +49,7 @@ pub struct Counted {
     pub lost: u64,
     /// Most converters busy at once.
     pub peak_busy: u32,
-    /// Range errors of the right points.
+    /// Range errors of the right points, and of more if they are spread wider.
     pub right: RangeError,
     /// Where the last light was lost if there is not a single return.
     pub empty: Option<String>,
@@ -96,7 +96,7 @@ impl Job<'_> {
             detections: scan.tally.detections,
             lost: scan.tally.lost,
             peak_busy: scan.tally.peak_busy,
-            right: RangeError::of(&scan.cloud()),
+            right: RangeError::of_spread(&scan.cloud(), design.right_within),
             empty: scan.tally.where_all_was_lost().map(str::to_owned),
         }))
     }

@@ -86,8 +86,10 @@ impl Metric {
             Self::Edge => "share of all pixels with a return from a surface beside the pixel",
             Self::Target => "share of the rays that meet the target which gave a point on it",
             Self::Points => "returns per scan, or per measured part of it",
-            Self::Precision => "standard deviation of the range error of right points, m",
-            Self::Bias => "mean range error of right points, m",
+            Self::Precision => {
+                "standard deviation of the range error, sidelobes and wrong points apart, m"
+            }
+            Self::Bias => "mean of the same, m",
             Self::Lost => "share of the detection events that found every converter busy",
             Self::Busy => "most converters busy at once, mean over the seeds",
         }
@@ -131,11 +133,11 @@ impl Metric {
         let per_echo = |outcome: Outcome| {
             rate(&|counted| [counted.score.count(outcome), counted.score.with_echo()])
         };
-        let mean = |of: &dyn Fn(&Counted) -> f64| {
-            Estimate::of_mean(&counted.iter().map(of).collect::<Vec<_>>())
         let per_pixel = |outcome: Outcome| {
             rate(&|counted| [counted.score.count(outcome), counted.score.pixels.iter().sum()])
         };
+        let mean = |of: &dyn Fn(&Counted) -> f64| {
+            Estimate::of_mean(&counted.iter().map(of).collect::<Vec<_>>())
         };
         match self {
             Self::Pd => rate(&|counted| {
@@ -197,9 +199,9 @@ mod tests {
             4.0 / 87.0,
             18.0 / 87.0,
             0.01,
+            0.03,
             0.75,
             73.0,
-            0.03,
             2e-4,
             1e-4,
             0.005,
