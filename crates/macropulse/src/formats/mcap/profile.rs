@@ -22,6 +22,8 @@ pub(super) enum Quantity {
     Float(Attribute),
     /// Apparent reflectance in percent, as a float.
     Percent,
+    /// The same, 255 at most.
+    PercentTo255,
     /// The same, whole, 255 at most, in one byte or two.
     PercentU1,
     PercentU2,
@@ -62,7 +64,7 @@ const VELODYNE: &[Row] = &[
     X,
     Y,
     Z,
-    ("intensity", 12, Quantity::Percent),
+    ("intensity", 12, Quantity::PercentTo255),
     ("ring", 16, Quantity::RingFromBelow),
     ("time", 18, Quantity::SecondsF4),
 ];
@@ -175,8 +177,8 @@ impl Quantity {
             Self::PercentU1 | Self::LineU1 | Self::LivoxTag | Self::ReturnType => Kind::U1,
             Self::PercentU2 | Self::RingFromBelow | Self::ZeroU2 => Kind::U2,
             Self::NanosU4 | Self::MillimetresU4 => Kind::U4,
-            Self::Percent | Self::Livox150 | Self::SecondsF4 => Kind::F4,
-            Self::Azimuth | Self::Elevation => Kind::F4,
+            Self::Percent | Self::PercentTo255 | Self::Livox150 => Kind::F4,
+            Self::SecondsF4 | Self::Azimuth | Self::Elevation => Kind::F4,
             Self::NanosF8 => Kind::F8,
         }
     }
@@ -187,6 +189,7 @@ impl Quantity {
         Some(match self {
             Self::Of(attribute) | Self::Float(attribute) => (attribute, Whole),
             Self::Percent => (Attribute::Intensity, Partly("in percent")),
+            Self::PercentTo255 => (Attribute::Intensity, Partly("in percent, 255 at most")),
             Self::PercentU1 => (Attribute::Intensity, Partly("whole percent, 255 at most")),
             Self::Livox150 => (Attribute::Intensity, Partly("white is 150, 255 at most")),
             Self::SecondsF4 => (Attribute::TimeNs, Partly("s from the stamp, float")),
@@ -232,6 +235,7 @@ impl<'a> Source<'a> {
             Quantity::Of(attribute) => attribute.value(self.cloud, point),
             Quantity::Float(attribute) => attribute.value(self.cloud, point).narrowed(),
             Quantity::Percent => Value::F4(percent() as f32),
+            Quantity::PercentTo255 => Value::F4(percent().clamp(0.0, 255.0) as f32),
             Quantity::PercentU1 => Value::U1(whole(percent(), 255.0) as u8),
             Quantity::PercentU2 => Value::U2(whole(percent(), 255.0) as u16),
             Quantity::Livox150 => {
@@ -336,6 +340,7 @@ mod tests {
         let source = Source::new(&cloud, 40.0);
         let value = |quantity| source.value(quantity, Point::Return(1));
         assert_eq!(value(Quantity::PercentU1), Value::U1(10));
+        assert_eq!(value(Quantity::PercentTo255), value(Quantity::Percent));
         assert_eq!(value(Quantity::MillimetresU4), Value::U4(30_500));
         assert_eq!(value(Quantity::NanosU4), Value::U4(1));
         assert_eq!(value(Quantity::NanosF8), Value::F8(1_000_000_040.946_5));
@@ -343,6 +348,21 @@ mod tests {
         let Value::F4(elevation) = value(Quantity::Elevation) else { panic!() };
         assert!((elevation - (0.5_f32 / 30.5).atan()).abs() < 1e-7);
         assert_eq!(source.value(Quantity::PercentU1, Point::Unanswered(2)), Value::U1(0));
+    }
+
+    /// A sign is 255 to a Velodyne, as its driver has it.
+    #[test]
+    fn a_retroreflector_does_not_leave_the_scale() {
+        let mut cloud = sample_cloud();
+        cloud.intensity[1] = 255.55;
+        let source = Source::new(&cloud, 40.0);
+        let value = |quantity| source.value(quantity, Point::Return(1));
+        assert_eq!(value(Quantity::PercentTo255), Value::F4(255.0));
+        assert_eq!(value(Quantity::Percent), Value::F4(25_555.0));
+        let Value::F4(none) = source.value(Quantity::PercentTo255, Point::Unanswered(2)) else {
+            panic!()
+        };
+        assert!(none.is_nan());
     }
 
     #[test]
