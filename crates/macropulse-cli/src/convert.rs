@@ -4,7 +4,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{CloudRoom, Clouds, Format, Recording};
+use macropulse::formats::{CloudRoom, Clouds, Reading, Format, Recording};
 use macropulse::points::PointCloud;
 
 use crate::fault::{Fault, note, warn};
@@ -212,7 +212,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
 
 impl Conversion<'_> {
     fn convert(&mut self, input: &Path, inputs: usize, interrupt: &Interrupt) -> Result<(), Fault> {
-        let mut clouds = Clouds::open_within(input, self.room)?;
+        let mut clouds = Clouds::open_with(input, Reading { room: self.room, topic: None })?;
         let has_several = input.extension().is_some_and(|ending| ending == "mcap");
         let mut next = clouds.next();
         while let Some(cloud) = next.take() {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use macropulse::design::preset_text;
-use macropulse::formats::{CloudRoom, Clouds, clear_unfinished, write_atomically};
+use macropulse::formats::{CloudRoom, Clouds, Reading, clear_unfinished, write_atomically};
 use macropulse::scene::Scene;
 use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
@@ -38,7 +38,7 @@ pub struct View {
 
 /// Adds the clouds of the file at `path`.
 fn add(page: &mut Explorer, (name, path): (&str, &Path), room: CloudRoom) -> Result<(), Fault> {
-    let mut clouds = Clouds::open_within(path, room)?;
+    let mut clouds = Clouds::open_with(path, Reading { room, topic: None })?;
     let mut at = 0;
     while let Some(cloud) = clouds.next() {
         let cloud = cloud?;

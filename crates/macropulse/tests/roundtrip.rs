@@ -74,6 +74,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
         marks: count(5),
         margin: count(2),
         exact: Exact::default(),
+        stamp_ns: None,
         photons: vec![f32::NAN; all.len()],
         saturated: all.iter().map(|point| place(point) % 3 == 1).collect(),
         fired_ns,

@@ -60,6 +60,7 @@ fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
         y,
         z,
         exact: _,
+        stamp_ns: _,
         intensity,
         range,
         time_ns,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use macropulse::formats::{CloudRoom, Clouds, Names};
+use macropulse::formats::{CloudRoom, Clouds, Reading, Names};
 use macropulse::opened;
 use macropulse::points::PointCloud;
 use serde_json::Value;
@@ -133,7 +133,7 @@ impl CloudsAt {
     /// If it cannot be read, or is a folder that holds none.
     pub fn open(path: &Path, room: CloudRoom) -> Result<Self, Error> {
         if !path.is_dir() {
-            let open = Some(Clouds::open_within(path, room)?);
+            let open = Some(Clouds::open_with(path, Reading { room, topic: None })?);
             return Ok(Self { left: Vec::new(), open, room });
         }
         let left = Left::of(path)?;
@@ -153,7 +153,7 @@ impl CloudsAt {
         let mut next = self.open.as_mut().and_then(Iterator::next);
         while next.is_none() {
             let Some(path) = self.left.pop() else { return Ok(None) };
-            next = self.open.insert(Clouds::open_within(&path, self.room)?).next();
+            next = self.open.insert(Clouds::open_with(&path, Reading { room: self.room, topic: None })?).next();
         }
         let cloud = next.transpose()?;
         Ok(cloud.zip(self.open.as_ref().map(Clouds::names)))

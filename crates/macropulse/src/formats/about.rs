@@ -13,10 +13,14 @@ const LIST: &str = "macropulse list ";
 /// Begins the line with the pose of the sensor.
 const VIEWPOINT: &str = "macropulse viewpoint ";
 
+/// Begins the line with the stamp of the scan, ns of Unix time.
+const STAMP: &str = "macropulse stamp ";
+
 /// What a file says of its cloud beside the points.
 #[derive(Debug, Default)]
 pub(super) struct About {
     pub scan: u64,
+    pub stamp_ns: Option<u64>,
     pub viewpoint: Viewpoint,
     /// The image of a list, if the file tells it.
     pub list: Option<List>,
@@ -55,6 +59,11 @@ pub(super) fn viewpoint_line(cloud: &PointCloud) -> String {
     format!("{VIEWPOINT}{}", viewpoint_text(&cloud.viewpoint))
 }
 
+/// The line with the stamp of the scan, if it has one.
+pub(super) fn stamp_line(cloud: &PointCloud) -> Option<String> {
+    cloud.stamp_ns.map(|stamp| format!("{STAMP}{stamp}"))
+}
+
 /// A pose as PCD has it: x y z, then w i j k.
 pub(super) fn viewpoint_text(viewpoint: &Viewpoint) -> String {
     let Viewpoint { position: [x, y, z], turn: [w, i, j, k] } = viewpoint;
@@ -76,7 +85,7 @@ pub(super) fn all_lines<'a>(
     names: &'a Names,
 ) -> impl Iterator<Item = String> + use<'a> {
     let own = [scan_line(cloud), list_line(cloud), viewpoint_line(cloud)];
-    own.into_iter().chain(name_lines(names))
+    own.into_iter().chain(stamp_line(cloud)).chain(name_lines(names))
 }
 
 impl About {
@@ -92,6 +101,8 @@ impl About {
     pub fn take(&mut self, line: &str) -> Result<(), String> {
         if let Some(scan) = line.strip_prefix(SCAN) {
             self.scan = scan.trim().parse().unwrap_or(0);
+        } else if let Some(stamp) = line.strip_prefix(STAMP) {
+            self.stamp_ns = stamp.trim().parse().ok();
         } else if let Some(list) = line.strip_prefix(LIST) {
             self.list = Some(list_of(list)?);
         } else if let Some(text) = line.strip_prefix(VIEWPOINT) {
@@ -148,12 +159,13 @@ mod tests {
 
     #[test]
     fn what_is_written_is_taken_in_again() {
-        let cloud = sample_cloud();
+        let cloud = PointCloud { stamp_ns: Some(1_700_000_000_123_456_789), ..sample_cloud() };
         let objects = ["car, red".to_owned(), "the road".to_owned()];
         let names = Names { objects: &objects, materials: &[] };
         let mut about = About::default();
         all_lines(&cloud, &names).for_each(|line| about.take(&line).unwrap());
         assert_eq!((about.scan, about.viewpoint), (cloud.scan, cloud.viewpoint));
+        assert_eq!(about.stamp_ns, cloud.stamp_ns);
         let list = List { rows: 2, columns: 3, most: 1, pick: Pick::Strongest };
         assert_eq!(about.list, Some(list));
         assert_eq!((about.objects.as_slice(), about.materials.len()), (&objects[..], 0));

@@ -3,23 +3,40 @@
 use super::about::About;
 use super::mcap::Messages;
 use super::{
-    CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57, kitti, las_reader, npy, pcd_reader,
+    CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57_reader, kitti, las_reader, npy,
+    pcd_reader,
     ply_reader,
 };
 use crate::opened;
 use crate::points::PointCloud;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most bytes of a file with one cloud, which is read at once.
 const MOST_BYTES: u64 = 8 << 30;
 
-/// The clouds of a file, one after the other: many of an MCAP file, one of any other.
-pub struct Clouds(Source);
+/// How the clouds of a file are read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reading<'a> {
+    /// The memory that the clouds may take: by default four fifths of what the machine has.
+    pub room: CloudRoom,
+    /// The topic of an MCAP file whose clouds alone are read; all topics without it.
+    pub topic: Option<&'a str>,
+}
+
+/// The clouds of a file, one after the other: many of an MCAP or E57 file, one of any other. Their
+/// numbers ascend.
+pub struct Clouds {
+    path: PathBuf,
+    source: Source,
+    /// The number that the next cloud has at least.
+    next: u64,
+}
 
 enum Source {
     One { cloud: Option<Box<PointCloud>>, about: About },
-    Many(Box<Messages>),
+    Scans(Box<e57_reader::Scans>),
+    Messages(Box<Messages>),
 }
 
 impl Clouds {
@@ -35,37 +52,45 @@ impl Clouds {
     /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is not what its ending
     /// says, [`Error::Unreadable`] if no cloud is read from files of that ending.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        Self::open_within(path, CloudRoom::default())
+        Self::open_with(path, Reading::default())
     }
 
-    /// The same with a limit of memory. [`Clouds::open`] allows four fifths of what the machine has.
+    /// As [`Clouds::open`], with a limit of memory and a choice of the topic.
     ///
     /// # Errors
-    /// As [`Clouds::open`], and if they take more.
-    pub fn open_within(path: &Path, room: CloudRoom) -> Result<Self, Error> {
+    /// As [`Clouds::open`]; if the clouds take more memory than the limit; and [`Error::NoTopics`] if
+    /// a topic is chosen in a file of a format that has none.
+    pub fn open_with(path: &Path, reading: Reading) -> Result<Self, Error> {
         let Some(format) = format_of(path) else {
             // A name that is misspelt is no format that is unknown.
             std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?;
             return Err(Error::unreadable(path));
         };
-        if let Format::Mcap(_) = format {
-            return Ok(Self(Source::Many(Box::new(Messages::open(path, room)?))));
-        }
-        let size = std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?.len();
-        let room = room.beside(size).map_err(|fault| Error::invalid(path, format, fault))?;
-        let read = || whole(path, format).map_err(|cause| Error::read(path, cause));
-        let parsed = match format {
-            Format::Pcd => pcd_reader::parse(&read()?, room),
-            Format::Ply => ply_reader::parse(&read()?, room),
-            Format::Las | Format::Laz => las_reader::parse(read()?, room),
-            Format::E57 => e57::parse(read()?, room),
-            Format::Npy => npy::parse(&read()?, room),
-            Format::Csv => csv_reader::parse(&read()?, room),
-            Format::Kitti => kitti::parse(&read()?, kitti::Floats::of_name(path), room),
-            _ => return Err(Error::unreadable(path)),
+        let source = match format {
+            Format::Mcap(_) => Source::Messages(Box::new(Messages::open(path, reading)?)),
+            _ if reading.topic.is_some() => {
+                return Err(Error::NoTopics { path: path.to_owned() });
+            }
+            _ => Source::of_file(path, format, reading.room)?,
         };
-        let (cloud, about) = parsed.map_err(|fault| Error::invalid(path, format, fault))?;
-        Ok(Self(Source::One { cloud: Some(Box::new(cloud)), about }))
+        Ok(Self { path: path.to_owned(), source, next: 0 })
+    }
+
+    /// Whether the file may hold several clouds.
+    pub fn has_several(&self) -> bool {
+        match &self.source {
+            Source::One { .. } => false,
+            Source::Scans(scans) => scans.count() > 1,
+            Source::Messages(_) => true,
+        }
+    }
+
+    /// The topics with clouds, as far as the file was read; none of a format without topics.
+    pub fn topics(&self) -> Vec<&str> {
+        match &self.source {
+            Source::Messages(messages) => messages.topics().iter().map(String::as_str).collect(),
+            Source::One { .. } | Source::Scans(_) => Vec::new(),
+        }
     }
 
     /// What of the file, as far as it was read, is not in its clouds.
@@ -74,9 +99,10 @@ impl Clouds {
     }
 
     fn about(&self) -> &About {
-        match &self.0 {
+        match &self.source {
             Source::One { about, .. } => about,
-            Source::Many(messages) => messages.about(),
+            Source::Scans(scans) => scans.about(),
+            Source::Messages(messages) => messages.about(),
         }
     }
 
@@ -91,10 +117,45 @@ impl Iterator for Clouds {
     type Item = Result<PointCloud, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        match &mut self.0 {
-            Source::One { cloud, .. } => cloud.take().map(|cloud| Ok(*cloud)),
-            Source::Many(messages) => messages.next(),
-        }
+        let next = match &mut self.source {
+            Source::One { cloud, .. } => Ok(*cloud.take()?),
+            Source::Scans(scans) => {
+                let invalid = |fault| Error::invalid(&self.path, Format::E57, fault);
+                scans.advance()?.map_err(invalid)
+            }
+            Source::Messages(messages) => messages.next()?,
+        };
+        Some(next.map(|mut cloud| {
+            // Many writers number every scan 0.
+            cloud.scan = cloud.scan.max(self.next);
+            self.next = cloud.scan.saturating_add(1);
+            cloud
+        }))
+    }
+}
+
+impl Source {
+    /// What is read at once, in a format without messages.
+    fn of_file(path: &Path, format: Format, room: CloudRoom) -> Result<Self, Error> {
+        let read = || whole(path, format).map_err(|cause| Error::read(path, cause));
+        let invalid = |fault| Error::invalid(path, format, fault);
+        let size = std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?.len();
+        let room = room.beside(size).map_err(invalid)?;
+        let parsed = match format {
+            Format::Pcd => pcd_reader::parse(&read()?, room),
+            Format::Ply => ply_reader::parse(&read()?, room),
+            Format::Las | Format::Laz => las_reader::parse(read()?, room),
+            Format::E57 => {
+                let scans = e57_reader::Scans::open(read()?, room).map_err(invalid)?;
+                return Ok(Self::Scans(Box::new(scans)));
+            }
+            Format::Npy => npy::parse(&read()?, room),
+            Format::Csv => csv_reader::parse(&read()?, room),
+            Format::Kitti => kitti::parse(&read()?, kitti::Floats::of_name(path), room),
+            _ => return Err(Error::unreadable(path)),
+        };
+        let (cloud, about) = parsed.map_err(invalid)?;
+        Ok(Self::One { cloud: Some(Box::new(cloud)), about })
     }
 }
 

@@ -68,6 +68,12 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A topic was chosen of a file without topics.
+    #[error("{}: has no topics; only MCAP files have them: leave the topic out", path.display())]
+    NoTopics {
+        /// The file.
+        path: PathBuf,
+    },
     /// No format is called so.
     #[error("unknown format `{name}`;{suggestion} known: {}", known().join(", "))]
     UnknownFormat {

@@ -2,7 +2,7 @@
 
 use super::attributes::Attribute;
 use super::kitti;
-use super::mcap::{Message, profile_holding};
+use super::mcap::{Message, Profile, profile_holding};
 use super::{Format, Names, las};
 use crate::points::{PointCloud, Viewpoint};
 
@@ -26,16 +26,22 @@ pub(super) enum Further {
     Pose,
     /// The names of objects and materials.
     Names,
+    /// The stamp of a scan whose file told it.
+    Stamp,
+    /// Digits of coordinates beyond those of 32-bit floats.
+    Digits,
 }
 
 impl Further {
-    const ALL: [Self; 3] = [Self::EmptyPixels, Self::Pose, Self::Names];
+    const ALL: [Self; 5] = [Self::EmptyPixels, Self::Pose, Self::Names, Self::Stamp, Self::Digits];
 
     fn name(self) -> &'static str {
         match self {
             Self::EmptyPixels => "pixels without a return",
             Self::Pose => "pose of the sensor",
             Self::Names => "names of objects and materials",
+            Self::Stamp => "stamp of the scan",
+            Self::Digits => "digits of coordinates beyond 32-bit floats",
         }
     }
 
@@ -45,6 +51,8 @@ impl Further {
             Self::EmptyPixels => cloud.image(cloud.pick).iter().any(|at| at.is_none()),
             Self::Pose => cloud.viewpoint != Viewpoint::default(),
             Self::Names => !names.objects.is_empty() || !names.materials.is_empty(),
+            Self::Stamp => cloud.stamp_ns.is_some(),
+            Self::Digits => !cloud.exact.x.is_empty(),
         };
         Self::ALL.into_iter().filter(has)
     }
@@ -77,7 +85,9 @@ impl Format {
             #[cfg(feature = "parquet")]
             Self::Parquet => Whole,
             Self::Las | Self::Laz => match attribute {
-                Attribute::X | Attribute::Y | Attribute::Z => Partly("steps of 1 µm"),
+                Attribute::X | Attribute::Y | Attribute::Z => {
+                    Partly("steps of 1 µm, or those of the file read")
+                }
                 Attribute::TimeNs => Partly("`gps_time`, s"),
                 Attribute::ReturnNumber | Attribute::NumberOfReturns => Partly("up to 15"),
                 other if las::extra_name(other) != Some(other.name()) => {
@@ -110,7 +120,7 @@ impl Format {
 
     /// Whether it holds what is no attribute of a point.
     pub(super) fn holds_further(self, further: Further) -> bool {
-        use Further::{EmptyPixels, Names, Pose};
+        use Further::{Digits, EmptyPixels, Names, Pose, Stamp};
         match self {
             Self::Pcd => true,
             Self::Ply | Self::PlyCloudCompare | Self::Las | Self::Laz | Self::E57 => {
@@ -118,15 +128,18 @@ impl Format {
             }
             #[cfg(feature = "parquet")]
             Self::Parquet => further != EmptyPixels,
-            Self::Npy | Self::Kitti => false,
-            Self::Csv => further == Names,
+            Self::Npy => further == Digits,
+            Self::Kitti => false,
+            Self::Csv => matches!(further, Names | Digits),
             Self::Mcap(Message::Ros2(profile)) => match further {
                 EmptyPixels => profile.is_organised(),
-                Pose | Names => true,
+                Pose | Names | Stamp => true,
+                Digits => profile == Profile::Extended,
             },
             Self::Mcap(Message::Foxglove) => further != EmptyPixels,
-            Self::Mcap(Message::Osi) => further == Names,
-            Self::Png | Self::RangeNpy => further == EmptyPixels,
+            Self::Mcap(Message::Osi) => matches!(further, Names | Stamp | Digits),
+            // Images have no coordinates.
+            Self::Png | Self::RangeNpy => matches!(further, EmptyPixels | Digits),
         }
     }
 }
@@ -148,7 +161,6 @@ fn osi(attribute: Attribute) -> Holding {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mcap::Profile;
     use super::super::sample_cloud;
     use super::*;
     use crate::points::Truth;

@@ -9,8 +9,15 @@ use las::{Builder, Point, Transform, Vector, Version, Vlr, Writer};
 use std::io::{self, Cursor, Write};
 
 /// Length of the smallest step of a coordinate, m, unless the cloud is too large for it. A float of
-/// 32 bits, which a coordinate is before, has steps of 1 to 8 µm between 8 and 128 m.
+/// 32 bits, which a coordinate of a simulation is before, has steps of 1 to 8 µm between 8 and 128 m.
 const STEP: f64 = 1e-6;
+
+/// Steps that coordinates with more digits may have, m: the coarsest that keeps all of them counts.
+const STEPS: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
+
+/// Share of a step by which a coordinate may be beside it, and lies on it: what remains of sums of
+/// 64-bit floats.
+const BESIDE: f64 = 1e-3;
 
 /// What an apparent reflectance of 1 is as an intensity: the 16 bits end at 6.5535.
 pub(super) const WHITE: f64 = 10_000.0;
@@ -84,8 +91,7 @@ fn builder(
     builder.point_format.is_compressed = compress;
     let size = extra.iter().map(|attribute| attribute.blank(cloud).kind().size()).sum::<usize>();
     builder.point_format.extra_bytes = size as u16;
-    let transform = Transform { scale: step(cloud), offset: 0.0 };
-    builder.transforms = Vector { x: transform, y: transform, z: transform };
+    builder.transforms = transforms(cloud);
     let described = extra.iter().flat_map(|attribute| description(*attribute, cloud)).collect();
     let lines: Vec<String> = all_lines(cloud, names).collect();
     builder.vlrs.push(record(EXTRA_BYTES, "extra bytes", described));
@@ -111,6 +117,38 @@ fn description(attribute: Attribute, cloud: &PointCloud) -> [u8; DESCRIPTION] {
     let kind = attribute.blank(cloud).kind();
     bytes[2] = KINDS.iter().position(|known| *known == kind).map_or(0, |at| at as u8 + 1);
     bytes
+}
+
+/// Steps and offsets of the coordinates.
+fn transforms(cloud: &PointCloud) -> Vector<Transform> {
+    let exact = &cloud.exact;
+    if exact.x.is_empty() {
+        let transform = Transform { scale: step(cloud), offset: 0.0 };
+        return Vector { x: transform, y: transform, z: transform };
+    }
+    Vector { x: transform(&exact.x), y: transform(&exact.y), z: transform(&exact.z) }
+}
+
+/// The offset in whole metres amid `places`, m, and the coarsest step that keeps each of them; else the
+/// finest step by which 32 bits reach all.
+fn transform(places: &[f64]) -> Transform {
+    let bounds = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = places.iter().fold(bounds, |(low, high), &at| (low.min(at), high.max(at)));
+    let offset = (0.5 * (low + high)).round();
+    let farthest = (high - offset).max(offset - low);
+    let reaches = |step: f64| farthest <= step * f64::from(i32::MAX - 1);
+    let keeps = |step: f64| {
+        places.iter().all(|at| {
+            let steps = (at - offset) / step;
+            (steps - steps.round()).abs() <= BESIDE
+        })
+    };
+    let mut finest = STEPS.into_iter().rev().find(|step| reaches(*step)).unwrap_or(STEPS[0]);
+    while !reaches(finest) && finest < 1e30 {
+        finest *= 10.0;
+    }
+    let coarsest = STEPS.into_iter().find(|step| *step >= finest && keeps(*step));
+    Transform { scale: coarsest.unwrap_or(finest), offset }
 }
 
 /// The smallest step of coordinates, m: a power of ten by which the farthest of them has 31 bits.
@@ -167,6 +205,20 @@ mod tests {
         assert_eq!(step(&cloud), 1e-6);
         let far = PointCloud { x: vec![3000.0], ..PointCloud::default() };
         assert!((step(&far) - 1e-5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_step_is_the_coarsest_that_keeps_every_coordinate() {
+        let found = |places: &[f64]| {
+            let Transform { scale, offset } = transform(places);
+            (scale, offset)
+        };
+        assert_eq!(found(&[494_428.61, 494_430.07]), (1e-2, 494_429.0));
+        assert_eq!(found(&[4_877_455.58, 4_877_455.581]), (1e-3, 4_877_456.0));
+        // Thirds lie on no step: the finest by which 31 bits reach 1000 m.
+        assert_eq!(found(&[1.0 / 3.0, 2000.0]), (1e-6, 1000.0));
+        let (step, _) = found(&[-1e9, 1e9 + 1.0 / 3.0]);
+        assert!(1e9 <= step * f64::from(i32::MAX) && step <= 1.0, "{step}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::about::About;
 use super::attributes::Attribute;
 use super::contained::contained;
 use super::las::{DESCRIPTION, EXTRA_BYTES, KINDS, TEXT, WHITE, extra_name};
+use super::left_out::{LeftOut, NoPoint};
 use super::number::Kind;
 use super::table::{Digits, Gathered, Record};
 use crate::points::PointCloud;
@@ -31,32 +32,134 @@ pub(super) fn parse(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, Abou
 
 /// The same, of a file that holds what its header promises.
 fn parse_checked(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), String> {
-    let header = Header::new(Cursor::new(&bytes)).map_err(|error| error.to_string())?;
+    let damaged = |_| "its header is damaged".to_owned();
+    let header = Header::new(Cursor::new(&bytes)).map_err(damaged)?;
+    check_compression(&header)?;
     check_layers(&bytes, &header)?;
-    let mut reader = Reader::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    let mut reader = Reader::new(Cursor::new(bytes)).map_err(damaged)?;
     let mut about = About { room, ..about(reader.header())? };
-    let extra = extra(reader.header());
+    let extra = extra(reader.header(), &mut about.left_out);
     let mut gathered = Gathered::new(&about, &attributes(&extra), Digits::Double)?;
+    let mut unread = Unread::new(reader.header());
     let points = reader.header().number_of_points();
     room.check(points)?;
     let mut batch = las::PointDataBuilder::new().for_header(reader.header()).build();
     let together = (AT_A_TIME / u64::from(header.point_format().len()).max(1)).max(1);
     let mut at = 0_usize;
+    let ends = |at: usize| format!("it ends after {at} of {points} points, or is damaged");
     loop {
-        let found = reader
-            .fill_points(together, &mut batch)
-            .map_err(|why| format!("it ends after {at} of {points} points or is damaged: {why}"))?;
+        let found = reader.fill_points(together, &mut batch).map_err(|_| ends(at))?;
         if found == 0 {
             break;
         }
         for point in batch.points() {
-            gathered.add(record(&point.map_err(|error| error.to_string())?, &extra, at)?);
+            let point = point.map_err(|_| ends(at))?;
+            if point.is_withheld {
+                gathered.drop_point(NoPoint::Withheld);
+            } else {
+                unread.see(&point);
+                gathered.add(record(&point, &extra, at)?);
+            }
             at += 1;
         }
     }
+    unread.tell(&mut about.left_out);
     let mut cloud = gathered.cloud(&mut about)?;
     forget_blank(&mut cloud, &extra);
     Ok((cloud, about))
+}
+
+/// Fields of LAS that a cloud has no column for.
+const UNREAD: [&str; 13] = [
+    "classification",
+    "red",
+    "green",
+    "blue",
+    "nir",
+    "scan_angle",
+    "user_data",
+    "point_source_id",
+    "scanner_channel",
+    "edge_of_flight_line",
+    "synthetic",
+    "key_point",
+    "overlap",
+];
+
+/// Which of [`UNREAD`] say something of any point.
+struct Unread {
+    seen: [bool; UNREAD.len()],
+    /// Whether the file is ours, where the user's data is the row.
+    is_ours: bool,
+}
+
+impl Unread {
+    fn new(header: &Header) -> Self {
+        let mut records = header.all_vlrs();
+        let is_ours = records.any(|vlr| (vlr.user_id.as_str(), vlr.record_id) == TEXT);
+        Self { seen: [false; UNREAD.len()], is_ours }
+    }
+
+    fn see(&mut self, point: &Point) {
+        let colour = point.color.unwrap_or_default();
+        let says = [
+            u8::from(point.classification) > 1,
+            colour.red != 0,
+            colour.green != 0,
+            colour.blue != 0,
+            point.nir.is_some_and(|nir| nir != 0),
+            point.scan_angle != 0.0,
+            point.user_data != 0 && !self.is_ours,
+            point.point_source_id != 0,
+            point.scanner_channel != 0,
+            point.is_edge_of_flight_line,
+            point.is_synthetic,
+            point.is_key_point,
+            point.is_overlap,
+        ];
+        self.seen.iter_mut().zip(says).for_each(|(seen, says)| *seen |= says);
+    }
+
+    fn tell(&self, left_out: &mut LeftOut) {
+        let seen = UNREAD.iter().zip(self.seen).filter(|(_, seen)| *seen);
+        seen.for_each(|(name, _)| left_out.field(name));
+    }
+}
+
+/// Number of the compression without chunks, by which LASzip began.
+const POINTWISE: [u8; 2] = [1, 0];
+
+/// Refuses points that are compressed in one piece, which the library does not read.
+fn check_compression(header: &Header) -> Result<(), String> {
+    let mut records = header.vlrs().iter();
+    let laszip = records.find(|vlr| vlr.user_id == "laszip encoded" && vlr.record_id == 22_204);
+    match laszip {
+        Some(vlr) if vlr.data.starts_with(&POINTWISE) => Err(
+            "its points are compressed pointwise, in one piece, as the first versions of LASzip \
+             did; chunks are read: write it anew, as `laszip -i in.laz -o out.las` does"
+                .to_owned(),
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// The name of the coordinate reference system: that of a text by OGC, or the number of a GeoTIFF key.
+fn reference_system(header: &Header) -> Option<String> {
+    if let Some(text) = header.get_wkt_crs_bytes() {
+        let text = String::from_utf8_lossy(text);
+        let name = text.split('"').nth(1).unwrap_or("without a name");
+        return Some(format!("\"{name}\""));
+    }
+    let mut records = header.all_vlrs();
+    let keys = records.find(|vlr| vlr.user_id == "LASF_Projection" && vlr.record_id == 34_735)?;
+    let number =
+        |at: usize| Some(u16::from_le_bytes([*keys.data.get(at)?, *keys.data.get(at + 1)?]));
+    // Four numbers each behind four of the whole: key, where its value is, how many there are, the value.
+    let mut all = (1..keys.data.len() / 8).map(|key| 8 * key);
+    let of_earth = |key: u16| key == 2048 || key == 3072;
+    let found = all.rfind(|&at| number(at).is_some_and(of_earth) && number(at + 2) == Some(0));
+    let code = found.and_then(|at| number(at + 6));
+    Some(code.map_or_else(|| "of GeoTIFF keys".to_owned(), |code| format!("EPSG:{code}")))
 }
 
 /// Refuses sizes in the header that reach beyond the file, before any memory is spent on them.
@@ -121,8 +224,7 @@ fn check_layers(bytes: &[u8], header: &Header) -> Result<(), String> {
     let layers = 9 + colours + u64::from(format.extra_bytes) + u64::from(format.has_waveform);
     let mut source = Cursor::new(bytes);
     source.set_position(begin);
-    let table =
-        laz::laszip::ChunkTable::read_from(&mut source, &vlr).map_err(|why| why.to_string())?;
+    let table = laz::laszip::ChunkTable::read_from(&mut source, &vlr).map_err(|_| fault())?;
     let mut at = begin + 8;
     for chunk in 0..table.len() {
         // The first point as it is, then how many there are, then the sizes of the layers.
@@ -167,11 +269,12 @@ fn about(header: &Header) -> Result<About, String> {
             }
         }
     }
+    about.left_out.reference_system = reference_system(header);
     Ok(about)
 }
 
-/// Our attributes among the extra bytes.
-fn extra(header: &Header) -> Vec<Extra> {
+/// Our attributes among the extra bytes; others are named in `left_out`.
+fn extra(header: &Header, left_out: &mut LeftOut) -> Vec<Extra> {
     let (mut found, mut offset) = (Vec::new(), 0);
     let ours = header.all_vlrs().filter(|vlr| (vlr.user_id.as_str(), vlr.record_id) == EXTRA_BYTES);
     for bytes in ours.flat_map(|vlr| vlr.data.chunks_exact(DESCRIPTION)) {
@@ -186,8 +289,9 @@ fn extra(header: &Header) -> Vec<Extra> {
             .into_iter()
             .find(|attribute| extra_name(*attribute).is_some_and(|known| known.as_bytes() == name));
         // Scaled dimensions are those of others.
-        if let Some(attribute) = known.filter(|_| bytes[3] & 0b11000 == 0) {
-            found.push(Extra { attribute, kind, offset });
+        match known.filter(|_| bytes[3] & 0b11000 == 0) {
+            Some(attribute) => found.push(Extra { attribute, kind, offset }),
+            None => left_out.field(&String::from_utf8_lossy(name)),
         }
         offset += kind.size();
     }
@@ -236,7 +340,8 @@ fn record(point: &Point, extra: &[Extra], at: usize) -> Result<Record, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Names, las, sample_cloud};
+    use super::super::las as writer;
+    use super::super::{Names, sample_cloud};
     use super::*;
 
     fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
@@ -245,7 +350,7 @@ mod tests {
 
     fn written(compress: bool) -> Vec<u8> {
         let mut bytes = Vec::new();
-        las::write(&sample_cloud(), &Names::default(), compress, &mut bytes).unwrap();
+        writer::write(&sample_cloud(), &Names::default(), compress, &mut bytes).unwrap();
         bytes
     }
 
@@ -259,10 +364,81 @@ mod tests {
             assert_eq!((&read.range, &read.intensity), (&cloud.range, &cloud.intensity));
             assert_eq!((&read.row, &read.column), (&cloud.row, &cloud.column));
             assert_eq!(read.truth.returns.outcome, cloud.truth.returns.outcome);
-            for (read, written) in read.x.iter().zip(&cloud.x) {
-                assert!((read - written).abs() <= 5e-7, "{read} {written}");
+            for at in 0..cloud.returns() {
+                let (read, written) = (read.position(at), cloud.position(at));
+                assert!(read.iter().zip(written).all(|(a, b)| (a - b).abs() <= 5e-7), "{read:?}");
             }
+            assert!(about.left_out.is_empty(), "{}", about.left_out);
         }
+    }
+
+    /// A file of another writer with these points, changed by `change` before.
+    fn foreign(points: &[Point], change: impl FnOnce(&mut las::Builder)) -> Vec<u8> {
+        let mut builder = las::Builder::from(las::Version::new(1, 2));
+        builder.point_format = las::point::Format::new(3).unwrap();
+        let transform = |offset: f64| las::Transform { scale: 0.01, offset };
+        let (x, y, z) = (transform(494_000.0), transform(4_877_000.0), transform(0.0));
+        builder.transforms = las::Vector { x, y, z };
+        change(&mut builder);
+        let header = builder.into_header().unwrap();
+        let mut writer = las::Writer::new(Cursor::new(Vec::new()), header).unwrap();
+        points.iter().for_each(|point| writer.write_point(point.clone()).unwrap());
+        writer.into_inner().unwrap().into_inner()
+    }
+
+    fn point(x: f64, y: f64, z: f64) -> Point {
+        let (gps_time, color) = (Some(0.0), Some(las::Color::default()));
+        Point { x, y, z, gps_time, color, ..Point::default() }
+    }
+
+    #[test]
+    fn a_stranger_s_coordinates_keep_their_step_there_and_back() {
+        let far = [494_428.61, 4_877_455.58, 123.45];
+        let [x, y, z] = far;
+        let (cloud, about) =
+            parse(foreign(&[point(x, y, z), point(x + 9e3, y, z)], |_| ())).unwrap();
+        assert!(cloud.intensity.is_empty() && cloud.time_ns.is_empty());
+        assert!(cloud.return_number.is_empty() && about.left_out.is_empty());
+        let mut bytes = Vec::new();
+        writer::write(&cloud, &Names::default(), true, &mut bytes).unwrap();
+        let (again, _) = parse(bytes).unwrap();
+        for (found, written) in again.position(0).into_iter().zip(far) {
+            assert!((found - written).abs() < 1e-9, "{found} {written}");
+        }
+        assert!(again.intensity.is_empty() && again.time_ns.is_empty());
+    }
+
+    #[test]
+    fn withheld_points_are_none_and_what_is_not_read_is_named() {
+        let mut points = [point(1.0, 2.0, 3.0), point(4.0, 5.0, 6.0)];
+        points[0].is_withheld = true;
+        points[1].color = Some(las::Color { red: 9, green: 0, blue: 1 });
+        points[1].classification = las::point::Classification::Ground;
+        points[1].intensity = 500;
+        let bytes = foreign(&points, |builder| {
+            let mut data = vec![1, 0, 1, 0, 0, 0, 1, 0];
+            data.extend([3072_u16, 0, 1, 25_832].iter().flat_map(|number| number.to_le_bytes()));
+            let (user_id, record_id) = ("LASF_Projection".to_owned(), 34_735);
+            builder.vlrs.push(las::Vlr { user_id, record_id, description: String::new(), data });
+        });
+        let (cloud, about) = parse(bytes).unwrap();
+        assert_eq!((cloud.returns(), cloud.position(0)), (1, [4.0, 5.0, 6.0]));
+        assert_eq!(cloud.intensity, [0.05]);
+        assert_eq!(
+            about.left_out.to_string(),
+            "fields classification, red, blue; coordinate reference system EPSG:25832; \
+             1 point marked as withheld"
+        );
+    }
+
+    #[test]
+    fn points_compressed_in_one_piece_are_named_as_such() {
+        let mut laz = written(true);
+        let name = b"laszip encoded";
+        let at = laz.windows(name.len()).position(|window| window == name).unwrap();
+        // Behind the name of 16 bytes its number, its length and a description of 32.
+        laz[at + 16 + 4 + 32..][..2].copy_from_slice(&[1, 0]);
+        assert!(parse(laz).unwrap_err().contains("are compressed pointwise"));
     }
 
     #[test]

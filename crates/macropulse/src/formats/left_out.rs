@@ -48,6 +48,13 @@ impl LeftOut {
         *self == Self::default()
     }
 
+    /// Whether `other` leaves out the same, but for the number of points.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        self.fields == other.fields
+            && self.reference_system == other.reference_system
+            && self.points.keys().eq(other.points.keys())
+    }
+
     /// Adds a field, unless it is known.
     pub(super) fn field(&mut self, name: &str) {
         let name = name.replace(char::is_control, " ");

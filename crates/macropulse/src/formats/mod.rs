@@ -11,6 +11,7 @@ mod contained;
 mod csv;
 mod csv_reader;
 mod e57;
+mod e57_reader;
 mod error;
 mod format;
 mod headings;
@@ -37,7 +38,7 @@ mod room;
 mod table;
 
 pub use atomic::{WholeFile, clear_unfinished, write_atomically};
-pub use clouds::{Clouds, read_cloud, read_pcd};
+pub use clouds::{Clouds, Reading, read_cloud, read_pcd};
 pub use contained::is_contained;
 pub use csv::quoted;
 pub use error::Error;
@@ -138,6 +139,7 @@ fn sample_cloud() -> PointCloud {
         marks: vec![174, 174, 174, 174, 58],
         margin: vec![80, 70, 3, 81, 20],
         exact: Exact::default(),
+        stamp_ns: None,
         photons: vec![nan; 5],
         saturated: vec![false; 5],
         fired_ns,

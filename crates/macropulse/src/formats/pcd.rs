@@ -1,7 +1,7 @@
 //! PCD 0.7, binary: organised, every pixel, where a shot has one return at most; else a list.
 
 use super::Names;
-use super::about::{list_line, name_lines, scan_line, viewpoint_text};
+use super::about::{list_line, name_lines, scan_line, stamp_line, viewpoint_text};
 use super::attributes::{Attribute, pixels, returns};
 use crate::points::PointCloud;
 use std::io::{self, Write};
@@ -46,7 +46,7 @@ fn write_header(
         writeln!(out, "# {}", list_line(cloud))?;
         (columns, rows) = (cloud.returns(), 1);
     }
-    for line in name_lines(names) {
+    for line in stamp_line(cloud).into_iter().chain(name_lines(names)) {
         writeln!(out, "# {line}")?;
     }
     writeln!(out, "VERSION 0.7")?;

@@ -63,6 +63,12 @@ impl Recording {
         Ok(files)
     }
 
+    /// How many scans of a file that holds all scans were moved behind the one before, as they do not
+    /// begin after it: most of any format.
+    pub fn moved(&self) -> u64 {
+        self.open.iter().map(|(_, messages)| messages.moved()).max().unwrap_or(0)
+    }
+
     /// Finishes the files that hold all scans.
     ///
     /// # Errors

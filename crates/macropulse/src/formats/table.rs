@@ -309,6 +309,7 @@ impl Gathered {
     fn of_image(about: &About, (attributes, digits): (&[Attribute], Digits), list: List) -> Self {
         let cloud = PointCloud {
             scan: about.scan,
+            stamp_ns: about.stamp_ns,
             viewpoint: about.viewpoint,
             rows: list.rows,
             columns: list.columns,

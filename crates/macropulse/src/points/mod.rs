@@ -71,6 +71,9 @@ impl Outcome {
 pub struct PointCloud {
     /// Number of the scan, from 0.
     pub scan: u64,
+    /// When the scan was taken, ns of Unix time, of a cloud whose file tells it; its times then count
+    /// from there.
+    pub stamp_ns: Option<u64>,
     /// Where the sensor was when the scan began.
     pub viewpoint: Viewpoint,
     /// Rows of pixels; 0 where the list has no image.
@@ -105,7 +108,8 @@ pub struct PointCloud {
     pub saturated: Vec<bool>,
     /// One-way range, m; rounded where [`PointCloud::exact`] has more digits.
     pub range: Vec<f32>,
-    /// Time at which the shot was fired, ns from the beginning of the first scan.
+    /// Time at which the shot was fired, ns from the beginning of the first scan, or from the stamp of a
+    /// cloud that has one.
     pub time_ns: Vec<f64>,
     /// Marks found at their place.
     pub peak: Vec<u16>,

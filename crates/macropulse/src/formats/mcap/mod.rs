@@ -13,6 +13,7 @@ mod profile;
 mod protobuf;
 mod reader;
 mod ros2;
+mod zstd;
 
 pub(super) use profile::holding as profile_holding;
 pub(super) use reader::Messages;
@@ -110,6 +111,9 @@ pub(super) struct Recorder<W: Write + Seek> {
     message: Message,
     channels: Vec<u16>,
     scans: u64,
+    /// The stamp of the last scan, ns, and how many scans were moved behind the one before.
+    last_ns: Option<u64>,
+    moved: u64,
 }
 
 impl<W: Write + Seek> Recorder<W> {
@@ -132,11 +136,24 @@ impl<W: Write + Seek> Recorder<W> {
         if let Some(metadata) = message.file_metadata() {
             writer.write_metadata(&metadata)?;
         }
-        Ok(Self { writer, message, channels, scans: 0 })
+        Ok(Self { writer, message, channels, scans: 0, last_ns: None, moved: 0 })
     }
 
-    /// Adds a scan, whose columns are even, as a chunk that is flushed.
+    /// Adds a scan, whose columns are even, as a chunk that is flushed. A scan that does not begin
+    /// after the one before is moved behind it: messages are told apart by their stamps.
     fn add(&mut self, cloud: &PointCloud, names: &Names) -> Result<(), McapError> {
+        let stamp = stamp_ns(cloud);
+        match self.last_ns {
+            Some(last) if stamp <= last => {
+                self.moved += 1;
+                let later = last.saturating_add(PAUSE_NS) - stamp;
+                self.add_in_order(&moved(cloud, later), names)
+            }
+            _ => self.add_in_order(cloud, names),
+        }
+    }
+
+    fn add_in_order(&mut self, cloud: &PointCloud, names: &Names) -> Result<(), McapError> {
         let is_first = self.scans == 0;
         if is_first {
             let lines = [list_line(cloud)].into_iter().chain(name_lines(names));
@@ -152,6 +169,7 @@ impl<W: Write + Seek> Recorder<W> {
             self.writer.write_to_known_channel(&header, &payload)?;
         }
         self.scans += 1;
+        self.last_ns = Some(time);
         self.writer.flush()
     }
 }
@@ -175,6 +193,11 @@ impl Recording {
     pub fn add(&mut self, cloud: &PointCloud, names: &Names) -> Result<(), Error> {
         let added = self.recorder.add(cloud, names);
         added.map_err(|error| Error::write(&self.path, cause(error)))
+    }
+
+    /// How many scans were moved behind the one before, as they did not begin after it.
+    pub fn moved(&self) -> u64 {
+        self.recorder.moved
     }
 
     /// Writes the summary.
@@ -216,7 +239,32 @@ fn begins_ns(cloud: &PointCloud) -> f64 {
     if first.is_finite() { first } else { 0.0 }
 }
 
-/// The time of a scan, whole ns from the epoch of the file.
+/// Time, ns, by which a sum of floats may fall short of the whole ns that it stands for.
+const SHORT_NS: f64 = 1e-3;
+
+/// The stamp of a scan, ns: its own or, of a scan without one, its beginning from the epoch of the
+/// file, in whole ns.
 fn stamp_ns(cloud: &PointCloud) -> u64 {
-    EPOCH_NS.saturating_add(begins_ns(cloud).max(0.0) as u64)
+    let begins = || EPOCH_NS.saturating_add((begins_ns(cloud) + SHORT_NS).max(0.0) as u64);
+    cloud.stamp_ns.unwrap_or_else(begins)
+}
+
+/// The time from which `time_ns` of a cloud counts, ns.
+fn times_from_ns(cloud: &PointCloud) -> u64 {
+    cloud.stamp_ns.unwrap_or(EPOCH_NS)
+}
+
+/// Time that passes, ns, between two clouds that would have one stamp.
+const PAUSE_NS: u64 = 100_000_000;
+
+/// The same cloud, taken `later_ns` later.
+fn moved(cloud: &PointCloud, later_ns: u64) -> PointCloud {
+    let mut moved = cloud.clone();
+    if cloud.stamp_ns.is_some() || cloud.time_ns.is_empty() {
+        moved.stamp_ns = Some(stamp_ns(cloud).saturating_add(later_ns));
+    } else {
+        let times = moved.time_ns.iter_mut().chain(&mut moved.fired_ns);
+        times.for_each(|time| *time += later_ns as f64);
+    }
+    moved
 }

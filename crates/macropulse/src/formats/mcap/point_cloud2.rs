@@ -8,7 +8,7 @@ use super::super::pcd::is_list;
 use super::super::table::{self, Layout};
 use super::cdr::{Decoder, Encoder};
 use super::profile::{Source, fields};
-use super::{EPOCH_NS, Profile, stamp_ns};
+use super::{EPOCH_NS, Profile, stamp_ns, times_from_ns};
 use crate::points::PointCloud;
 use std::borrow::Cow;
 use std::io;
@@ -20,7 +20,7 @@ pub(super) const SENSOR_FRAME: &str = "lidar";
 /// at most and the driver of the profile does the same; else a list.
 pub(super) fn encode(profile: Profile, cloud: &PointCloud) -> io::Result<Vec<u8>> {
     let stamp = stamp_ns(cloud);
-    let source = Source::new(cloud, stamp as f64 - EPOCH_NS as f64);
+    let source = Source::new(cloud, stamp as f64 - times_from_ns(cloud) as f64);
     let is_list = is_list(cloud) || !profile.is_organised();
     let (rows, columns) = (cloud.rows, cloud.columns);
     let ([height, width], points) = match (is_list, profile.is_by_column()) {
@@ -71,6 +71,10 @@ pub(super) fn write_stamp(message: &mut Encoder, stamp_ns: u64, frame: &str) {
     message.text(frame);
 }
 
+/// Stamps below this, 104 days, are those of simulations, which count from the first scan; a clock shows
+/// more. Up to here 64-bit floats have every whole ns.
+const LATEST_SIMULATED_NS: u64 = 1 << 53;
+
 /// A field as a message has it.
 struct Stored<'a> {
     name: &'a str,
@@ -81,16 +85,17 @@ struct Stored<'a> {
 /// The cloud of a message: of ours, or of a driver whose fields we know.
 pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, String> {
     let mut message = Decoder::new(message)?;
-    let seconds = message.u4()?;
-    let stamp_ns = f64::from(seconds) * 1e9 + f64::from(message.u4()?);
+    let stamp_ns = u64::from(message.u4()?) * 1_000_000_000 + u64::from(message.u4()?);
     message.text()?;
     let (height, width) = (message.u4()? as usize, message.u4()? as usize);
     let mut fields = Vec::new();
     for _ in 0..message.u4()? {
         let (name, offset) = (message.text()?, message.u4()? as usize);
         let (kind, count) = (message.u1()?, message.u4()?);
-        let kind = Kind::from_ros(kind).filter(|_| count <= 1);
-        fields.extend(kind.map(|kind| Stored { name, offset, kind }));
+        match Kind::from_ros(kind).filter(|_| count <= 1) {
+            Some(kind) => fields.push(Stored { name, offset, kind }),
+            None => about.left_out.field(name),
+        }
     }
     if message.u1()? != 0 {
         return Err("its points are big endian; little-endian ones are read".to_owned());
@@ -101,13 +106,14 @@ pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, St
     }
     message.u4()?;
     let body = message.bytes()?;
-    let (layout, time_from_ns) = layout(&fields, stride, stamp_ns);
+    let (layout, time_from_ns) = layout(&fields, stride, stamp_ns as f64);
     let (body, height, width) = match by_column(&fields, body, stride, [height, width]) {
         Some(by_rows) => (Cow::Owned(by_rows), width, height),
         None => (Cow::Borrowed(body), height, width),
     };
     // Our own messages say by NaN that nothing returned.
-    about.is_of_driver = !fields.iter().any(|field| field.name == "time_ns");
+    let is_ours = about.list.is_some() || fields.iter().any(|field| field.name == "time_ns");
+    about.is_of_driver = !is_ours;
     let mut cloud = if height == 1 {
         table::list(about, &layout, &body, width)?
     } else {
@@ -118,9 +124,16 @@ pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, St
         let last = lasers(about, &cloud).saturating_sub(1) as u16;
         cloud.row.iter_mut().for_each(|row| *row = last.saturating_sub(*row));
     }
-    if time_from_ns != 0.0 {
+    let mut later_ns = time_from_ns;
+    if stamp_ns >= LATEST_SIMULATED_NS || cloud.time_ns.is_empty() {
+        cloud.stamp_ns = Some(stamp_ns);
+        let is_from_stamp = fields.iter().any(|field| field.name == "time_ns");
+        let stamp_ns = stamp_ns as f64 - EPOCH_NS as f64;
+        later_ns = if is_from_stamp { 0.0 } else { time_from_ns - stamp_ns };
+    }
+    if later_ns != 0.0 {
         let times = cloud.time_ns.iter_mut().chain(&mut cloud.fired_ns);
-        times.for_each(|time| *time += time_from_ns);
+        times.for_each(|time| *time += later_ns);
     }
     Ok(cloud)
 }
@@ -252,6 +265,58 @@ mod tests {
         let message = encode(Profile::Velodyne, &list).unwrap();
         let rows = decode(&message, &mut About::default()).unwrap().row;
         assert_eq!(rows, [14, 14, 15, 15, 15]);
+    }
+
+    #[test]
+    fn a_stamp_comes_back_to_the_nanosecond_and_times_count_from_it() {
+        let stamp = 1_715_964_782_123_456_789;
+        let written = PointCloud { stamp_ns: Some(stamp), ..sample_cloud() };
+        let driver = PointCloud { truth: Truth::default(), ..written.clone() };
+        let timeless = PointCloud { time_ns: Vec::new(), fired_ns: Vec::new(), ..driver.clone() };
+        for (profile, cloud) in [
+            (Profile::Extended, &written),
+            (Profile::Velodyne, &driver),
+            (Profile::Ouster, &driver),
+            (Profile::Extended, &timeless),
+        ] {
+            let read = read(profile, cloud);
+            assert_eq!((read.stamp_ns, read.time_ns.len()), (Some(stamp), cloud.time_ns.len()));
+            for (read, written) in read.time_ns.iter().zip(&cloud.time_ns) {
+                assert!((read - written).abs() <= 0.5, "{profile:?}: {read} {written}");
+            }
+        }
+        // 64-bit floats have steps of 256 ns there.
+        let read = read(Profile::Livox, &driver);
+        assert!(read.time_ns.iter().zip(&driver.time_ns).all(|(a, b)| (a - b).abs() <= 256.0));
+    }
+
+    #[test]
+    fn a_driver_s_zeros_and_unknown_fields_are_told() {
+        let mut cloud =
+            PointCloud { truth: Truth::default(), rows: 0, columns: 0, ..sample_cloud() };
+        (cloud.x[1], cloud.y[1], cloud.z[1]) = (0.0, 0.0, 0.0);
+        cloud.fired_ns = Vec::new();
+        let mut about = About::default();
+        let message = encode(Profile::Ouster, &cloud).unwrap();
+        let read = decode(&message, &mut about).unwrap();
+        assert_eq!((read.returns(), read.x[1]), (4, cloud.x[2]));
+        let told = about.left_out.to_string();
+        assert_eq!(told, "fields reflectivity, ambient; 1 point at (0, 0, 0)");
+        // Nothing of ours is left out, and no point of ours is none.
+        let mut about = About::default();
+        let read = decode(&encode(Profile::Extended, &cloud).unwrap(), &mut about).unwrap();
+        assert!(read.returns() == 5 && about.left_out.is_empty());
+    }
+
+    #[test]
+    fn digits_of_coordinates_are_kept_in_64_bits() {
+        let mut cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
+        let far = [494_428.61, 4_877_455.58, 123.456];
+        cloud.exact.x = vec![far[0]; 5];
+        cloud.exact.y = vec![far[1]; 5];
+        cloud.exact.z = vec![far[2]; 5];
+        assert_eq!(read(Profile::Extended, &cloud).position(3), far);
+        assert_eq!(read(Profile::Velodyne, &cloud).position(3), far.map(|at| f64::from(at as f32)));
     }
 
     #[test]

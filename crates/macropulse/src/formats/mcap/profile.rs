@@ -3,7 +3,7 @@
 use super::super::attributes::{Attribute, Point, Value};
 use super::super::holding::Holding;
 use super::super::number::Kind;
-use super::Profile;
+use super::{Profile, times_from_ns};
 use crate::points::{Image, Pick, PointCloud};
 
 /// A field of a point.
@@ -243,7 +243,9 @@ impl<'a> Source<'a> {
             }
             Quantity::SecondsF4 => Value::F4((since() * 1e-9) as f32),
             Quantity::NanosU4 => Value::U4(whole(since(), f64::from(u32::MAX)) as u32),
-            Quantity::NanosF8 => Value::F8(number(Attribute::TimeNs) + super::EPOCH_NS as f64),
+            Quantity::NanosF8 => {
+                Value::F8(number(Attribute::TimeNs) + times_from_ns(self.cloud) as f64)
+            }
             Quantity::MillimetresU4 => {
                 let millimetres = number(Attribute::Range) * 1e3;
                 Value::U4(whole(millimetres, f64::from(u32::MAX)) as u32)

@@ -3,14 +3,15 @@
 
 use super::super::about::About;
 use super::super::contained::contained;
-use super::super::{CloudRoom, Error, Format};
+use super::super::{Error, Format, Reading};
+use super::zstd::Zstd;
 use super::{ABOUT, METADATA, Message, Profile, point_cloud2, ros2};
 use crate::opened;
 use crate::points::PointCloud;
 use ::mcap::McapError;
 use ::mcap::records::op;
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -32,12 +33,22 @@ pub(in super::super) struct Messages {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    /// Names of the schemas, and of the channels with clouds or transforms what they have.
-    schemas: BTreeMap<u16, String>,
-    channels: BTreeMap<u16, Content>,
+    contents: Contents,
     about: About,
     clouds: u64,
     is_over: bool,
+}
+
+/// What the records of a file have told so far.
+#[derive(Default)]
+struct Contents {
+    /// The one topic whose clouds are wanted; all topics without it.
+    wanted: Option<String>,
+    /// Names of the schemas, and of the channels with clouds or transforms what they have.
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Content>,
+    /// Topics with clouds.
+    topics: BTreeSet<String>,
 }
 
 #[derive(Clone, Copy)]
@@ -47,9 +58,11 @@ enum Content {
 }
 
 impl Messages {
+    /// The clouds of the file at `path`.
+    ///
     /// # Errors
     /// If the file cannot be opened.
-    pub fn open(path: &Path, room: CloudRoom) -> Result<Self, Error> {
+    pub fn open(path: &Path, Reading { room, topic }: Reading) -> Result<Self, Error> {
         let file = opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
         let length = file.metadata().map_err(|cause| Error::read(path, cause))?.len();
         let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST).min(room.bytes()) as usize;
@@ -57,12 +70,14 @@ impl Messages {
             .with_skip_end_magic(true)
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(limit);
+        let mut reader = LinearReader::new_with_options(options);
+        let added = reader.add_decompressor(Zstd::new());
+        added.map_err(|error| Error::invalid(path, FORMAT, told(&error)))?;
         Ok(Self {
             path: path.to_owned(),
             file,
-            reader: LinearReader::new_with_options(options),
-            schemas: BTreeMap::new(),
-            channels: BTreeMap::new(),
+            reader,
+            contents: Contents { wanted: topic.map(str::to_owned), ..Contents::default() },
             about: About::within(room),
             clouds: 0,
             is_over: false,
@@ -72,6 +87,11 @@ impl Messages {
     /// What the file says beside its clouds, as far as it was read.
     pub fn about(&self) -> &About {
         &self.about
+    }
+
+    /// The topics with clouds, as far as the file was read.
+    pub fn topics(&self) -> &BTreeSet<String> {
+        &self.contents.topics
     }
 
     fn fault(&self, fault: &str) -> Error {
@@ -102,9 +122,7 @@ impl Messages {
                     self.reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {
-                    let (schemas, channels) = (&mut self.schemas, &mut self.channels);
-                    let taken = take(opcode, data, schemas, channels, &mut self.about);
-                    match taken {
+                    match self.contents.take(opcode, data, &mut self.about) {
                         Ok(None) => {}
                         Ok(Some(cloud)) => {
                             self.clouds += 1;
@@ -116,72 +134,104 @@ impl Messages {
             }
         }
         if self.clouds == 0 {
-            let fault = "it has no messages of the type sensor_msgs/msg/PointCloud2";
-            return Err(Error::invalid(&self.path, FORMAT, fault));
+            return Err(Error::invalid(&self.path, FORMAT, self.contents.nothing()));
         }
         Ok(None)
     }
 }
 
+/// What went wrong in the library, in our words.
 fn told(error: &McapError) -> String {
     match error {
         McapError::UnexpectedEof => "it ends within a record; the file was cut short".to_owned(),
-        other => other.to_string(),
+        McapError::BadMagic => "it does not begin as MCAP files do".to_owned(),
+        McapError::UnsupportedCompression(name) => {
+            format!("its chunks are compressed by `{name}`; lz4 and zstd are read")
+        }
+        McapError::BadChunkCrc { .. } => "a chunk is damaged: its checksum differs".to_owned(),
+        McapError::DecompressionError(_) | McapError::Io(_) => {
+            "a chunk is damaged: it does not unpack".to_owned()
+        }
+        McapError::RecordTooLarge { .. } | McapError::ChunkTooLarge(_) => {
+            "a record says that it is longer than the file can hold".to_owned()
+        }
+        _ => "a record is damaged".to_owned(),
     }
 }
 
-/// Takes in a record; the cloud of a message that is one.
-fn take(
-    opcode: u8,
-    data: &[u8],
-    schemas: &mut BTreeMap<u16, String>,
-    channels: &mut BTreeMap<u16, Content>,
-    about: &mut About,
-) -> Result<Option<PointCloud>, String> {
-    let mut fields = Fields(data);
-    match opcode {
-        op::SCHEMA => {
-            let number = fields.u2()?;
-            schemas.insert(number, fields.text()?.to_owned());
-        }
-        op::CHANNEL => {
-            let number = fields.u2()?;
-            let schema = schemas.get(&fields.u2()?).map(String::as_str);
-            let (topic, encoding) = (fields.text()?, fields.text()?);
-            let content = match (schema, topic) {
-                (Some(ros2::POINT_CLOUD2), _) => Some(Content::Clouds),
-                (_, ros2::TF) => Some(Content::Transforms),
-                _ => None,
-            };
-            channels.extend(content.filter(|_| encoding == "cdr").map(|content| (number, content)));
-        }
-        op::METADATA if fields.text()? == METADATA => {
-            let mut entries = Fields(fields.bytes()?);
-            while !entries.0.is_empty() {
-                let (key, text) = (entries.text()?, entries.text()?);
-                let mut lines = text.lines().filter(|_| key == ABOUT);
-                lines.try_for_each(|line| about.take(line))?;
+impl Contents {
+    /// Takes in a record; the cloud of a message that is one.
+    fn take(
+        &mut self,
+        opcode: u8,
+        data: &[u8],
+        about: &mut About,
+    ) -> Result<Option<PointCloud>, String> {
+        let mut fields = Fields(data);
+        match opcode {
+            op::SCHEMA => {
+                let number = fields.u2()?;
+                self.schemas.insert(number, fields.text()?.to_owned());
             }
-        }
-        op::MESSAGE => {
-            let channel = fields.u2()?;
-            let sequence = fields.u4()?;
-            // When it was recorded, and when it was published.
-            fields.take(16)?;
-            match channels.get(&channel) {
-                Some(Content::Transforms) => {
-                    about.viewpoint = ros2::viewpoint(fields.0)?.unwrap_or(about.viewpoint);
+            op::CHANNEL => self.take_channel(fields)?,
+            op::METADATA if fields.text()? == METADATA => {
+                let mut entries = Fields(fields.bytes()?);
+                while !entries.0.is_empty() {
+                    let (key, text) = (entries.text()?, entries.text()?);
+                    let mut lines = text.lines().filter(|_| key == ABOUT);
+                    lines.try_for_each(|line| about.take(line))?;
                 }
-                Some(Content::Clouds) => {
-                    about.scan = sequence.into();
-                    return point_cloud2::decode(fields.0, about).map(Some);
-                }
-                None => {}
             }
+            op::MESSAGE => {
+                let channel = fields.u2()?;
+                let sequence = fields.u4()?;
+                // When it was recorded, and when it was published.
+                fields.take(16)?;
+                match self.channels.get(&channel) {
+                    Some(Content::Transforms) => {
+                        about.viewpoint = ros2::viewpoint(fields.0)?.unwrap_or(about.viewpoint);
+                    }
+                    Some(Content::Clouds) => {
+                        about.scan = sequence.into();
+                        return point_cloud2::decode(fields.0, about).map(Some);
+                    }
+                    None => {}
+                }
+            }
+            _ => {}
         }
-        _ => {}
+        Ok(None)
     }
-    Ok(None)
+
+    fn take_channel(&mut self, mut fields: Fields) -> Result<(), String> {
+        let number = fields.u2()?;
+        let schema = self.schemas.get(&fields.u2()?).map(String::as_str);
+        let (topic, encoding) = (fields.text()?, fields.text()?);
+        if encoding != "cdr" {
+            return Ok(());
+        }
+        if schema == Some(ros2::POINT_CLOUD2) {
+            self.topics.insert(topic.to_owned());
+            if self.wanted.as_ref().is_none_or(|wanted| wanted == topic) {
+                self.channels.insert(number, Content::Clouds);
+            }
+        } else if topic == ros2::TF {
+            self.channels.insert(number, Content::Transforms);
+        }
+        Ok(())
+    }
+
+    /// Why there is no cloud.
+    fn nothing(&self) -> String {
+        let topics: Vec<&str> = self.topics.iter().map(String::as_str).collect();
+        match (&self.wanted, topics.as_slice()) {
+            (_, []) => "it has no messages of the type sensor_msgs/msg/PointCloud2".to_owned(),
+            (Some(wanted), topics) => {
+                format!("it has no clouds on the topic `{wanted}`, but on {}", topics.join(", "))
+            }
+            (None, topics) => format!("there is no message on {}", topics.join(", ")),
+        }
+    }
 }
 
 /// What is left of a record. The parser of the library takes the memory that a length asks for before
