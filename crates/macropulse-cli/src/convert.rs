@@ -1,10 +1,11 @@
 //! `macropulse convert`: point clouds from one format to another.
 
+use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use macropulse::formats::{CloudRoom, Clouds, Reading, Format, Recording};
+use macropulse::formats::{Clouds, Format, Reading, Recording};
 use macropulse::points::PointCloud;
 
 use crate::fault::{Fault, note, warn};
@@ -17,8 +18,9 @@ use crate::text::{counted, print};
 
 /// Convert point clouds to another format
 ///
-/// Read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .xyz, .txt, .pts, .bin (KITTI,
-/// nuScenes) and .mcap (clouds of ROS 2, one after the other). What an output cannot hold is said.
+/// Reads files that end in .pcd, .ply, .las, .laz, .e57 (every scan), .npy, .csv, .xyz, .txt, .pts, .bin
+/// (KITTI, nuScenes) and .mcap (every cloud of ROS 2). Says what is left out on the way in, and what an
+/// output cannot hold.
 #[derive(Args)]
 #[command(after_help = "Examples:
   macropulse convert out/scan-000000.pcd -o car.laz
@@ -43,6 +45,10 @@ pub struct Convert {
 
     #[command(flatten)]
     memory: MemoryLimit,
+
+    /// Of MCAP files, read the clouds of this topic alone [default: those of all topics]
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
 }
 
 /// Where the clouds go.
@@ -165,9 +171,12 @@ struct Conversion<'a> {
     common: &'a Common,
     folder: Folder,
     recording: Recording,
-    room: CloudRoom,
+    reading: Reading<'a>,
     /// Number of the scan that comes next at least, where they go into one file.
     next: u64,
+    /// Files with one scan each that are written, and what was said of formats.
+    written: BTreeSet<OsString>,
+    said: BTreeSet<String>,
     scans: u64,
     points: u64,
     files: u64,
@@ -182,8 +191,13 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         common,
         folder: Folder::claim(&target.folder)?,
         recording: Recording::new(&target.folder, &target.formats),
-        room: options.memory.cloud_room(),
+        reading: Reading {
+            room: options.memory.cloud_room(),
+            topic: options.topic.as_deref(),
+        },
         next: 0,
+        written: BTreeSet::new(),
+        said: BTreeSet::new(),
         scans: 0,
         points: 0,
         files: 0,
@@ -196,8 +210,17 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         }
     }
     let Conversion { recording, scans, points, files, .. } = conversion;
+    let moved = recording.moved();
     interrupt.undisturbed(|| recording.finish())?;
     converted?;
+    if moved > 0 {
+        let (begin, moved) =
+            if moved == 1 { ("begins", "1 scan") } else { ("begin", &*format!("{moved} scans")) };
+        let told = format!(
+            "{moved} {begin} no later than the one before: written with a stamp 0.1 s after it"
+        );
+        note(&told, common);
+    }
     if points == 0 {
         warn("not a single point: there is none in what was read");
     }
@@ -212,8 +235,8 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
 
 impl Conversion<'_> {
     fn convert(&mut self, input: &Path, inputs: usize, interrupt: &Interrupt) -> Result<(), Fault> {
-        let mut clouds = Clouds::open_with(input, Reading { room: self.room, topic: None })?;
-        let has_several = input.extension().is_some_and(|ending| ending == "mcap");
+        let mut clouds = Clouds::open_with(input, self.reading)?;
+        let has_several = clouds.has_several();
         let mut next = clouds.next();
         while let Some(cloud) = next.take() {
             if interrupt.is_raised() {
@@ -229,6 +252,7 @@ impl Conversion<'_> {
             interrupt.undisturbed(|| self.write(cloud, (input, has_several), &clouds))?;
             next = next.or_else(|| clouds.next());
         }
+        say_left_out(input, &clouds, self.reading.topic, self.common);
         Ok(())
     }
 
@@ -249,24 +273,46 @@ impl Conversion<'_> {
         let names = clouds.names();
         if self.scans == 0 {
             self.folder.make()?;
-            for format in &self.target.formats {
-                let left_out = format.leaves_out(&cloud, &names);
-                if !left_out.is_empty() {
-                    let (name, left_out) = (format.name(), left_out.join(", "));
-                    let told = format!("{name} cannot hold {left_out}: left out");
-                    note(&told, self.common);
-                }
+        }
+        for format in &self.target.formats {
+            let left_out = format.leaves_out(&cloud, &names);
+            let (name, left_out) = (format.name(), left_out.join(", "));
+            let told = format!("{name} cannot hold {left_out}: left out");
+            if !left_out.is_empty() && self.said.insert(told.clone()) {
+                note(&told, self.common);
             }
         }
         let scan = cloud.scan;
         cloud.scan = scan.max(self.next);
         self.next = cloud.scan + 1;
         let scan = has_several.then_some(scan);
-        let name = |format| self.target.name(format, input, scan);
+        let name = |format: Format| self.target.name(format, input, scan);
+        for &format in self.target.formats.iter().filter(|format| !format.is_of_run()) {
+            let file = name(format);
+            if !self.written.insert(file.clone()) {
+                let (file, input) = (Path::new(&file).display(), input.display());
+                return Err(Fault::Wrong(format!(
+                    "{input}: another cloud is in {file} already; convert it to a folder of its own"
+                )));
+            }
+        }
         self.files += self.recording.add_as(&cloud, &names, name)?.len() as u64;
         self.folder.keep();
         self.scans += 1;
         self.points += cloud.returns() as u64;
         Ok(())
+    }
+}
+
+/// Says what of a file that was read is not in its clouds, and which topics there are to choose.
+pub fn say_left_out(input: &Path, clouds: &Clouds, topic: Option<&str>, common: &Common) {
+    let (input, left_out) = (input.display(), clouds.left_out());
+    if !left_out.is_empty() {
+        note(&format!("{input}: left out: {left_out}"), common);
+    }
+    let topics = clouds.topics();
+    if topics.len() > 1 && topic.is_none() {
+        let topics = topics.join(", ");
+        note(&format!("{input}: has clouds on {topics}; --topic chooses one"), common);
     }
 }

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use macropulse::design::preset_text;
-use macropulse::formats::{CloudRoom, Clouds, Reading, clear_unfinished, write_atomically};
+use macropulse::formats::{Clouds, Reading, clear_unfinished, write_atomically};
 use macropulse::scene::Scene;
 use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
 use serde_json::Value;
 
+use crate::convert::say_left_out;
 use crate::fault::{Fault, note};
 use crate::memory::MemoryLimit;
 use crate::options::Common;
@@ -34,32 +35,46 @@ pub struct View {
 
     #[command(flatten)]
     memory: MemoryLimit,
+
+    /// Of an MCAP file, show the clouds of this topic alone [default: those of all topics]
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
 }
 
-/// Adds the clouds of the file at `path`.
-fn add(page: &mut Explorer, (name, path): (&str, &Path), room: CloudRoom) -> Result<(), Fault> {
-    let mut clouds = Clouds::open_with(path, Reading { room, topic: None })?;
-    let mut at = 0;
-    while let Some(cloud) = clouds.next() {
-        let cloud = cloud?;
-        let of_several = || format!("{name}, scan {}", cloud.scan);
-        let name = if at == 0 && !name.ends_with(".mcap") { name.to_owned() } else { of_several() };
-        page.cloud(&name, &cloud, &clouds.names());
-        at += 1;
+/// How clouds are read for a page, and what is said of them.
+struct Reader<'a> {
+    reading: Reading<'a>,
+    common: &'a Common,
+}
+
+impl Reader<'_> {
+    /// Adds the clouds of the file at `path`, called `name`, to a page.
+    fn add(&self, page: &mut Explorer, name: &str, path: &Path) -> Result<(), Fault> {
+        let mut clouds = Clouds::open_with(path, self.reading)?;
+        while let Some(cloud) = clouds.next() {
+            let cloud = cloud?;
+            let name = match clouds.has_several() {
+                true => format!("{name}, scan {}", cloud.scan),
+                false => name.to_owned(),
+            };
+            page.cloud(&name, &cloud, &clouds.names());
+        }
+        say_left_out(path, &clouds, self.reading.topic, self.common);
+        Ok(())
     }
-    Ok(())
 }
 
 pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
     let path = &options.path;
     let room = options.memory.cloud_room();
+    let reader = Reader { reading: Reading { room, topic: options.topic.as_deref() }, common };
     refuse_name(path)?;
     let (page, output) = if path.is_dir() {
         let output = options.output.clone().unwrap_or_else(|| path.join(PAGE));
-        (of_folder((path, &output), room, common)?, output)
+        (of_folder((path, &output), &reader)?, output)
     } else {
         let output = options.output.clone().unwrap_or_else(|| path.with_extension("html"));
-        (of_file((path, &output), room)?, output)
+        (of_file((path, &output), &reader)?, output)
     };
     let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
     if ending.is_none_or(|ending| ending != "html" && ending != "htm") {
@@ -94,18 +109,17 @@ fn refuse_name(path: &Path) -> Result<(), Fault> {
     )))
 }
 
-fn of_file((path, output): (&Path, &Path), room: CloudRoom) -> Result<Explorer, Fault> {
+fn of_file((path, output): (&Path, &Path), reader: &Reader) -> Result<Explorer, Fault> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut page = Explorer::new(&name);
     page.file(&beside(output, path));
-    add(&mut page, (&name, path), room)?;
+    reader.add(&mut page, &name, path)?;
     Ok(page)
 }
 
 fn of_folder(
     (folder, output): (&Path, &Path),
-    room: CloudRoom,
-    common: &Common,
+    reader: &Reader,
 ) -> Result<Explorer, Fault> {
     let left = Left::of(folder)?;
     if left.is_unfinished {
@@ -114,7 +128,7 @@ fn of_folder(
             "{folder}: the run that writes into it is not over, or was killed: what is shown may be of \
              several runs"
         );
-        note(&told, common);
+        note(&told, reader.common);
     }
     let clouds = left.clouds();
     if clouds.is_empty() {
@@ -131,7 +145,7 @@ fn of_folder(
         explain(&mut page, &folder.join(file));
     }
     for file in clouds {
-        add(&mut page, (file, &folder.join(file)), room)?;
+        reader.add(&mut page, file, &folder.join(file))?;
     }
     Ok(page)
 }
