@@ -171,7 +171,7 @@ struct Conversion<'a> {
     common: &'a Common,
     folder: Folder,
     recording: Recording,
-    reading: Reading<'a>,
+    reading: Reading,
     /// Number of the scan that comes next at least, where they go into one file.
     next: u64,
     /// Files with one scan each that are written, and what was said of formats.
@@ -193,7 +193,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         recording: Recording::new(&target.folder, &target.formats),
         reading: Reading {
             room: options.memory.cloud_room(),
-            topic: options.topic.as_deref(),
+            topic: options.topic.clone(),
         },
         next: 0,
         written: BTreeSet::new(),
@@ -235,7 +235,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
 
 impl Conversion<'_> {
     fn convert(&mut self, input: &Path, inputs: usize, interrupt: &Interrupt) -> Result<(), Fault> {
-        let mut clouds = Clouds::open_with(input, self.reading)?;
+        let mut clouds = Clouds::open_with(input, &self.reading)?;
         let has_several = clouds.has_several();
         let mut next = clouds.next();
         while let Some(cloud) = next.take() {
@@ -252,7 +252,7 @@ impl Conversion<'_> {
             interrupt.undisturbed(|| self.write(cloud, (input, has_several), &clouds))?;
             next = next.or_else(|| clouds.next());
         }
-        say_left_out(input, &clouds, self.reading.topic, self.common);
+        say_left_out(input, &clouds, &self.reading, self.common);
         Ok(())
     }
 
@@ -305,13 +305,13 @@ impl Conversion<'_> {
 }
 
 /// Says what of a file that was read is not in its clouds, and which topics there are to choose.
-pub fn say_left_out(input: &Path, clouds: &Clouds, topic: Option<&str>, common: &Common) {
+pub fn say_left_out(input: &Path, clouds: &Clouds, reading: &Reading, common: &Common) {
     let (input, left_out) = (input.display(), clouds.left_out());
     if !left_out.is_empty() {
         note(&format!("{input}: left out: {left_out}"), common);
     }
     let topics = clouds.topics();
-    if topics.len() > 1 && topic.is_none() {
+    if topics.len() > 1 && reading.topic.is_none() {
         let topics = topics.join(", ");
         note(&format!("{input}: has clouds on {topics}; --topic chooses one"), common);
     }

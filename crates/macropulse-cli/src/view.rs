@@ -43,14 +43,14 @@ pub struct View {
 
 /// How clouds are read for a page, and what is said of them.
 struct Reader<'a> {
-    reading: Reading<'a>,
+    reading: Reading,
     common: &'a Common,
 }
 
 impl Reader<'_> {
     /// Adds the clouds of the file at `path`, called `name`, to a page.
     fn add(&self, page: &mut Explorer, name: &str, path: &Path) -> Result<(), Fault> {
-        let mut clouds = Clouds::open_with(path, self.reading)?;
+        let mut clouds = Clouds::open_with(path, &self.reading)?;
         while let Some(cloud) = clouds.next() {
             let cloud = cloud?;
             let name = match clouds.has_several() {
@@ -59,7 +59,7 @@ impl Reader<'_> {
             };
             page.cloud(&name, &cloud, &clouds.names());
         }
-        say_left_out(path, &clouds, self.reading.topic, self.common);
+        say_left_out(path, &clouds, &self.reading, self.common);
         Ok(())
     }
 }
@@ -67,7 +67,7 @@ impl Reader<'_> {
 pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
     let path = &options.path;
     let room = options.memory.cloud_room();
-    let reader = Reader { reading: Reading { room, topic: options.topic.as_deref() }, common };
+    let reader = Reader { reading: Reading { room, topic: options.topic.clone() }, common };
     refuse_name(path)?;
     let (page, output) = if path.is_dir() {
         let output = options.output.clone().unwrap_or_else(|| path.join(PAGE));

@@ -5,13 +5,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use macropulse::channel::Operating;
 use macropulse::design::Design;
-use macropulse::formats::{CloudRoom, Format, Names, write_cloud};
+use macropulse::formats::{CloudRoom, Format, LeftOut, Names, Reading, write_cloud};
 use macropulse::points::{PointCloud, Scale, Truth};
 use macropulse_study::decoding::{self, Decoding};
 use macropulse_study::record::{self, CloudsAt};
 use pyo3::prelude::*;
 
-use crate::error::{OrRaise, Raise, wrong};
+use crate::error::{OrRaise, Raise, warned, wrong};
 use crate::scan::{About, Scan};
 use crate::work::{self, Stop};
 
@@ -93,6 +93,14 @@ impl Raise for Failed {
 }
 
 impl Source {
+    /// What of the file that was read last is not in its scans.
+    fn left_out(&self) -> LeftOut {
+        match self {
+            Self::Clouds(clouds) => clouds.left_out().cloned().unwrap_or_default(),
+            Self::Recorded(..) => LeftOut::default(),
+        }
+    }
+
     /// The next scan; `None` behind the last one, or once it is told to stop.
     fn next(&mut self, stop: &Stop) -> Result<Option<Scan>, Failed> {
         match self {
@@ -120,11 +128,25 @@ pub struct StoredScans {
     source: Arc<Mutex<Option<Source>>>,
     /// What is read.
     name: String,
+    /// What was said last of what is left out.
+    told: Mutex<Option<LeftOut>>,
 }
 
 impl StoredScans {
     fn new(source: Source, name: String) -> Self {
-        Self { source: Arc::new(Mutex::new(Some(source))), name }
+        Self { source: Arc::new(Mutex::new(Some(source))), name, told: Mutex::new(None) }
+    }
+
+    /// Warns of what of the file is not in its scans, once for each kind of it.
+    fn warn(&self, py: Python<'_>, left_out: LeftOut) -> PyResult<()> {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if left_out.is_empty() || told.as_ref().is_some_and(|told| told.is_alike(&left_out)) {
+            return Ok(());
+        }
+        let sentence = format!("{}: left out: {left_out}", self.name);
+        *told = Some(left_out);
+        drop(told);
+        warned(py, sentence)
     }
 
     /// The scan that is the only one.
@@ -154,13 +176,15 @@ impl StoredScans {
         let next = work::done(py, 0, move |stop| {
             let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
             let Some(mut open) = source.take() else { return Ok(None) };
-            let next = open.next(stop)?;
+            let next = open.next(stop)?.map(|scan| (scan, open.left_out()));
             if next.is_some() {
                 *source = Some(open);
             }
             Ok::<_, Failed>(next)
         })?;
-        next.or_raise()
+        let Some((scan, left_out)) = next.or_raise()? else { return Ok(None) };
+        self.warn(py, left_out)?;
+        Ok(Some(scan))
     }
 
     fn __repr__(&self) -> String {
@@ -168,10 +192,16 @@ impl StoredScans {
     }
 }
 
-fn clouds_at(py: Python<'_>, path: PathBuf, limit: Option<u64>) -> PyResult<StoredScans> {
+fn clouds_at(
+    py: Python<'_>,
+    path: PathBuf,
+    topic: Option<String>,
+    limit: Option<u64>,
+) -> PyResult<StoredScans> {
     let name = path.display().to_string();
     let room = limit.map_or_else(CloudRoom::default, CloudRoom::of_bytes);
-    let clouds = work::done(py, 0, move |_| CloudsAt::open(&path, room))?.or_raise()?;
+    let open = move |_: &Stop| CloudsAt::open(&path, Reading { room, topic });
+    let clouds = work::done(py, 0, open)?.or_raise()?;
     Ok(StoredScans::new(Source::Clouds(clouds), name))
 }
 
@@ -180,8 +210,12 @@ fn clouds_at(py: Python<'_>, path: PathBuf, limit: Option<u64>) -> PyResult<Stor
 /// Args:
 ///     path: A file that `Scan.save` or the program has written, its ending says the format; or the
 ///         folder of a run. It holds a single scan; of several, `load_scans` gives one after the other.
+///     topic: Of an MCAP file, the one topic whose clouds are read; all topics if left out.
 ///     memory_limit: Bytes that the program may take; four fifths of what the machine has unless it is
 ///         given. A file with more points than fit into them is refused.
+///
+/// Warns of what of the file is not in the scan: fields, points that are none, the coordinate reference
+/// system.
 ///
 /// Raises:
 ///     Error: If the file is none of a format that can be read, holds several scans, or takes too much
@@ -191,9 +225,14 @@ fn clouds_at(py: Python<'_>, path: PathBuf, limit: Option<u64>) -> PyResult<Stor
 /// Example:
 ///     >>> scan = macropulse.load("out/scan-000000.pcd")
 #[pyfunction]
-#[pyo3(signature = (path, *, memory_limit=None))]
-pub fn load(py: Python<'_>, path: PathBuf, memory_limit: Option<u64>) -> PyResult<Scan> {
-    clouds_at(py, path, memory_limit)?
+#[pyo3(signature = (path, *, topic=None, memory_limit=None))]
+pub fn load(
+    py: Python<'_>,
+    path: PathBuf,
+    topic: Option<String>,
+    memory_limit: Option<u64>,
+) -> PyResult<Scan> {
+    clouds_at(py, path, topic, memory_limit)?
         .only(py, "iterate over them: `for scan in macropulse.load_scans(path)`")
 }
 
@@ -203,7 +242,10 @@ pub fn load(py: Python<'_>, path: PathBuf, memory_limit: Option<u64>) -> PyResul
 ///     path: A file with several scans, as `scans.mcap`; or a folder with files of one scan each, as
 ///         the program leaves it behind `-o`, of which each scan is read once, from the file that
 ///         keeps most.
+///     topic: Of an MCAP file, the one topic whose clouds are read; all topics if left out.
 ///     memory_limit: Bytes that the program may take, as of `load`.
+///
+/// Warns as `load` does.
 ///
 /// Returns:
 ///     An iterator of `Scan`.
@@ -216,13 +258,14 @@ pub fn load(py: Python<'_>, path: PathBuf, memory_limit: Option<u64>) -> PyResul
 ///     >>> for scan in macropulse.load_scans("out"):
 ///     ...     print(scan.number, len(scan))
 #[pyfunction]
-#[pyo3(signature = (path, *, memory_limit=None))]
+#[pyo3(signature = (path, *, topic=None, memory_limit=None))]
 pub fn load_scans(
     py: Python<'_>,
     path: PathBuf,
+    topic: Option<String>,
     memory_limit: Option<u64>,
 ) -> PyResult<StoredScans> {
-    clouds_at(py, path, memory_limit)
+    clouds_at(py, path, topic, memory_limit)
 }
 
 /// The decoding of the files at these paths.

@@ -298,6 +298,13 @@ impl Scan {
         self.cloud.scan
     }
 
+    /// When the scan was taken, ns of Unix time, of a scan whose file tells it; `time_ns` then counts from
+    /// it. None of a simulated one.
+    #[getter]
+    fn stamp_ns(&self) -> Option<u64> {
+        self.cloud.stamp_ns
+    }
+
     /// Rows and columns of pixels; (0, 0) for a list without an image.
     #[getter]
     fn shape(&self) -> (usize, usize) {

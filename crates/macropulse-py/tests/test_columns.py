@@ -64,5 +64,24 @@ def test_a_file_without_truth_has_none(scan, tmp_path):
     scan.save(tmp_path / "plain.pcd", truth=False)
     plain = mp.load(tmp_path / "plain.pcd")
     assert "outcome" not in plain.columns() and "x" in plain.columns()
+    # Files do not keep the photons.
+    truth = {"true_range", "object", "material", "incidence", "outcome"}
+    assert set(scan.columns()) - set(plain.columns()) == truth | {"photons"}
+
+
+def test_a_file_of_another_program_has_its_own_columns_digits_and_losses(tmp_path):
+    (tmp_path / "a.csv").write_text("x,y,z,red\n494428.61,4877455.58,123.456,7\n3,4,12,8\n")
+    with pytest.warns(UserWarning, match="a.csv: left out: field red$"):
+        scan = mp.load(tmp_path / "a.csv")
+    assert list(scan.columns()) == ["x", "y", "z"]
+    assert scan.x.dtype == scan.xyz().dtype == np.float64
+    np.testing.assert_array_equal(scan.xyz()[0], [494428.61, 4877455.58, 123.456])
+    # The range is not the file's: the distance from the origin stands for it.
+    assert scan.range[1] == 13.0 and scan.range.dtype == np.float32
+    for name in ("intensity", "time_ns", "flags", "photons"):
+        with pytest.raises(mp.Error, match=f"there is no {name}: the file of the scan does not have it"):
+            getattr(scan, name)
+    with pytest.raises(mp.Error, match="a.csv: has no topics"):
+        mp.load(tmp_path / "a.csv", topic="/points")
     with pytest.raises(mp.Error, match="there is no outcome: the scan has no truth"):
         plain.outcome

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use macropulse::formats::{CloudRoom, Clouds, Reading, Names};
+use macropulse::formats::{Clouds, LeftOut, Names, Reading};
 use macropulse::opened;
 use macropulse::points::PointCloud;
 use serde_json::Value;
@@ -122,19 +122,18 @@ pub struct CloudsAt {
     /// Files that are still to be opened, the next one last.
     left: Vec<PathBuf>,
     open: Option<Clouds>,
-    /// The memory that the clouds of a file may take.
-    room: CloudRoom,
+    reading: Reading,
 }
 
 impl CloudsAt {
-    /// The clouds at `path`, a file or a folder. Those of a file may take the memory of `room`.
+    /// The clouds at `path`, a file or a folder, each file read as `reading` says.
     ///
     /// # Errors
     /// If it cannot be read, or is a folder that holds none.
-    pub fn open(path: &Path, room: CloudRoom) -> Result<Self, Error> {
+    pub fn open(path: &Path, reading: Reading) -> Result<Self, Error> {
         if !path.is_dir() {
-            let open = Some(Clouds::open_with(path, Reading { room, topic: None })?);
-            return Ok(Self { left: Vec::new(), open, room });
+            let open = Some(Clouds::open_with(path, &reading)?);
+            return Ok(Self { left: Vec::new(), open, reading });
         }
         let left = Left::of(path)?;
         let mut files: Vec<PathBuf> = left.clouds().iter().map(|file| path.join(file)).collect();
@@ -142,7 +141,12 @@ impl CloudsAt {
             return Err(Error::NoCloud { folder: path.to_owned() });
         }
         files.reverse();
-        Ok(Self { left: files, open: None, room })
+        Ok(Self { left: files, open: None, reading })
+    }
+
+    /// What of the file that was read last is not in its clouds.
+    pub fn left_out(&self) -> Option<&LeftOut> {
+        self.open.as_ref().map(Clouds::left_out)
     }
 
     /// The next cloud, with the names of what it has the numbers of.
@@ -153,7 +157,8 @@ impl CloudsAt {
         let mut next = self.open.as_mut().and_then(Iterator::next);
         while next.is_none() {
             let Some(path) = self.left.pop() else { return Ok(None) };
-            next = self.open.insert(Clouds::open_with(&path, Reading { room: self.room, topic: None })?).next();
+            let clouds = Clouds::open_with(&path, &self.reading)?;
+            next = self.open.insert(clouds).next();
         }
         let cloud = next.transpose()?;
         Ok(cloud.zip(self.open.as_ref().map(Clouds::names)))
@@ -190,7 +195,7 @@ mod tests {
             write_cloud(Format::Ply, &cloud, &Names::default(), &named(scan)).unwrap();
         }
         let numbers = |path: &Path| -> Result<Vec<u64>, Error> {
-            let mut clouds = CloudsAt::open(path, CloudRoom::default())?;
+            let mut clouds = CloudsAt::open(path, Reading::default())?;
             let mut numbers = Vec::new();
             while let Some((cloud, _)) = clouds.next_cloud()? {
                 numbers.push(cloud.scan);

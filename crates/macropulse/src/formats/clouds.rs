@@ -16,12 +16,12 @@ use std::path::{Path, PathBuf};
 const MOST_BYTES: u64 = 8 << 30;
 
 /// How the clouds of a file are read.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Reading<'a> {
+#[derive(Debug, Clone, Default)]
+pub struct Reading {
     /// The memory that the clouds may take: by default four fifths of what the machine has.
     pub room: CloudRoom,
     /// The topic of an MCAP file whose clouds alone are read; all topics without it.
-    pub topic: Option<&'a str>,
+    pub topic: Option<String>,
 }
 
 /// The clouds of a file, one after the other: many of an MCAP or E57 file, one of any other. Their
@@ -52,7 +52,7 @@ impl Clouds {
     /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is not what its ending
     /// says, [`Error::Unreadable`] if no cloud is read from files of that ending.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        Self::open_with(path, Reading::default())
+        Self::open_with(path, &Reading::default())
     }
 
     /// As [`Clouds::open`], with a limit of memory and a choice of the topic.
@@ -60,7 +60,7 @@ impl Clouds {
     /// # Errors
     /// As [`Clouds::open`]; if the clouds take more memory than the limit; and [`Error::NoTopics`] if
     /// a topic is chosen in a file of a format that has none.
-    pub fn open_with(path: &Path, reading: Reading) -> Result<Self, Error> {
+    pub fn open_with(path: &Path, reading: &Reading) -> Result<Self, Error> {
         let Some(format) = format_of(path) else {
             // A name that is misspelt is no format that is unknown.
             std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?;

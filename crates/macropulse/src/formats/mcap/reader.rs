@@ -62,10 +62,10 @@ impl Messages {
     ///
     /// # Errors
     /// If the file cannot be opened.
-    pub fn open(path: &Path, Reading { room, topic }: Reading) -> Result<Self, Error> {
+    pub fn open(path: &Path, reading: &Reading) -> Result<Self, Error> {
         let file = opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
         let length = file.metadata().map_err(|cause| Error::read(path, cause))?.len();
-        let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST).min(room.bytes()) as usize;
+        let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST).min(reading.room.bytes()) as usize;
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
             .with_validate_chunk_crcs(true)
@@ -77,8 +77,8 @@ impl Messages {
             path: path.to_owned(),
             file,
             reader,
-            contents: Contents { wanted: topic.map(str::to_owned), ..Contents::default() },
-            about: About::within(room),
+            contents: Contents { wanted: reading.topic.clone(), ..Contents::default() },
+            about: About::within(reading.room),
             clouds: 0,
             is_over: false,
         })
