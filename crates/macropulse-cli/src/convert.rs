@@ -191,10 +191,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         common,
         folder: Folder::claim(&target.folder)?,
         recording: Recording::new(&target.folder, &target.formats),
-        reading: Reading {
-            room: options.memory.cloud_room(),
-            topic: options.topic.clone(),
-        },
+        reading: Reading { room: options.memory.cloud_room(), topic: options.topic.clone() },
         next: 0,
         written: BTreeSet::new(),
         said: BTreeSet::new(),

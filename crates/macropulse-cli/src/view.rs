@@ -117,10 +117,7 @@ fn of_file((path, output): (&Path, &Path), reader: &Reader) -> Result<Explorer, 
     Ok(page)
 }
 
-fn of_folder(
-    (folder, output): (&Path, &Path),
-    reader: &Reader,
-) -> Result<Explorer, Fault> {
+fn of_folder((folder, output): (&Path, &Path), reader: &Reader) -> Result<Explorer, Fault> {
     let left = Left::of(folder)?;
     if left.is_unfinished {
         let folder = folder.display();

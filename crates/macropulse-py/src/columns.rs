@@ -83,16 +83,12 @@ impl Scan {
     pub fn column(&self, name: &str) -> Option<Column<'_>> {
         let (cloud, truth) = (&self.cloud, &self.cloud.truth.returns);
         let has_truth = self.has_truth();
-        let length = |single, exact: &'_ Vec<f64>| match exact.is_empty() {
-            true => Column::F4(single),
-            false => Column::F8(exact),
-        };
         let column = match name {
-            "x" => length(&cloud.x, &cloud.exact.x),
-            "y" => length(&cloud.y, &cloud.exact.y),
-            "z" => length(&cloud.z, &cloud.exact.z),
+            "x" => Column::length(&cloud.x, &cloud.exact.x),
+            "y" => Column::length(&cloud.y, &cloud.exact.y),
+            "z" => Column::length(&cloud.z, &cloud.exact.z),
             "intensity" => Column::F4(&cloud.intensity),
-            "range" => length(&cloud.range, &cloud.exact.range),
+            "range" => Column::length(&cloud.range, &cloud.exact.range),
             "time_ns" => Column::F8(&cloud.time_ns),
             "row" | "ring" => Column::U2(&cloud.row),
             "column" => Column::U2(&cloud.column),
@@ -116,7 +112,15 @@ impl Scan {
     }
 }
 
-impl Column<'_> {
+impl<'a> Column<'a> {
+    /// A length: the exact column where there is one.
+    fn length(single: &'a [f32], exact: &'a [f64]) -> Self {
+        match exact.is_empty() {
+            true => Self::F4(single),
+            false => Self::F8(exact),
+        }
+    }
+
     fn len(&self) -> usize {
         match self {
             Self::F4(entries) => entries.len(),

@@ -4,8 +4,7 @@ use super::about::About;
 use super::mcap::Messages;
 use super::{
     CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57_reader, kitti, las_reader, npy,
-    pcd_reader,
-    ply_reader,
+    pcd_reader, ply_reader,
 };
 use crate::opened;
 use crate::points::PointCloud;

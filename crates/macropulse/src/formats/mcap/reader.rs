@@ -65,7 +65,8 @@ impl Messages {
     pub fn open(path: &Path, reading: &Reading) -> Result<Self, Error> {
         let file = opened::file(path, u64::MAX).map_err(|cause| Error::read(path, cause))?;
         let length = file.metadata().map_err(|cause| Error::read(path, cause))?.len();
-        let limit = length.saturating_mul(MOST_COMPRESSED).min(LONGEST).min(reading.room.bytes()) as usize;
+        let limit =
+            length.saturating_mul(MOST_COMPRESSED).min(LONGEST).min(reading.room.bytes()) as usize;
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
             .with_validate_chunk_crcs(true)
