@@ -32,6 +32,23 @@ fn the_paper_with_honest_light_has_the_numbers_of_its_budget() {
     assert_eq!(budget["range_m"], 150.0);
 }
 
+/// The probability of a return is that nothing comes before the echo: exp(−10/s · 2·119.1 m/c) of hdl-64e,
+/// whose gate opens at 0.9 m.
+#[test]
+fn a_sensor_that_never_misses_has_a_budget_that_closes() {
+    let never = "--set detector.single-stop.sensitivity.pd=1";
+    let budget = json(&format!("budget hdl-64e {never} --environment vacuum-dark --json"));
+    let first = (-10.0 * 2.0 * 119.1 / 299_792_458.0_f64).exp();
+    assert!((budget["pd"].as_f64().unwrap() - first).abs() < 1e-9, "{}", budget["pd"]);
+    assert_eq!((&budget["closes"], budget["converter_loss"].is_f64()), (&true.into(), true));
+    // What has no end is null.
+    assert!(budget["snr"].is_null() && budget["detected_per_micropulse"].is_null());
+    for name in ["peregrine", "rosette-mid-40"] {
+        let text = Desk::new().run(&format!("budget {name} {never}")).out;
+        assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
+    }
+}
+
 #[test]
 fn at_night_and_square_on_nothing_but_the_slant_fails() {
     let budget = json("budget kim-park-2016-physical --environment night --range 130 --json");

@@ -49,6 +49,21 @@ fn what_stands_in_the_wrong_place_is_said_with_the_right_line() {
 }
 
 #[test]
+fn threads_asked_for_by_the_environment_have_the_limit_of_the_option() {
+    let desk = Desk::new();
+    let ran = |line: &str, threads: &str| {
+        let output = desk.command(line).env("RAYON_NUM_THREADS", threads).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (code, told) = ran("sensors", "100000");
+    assert_eq!(code, Some(2));
+    assert!(told.contains("RAYON_NUM_THREADS is 100000; it must be from 0 to 1024"), "{told}");
+    for (line, threads) in [("sensors", "2"), ("sensors", "many"), ("sensors -j 1", "100000")] {
+        assert_eq!(ran(line, threads), (Some(0), String::new()));
+    }
+}
+
+#[test]
 fn a_hyphen_is_standard_input() {
     let desk = Desk::new();
     let sensor = desk.run("sensors peregrine").out;

@@ -195,6 +195,11 @@ const CALIBRATIONS: &[Row] = &[
         "lasers:\n- {laser_id: 0, rot_correction: 0, vert_correction: 0}\nnum_lasers: 2\n",
         &["cal.yaml", "2"],
     ),
+    (
+        "lasers:\n- {laser_id: 0, rot_correction: 0, vert_correction: 0, vert_correction: 0}\n",
+        &["cal.yaml:2", "the key `vert_correction` stands twice"],
+    ),
+    ("Laser id,Elevation\n1,14.4\n", &["cal.yaml:1:1", "begins with `lasers:`"]),
     ("<xml/>\n", &["cal.yaml"]),
 ];
 
