@@ -7,6 +7,7 @@ simulation needs, keep 0.5 m of them.
 import csv
 import os
 import subprocess
+from unittest import mock
 
 import laspy
 import numpy as np
@@ -54,8 +55,16 @@ def write_las_1_4(path, points):
 
 
 def write_e57(path, points):
-    with pye57.E57(str(path), mode="w") as file:
-        file.write_scan_raw(dict(zip(["cartesianX", "cartesianY", "cartesianZ"], points.T.copy())))
+    write_scans(path, [(points, {})])
+
+
+def write_scans(path, scans):
+    """pye57 writes 32-bit floats; the library under it writes 64 bits as well."""
+    axes = ["cartesianX", "cartesianY", "cartesianZ"]
+    with mock.patch.object(pye57.libe57, "E57_SINGLE", pye57.libe57.E57_DOUBLE):
+        with pye57.E57(str(path), mode="w") as file:
+            for points, pose in scans:
+                file.write_scan_raw(dict(zip(axes, points.T.copy())), **pose)
 
 
 def structured(points):
@@ -76,7 +85,7 @@ def write_ply_text(path, points):
 
 def write_pcd(path, points):
     fields, types = ("x", "y", "z"), (np.float64,) * 3
-    pypcd4.PointCloud.from_points(points.T, fields, types).save(path)
+    pypcd4.PointCloud.from_points(points, fields, types).save(path)
 
 
 def write_npy(path, points):
@@ -196,11 +205,11 @@ def test_coordinates_survive_from_every_writer_to_every_reader(writer, tmp_path)
 def test_every_scan_of_an_e57_survives_with_its_pose(tmp_path):
     scans = [far(20, 1), far(30, 2), far(40, 3)]
     turns = [[1.0, 0, 0, 0], [0.6, 0, 0, 0.8], [0, 1.0, 0, 0]]
-    with pye57.E57(str(tmp_path / "in.e57"), mode="w") as file:
-        for at, points in enumerate(scans):
-            data = dict(zip(["cartesianX", "cartesianY", "cartesianZ"], points.T.copy()))
-            turn, place = np.array(turns[at]), np.array([at, 10.5, 0])
-            file.write_scan_raw(data, name=f"scan {at}", rotation=turn, translation=place)
+    poses = [
+        {"rotation": np.array(turn), "translation": np.array([at, 10.5, 0])}
+        for at, turn in enumerate(turns)
+    ]
+    write_scans(tmp_path / "in.e57", zip(scans, poses))
     ran = convert(tmp_path / "in.e57", "--format", "e57,mcap", "-o", tmp_path / "out")
     files = sorted((tmp_path / "out").glob("*.e57"))
     assert len(files) == 3 and ran.stdout.startswith("3 scans, 90 points, 4 files")
