@@ -4,6 +4,7 @@ use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
 use super::contained::contained;
+use super::headings::Meaning;
 use super::las::{DESCRIPTION, EXTRA_BYTES, KINDS, TEXT, WHITE, extra_name};
 use super::left_out::{LeftOut, NoPoint};
 use super::number::Kind;
@@ -19,7 +20,7 @@ const AT_A_TIME: u64 = 1 << 22;
 
 /// A dimension of the extra bytes that is one of our attributes.
 struct Extra {
-    attribute: Attribute,
+    meaning: Meaning,
     kind: Kind,
     offset: usize,
 }
@@ -285,29 +286,36 @@ fn extra(header: &Header, left_out: &mut LeftOut) -> Vec<Extra> {
             offset += usize::from(bytes[3]);
             continue;
         };
-        let known = Attribute::ALL
-            .into_iter()
-            .find(|attribute| extra_name(*attribute).is_some_and(|known| known.as_bytes() == name));
+        let name = String::from_utf8_lossy(name);
+        let ours = Attribute::ALL.into_iter().find(|known| extra_name(*known) == Some(&*name));
         // Scaled dimensions are those of others.
-        match known.filter(|_| bytes[3] & 0b11000 == 0) {
-            Some(attribute) => found.push(Extra { attribute, kind, offset }),
-            None => left_out.field(&String::from_utf8_lossy(name)),
+        let meaning = ours.map(Meaning::of).or_else(|| of_others(&name, kind));
+        match meaning.filter(|_| bytes[3] & 0b11000 == 0) {
+            Some(meaning) => found.push(Extra { meaning, kind, offset }),
+            None => left_out.field(&name),
         }
         offset += kind.size();
     }
     found
 }
 
+/// What extra bytes of another program hold. For coordinates, times and returns LAS has fields.
+fn of_others(name: &str, kind: Kind) -> Option<Meaning> {
+    use Attribute::{Column, Intensity, Range, Ring, Row};
+    let meaning = Meaning::of_heading(name, Some(kind));
+    meaning.filter(|known| matches!(known.attribute, Intensity | Range | Row | Column | Ring))
+}
+
 /// What the points of a file have. Fields that LAS always has are told apart by [`forget_blank`].
 fn attributes(extra: &[Extra]) -> Vec<Attribute> {
     let always = [Attribute::Intensity, Attribute::ReturnNumber, Attribute::NumberOfReturns];
-    let extra = extra.iter().map(|extra| extra.attribute);
+    let extra = extra.iter().map(|extra| extra.meaning.attribute);
     always.into_iter().chain([Attribute::TimeNs]).chain(extra).collect()
 }
 
 /// Empties columns that are 0 throughout: LAS has no other way to say that nothing is known.
 fn forget_blank(cloud: &mut PointCloud, extra: &[Extra]) {
-    let is_extra = extra.iter().any(|extra| extra.attribute == Attribute::Intensity);
+    let is_extra = extra.iter().any(|extra| extra.meaning.attribute == Attribute::Intensity);
     if !is_extra && cloud.intensity.iter().all(|intensity| *intensity == 0.0) {
         cloud.intensity.clear();
     }
@@ -331,9 +339,9 @@ fn record(point: &Point, extra: &[Extra], at: usize) -> Result<Record, String> {
     record.set(at, Attribute::ReturnNumber, f64::from(point.return_number))?;
     record.set(at, Attribute::NumberOfReturns, f64::from(point.number_of_returns))?;
     record.set(at, Attribute::TimeNs, point.gps_time.unwrap_or(0.0) * 1e9)?;
-    for Extra { attribute, kind, offset } in extra {
+    for Extra { meaning, kind, offset } in extra {
         let bytes = point.extra_bytes.get(*offset..).unwrap_or_default();
-        record.set(at, *attribute, kind.read(bytes))?;
+        record.set(at, meaning.attribute, meaning.number(kind.read(bytes)))?;
     }
     Ok(record)
 }
@@ -439,6 +447,18 @@ mod tests {
         // Behind the name of 16 bytes its number, its length and a description of 32.
         laz[at + 16 + 4 + 32..][..2].copy_from_slice(&[1, 0]);
         assert!(parse(laz).unwrap_err().contains("are compressed pointwise"));
+    }
+
+    #[test]
+    fn extra_bytes_of_others_are_known_by_their_names() {
+        let attribute = |name: &str, kind| of_others(name, kind).map(|known| known.attribute);
+        assert_eq!(attribute("scalar_Intensity", Kind::F4), Some(Attribute::Intensity));
+        assert_eq!(attribute("Laser_ID", Kind::U1), Some(Attribute::Ring));
+        assert_eq!(of_others("Distance", Kind::U4).map(|known| known.number(1500.0)), Some(1.5));
+        // LAS has fields for these.
+        for name in ["x", "GpsTime", "NumberOfReturns"] {
+            assert_eq!(attribute(name, Kind::F8), None, "{name}");
+        }
     }
 
     #[test]
