@@ -33,7 +33,7 @@ pub struct Clouds {
 }
 
 enum Source {
-    One { cloud: Option<Box<PointCloud>>, about: About },
+    One { cloud: Option<Box<PointCloud>>, about: Box<About> },
     Scans(Box<e57_reader::Scans>),
     Messages(Box<Messages>),
 }
@@ -154,7 +154,7 @@ impl Source {
             _ => return Err(Error::unreadable(path)),
         };
         let (cloud, about) = parsed.map_err(invalid)?;
-        Ok(Self::One { cloud: Some(Box::new(cloud)), about })
+        Ok(Self::One { cloud: Some(Box::new(cloud)), about: Box::new(about) })
     }
 }
 
