@@ -15,15 +15,15 @@ use std::io::Cursor;
 /// The clouds of an E57 file, one for each of its scans, in the frame of the scanner.
 pub(super) struct Scans {
     reader: E57Reader<Cursor<Vec<u8>>>,
+    /// Bytes of the file.
+    size: u64,
     scans: Vec<Scan>,
     next: usize,
     about: About,
-    /// Size of the file, bytes.
-    size: u64,
 }
 
 impl Scans {
-    /// Reads what the file says of its scans. Each of its clouds may take the memory of `room`.
+    /// Reads what the file says of its scans.
     pub fn open(bytes: Vec<u8>, room: CloudRoom) -> Result<Self, String> {
         let size = bytes.len() as u64;
         let reader = E57Reader::new(Cursor::new(bytes)).map_err(|why| told(&why))?;
@@ -33,7 +33,7 @@ impl Scans {
         }
         let mut about = About::within(room);
         about.left_out.reference_system = reader.coordinate_metadata().map(str::to_owned);
-        Ok(Self { reader, scans, next: 0, about, size })
+        Ok(Self { reader, size, scans, next: 0, about })
     }
 
     /// How many scans there are.
@@ -55,8 +55,8 @@ impl Scans {
             all => format!("scan {} of {all}: {fault}", self.next),
         };
         let checked = check_size(&scan.prototype, scan.records, self.size);
-        let cloud = checked.and_then(|()| read(&mut self.reader, &scan, &mut self.about));
-        Some(cloud.map_err(place))
+        let read = checked.and_then(|()| read(&mut self.reader, &scan, &mut self.about));
+        Some(read.map_err(place))
     }
 }
 
@@ -75,7 +75,6 @@ fn read(
 ) -> Result<PointCloud, String> {
     let left_out = std::mem::take(&mut about.left_out);
     *about = About { left_out, ..About::within(about.room) };
-    about.room.check(scan.records)?;
     for line in scan.description.iter().flat_map(|text| text.lines()) {
         about.take(line)?;
     }
@@ -96,6 +95,7 @@ fn read(
     check_coordinates(&attributes)?;
     let mut gathered = Gathered::new(about, &attributes, columns.digits)?;
     let points = scan.records;
+    gathered.expect(points)?;
     let broken = |at: usize| format!("it ends after {at} of {points} points, or is damaged");
     for (at, values) in reader.pointcloud_raw(scan).map_err(|why| told(&why))?.enumerate() {
         let values = values.map_err(|_| broken(at))?;
@@ -114,7 +114,7 @@ fn check_size(prototype: &[Record], records: u64, size: u64) -> Result<(), Strin
         RecordDataType::Single { .. } => 32,
         RecordDataType::Double { .. } => 64,
         RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => {
-            u128::BITS - (i128::from(max) - i128::from(min)).max(0).leading_zeros()
+            u128::BITS - (i128::from(max) - i128::from(min)).max(0).unsigned_abs().leading_zeros()
         }
     };
     let bits: u64 = prototype.iter().map(|record| u64::from(bits(record))).sum();
@@ -278,14 +278,6 @@ mod tests {
     use super::*;
     use ::e57::{DateTime, E57Writer, Quaternion, RawValues, Translation};
 
-    fn open(bytes: Vec<u8>) -> Result<Scans, String> {
-        Scans::open(bytes, CloudRoom::default())
-    }
-
-    fn first(bytes: Vec<u8>) -> Result<PointCloud, String> {
-        open(bytes)?.advance().unwrap()
-    }
-
     #[test]
     fn records_that_the_file_cannot_hold_are_refused() {
         let record = |data_type| Record { name: RecordName::CartesianX, data_type };
@@ -293,7 +285,7 @@ mod tests {
         let bit = record(RecordDataType::ScaledInteger { min: 0, max: 1, scale: 1.0, offset: 0.0 });
         let wide = record(RecordDataType::Integer { min: i64::MIN, max: i64::MAX });
         for (prototype, most) in [
-            (vec![same.clone(); 3], 8000),
+            (vec![same.clone(), same.clone(), same.clone()], 8000),
             (vec![same, bit.clone()], 8000),
             (vec![bit, wide.clone(), wide], 8000 / 129),
         ] {
@@ -301,6 +293,10 @@ mod tests {
             let told = check_size(&prototype, most + 1, 1000).unwrap_err();
             assert!(told.contains("which its 1000 bytes cannot hold"), "{told}");
         }
+    }
+
+    fn first(bytes: Vec<u8>) -> Result<PointCloud, String> {
+        Scans::open(bytes, CloudRoom::default())?.advance().unwrap()
     }
 
     /// A file with these scans, each with its records and the values of its points.
@@ -347,7 +343,7 @@ mod tests {
                 vec![[877_455_581, 1, 2].map(RecordValue::ScaledInteger).to_vec()],
             ),
         ]);
-        let mut scans = open(bytes).unwrap();
+        let mut scans = Scans::open(bytes, CloudRoom::default()).unwrap();
         assert_eq!(scans.count(), 2);
         let one = scans.advance().unwrap().unwrap();
         assert_eq!((one.position(0), one.returns()), (far, 2));
@@ -379,7 +375,7 @@ mod tests {
             values
         };
         let points = vec![point(1.0, 0, 0), point(0.0, 2, 0), point(3.0, 1, 0), point(4.0, 0, 1)];
-        let mut scans = open(file(&[(records, points)])).unwrap();
+        let mut scans = Scans::open(file(&[(records, points)]), CloudRoom::default()).unwrap();
         let read = scans.advance().unwrap().unwrap();
         assert_eq!(read.x, [1.0, 4.0]);
         assert!(read.intensity[0] == 0.5 && read.intensity[1].is_nan());
@@ -411,7 +407,7 @@ mod tests {
         let cloud = sample_cloud();
         let objects = ["car <red> & more".to_owned()];
         let bytes = encode(&cloud, &Names { objects: &objects, materials: &[] }).unwrap();
-        let mut scans = open(bytes).unwrap();
+        let mut scans = Scans::open(bytes, CloudRoom::default()).unwrap();
         let read = scans.advance().unwrap().unwrap();
         assert!(scans.advance().is_none() && scans.about().left_out.is_empty());
         assert_eq!((read.scan, read.rows, read.columns, read.pick), (3, 2, 3, cloud.pick));

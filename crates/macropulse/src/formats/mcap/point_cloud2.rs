@@ -205,7 +205,8 @@ fn layout(fields: &[Stored], stride: usize, stamp_ns: f64) -> (Layout, f64) {
         });
         match name {
             "time" | "t" | "time_stamp" => time_from_ns = stamp_ns - epoch_ns,
-            "timestamp" if has("tag") => time_from_ns = -epoch_ns,
+            // A time of day, in ns from Livox and in seconds from others.
+            "timestamp" => time_from_ns = -epoch_ns,
             _ => {}
         }
         layout.place((name, known), kind, offset);
@@ -255,7 +256,8 @@ mod tests {
         let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
         let message = encode(Profile::Velodyne, &cloud).unwrap();
         let mut fields = Decoder::new(&message).unwrap();
-        (fields.u4().unwrap(), fields.u4().unwrap(), fields.text().unwrap());
+        // The stamp and the frame.
+        let _ = (fields.u4().unwrap(), fields.u4().unwrap(), fields.text().unwrap());
         assert_eq!((fields.u4().unwrap(), fields.u4().unwrap()), (3, 2));
         let read = read(Profile::Velodyne, &cloud);
         assert_eq!((read.rows, read.columns), (2, 3));
