@@ -67,13 +67,23 @@ fn add_name(line: &mut String, names: &[String], at: u16) {
     }
 }
 
-/// A name in quotes if it would otherwise end its cell \[RFC4180\].
+/// Signs by which a spreadsheet knows a formula.
+const OF_FORMULAS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+
+/// A name as the text of a cell: in quotes if it would otherwise end its cell \[RFC4180\], and behind an
+/// apostrophe if a spreadsheet would compute it. A number stays as it is.
 pub fn quoted(name: &str) -> Cow<'_, str> {
-    if name.contains([',', '"', '\n', '\r']) {
-        Cow::Owned(format!("\"{}\"", name.replace('"', "\"\"")))
-    } else {
-        Cow::Borrowed(name)
+    let is_formula = name.starts_with(OF_FORMULAS) && name.parse::<f64>().is_err();
+    let name = if is_formula { Cow::Owned(format!("'{name}")) } else { Cow::Borrowed(name) };
+    match name.contains([',', '"', '\n', '\r']) {
+        true => Cow::Owned(format!("\"{}\"", name.replace('"', "\"\""))),
+        false => name,
     }
+}
+
+/// The name that [`quoted`] put behind an apostrophe, or `cell` itself.
+pub(super) fn unquoted(cell: &str) -> &str {
+    cell.strip_prefix('\'').filter(|name| name.starts_with(OF_FORMULAS)).unwrap_or(cell)
 }
 
 #[cfg(test)]
@@ -109,6 +119,23 @@ mod tests {
     fn a_false_return_has_empty_truth() {
         let lines = lines(&sample_cloud(), &Names::default());
         assert!(lines[5].ends_with(",58,58,20,1,1,0,,,,,false"), "{}", lines[5]);
+    }
+
+    #[test]
+    fn spreadsheet_computes_no_name() {
+        for (name, cell) in [
+            ("=1+1", "'=1+1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("-x", "'-x"),
+            ("+x, y", "\"'+x, y\""),
+            ("-1.5", "-1.5"),
+            ("car", "car"),
+            ("'tis", "'tis"),
+        ] {
+            assert_eq!(quoted(name), cell);
+            let inner = cell.trim_matches('"');
+            assert_eq!(unquoted(inner), name);
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
+use super::csv::unquoted;
 use super::headings::Meaning;
 use super::table::{Digits, Gathered, Record, check_coordinates};
 use crate::points::{NO_OBJECT, Outcome, PointCloud};
@@ -234,8 +235,8 @@ fn value(
             let known = Outcome::ALL.into_iter().find(|outcome| outcome.name() == cell);
             known.map(|outcome| f64::from(outcome as u8)).or(number)
         }
-        Attribute::Object => number.or_else(|| numbered(&mut about.objects, cell)),
-        Attribute::Material => number.or_else(|| numbered(&mut about.materials, cell)),
+        Attribute::Object => number.or_else(|| numbered(&mut about.objects, unquoted(cell))),
+        Attribute::Material => number.or_else(|| numbered(&mut about.materials, unquoted(cell))),
         _ => number,
     };
     number.map(Some).ok_or_else(|| format!("`{cell}` is no {}", meaning.attribute.name()))
@@ -265,7 +266,7 @@ mod tests {
     #[test]
     fn what_was_written_is_read() {
         let cloud = sample_cloud();
-        let objects = ["car, red".to_owned(), "the \"road\"".to_owned()];
+        let objects = ["=car,\nred".to_owned(), "the \"road\"".to_owned()];
         let mut bytes = Vec::new();
         csv::write(&cloud, &Names { objects: &objects, materials: &[] }, &mut bytes).unwrap();
         let (read, about) = parse(&bytes).unwrap();

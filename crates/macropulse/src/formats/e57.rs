@@ -40,7 +40,8 @@ pub(super) fn encode(cloud: &PointCloud, names: &Names) -> e57::Result<Vec<u8>> 
     points.set_name(Some(format!("scan {scan}")));
     let lines = [scan_line(cloud), list_line(cloud)].into_iter().chain(stamp_line(cloud));
     let lines = lines.chain(name_lines(names));
-    points.set_description(Some(lines.collect::<Vec<_>>().join("\n")));
+    points.set_description(Some(unclosed(&lines.collect::<Vec<_>>().join("
+"))));
     points.set_transform(Some(transform(&cloud.viewpoint)));
     points.set_acquisition_start(cloud.stamp_ns.map(|stamp| DateTime {
         gps_time: stamp as f64 * 1e-9 - GPS_BEHIND_S,
@@ -55,6 +56,12 @@ pub(super) fn encode(cloud: &PointCloud, names: &Names) -> e57::Result<Vec<u8>> 
     writer.finalize()?;
     drop(writer);
     Ok(file.into_inner())
+}
+
+/// A text that does not end the section of character data (CDATA) that it is written into: where it would,
+/// it goes on in a second one, and readers join both.
+fn unclosed(text: &str) -> String {
+    text.replace("]]>", "]]]]><![CDATA[>")
 }
 
 /// The name of an attribute: that of the standard, or one of our extension.

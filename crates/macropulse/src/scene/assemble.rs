@@ -204,6 +204,10 @@ impl Assembly<'_> {
         let ground = file.ground.as_ref().map(|ground| ("ground", ground.material.span()));
         let mut taken: HashMap<&str, Range<usize>> = ground.into_iter().collect();
         for name in typed.iter().flatten() {
+            if name.get_ref().trim().is_empty() {
+                let message = "an object has an empty name; give it one, or leave `name` out";
+                return Err(self.source.fault(name.span(), message.to_owned()));
+            }
             if let Some(first) = taken.insert(name.get_ref(), name.span()) {
                 let (line, column) = line_column(self.source.text, first.start);
                 let message = format!(

@@ -77,6 +77,9 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         let message = format!("is {}, but this program reads version {VERSION}", file.version);
         return Err(chain.error("version", message));
     }
+    if file.name.trim().is_empty() {
+        return Err(chain.error("name", "is empty; name the sensor, as \"mine\""));
+    }
     let mut faults = Faults::default();
     let Some(parts) = parts(&Check { chain }, &file, &mut faults) else {
         return Err(faults.into_error(chain));
