@@ -186,9 +186,10 @@ pub(super) mod avx512 {
         places: &[u32],
         planes: &mut [u64],
     ) {
-        // SAFETY: the caller answers for it.
         match W {
+            // SAFETY: the caller answers for it.
             NARROW => unsafe { narrow::<W, HIGH, false>(words, first, places, 0, planes) },
+            // SAFETY: as above.
             _ => unsafe { wide::<W, HIGH, false>(words, first, places, 0, planes) },
         }
     }
@@ -204,9 +205,10 @@ pub(super) mod avx512 {
         least: u32,
         enough: &mut [u64],
     ) {
-        // SAFETY: the caller answers for it.
         match W {
+            // SAFETY: the caller answers for it.
             NARROW => unsafe { narrow::<W, HIGH, true>(words, first, places, least, enough) },
+            // SAFETY: as above.
             _ => unsafe { wide::<W, HIGH, true>(words, first, places, least, enough) },
         }
     }

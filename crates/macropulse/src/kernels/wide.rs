@@ -221,6 +221,7 @@ mod x86 {
     /// All bits of each lane in `set`.
     #[inline(always)]
     fn mask(set: u32) -> __m256 {
+        // SAFETY: the processor has the feature, as for every value of this type.
         unsafe {
             let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
             let of_set = _mm256_and_si256(_mm256_set1_epi32(set as i32), lanes);
@@ -262,6 +263,7 @@ mod x86 {
         let [a, b, c, d, e, f, g, h] = halves;
         let (low, high) = (a.with(b).and(c.with(d)), e.with(f).and(g.with(h)));
         let mut greatest = [0.0; SIDE];
+        // SAFETY: the processor has the feature, as for every value of this type.
         unsafe {
             let first = Eight(_mm256_permute2f128_ps::<0x20>(low.0, high.0));
             let last = Eight(_mm256_permute2f128_ps::<0x31>(low.0, high.0));
@@ -282,9 +284,8 @@ mod x86 {
     #[derive(Clone, Copy)]
     pub(in super::super) struct Sixteen(__m512);
 
-    // SAFETY, for each block below: values of these types are made and used only inside
-    // functions that are called after the processor was asked for the feature; loads and stores
-    // stay within an array of as many numbers and ask for no alignment.
+    // Values of these types are made and used only inside functions that are called after the processor was
+    // asked for the feature. Loads and stores ask for no alignment.
 
     const _: () = assert!(SIDE == 8 && LANES == 16);
 
@@ -292,12 +293,14 @@ mod x86 {
         /// Its lanes where all bits of a mask are set, those of the other where none is.
         #[inline(always)]
         fn where_set(self, mask: __m256, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask) })
         }
 
         /// In each half the greater ones of two pairs of lanes, those of the other behind each: halves both.
         #[inline(always)]
         fn with(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             unsafe {
                 let low = Self(_mm256_unpacklo_ps(self.0, other.0));
                 low.most(Self(_mm256_unpackhi_ps(self.0, other.0)))
@@ -307,6 +310,7 @@ mod x86 {
         /// The same of pairs that [`Self::with`] made.
         #[inline(always)]
         fn and(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             unsafe {
                 let (one, other) = (_mm256_castps_pd(self.0), _mm256_castps_pd(other.0));
                 let low = Self(_mm256_castpd_ps(_mm256_unpacklo_pd(one, other)));
@@ -316,6 +320,7 @@ mod x86 {
 
         #[inline(always)]
         fn greatest_lane(self) -> f32 {
+            // SAFETY: the processor has the feature, as for every value of this type.
             unsafe {
                 let four =
                     _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
@@ -328,46 +333,55 @@ mod x86 {
     impl Wide<SIDE> for Eight {
         #[inline(always)]
         fn splat(value: f32) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm256_set1_ps(value) })
         }
 
         #[inline(always)]
         fn load(values: &[f32; SIDE]) -> Self {
+            // SAFETY: the array has as many numbers, and the processor the feature.
             Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
         }
 
         #[inline(always)]
         fn store(self, values: &mut [f32; SIDE]) {
+            // SAFETY: the array has as many numbers, and the processor the feature.
             unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) }
         }
 
         #[inline(always)]
         fn minus(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm256_sub_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn times(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm256_mul_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn least(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm256_min_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn most(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm256_max_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn at_most(self, other: Self) -> u32 {
+            // SAFETY: the processor has the feature, as for every value of this type.
             unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
         }
 
         #[inline(always)]
         fn below(self, other: Self) -> u32 {
+            // SAFETY: the processor has the feature, as for every value of this type.
             unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
         }
     }
@@ -391,12 +405,14 @@ mod x86 {
         #[inline(always)]
         fn load(values: &[f32; LANES]) -> Self {
             let start = values.as_ptr();
+            // SAFETY: the array has as many numbers, and the processor the feature.
             unsafe { Self(Eight(_mm256_loadu_ps(start)), Eight(_mm256_loadu_ps(start.add(SIDE)))) }
         }
 
         #[inline(always)]
         fn store(self, values: &mut [f32; LANES]) {
             let start = values.as_mut_ptr();
+            // SAFETY: the array has as many numbers, and the processor the feature.
             unsafe {
                 _mm256_storeu_ps(start, self.0.0);
                 _mm256_storeu_ps(start.add(SIDE), self.1.0);
@@ -437,6 +453,7 @@ mod x86 {
     impl Halves for Sixteen {
         #[inline(always)]
         fn greatest_of_halves(self, set: u32) -> Eight {
+            // SAFETY: the processor has the feature, as for every value of this type.
             unsafe {
                 let none = _mm512_set1_ps(f32::NEG_INFINITY);
                 let of_set = _mm512_mask_blend_ps(set as u16, none, self.0);
@@ -449,46 +466,55 @@ mod x86 {
     impl Wide<LANES> for Sixteen {
         #[inline(always)]
         fn splat(value: f32) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm512_set1_ps(value) })
         }
 
         #[inline(always)]
         fn load(values: &[f32; LANES]) -> Self {
+            // SAFETY: the array has as many numbers, and the processor the feature.
             Self(unsafe { _mm512_loadu_ps(values.as_ptr()) })
         }
 
         #[inline(always)]
         fn store(self, values: &mut [f32; LANES]) {
+            // SAFETY: the array has as many numbers, and the processor the feature.
             unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) }
         }
 
         #[inline(always)]
         fn minus(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm512_sub_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn times(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm512_mul_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn least(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm512_min_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn most(self, other: Self) -> Self {
+            // SAFETY: the processor has the feature, as for every value of this type.
             Self(unsafe { _mm512_max_ps(self.0, other.0) })
         }
 
         #[inline(always)]
         fn at_most(self, other: Self) -> u32 {
+            // SAFETY: the processor has the feature, as for every value of this type.
             u32::from(unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0) })
         }
 
         #[inline(always)]
         fn below(self, other: Self) -> u32 {
+            // SAFETY: the processor has the feature, as for every value of this type.
             u32::from(unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) })
         }
     }
