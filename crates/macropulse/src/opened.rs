@@ -77,6 +77,46 @@ pub fn stream(path: &Path) -> io::Result<Stream> {
     Ok(Cursor::new(first).chain(file))
 }
 
+/// Whether both paths lead to one file, through whatever links.
+pub fn is_same(one: &Path, other: &Path) -> bool {
+    pipe::is_same(one, other)
+}
+
+/// Whether bytes written to `path` go through it: to a device that takes them one by one, into a pipe, or
+/// to a standard stream.
+pub fn is_written_through(path: &Path) -> bool {
+    stream_number(path).is_some()
+        || std::fs::metadata(path).is_ok_and(|about| pipe::takes_bytes(&about))
+}
+
+/// What bytes written to `path` go through, if it is of that kind.
+///
+/// # Errors
+/// What the system says; or, in a sentence, that nothing reads from the pipe.
+pub(crate) fn written_through(path: &Path) -> io::Result<Option<File>> {
+    match stream_number(path) {
+        Some(number) => pipe::standard_stream(number),
+        None if is_written_through(path) => pipe::read_by_others(path).map(Some),
+        None => Ok(None),
+    }
+}
+
+/// Whether `path` names standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    stream_number(path) == Some(1)
+}
+
+/// The number of the standard output or error that `path` names, as `/dev/stdout` does.
+fn stream_number(path: &Path) -> Option<u8> {
+    let names = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+    let of_errors = ["/dev/stderr", "/dev/fd/2", "/proc/self/fd/2"];
+    match path.to_str()? {
+        name if names.contains(&name) => Some(1),
+        name if of_errors.contains(&name) => Some(2),
+        _ => None,
+    }
+}
+
 fn too_large(most: u64) -> io::Error {
     let most = match most {
         1..1_048_576 => format!("{most} bytes"),
@@ -119,7 +159,9 @@ fn check(about: &Metadata) -> io::Result<()> {
 mod pipe {
     use std::fs::{File, Metadata, OpenOptions};
     use std::io::{self, Read};
-    use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+    use std::path::Path;
     use std::time::{Duration, Instant};
 
     use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -129,6 +171,52 @@ mod pipe {
 
     pub(super) fn is(about: &Metadata) -> bool {
         about.file_type().is_fifo()
+    }
+
+    pub(super) fn takes_bytes(about: &Metadata) -> bool {
+        let kind = about.file_type();
+        kind.is_fifo() || kind.is_char_device()
+    }
+
+    pub(super) fn is_same(one: &Path, other: &Path) -> bool {
+        let inode = |path: &Path| std::fs::metadata(path).map(|about| (about.dev(), about.ino()));
+        matches!((inode(one), inode(other)), (Ok(one), Ok(other)) if one == other)
+    }
+
+    /// The stream itself and not what opens it anew, so that bytes go behind those of others.
+    pub(super) fn standard_stream(number: u8) -> io::Result<Option<File>> {
+        let stream = match number {
+            1 => io::stdout().as_fd().try_clone_to_owned(),
+            _ => io::stderr().as_fd().try_clone_to_owned(),
+        };
+        stream.map(File::from).map(Some)
+    }
+
+    /// A device, or a pipe once a program reads from it.
+    pub(super) fn read_by_others(path: &Path) -> io::Result<File> {
+        let began = Instant::now();
+        let mut options = OpenOptions::new();
+        options.write(true);
+        without_waiting(&mut options);
+        let unread = rustix::io::Errno::NXIO.raw_os_error();
+        loop {
+            match options.open(path) {
+                Ok(file) => {
+                    fcntl_setfl(&file, fcntl_getfl(&file)? - OFlags::NONBLOCK)?;
+                    return Ok(file);
+                }
+                Err(error) if error.raw_os_error() != Some(unread) => return Err(error),
+                Err(_) if began.elapsed() < PATIENCE => {
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+                Err(_) => {
+                    return Err(io::Error::new(
+                        io::ErrorKind::InvalidInput,
+                        "it is a pipe, and nothing reads from it: first start what does, or name a file",
+                    ));
+                }
+            }
+        }
     }
 
     pub(super) fn without_waiting(options: &mut OpenOptions) {
@@ -166,9 +254,26 @@ mod pipe {
 mod pipe {
     use std::fs::{File, Metadata, OpenOptions};
     use std::io;
+    use std::path::Path;
 
     pub(super) fn is(_: &Metadata) -> bool {
         false
+    }
+
+    pub(super) fn takes_bytes(_: &Metadata) -> bool {
+        false
+    }
+
+    pub(super) fn is_same(one: &Path, other: &Path) -> bool {
+        matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
+    }
+
+    pub(super) fn standard_stream(_: u8) -> io::Result<Option<File>> {
+        Ok(None)
+    }
+
+    pub(super) fn read_by_others(path: &Path) -> io::Result<File> {
+        OpenOptions::new().write(true).open(path)
     }
 
     pub(super) fn without_waiting(_: &mut OpenOptions) {}

@@ -5,6 +5,7 @@ use super::table::Table;
 use super::theme;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use macropulse::formats::GENERATOR;
 
 /// A picture or chart with a caption.
 #[derive(Debug, Clone, PartialEq)]
@@ -219,7 +220,7 @@ impl Page {
     pub fn html(&self) -> String {
         let mut html = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n{GENERATOR}\n\
              <title>{}</title>\n<style>\n{}\n</style>\n</head>\n<body>\n",
             escape(&self.title),
             theme::style()

@@ -68,6 +68,8 @@ pub enum State {
     Finished,
     /// Stopped by whoever started it: what it names is whole, and the rest was not begun.
     Stopped,
+    /// Ended by an error: what it names is whole.
+    Failed,
 }
 
 /// When a scan began, and where the sensor was then.

@@ -26,6 +26,7 @@ mod manifest;
 mod mcap;
 mod npy;
 mod number;
+mod own;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pcd;
@@ -37,7 +38,7 @@ mod recording;
 mod room;
 mod table;
 
-pub use atomic::{WholeFile, clear_unfinished, write_atomically};
+pub use atomic::{WholeFile, clear_unfinished, prove_writable, write_atomically, write_named};
 pub use clouds::{Clouds, Reading, read_cloud, read_pcd};
 pub use contained::is_contained;
 pub use csv::quoted;
@@ -48,6 +49,7 @@ pub use manifest::{
     Begun, Entries, Manifest, Named, SCHEMA_VERSION, State, Surroundings, versioned, write_manifest,
 };
 pub use mcap::{Message, Profile};
+pub use own::{GENERATOR, Own, is_of_scan};
 pub use png16::{RangeImage, read_range_png};
 pub use recording::Recording;
 pub use room::CloudRoom;
@@ -65,7 +67,7 @@ pub struct Names<'a> {
     pub materials: &'a [String],
 }
 
-/// Writes `cloud` to `path`. Truth is written when the cloud has it and the format can hold it. A
+/// Writes `cloud` to `path`, as [`write_named`] does. Truth is written when the cloud has it and the format can hold it. A
 /// format with all scans of a run in one file has this one alone; see [`Recording`].
 ///
 /// # Errors
@@ -78,7 +80,16 @@ pub fn write_cloud(
     path: &Path,
 ) -> Result<(), Error> {
     attributes::check_even(cloud)?;
-    write_atomically(path, |out| match format {
+    write_named(path, |out| write_even(format, (cloud, names), out))
+}
+
+/// Writes a cloud whose columns are even.
+fn write_even(
+    format: Format,
+    (cloud, names): (&PointCloud, &Names),
+    out: &mut dyn std::io::Write,
+) -> std::io::Result<()> {
+    match format {
         Format::Pcd => pcd::write(cloud, names, out),
         Format::Ply => ply::write(cloud, names, ply::Called::AsTheyAre, out),
         Format::PlyCloudCompare => ply::write(cloud, names, ply::Called::Scalars, out),
@@ -93,7 +104,7 @@ pub fn write_cloud(
         Format::Mcap(message) => mcap::write(message, cloud, names, out),
         Format::Png => png16::write(cloud, out),
         Format::RangeNpy => npy::write_range(cloud, out),
-    })
+    }
 }
 
 /// Writes the returns of `cloud` as lines of [`Format::Csv`], for a stream of parts of which only the

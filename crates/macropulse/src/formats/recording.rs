@@ -1,8 +1,9 @@
 //! The files of a run, written scan by scan.
 
 use super::mcap::Recording as Messages;
-use super::{Error, Format, Names, attributes, write_cloud};
+use super::{Error, Format, Names, attributes, write_atomically, write_even, write_named};
 use crate::points::PointCloud;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The files of a run in one folder: those with a scan each, which appear as a whole, and those with
@@ -11,18 +12,31 @@ pub struct Recording {
     folder: PathBuf,
     formats: Vec<Format>,
     open: Vec<(Format, Messages)>,
+    /// Whether a user typed the names of the files.
+    is_named: bool,
 }
 
 impl Recording {
     /// A run that is to be written to `folder` in `formats`. Nothing is written yet.
     pub fn new(folder: &Path, formats: &[Format]) -> Self {
-        Self { folder: folder.to_owned(), formats: formats.to_vec(), open: Vec::new() }
+        Self {
+            folder: folder.to_owned(),
+            formats: formats.to_vec(),
+            open: Vec::new(),
+            is_named: false,
+        }
+    }
+
+    /// The same, with names that a user typed: links are followed, and devices and pipes are written
+    /// into, as by [`write_named`].
+    pub fn named(self) -> Self {
+        Self { is_named: true, ..self }
     }
 
     /// Writes a scan in all formats, and gives the formats and names of the files that are new.
     ///
     /// # Errors
-    /// As [`write_cloud`]; files written before stay.
+    /// As [`write_cloud`](super::write_cloud); files written before stay.
     pub fn add(
         &mut self,
         cloud: &PointCloud,
@@ -35,7 +49,7 @@ impl Recording {
     /// into one file, the first name counts.
     ///
     /// # Errors
-    /// As [`write_cloud`]; files written before stay.
+    /// As [`write_cloud`](super::write_cloud); files written before stay.
     pub fn add_as<N: AsRef<Path>>(
         &mut self,
         cloud: &PointCloud,
@@ -48,14 +62,18 @@ impl Recording {
             let file = name(format);
             let path = self.folder.join(&file);
             let Format::Mcap(message) = format else {
-                write_cloud(format, cloud, names, &path)?;
+                let write = |out: &mut dyn Write| write_even(format, (cloud, names), out);
+                match self.is_named {
+                    true => write_named(&path, write),
+                    false => write_atomically(&path, write),
+                }?;
                 files.push((format, file));
                 continue;
             };
             let at = self.open.iter().position(|(open, _)| *open == format);
             let at = at.unwrap_or(self.open.len());
             if at == self.open.len() {
-                self.open.push((format, Messages::begin(message, &path)?));
+                self.open.push((format, Messages::begin(message, &path, self.is_named)?));
                 files.push((format, file));
             }
             self.open[at].1.add(cloud, names)?;

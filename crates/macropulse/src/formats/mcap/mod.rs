@@ -19,6 +19,7 @@ pub(super) use profile::holding as profile_holding;
 pub(super) use reader::Messages;
 
 use super::about::{list_line, name_lines};
+use super::atomic::{growing, growing_named};
 use super::{Error, Names};
 use crate::points::PointCloud;
 use ::mcap::records::{MessageHeader, Metadata};
@@ -181,9 +182,10 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Begins the file at `path`, in place of an older one.
-    pub fn begin(message: Message, path: &Path) -> Result<Self, Error> {
-        let file = File::create(path).map_err(|cause| Error::write(path, cause))?;
+    /// Begins the file at `path`, in place of an older one; `is_named` says that a user typed its name.
+    pub fn begin(message: Message, path: &Path, is_named: bool) -> Result<Self, Error> {
+        let file = if is_named { growing_named(path) } else { growing(path) };
+        let file = file.map_err(|cause| Error::write(path, cause))?;
         let recorder = Recorder::begin(message, BufWriter::with_capacity(1 << 16, file))
             .map_err(|error| Error::write(path, cause(error)))?;
         Ok(Self { recorder, path: path.to_owned() })
