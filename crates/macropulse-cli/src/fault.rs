@@ -11,6 +11,7 @@ use macropulse_study::text::broken;
 use macropulse_study::{decoding, designs, paper, record, sweep, validate};
 
 use crate::options::Common;
+use crate::text::{harmless, say};
 
 /// Why a command did not do what was asked.
 #[derive(Debug)]
@@ -92,19 +93,14 @@ fn tell(sentence: &str, colour: AnsiColor) {
     let rest = text.strip_prefix("macropulse:").unwrap_or(&text);
     let name = colour.on_default().bold();
     // Without colour where stderr is no terminal, or NO_COLOR is set.
-    anstream::eprintln!("{name}macropulse:{name:#}{rest}");
+    say(&format!("{name}macropulse:{name:#}{rest}"));
 }
 
 /// What is repeated of a name or a file may have lines, and signs that a terminal would obey.
 fn one_line(text: &str) -> String {
-    let harmless = |sign: char| match sign {
-        '\t' => ' ',
-        sign if sign.is_control() => char::REPLACEMENT_CHARACTER,
-        sign => sign,
-    };
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let text: String = lines.collect::<Vec<_>>().join(" ").chars().map(harmless).collect();
-    clipped(text)
+    let text = lines.collect::<Vec<_>>().join(" ").replace('\t', " ");
+    clipped(harmless(&text, |_| char::REPLACEMENT_CHARACTER.to_string()))
 }
 
 /// Most letters of a sentence, at its beginning and at its end: a word of a file may have millions.
@@ -131,7 +127,7 @@ pub fn usage(error: &clap::Error) -> Result<(), Fault> {
             Ok(())
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            eprint!("{}", error.render());
+            say(error.render().to_string().trim_end());
             Err(Fault::Told)
         }
         kind => {

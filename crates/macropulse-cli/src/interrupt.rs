@@ -17,11 +17,12 @@ static WRITING: Mutex<()> = Mutex::new(());
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Takes Ctrl-C over. The second one ends the program at once, but not within a file.
+    /// Takes Ctrl-C over. The second one ends the program at once, but not within a file. A signal that
+    /// whoever started the program wants ignored, as `nohup` does, stays ignored.
     pub fn listen() -> Result<Self, Fault> {
         let raised = Arc::new(AtomicBool::new(false));
         let seen = Self(raised.clone());
-        ctrlc::set_handler(move || {
+        signals::heed(move || {
             if raised.swap(true, Ordering::SeqCst) {
                 let _whole = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
                 std::process::exit(i32::from(EXIT_CODE));
@@ -41,5 +42,60 @@ impl Interrupt {
     pub fn undisturbed<T>(&self, work: impl FnOnce() -> T) -> T {
         let _whole = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         work()
+    }
+}
+
+/// Makes a file that passes the limit of the shell (`ulimit -f`) an error of its write, where it would end
+/// the program without a word.
+pub fn outlast_limits() -> Result<(), Fault> {
+    signals::outlast_limits()
+        .map_err(|error| Fault::Ours(format!("cannot listen for signals: {error}")))
+}
+
+#[cfg(unix)]
+mod signals {
+    use std::io;
+    use std::sync::Arc;
+
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::flag;
+    use signal_hook::iterator::Signals;
+
+    /// Calls `act` at every signal that asks the program to end, and is not ignored.
+    pub(super) fn heed(act: impl Fn() + Send + 'static) -> io::Result<()> {
+        let ignored = ignored();
+        let asked = [SIGINT, SIGTERM, SIGHUP];
+        let mut signals = Signals::new(asked.iter().filter(|signal| !has(ignored, **signal)))?;
+        std::thread::Builder::new().spawn(move || signals.forever().for_each(|_| act()))?;
+        Ok(())
+    }
+
+    pub(super) fn outlast_limits() -> io::Result<()> {
+        flag::register(SIGXFSZ, Arc::default()).map(|_| ())
+    }
+
+    /// The signals that are ignored, a bit for each; none where the system does not say so in a file.
+    fn ignored() -> u64 {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+    }
+
+    /// Whether `mask` has the bit of a signal.
+    fn has(mask: u64, signal: i32) -> bool {
+        mask & (1 << (signal - 1)) != 0
+    }
+}
+
+#[cfg(not(unix))]
+mod signals {
+    use std::io;
+
+    pub(super) fn heed(act: impl Fn() + Send + 'static) -> io::Result<()> {
+        ctrlc::set_handler(act).map_err(io::Error::other)
+    }
+
+    pub(super) fn outlast_limits() -> io::Result<()> {
+        Ok(())
     }
 }

@@ -1,5 +1,7 @@
 //! The command line of Macropulse: one file per subcommand.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod budget;
 mod check;
 mod codes;
@@ -90,7 +92,8 @@ fn main() -> ExitCode {
     let parsed = command.try_get_matches().and_then(|typed| Options::from_arg_matches(&typed));
     let done = match parsed {
         Ok(options) => {
-            kernels().and_then(|()| options.common.use_threads()).and_then(|()| run(&options))
+            let ready = interrupt::outlast_limits().and_then(|()| kernels());
+            ready.and_then(|()| options.common.use_threads()).and_then(|()| run(&options))
         }
         Err(usage) => fault::usage(&usage),
     };

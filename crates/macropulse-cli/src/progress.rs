@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::options::{Common, ProgressKind};
-use crate::text::{NO_BREAK, grouped};
+use crate::text::{NO_BREAK, grouped, harmless, say};
 
 /// Least time between two plain lines or JSON objects.
 const PAUSE: Duration = Duration::from_secs(5);
@@ -33,6 +33,7 @@ enum Face {
 impl Progress {
     /// The progress of `total` shots of what is called `name`.
     pub fn of(common: &Common, name: &str, total: u64) -> Self {
+        let name = &harmless(name, |_| char::REPLACEMENT_CHARACTER.to_string()).replace('\n', " ");
         let face = match common.progress {
             ProgressKind::Json => Face::Json,
             ProgressKind::None => Face::Nothing,
@@ -88,14 +89,11 @@ impl Progress {
                 "event": event, "name": self.name, "shots": done, "shots_total": self.total,
                 "elapsed_s": elapsed, "shots_per_s": rate, "left_s": left,
             });
-            eprintln!("{line}");
+            say(&line.to_string());
         } else {
-            eprintln!(
-                "{}: {:.0} %, {} shots/s, {left:.0} s left",
-                self.name,
-                100.0 * done as f64 / self.total.max(1) as f64,
-                spaced(rate),
-            );
+            let percent = 100.0 * done as f64 / self.total.max(1) as f64;
+            let rate = spaced(rate);
+            say(&format!("{}: {percent:.0} %, {rate} shots/s, {left:.0} s left", self.name));
         }
     }
 }

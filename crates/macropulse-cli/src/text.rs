@@ -1,4 +1,5 @@
-//! What is printed: to stdout, with counts and durations one can read.
+//! What is printed: to stdout, with counts and durations one can read, and to stderr. Nothing else in the
+//! program writes to either.
 
 use std::io::{ErrorKind, Write};
 
@@ -7,18 +8,50 @@ pub use macropulse_study::text::{Columns, NO_BREAK, grouped, section, short};
 
 use crate::fault::Fault;
 
-/// Writes to stdout. A reader who has seen enough (`| head`) is no fault.
+/// Writes to stdout, without signs that a terminal would obey. A reader who has seen enough (`| head`) is no
+/// fault.
 pub fn print(text: &str) -> Result<(), Fault> {
-    print_bytes(text.as_bytes())
+    print_bytes(harmless(text, |_| char::REPLACEMENT_CHARACTER.to_string()).as_bytes())
 }
 
 /// As [`print`], what is no text.
 pub fn print_bytes(bytes: &[u8]) -> Result<(), Fault> {
+    pour(bytes).map(|_| ())
+}
+
+/// As [`print_bytes`]; `false` once the reader has seen enough.
+pub fn pour(bytes: &[u8]) -> Result<bool, Fault> {
     let mut out = std::io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Fault::unprinted(&error)),
-        _ => Ok(()),
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(Fault::unprinted(&error)),
     }
+}
+
+/// Writes a line to stderr, in colour where that is a terminal that wants it. It may be closed or full:
+/// what is said there is not what was asked for, and its loss ends no run.
+pub fn say(line: &str) {
+    let _ = writeln!(anstream::stderr(), "{line}");
+}
+
+/// A text in which every sign that a terminal would obey is `replaced`: control characters, and those that
+/// turn the direction of what follows them.
+pub fn harmless(text: &str, replaced: impl Fn(char) -> String) -> String {
+    let is_obeyed = |sign: char| match sign {
+        '\n' | '\t' => false,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' => true,
+        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
+        sign => sign.is_control(),
+    };
+    let mut harmless = String::with_capacity(text.len());
+    for sign in text.chars() {
+        match is_obeyed(sign) {
+            true => harmless += &replaced(sign),
+            false => harmless.push(sign),
+        }
+    }
+    harmless
 }
 
 /// Writes JSON to stdout, each object with the version of its keys: the only one as itself, several
@@ -26,7 +59,9 @@ pub fn print_bytes(bytes: &[u8]) -> Result<(), Fault> {
 pub fn print_json(values: Vec<serde_json::Value>) -> Result<(), Fault> {
     let mut values: Vec<_> = values.into_iter().map(versioned).collect();
     let value = if values.len() == 1 { values.remove(0) } else { values.into() };
-    print(&format!("{value:#}\n"))
+    // As JSON spells them, so that a program reads the same text.
+    let text = harmless(&format!("{value:#}\n"), |sign| format!("\\u{:04x}", u32::from(sign)));
+    print_bytes(text.as_bytes())
 }
 
 /// The text of a ready file to start from: its first line names a schema beside it, which is not
@@ -76,6 +111,17 @@ mod tests {
     fn a_schema_is_not_named_where_it_is_not() {
         assert_eq!(to_start_from("#:schema ../s.json\n# A wall.\n"), "# A wall.\n");
         assert_eq!(to_start_from("# A wall.\na = 1\n"), "# A wall.\na = 1\n");
+    }
+
+    #[test]
+    fn terminal_obeys_nothing_and_json_keeps_its_text() {
+        let text = "a\u{1b}[31m\u{202e}b\u{9b}\tc\nd\u{2069}";
+        let seen = harmless(text, |_| "?".to_owned());
+        assert_eq!(seen, "a?[31m?b?\tc\nd?");
+        let json = serde_json::Value::from(text).to_string();
+        let told = harmless(&json, |sign| format!("\\u{:04x}", u32::from(sign)));
+        assert_eq!(serde_json::from_str::<String>(&told).unwrap(), text);
+        assert!(told.is_ascii(), "{told}");
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //! * [`level`]: which instructions the wide loops use; [`steps`]: two of these loops by themselves.
 
 #![cfg_attr(test, allow(missing_docs))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod code;
 pub mod decode;

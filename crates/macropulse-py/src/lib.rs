@@ -4,6 +4,8 @@
 //! Python sees of the library, and how its columns become arrays, errors exceptions, and Ctrl-C an
 //! end.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod codes;
 mod columns;
 mod error;

@@ -2,6 +2,7 @@
 //! link budgets, and the pictures, charts and pages that show them.
 
 #![cfg_attr(test, allow(missing_docs))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod budget;
 pub mod codes;

@@ -19,6 +19,7 @@
 //! The modules in the order in which light travels:
 
 #![cfg_attr(test, allow(missing_docs))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod environment;
 pub mod design;
