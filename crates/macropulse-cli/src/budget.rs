@@ -10,10 +10,13 @@ use macropulse::predict::verdict::Wanted;
 use macropulse_study::budget::{Figures, USUAL_FALSE_POINTS, USUAL_PD, USUAL_REFLECTANCE, usual};
 
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::options::{Changes, Common, Surroundings};
 use crate::text::{print, print_json};
 use crate::{completions, input};
+
+/// Name of the page.
+const PAGE: &str = "budget.html";
 
 /// Work out the link budget of a sensor: photons, Pd, false points, precision, eye safety
 ///
@@ -86,10 +89,10 @@ pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
     };
     let figures = Figures::of(&design, environment, wanted)?;
     if let Some(output) = &options.output {
-        let mut folder = Folder::claim(output)?;
+        let mut folder = Folder::claim(output, Outputs::named([PAGE]))?;
         folder.make()?;
         let html = figures.page().html();
-        write_atomically(&folder.path().join("budget.html"), |out| out.write_all(html.as_bytes()))?;
+        write_atomically(&folder.path().join(PAGE), |out| out.write_all(html.as_bytes()))?;
         folder.keep();
     }
     if options.json {
@@ -100,9 +103,7 @@ pub fn run(options: &Budget, common: &Common) -> Result<(), Fault> {
     }
     print(&figures.text())?;
     match &options.output {
-        Some(output) => {
-            print(&format!("\n  curves      {}\n", output.join("budget.html").display()))
-        }
+        Some(output) => print(&format!("\n  curves      {}\n", output.join(PAGE).display())),
         None => Ok(()),
     }
 }

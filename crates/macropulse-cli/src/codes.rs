@@ -12,7 +12,7 @@ use macropulse_study::codes::{USERS, told};
 use serde_json::json;
 
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::options::Common;
 use crate::text::{print, print_json};
 
@@ -55,7 +55,10 @@ pub fn run(options: &Codes, common: &Common) -> Result<(), Fault> {
     // All of them are read before the first is compared.
     let families = texts.iter().map(|text| family_from_toml(text));
     let families = families.collect::<Result<Vec<_>, _>>()?;
-    let mut folder = options.output.as_deref().map(Folder::claim).transpose()?;
+    let names: Vec<String> = families.iter().map(|family| family.to_string()).collect();
+    let outputs = || Outputs::named(pictures::files(names.iter().map(String::as_str)));
+    let folder = options.output.as_deref().map(|path| Folder::claim(path, outputs()));
+    let mut folder = folder.transpose()?;
     let compared: Vec<Comparison> = families.into_iter().map(Comparison::of).collect();
     if let Some(folder) = &mut folder {
         folder.make()?;

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use macropulse::formats::{Clouds, Format, Reading, Recording};
+use macropulse::opened::{is_standard_output, is_written_through};
 use macropulse::points::PointCloud;
 
 use crate::fault::{Fault, note, warn};
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs, check_file};
 use crate::interrupt::Interrupt;
 use crate::memory::MemoryLimit;
 use crate::options::Common;
@@ -49,6 +50,10 @@ pub struct Convert {
     /// Of MCAP files, read the clouds of this topic alone [default: those of all topics]
     #[arg(long, value_name = "TOPIC")]
     topic: Option<String>,
+
+    /// Replace files in the folder OUT that are not known to be written by macropulse
+    #[arg(long)]
+    replace: bool,
 }
 
 /// Where the clouds go.
@@ -81,6 +86,12 @@ impl Convert {
                 )));
             }
             (Some(formats), _) => formats.0.clone(),
+            (None, None) if is_written_through(output) => {
+                return Err(Fault::Wrong(format!(
+                    "{}: says no format; say it, as --format ply",
+                    output.display()
+                )));
+            }
             (None, Some(format)) => vec![format],
             (None, None)
                 if output.is_dir() || output.as_os_str().to_string_lossy().ends_with('/') =>
@@ -99,7 +110,9 @@ impl Convert {
             }
         };
         let is_file = match formats.as_slice() {
-            [format] => ending == Some(format.extension()) && !output.is_dir(),
+            [format] => {
+                ending == Some(format.extension()) && !output.is_dir() || is_written_through(output)
+            }
             _ => false,
         };
         let name = output.file_name().filter(|_| is_file);
@@ -119,7 +132,9 @@ impl Target {
                 "{folder}: is a folder; name the files in it, as {folder}/scan-000000.pcd"
             )));
         }
-        let Some(file) = &self.file else {
+        if let Some(file) = &self.file {
+            check_file(&self.folder.join(file), inputs)?;
+        } else {
             for (at, input) in inputs.iter().enumerate() {
                 let is_same = |other: &&PathBuf| other.file_stem() == input.file_stem();
                 if let Some(other) = inputs[..at].iter().find(is_same) {
@@ -130,18 +145,26 @@ impl Target {
                     )));
                 }
             }
-            return Ok(());
-        };
-        let output = std::fs::canonicalize(self.folder.join(file)).ok();
-        let is_output = |input: &&PathBuf| output.is_some() && input.canonicalize().ok() == output;
-        match inputs.iter().find(is_output) {
-            Some(input) => {
-                let input = input.display();
-                let sentence = format!("{input}: is to be read and written; choose another name");
-                Err(Fault::Wrong(sentence))
-            }
-            None => Ok(()),
         }
+        Ok(())
+    }
+
+    /// The files whose names are derived from those of the `inputs`.
+    fn outputs(&self, inputs: &[PathBuf]) -> Outputs {
+        let (mut plain, mut numbered) = (Vec::new(), Vec::new());
+        for input in inputs.iter().filter(|_| self.file.is_none()) {
+            for format in &self.formats {
+                plain.push(self.name(*format, input, None));
+                if may_have_several(input) {
+                    numbered.push(self.name(*format, input, Some(0)));
+                }
+            }
+        }
+        let is_written = move |path: &Path| {
+            let name = path.as_os_str();
+            plain.iter().any(|one| one == name) || numbered.contains(&of_first_scan(name))
+        };
+        Outputs::of(is_written).beside(inputs)
     }
 
     /// Whether it takes several scans.
@@ -165,11 +188,30 @@ impl Target {
     }
 }
 
+/// Whether a file may hold several clouds, whose files are then numbered.
+fn may_have_several(input: &Path) -> bool {
+    input.extension().is_some_and(|ending| ending == "mcap" || ending == "e57")
+}
+
+/// The name of a file with the number of its scan, if it has one, as that of the first.
+fn of_first_scan(name: &OsStr) -> OsString {
+    let is_digits = |text: &str| text.len() >= 6 && text.bytes().all(|byte| byte.is_ascii_digit());
+    let Some(text) = name.to_str() else { return name.to_owned() };
+    let mut parts: Vec<&str> = text.split_inclusive(['-', '.']).collect();
+    if let Some(number) =
+        parts.iter_mut().rev().find(|part| is_digits(part.trim_end_matches(['-', '.'])))
+    {
+        *number = if number.ends_with('-') { "000000-" } else { "000000." };
+    }
+    parts.concat().into()
+}
+
 /// A conversion under way.
 struct Conversion<'a> {
     target: &'a Target,
     common: &'a Common,
-    folder: Folder,
+    /// None where the one file is a device, a pipe or a standard stream.
+    folder: Option<Folder>,
     recording: Recording,
     reading: Reading,
     /// Number of the scan that comes next at least, where they go into one file.
@@ -186,11 +228,14 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
     let target = options.target()?;
     target.check(&options.inputs)?;
     let interrupt = Interrupt::listen()?;
+    let is_stream = target.file.is_some() && is_written_through(&options.output);
+    let outputs = target.outputs(&options.inputs).replacing(options.replace);
+    let recording = Recording::new(&target.folder, &target.formats);
     let mut conversion = Conversion {
         target: &target,
         common,
-        folder: Folder::claim(&target.folder)?,
-        recording: Recording::new(&target.folder, &target.formats),
+        folder: if is_stream { None } else { Some(Folder::claim(&target.folder, outputs)?) },
+        recording: if target.file.is_some() { recording.named() } else { recording },
         reading: Reading { room: options.memory.cloud_room(), topic: options.topic.clone() },
         next: 0,
         written: BTreeSet::new(),
@@ -221,7 +266,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
     if points == 0 {
         warn("not a single point: there is none in what was read");
     }
-    if !common.quiet {
+    if !common.quiet && !is_standard_output(&options.output) {
         let (scans, points) = (counted(scans, "scan"), counted(points, "point"));
         let files = counted(files, "file");
         let output = options.output.display();
@@ -269,7 +314,7 @@ impl Conversion<'_> {
     ) -> Result<(), Fault> {
         let names = clouds.names();
         if self.scans == 0 {
-            self.folder.make()?;
+            self.folder.as_mut().map_or(Ok(()), Folder::make)?;
         }
         for format in &self.target.formats {
             let left_out = format.leaves_out(&cloud, &names);
@@ -294,7 +339,7 @@ impl Conversion<'_> {
             }
         }
         self.files += self.recording.add_as(&cloud, &names, name)?.len() as u64;
-        self.folder.keep();
+        self.folder.iter_mut().for_each(Folder::keep);
         self.scans += 1;
         self.points += cloud.returns() as u64;
         Ok(())

@@ -7,7 +7,7 @@ use macropulse::sim::Watch;
 use macropulse_study::designs::{PAGE, Requirements, Search, make_room};
 
 use crate::fault::{Fault, warn};
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
@@ -44,7 +44,8 @@ pub struct Design {
 
 pub fn run(options: &Design, common: &Common) -> Result<(), Fault> {
     let required = Requirements::open(&options.requirements)?;
-    let mut folder = Folder::claim_alone(&options.output)?;
+    // The search itself knows which results it has written, and replaces no others.
+    let mut folder = Folder::claim_alone(&options.output, Outputs::named::<&str>([]))?;
     let interrupt = Interrupt::listen()?;
     folder.make()?;
     // What is counted stays there for the next time, however this one ends.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::text::print;
 
 /// Write the manual pages, one for the program and one for each command
@@ -36,11 +36,13 @@ pub fn run(options: &Man, mut program: clap::Command) -> Result<(), Fault> {
         return print(&String::from_utf8_lossy(&rendered(page)?));
     }
     let Some(output) = &options.output else { return Ok(()) };
-    let mut folder = Folder::claim(output)?;
+    let name =
+        |page: &clap::Command| format!("{}.1", page.get_display_name().unwrap_or(page.get_name()));
+    let pages: Vec<_> = std::iter::once(&program).chain(program.get_subcommands()).collect();
+    let mut folder = Folder::claim(output, Outputs::named(pages.iter().map(|page| name(page))))?;
     folder.make()?;
-    for page in std::iter::once(&program).chain(program.get_subcommands()) {
-        let name = page.get_display_name().unwrap_or(page.get_name());
-        let path = folder.path().join(format!("{name}.1"));
+    for page in pages {
+        let path = folder.path().join(name(page));
         let text = rendered(page)?;
         macropulse::formats::write_atomically(&path, |out| out.write_all(&text))?;
     }

@@ -1,14 +1,16 @@
 //! `macropulse paper`: the whole experiment of \[KP16\].
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use macropulse::formats::is_of_scan;
 use macropulse::sim::Watch;
 use macropulse_study::paper::{self, Findings, Verdict};
+use macropulse_study::record::{MANIFEST, PAGE};
 use serde_json::json;
 
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
@@ -34,7 +36,7 @@ pub struct Paper {
 }
 
 pub fn run(options: &Paper, common: &Common) -> Result<(), Fault> {
-    let mut folder = Folder::claim_alone(&options.output)?;
+    let mut folder = Folder::claim_alone(&options.output, outputs())?;
     let interrupt = Interrupt::listen()?;
     folder.make()?;
     let progress = Progress::of(common, "paper", paper::shots()?);
@@ -49,6 +51,21 @@ pub fn run(options: &Paper, common: &Common) -> Result<(), Fault> {
         print(&format!("\nopen {}\n", folder.path().join("index.html").display()))?;
     }
     Ok(())
+}
+
+/// The report and its tables, and the files of a run in the folder of each trial.
+fn outputs() -> Outputs {
+    let folders = paper::folders();
+    let known = folders.clone();
+    let is_written = move |path: &Path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let parent = path.parent().unwrap_or(Path::new(""));
+        match known.iter().any(|folder| Path::new(folder) == parent) {
+            true => is_of_scan(&name) || name == MANIFEST || name == PAGE,
+            false => paper::FILES.iter().any(|file| Path::new(file) == path),
+        }
+    };
+    Outputs::of(is_written).within(folders)
 }
 
 fn json(findings: &Findings) -> serde_json::Value {

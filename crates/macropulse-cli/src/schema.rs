@@ -51,7 +51,7 @@ pub fn run(options: &Schema) -> Result<(), Fault> {
         None => print(&text),
         Some(path) if path == Path::new(STREAM) => print(&text),
         Some(path) => {
-            Ok(macropulse::formats::write_atomically(path, |out| out.write_all(text.as_bytes()))?)
+            Ok(macropulse::formats::write_named(path, |out| out.write_all(text.as_bytes()))?)
         }
     }
 }

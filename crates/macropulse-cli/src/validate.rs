@@ -7,7 +7,7 @@ use macropulse::sim::Watch;
 use macropulse_study::validate::{self, Findings, SENSORS};
 
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::text::{Columns, print, print_json};
@@ -34,7 +34,9 @@ pub struct Validate {
 }
 
 pub fn run(options: &Validate, common: &Common) -> Result<(), Fault> {
-    let mut folder = options.output.as_deref().map(Folder::claim).transpose()?;
+    let folder =
+        options.output.as_deref().map(|path| Folder::claim(path, Outputs::named(validate::FILES)));
+    let mut folder = folder.transpose()?;
     let interrupt = Interrupt::listen()?;
     let watch = Watch { done: &|_| {}, stop: &|| interrupt.is_raised() };
     let findings = validate::run(options.seed, &watch)?;

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use macropulse::design::preset_text;
-use macropulse::formats::{Clouds, Reading, clear_unfinished, write_atomically};
+use macropulse::formats::{Clouds, Reading, clear_unfinished, write_atomically, write_named};
+use macropulse::opened;
 use macropulse::scene::Scene;
 use macropulse_study::record::{self, Left, PAGE, describe, explain};
 use macropulse_study::view::Explorer;
@@ -12,6 +13,7 @@ use serde_json::Value;
 
 use crate::convert::say_left_out;
 use crate::fault::{Fault, note};
+use crate::folder::{Outputs, check_file};
 use crate::memory::MemoryLimit;
 use crate::options::Common;
 use crate::text::print;
@@ -69,28 +71,56 @@ pub fn run(options: &View, common: &Common) -> Result<(), Fault> {
     let room = options.memory.cloud_room();
     let reader = Reader { reading: Reading { room, topic: options.topic.clone() }, common };
     refuse_name(path)?;
-    let (page, output) = if path.is_dir() {
-        let output = options.output.clone().unwrap_or_else(|| path.join(PAGE));
-        (of_folder((path, &output), &reader)?, output)
-    } else {
-        let output = options.output.clone().unwrap_or_else(|| path.with_extension("html"));
-        (of_file((path, &output), &reader)?, output)
+    let left = if path.is_dir() { Some(Left::of(path)?) } else { None };
+    let inputs = match &left {
+        Some(left) => {
+            left.files.iter().filter(|file| *file != PAGE).map(|one| path.join(one)).collect()
+        }
+        None => vec![path.clone()],
     };
-    let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
-    if ending.is_none_or(|ending| ending != "html" && ending != "htm") {
-        return Err(Fault::Wrong(format!(
-            "{}: what is written is a page: give it a name that ends in .html",
-            output.display()
-        )));
-    }
+    let output = options.page(&inputs)?;
+    let page = match left {
+        Some(left) => of_folder((path, &left), &output, &reader)?,
+        None => of_file((path, &output), &reader)?,
+    };
     if let Some(folder) = output.parent() {
         clear_unfinished(folder);
     }
-    write_atomically(&output, |out| out.write_all(page.html().as_bytes()))?;
-    if !common.quiet {
+    let html = page.html();
+    match options.output {
+        Some(_) => write_named(&output, |out| out.write_all(html.as_bytes())),
+        None => write_atomically(&output, |out| out.write_all(html.as_bytes())),
+    }?;
+    if !common.quiet && !opened::is_standard_output(&output) {
         print(&format!("open {}\n", output.display()))?;
     }
     Ok(())
+}
+
+impl View {
+    /// The page to write: where one is named, or beside what is shown.
+    fn page(&self, inputs: &[PathBuf]) -> Result<PathBuf, Fault> {
+        let Some(output) = &self.output else {
+            let output = match self.path.is_dir() {
+                true => self.path.join(PAGE),
+                false => self.path.with_extension("html"),
+            };
+            let name = output.file_name().into_iter();
+            let outputs = Outputs::named(name).beside(inputs).or("name another page with -o");
+            outputs.check(output.parent().unwrap_or(Path::new("")))?;
+            return Ok(output);
+        };
+        let ending = output.extension().map(|ending| ending.to_ascii_lowercase());
+        let is_page = ending.is_some_and(|ending| ending == "html" || ending == "htm");
+        if !is_page && !opened::is_written_through(output) {
+            return Err(Fault::Wrong(format!(
+                "{}: what is written is a page: give it a name that ends in .html",
+                output.display()
+            )));
+        }
+        check_file(output, inputs)?;
+        Ok(output.clone())
+    }
 }
 
 /// Refuses a ready sensor or scene where what came of one is wanted.
@@ -117,8 +147,19 @@ fn of_file((path, output): (&Path, &Path), reader: &Reader) -> Result<Explorer, 
     Ok(page)
 }
 
-fn of_folder((folder, output): (&Path, &Path), reader: &Reader) -> Result<Explorer, Fault> {
-    let left = Left::of(folder)?;
+fn of_folder(
+    (folder, left): (&Path, &Left),
+    output: &Path,
+    reader: &Reader,
+) -> Result<Explorer, Fault> {
+    if let Some(first) = left.outside.first() {
+        let (folder, count) = (folder.display(), left.outside.len());
+        let told = format!(
+            "{folder}: {first} leads out of the folder ({count} such in all) and is not shown; name the \
+             file itself to see it"
+        );
+        note(&told, reader.common);
+    }
     if left.is_unfinished {
         let folder = folder.display();
         let told = format!(

@@ -127,3 +127,137 @@ fn what_makes_no_sense_is_refused() {
         desk.refused(&format!("convert {name} -o points.ply"), &[name, "can be read"]);
     }
 }
+
+#[test]
+fn derived_name_takes_no_place_of_an_input_or_of_a_file_of_others() {
+    let desk = Desk::new();
+    let mine = "x_m,y_m,z_m,mine\n1,2,3,4\n";
+    desk.put("mine.csv", mine).put("mine.ply", "ply\n").put("other.csv", mine);
+    let read = |name: &str| fs::read_to_string(desk.path().join(name)).unwrap();
+    desk.refused("convert mine.csv --format csv -o .", &["mine.csv", "is to be read and written"]);
+    desk.refused(
+        "convert other.csv mine.csv --format pcd,csv -o .",
+        &["is to be read and written"],
+    );
+    desk.refused(
+        "convert mine.csv --format ply -o .",
+        &["mine.ply", "not known to be written by macropulse", "--replace"],
+    );
+    assert_eq!((read("mine.csv").as_str(), read("mine.ply").as_str()), (mine, "ply\n"));
+    assert_eq!(desk.run("convert mine.csv --format ply -o . --replace").code, Some(0));
+    // Now it is ours, and its header says so.
+    assert_eq!(desk.run("convert mine.csv --format ply -o .").code, Some(0));
+    desk.refused("convert mine.csv --format csv -o . --replace", &["is to be read and written"]);
+    assert_eq!(desk.run("convert mine.csv --format npy -o .").code, Some(0));
+    desk.refused("convert mine.csv --format npy -o .", &["mine.npy", "--replace"]);
+    assert_eq!(desk.run("convert mine.csv -o mine.npy").code, Some(0));
+    assert_eq!(read("mine.csv"), mine);
+}
+
+#[test]
+fn numbered_names_of_a_container_are_looked_at_too() {
+    let desk = desk();
+    fs::create_dir(desk.path().join("apart")).unwrap();
+    desk.put("apart/scans-000001.ply", "mine").put("apart/scan-000001.ply", "mine");
+    let words = ["scans-000001.ply", "not known"];
+    desk.refused("convert in/scans.mcap --format ply -o apart", &words);
+    fs::remove_file(desk.path().join("apart/scans-000001.ply")).unwrap();
+    assert_eq!(desk.run("convert in/scans.mcap --format ply -o apart").code, Some(0));
+    assert_eq!(fs::read_to_string(desk.path().join("apart/scan-000001.ply")).unwrap(), "mine");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_are_followed_from_typed_names_alone() {
+    use std::os::unix::fs::symlink;
+    let desk = desk();
+    let path = |name: &str| desk.path().join(name);
+    fs::create_dir(path("apart")).unwrap();
+    desk.put("outside", "mine");
+    for link in ["scan-000000.ply", "scans.mcap"] {
+        symlink("../outside", path("apart").join(link)).unwrap();
+    }
+    for format in ["ply", "mcap"] {
+        let line = format!("convert in/scan-000000.pcd --format {format} -o apart --replace");
+        desk.refused(&line, &["is a link"]);
+    }
+    assert_eq!(fs::read_to_string(path("outside")).unwrap(), "mine");
+    symlink("outside", path("typed.ply")).unwrap();
+    symlink("outside", path("typed.mcap")).unwrap();
+    for name in ["typed.ply", "typed.mcap"] {
+        assert_eq!(desk.run(&format!("convert in/scan-000000.pcd -o {name}")).code, Some(0));
+        assert!(path(name).is_symlink());
+        assert!(fs::read(path("outside")).unwrap().len() > 1000, "{name}");
+    }
+    // An input by another of its names.
+    fs::hard_link(path("in/scan-000000.pcd"), path("same.pcd")).unwrap();
+    symlink("in/scan-000000.pcd", path("link.pcd")).unwrap();
+    for name in ["same.pcd", "link.pcd"] {
+        let line = format!("convert in/scan-000000.pcd -o {name}");
+        desk.refused(&line, &[name, "is to be read and written"]);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn devices_and_pipes_are_written_into() {
+    use std::os::unix::fs::FileTypeExt;
+    let desk = desk();
+    let from = "convert in/scan-000000.pcd";
+    let whole = desk.run(&format!("{from} -o whole.csv"));
+    assert_eq!(whole.code, Some(0));
+    let whole = fs::read_to_string(desk.path().join("whole.csv")).unwrap();
+    for name in ["/dev/stdout", "/dev/fd/1"] {
+        let ran = desk.run(&format!("{from} --format csv -o {name}"));
+        assert_eq!((ran.code, ran.out.as_str()), (Some(0), whole.as_str()), "{}", ran.err);
+    }
+    for format in ["csv", "mcap", "laz"] {
+        assert_eq!(desk.run(&format!("{from} --format {format} -o /dev/null")).code, Some(0));
+    }
+    assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+    desk.refused(&format!("{from} -o /dev/null"), &["/dev/null", "--format"]);
+    let ran = desk.run("schema sensor -o /dev/stdout");
+    assert!(ran.code == Some(0) && ran.out.starts_with('{'), "{}", ran.err);
+    let made = std::process::Command::new("mkfifo").arg(desk.path().join("pipe.csv")).status();
+    assert!(made.unwrap().success());
+    let ran = desk.run(&format!("{from} -o pipe.csv -q"));
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("pipe.csv: it is a pipe, and nothing reads from it"), "{}", ran.err);
+    let pipe = desk.path().join("pipe.csv");
+    let reader = std::thread::spawn(move || fs::read_to_string(pipe).unwrap());
+    assert_eq!(desk.run(&format!("{from} -o pipe.csv")).code, Some(0));
+    assert_eq!(reader.join().unwrap(), whole);
+    let about = fs::symlink_metadata(desk.path().join("pipe.csv")).unwrap();
+    assert!(about.file_type().is_fifo());
+}
+
+#[test]
+fn names_pass_through_every_format_whatever_they_hold() {
+    let desk = Desk::new();
+    let scene = |name: &str| {
+        format!(
+            "version = 1\n[sensor]\nposition_m = [0.0, 0.0, 2.0]\n[[object]]\nname = {name:?}\n\
+             shape = {{ sphere = {{ radius_m = 1.0 }} }}\nposition_m = [10.0, 0.0, 2.0]\n\
+             material = \"white\"\n"
+        )
+    };
+    for (name, told) in [
+        ("a]]>b<c>&", "a]]>b<c>&"),
+        ("=HYPERLINK(\"x\")", "=HYPERLINK(\"x\")"),
+        ("a\nb", "a b"),
+        ("+a, \"b\"\nc", "+a, \"b\" c"),
+    ] {
+        desk.put("s.toml", &scene(name));
+        let line = "simulate peregrine s.toml --truth --format csv,e57,las,ply -o out --no-page";
+        assert_eq!(desk.run(line).code, Some(0), "{name:?}");
+        for ending in ["csv", "e57", "las", "ply"] {
+            let ran = desk.run(&format!("convert out/scan-000000.{ending} -o again.pcd"));
+            assert_eq!(ran.code, Some(0), "{name:?}, {ending}: {}", ran.err);
+            let again = fs::read(desk.path().join("again.pcd")).unwrap();
+            let again = String::from_utf8_lossy(&again);
+            assert!(again.contains(&format!("# object 0 {told}\n")), "{name:?}, {ending}");
+        }
+        let csv = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
+        assert!(!csv.contains(",=") && !csv.contains(",\"+"), "{name:?}");
+    }
+}

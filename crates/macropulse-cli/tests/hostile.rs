@@ -230,6 +230,33 @@ fn more_elements_than_a_file_has_bytes() {
     refused(desk.put("s.toml", &scene("a.stl")), "check s.toml", &["a.stl"]);
 }
 
+#[test]
+fn names_that_a_terminal_would_obey() {
+    let desk = Desk::new();
+    let sensor = desk.run("sensors peregrine").out;
+    let named = |name: &str| sensor.replacen("name = \"peregrine\"", &format!("name = {name}"), 1);
+    let name = "\"a\\u001b[31m\\u202eb\\u009b\"";
+    desk.put("s.toml", &named(name));
+    for line in ["check s.toml", "simulate s.toml wall --format none", "budget s.toml"] {
+        let ran = desk.run(line);
+        assert_eq!(ran.code, Some(0), "{line}: {}", ran.err);
+        for told in [&ran.out, &ran.err] {
+            assert!(!told.contains(['\u{1b}', '\u{202e}', '\u{9b}']), "{line}: {told}");
+        }
+    }
+    let told = desk.run("simulate s.toml wall --format none --json").out;
+    assert!(!told.contains('\u{202e}') && told.contains("\\u202e"));
+    let json: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(json["sensor"]["name"], "a\u{1b}[31m\u{202e}b\u{9b}");
+    for empty in ["\"\"", "\" \""] {
+        refused(
+            desk.put("s.toml", &named(empty)),
+            "check s.toml",
+            &["s.toml:", "name", "is empty"],
+        );
+    }
+}
+
 /// A glTF of one triangle with `keys` of its own.
 fn gltf(keys: &str) -> String {
     format!(

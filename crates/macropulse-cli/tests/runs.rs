@@ -103,7 +103,7 @@ fn a_full_disk_and_a_folder_that_is_read_only_are_no_fault_of_the_user() {
     let desk = Desk::new();
     // A file may have 64 KiB here: a cloud is larger.
     let script = format!(
-        "ulimit -f 64; trap '' XFSZ; exec {} simulate vlp-16 street -o out --format pcd",
+        "ulimit -f 64; exec {} simulate vlp-16 street -o out --format pcd",
         env!("CARGO_BIN_EXE_macropulse")
     );
     let mut command = std::process::Command::new("bash");
@@ -120,6 +120,151 @@ fn a_full_disk_and_a_folder_that_is_read_only_are_no_fault_of_the_user() {
     // Nothing can be made in it, whoever asks.
     let ran = desk.run("simulate peregrine wall -o /proc/out --format pcd");
     assert!(ran.code != Some(0) && ran.err.contains("/proc/out"), "{}", ran.err);
+}
+
+#[test]
+fn run_that_fails_says_so_in_its_manifest() {
+    let desk = Desk::new();
+    fs::create_dir(desk.path().join("out")).unwrap();
+    let script = format!(
+        "ulimit -f 64; exec {} simulate vlp-16 street -o out --format pcd",
+        env!("CARGO_BIN_EXE_macropulse")
+    );
+    let mut command = std::process::Command::new("bash");
+    let ran = command.args(["-c", &script]).current_dir(desk.path()).output().unwrap();
+    assert_eq!(ran.status.code(), Some(1));
+    assert_eq!(manifest(&desk)["state"], "failed");
+    assert_eq!(desk.files(), ["out", "out/manifest.json"]);
+}
+
+/// Starts the words of `line` in a shell, and waits for its fifth scan.
+fn begun(desk: &Desk, script: &str) -> std::process::Child {
+    let line = "simulate peregrine street -o out --scans 100000 --format pcd -q --no-page";
+    let script = format!("{script}; exec {} {line}", env!("CARGO_BIN_EXE_macropulse"));
+    let mut command = std::process::Command::new("bash");
+    command.args(["-c", &script]).current_dir(desk.path()).stderr(Stdio::null());
+    let child = command.spawn().unwrap();
+    there_is(desk, "out/scan-000004.pcd");
+    child
+}
+
+/// Waits for a file.
+fn there_is(desk: &Desk, file: &str) {
+    let began = Instant::now();
+    while !desk.path().join(file).exists() {
+        assert!(began.elapsed() < Duration::from_secs(60), "{file}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn signal_that_is_inherited_as_ignored_stays_ignored() {
+    let desk = Desk::new();
+    let mut child = begun(&desk, "trap '' HUP INT");
+    let send = |signal: &str| {
+        let kill =
+            std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+    };
+    send("-HUP");
+    send("-INT");
+    // It goes on, with several scans that it had not begun.
+    let written = desk.files().len();
+    there_is(&desk, &format!("out/scan-{:06}.pcd", written + 20));
+    send("-TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(manifest(&desk)["state"], "stopped");
+}
+
+#[test]
+fn standard_error_that_goes_away_ends_no_run() {
+    let desk = Desk::new();
+    let line = "simulate peregrine wall --scans 3 --format pcd --progress json -o out";
+    // Nobody reads what is said.
+    let mut child =
+        desk.command(line).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(manifest(&desk)["state"], "finished");
+    let full = || fs::File::options().write(true).open("/dev/full").unwrap();
+    let ended = |line: &str| desk.command(line).stderr(full()).output().unwrap().status.code();
+    assert_eq!(ended(line), Some(0));
+    assert_eq!(ended("simulate"), Some(2));
+    assert_eq!(ended("no-such-command"), Some(2));
+}
+
+#[test]
+fn reader_that_has_seen_enough_ends_a_run_quietly() {
+    let desk = Desk::new();
+    desk.run("simulate peregrine street --format ticks -o out -q");
+    let program = env!("CARGO_BIN_EXE_macropulse");
+    let script = format!(
+        "set -o pipefail; {program} decode --sensor peregrine out/shots-000000.mps \
+         out/ticks-000000.mpt -o - | head -1"
+    );
+    let mut command = std::process::Command::new("bash");
+    let ran = command.args(["-c", &script]).current_dir(desk.path()).output().unwrap();
+    let told = String::from_utf8(ran.stderr).unwrap();
+    assert_eq!((ran.status.code(), told.as_str()), (Some(0), ""));
+    assert!(ran.stdout.starts_with(b"x_m,"));
+}
+
+#[test]
+fn page_is_written_where_there_are_clouds_and_it_is_wanted() {
+    let desk = Desk::new();
+    let files = |line: &str| {
+        assert_eq!(desk.run(line).code, Some(0), "{line}");
+        let mut files = desk.files();
+        files.retain(|file| file.starts_with("out/"));
+        fs::remove_dir_all(desk.path().join("out")).unwrap();
+        files
+    };
+    let wall = "simulate peregrine wall -o out";
+    assert_eq!(files(&format!("{wall} --format none")), ["out/manifest.json"]);
+    let without = ["out/manifest.json", "out/scan-000000.pcd"];
+    assert_eq!(files(&format!("{wall} --format pcd --no-page")), without);
+    let explained = files(&format!("{wall} --format none --explain 3,4"));
+    assert!(explained.contains(&"out/index.html".to_owned()), "{explained:?}");
+    assert_eq!(desk.run(&format!("{wall} --format pcd --scans 12")).code, Some(0));
+    let html = fs::read_to_string(desk.path().join("out/index.html")).unwrap();
+    assert!(html.contains("id=\"scan-9\"") && !html.contains("id=\"scan-10\""));
+    assert!(html.contains("2 clouds are not in it"));
+}
+
+#[test]
+fn run_replaces_its_own_files_and_none_of_a_user() {
+    let desk = Desk::new();
+    let line = "simulate peregrine wall --format npy,pcd -o out";
+    assert_eq!(desk.run(line).code, Some(0));
+    assert_eq!(desk.run(line).code, Some(0));
+    for (name, text) in [
+        ("index.html", "<title>mine</title>"),
+        ("manifest.json", "{\"name\": \"app\"}"),
+        ("scan-000000.pcd", "VERSION 0.7\n"),
+    ] {
+        let folder = desk.path().join("mine");
+        fs::create_dir(&folder).unwrap();
+        desk.put(&format!("mine/{name}"), text);
+        let words = [name, "not known to be written by macropulse", "another folder"];
+        desk.refused("simulate peregrine wall --format npy,pcd -o mine", &words);
+        assert_eq!(fs::read_to_string(folder.join(name)).unwrap(), text);
+        // What no run writes is in nobody's way.
+        desk.put("mine/scan-000007.pcd", "mine");
+        fs::remove_file(folder.join(name)).unwrap();
+        assert_eq!(desk.run("simulate peregrine wall --format pcd -o mine").code, Some(0));
+        assert_eq!(fs::read_to_string(folder.join("scan-000007.pcd")).unwrap(), "mine");
+        fs::remove_dir_all(folder).unwrap();
+    }
+    for line in ["budget hdl-64e -o mine", "codes prime=5 -o mine"] {
+        fs::create_dir(desk.path().join("mine")).unwrap();
+        let name = if line.starts_with("budget") { "budget.html" } else { "index.html" };
+        desk.put(&format!("mine/{name}"), "mine");
+        desk.refused(line, &[name, "not known"]);
+        fs::remove_file(desk.path().join("mine").join(name)).unwrap();
+        assert_eq!((desk.run(line).code, desk.run(line).code), (Some(0), Some(0)), "{line}");
+        fs::remove_dir_all(desk.path().join("mine")).unwrap();
+    }
 }
 
 #[cfg(target_os = "linux")]

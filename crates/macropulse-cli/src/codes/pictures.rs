@@ -20,6 +20,16 @@ const LEAST_ERROR: f64 = 1e-20;
 /// Probability of a wrong bit among so many users.
 type Errors = fn(&MultipleAccess) -> f64;
 
+/// Name of the page, and of the pictures of errors.
+const PAGE: &str = "index.html";
+const CURVES: [&str; 2] = ["errors-soft.svg", "errors-hard.svg"];
+
+/// Names of the files that [`write`] writes of the families of these names.
+pub fn files<'a>(families: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let fixed = CURVES.into_iter().chain([PAGE]).map(str::to_owned);
+    families.map(file_of).chain(fixed).collect()
+}
+
 /// Writes the correlation matrix of each family, the errors of all of them, and a page of both with
 /// the `listing` that is printed.
 pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<(), Fault> {
@@ -30,14 +40,14 @@ pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<()
         let title = format!("{name}: marks two words share at most");
         let picture = MatrixPicture { title, side: of.compared, values: &of.matrix };
         let png = picture.png().map_err(|error| Fault::Ours(error.to_string()))?;
-        let file = format!("{}.png", file_name(&name));
+        let file = file_of(&name);
         write_atomically(&folder.join(&file), |out| out.write_all(&png))?;
         matrices.push(Figure::png(png, &picture.title, &name));
         files.push(file);
     }
     let limits: [(&str, Errors, &str); 2] = [
-        ("errors-soft.svg", bit_error_soft, "every mark counted"),
-        ("errors-hard.svg", bit_error_hard, "one mark per chip"),
+        (CURVES[0], bit_error_soft, "every mark counted"),
+        (CURVES[1], bit_error_hard, "one mark per chip"),
     ];
     let mut curves = Section::new("Errors");
     for (file, error, how) in limits {
@@ -53,7 +63,7 @@ pub fn write(compared: &[Comparison], listing: &str, folder: &Path) -> Result<()
         .section(Section::new("Numbers").block(Block::Listing(listing.to_owned())))
         .section(Section::new("Correlations").block(Block::Gallery(2, matrices)))
         .files(&files);
-    write_atomically(&folder.join("index.html"), |out| out.write_all(page.html().as_bytes()))?;
+    write_atomically(&folder.join(PAGE), |out| out.write_all(page.html().as_bytes()))?;
     Ok(())
 }
 
@@ -69,6 +79,11 @@ fn errors(compared: &[Comparison], error: Errors, title: &str) -> Chart {
         }
     }
     chart
+}
+
+/// The file with the correlations of a family.
+fn file_of(family: &str) -> String {
+    format!("{}.png", file_name(family))
 }
 
 /// `extended prime 29` as `extended-prime-29`.

@@ -10,15 +10,18 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::channel::Operating;
+use macropulse::formats::Format;
+use macropulse_study::record::{MANIFEST, PAGE};
 
 use crate::completions;
 use crate::explain::{self, Pixel};
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::options::{self, Common, Surroundings};
 use crate::simulate::formats::Formats;
+use crate::simulate::scenario::files_of_scan;
 use crate::text::{print, print_json};
 use run::{Run, Setting, Sink};
 
@@ -65,6 +68,10 @@ pub struct Decode {
     )]
     format: Option<Formats>,
 
+    /// Write no page: no index.html to look at the clouds with
+    #[arg(long)]
+    no_page: bool,
+
     /// Say why the shot to this pixel was decided as it was; repeatable
     #[arg(long = "explain", value_name = "ROW,COLUMN", value_parser = explain::pixel)]
     explain: Vec<Pixel>,
@@ -84,7 +91,13 @@ pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
     let sink = match options.output.as_deref() {
         None => Sink::Nothing,
         Some(path) if path == Path::new(STREAM) => Sink::Lines,
-        Some(path) => Sink::Folder(Folder::claim_alone(path)?, formats),
+        Some(path) => {
+            let formats = formats.0;
+            let has_files = !formats.is_empty() || !options.explain.is_empty();
+            let has_page = has_files && !options.no_page;
+            let outputs = options.outputs(&formats, has_page);
+            Sink::Folder(Folder::claim_alone(path, outputs)?, formats, has_page)
+        }
     };
     if matches!(sink, Sink::Lines) && (options.json || !options.explain.is_empty()) {
         return Err(Fault::Wrong(
@@ -107,6 +120,17 @@ pub fn run(options: &Decode, common: &Common) -> Result<(), Fault> {
 }
 
 impl Decode {
+    /// The files of a run that ends with the recording, after however many scans.
+    fn outputs(&self, formats: &[Format], has_page: bool) -> Outputs {
+        let (formats, pixels) = (formats.to_vec(), self.explain.clone());
+        let fixed = [Some(MANIFEST), has_page.then_some(PAGE)];
+        let outputs = Outputs::of_scans(fixed.into_iter().flatten(), move |scan| {
+            let explained = pixels.iter().flat_map(|pixel| explain::names(scan, *pixel));
+            files_of_scan(&formats, scan).chain(explained).collect()
+        });
+        outputs.beside(&[self.shots.as_path(), &self.record, Path::new(&self.sensor)])
+    }
+
     fn formats(&self) -> Result<Formats, Fault> {
         let formats = self.format.clone().unwrap_or_default();
         match formats.1.is_none() {

@@ -1,6 +1,5 @@
 //! Band after band, from ticks to files.
 
-use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -8,7 +7,7 @@ use macropulse::channel::Operating;
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::environment::Environment;
-use macropulse::formats::{State, write_csv_lines, write_manifest};
+use macropulse::formats::{Format, State, write_csv_lines, write_manifest};
 use macropulse::points::{PointCloud, Scale};
 use macropulse_study::decoding::{Band, Decoding};
 use macropulse_study::record::{self, Decoded, PAGE, Page};
@@ -20,7 +19,7 @@ use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::simulate::formats::Formats;
+use crate::text::pour;
 
 /// Where the points go.
 pub enum Sink {
@@ -28,8 +27,8 @@ pub enum Sink {
     Nothing,
     /// Lines of CSV on stdout, as they are decided.
     Lines,
-    /// Files of each scan.
-    Folder(Folder, Formats),
+    /// Files of each scan in these formats, and a page if that is wanted.
+    Folder(Folder, Vec<Format>, bool),
 }
 
 /// What decodes.
@@ -55,6 +54,10 @@ pub struct Run<'a> {
     pub folder: String,
     pub files: Vec<String>,
     pub warnings: Vec<String>,
+    /// Whether the manifest of this run is on the disk.
+    is_announced: bool,
+    /// Whether the reader of stdout has seen enough.
+    has_lost_reader: bool,
     /// Whether stdout has the points.
     pub is_streamed: bool,
     /// Pixels to be explained.
@@ -79,6 +82,8 @@ impl<'a> Run<'a> {
             folder: String::new(),
             files: Vec::new(),
             warnings: Vec::new(),
+            is_announced: false,
+            has_lost_reader: false,
             is_streamed: false,
             asked,
             explained: Vec::new(),
@@ -86,37 +91,61 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Decodes all that comes, and puts it where it belongs.
+    /// Decodes all that comes, and puts it where it belongs. If that fails, a manifest that is there already
+    /// says so.
     pub fn through(
         mut self,
-        mut decoding: Decoding,
+        decoding: Decoding,
         mut sink: Sink,
-        (common, interrupt): (&Common, &Interrupt),
+        about: (&Common, &Interrupt),
     ) -> Result<Self, Fault> {
+        match self.work(decoding, &mut sink, about) {
+            Ok(()) => Ok(self),
+            Err(fault) => {
+                self.state = State::Failed;
+                if let Sink::Folder(folder, ..) = &sink
+                    && self.is_announced
+                {
+                    // What failed first is what is told.
+                    let _ = write_manifest(&format!("{:#}\n", self.manifest()), folder.path());
+                }
+                Err(fault)
+            }
+        }
+    }
+
+    fn work(
+        &mut self,
+        mut decoding: Decoding,
+        sink: &mut Sink,
+        (common, interrupt): (&Common, &Interrupt),
+    ) -> Result<(), Fault> {
         let began = Instant::now();
         let Setting { design, operating, .. } = self.setting;
         self.is_streamed = matches!(sink, Sink::Lines);
         let progress = Progress::of(common, &design.name, design.shots_per_scan());
-        let mut recorded = match &sink {
-            Sink::Folder(folder, formats) => {
-                Some(record::Files::new(folder.path(), &formats.0, (design, None)))
+        let mut recorded = match sink {
+            Sink::Folder(folder, formats, _) => {
+                Some(record::Files::new(folder.path(), formats, (design, None)))
             }
             _ => None,
         };
-        let mut page = Page::new(design, None);
+        let mut page = matches!(sink, Sink::Folder(.., true)).then(|| Page::new(design, None));
         let scale = Scale::of(design, operating);
         while let Some(cloud) = decoding.next_scan((design, &scale), |band| {
             progress.add(band.log.owned.len() as u64);
-            self.take(band, &mut sink)?;
-            Ok::<_, Fault>(match interrupt.is_raised() {
+            self.take(band, sink)?;
+            Ok::<_, Fault>(match interrupt.is_raised() || self.has_lost_reader {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             })
         })? {
             self.scans += 1;
-            if let (Sink::Folder(folder, _), Some(recorded)) = (&mut sink, &mut recorded) {
-                page.add(&cloud);
-                self.files.extend(interrupt.undisturbed(|| {
+            if let (Sink::Folder(folder, ..), Some(recorded)) = (&mut *sink, &mut recorded) {
+                if let Some(page) = &mut page {
+                    page.add(&cloud);
+                }
+                let files = interrupt.undisturbed(|| {
                     folder.make_once()?;
                     if self.scans == 1 {
                         self.announce(folder)?;
@@ -124,7 +153,8 @@ impl<'a> Run<'a> {
                     let files = recorded.add(&cloud)?;
                     folder.keep();
                     Ok::<_, Fault>(files)
-                })?);
+                })?;
+                self.files.extend(files);
             }
         }
         if let Some(recorded) = recorded {
@@ -136,28 +166,35 @@ impl<'a> Run<'a> {
             true => State::Stopped,
             false => State::Finished,
         };
-        self.find_warnings(&sink, common);
-        if let (Sink::Folder(folder, _), 1..) = (&sink, self.scans) {
+        if self.has_lost_reader {
+            return Ok(());
+        }
+        self.find_warnings(sink, common);
+        if let (Sink::Folder(folder, ..), 1..) = (&*sink, self.scans) {
             self.folder = folder.path().display().to_string();
-            self.files.push(PAGE.to_owned());
+            self.files.extend(page.as_ref().map(|_| PAGE.to_owned()));
             interrupt.undisturbed(|| {
                 let manifest = self.manifest();
-                page.write(folder.path(), &manifest)?;
+                if let Some(page) = page {
+                    page.write(folder.path(), &manifest)?;
+                }
                 write_manifest(&format!("{manifest:#}\n"), folder.path())
             })?;
         }
-        Ok(self)
+        Ok(())
     }
 
     /// Writes the manifest of a run that has no file yet, in place of that of an older one.
-    fn announce(&self, folder: &Folder) -> Result<(), Fault> {
+    fn announce(&mut self, folder: &Folder) -> Result<(), Fault> {
         let mut manifest = self.manifest();
         if let (Some(older), Some(said)) =
             (folder.warning_of_older(&[]), manifest["warnings"].as_array_mut())
         {
             said.push(older.into());
         }
-        Ok(write_manifest(&format!("{manifest:#}\n"), folder.path())?)
+        write_manifest(&format!("{manifest:#}\n"), folder.path())?;
+        self.is_announced = true;
+        Ok(())
     }
 
     /// Counts a band, explains what is asked for of it, and prints its points where they are to be.
@@ -173,7 +210,7 @@ impl<'a> Run<'a> {
             let given = (&band.log, &band.given);
             let explained = explain::Explained::of(self.setting.design, given, shot)?;
             self.explained.push((explained.text(), explained.json()));
-            if let Sink::Folder(folder, _) = sink {
+            if let Sink::Folder(folder, ..) = sink {
                 folder.make_once()?;
                 self.files.extend(explained.write(folder.path())?);
                 folder.keep();
@@ -187,15 +224,12 @@ impl<'a> Run<'a> {
 
     /// Writes the points of a band to stdout.
     fn print(&mut self, points: &PointCloud) -> Result<(), Fault> {
-        let mut out = std::io::stdout().lock();
-        let written = write_csv_lines(points, !self.has_header, &mut out);
+        let mut lines = Vec::new();
+        write_csv_lines(points, !self.has_header, &mut lines)
+            .map_err(|error| Fault::unprinted(&error))?;
         self.has_header = true;
-        match written.and_then(|()| out.flush()) {
-            // A reader who has seen enough is no fault.
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Err(Fault::Told),
-            Err(error) => Err(Fault::unprinted(&error)),
-            Ok(()) => Ok(()),
-        }
+        self.has_lost_reader = !pour(&lines)?;
+        Ok(())
     }
 
     /// What its user should know, said at once.
@@ -214,7 +248,7 @@ impl<'a> Run<'a> {
             self.warnings.push("a pixel of --explain has no shot in the log".to_owned());
         }
         self.warnings.iter().for_each(|warning| warn(warning));
-        if let Sink::Folder(folder, _) = sink
+        if let Sink::Folder(folder, ..) = sink
             && let Some(older) = folder.warning_of_older(&self.files)
         {
             note(&older, common);

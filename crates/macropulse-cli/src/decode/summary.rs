@@ -1,12 +1,10 @@
 //! What is printed of a run that decodes.
 
-use std::path::Path;
-
 use macropulse::codec::decode::Reject;
-use macropulse_study::record::PAGE;
 use serde_json::Value;
 
 use super::run::Run;
+use crate::simulate::summary::written;
 use crate::text::{Columns, counted, grouped};
 
 impl Run<'_> {
@@ -28,11 +26,7 @@ impl Run<'_> {
             .push("intensity", format!("as in {}: {}", environment.name, environment.conditions()));
         columns.push_list("warnings", self.warnings.iter().cloned());
         if !self.folder.is_empty() {
-            let files = counted(self.files.len() as u64, "file");
-            let page = Path::new(&self.folder).join(PAGE);
-            let text =
-                format!("{files} and manifest.json to {}; open {}", self.folder, page.display());
-            columns.push("written", text);
+            columns.push("written", written(&self.files, &self.folder));
         }
         let (name, scans) = (&self.setting.design.name, counted(self.scans, "scan"));
         let mut text = format!("{name}: {scans} decoded, {:.2} s\n\n", self.elapsed);

@@ -14,7 +14,7 @@ use macropulse::units::{fs_from_s, tof_from_range};
 use serde_json::json;
 
 use crate::fault::Fault;
-use crate::folder::Folder;
+use crate::folder::{Folder, Outputs};
 use crate::simulate::formats;
 use crate::simulate::recorded::Recorded;
 use crate::text::{grouped, print_bytes};
@@ -69,9 +69,10 @@ pub fn write(
             design.name
         )));
     }
-    let mut folder = Folder::claim(output)?;
-    folder.make()?;
     let [shots, ticks] = recorded.names();
+    let written = std::iter::once(&shots).chain(wall.map(|_| &ticks));
+    let mut folder = Folder::claim(output, Outputs::named(written))?;
+    folder.make()?;
     let path = |name: &str| folder.path().join(name);
     let mut log = WholeFile::create(&path(&shots))?;
     recorded.write_shots(&mut log, LEVEL).map_err(|cause| log.failed(cause))?;

@@ -223,21 +223,26 @@ impl<'a> Explained<'a> {
     pub fn write(&self, folder: &Path) -> Result<Vec<String>, Fault> {
         let (row, column) = self.pixel;
         let scan = self.id / self.design.shots_per_scan();
-        let name = format!("explain-{scan:06}-{row}-{column}");
         let whole = self.whole_json();
         let picture = pixel_picture(&whole);
         let png = picture.png().map_err(|error| Fault::Ours(error.to_string()))?;
-        let files = [
-            (format!("{name}.txt"), self.text().into_bytes()),
-            (format!("{name}.json"), versioned(whole).to_string().into_bytes()),
-            (format!("{name}.svg"), picture.svg().into_bytes()),
-            (format!("{name}.png"), png),
+        let contents = [
+            self.text().into_bytes(),
+            versioned(whole).to_string().into_bytes(),
+            picture.svg().into_bytes(),
+            png,
         ];
-        for (file, bytes) in &files {
-            write_atomically(&folder.join(file), |out| out.write_all(bytes))?;
+        let files = names(scan, (row, column));
+        for (file, bytes) in files.iter().zip(contents) {
+            write_atomically(&folder.join(file), |out| out.write_all(&bytes))?;
         }
-        Ok(files.into_iter().map(|(file, _)| file).collect())
+        Ok(files.into())
     }
+}
+
+/// Names of the files that explain a pixel of a scan.
+pub fn names(scan: u64, (row, column): Pixel) -> [String; 4] {
+    ["txt", "json", "svg", "png"].map(|ending| format!("explain-{scan:06}-{row}-{column}.{ending}"))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ pub mod formats;
 pub mod recorded;
 mod run;
 pub mod scenario;
-mod summary;
+pub mod summary;
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -99,6 +99,10 @@ pub struct Simulate {
     #[arg(long, value_name = "LIST", help = Formats::help())]
     format: Option<Formats>,
 
+    /// Write no page: no index.html to look at the clouds with
+    #[arg(long)]
+    no_page: bool,
+
     /// Write the truth beside each point: range, object, material, incidence, outcome
     #[arg(long)]
     truth: bool,
@@ -157,6 +161,8 @@ impl Simulate {
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         scenario.truth |= self.truth;
         scenario.explain.clone_from(&self.explain);
+        let has_files = !scenario.writes_nothing() || !self.explain.is_empty();
+        scenario.has_page = has_files && !self.no_page;
         scenario.designs.iter().try_for_each(|design| explain::check(design, &self.explain))?;
         for design in &scenario.designs {
             let estimate = Estimate::in_scene(design, &scenario.scene).map_err(Fault::from)?;
@@ -170,7 +176,7 @@ impl Simulate {
     /// A folder for each sensor, proven to be writable; none where nothing is to be written.
     fn folders(&self, scenario: &Scenario) -> Result<Vec<Option<Folder>>, Fault> {
         let Some(output) = &self.output else {
-            if scenario.formats.is_empty() && scenario.records.is_none() {
+            if scenario.writes_nothing() {
                 return Ok(scenario.designs.iter().map(|_| None).collect());
             }
             let remedy = "say where the results go with -o DIR, or write none with --format none";
@@ -180,7 +186,11 @@ impl Simulate {
             [_] => vec![output.clone()],
             several => subfolders(output, several.iter().map(|design| design.name.as_str())),
         };
-        paths.iter().map(|path| Folder::claim_alone(path).map(Some)).collect()
+        let folders = paths
+            .iter()
+            .zip(&scenario.designs)
+            .map(|(path, design)| Folder::claim_alone(path, scenario.outputs(design)).map(Some));
+        folders.collect()
     }
 }
 

@@ -34,6 +34,16 @@ impl Kept {
             Self::Samples => Form::Binary,
         }
     }
+
+    /// The names of the files of a scan: shots, and ticks or samples.
+    pub fn names(self, scan: u64) -> [String; 2] {
+        let [shots, record] = match self {
+            Self::Ticks(Form::Binary) => [("shots", "mps"), ("ticks", "mpt")],
+            Self::Ticks(Form::Text) => [("shots", "csv"), ("ticks", "csv")],
+            Self::Samples => [("shots", "mps"), ("samples", "mpw")],
+        };
+        [shots, record].map(|(name, ending)| format!("{name}-{scan:06}.{ending}"))
+    }
 }
 
 /// A scan of a sensor that is written so.
@@ -47,12 +57,7 @@ pub struct Recorded<'a> {
 impl Recorded<'_> {
     /// The names of its files of shots, and of ticks or samples.
     pub fn names(&self) -> [String; 2] {
-        let [shots, record] = match self.kept {
-            Kept::Ticks(Form::Binary) => [("shots", "mps"), ("ticks", "mpt")],
-            Kept::Ticks(Form::Text) => [("shots", "csv"), ("ticks", "csv")],
-            Kept::Samples => [("shots", "mps"), ("samples", "mpw")],
-        };
-        [shots, record].map(|(name, ending)| format!("{name}-{:06}.{ending}", self.number))
+        self.kept.names(self.number)
     }
 
     /// Writes the shot log of the scan, guard shots included, of a sensor that stands at `position`

@@ -42,36 +42,59 @@ pub struct Run<'a> {
     pub explained: Vec<(String, Value)>,
     /// What its user should know.
     pub warnings: Vec<String>,
+    /// Whether the manifest of this run is on the disk.
+    is_announced: bool,
 }
 
 impl<'a> Run<'a> {
-    /// Simulates and writes scan after scan, and the manifest at the end.
+    /// Simulates and writes scan after scan, and the manifest at the end. If that fails, a manifest that is
+    /// there already says so.
     pub fn of(
         design: &'a Design,
         scenario: &'a Scenario,
         mut folder: Option<Folder>,
-        (common, interrupt): (&Common, &Interrupt),
+        about: (&Common, &Interrupt),
     ) -> Result<Self, Fault> {
         let mut run = Self::new(design, scenario);
+        match run.work(scenario, &mut folder, about) {
+            Ok(()) => Ok(run),
+            Err(fault) => {
+                run.state = State::Failed;
+                if let Some(folder) = folder.as_ref().filter(|_| run.is_announced) {
+                    // What failed first is what is told.
+                    let _ = run.manifest().write(folder.path());
+                }
+                Err(fault)
+            }
+        }
+    }
+
+    fn work(
+        &mut self,
+        scenario: &'a Scenario,
+        folder: &mut Option<Folder>,
+        (common, interrupt): (&Common, &Interrupt),
+    ) -> Result<(), Fault> {
+        let design = self.design;
         let shots = scenario.scans * design.shots_per_scan();
         let progress = Progress::of(common, &design.name, shots);
         let began = Instant::now();
-        let mut page = Page::new(design, Some(&scenario.scene));
+        let mut page = scenario.has_page.then(|| Page::new(design, Some(&scenario.scene)));
         let mut scans = Scans::new(design, &scenario.scene, scenario.seed)?;
         let stage = (design, Some(&scenario.scene));
         let kept = scenario.records.of(design).map_err(Fault::Wrong)?;
         let mut recorded = folder
             .as_ref()
             .map(|folder| record::Files::new(folder.path(), &scenario.formats, stage));
-        while run.scans < scenario.scans && !interrupt.is_raised() {
+        while self.scans < scenario.scans && !interrupt.is_raised() {
             let watch =
                 Watch { done: &|shots| progress.add(shots), stop: &|| interrupt.is_raised() };
-            let record = match (&mut folder, kept) {
+            let record = match (&mut *folder, kept) {
                 (Some(folder), Some(kept)) => {
-                    if run.scans == 0 {
+                    if self.scans == 0 {
                         folder.make()?;
                     }
-                    let recorded = Recorded { design, number: run.scans, kept };
+                    let recorded = Recorded { design, number: self.scans, kept };
                     Some(RecordFiles::begin(folder.path(), recorded, (&scans, &scenario.scene))?)
                 }
                 _ => None,
@@ -79,60 +102,64 @@ impl<'a> Run<'a> {
             let keep = |given: &Record| {
                 record.iter().for_each(|files| files.take(given));
             };
-            let Some(scan) = scans.scan_kept(run.scans, &watch, &keep)? else { break };
-            run.score.add(&scan.score);
-            run.tally.add(&scan.tally);
-            if let (Some(folder), Some(recorded)) = (&mut folder, &mut recorded) {
+            let Some(scan) = scans.scan_kept(self.scans, &watch, &keep)? else { break };
+            self.score.add(&scan.score);
+            self.tally.add(&scan.tally);
+            if let (Some(folder), Some(recorded)) = (&mut *folder, &mut recorded) {
                 let writing = Instant::now();
                 let mut cloud = scan.cloud();
-                page.add(&cloud);
+                if let Some(page) = &mut page {
+                    page.add(&cloud);
+                }
                 if !scenario.truth {
                     cloud.truth = Truth::default();
                 }
                 let files = interrupt.undisturbed(|| {
-                    if run.scans == 0 {
+                    if self.scans == 0 {
                         if kept.is_none() {
                             folder.make()?;
                         }
-                        run.announce(folder)?;
+                        self.announce(folder)?;
                     }
                     let record = record.map(RecordFiles::finish).transpose()?.unwrap_or_default();
                     let files = recorded.add(&cloud)?;
                     folder.keep();
                     Ok::<_, Fault>((files, record))
                 })?;
-                run.files.extend(files.0);
-                run.files.extend(files.1);
-                run.writing += writing.elapsed().as_secs_f64();
+                self.files.extend(files.0);
+                self.files.extend(files.1);
+                self.writing += writing.elapsed().as_secs_f64();
             }
-            run.scans += 1;
+            self.scans += 1;
         }
         if let Some(recorded) = recorded {
             interrupt.undisturbed(|| recorded.finish())?;
         }
-        run.elapsed = began.elapsed().as_secs_f64();
-        if run.scans > 0 {
-            run.explain(&scans, &scenario.explain, folder.as_ref())?;
+        self.elapsed = began.elapsed().as_secs_f64();
+        if self.scans > 0 {
+            self.explain(&scans, &scenario.explain, folder.as_ref())?;
         }
         progress.finish();
-        run.state = match run.scans < scenario.scans {
+        self.state = match self.scans < scenario.scans {
             true => State::Stopped,
             false => State::Finished,
         };
-        run.find_warnings(scenario, folder.as_ref(), common);
-        if let (Some(folder), 1..) = (&folder, run.scans) {
-            run.folder = folder.path().display().to_string();
-            run.files.push(PAGE.to_owned());
+        self.find_warnings(scenario, folder.as_ref(), common);
+        if let (Some(folder), 1..) = (&*folder, self.scans) {
+            self.folder = folder.path().display().to_string();
+            self.files.extend(page.as_ref().map(|_| PAGE.to_owned()));
             interrupt.undisturbed(|| {
-                let mut manifest = run.manifest();
-                // The page tells nothing of each scan, and a hundred thousand as JSON values are 200 MB.
-                let scans = std::mem::take(&mut manifest.scans);
-                page.write(folder.path(), &manifest.value())?;
-                manifest.scans = scans;
+                let mut manifest = self.manifest();
+                if let Some(page) = page {
+                    // It tells nothing of each scan, and a hundred thousand as JSON values are 200 MB.
+                    let scans = std::mem::take(&mut manifest.scans);
+                    page.write(folder.path(), &manifest.value())?;
+                    manifest.scans = scans;
+                }
                 manifest.write(folder.path())
             })?;
         }
-        Ok(run)
+        Ok(())
     }
 
     /// Explains the shots of the first scan to `pixels`.
@@ -165,10 +192,12 @@ impl<'a> Run<'a> {
 
     /// Writes the manifest of a run that has no file yet, in place of that of an older one, whose files
     /// this one is about to replace; those that stay, it names.
-    fn announce(&self, folder: &Folder) -> Result<(), Fault> {
+    fn announce(&mut self, folder: &Folder) -> Result<(), Fault> {
         let mut manifest = self.manifest();
         manifest.warnings.extend(folder.warning_of_older(&[]));
-        Ok(manifest.write(folder.path())?)
+        manifest.write(folder.path())?;
+        self.is_announced = true;
+        Ok(())
     }
 
     fn new(design: &'a Design, scenario: &'a Scenario) -> Self {
@@ -185,6 +214,7 @@ impl<'a> Run<'a> {
             folder: String::new(),
             files: Vec::new(),
             explained: Vec::new(),
+            is_announced: false,
             warnings: record::warnings(design, &scenario.scene),
         }
     }

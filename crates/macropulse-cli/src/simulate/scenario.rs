@@ -10,12 +10,14 @@ use macropulse::emit::most_scans;
 use macropulse::formats::Format;
 use macropulse::scene::{Changes, Room, Scene};
 use macropulse::told;
+use macropulse_study::record::{MANIFEST, PAGE, colour_name};
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::formats::{Formats, Records};
-use crate::explain::Pixel;
+use crate::explain::{self, Pixel};
 use crate::fault::Fault;
+use crate::folder::Outputs;
 use crate::input::{self, STREAM};
 use crate::kind;
 
@@ -37,6 +39,14 @@ pub struct Scenario {
     pub truth: bool,
     /// Pixels to be explained.
     pub explain: Vec<Pixel>,
+    /// Whether there is a page to look at the clouds with.
+    pub has_page: bool,
+}
+
+/// Names of the files of a scan in these formats.
+pub fn files_of_scan(formats: &[Format], scan: u64) -> impl Iterator<Item = String> {
+    let colour = formats.contains(&Format::Png).then(|| colour_name(scan));
+    formats.iter().map(move |format| format.file_name(scan)).chain(colour)
 }
 
 /// A scenario file as typed.
@@ -56,6 +66,27 @@ struct ScenarioFile {
 }
 
 impl Scenario {
+    /// Whether neither clouds nor records are written.
+    pub fn writes_nothing(&self) -> bool {
+        self.formats.is_empty() && self.records.is_none()
+    }
+
+    /// The files that a run of `design` writes.
+    pub fn outputs(&self, design: &Design) -> Outputs {
+        let (formats, scans, explain) = (self.formats.clone(), self.scans, self.explain.clone());
+        let kept = self.records.of(design).ok().flatten();
+        let fixed = [Some(MANIFEST), self.has_page.then_some(PAGE)];
+        Outputs::of_scans(fixed.into_iter().flatten(), move |scan| {
+            if scan >= scans {
+                return Vec::new();
+            }
+            let explained = explain.iter().filter(|_| scan == 0);
+            let explained = explained.flat_map(|pixel| explain::names(scan, *pixel));
+            let records = kept.into_iter().flat_map(|kept| kept.names(scan));
+            files_of_scan(&formats, scan).chain(records).chain(explained).collect()
+        })
+    }
+
     /// One scan of the sensors in the scene, each a ready one or a file.
     pub fn of(
         sensors: &[OsString],
@@ -93,6 +124,7 @@ impl Scenario {
             records,
             truth: false,
             explain: Vec::new(),
+            has_page: true,
         })
     }
 
@@ -138,7 +170,8 @@ impl Scenario {
             return Err(source.fault(typed.span(), &format!("scans: {sentence}")));
         }
         let (seed, truth) = (file.seed.unwrap_or(1), file.truth);
-        Ok(Self { designs, scene, scans, seed, formats, records, truth, explain: Vec::new() })
+        let (explain, has_page) = (Vec::new(), true);
+        Ok(Self { designs, scene, scans, seed, formats, records, truth, explain, has_page })
     }
 }
 

@@ -11,6 +11,16 @@ use serde_json::Value;
 use super::run::Run;
 use crate::text::{Columns, NO_BREAK, counted, grouped, lasted, short};
 
+/// What was written to a folder, and what to open there.
+pub fn written(files: &[String], folder: &str) -> String {
+    let count = counted(files.len() as u64, "file");
+    let page = Path::new(folder).join(PAGE);
+    match files.iter().any(|file| file == PAGE) {
+        true => format!("{count} and manifest.json to {folder}; open {}", page.display()),
+        false => format!("{count} and manifest.json to {folder}"),
+    }
+}
+
 impl Run<'_> {
     /// A report for people.
     pub fn text(&self, verbose: bool) -> String {
@@ -141,9 +151,7 @@ impl Run<'_> {
     }
 
     fn written(&self) -> String {
-        let files = counted(self.files.len() as u64, "file");
-        let page = Path::new(&self.folder).join(PAGE);
-        format!("{files} and manifest.json to {}; open {}", self.folder, page.display())
+        written(&self.files, &self.folder)
     }
 
     /// The same for programs: the manifest, and what depends on this machine.

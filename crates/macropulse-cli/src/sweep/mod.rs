@@ -9,11 +9,11 @@ use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::scene;
 use macropulse::sim::Watch;
-use macropulse_study::sweep::{Axis, Error, Job, Metric, Plan, Request, Shard};
+use macropulse_study::sweep::{Axis, Error, FILES, Job, Metric, Plan, Request, Shard};
 
 use crate::completions;
 use crate::fault::{Fault, warn};
-use crate::folder::refuse_no_folder;
+use crate::folder::{Outputs, refuse_no_folder};
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
@@ -163,6 +163,7 @@ pub fn run(options: &Sweep, common: &Common) -> Result<(), Fault> {
     let plan = Plan::within(&options.request()?, options.memory.room())?;
     let folder = options.output.as_path();
     plan.check_folder(folder)?;
+    Outputs::named(FILES).check(folder)?;
     let seed = options.seed;
     for job in plan.jobs().filter(|job| job.seed == seed) {
         let (sensor, scene) = (&job.point.sensor.name, &job.point.scene.name);

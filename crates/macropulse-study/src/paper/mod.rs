@@ -96,6 +96,15 @@ pub struct Findings {
     pub claims: Vec<Claim>,
 }
 
+/// Files that [`run`] writes beside the folders of its trials.
+pub const FILES: [&str; 3] = ["points.csv", "claims.json", crate::record::PAGE];
+
+/// The folder of each trial of [`run`].
+pub fn folders() -> Vec<String> {
+    let each = |sensor| DISTANCES.map(|distance| experiment::folder(sensor, distance));
+    SENSORS.into_iter().flat_map(each).collect()
+}
+
 /// Shots that [`run`] tells its watch of.
 ///
 /// # Errors
@@ -128,14 +137,15 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let claims = judge(&measured);
     let environment = experiment::scene(DISTANCES[0])?.environment;
     let findings = Findings { designs, environment, trials, comparisons, measured, claims };
-    write_atomically(&folder.join("points.csv"), |out| {
+    let [points, claims, page] = FILES.map(|file| folder.join(file));
+    write_atomically(&points, |out| {
         out.write_all(tables::points_csv(&findings.trials).as_bytes())
     })?;
-    write_atomically(&folder.join("claims.json"), |out| {
+    write_atomically(&claims, |out| {
         serde_json::to_writer_pretty(&mut *out, &findings.claims)?;
         out.write_all(b"\n")
     })?;
     let html = report::page(&findings, seed)?.html();
-    write_atomically(&folder.join("index.html"), |out| out.write_all(html.as_bytes()))?;
+    write_atomically(&page, |out| out.write_all(html.as_bytes()))?;
     Ok(findings)
 }

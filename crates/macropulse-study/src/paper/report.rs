@@ -40,11 +40,11 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
 
 /// What lies beside the page: the tables, and of each trial a page to explore its cloud.
 fn files(findings: &Findings) -> Vec<String> {
-    let tables = ["points.csv", "claims.json"].map(str::to_owned);
+    let tables = super::FILES[..2].iter().map(|file| (*file).to_owned());
     let pages = findings.trials.iter().map(|trial| {
         format!("{}/{}", experiment::folder(trial.sensor, trial.distance), record::PAGE)
     });
-    tables.into_iter().chain(pages).collect()
+    tables.chain(pages).collect()
 }
 
 fn summary(findings: &Findings) -> Section {

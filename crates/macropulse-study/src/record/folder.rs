@@ -1,14 +1,14 @@
 //! What a run has left in a folder, and which files of it hold the clouds.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use macropulse::formats::{Clouds, LeftOut, Names, Reading};
 use macropulse::opened;
 use macropulse::points::PointCloud;
 use serde_json::Value;
 
-use super::Error;
+use super::{Error, MANIFEST};
 
 /// Endings of the files in a folder that hold clouds, the one that keeps most first. What ends as one
 /// of the last may be many things: there the name must begin as that of a scan.
@@ -26,6 +26,8 @@ pub struct Left {
     pub is_unfinished: bool,
     /// Names of its files: those of the manifest, or else all that may hold clouds.
     pub files: Vec<String>,
+    /// Names that lead out of the folder, by their path or by a link; they are not followed.
+    pub outside: Vec<String>,
 }
 
 impl Left {
@@ -42,7 +44,8 @@ impl Left {
             Some(manifest) => named(&manifest["files"]),
             None => listed(folder)?,
         };
-        Ok(Self { manifest, is_unfinished, files })
+        let (files, outside) = files.into_iter().partition(|file| is_inside(folder, file));
+        Ok(Self { manifest, is_unfinished, files, outside })
     }
 
     /// Names of the files with its clouds. Of several files of one cloud, which differ in their
@@ -84,13 +87,23 @@ fn rank(name: &str) -> Option<usize> {
 }
 
 fn manifest(folder: &Path) -> Result<Option<Value>, Error> {
-    let path = folder.join("manifest.json");
-    if !path.exists() {
+    let path = folder.join(MANIFEST);
+    if !path.exists() || !is_inside(folder, MANIFEST) {
         return Ok(None);
     }
     let text = opened::text(&path).map_err(|cause| unreadable(&path, cause))?;
     let manifest = serde_json::from_str(&text);
     manifest.map(Some).map_err(|cause| Error::Manifest { path, cause })
+}
+
+/// Whether what is called `name` in `folder` lies in it. A name without a file leads nowhere else.
+fn is_inside(folder: &Path, name: &str) -> bool {
+    let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    let leads_out = || match (folder.canonicalize(), folder.join(name).canonicalize()) {
+        (Ok(folder), Ok(file)) => !file.starts_with(folder),
+        _ => false,
+    };
+    is_below && !leads_out()
 }
 
 fn named(list: &Value) -> Vec<String> {
@@ -172,7 +185,8 @@ mod tests {
 
     fn clouds(files: &[&str]) -> Vec<String> {
         let files = files.iter().map(|file| (*file).to_owned()).collect();
-        Left { manifest: None, is_unfinished: false, files }.clouds().into_iter().cloned().collect()
+        let left = Left { manifest: None, is_unfinished: false, files, outside: Vec::new() };
+        left.clouds().into_iter().cloned().collect()
     }
 
     #[test]
@@ -184,6 +198,32 @@ mod tests {
         assert_eq!(clouds(&files[2..]), ["scans.mcap"]);
         let files = ["scan-0.ply", "scan-0-cloudcompare.ply", "scan-1-cloudcompare.ply"];
         assert_eq!(clouds(&files), ["scan-0.ply", "scan-1-cloudcompare.ply"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_outside_the_folder_is_followed() {
+        let desk = tempfile::tempdir().unwrap();
+        let folder = desk.path().join("out");
+        fs::create_dir(&folder).unwrap();
+        let link = |to: &str, name: &str| {
+            std::os::unix::fs::symlink(to, folder.join(name)).unwrap();
+        };
+        fs::write(desk.path().join("secret.pcd"), "").unwrap();
+        fs::write(folder.join("scan-000000.pcd"), "").unwrap();
+        link("../secret.pcd", "scan-000001.pcd");
+        link("scan-000000.pcd", "scan-000002.pcd");
+        let left = Left::of(&folder).unwrap();
+        assert_eq!(left.files, ["scan-000000.pcd", "scan-000002.pcd"]);
+        assert_eq!(left.outside, ["scan-000001.pcd"]);
+        let names = r#"{"files": ["scan-000001.pcd", "../secret.pcd", "/etc/passwd", "a.pcd"]}"#;
+        fs::write(folder.join("manifest.json"), names).unwrap();
+        let left = Left::of(&folder).unwrap();
+        assert_eq!(left.files, ["a.pcd"]);
+        assert_eq!(left.outside, ["scan-000001.pcd", "../secret.pcd", "/etc/passwd"]);
+        fs::rename(folder.join("manifest.json"), desk.path().join("manifest.json")).unwrap();
+        link("../manifest.json", "manifest.json");
+        assert!(Left::of(&folder).unwrap().manifest.is_none());
     }
 
     #[test]

@@ -27,7 +27,7 @@ use serde_json::json;
 
 pub use decoded::Decoded;
 pub use folder::{CloudsAt, Left};
-pub use page::{PAGE, Page, describe, explain, title};
+pub use page::{MANIFEST, PAGE, Page, describe, explain, title};
 pub use pixel::picture as pixel_picture;
 
 /// How the names of range images in colour end.
@@ -116,7 +116,7 @@ impl<'a> Files<'a> {
                     Err(crate::view::Error::Size { .. }) => continue,
                     picture => picture?,
                 };
-                let file = format!("range-{:06}{COLOUR}", cloud.scan);
+                let file = colour_name(cloud.scan);
                 write_atomically(&self.folder.join(&file), |out| out.write_all(&picture))?;
                 files.push(file);
             }
@@ -131,6 +131,11 @@ impl<'a> Files<'a> {
     pub fn finish(self) -> Result<(), Error> {
         Ok(self.recording.finish()?)
     }
+}
+
+/// Name of the range image in colour of a scan.
+pub fn colour_name(scan: u64) -> String {
+    format!("range-{scan:06}{COLOUR}")
 }
 
 /// The range image for people, large enough to see something in.

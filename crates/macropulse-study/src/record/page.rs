@@ -15,10 +15,17 @@ use crate::view::Explorer;
 /// Name of the page that a run leaves.
 pub const PAGE: &str = "index.html";
 
+/// Name of the manifest that a run leaves.
+pub const MANIFEST: &str = "manifest.json";
+
+/// Most scans in the page of a run: each takes time and room, and few look at more.
+const MOST_SCANS: usize = 10;
+
 /// The page of a run in the making: its clouds, scan after scan, and what its manifest tells.
 #[derive(Debug, Clone)]
 pub struct Page {
     explorer: Explorer,
+    scans: usize,
     objects: Vec<String>,
     materials: Vec<String>,
 }
@@ -30,13 +37,20 @@ impl Page {
         let names = |of: fn(&Scene) -> Vec<String>| scene.map(of).unwrap_or_default();
         Self {
             explorer: Explorer::new(&title),
+            scans: 0,
             objects: names(|scene| scene.objects.iter().map(|one| one.name.clone()).collect()),
             materials: names(|scene| scene.materials.iter().map(|one| one.name.clone()).collect()),
         }
     }
 
-    /// Adds a scan, with the truth if the cloud has it. The page says how many have no room in it.
+    /// Adds a scan, with the truth if the cloud has it. The page shows the first ten, and says how many it
+    /// leaves out.
     pub fn add(&mut self, cloud: &PointCloud) {
+        self.scans += 1;
+        if self.scans > MOST_SCANS {
+            self.explorer.leave_out();
+            return;
+        }
         let names = Names { objects: &self.objects, materials: &self.materials };
         self.explorer.cloud(&format!("scan {}", cloud.scan), cloud, &names);
     }
@@ -48,7 +62,7 @@ impl Page {
     /// If it cannot be written.
     pub fn write(mut self, folder: &Path, manifest: &Value) -> Result<(), formats::Error> {
         describe(&mut self.explorer, manifest);
-        self.explorer.file("manifest.json");
+        self.explorer.file(MANIFEST);
         let files = manifest["files"].as_array().into_iter().flatten().filter_map(Value::as_str);
         for file in files.filter(|file| *file != PAGE) {
             self.explorer.file(file);

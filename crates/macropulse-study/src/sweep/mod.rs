@@ -21,7 +21,7 @@ pub use job::{Counted, Job};
 pub use metric::Metric;
 pub use plan::{Plan, Point, Request};
 pub use shard::Shard;
-pub use table::{Row, Table};
+pub use table::{FILES, Row, Table};
 
 /// Why a sweep was not made. Each message is one sentence.
 #[derive(Debug, thiserror::Error)]

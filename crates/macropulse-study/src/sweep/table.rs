@@ -10,7 +10,7 @@ use macropulse::formats::{Surroundings, quoted, versioned, write_atomically};
 use macropulse::score::Estimate;
 
 /// Files written beside the manifest.
-const FILES: [&str; 4] = ["index.html", "sweep.csv", "sweep.svg", "sweep.png"];
+pub const FILES: [&str; 4] = ["index.html", "sweep.csv", "sweep.svg", "sweep.png"];
 
 /// Scores of every point, with intervals.
 #[derive(Debug, Clone, PartialEq)]

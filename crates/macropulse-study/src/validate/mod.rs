@@ -102,18 +102,17 @@ pub fn run(seed: u64, watch: &Watch) -> Result<Findings, Error> {
     Ok(Findings { seed, published, forecasts: all })
 }
 
-/// Writes `findings` into `folder`: `validation.md`, `validation.json`, and `index.html` last.
+/// Files that [`write`] writes, the page last.
+pub const FILES: [&str; 3] = ["validation.md", "validation.json", "index.html"];
+
+/// Writes `findings` into `folder`, as [`FILES`].
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write(findings: &Findings, folder: &Path) -> Result<(), Error> {
     let json = serde_json::to_string_pretty(&findings).unwrap_or_default() + "\n";
-    let files = [
-        ("validation.md", findings.markdown()),
-        ("validation.json", json),
-        ("index.html", page::html(findings)),
-    ];
-    for (name, text) in files {
+    let texts = [findings.markdown(), json, page::html(findings)];
+    for (name, text) in FILES.into_iter().zip(texts) {
         write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))?;
     }
     Ok(())

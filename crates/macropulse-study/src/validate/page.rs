@@ -205,7 +205,7 @@ pub(super) fn html(findings: &Findings) -> String {
         });
     let forecasts = Section::new("Forecasts").paragraph(&of_forecasts(findings)).table(table);
     page.section(forecasts)
-        .files(&["validation.md", "validation.json"].map(str::to_owned))
+        .files(&[super::FILES[0], super::FILES[1]].map(str::to_owned))
         .footer(&format!("macropulse {}, seed {}.", env!("CARGO_PKG_VERSION"), findings.seed))
         .html()
 }

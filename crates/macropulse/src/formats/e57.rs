@@ -40,8 +40,10 @@ pub(super) fn encode(cloud: &PointCloud, names: &Names) -> e57::Result<Vec<u8>> 
     points.set_name(Some(format!("scan {scan}")));
     let lines = [scan_line(cloud), list_line(cloud)].into_iter().chain(stamp_line(cloud));
     let lines = lines.chain(name_lines(names));
-    points.set_description(Some(unclosed(&lines.collect::<Vec<_>>().join("
-"))));
+    points.set_description(Some(unclosed(&lines.collect::<Vec<_>>().join(
+        "
+",
+    ))));
     points.set_transform(Some(transform(&cloud.viewpoint)));
     points.set_acquisition_start(cloud.stamp_ns.map(|stamp| DateTime {
         gps_time: stamp as f64 * 1e-9 - GPS_BEHIND_S,

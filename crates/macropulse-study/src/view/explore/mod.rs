@@ -78,17 +78,20 @@ impl Explorer {
     /// where they span more than a thousand million steps.
     pub fn cloud(&mut self, label: &str, cloud: &PointCloud, names: &Names) {
         if self.used >= ROOM {
-            self.left_out += 1;
-            return;
+            return self.leave_out();
         }
         let scan = Scan::of(label, cloud, names);
         self.used += scan.size();
         if self.used > ROOM && !self.scans.is_empty() {
             self.used = ROOM;
-            self.left_out += 1;
-            return;
+            return self.leave_out();
         }
         self.scans.push(scan);
+    }
+
+    /// Counts a cloud that is not to be in the page.
+    pub fn leave_out(&mut self) {
+        self.left_out += 1;
     }
 
     /// Adds a section below the cloud, as of what was sent and received of one pixel. One called
