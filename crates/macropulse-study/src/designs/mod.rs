@@ -24,7 +24,7 @@ pub use ablation::Ablation;
 pub use bill::{Bill, Converter};
 pub use candidate::Candidate;
 pub use closed::{Assessed, Worst};
-pub use files::{PAGE, files, make_room};
+pub use files::{PAGE, make_room};
 pub use frontier::{CHANNELS, Frontier, Row};
 pub use in_flight::InFlight;
 pub use mirrors::{Mirror, Side};
