@@ -31,6 +31,24 @@ impl Verdict {
     }
 }
 
+/// All claims as Markdown, sorted by their verdicts: how docs/paper.md ends.
+pub fn listing(claims: &[Claim]) -> String {
+    use Verdict::{Assumed, Fails, Holds, Partly, Unsaid};
+    let mut text = String::new();
+    for verdict in [Holds, Partly, Fails, Unsaid, Assumed] {
+        let name = verdict.name();
+        text += &format!(
+            "\n### Verdict: {name}\n\n| row | the paper says | measured |\n|---|---|---|\n"
+        );
+        for claim in claims.iter().filter(|claim| claim.verdict == verdict) {
+            let cell = |text: &str| text.replace('|', "\\|");
+            let (said, measured) = (cell(claim.claim), cell(&claim.measured));
+            text += &format!("| `{}` | {said} | {measured} |\n", claim.id);
+        }
+    }
+    text
+}
+
 /// One claim of \[KP16\].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Claim {

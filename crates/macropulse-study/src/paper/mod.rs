@@ -11,17 +11,19 @@ mod pictures;
 mod receivers;
 mod report;
 mod tables;
+mod walls;
 
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-pub use claim::{Claim, Verdict};
+pub use claim::{Claim, Verdict, listing};
 pub use claims::{NOT_MEASURED, RECOGNISED, judge, judge_on_paper};
 pub use experiment::{DISTANCES, SENSORS, Trial};
 pub use geometry::{Prediction, predict};
 pub use measured::{Measured, OnPaper};
 pub use receivers::{Comparison, PERFECT};
+pub use walls::Wall;
 
 use macropulse::design::Design;
 use macropulse::environment::Environment;
@@ -97,7 +99,7 @@ pub struct Findings {
 }
 
 /// Files that [`run`] writes beside the folders of its trials.
-pub const FILES: [&str; 3] = ["points.csv", "claims.json", crate::record::PAGE];
+pub const FILES: [&str; 4] = ["points.csv", "claims.json", "claims.md", crate::record::PAGE];
 
 /// The folder of each trial of [`run`].
 pub fn folders() -> Vec<String> {
@@ -119,7 +121,7 @@ fn designs() -> Result<Vec<Design>, Error> {
 }
 
 /// Runs the whole experiment and writes into `folder`: one folder per sensor and distance,
-/// `points.csv`, `claims.json`, and `index.html` last.
+/// `points.csv`, `claims.json`, `claims.md`, and `index.html` last.
 ///
 /// # Errors
 /// If something cannot be written, or the watch says stop.
@@ -133,17 +135,21 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     });
     let trials = trials.collect::<Result<Vec<_>, Error>>()?;
     let comparisons = receivers::compare(seed, watch)?;
-    let measured = Measured::of(&designs[0], &trials, &comparisons)?;
+    let walls = walls::near_and_far(&designs, seed)?;
+    let measured = Measured::of(&designs[0], &trials, &comparisons, walls)?;
     let claims = judge(&measured);
     let environment = experiment::scene(DISTANCES[0])?.environment;
     let findings = Findings { designs, environment, trials, comparisons, measured, claims };
-    let [points, claims, page] = FILES.map(|file| folder.join(file));
+    let [points, claims, list, page] = FILES.map(|file| folder.join(file));
     write_atomically(&points, |out| {
         out.write_all(tables::points_csv(&findings.trials).as_bytes())
     })?;
     write_atomically(&claims, |out| {
         serde_json::to_writer_pretty(&mut *out, &findings.claims)?;
         out.write_all(b"\n")
+    })?;
+    write_atomically(&list, |out| {
+        out.write_all(listing(&findings.claims).as_bytes())
     })?;
     let html = report::page(&findings, seed)?.html();
     write_atomically(&page, |out| out.write_all(html.as_bytes()))?;

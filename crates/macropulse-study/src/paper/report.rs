@@ -40,7 +40,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
 
 /// What lies beside the page: the tables, and of each trial a page to explore its cloud.
 fn files(findings: &Findings) -> Vec<String> {
-    let tables = super::FILES[..2].iter().map(|file| (*file).to_owned());
+    let tables = super::FILES[..3].iter().map(|file| (*file).to_owned());
     let pages = findings.trials.iter().map(|trial| {
         format!("{}/{}", experiment::folder(trial.sensor, trial.distance), record::PAGE)
     });

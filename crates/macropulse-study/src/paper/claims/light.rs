@@ -134,7 +134,7 @@ fn energy(found: &Light) -> Vec<Claim> {
             found.pd_by_night >= 0.5,
             format!(
                 "at {:.2} nJ, 25 mm aperture and 0.7 optics: {:.1} photons a macropulse, {:.2} a \
-                 micropulse. A receiver that matches whole macropulses has by night Pd {:.3} at \
+                 micropulse. A receiver that matches whole macropulses has by night, simulated, Pd {:.3} at \
                  {:.0} m and 0.9 at {:.0} m, by day, staring, with {:.0} photons of sunlight in \
                  every chip, Pd {:.3}. Mark by mark it would need {:.1} a \
                  micropulse. Declared by sensitivity instead",

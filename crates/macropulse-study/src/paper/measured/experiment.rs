@@ -2,6 +2,7 @@
 
 use crate::paper::experiment::Trial;
 use crate::paper::receivers::Comparison;
+use crate::paper::walls::Wall;
 use macropulse::points::Outcome;
 
 /// What the experiment found.
@@ -11,6 +12,8 @@ pub struct Experiment {
     pub seen: Vec<Seen>,
     /// Receivers compared.
     pub shares: Vec<Share>,
+    /// A wall near by and one far away, by sensor.
+    pub walls: Vec<[Wall; 2]>,
 }
 
 /// The car, as one sensor sees it at one distance.
@@ -92,6 +95,7 @@ impl Experiment {
         Self {
             seen: trials.iter().map(seen).collect(),
             shares: comparisons.iter().map(share).collect(),
+            walls: Vec::new(),
         }
     }
 

@@ -19,6 +19,7 @@ pub use system::{Converters, Head, Light, Timing};
 use super::Error;
 use super::experiment::Trial;
 use super::receivers::Comparison;
+use super::walls::Wall;
 use macropulse::design::Design;
 
 /// What follows from the sensors alone, without an experiment.
@@ -78,10 +79,11 @@ impl Measured {
         design: &Design,
         trials: &[Trial],
         comparisons: &[Comparison],
+        walls: Vec<[Wall; 2]>,
     ) -> Result<Self, Error> {
         Ok(Self {
             on_paper: OnPaper::of(design)?,
-            experiment: Experiment::of(trials, comparisons),
+            experiment: Experiment { walls, ..Experiment::of(trials, comparisons) },
             roles: roles::printed(),
         })
     }

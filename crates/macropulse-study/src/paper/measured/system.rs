@@ -3,6 +3,7 @@
 use std::f64::consts::{LN_2, PI};
 
 use super::Error;
+use crate::paper::walls::Wall;
 use macropulse::channel::Link;
 use macropulse::codec::statistics::binomial_tail;
 use macropulse::design::safety::Class1;
@@ -254,10 +255,15 @@ impl Light {
         let through_air = Link::of(&honest, &day).transmission(range).powi(2);
         let photons = budget.photons(budget.energy, 1.0, range) * through_air;
         let per_mark = photons / derived.marks.1;
+        // A declared sensitivity is that without air.
+        let in_vacuum = budget.photons(budget.energy, 1.0, range) / derived.marks.1;
         let irradiance = day.irradiance(wavelength).unwrap_or(f64::NAN);
         let limits = Class1::at(wavelength);
         let by_day = Forecaster::new(&honest, &day)?;
-        let by_night = Forecaster::new(&honest, &day.at_night())?;
+        let seen_by_night = |range: f64| -> Result<f64, Error> {
+            let sensor = ("kim-park-2016-physical", &honest);
+            Ok(Wall::of(sensor, (range, 1.0), "night", SEED)?.seen)
+        };
         let mirror = [1.1e-3, 1.2e-3];
         let takes = |side: f64| libm::erf(std::f64::consts::SQRT_2 * side / beam);
         Ok(Self {
@@ -283,16 +289,36 @@ impl Light {
             energy_lax: lax.energy,
             energy_alone: limits.map_or(f64::NAN, |l| l.single_exposure(derived.macropulse)),
             power: limits.map_or(f64::NAN, |l| l.continuous()),
-            energy_needed: budget.energy * derived.reference_photons / per_mark,
+            energy_needed: budget.energy * derived.reference_photons / in_vacuum,
             photons,
             photons_per_mark: per_mark,
             photons_declared: derived.reference_photons,
             sunlight: budget.background(irradiance, day.albedo) * s_from_fs(design.coding.chip_fs),
             pd_by_day: by_day.forecast(1.0, range).pd,
-            pd_by_night: by_night.forecast(1.0, range).pd,
-            range_by_night: by_night.farthest(0.9, 1.0).unwrap_or(0.0),
+            pd_by_night: seen_by_night(range)?,
+            range_by_night: farthest(range, |range| Ok(seen_by_night(range)? >= 0.9))?,
         })
     }
+}
+
+/// Seed of what is simulated for numbers on paper.
+const SEED: u64 = 1;
+
+/// The farthest range up to `most` metres, to 1 % of it, at which `is_seen`; 0 if it is not seen at
+/// half of it.
+fn farthest(most: f64, is_seen: impl Fn(f64) -> Result<bool, Error>) -> Result<f64, Error> {
+    let (mut near, mut far) = (most / 2.0, most);
+    if is_seen(far)? {
+        return Ok(far);
+    }
+    if !is_seen(near)? {
+        return Ok(0.0);
+    }
+    while far - near > 0.01 * most {
+        let middle = (near + far) / 2.0;
+        if is_seen(middle)? { near = middle } else { far = middle }
+    }
+    Ok(near)
 }
 
 /// The HDL-64E, as it is here and as its makers count.
