@@ -20,6 +20,9 @@ const STEPS: f64 = 2.5;
 /// point, with this 2.5·10⁻⁴; it costs a twentieth of the light.
 const FALSE_SHARE: f64 = 0.03;
 
+/// How long a lidar that waits may be blanked, ns: to 3 m. The nearest targets of a trial stand at 4 m.
+const LATE: f64 = 20.0;
+
 /// What a lidar does between its shots: as a code lets it, no more than its mirror asks, or until every echo
 /// is back.
 pub(super) const SCHEMES: [&str; 2] = ["coded", "waiting"];
@@ -45,6 +48,9 @@ pub struct Candidate {
     pub aperture: f64,
     /// Its words; `None` of one that waits.
     pub words: Option<Separated>,
+    /// Whether it listens no nearer than [`LATE`], because its stray light lasts longer than the sensor of the
+    /// requirements is blanked.
+    pub is_late: bool,
 }
 
 /// What is built of it for a purpose.
@@ -175,6 +181,10 @@ impl Candidate {
         set("detector.sampled.capacitance_pf", self.part.capacitance_pf.into());
         set("detector.sampled.bandwidth_mhz", (self.bandwidth * 1e-6).into());
         set("detector.sampled.step_photons", step.into());
+        if self.is_late {
+            let usual = number(&required.template, "receiver.blank_ns").unwrap_or(0.0);
+            set("receiver.blank_ns", usual.max(LATE).into());
+        }
         set("receiver.false_alarm", (FALSE_SHARE * wanted.false_points).into());
         match &self.words {
             None => {

@@ -73,15 +73,23 @@ pub(super) fn for_eyes(required: &Requirements, dim: Candidate) -> Result<Candid
 
 /// As bright as eyes and its own stray light allow.
 pub(super) fn brightest(required: &Requirements, dim: Candidate) -> Result<Candidate, Error> {
-    let bright = for_eyes(required, dim)?;
-    let share = bearable(&bright.unlimited(required)?);
+    let (bright, share) = bearable(required, for_eyes(required, dim)?)?;
     Ok(Candidate { energy: share * bright.energy, ..bright })
 }
 
-/// Share of its light with which the stray light of its own marks is over when a channel listens again.
-fn bearable(design: &Design) -> f64 {
+/// `candidate`, and the share of its light with which the stray light of its own marks is over when a channel listens
+/// again. One that waits listens later if it must.
+fn bearable(required: &Requirements, candidate: Candidate) -> Result<(Candidate, f64), Error> {
     // A little less, so that no rounding is more.
-    stray_room(design).map_or(1.0, |room| (room * (1.0 - 1e-9)).min(1.0))
+    let share =
+        |design: &Design| stray_room(design).map_or(1.0, |room| (room * (1.0 - 1e-9)).min(1.0));
+    let at_once = share(&candidate.unlimited(required)?);
+    if at_once == 1.0 || !candidate.waits() {
+        return Ok((candidate, at_once));
+    }
+    let late = Candidate { is_late: true, ..candidate };
+    let share = share(&late.unlimited(required)?);
+    Ok((late, share))
 }
 
 /// The target wanted sends back so much of what the converter has codes for at most. More light would find nothing
@@ -281,9 +289,9 @@ impl CostFunction for Cost<'_> {
         if over > 1.0 {
             return Ok(MOST.ln() + beside + over);
         }
+        let (candidate, share) = bearable(required, candidate)?;
         let design = candidate.unlimited(required)?;
-        let forecaster = Forecaster::new(&design, &required.environment)?;
-        let forecaster = forecaster.with_light(bearable(&design));
+        let forecaster = Forecaster::new(&design, &required.environment)?.with_light(share);
         let period = design.scan.shortest_period();
         let range = required.wanted.range_m;
         let smeared = slant(&design, range).map_or(0.0, |check| check.shortfall.max(1.0).ln());

@@ -42,6 +42,8 @@ impl InFlight {
     /// numbers allowed leaves enough time.
     pub(super) fn of(required: &Requirements, waiting: &Candidate) -> Result<Option<Self>, Error> {
         let wanted = &required.wanted;
+        // Blanked no longer than a coded one: what leaves later is in flight with the echoes.
+        let waiting = &Candidate { is_late: false, ..waiting.clone() };
         let design = waiting.unlimited(required)?;
         let Some(blind) = design.receiver.sampling.as_ref().and_then(Blind::at_most) else {
             return Ok(None);

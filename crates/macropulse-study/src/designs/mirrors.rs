@@ -28,7 +28,8 @@ pub struct Side {
     pub tip_speed: f64,
 }
 
-/// Every number of facets with the lidars that do, if any; empty where there is no polygon.
+/// Every number of facets with the lidars that do, as far as the polygon of one of them is not too large; empty where
+/// there is no polygon.
 pub(super) fn mirrors(
     required: &Requirements,
     best: [Option<&Trial>; 2],
@@ -60,5 +61,7 @@ pub(super) fn mirrors(
         duty: required.duty(facets),
         sides: [coded, waiting, flying].map(|needs| side(facets, needs)),
     };
-    required.facets().into_iter().map(of_facets).collect()
+    let most = required.parts.polygon_mm * 1e-3;
+    let fits = |mirror: &Mirror| mirror.sides.iter().flatten().any(|side| side.diameter <= most);
+    required.facets().into_iter().map(of_facets).filter(fits).collect()
 }

@@ -36,8 +36,8 @@ const HALVINGS: u32 = 3;
 /// Apertures are rounded up to so much, m.
 const ROUND: f64 = 0.5e-3;
 
-/// Closed forms leave so many times the aperture that they ask for, so that a simulation may ask for more, or else a
-/// mirror with fewer facets is taken, which holds more. Found apertures are up to 1.2 times those of closed forms.
+/// A mirror must hold so many times the aperture that closed forms ask for, as simulations ask for more; or else one
+/// with fewer facets is taken, which holds more.
 const SPARE: f64 = 1.25;
 
 /// All that was found.
@@ -258,6 +258,7 @@ impl Combination<'_> {
             energy: DIM,
             aperture: required.parts.aperture_mm[1] * 1e-3,
             words: None,
+            is_late: false,
         };
         let dim = required.with_shortest_words(dim)?;
         let rough = self.possible(&dim, &mut Vec::new());

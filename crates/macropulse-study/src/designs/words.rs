@@ -177,8 +177,18 @@ mod tests {
             let (part, energy, words) = (required.detectors[0].clone(), DIM, None);
             let marks = 3;
             let facets = required.usual_facets();
-            let bare =
-                Candidate { part, marks, beams, facets, pulse, bandwidth, energy, aperture, words };
+            let bare = Candidate {
+                part,
+                marks,
+                beams,
+                facets,
+                pulse,
+                bandwidth,
+                energy,
+                aperture,
+                words,
+                is_late: false,
+            };
             let short = required.with_shortest_words(bare).unwrap();
             let best = required.with_best_words(&short).unwrap();
             let lost = |it: &Candidate| {
