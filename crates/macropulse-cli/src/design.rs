@@ -45,7 +45,7 @@ pub struct Design {
 pub fn run(options: &Design, common: &Common) -> Result<(), Fault> {
     let required = Requirements::open(&options.requirements)?;
     // The search itself knows which results it has written, and replaces no others.
-    let mut folder = Folder::claim_alone(&options.output, Outputs::named::<&str>([]))?;
+    let mut folder = Folder::claim_alone(&options.output, Outputs::named([] as [&str; 0]))?;
     let interrupt = Interrupt::listen()?;
     folder.make()?;
     // What is counted stays there for the next time, however this one ends.

@@ -1,7 +1,7 @@
 //! `macropulse convert`: what arrives, what is said to be left out, what is refused.
 #![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use std::fs;
 

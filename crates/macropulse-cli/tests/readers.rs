@@ -2,7 +2,7 @@
 //! what Python packages find in the files against what NumPy does.
 #![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use std::io::Write;
 use std::path::Path;

@@ -3,7 +3,7 @@
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
-mod common;
+use crate::common;
 #[path = "schema/scenes.rs"]
 mod scenes;
 

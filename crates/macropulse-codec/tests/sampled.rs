@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod waveform;
+use crate::waveform;
 
 use macropulse_codec::decode::{MarkSeen, MarkState, Receiver, Reject, Returns, Sampling};
 use macropulse_codec::level::forced::at_each_level;

@@ -573,3 +573,24 @@ fn only_kernels_are_unsafe() {
         }
     }
 }
+
+/// A file of `tests` that neither `all.rs` nor the list of test programs names would not run.
+#[test]
+fn every_file_of_tests_is_run() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut files = 0;
+    for name in ["macropulse", "macropulse-cli", "macropulse-codec", "macropulse-study"] {
+        let folder = crates.join(name);
+        let all = fs::read_to_string(folder.join("tests/all.rs")).unwrap();
+        let programs = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        for entry in fs::read_dir(folder.join("tests")).unwrap() {
+            let file = entry.unwrap().file_name().into_string().unwrap();
+            let Some(module) = file.strip_suffix(".rs") else { continue };
+            let is_module = all.contains(&format!("\nmod {module};\n"));
+            let is_program = programs.contains(&format!("path = \"tests/{file}\""));
+            assert!(is_module != is_program, "{name}/tests/{file}: name it in all.rs");
+            files += 1;
+        }
+    }
+    assert!(files > 50, "{files}");
+}

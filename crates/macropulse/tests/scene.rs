@@ -1,8 +1,7 @@
 //! Scenes from files: where things stand, and what each wrong file leads to.
 #![allow(clippy::unwrap_used)]
 
-#[path = "scene/tetra.rs"]
-mod tetra;
+use crate::tetra;
 
 use std::path::Path;
 

@@ -1,8 +1,7 @@
 //! Meshes from files: what each format and each damaged file leads to.
 #![allow(clippy::unwrap_used)]
 
-#[path = "scene/tetra.rs"]
-mod tetra;
+use crate::tetra;
 
 use std::fs;
 use std::path::{Path, PathBuf};

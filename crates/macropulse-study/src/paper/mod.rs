@@ -148,9 +148,7 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
         serde_json::to_writer_pretty(&mut *out, &findings.claims)?;
         out.write_all(b"\n")
     })?;
-    write_atomically(&list, |out| {
-        out.write_all(listing(&findings.claims).as_bytes())
-    })?;
+    write_atomically(&list, |out| out.write_all(listing(&findings.claims).as_bytes()))?;
     let html = report::page(&findings, seed)?.html();
     write_atomically(&page, |out| out.write_all(html.as_bytes()))?;
     Ok(findings)

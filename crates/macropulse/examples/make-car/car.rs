@@ -6,8 +6,8 @@
 
 use std::error::Error;
 
-use crate::mesh::Mesh;
-use crate::parts::{self, Sheet};
+use super::mesh::Mesh;
+use super::parts::{self, Sheet};
 
 /// Length, width and height of the car, m. The mesh has exactly this bounding box.
 pub const SIZE: [f64; 3] = [4.70, 1.82, 1.42];

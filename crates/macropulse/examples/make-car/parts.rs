@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use macropulse::scene::{Ray, Scene};
 
-use crate::car::{AXLES, PAINT, TRIM, WHEEL_RADIUS};
-use crate::mesh::Mesh;
+use super::car::{AXLES, PAINT, TRIM, WHEEL_RADIUS};
+use super::mesh::Mesh;
 
 const RUBBER: &str = "rubber";
 const RIM: &str = "metal";

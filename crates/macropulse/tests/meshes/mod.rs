@@ -2,8 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 #[allow(dead_code, reason = "other tests use more of it")]
-#[path = "../scene/tetra.rs"]
-mod tetra;
+use crate::tetra;
 
 mod gltf;
 mod obj;

@@ -1,0 +1,11 @@
+//! The tests of the codec across its modules, as one program: it is linked once, and its tests share
+//! the cores. A test that limits its own process is a program of its own.
+#![allow(missing_docs)]
+
+mod waveform;
+
+mod contract;
+mod files;
+mod readme;
+mod sample_files;
+mod sampled;
