@@ -275,6 +275,7 @@ fn what_a_receiver_refuses_is_refused_with_its_key() {
     ];
     let said = told("coded-32", &long);
     assert!(said.contains("detector.sampled.sample_ps: is 1 ps, too short for a mark"), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
     let said = told("kim-park-2016", &[("scan.raster.columns", "1")]);
     assert!(said.contains("code.allow_dark: no label of this sensor sends any light"), "{said}");
     let said = told("coded-32", &[("detector.sampled.step_photons", "1e12")]);

@@ -142,6 +142,10 @@ impl Check<'_> {
             pick,
             sampling: self.sampling(file, coding, sampled)?,
         };
+        // A detector that was refused leaves open what the receiver knows of it.
+        if samples && sampled.is_none() {
+            return Ok(receiver);
+        }
         // What the receiver itself asks before it decodes; the keys ask most of it already.
         match receiver.check(&coding.codebook) {
             Err(decode::Error::TooLong { what, ticks, possible }) => self.refuse(
