@@ -99,7 +99,7 @@ impl Reader {
 ///
 /// # Errors
 /// If it is negative or too large; `TypeError` if it is no whole number.
-pub fn whole<'py, N>(given: &Bound<'py, PyAny>) -> PyResult<N>
+pub fn whole<N>(given: &Bound<'_, PyAny>) -> PyResult<N>
 where
     N: TryFrom<u64>,
 {
