@@ -25,8 +25,9 @@ use crate::text::{Columns, counted, print, print_json};
 
 /// Check sensors, scenes and scenarios, and print what follows from them
 ///
-/// Prints derived quantities, every default used, every idealisation with what it assumes, and
-/// warnings. Which of the three a file is, is told by its content.
+/// Prints derived quantities, every default used, every idealisation with what it assumes, what is
+/// not modelled and how large it is, and warnings. The content of a file tells which of the three it
+/// is.
 #[derive(Args)]
 #[command(after_help = "Example:
   macropulse check kim-park-2016 mine.toml")]
