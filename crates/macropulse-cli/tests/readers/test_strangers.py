@@ -215,7 +215,8 @@ def test_every_scan_of_an_e57_survives_with_its_pose(tmp_path):
     assert len(files) == 3 and ran.stdout.startswith("3 scans, 90 points, 4 files")
     for at, path in enumerate(files):
         np.testing.assert_array_equal(read_e57(path), scans[at])
-        header = pye57.E57(str(path)).get_header(0)
+        file = pye57.E57(str(path))
+        header = file.get_header(0)
         np.testing.assert_allclose(header.rotation, turns[at])
         np.testing.assert_allclose(header.translation, [at, 10.5, 0])
     (bag,) = (tmp_path / "out").glob("*.mcap")

@@ -32,7 +32,8 @@ impl Scans {
             return Err("it has no scan".to_owned());
         }
         let mut about = About::within(room);
-        about.left_out.reference_system = reader.coordinate_metadata().map(str::to_owned);
+        let system = reader.coordinate_metadata().map(str::trim).filter(|text| !text.is_empty());
+        about.left_out.reference_system = system.map(str::to_owned);
         Ok(Self { reader, size, scans, next: 0, about })
     }
 

@@ -27,7 +27,7 @@ function attributesOf(cloud, at, outcomes) {
 // never misses has no scale for it, and says 1.
 function isBound(cloud, at) {
   const { intensity, flags } = cloud.values;
-  return (flags?.[at] & 4) !== 0 && intensity[at] !== 1;
+  return (flags?.[at] & 4) !== 0 && intensity?.[at] !== 1;
 }
 
 // Decimals that values of this step have.
