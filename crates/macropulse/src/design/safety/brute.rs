@@ -12,7 +12,7 @@ use crate::design::Design;
 /// The energy that the search allows is at most this share above that of the worst place of a grid.
 const TOLERANCE: f64 = 0.02;
 /// Places of a grid at most, and shots that are looked at there.
-const PLACES: f64 = 600.0;
+const PLACES: f64 = 200.0;
 const SHOTS: f64 = 2e5;
 
 /// A shot: where it goes, when, and how bright it is beside the mean one.
@@ -39,25 +39,33 @@ fn shots(design: &Design) -> Vec<Shot> {
 }
 
 /// The share of a beam of radius `beam` that falls into a circle of `radius`, by how many steps of a 128th of
-/// the way to where there is none it is off: the sum over rings and sectors of the circle.
+/// the way to where there is none it is off: of 4096 places of the smaller one with the same light or area, those
+/// within the other, or the light there.
 fn shares(radius: f64, beam: f64) -> (f64, Vec<f64>) {
-    let reach = radius + 2.0 * beam;
-    let step = reach / 128.0;
-    if beam <= 0.0 {
-        return (step, vec![1.0; 129]);
-    }
+    let step = (radius + 2.0 * beam) / 128.0;
+    let mean = |of_ring: &dyn Fn(f64) -> f64, at: &dyn Fn(f64) -> f64, off: f64| {
+        let ring = |ring: u32| {
+            let r = of_ring((f64::from(ring) + 0.5) / 64.0);
+            let angles = (0..64).map(|sector| (f64::from(sector) + 0.5) / 64.0 * 2.0 * PI);
+            angles.map(|angle| at((off + r * angle.cos()).hypot(r * angle.sin()))).sum::<f64>()
+        };
+        (0..64).map(ring).sum::<f64>() / 4096.0
+    };
     let share = |place: u32| {
         let off = f64::from(place) * step;
-        let mut sum = 0.0;
-        for ring in 0..32 {
-            let r = (f64::from(ring) + 0.5) / 32.0 * radius;
-            for sector in 0..32 {
-                let angle = (f64::from(sector) + 0.5) / 32.0 * 2.0 * PI;
-                let square = r * r + off * off - 2.0 * r * off * angle.cos();
-                sum += r * (-2.0 * square / (beam * beam)).exp();
+        match beam {
+            // A beam without width passes at the rim, too, and not at once beyond.
+            0.0 => 1.0,
+            beam if beam < radius => {
+                let ring = |part: f64| beam * (-(1.0 - part).ln() / 2.0).sqrt();
+                mean(&ring, &|r| f64::from(u8::from(r <= radius)), off)
+            }
+            beam => {
+                let light =
+                    |r: f64| 2.0 * (-2.0 * (r / beam).powi(2)).exp() * (radius / beam).powi(2);
+                mean(&|part: f64| radius * part.sqrt(), &light, off)
             }
         }
-        sum * (radius / 32.0) * (2.0 * PI / 32.0) * 2.0 / (PI * beam * beam)
     };
     (step, (0..=128).map(share).collect())
 }
@@ -90,7 +98,7 @@ fn allowed(
         _ => 1.0,
     };
     // Every run, or where these are too many those of a few hundred lengths.
-    let stride = (count / 64).max(1);
+    let stride = (count / 16).max(1);
     for first in 0..count {
         let mut sum = 0.0;
         for last in first..first + count {
@@ -110,10 +118,14 @@ fn allowed(
     }
     if let [Some(first), Some(last)] = [all.first(), all.last()] {
         let pass = last[0] - first[0] + lasts;
-        for scans in 2..=(100.0 / period) as u32 + 1 {
-            let t = f64::from(scans - 1) * period + pass;
-            if judged(t) && t <= 100.0 {
-                least[2] = least[2].min(class.single_exposure(t) / (once * f64::from(scans)));
+        // What is allowed to a scan falls with their number up to 10 s, and beyond that from there on.
+        for end in [10.0, durations[1].min(100.0)] {
+            let most = ((end - pass) / period) as u32 + 1;
+            for scans in [2, most, most + 1] {
+                let t = f64::from(scans - 1) * period + pass;
+                if scans > 1 && judged(t) && t <= 100.0 {
+                    least[2] = least[2].min(class.single_exposure(t) / (once * f64::from(scans)));
+                }
             }
         }
         if durations[1].is_infinite() {
@@ -265,7 +277,7 @@ fn drawn(number: u64) -> (String, Design) {
         _ => format!(
             "scan.rosette = {{ shots_per_s = {}, prisms = [{{ deflection_deg = {}, turns_per_s = {} }}, \
              {{ deflection_deg = {}, turns_per_s = {} }}] }}",
-            (rate * between(200.0, 2000.0)).round(),
+            (rate * between(100.0, 500.0)).round(),
             between(0.3, 4.0),
             between(20.0, 150.0),
             between(0.3, 4.0),

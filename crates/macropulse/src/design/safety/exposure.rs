@@ -278,15 +278,15 @@ impl<'a> Train<'a> {
         while longest < period {
             longest = (longest * 2.0).min(period);
             let mut strictest: Option<(f64, [usize; 2])> = None;
-            let mut most = (0.0, f64::INFINITY);
             for run in self.runs(longest) {
-                let (sum, duration) = (self.sum(run)[1], self.duration(run));
-                // Less light in more time is allowed more.
-                if sum <= most.0 && duration >= most.1 || duration <= least {
-                    continue;
+                // Less light in more time than that of the strictest is allowed more.
+                let is_less = strictest.is_some_and(|(_, other)| {
+                    self.sum(run)[1] <= self.sum(other)[1]
+                        && self.duration(run) >= self.duration(other)
+                });
+                if !is_less {
+                    self.keep(&mut strictest, run, least);
                 }
-                most = (sum, duration);
-                self.keep(&mut strictest, run, least);
             }
             // A part of it may be allowed less, for a shorter time.
             for _ in 0..2 {

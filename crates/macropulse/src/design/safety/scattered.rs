@@ -10,7 +10,7 @@ use super::worst::{Aim, Field, coarse_first};
 use crate::design::Scan;
 
 /// Shots that a search may look at.
-const EFFORT: usize = 3_000_000;
+const EFFORT: usize = 600_000;
 
 /// The beams of a scan, in the order in which they are sent.
 pub(super) struct Scattered<'a> {

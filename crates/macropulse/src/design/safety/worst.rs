@@ -15,11 +15,11 @@ use super::exposure::Crossing;
 /// Places tried along the width of the light that passes an aperture, to begin with.
 const STEPS: f64 = 8.0;
 /// Places of each rule that are refined.
-const FINALISTS: usize = 5;
+const FINALISTS: usize = 3;
 /// Times the steps are halved by which a place is refined.
-const HALVINGS: u32 = 5;
+const HALVINGS: u32 = 4;
 /// Moves by steps of one length.
-const MOVES: u32 = 4;
+const MOVES: u32 = 3;
 /// Steps to the right on a way around a place in eighths of a turn, and with two eighths more, upwards.
 const SIDES: [f64; 8] = [0.0, 1.0, 1.0, 1.0, 0.0, -1.0, -1.0, -1.0];
 /// Places that are tried in any case.
