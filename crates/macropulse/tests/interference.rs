@@ -64,7 +64,7 @@ fn score(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Score {
 fn without_others_nothing_changes() {
     let alone = part("none", &[], 0);
     assert_eq!(alone.score.ghosts + alone.tally.interferer_shots, 0);
-    assert_eq!(alone.score.pixels, [1284, 5500, 0, 0, 0, 0]);
+    assert_eq!(alone.score.pixels, [1284, 5500, 0, 0, 0, 0, 0]);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/interference");
     let text = std::fs::read_to_string(folder.join("none.toml")).unwrap();
     // None at all, and one that looks into the sky behind us.
