@@ -33,7 +33,7 @@ pub(crate) struct Line {
 }
 
 /// Shots that a search may look at.
-const EFFORT: usize = 60_000;
+const EFFORT: usize = 120_000;
 /// Elevations that are tried at most.
 const MOST_PLACES: f64 = 4096.0;
 /// Phases of the columns that are tried at most.
