@@ -38,7 +38,7 @@ const ROUND: f64 = 0.5e-3;
 
 /// A mirror must hold so many times the aperture that closed forms ask for, as simulations ask for more; or else one
 /// with fewer facets is taken, which holds more.
-const SPARE: f64 = 1.25;
+const SPARE: f64 = 1.2;
 
 /// All that was found.
 #[derive(Debug)]
