@@ -363,7 +363,7 @@ mod tests {
         let told = write_atomically(Path::new("/dev/null"), |_| Ok(())).unwrap_err().to_string();
         assert!(told.contains("a device"), "{told}");
         let full = write_named(Path::new("/dev/full"), |out| out.write_all(b"x")).unwrap_err();
-        assert!(full.to_string().ends_with("the disk is full"), "{full}");
+        assert!(full.to_string().contains("the disk is full"), "{full}");
     }
 
     #[test]
