@@ -396,8 +396,8 @@ fn chain(shots: u32, dead: f64, rate: f64, pd: f64) -> f64 {
 }
 
 /// N = 100 000 shots each, seed 8, beside the forecast and beside a chain of events. Control: were a cell as
-/// often armed at each gate as counts alone leave it, more echoes would be seen where it is dead over the
-/// pause.
+/// often armed at each gate as counts alone leave it, more echoes would be seen where counts are rare and it is
+/// dead over the pause.
 #[test]
 fn a_cell_remembers_what_it_saw_before_the_gate_opened() {
     for (dead_ns, rate) in [(300.0, 1e5), (1500.0, 1e5), (3200.0, 1e5), (1500.0, 1e6)] {
@@ -420,6 +420,7 @@ fn a_cell_remembers_what_it_saw_before_the_gate_opened() {
         assert!(agrees(found, shots, chain), "{dead_ns}: {found}, chain {chain}");
         let blind = rate * dead_ns * 1e-9;
         let forgets = 0.15 * (1.0 - rate * 4e-7 / (1.0 + blind)).min(1.0 / (1.0 + blind));
-        assert!(dead_ns < 1000.0 || !agrees(found, shots, forgets), "{dead_ns}: {forgets}");
+        let is_told = dead_ns > 1000.0 && blind < 1.0;
+        assert!(!is_told || !agrees(found, shots, forgets), "{dead_ns}: {forgets}");
     }
 }

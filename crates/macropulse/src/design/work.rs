@@ -1,8 +1,8 @@
 //! How much a band may take to compute: what grows with a ratio of keys has a limit here.
 //!
 //! A band is the least that is computed in one go. What it takes grows with the number of pixels, and beside
-//! that with how many shots are under way at once, how many ticks a gate has, how many counts come within it,
-//! and how many cells each mark may fire.
+//! that with how many shots are under way at once, how many samples a gate has, and how many counts come within
+//! it.
 
 use super::detector::Detector;
 use super::limits::Check;
@@ -24,9 +24,6 @@ const MOST_SAMPLES: f64 = 4_294_967_296.0;
 
 /// Detection events without light of lidars, of all channels.
 const MOST_COUNTS: f64 = 268_435_456.0;
-
-/// Cells that all marks together may fire.
-const MOST_FIRED: f64 = 17_179_869_184.0;
 
 impl Design {
     /// How long a band lasts with its guard shots and their light, s: that of the first shots of a scan.
@@ -78,35 +75,18 @@ impl Check<'_> {
         {
             return self.refuse("detector", why);
         }
-        match &design.detector {
-            Detector::Sampled(sampled) => {
-                let lasts = design.band_lasts() + sampled.recovery;
-                let samples = lasts / sampled.sample * f64::from(design.channels());
-                if samples > MOST_SAMPLES {
-                    let message = format!(
-                        "makes {samples:.1e} samples of {} channels while the shots of one band are listened \
-                         to, more than {MOST_SAMPLES:.1e}: take longer samples, or a shorter range gate, \
-                         recovery_ns or memory of the baseline",
-                        design.channels()
-                    );
-                    return self.refuse("detector.sampled.sample_ps", message);
-                }
+        if let Detector::Sampled(sampled) = &design.detector {
+            let lasts = design.band_lasts() + sampled.recovery;
+            let samples = lasts / sampled.sample * f64::from(design.channels());
+            if samples > MOST_SAMPLES {
+                let message = format!(
+                    "makes {samples:.1e} samples of {} channels while the shots of one band are listened \
+                     to, more than {MOST_SAMPLES:.1e}: take longer samples, or a shorter range gate, \
+                     recovery_ns or memory of the baseline",
+                    design.channels()
+                );
+                return self.refuse("detector.sampled.sample_ps", message);
             }
-            Detector::Geiger(geiger) => {
-                let shots = known + SHOTS_OF_BAND as f64;
-                let marks = shots * design.coding.codebook.mean_weight();
-                let most = (MOST_FIRED / marks).floor();
-                if f64::from(geiger.cells) > most {
-                    let message = format!(
-                        "is {}, but the {marks:.1e} marks of one band may each fire all cells, of which \
-                         no more than {MOST_FIRED:.1e} are followed: take {most} at most, or a code of \
-                         fewer marks",
-                        geiger.cells
-                    );
-                    return self.refuse("detector.geiger.cells", message);
-                }
-            }
-            Detector::PhotonCounting(_) | Detector::Linear(_) | Detector::SingleStop(_) => {}
         }
         Ok(())
     }
@@ -130,19 +110,6 @@ mod tests {
             "{often}"
         );
         assert_eq!(told("hdl-64e", &[]), "fine");
-    }
-
-    #[test]
-    fn too_many_cells_for_the_marks_of_a_band_are_refused() {
-        let cells = |count: &str| {
-            let cells = format!(
-                "{{ geiger = {{ cells = {count}, dead_time_ns = 0, sensitivity = {{ range_m = 150.0, \
-                 reflectance = 1.0, pd = 0.99 }} }} }}"
-            );
-            told("kim-park-2016", &[("detector", &cells)])
-        };
-        assert_eq!(cells("1000"), "fine");
-        assert!(cells("1048576").contains("detector.geiger.cells: is 1048576, but the"));
     }
 
     #[test]

@@ -41,17 +41,27 @@ impl Clock {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::sync::LazyLock;
+
+    /// Sensors with ticks of three lengths.
+    fn designs() -> &'static [Design] {
+        static DESIGNS: LazyLock<Vec<Design>> = LazyLock::new(|| {
+            let of_tick = |tick: &str| {
+                let set = [("tdc.resolution_ps", tick), ("tdc.bits", "16")]
+                    .map(|(key, value)| (key.to_owned(), value.to_owned()));
+                Design::open("kim-park-2016", &set)
+                    .unwrap_or_else(|_| Design::open("kim-park-2016", &[]).unwrap())
+            };
+            ["2.5", "0.1", "10.0"].map(of_tick).into()
+        });
+        &DESIGNS
+    }
 
     proptest! {
         #[test]
         fn parts_are_rounded_down(fs in 0..1_000_000_000_000_i64, tick in 0..3_usize) {
-            let tick = ["2.5", "0.1", "10.0"][tick];
-            let set = [("tdc.resolution_ps", tick), ("tdc.bits", "16")]
-                .map(|(key, value)| (key.to_owned(), value.to_owned()));
-            let design = Design::open("kim-park-2016", &set).unwrap_or_else(|_| {
-                Design::open("kim-park-2016", &[]).unwrap()
-            });
-            let clock = Clock::new(&design, 1_234_567_890);
+            let design = &designs()[tick];
+            let clock = Clock::new(design, 1_234_567_890);
             prop_assert_eq!(clock.parts(fs), fs * 64 / design.tdc.tick_fs);
             prop_assert_eq!(clock.epoch_fs % design.tdc.clock_fs, 0);
             prop_assert!(clock.time(1_234_567_890) >= 0);

@@ -112,8 +112,10 @@ fn of_events(bank: &mut Bank, events: Detections) -> Taken {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::Tdc;
     use proptest::prelude::*;
     use std::collections::VecDeque;
+    use std::sync::LazyLock;
 
     fn sensor(set: &[(&str, &str)]) -> Design {
         let set: Vec<(String, String)> =
@@ -196,6 +198,18 @@ mod tests {
         found
     }
 
+    fn sensor_alone() -> &'static Design {
+        static ALONE: LazyLock<Design> = LazyLock::new(|| sensor(&[]));
+        &ALONE
+    }
+
+    /// A sensor with a bank of so many converters. Reading its file for each takes a second for twenty.
+    fn with_bank(converters: u32, dead_fs: i64) -> Design {
+        let design = sensor_alone().clone();
+        let tdc = Tdc { converters, dead_fs, ..design.tdc.clone() };
+        Design { tdc, ..design }
+    }
+
     proptest! {
         #[test]
         fn blocks_come_to_the_same_as_one_event_after_the_other(
@@ -205,10 +219,7 @@ mod tests {
             dead_ns in 0..5_u32,
             known in 0..100_u32,
         ) {
-            let set = [
-                ("converters", converters.to_string()), ("dead_time_ns", dead_ns.to_string()),
-            ];
-            let design = sensor(&set.each_ref().map(|(key, value)| (*key, &value[..])));
+            let design = with_bank(converters, i64::from(dead_ns) * 1_000_000);
             let times: Vec<u32> = gaps.iter().scan(0, |time, gap| {
                 *time += gap >> (4 * scale);
                 Some(*time)
@@ -228,7 +239,7 @@ mod tests {
             converters in 1..60_u32,
         ) {
             times.sort_unstable();
-            let design = sensor(&[("converters", &converters.to_string())]);
+            let design = with_bank(converters, sensor_alone().tdc.dead_fs);
             let without = timed(&design, 0, times.clone());
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
             let detections = Detections { time: times, amplitude, ..Detections::default() };
