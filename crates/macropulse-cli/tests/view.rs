@@ -44,7 +44,9 @@ fn what_cannot_be_shown_is_one_sentence() {
     fs::create_dir(desk.path().join("odd")).unwrap();
     desk.put("notes.txt", "x").put("broken.pcd", "x\n").put("odd/manifest.json", "{");
     desk.refused("view nowhere.pcd", &["nowhere.pcd", "no such file"]);
-    desk.refused("view notes.txt", &["notes.txt", "pcd", "laz"]);
+    desk.refused("view notes.txt", &["notes.txt", "its first line names the columns"]);
+    desk.put("notes.md", "x");
+    desk.refused("view notes.md", &["notes.md", "pcd", "laz"]);
     desk.refused("view broken.pcd", &["broken.pcd", "pcd"]);
     desk.refused("view empty", &["empty", "no point cloud", "--format pcd"]);
     desk.refused("view odd", &["manifest.json", "name a cloud instead"]);

@@ -52,7 +52,10 @@ fn wrong_scene_files_are_refused_at_their_place() {
             "did you mean \"asphalt\"?",
         ),
         ("shape = { spher = { radius_m = 1 } }", "did you mean `sphere`?"),
-        ("car = {}\nyaw_deg = nan", "test.toml:4:11: yaw_deg must be a finite number"),
+        (
+            "car = {}\nyaw_deg = nan",
+            "test.toml:4:11: yaw_deg must be a number from -36000 to 36000",
+        ),
         ("car = {}\nposition_m = [inf, 0, 0]", "position_m must be three finite numbers"),
         ("mesh = \"a.obj\"\nmaterial = \"white\"", "cannot be read"),
         ("car = {}\nscale = 2", "`scale` belongs to objects with a `mesh`"),

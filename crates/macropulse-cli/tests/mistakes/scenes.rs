@@ -75,7 +75,7 @@ const ROWS: &[Row] = &[
     ),
     (
         "[[object]]\ncar = {}\nyaw_deg = nan",
-        &["mine.toml:4:11:", "yaw_deg must be a finite number"],
+        &["mine.toml:4:11:", "yaw_deg must be a number from -36000 to 36000"],
     ),
     (
         "[[object]]\ncar = {}\nmaterials = \"white\"",
