@@ -282,7 +282,7 @@ fn the_metadata_of_an_ouster_sensor_are_a_head() {
     std::fs::write(folder.path().join("mine.toml"), text).unwrap();
     let head = |json: &str| {
         std::fs::write(folder.path().join("beams.json"), json).unwrap();
-        Design::open(&folder.path().join("mine.toml").display().to_string(), &[]).unwrap()
+        Design::open(folder.path().join("mine.toml").display().to_string(), &[]).unwrap()
     };
     let three = head(
         "{\"beam_altitude_angles\": [20.0, 0.5, -15.0], \"beam_azimuth_angles\": [3.0, -3.0, 0.0]}",

@@ -1,5 +1,6 @@
 //! Samples as a linear detector makes them, for tests: Gaussian pulses of counted and multiplied photons
 //! and white noise through three poles, rounded to codes.
+#![allow(clippy::unwrap_used)]
 
 use macropulse_codec::code::{Codebook, Family, Keying, Separated};
 use macropulse_codec::decode::{Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};

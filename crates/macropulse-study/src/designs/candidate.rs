@@ -48,8 +48,8 @@ pub struct Candidate {
     pub aperture: f64,
     /// Its words; `None` of one that waits.
     pub words: Option<Separated>,
-    /// Whether it listens no nearer than [`LATE`], because its stray light lasts longer than the sensor of the
-    /// requirements is blanked.
+    /// Whether it begins to listen later, because its stray light outlasts the blanking of the sensor of the
+    /// requirements.
     pub is_late: bool,
 }
 

@@ -102,7 +102,7 @@ pub fn run(seed: u64, watch: &Watch) -> Result<Findings, Error> {
     Ok(Findings { seed, published, forecasts: all })
 }
 
-/// Files that [`write`] writes, the page last.
+/// Files that [`write()`] writes, the page last.
 pub const FILES: [&str; 3] = ["validation.md", "validation.json", "index.html"];
 
 /// Writes `findings` into `folder`, as [`FILES`].

@@ -300,8 +300,11 @@ mod tests {
         Scans::open(bytes, CloudRoom::default())?.advance().unwrap()
     }
 
-    /// A file with these scans, each with its records and the values of its points.
-    fn file(scans: &[(Vec<(RecordName, RecordDataType)>, Vec<Vec<RecordValue>>)]) -> Vec<u8> {
+    /// The records of a scan, and the values of its points.
+    type Written = (Vec<(RecordName, RecordDataType)>, Vec<Vec<RecordValue>>);
+
+    /// A file with these scans.
+    fn file(scans: &[Written]) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
         let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
         for (at, (records, points)) in scans.iter().enumerate() {

@@ -30,7 +30,7 @@ impl RangeError {
     }
 
     /// As [`RangeError::of`], but of the whole spread where it is cut off by `limit`, the error up
-    /// to which a point is right: the limit is doubled until it holds [`WITHIN`] deviations of what
+    /// to which a point is right: the limit is doubled until it holds four deviations of what
     /// it lets in. So it is the deviation that a link budget forecasts.
     pub fn of_spread(cloud: &PointCloud, limit: f64) -> Self {
         let right = Self::of(cloud);

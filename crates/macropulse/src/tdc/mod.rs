@@ -112,7 +112,6 @@ fn of_events(bank: &mut Bank, events: Detections) -> Taken {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::Tdc;
     use proptest::prelude::*;
     use std::collections::VecDeque;
     use std::sync::LazyLock;
@@ -205,9 +204,9 @@ mod tests {
 
     /// A sensor with a bank of so many converters. Reading its file for each takes a second for twenty.
     fn with_bank(converters: u32, dead_fs: i64) -> Design {
-        let design = sensor_alone().clone();
-        let tdc = Tdc { converters, dead_fs, ..design.tdc.clone() };
-        Design { tdc, ..design }
+        let mut design = sensor_alone().clone();
+        (design.tdc.converters, design.tdc.dead_fs) = (converters, dead_fs);
+        design
     }
 
     proptest! {

@@ -1,4 +1,5 @@
 //! A tetrahedron, and scenes with one object in them.
+#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;

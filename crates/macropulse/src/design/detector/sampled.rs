@@ -310,7 +310,7 @@ impl Sampled {
     }
 
     /// Time, s, before and behind a mark of stray light in which it shows above the noise: s·√(2·ln(n/v)), with the rms
-    /// length s of the mark, its n photons, and v, [`SHOWS`] deviations of the noise.
+    /// length s of the mark, its n photons, and v, four deviations of the noise.
     pub fn stray_shows(&self, background: f64) -> f64 {
         let over = (self.stray / (SHOWS * self.rms_noise(background))).max(1.0);
         self.front_end.mark_rms() * (2.0 * libm::log(over)).sqrt()

@@ -1,7 +1,7 @@
 //! What the simulator does not model, and how large each effect would be.
 //!
 //! These effects have no switch. An effect that a sensor or an environment may leave out is an
-//! [`Effect`](crate::design::Effect) of the list `idealised`. The formulas and their sources stand
+//! [`crate::design::Effect`] of the list `idealised`. The formulas and their sources stand
 //! in docs/limits.md.
 
 mod size;
