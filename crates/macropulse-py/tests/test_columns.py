@@ -84,4 +84,4 @@ def test_a_file_of_another_program_has_its_own_columns_digits_and_losses(tmp_pat
     with pytest.raises(mp.Error, match="a.csv: has no topics"):
         mp.load(tmp_path / "a.csv", topic="/points")
     with pytest.raises(mp.Error, match="there is no outcome: the scan has no truth"):
-        plain.outcome
+        scan.outcome

@@ -136,7 +136,7 @@ LOADED = [
     ("text.ply", b"hello\n", ["is not a ply file", "no header from `ply`"]),
     ("empty.ply", b"", ["is not a ply file"]),
     ("names.csv", b"a,b,c\n1,2,3\n", ["no field `x`", "as `x,y,z,intensity`"]),
-    ("headless.csv", b"1,2\n4,5\n", ["no field `z`", "its first line names the columns"]),
+    ("headless.csv", b"1,2\n4,5\n", ["no field `y`", "its first line names the columns"]),
     ("words.csv", b"x_m,y_m,z_m\n1,2,far\n", ["words.csv", "far"]),
     ("short.csv", b"x_m,y_m,z_m\n1,2\n", ["short.csv", "2"]),
     ("empty.csv", b"", ["empty.csv"]),

@@ -47,7 +47,7 @@ pub fn outcome_colour(outcome: Outcome) -> Rgb {
         Outcome::Wrong => [226, 87, 76],
         Outcome::Missed => [92, 124, 214],
         Outcome::False => [214, 112, 214],
-        Outcome::Edge => [98, 200, 214],
+        Outcome::Edge => [110, 214, 222],
     }
 }
 
