@@ -278,7 +278,8 @@ fn a_calibration_is_a_list_of_lasers() {
 fn the_metadata_of_an_ouster_sensor_are_a_head() {
     let folder = tempfile::tempdir().unwrap();
     let text = "version = 1\nname = \"mine\"\nextends = \"vlp-16\"\n\
-                scan.spinning = { calibration = \"beams.json\", firing_us = 0.4 }\n";
+                scan.spinning = { calibration = \"beams.json\", firing_us = 0.4 }\n\
+                tdc.converters = 128\n";
     std::fs::write(folder.path().join("mine.toml"), text).unwrap();
     let head = |json: &str| {
         std::fs::write(folder.path().join("beams.json"), json).unwrap();
