@@ -35,6 +35,8 @@ reflectance = 0.5
 detectors = ["inalas"]
 marks = [3]
 beams = [15, 30]
+facets = [24]
+polygon_mm = 700.0
 """
 
 
