@@ -20,7 +20,7 @@ pub const SHOTS_OF_BAND: u64 = 3400;
 const MOST_SHOTS: f64 = 1_048_576.0;
 
 /// Samples of all channels.
-const MOST_SAMPLES: f64 = 4_294_967_296.0;
+const MOST_SAMPLES: f64 = 68_719_476_736.0;
 
 /// Detection events without light of lidars, of all channels.
 const MOST_COUNTS: f64 = 268_435_456.0;
