@@ -188,7 +188,7 @@ impl Target {
     }
 }
 
-/// Whether a file may hold several clouds, whose files are then numbered.
+/// True for containers of several clouds. The files of their clouds have numbers in their names.
 fn may_have_several(input: &Path) -> bool {
     input.extension().is_some_and(|ending| ending == "mcap" || ending == "e57")
 }

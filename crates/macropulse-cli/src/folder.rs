@@ -14,7 +14,7 @@ use crate::input::STREAM;
 /// Endings of files, beside those of point clouds.
 const OF_FILES: [&str; 7] = ["html", "json", "toml", "svg", "txt", "mps", "mpt"];
 
-/// What to do where a file is in the way.
+/// Remedy to name where a file is in the way.
 const ELSEWHERE: &str = "choose another folder with -o";
 
 /// The files that a command writes into its folder, under names that it derives.
@@ -22,7 +22,7 @@ const ELSEWHERE: &str = "choose another folder with -o";
 /// Such a name replaces a file that Macropulse is known to have written, and nothing else: no input of the
 /// same run, no file of a user, no link, no device.
 pub struct Outputs {
-    /// Whether a path in the folder is that of a file to be written.
+    /// True for the path, within the folder, of a file that the run writes.
     is_written: Box<dyn Fn(&Path) -> bool>,
     /// Paths of folders in the folder.
     folders: Vec<PathBuf>,

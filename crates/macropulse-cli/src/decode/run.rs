@@ -54,9 +54,9 @@ pub struct Run<'a> {
     pub folder: String,
     pub files: Vec<String>,
     pub warnings: Vec<String>,
-    /// Whether the manifest of this run is on the disk.
+    /// True once the manifest of this run is on the disk.
     is_announced: bool,
-    /// Whether the reader of stdout has seen enough.
+    /// True once the reader of stdout has closed its end.
     has_lost_reader: bool,
     /// Whether stdout has the points.
     pub is_streamed: bool,
@@ -106,7 +106,7 @@ impl<'a> Run<'a> {
                 if let Sink::Folder(folder, ..) = &sink
                     && self.is_announced
                 {
-                    // What failed first is what is told.
+                    // The first failure is the one to report.
                     let _ = write_manifest(&format!("{:#}\n", self.manifest()), folder.path());
                 }
                 Err(fault)

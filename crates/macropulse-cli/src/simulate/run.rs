@@ -42,7 +42,7 @@ pub struct Run<'a> {
     pub explained: Vec<(String, Value)>,
     /// What its user should know.
     pub warnings: Vec<String>,
-    /// Whether the manifest of this run is on the disk.
+    /// True once the manifest of this run is on the disk.
     is_announced: bool,
 }
 
