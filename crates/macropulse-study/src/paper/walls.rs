@@ -12,7 +12,8 @@ use macropulse::scene::Scene;
 use macropulse::score::Score;
 use macropulse::sim;
 
-/// Shots at a wall, about: a part of a scan, or several scans.
+/// Shots of each sensor at a wall, about: a part of a scan, or several scans. Errors in range are then
+/// known to 0.5 %.
 const SHOTS: u64 = 20_000;
 
 /// What a sensor sees of a wall that is square on in all directions.
@@ -31,12 +32,13 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// A wall of the diffuse reflectance `diffuse`, in a ready `environment`.
+    /// A wall of the diffuse reflectance `diffuse`, in a ready `environment`, at which about `shots` are
+    /// fired.
     pub(super) fn of(
         (sensor, design): (&'static str, &Design),
         (distance, diffuse): (f64, f64),
         environment: &str,
-        seed: u64,
+        (shots, seed): (u64, u64),
     ) -> Result<Self, Error> {
         let text = format!(
             "version = 1\nenvironment = \"{environment}\"\n[[material]]\nname = \"paint\"\n\
@@ -44,9 +46,9 @@ impl Wall {
              material = \"paint\"\n"
         );
         let scene = Scene::from_toml(&text, "wall", Path::new(""))?;
-        let every = (design.shots_per_scan() / SHOTS).max(1);
+        let every = (design.shots_per_scan() / shots).max(1);
         let (mut score, mut squares) = (Score::default(), Vec::new());
-        for number in 0..SHOTS.div_ceil(design.shots_per_scan()) {
+        for number in 0..shots.div_ceil(design.shots_per_scan()) {
             let bands: Vec<Band> = short_bands(design, number).step_by(every as usize).collect();
             let scan = sim::scan_part(design, &scene, seed, &bands)?;
             let cloud = scan.cloud();
@@ -73,7 +75,7 @@ pub(super) fn near_and_far(designs: &[Design], seed: u64) -> Result<Vec<[Wall; 2
     let pair = |(design, sensor): (&Design, &'static str)| {
         let reached = DISTANCES.into_iter().rfind(|d| f64::from(*d) <= design.scan.rated_range);
         let wall = |distance: u32| {
-            Wall::of((sensor, design), (f64::from(distance), 0.5), "clear-day", seed)
+            Wall::of((sensor, design), (f64::from(distance), 0.5), "clear-day", (SHOTS, seed))
         };
         Ok([wall(DISTANCES[0])?, wall(reached.unwrap_or(DISTANCES[0]))?])
     };
