@@ -1,15 +1,15 @@
 //! The codec of Macropulse: what both ends of a pulse-coded lidar link speak, and the receivers.
 //!
 //! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word laid out on
-//! chips. A receiver is given the **ticks** at which its converters saw light, or the **samples** of
-//! the signal, and the **shot log** of what was sent when, and finds the delay of every shot. Nothing
-//! here knows a scene, light, a file system or a thread pool.
+//! chips. A receiver is given the **ticks** at which its converters saw light, the **samples** of the
+//! signal or **histograms** of photons, and the **shot log** of what was sent when, and finds the delay
+//! of every shot. Nothing here knows a scene, light, a file system or a thread pool.
 //!
 //! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
-//! * [`ShotLog`], and [`Ticks`] or [`Samples`]: what a receiver is given, as columns; [`Cut`]: how
+//! * [`ShotLog`], and [`Ticks`], [`Samples`] or [`Histograms`]: what a receiver is given, as columns; [`Cut`]: how
 //!   they are cut out of a stream.
-//! * [`files`]: shot logs and ticks as text and as bytes, samples as bytes.
-//! * [`decode`]: the receivers, from ticks or samples to returns.
+//! * [`files`]: shot logs and ticks as text and as bytes, samples and histograms as bytes.
+//! * [`decode`]: the receivers, from ticks, samples or histograms to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
 //! * [`level`]: which instructions the wide loops use; [`steps`]: two of these loops by themselves.
 
@@ -24,12 +24,14 @@ pub mod steps;
 pub mod time;
 
 mod cut;
+mod histograms;
 mod kernels;
 mod samples;
 mod shot_log;
 mod ticks;
 
 pub use cut::Cut;
+pub use histograms::Histograms;
 pub use kernels::level;
 pub use samples::{Given, Record, Samples};
 pub use shot_log::ShotLog;

@@ -1,7 +1,8 @@
-//! Shots, ticks and samples as text and as bytes.
+//! Shots, ticks, samples and histograms as text and as bytes.
 
 use macropulse::codec::files::{
-    Error, Limits, SampleHeader, SampleReader, ShotReader, Stream, TickReader,
+    Error, HistogramHeader, HistogramReader, Limits, SampleHeader, SampleReader, ShotReader,
+    Stream, TickReader,
 };
 use macropulse::codec::{Cut, Given};
 
@@ -84,5 +85,18 @@ pub fn samples(bytes: &[u8]) {
         assert_eq!(samples.per_channel() * samples.channel.len(), samples.code.len());
         let (lowest, highest) = SAMPLES.codes;
         assert!(samples.code.iter().all(|code| (lowest..=highest).contains(code)));
+    }
+}
+
+/// What the histograms of the sensor begin with.
+const HISTOGRAMS: HistogramHeader =
+    HistogramHeader { bin_fs: TICK_FS, offset_fs: 0, bins: 32, digest: None, count: None };
+
+/// Reads `bytes` as histograms.
+pub fn histograms(bytes: &[u8]) {
+    if let Some(mut reader) = told(HistogramReader::new(bytes, &HISTOGRAMS)) {
+        while let Some(histogram) = told(reader.next_histogram()).flatten() {
+            assert_eq!(histogram.counts.len(), HISTOGRAMS.bins as usize);
+        }
     }
 }

@@ -47,6 +47,7 @@ const CODEC: Layers = Layers {
             may_name: &["ticks"],
             because: "samples are columns, and a record is those or ticks",
         },
+        Rule { module: "histograms", may_name: &[], because: "histograms are columns" },
         Rule {
             module: "cut",
             may_name: &["shot_log"],
@@ -54,12 +55,21 @@ const CODEC: Layers = Layers {
         },
         Rule {
             module: "files",
-            may_name: &["cut", "samples", "shot_log", "ticks"],
-            because: "files hold shots, ticks and samples, whoever made them and whatever decodes them",
+            may_name: &["cut", "histograms", "samples", "shot_log", "ticks"],
+            because: "files hold shots and what was recorded of them, whoever made them and whatever decodes them",
         },
         Rule {
             module: "decode",
-            may_name: &["code", "kernels", "samples", "shot_log", "statistics", "ticks", "time"],
+            may_name: &[
+                "code",
+                "histograms",
+                "kernels",
+                "samples",
+                "shot_log",
+                "statistics",
+                "ticks",
+                "time",
+            ],
             because: "a receiver knows its record and what was fired, as the hardware would",
         },
     ],
@@ -390,6 +400,7 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
         "ShotLog" => "shot_log".to_owned(),
         "Tick" | "Ticks" => "ticks".to_owned(),
         "Record" | "Samples" => "samples".to_owned(),
+        "Histograms" => "histograms".to_owned(),
         "Cut" => "cut".to_owned(),
         _ => name.to_owned(),
     };

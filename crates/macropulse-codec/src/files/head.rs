@@ -98,17 +98,17 @@ fn check_kind<R: Read>(source: &Source<R>, kind: &str) -> Result<(), Error> {
     let name = source.name();
     match kind {
         _ if kind == name => Ok(()),
-        "ticks" | "samples" if source.what != What::Shots => source.refuse(format!(
+        "ticks" | "samples" | "histograms" if source.what != What::Shots => source.refuse(format!(
             "these are {kind}, where the sensor records {name}: is it the one that they were recorded \
              with?"
         )),
-        "shots" | "ticks" | "samples" => {
+        "shots" | "ticks" | "samples" | "histograms" => {
             let behind = if source.what == What::Shots { kind } else { name };
             source.refuse(format!(
                 "these are {kind}, where {name} are wanted: the shot log comes first, then the {behind}"
             ))
         }
-        _ => source.refuse(format!("`{kind}` are neither shots nor ticks nor samples")),
+        _ => source.refuse(format!("`{kind}` are neither shots nor ticks, samples or histograms")),
     }
 }
 
@@ -192,7 +192,11 @@ pub(super) fn binary<R: Read>(source: &mut Source<R>) -> Result<[u8; HEADER], Er
         b"MPSHOTS\0" => "shots",
         b"MPTICKS\0" => "ticks",
         b"MPSAMPL\0" => "samples",
-        _ => return source.refuse("this is no file of Macropulse's shots, ticks or samples"),
+        b"MPHISTO\0" => "histograms",
+        _ => {
+            return source
+                .refuse("this is no file of Macropulse's shots, ticks, samples or histograms");
+        }
     };
     check_kind(source, kind)?;
     check_version(source, &number!(header, 8, u32).to_string())?;

@@ -1,9 +1,9 @@
-//! Shot logs, ticks and samples as files and streams: the seam at which recorded hardware takes the place
+//! Shot logs, ticks, samples and histograms as files and streams: the seam at which recorded hardware takes the place
 //! of a simulation.
 //!
 //! Shots and ticks have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
 //! line that says what they are, and **binary**, little-endian records under a header. A reader
-//! tells them apart by their first byte. Samples are binary. `docs/formats.md` has them byte by byte.
+//! tells them apart by their first byte. Samples and histograms are binary. `docs/formats.md` has them byte by byte.
 //!
 //! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
 //! record, and keep none. [`Stream`] reads shots and ticks, or samples, at once and cuts them into bands
@@ -12,6 +12,7 @@
 
 mod at_hand;
 mod head;
+mod histogram_files;
 mod sample_files;
 mod shots;
 mod source;
@@ -21,6 +22,7 @@ mod tick_files;
 use std::fmt;
 use std::io;
 
+pub use histogram_files::{Histogram, HistogramHeader, HistogramReader, HistogramWriter};
 pub use sample_files::{SampleBlock, SampleHeader, SampleReader, SampleWriter};
 pub use shots::{Limits, Shot, ShotHeader, ShotReader, ShotWriter};
 pub use stream::Stream;
@@ -91,6 +93,8 @@ pub enum What {
     Ticks,
     /// The samples.
     Samples,
+    /// The histograms.
+    Histograms,
 }
 
 /// Why a file cannot be read.

@@ -43,8 +43,9 @@ impl<R: Read> Source<R> {
         let source = Self { bytes, form, what, place, passed: 0, line: Vec::new() };
         match first {
             Some(b'#' | b'M') => Ok(source),
-            Some(_) if what == What::Samples => {
-                source.refuse("this is no file of Macropulse's samples")
+            Some(_) if matches!(what, What::Samples | What::Histograms) => {
+                let name = source.name();
+                source.refuse(format!("this is no file of Macropulse's {name}"))
             }
             Some(_) => source.refuse(format!(
                 "neither text that begins with `# macropulse {}` nor its binary form",
@@ -60,6 +61,7 @@ impl<R: Read> Source<R> {
             What::Shots => "shots",
             What::Ticks => "ticks",
             What::Samples => "samples",
+            What::Histograms => "histograms",
         }
     }
 

@@ -1,0 +1,162 @@
+//! Histograms as files: what is written is read, what is wrong has a place, and no bytes make a reader
+//! panic.
+
+#![allow(clippy::unwrap_used)]
+
+use macropulse_codec::Histograms;
+use macropulse_codec::files::{
+    Digest, Error, Histogram, HistogramHeader, HistogramReader, HistogramWriter,
+};
+use proptest::prelude::*;
+
+fn header() -> HistogramHeader {
+    HistogramHeader { bin_fs: 95_000, offset_fs: -1000, bins: 3, digest: None, count: None }
+}
+
+fn histograms() -> Histograms {
+    Histograms {
+        bin_fs: 95_000,
+        offset_fs: -1000,
+        bins: 3,
+        cycles: vec![4096, 0],
+        counts: vec![0, 258, 1, 7, u32::MAX, 9],
+    }
+}
+
+fn written(header: &HistogramHeader, parts: &[(u64, Histograms)]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut writer = HistogramWriter::new(&mut bytes, header).unwrap();
+    for (first, part) in parts {
+        writer.write(part, *first).unwrap();
+    }
+    bytes
+}
+
+fn read(
+    bytes: &[u8],
+    wanted: &HistogramHeader,
+) -> Result<(HistogramHeader, Vec<Histogram>), Error> {
+    let mut reader = HistogramReader::new(bytes, wanted)?;
+    let mut read = Vec::new();
+    while let Some(histogram) = reader.next_histogram()? {
+        read.push(histogram);
+    }
+    Ok((*reader.header(), read))
+}
+
+/// The bytes of the documentation, one by one.
+#[test]
+fn a_file_is_as_it_is_documented() {
+    let header = HistogramHeader { digest: Some(Digest([9; 16])), count: Some(2), ..header() };
+    let bytes = written(&header, &[(300, histograms())]);
+    assert_eq!(bytes.len(), 128 + 2 * (16 + 12));
+    assert_eq!(bytes[..24], *b"MPHISTO\0\x01\0\0\0\x80\0\0\0\x02\0\0\0\0\0\0\0");
+    assert_eq!(bytes[24..32], 95_000_i64.to_le_bytes());
+    assert_eq!((&bytes[32..48], &bytes[48..56]), (&[9; 16][..], &(-1000_i64).to_le_bytes()[..]));
+    assert_eq!((&bytes[56..60], &bytes[60..128]), (&[3, 0, 0, 0][..], &[0; 68][..]));
+    assert_eq!(bytes[128..144], *b"\x2c\x01\0\0\0\0\0\0\0\x10\0\0\0\0\0\0");
+    assert_eq!(bytes[144..156], *b"\0\0\0\0\x02\x01\0\0\x01\0\0\0");
+    assert_eq!(bytes[156..164], 301_u64.to_le_bytes());
+}
+
+/// `bytes` with others from place `at` on.
+fn with(bytes: &[u8], at: usize, others: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    bytes[at..at + others.len()].copy_from_slice(others);
+    bytes
+}
+
+#[test]
+fn what_is_wrong_is_one_sentence_with_its_place() {
+    let good = written(&HistogramHeader { count: Some(2), ..header() }, &[(5, histograms())]);
+    let second = 128 + 28;
+    let refused = |bytes: &[u8]| read(bytes, &header()).map_err(|error| error.to_string());
+    for (bytes, words) in [
+        (
+            good[..good.len() - 3].to_vec(),
+            &["byte 172", "9 bytes into a record of 12", "truncated"][..],
+        ),
+        (good[..second].to_vec(), &["after 1 of 2 histograms", "truncated"]),
+        (good[..second + 16].to_vec(), &["before the counts of shot 6", "truncated"]),
+        (good[..100].to_vec(), &["100 bytes into a record of 128"]),
+        (Vec::new(), &["is empty"]),
+        (b"# macropulse histograms 1".to_vec(), &["is text", "binary form alone"]),
+        (b"RIFF".to_vec(), &["this is no file of Macropulse's histograms"]),
+        (with(&good, 0, b"MPTICKS\0"), &["these are ticks, where the sensor records histograms"]),
+        (with(&good, 0, b"MPSHOTS\0"), &["the shot log comes first, then the histograms"]),
+        (with(&good, 8, &[2]), &["version `2` of histograms", "reads 1"]),
+        (with(&good, 16, &[1]), &["byte 156", "there are 1 histograms only"]),
+        (with(&good, 24, &0_i64.to_le_bytes()), &["bins of 0 fs", "1 fs to 137 s"]),
+        (
+            with(&good, 24, &i64::MAX.to_le_bytes()),
+            &["bins of 9223372036854775807 fs", "1 fs to 137 s"],
+        ),
+        (with(&good, 24, &95_001_i64.to_le_bytes()), &["bins of 95001 fs", "of 95000 fs"]),
+        (with(&good, 48, &i64::MIN.to_le_bytes()), &["more than 9000 s"]),
+        (with(&good, 48, &0_i64.to_le_bytes()), &["begins 0 fs after", "after -1000 fs"]),
+        (with(&good, 56, &u32::MAX.to_le_bytes()), &["4294967295 bins", "1 to 65536"]),
+        (with(&good, 56, &0_u32.to_le_bytes()), &["0 bins", "1 to 65536"]),
+        (with(&good, 56, &2_u32.to_le_bytes()), &["2 bins", "have 3"]),
+        (with(&good, 140, &[1]), &["byte 128", "four bytes of 0"]),
+        (with(&good, second, &[5]), &["byte 156", "shot 5 comes after that of shot 5"]),
+    ] {
+        let said = refused(&bytes).unwrap_err();
+        assert!(words.iter().all(|word| said.contains(word)), "{said}: not {words:?}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+    assert!(refused(&good).is_ok() && refused(&with(&good, 16, &[255; 8])).is_ok());
+}
+
+prop_compose! {
+    fn any_histograms()(
+        bins in 1..40_u32,
+        shots in 0..6_usize,
+        times in (1..1_000_000_i64, -1_000_000..1_000_000_i64),
+    )(
+        cycles in proptest::collection::vec(any::<u32>(), shots),
+        counts in proptest::collection::vec(any::<u32>(), shots * bins as usize),
+        bins in Just(bins),
+        (bin_fs, offset_fs) in Just(times),
+    ) -> Histograms {
+        Histograms { bin_fs, offset_fs, bins, cycles, counts }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    #[test]
+    fn histograms_are_read_as_they_were_written(
+        histograms in any_histograms(),
+        first in 0..u64::from(u32::MAX),
+        knows_count in any::<bool>(),
+    ) {
+        let Histograms { bin_fs, offset_fs, bins, .. } = histograms;
+        let count = knows_count.then_some(histograms.len() as u64);
+        let header = HistogramHeader { bin_fs, offset_fs, bins, digest: Digest::parse(&"7f".repeat(16)), count };
+        let (is, found) = read(&written(&header, &[(first, histograms.clone())]), &header).unwrap();
+        prop_assert_eq!(is, header);
+        prop_assert_eq!(found.len(), histograms.len());
+        for (at, one) in found.into_iter().enumerate() {
+            prop_assert_eq!((one.shot, one.cycles), (first + at as u64, histograms.cycles[at]));
+            prop_assert_eq!(&one.counts[..], histograms.of(at));
+        }
+    }
+
+    /// Whatever happens to the bytes: an error of one line, or histograms with all their bins.
+    #[test]
+    fn damaged_files_are_refused_or_read(
+        spoils in proptest::collection::vec((0..184_usize, any::<u8>()), 0..6),
+        keep in 0..400_usize,
+    ) {
+        let mut file = written(&HistogramHeader { count: Some(2), ..header() }, &[(1, histograms())]);
+        for (at, byte) in spoils {
+            file[at] = byte;
+        }
+        file.truncate(keep);
+        match read(&file, &header()) {
+            Err(error) => prop_assert_eq!(error.to_string().lines().count(), 1),
+            Ok((_, read)) => prop_assert!(read.iter().all(|one| one.counts.len() == 3)),
+        }
+    }
+}
