@@ -6,6 +6,7 @@ mod waveform;
 
 mod contract;
 mod files;
+mod histogram;
 mod histogram_files;
 mod readme;
 mod sample_files;

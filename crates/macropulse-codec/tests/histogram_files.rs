@@ -1,12 +1,13 @@
-//! Histograms as files: what is written is read, what is wrong has a place, and no bytes make a reader
-//! panic.
+//! Histograms as files and as columns: what is written is read, what is wrong has a place, and nothing
+//! that is given makes a reader or a receiver panic.
 
 #![allow(clippy::unwrap_used)]
 
-use macropulse_codec::Histograms;
+use macropulse_codec::decode::histogram::{HistogramReceiver, PileUp, Pulse, decode};
 use macropulse_codec::files::{
     Digest, Error, Histogram, HistogramHeader, HistogramReader, HistogramWriter,
 };
+use macropulse_codec::{Histograms, ShotLog};
 use proptest::prelude::*;
 
 fn header() -> HistogramHeader {
@@ -157,6 +158,71 @@ proptest! {
         match read(&file, &header()) {
             Err(error) => prop_assert_eq!(error.to_string().lines().count(), 1),
             Ok((_, read)) => prop_assert!(read.iter().all(|one| one.counts.len() == 3)),
+        }
+    }
+}
+
+fn any_f64() -> impl Strategy<Value = f64> {
+    prop_oneof![Just(0.0), Just(1.0), 0.0..1.0_f64, 0.0..1e7_f64, any::<f64>()]
+}
+
+fn any_i64() -> impl Strategy<Value = i64> {
+    prop_oneof![-3..3_i64, Just(i64::MIN), Just(i64::MAX), -1_000_000..1_000_000_i64, any::<i64>()]
+}
+
+fn any_u32() -> impl Strategy<Value = u32> {
+    prop_oneof![0..4_u32, 0..100_u32, Just(u32::MAX), any::<u32>()]
+}
+
+prop_compose! {
+    fn any_receiver()(
+        gate_fs in (any_i64(), any_i64()),
+        is_sane in any::<bool>(),
+        is_gaussian in any::<bool>(),
+        stops in any::<bool>(),
+        counts in proptest::collection::vec(any_f64(), 0..9),
+        numbers in [any_f64(), any_f64(), any_f64(), any_f64()],
+        returns in 0..10_u8,
+    ) -> HistogramReceiver {
+        let sane = numbers.map(|number| 1e-6 + (number.abs() % 1.0).min(0.9));
+        let (gate_fs, numbers, returns) = match is_sane {
+            true => ((-100, 9000), [1.0 + 1000.0 * sane[0], sane[1], sane[2], sane[3]], 1 + returns % 8),
+            false => (gate_fs, numbers, returns),
+        };
+        let [of_pulse, false_alarm, shape_error, least_share] = numbers;
+        let pulse = match is_gaussian {
+            true => Pulse::Gaussian { rms_fs: of_pulse },
+            false => Pulse::Measured { counts, origin: of_pulse },
+        };
+        let pile_up = if stops { PileUp::Coates } else { PileUp::None };
+        let base = HistogramReceiver::new(pulse);
+        HistogramReceiver { gate_fs, pile_up, false_alarm, shape_error, least_share, returns, ..base }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1500, ..ProptestConfig::default() })]
+
+    /// Whatever is given: an error of one line, or returns in order that are numbers.
+    #[test]
+    fn anything_is_refused_or_decoded(
+        receiver in any_receiver(),
+        times in prop_oneof![(1..1000_i64, -500..500_i64), (any_i64(), any_i64())],
+        bins in prop_oneof![4 => 1..9_u32, 1 => any_u32()],
+        cycles in proptest::collection::vec(any_u32(), 2),
+        counts in proptest::collection::vec(any_u32(), 18),
+    ) {
+        let log = ShotLog::of_one_channel(&[0, 0], &[0, 0]);
+        let counts = counts[..(2 * bins as usize).min(18)].to_vec();
+        let record = Histograms { bin_fs: times.0, offset_fs: times.1, bins, cycles, counts };
+        match decode(&receiver, &log, &record) {
+            Err(error) => prop_assert_eq!(error.to_string().lines().count(), 1),
+            Ok(returns) => {
+                let is_number = |tof: &f64| tof.is_finite();
+                prop_assert!(returns.tof.iter().all(is_number));
+                prop_assert!(returns.photons.iter().all(|photons| *photons >= 0.0));
+                prop_assert!(returns.shot.is_sorted() && returns.len() <= 16);
+            }
         }
     }
 }

@@ -153,7 +153,7 @@ fn reach(receiver: &Receiver, codebook: &Codebook) -> u64 {
 }
 
 /// Refuses columns that are not as long as the one beside them, and shots out of order.
-fn of_log(log: &ShotLog) -> Result<(), Error> {
+pub(super) fn of_log(log: &ShotLog) -> Result<(), Error> {
     let shots = log.len();
     let of_log = [
         ("row", log.row.len()),

@@ -181,6 +181,19 @@ pub enum Error {
         /// When it was fired, in ticks from the first sample on.
         ticks: i64,
     },
+    /// A detector that stops at its first photon counted more photons than laser pulses were sent.
+    #[error(
+        "shot {shot} has {counted} counts of {cycles} laser pulses, each of which stops the detector once: \
+         set `cycles` right, or `pile_up` to none if the detector counts several photons of a pulse"
+    )]
+    MoreThanCycles {
+        /// Place in the log.
+        shot: usize,
+        /// All its counts.
+        counted: u64,
+        /// Laser pulses accumulated.
+        cycles: u32,
+    },
     /// A shot is to be explained that is not in the log.
     #[error("shot {shot} is not in the log")]
     NoSuchShot {

@@ -1,4 +1,6 @@
-//! Ticks or samples to returns: the receiver. It sees these and the shot log, never the scene.
+//! Ticks, samples or histograms to returns: the receiver. It sees these and the shot log, never the scene.
+
+pub mod histogram;
 
 mod balanced;
 mod beyond;

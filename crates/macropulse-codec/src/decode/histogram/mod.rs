@@ -1,0 +1,143 @@
+//! Histograms of photons to returns: the receiver of a direct time-of-flight sensor that accumulates
+//! many laser pulses of a shot.
+//!
+//! Each histogram is decoded by itself. `pile_up` corrects the counts for a detector that stops at its
+//! first photon. `model` describes them by an even background and the pulses found so far, fitted by
+//! maximum likelihood. `search` finds the lag at which another pulse would explain most of the rest, and
+//! `chance` says how rarely the background alone would do as well. The pulse joins the model if that is
+//! rare enough, and the search begins anew.
+
+mod chance;
+mod check;
+mod model;
+mod pile_up;
+mod pulse;
+mod search;
+
+pub use pile_up::{PileUp, coates};
+pub use pulse::Pulse;
+
+use super::{Error, MOST_RETURNS, Pick, Reject, Return, Returns, Strength};
+use crate::{Histograms, ShotLog, time};
+use chance::Chance;
+use model::{Light, Model};
+use pile_up::Exposed;
+use pulse::{Kernel, STEPS};
+use search::Search;
+
+/// What a receiver of histograms is set to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HistogramReceiver {
+    /// Nearest and farthest two-way time of flight accepted, fs.
+    pub gate_fs: (i64, i64),
+    /// How photons that the detector missed behind others are made up for.
+    pub pile_up: PileUp,
+    /// The emitted pulse as the detector responds to it.
+    pub pulse: Pulse,
+    /// False returns accepted per histogram.
+    pub false_alarm: f64,
+    /// Standard deviation of the shape of the pulse in each bin, as a share of its height there or in a
+    /// bin beside it, whichever is higher; 0 if light has exactly this shape. A surface that is tilted or
+    /// moves stretches a pulse.
+    pub shape_error: f64,
+    /// A return with less than this share of the photons of the strongest one of its histogram is not
+    /// given. Reflections within the optics look like faint returns.
+    pub least_share: f64,
+    /// Returns of a histogram at most, 1 to [`MOST_RETURNS`].
+    pub returns: u8,
+    /// Which returns are kept if there are more.
+    pub pick: Pick,
+}
+
+impl HistogramReceiver {
+    /// A receiver of `pulse` that takes counts as they are and knows the shape exactly: a gate of 10 µs,
+    /// one false return in a thousand histograms, and the strongest return.
+    pub fn new(pulse: Pulse) -> Self {
+        Self {
+            gate_fs: (0, 10_000_000_000),
+            pile_up: PileUp::None,
+            pulse,
+            false_alarm: 1e-3,
+            shape_error: 0.0,
+            least_share: 0.0,
+            returns: 1,
+            pick: Pick::Strongest,
+        }
+    }
+}
+
+/// The returns of the owned shots of `log`, histogram `i` being that of shot `i`; ordered by shot, those
+/// of one shot by range.
+///
+/// `photons` of a return are all the signal photons of its pulse, freed of pile-up if that is corrected;
+/// `margin` is the significance beyond the threshold, in standard deviations of a normal variable;
+/// `saturated` says that every laser pulse had been counted before the histogram ended.
+///
+/// # Errors
+/// If a setting is outside its limits, columns differ in length, the log is out of order, or a detector
+/// that stops at its first photon counted more photons than laser pulses. A histogram in which nothing
+/// is found is no error: it is counted as [`Reject::NoPeak`].
+pub fn decode(
+    receiver: &HistogramReceiver,
+    log: &ShotLog,
+    histograms: &Histograms,
+) -> Result<Returns, Error> {
+    check::settings(receiver)?;
+    check::record(receiver, log, histograms)?;
+    let Some(kernel) = Kernel::new(&receiver.pulse, histograms.bin_fs) else {
+        return Err(check::unusable(&receiver.pulse));
+    };
+    check::work(&kernel, histograms)?;
+    let search = Search::new(&kernel, histograms, receiver.gate_fs);
+    let mut returns = Returns::default();
+    for shot in log.owned.clone() {
+        let counts = histograms.of(shot);
+        let exposed = Exposed::of(counts, histograms.cycles[shot], receiver.pile_up);
+        let mut found = lights(receiver, &search, &exposed);
+        if found.is_empty() {
+            returns.reject(Reject::NoPeak);
+        }
+        found.sort_by(|one, next| one.lag.total_cmp(&next.lag));
+        let strength = |light: &Light| Strength { peak: 1, light: light.photons as f32 };
+        receiver.pick.keep(receiver.returns.into(), &mut found, strength);
+        for light in found {
+            returns.push(Return {
+                shot,
+                tof: tof(&kernel, histograms, light.lag),
+                peak: 1,
+                marks: 1,
+                margin: light.margin,
+                photons: light.photons as f32,
+                saturated: exposed.is_exhausted,
+            });
+        }
+    }
+    Ok(returns)
+}
+
+/// Two-way time of flight, s, of light whose kernel begins `lag` bins after the first bin.
+fn tof(kernel: &Kernel, histograms: &Histograms, lag: f64) -> f64 {
+    let bins = lag + kernel.origin;
+    time::s_from_fs(histograms.offset_fs) + bins * time::s_from_fs(histograms.bin_fs)
+}
+
+/// The pulses in one histogram, in the order in which they were found.
+fn lights(receiver: &HistogramReceiver, search: &Search, exposed: &Exposed) -> Vec<Light> {
+    let Some(mut model) = Model::new(search.kernel, exposed, receiver.shape_error) else {
+        return Vec::new();
+    };
+    for _ in 0..MOST_RETURNS {
+        let Some(step) = search.strongest(&model) else { break };
+        let chance = Chance::of(&model, step);
+        let Some(margin) = chance.margin(search, receiver.false_alarm) else { break };
+        let lag = step as f64 / STEPS as f64;
+        model.add(Light { step, lag, photons: chance.photons, margin });
+    }
+    model.locate();
+    let mut lights = model.lights;
+    let strongest = lights.iter().fold(0.0, |most: f64, light| most.max(light.photons));
+    lights.retain(|light| {
+        light.photons >= receiver.least_share * strongest && search.is_in_gate(light.lag)
+    });
+    lights
+}

@@ -1,0 +1,72 @@
+//! Pile-up: a detector that counts one photon per laser pulse misses those behind it.
+
+use libm::log1p;
+
+/// How photons that the detector missed behind others are made up for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PileUp {
+    /// Counts are taken as they are: the detector counts every photon, or light is so faint that it
+    /// hardly misses any.
+    #[default]
+    None,
+    /// As of a detector that stops at the first photon of each laser pulse \[Coa68\].
+    Coates,
+}
+
+/// Mean number of photons per laser pulse in each bin, from the `counts` of `cycles` laser pulses of
+/// which each stops the detector at its first photon \[Coa68\]:
+///
+/// > λ_i = −ln(1 − h_i/(M − Σ_{k<i} h_k)),
+///
+/// h_i being the count of bin i and M the cycles. 0 from the bin on in which the last cycle is counted.
+pub fn coates(counts: &[u32], cycles: u32) -> Vec<f64> {
+    let exposed = Exposed::of(counts, cycles, PileUp::Coates);
+    let rate = |(count, exposure): (&f64, &f64)| match *exposure > 0.0 {
+        true => count / exposure / f64::from(cycles),
+        false => 0.0,
+    };
+    exposed.count.iter().zip(&exposed.exposure).map(rate).collect()
+}
+
+/// Counts that are Poisson variables of mean λ·e: λ photons would be counted in all cycles if none hid
+/// another, and a share e of the cycles was still waiting for its photon.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Exposed {
+    pub count: Vec<f64>,
+    pub exposure: Vec<f64>,
+    /// Whether every cycle was counted before the last bin.
+    pub is_exhausted: bool,
+}
+
+impl Exposed {
+    /// The `counts` of `cycles` laser pulses; those that are counted in one bin after another are
+    /// missing in the next, if each stops the detector.
+    ///
+    /// Given what came before, the count h of a bin is binomial: of S cycles left each has a photon with
+    /// probability 1 − e^(−λ/M). So −S·ln(1 − h/S) has the mean λ·S/M, and nearly its variance.
+    pub fn of(counts: &[u32], cycles: u32, pile_up: PileUp) -> Self {
+        if pile_up == PileUp::None {
+            let count = counts.iter().map(|count| f64::from(*count)).collect();
+            return Self { count, exposure: vec![1.0; counts.len()], is_exhausted: false };
+        }
+        let mut exposed = Self {
+            count: Vec::with_capacity(counts.len()),
+            exposure: Vec::with_capacity(counts.len()),
+            is_exhausted: false,
+        };
+        let mut left = cycles;
+        for &count in counts {
+            exposed.is_exhausted |= count >= left;
+            let all = f64::from(left);
+            if exposed.is_exhausted {
+                exposed.count.push(0.0);
+                exposed.exposure.push(0.0);
+            } else {
+                exposed.count.push(-all * log1p(-f64::from(count) / all));
+                exposed.exposure.push(all / f64::from(cycles));
+                left -= count;
+            }
+        }
+        exposed
+    }
+}
