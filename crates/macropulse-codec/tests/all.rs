@@ -9,5 +9,6 @@ mod files;
 mod histogram;
 mod histogram_files;
 mod readme;
+mod recorded_histograms;
 mod sample_files;
 mod sampled;
