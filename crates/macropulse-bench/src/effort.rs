@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use macropulse::codec::decode::{Effort, Receiver, Returns};
+use macropulse::codec::decode::{Effort, Method, Returns};
 
 use crate::Fallible;
 use crate::page::{self, grouped, three};
@@ -47,7 +47,9 @@ impl Row {
     fn add(&mut self, mut sample: Sample) -> Fallible<()> {
         let given = sample.given();
         let mut decode = |effort| -> Fallible<(Vec<Returns>, f64)> {
-            sample.design.receiver = Receiver { effort, ..sample.design.receiver.clone() };
+            if let Method::Matched(_, set_to) = &mut sample.design.receiver.method {
+                *set_to = effort;
+            }
             Ok(sample.decode_timed(&given)?)
         };
         let (thorough, long) = decode(Effort::Thorough)?;

@@ -102,7 +102,8 @@ struct Labels {
 
 impl Labels {
     fn of(sample: &Sample) -> Self {
-        let (book, scale) = (&sample.design.coding.codebook, sample.design.receiver.ticks_per_chip);
+        let book = &sample.design.coding.codebook;
+        let scale = sample.design.receiver.method.ticks_per_chip().unwrap_or(1);
         let word = |word: usize| WordMarks::new(&book.word(word as u16).marks, scale);
         let bits = book.payload().map_or(1, |payload| payload.bits());
         let chips = book.chips() / bits;
@@ -123,7 +124,7 @@ impl Labels {
 /// `labels` also to count them bit by bit, and with jitter by their lateness.
 fn laid_and_counted(sample: &Sample, given: &[Given], labels: &Labels, told: bool) -> f64 {
     let echoes = sample.echoes();
-    let width = sample.window();
+    let width = sample.design.receiver.window_ticks();
     let longest = echoes.iter().flatten().filter_map(|echo| echo.marks.last());
     let room = (STRETCH + *longest.max().unwrap_or(&0) as usize).div_ceil(64) + 8;
     let [mut seen, mut lit, mut left] = [(); 3].map(|()| vec![0; room]);

@@ -34,7 +34,8 @@ impl<'a> Sought<'a> {
         let (nearest, farthest) = receiver.gate_ticks;
         let fired = log.fired_at_fs[shot].div_euclid(receiver.tick_fs);
         let opens = fired + i64::from(nearest);
-        let length = i64::from(design.coding.codebook.chips() * receiver.ticks_per_chip);
+        let scale = receiver.method.ticks_per_chip().unwrap_or(1);
+        let length = i64::from(design.coding.codebook.chips() * scale);
         let closes = fired + i64::from(farthest) + length;
         let absolute = ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick));
         let lit = absolute.filter(|tick| (opens..closes).contains(tick));
@@ -42,11 +43,10 @@ impl<'a> Sought<'a> {
         let came = returns.tof[at] * 1e15 + log.fired_at_fs[shot] as f64;
         let came = (came / receiver.tick_fs as f64).floor() as i64;
         let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
-        let scale = receiver.ticks_per_chip as usize;
         Self {
             lit: lit.map(|tick| (tick - opens) as usize).collect(),
             lags: (farthest - nearest) as usize + 1,
-            marks: marks.iter().map(|&mark| scale * usize::from(mark)).collect(),
+            marks: marks.iter().map(|&mark| scale as usize * usize::from(mark)).collect(),
             found: (came - opens) as usize,
             design,
         }

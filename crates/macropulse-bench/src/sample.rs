@@ -175,16 +175,10 @@ impl Sample {
         }
     }
 
-    /// How many ticks a mark is looked for in: ± 2 σ of the jitter and the tick itself.
-    pub fn window(&self) -> u32 {
-        let jitter = self.design.receiver.jitter_ticks;
-        if jitter > 0.05 { 1 + (4.0 * jitter).ceil() as u32 } else { 1 }
-    }
-
     /// The echoes from within the range gate, band by band, in the order of their arrival.
     pub fn echoes(&self) -> Vec<Vec<Echo>> {
         let Design { receiver, coding, scan, tdc, .. } = &self.design;
-        let scale = receiver.ticks_per_chip;
+        let scale = receiver.method.ticks_per_chip().unwrap_or(1);
         let of_band = |(band, hits): &(Band, Hits)| {
             let log = band.shot_log(&self.design);
             let epoch = self.design.cut().epoch(log.fired_at_fs[0]);

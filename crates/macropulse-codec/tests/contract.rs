@@ -3,7 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse_codec::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse_codec::decode::{Effort, Error, Pick, Receiver, ReceiverKind, Reject, Sampling};
+use macropulse_codec::decode::{
+    Bitwise, Correlation, Effort, Error, Method, Opening, Pick, Receiver, ReceiverKind, Reject,
+    Sampled, Sampling,
+};
 use macropulse_codec::{Samples, ShotLog, Ticks};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -22,8 +25,31 @@ fn codebook() -> Codebook {
     Codebook::new(Family::prime(5).unwrap(), Some(payload), 16, Keying::OnOff).unwrap()
 }
 
+fn correlation() -> Correlation {
+    Correlation { light_ticks: 3000, ..Correlation::default() }
+}
+
+/// The method of a receiver of ticks of this kind.
+fn method(kind: ReceiverKind, bit_threshold: u16, correlation: Correlation) -> Method {
+    let Correlation { ticks_per_chip, jitter_ticks, .. } = correlation;
+    let bitwise =
+        |opening| Method::Bitwise(Bitwise { opening, bit_threshold, ticks_per_chip, jitter_ticks });
+    match kind {
+        ReceiverKind::Literal => bitwise(Opening::FirstBit),
+        ReceiverKind::Blind => bitwise(Opening::AnyBit),
+        ReceiverKind::Balanced => Method::Balanced(correlation),
+        ReceiverKind::Direct => Method::Direct,
+        _ => Method::Matched(correlation, Effort::Quick),
+    }
+}
+
+fn receiver_of(kind: ReceiverKind) -> Receiver {
+    let method = method(kind, 3, correlation());
+    Receiver { gate_ticks: (0, 2000), method, ..Receiver::matched(1000) }
+}
+
 fn receiver() -> Receiver {
-    Receiver { gate_ticks: (0, 2000), light_ticks: 3000, ..Receiver::matched(1000) }
+    receiver_of(ReceiverKind::Matched)
 }
 
 /// Three shots, 500 ticks apart.
@@ -150,7 +176,7 @@ fn times_that_are_not_counted_are_refused() {
     // At the limit it is decoded, in no more memory than elsewhere.
     for kind in KINDS.into_iter().filter(|kind| *kind != ReceiverKind::Direct) {
         let (mut log, mut ticks) = (log(), ticks());
-        let receiver = Receiver { kind, bit_threshold: 3, ..receiver() };
+        let receiver = receiver_of(kind);
         let near = receiver.decode(&codebook(), &log, &ticks).unwrap();
         let last = u32::MAX - 1000;
         log.fired_at_fs[2] = i64::from(last) * 1000;
@@ -170,14 +196,20 @@ fn settings_outside_their_limits_are_refused() {
     assert_eq!(error, Error::Gate { nearest: 20, farthest: 19 });
     assert_says(&error, &["swap", "`gate_ticks`"]);
     type Spoil = fn(&mut Receiver);
+    fn of(receiver: &mut Receiver) -> &mut Correlation {
+        match &mut receiver.method {
+            Method::Matched(correlation, _) => correlation,
+            other => panic!("{other:?}"),
+        }
+    }
     let spoils: [(&str, Spoil); 8] = [
         ("tick_fs", |receiver| receiver.tick_fs = 0),
         ("tick_fs", |receiver| receiver.tick_fs = -2500),
-        ("ticks_per_chip", |receiver| receiver.ticks_per_chip = 0),
-        ("jitter_ticks", |receiver| receiver.jitter_ticks = -0.1),
-        ("jitter_ticks", |receiver| receiver.jitter_ticks = f64::NAN),
-        ("false_alarm", |receiver| receiver.false_alarm = 0.0),
-        ("false_alarm", |receiver| receiver.false_alarm = f64::INFINITY),
+        ("ticks_per_chip", |receiver| of(receiver).ticks_per_chip = 0),
+        ("jitter_ticks", |receiver| of(receiver).jitter_ticks = -0.1),
+        ("jitter_ticks", |receiver| of(receiver).jitter_ticks = f64::NAN),
+        ("false_alarm", |receiver| of(receiver).false_alarm = 0.0),
+        ("false_alarm", |receiver| of(receiver).false_alarm = f64::INFINITY),
         ("returns", |receiver| receiver.returns = 9),
     ];
     for (name, spoil) in spoils {
@@ -186,9 +218,9 @@ fn settings_outside_their_limits_are_refused() {
         assert_says(&error, &[name, "use "]);
     }
     for spoil in [
-        (|receiver: &mut Receiver| receiver.light_ticks = u32::MAX) as Spoil,
+        (|receiver: &mut Receiver| of(receiver).light_ticks = u32::MAX) as Spoil,
         |receiver| receiver.gate_ticks.1 = u32::MAX,
-        |receiver| receiver.ticks_per_chip = u32::MAX,
+        |receiver| of(receiver).ticks_per_chip = u32::MAX,
     ] {
         let error = refused(|receiver, _, _| spoil(receiver));
         assert!(matches!(error, Error::TooLong { .. }), "{error:?}");
@@ -208,11 +240,12 @@ fn sampled() -> (Receiver, Samples) {
         least_marks: 2,
         coupling: None,
     };
-    let kind = ReceiverKind::Sampled;
     let mut code: Vec<i16> = (0..5000).map(|at| at * 3 % 5 - 2).collect();
     ticks().tick.iter().for_each(|tick| code[*tick as usize] += 100);
     let samples = Samples { epoch: 0, channel: vec![0], code };
-    (Receiver { kind, sampling: Some(sampling), ..receiver() }, samples)
+    let (ticks_per_chip, light_ticks, false_alarm) = (1, 3000, 1e-6);
+    let method = Method::Sampled(Sampled { ticks_per_chip, light_ticks, false_alarm, sampling });
+    (Receiver { method, ..receiver() }, samples)
 }
 
 /// What the receiver of samples says when one thing is wrong.
@@ -225,7 +258,7 @@ fn refused_sampled(spoil: impl Fn(&mut Receiver, &mut ShotLog, &mut Samples)) ->
 
 #[test]
 fn a_record_of_another_kind_is_refused() {
-    let error = refused_sampled(|receiver, _, _| receiver.kind = ReceiverKind::Matched);
+    let error = refused_sampled(|given, _, _| given.method = receiver().method);
     assert_eq!(error, Error::Record { wants: "ticks", given: "samples" });
     assert_says(&error, &["decodes ticks", "use a receiver of samples"]);
     let receiver = sampled().0;
@@ -271,13 +304,12 @@ fn signals_that_cannot_be_are_refused() {
     ];
     for (name, spoil) in spoils {
         let error = refused_sampled(|receiver, _, _| {
-            receiver.sampling.iter_mut().for_each(spoil);
+            let Method::Sampled(settings) = &mut receiver.method else { panic!() };
+            spoil(&mut settings.sampling);
         });
         assert!(matches!(error, Error::Setting { setting, .. } if setting == name), "{error:?}");
         assert_says(&error, &[name, "use "]);
     }
-    let error = refused_sampled(|receiver, _, _| receiver.sampling = None);
-    assert_says(&error, &["`sampling`", "missing"]);
 }
 
 #[test]
@@ -299,7 +331,7 @@ fn lit_zeros_are_for_the_balanced_receiver() {
     let book = Codebook::new(family, Some(payload), 4, Keying::Inversion).unwrap();
     let log = ShotLog::of_one_channel(&[0], &[1]);
     for kind in KINDS {
-        let receiver = Receiver { kind, ..receiver() };
+        let receiver = receiver_of(kind);
         let decoded = receiver.decode(&book, &log, &Ticks { tick: vec![5], ..Ticks::default() });
         let understands = matches!(kind, ReceiverKind::Balanced | ReceiverKind::Direct);
         assert_eq!(decoded.is_ok(), understands, "{kind:?}");
@@ -311,7 +343,7 @@ fn lit_zeros_are_for_the_balanced_receiver() {
 #[test]
 fn darkness_is_no_error_and_counts_every_shot() {
     for kind in KINDS {
-        let receiver = Receiver { kind, ..receiver() };
+        let receiver = receiver_of(kind);
         let mut log = log();
         // However far apart: where there is no tick there is nothing to be far from.
         log.fired_at_fs[2] = 1_000_000_000_000_000_000;
@@ -342,56 +374,60 @@ fn any_f64() -> impl Strategy<Value = f64> {
 }
 
 prop_compose! {
-    fn any_receiver()(
-        kind in 0..5_usize,
-        effort in prop_oneof![Just(Effort::Quick), Just(Effort::Thorough)],
-        gate_ticks in (any_u32(), any_u32()),
+    fn any_correlation()(
         light_ticks in any_u32(),
         ticks_per_chip in any_u32(),
-        tick_fs in any_i64(),
         jitter_ticks in any_f64(),
         false_alarm in any_f64(),
-        bit_threshold in any::<u16>(),
-        returns in 0..10_u8,
-        pick in prop_oneof![Just(Pick::First), Just(Pick::Strongest), Just(Pick::Last)],
-    ) -> Receiver {
-        let kind = KINDS[kind];
-        Receiver {
-            kind, effort, gate_ticks, light_ticks, ticks_per_chip, tick_fs, jitter_ticks, photons_apart: false,
-            false_alarm, bit_threshold, returns, pick, sampling: None,
-        }
+        photons_apart in any::<bool>(),
+    ) -> Correlation {
+        Correlation { ticks_per_chip, light_ticks, jitter_ticks, photons_apart, false_alarm }
     }
 }
 
-/// A receiver of which at most one setting is out of the ordinary.
-fn nearly_sane() -> impl Strategy<Value = Receiver> {
-    (any_receiver(), 0..12_usize, 1..4_u32, prop_oneof![Just(0.0), 0.1..20.0_f64]).prop_map(
-        |(any, wrong, ticks_per_chip, jitter_ticks)| {
-            let Receiver { kind, effort, pick, .. } = any;
-            let sane = Receiver {
-                kind,
-                effort,
-                pick,
-                ticks_per_chip,
-                jitter_ticks,
-                bit_threshold: 3,
-                returns: 3,
-                false_alarm: 1e-3,
-                ..receiver()
-            };
-            match wrong {
-                0 => Receiver { gate_ticks: any.gate_ticks, ..sane },
-                1 => Receiver { light_ticks: any.light_ticks, ..sane },
-                2 => Receiver { ticks_per_chip: any.ticks_per_chip, ..sane },
-                3 => Receiver { tick_fs: any.tick_fs, ..sane },
-                4 => Receiver { jitter_ticks: any.jitter_ticks, ..sane },
-                5 => Receiver { false_alarm: any.false_alarm, ..sane },
-                6 => Receiver { bit_threshold: any.bit_threshold, ..sane },
-                7 => any,
-                _ => sane,
-            }
-        },
-    )
+prop_compose! {
+    fn any_receiver()(
+        gate_ticks in (any_u32(), any_u32()),
+        tick_fs in any_i64(),
+        returns in 0..10_u8,
+        pick in prop_oneof![Just(Pick::First), Just(Pick::Strongest), Just(Pick::Last)],
+    ) -> Receiver {
+        Receiver { gate_ticks, returns, pick, ..Receiver::matched(tick_fs) }
+    }
+}
+
+prop_compose! {
+    /// A receiver of which at most one setting is out of the ordinary.
+    fn nearly_sane()(
+        (any, odd, odd_threshold) in (any_receiver(), any_correlation(), any::<u16>()),
+        kind in 0..KINDS.len(),
+        effort in prop_oneof![Just(Effort::Quick), Just(Effort::Thorough)],
+        wrong in 0..12_usize,
+        ticks_per_chip in 1..4_u32,
+        jitter_ticks in prop_oneof![Just(0.0), 0.1..20.0_f64],
+    ) -> Receiver {
+        let mut receiver = Receiver { pick: any.pick, returns: 3, ..receiver() };
+        let false_alarm = 1e-3;
+        let mut set_to =
+            Correlation { ticks_per_chip, jitter_ticks, false_alarm, ..correlation() };
+        let mut bit_threshold = 3;
+        match wrong {
+            0 => receiver.gate_ticks = any.gate_ticks,
+            1 => set_to.light_ticks = odd.light_ticks,
+            2 => set_to.ticks_per_chip = odd.ticks_per_chip,
+            3 => receiver.tick_fs = any.tick_fs,
+            4 => set_to.jitter_ticks = odd.jitter_ticks,
+            5 => set_to.false_alarm = odd.false_alarm,
+            6 => bit_threshold = odd_threshold,
+            7 => (receiver, set_to, bit_threshold) = (any, odd, odd_threshold),
+            _ => {}
+        }
+        receiver.method = method(KINDS[kind], bit_threshold, set_to);
+        if let Method::Matched(_, set_to) = &mut receiver.method {
+            *set_to = effort;
+        }
+        receiver
+    }
 }
 
 /// A log that is in order more often than not.

@@ -4,7 +4,9 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use macropulse_codec::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse_codec::decode::{Receiver, ReceiverKind};
+use macropulse_codec::decode::{
+    Bitwise, Correlation, Effort, Method, Opening, Receiver, ReceiverKind,
+};
 use macropulse_codec::files::{
     Digest, Error, Form, Limits, Place, Shot, ShotHeader, ShotReader, ShotWriter, Stream,
     TickHeader, TickReader, TickWriter, What,
@@ -243,8 +245,16 @@ fn codebook() -> Codebook {
     Codebook::new(Family::prime(5).unwrap(), Some(payload), 16, Keying::OnOff).unwrap()
 }
 
-fn receiver(kind: ReceiverKind) -> Receiver {
-    Receiver { kind, gate_ticks: (0, 2000), light_ticks: 3000, ..Receiver::matched(TICK_FS) }
+fn receiver(method: Method) -> Receiver {
+    Receiver { gate_ticks: (0, 2000), method, ..Receiver::matched(TICK_FS) }
+}
+
+fn correlation() -> Correlation {
+    Correlation { light_ticks: 3000, ..Correlation::default() }
+}
+
+fn matched() -> Method {
+    Method::Matched(correlation(), Effort::Quick)
 }
 
 /// Echoes of `shots` after 700 ticks and a bit more from shot to shot, and some noise.
@@ -313,15 +323,18 @@ fn a_stream_is_cut_into_bands_with_all_that_belongs_to_them() {
 fn what_is_explained_is_what_was_decided() {
     let shots = shots(100);
     let book = codebook();
-    for (kind, noise) in [
-        (ReceiverKind::Matched, 0),
-        (ReceiverKind::Matched, 4000),
-        (ReceiverKind::Matched, 20_000),
-        (ReceiverKind::Balanced, 300),
-        (ReceiverKind::Blind, 0),
-        (ReceiverKind::Direct, 300),
+    let (opening, bit_threshold, ticks_per_chip, jitter_ticks) = (Opening::AnyBit, 1, 1, 0.0);
+    let blind = Bitwise { opening, bit_threshold, ticks_per_chip, jitter_ticks };
+    for (method, noise) in [
+        (matched(), 0),
+        (matched(), 4000),
+        (matched(), 20_000),
+        (Method::Balanced(correlation()), 300),
+        (Method::Bitwise(blind), 0),
+        (Method::Direct, 300),
     ] {
-        let receiver = receiver(kind);
+        let kind = method.kind();
+        let receiver = receiver(method);
         let header = ShotHeader::default();
         let files = (
             written_shots(Form::Binary, &header, &shots),
@@ -383,7 +396,7 @@ proptest! {
         files[1].truncate(cuts.1);
         if let Ok(bands) = bands(&files[0], &files[1]) {
             for (log, ticks) in bands {
-                let _ = receiver(ReceiverKind::Matched).decode(&codebook(), &log, &ticks);
+                let _ = receiver(matched()).decode(&codebook(), &log, &ticks);
             }
         }
     }

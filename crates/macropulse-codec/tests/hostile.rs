@@ -7,7 +7,10 @@ use macropulse_codec::code::correlation::{
     CrossCorrelation, aperiodic, balanced, bipolar, periodic,
 };
 use macropulse_codec::code::{CodeWord, Codebook, Crc, Family, Keying, Payload, Sparse};
-use macropulse_codec::decode::{Coupling, Receiver, ReceiverKind, Sampling};
+use macropulse_codec::decode::{
+    Bitwise, Correlation, Coupling, Effort, Method, Opening, Receiver, ReceiverKind, Sampled,
+    Sampling,
+};
 use macropulse_codec::files::{
     Form, Limits, ShotHeader, ShotReader, ShotWriter, Stream, TickHeader, TickReader, TickWriter,
 };
@@ -23,6 +26,20 @@ const KINDS: [ReceiverKind; 5] = [
     ReceiverKind::Balanced,
     ReceiverKind::Direct,
 ];
+
+/// The method of a receiver of ticks of this kind.
+fn method(kind: ReceiverKind, bit_threshold: u16, correlation: Correlation) -> Method {
+    let Correlation { ticks_per_chip, jitter_ticks, .. } = correlation;
+    let bitwise =
+        |opening| Method::Bitwise(Bitwise { opening, bit_threshold, ticks_per_chip, jitter_ticks });
+    match kind {
+        ReceiverKind::Literal => bitwise(Opening::FirstBit),
+        ReceiverKind::Blind => bitwise(Opening::AnyBit),
+        ReceiverKind::Balanced => Method::Balanced(correlation),
+        ReceiverKind::Direct => Method::Direct,
+        _ => Method::Matched(correlation, Effort::Quick),
+    }
+}
 
 /// Address space that this program may have, bytes: what asks for more ends it.
 #[cfg(target_os = "linux")]
@@ -128,9 +145,15 @@ fn codebook() -> Codebook {
     Codebook::new(Family::prime(5).unwrap(), Some(payload), 16, Keying::OnOff).unwrap()
 }
 
+fn receiver(kind: ReceiverKind) -> Receiver {
+    let correlation = Correlation { light_ticks: 3000, ..Correlation::default() };
+    let method = method(kind, 1, correlation);
+    Receiver { gate_ticks: (0, 2000), method, ..Receiver::matched(1000) }
+}
+
 /// Three shots with light, and a receiver that finds them.
 fn sound() -> (Receiver, ShotLog, Ticks) {
-    let receiver = Receiver { gate_ticks: (0, 2000), light_ticks: 3000, ..Receiver::matched(1000) };
+    let receiver = receiver(ReceiverKind::Matched);
     let mut log = ShotLog::of_one_channel(&[0, 500_000, 1_000_000], &[0, 1, 2]);
     log.label = vec![5, 9, 12];
     let book = codebook();
@@ -170,8 +193,7 @@ proptest! {
         prop_assert_eq!(opens, closes.start);
         let _ = (cut.epoch(span.0), cut.shots(span.0, span.1));
         for kind in KINDS {
-            let receiver = Receiver { kind, ..sound().0 };
-            let decoded = receiver.decode(&codebook(), &log, &ticks);
+            let decoded = receiver(kind).decode(&codebook(), &log, &ticks);
             let even = [&log.row, &log.column, &log.label, &log.word, &log.channel]
                 .iter()
                 .all(|column| column.len() == log.len());
@@ -188,13 +210,14 @@ proptest! {
         numbers in (any_u32(), any_i64(), any::<f64>(), any::<f64>()),
     ) {
         let (mut receiver, log, ticks) = sound();
-        receiver.kind = KINDS[kind];
+        let mut set_to = Correlation { light_ticks: 3000, ..Correlation::default() };
         match spoilt {
             0 => receiver.gate_ticks = gate,
-            1 => (receiver.light_ticks, receiver.tick_fs) = (numbers.0, numbers.1),
-            2 => (receiver.jitter_ticks, receiver.false_alarm) = (numbers.2, numbers.3),
-            _ => receiver.ticks_per_chip = numbers.0,
+            1 => (set_to.light_ticks, receiver.tick_fs) = (numbers.0, numbers.1),
+            2 => (set_to.jitter_ticks, set_to.false_alarm) = (numbers.2, numbers.3),
+            _ => set_to.ticks_per_chip = numbers.0,
         }
+        receiver.method = method(KINDS[kind], 1, set_to);
         let explained = receiver.explain(&codebook(), (&log, &ticks), shot as usize);
         prop_assert!(shot < 3 || explained.is_err());
     }
@@ -289,21 +312,23 @@ proptest! {
         (gate, light, alarm) in ((any_u32(), any_u32()), any_u32(), any::<f64>()),
         (returns, chip) in (0..10_u8, any_u32()),
     ) {
-        let (receiver, sound, ticks) = sound();
-        let kind = ReceiverKind::Sampled;
-        let mut receiver = Receiver { kind, returns: 2, sampling: Some(sane), ..receiver };
+        let (sound_receiver, sound, ticks) = sound();
+        let mut receiver = Receiver { returns: 2, ..sound_receiver.clone() };
+        let (ticks_per_chip, light_ticks, false_alarm) = (1, 3000, 1e-6);
+        let mut set_to = Sampled { ticks_per_chip, light_ticks, false_alarm, sampling: sane };
         let (mut log_here, mut record) = (sound, lit);
         match wrong {
             0 => log_here = log,
             1 => record = samples,
-            2 => receiver.sampling = Some(sampling),
+            2 => set_to.sampling = sampling,
             3 => receiver.gate_ticks = gate,
-            4 => receiver.light_ticks = light,
-            5 => receiver.false_alarm = alarm,
+            4 => set_to.light_ticks = light,
+            5 => set_to.false_alarm = alarm,
             6 => record.epoch = samples.epoch,
-            7 => (receiver.returns, receiver.ticks_per_chip) = (returns, chip),
+            7 => (receiver.returns, set_to.ticks_per_chip) = (returns, chip),
             _ => {}
         }
+        receiver.method = Method::Sampled(set_to);
         if let Ok(returns) = receiver.decode(&codebook(), &log_here, &record) {
             FOUND.fetch_add(returns.len().min(1), Ordering::Relaxed);
             prop_assert!(returns.tof.iter().all(|tof| tof.is_finite()));
@@ -320,7 +345,7 @@ proptest! {
         }
         prop_assert!(receiver.decode(&codebook(), &log_here, &ticks).is_err());
         prop_assert!(receiver.explain(&codebook(), (&log_here, &ticks), 0).is_err());
-        receiver.kind = ReceiverKind::Matched;
+        receiver.method = sound_receiver.method;
         prop_assert!(receiver.decode(&codebook(), &log_here, &record).is_err());
     }
 }
@@ -393,14 +418,12 @@ fn counts_are_wide_enough_for_the_heaviest_code() {
         let log = ShotLog::of_one_channel(&[0, 200_000_000], &[0, 1]);
         for kind in [ReceiverKind::Literal, ReceiverKind::Matched, ReceiverKind::Balanced] {
             for jitter_ticks in [0.0, 2.0] {
-                let receiver = Receiver {
-                    kind,
-                    gate_ticks: (0, 2000),
-                    light_ticks: 4000,
-                    jitter_ticks,
-                    bit_threshold: (weight / 2) as u16,
-                    ..Receiver::matched(1000)
-                };
+                let light_ticks = 4000;
+                let correlation =
+                    Correlation { light_ticks, jitter_ticks, ..Correlation::default() };
+                let method = method(kind, (weight / 2) as u16, correlation);
+                let receiver =
+                    Receiver { gate_ticks: (0, 2000), method, ..Receiver::matched(1000) };
                 let of_shot = |shot: usize| {
                     let marks = book.marks(0, shot as u16).iter();
                     marks.map(move |mark| 200_000 * shot as u32 + 700 + u32::from(*mark))

@@ -4,14 +4,17 @@
 
 use crate::waveform;
 
-use macropulse_codec::decode::{MarkSeen, MarkState, Receiver, Reject, Returns, Sampling};
+use macropulse_codec::decode::{
+    MarkSeen, MarkState, Method, Receiver, Reject, Returns, Sampled, Sampling,
+};
 use macropulse_codec::level::forced::at_each_level;
 use macropulse_codec::{Samples, ShotLog};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use waveform::{
-    Channel, Echo, FAINT, FULL_SCALE, PERIOD, SIGMA, TICK_FS, codebook, log, receiver, sampling,
+    Channel, Echo, FAINT, FULL_SCALE, PERIOD, SIGMA, TICK_FS, codebook, log, receiver, receiver_of,
+    sampling,
 };
 
 /// Ticks of a return that is taken for that of an echo, ±: 0.3 m.
@@ -126,15 +129,9 @@ fn false_returns(false_alarm: f64, sampling: Sampling) -> usize {
         sigma: SIGMA,
         seed: 3,
     };
-    let gate_ticks = (8, 407);
-    let receiver = Receiver {
-        gate_ticks,
-        light_ticks: 407,
-        false_alarm,
-        returns: 8,
-        sampling: Some(sampling),
-        ..receiver()
-    };
+    let (ticks_per_chip, light_ticks) = (1, 407);
+    let method = Method::Sampled(Sampled { ticks_per_chip, light_ticks, false_alarm, sampling });
+    let receiver = Receiver { gate_ticks: (8, 407), returns: 8, method, ..receiver() };
     decode(&receiver, &channel).len()
 }
 
@@ -169,7 +166,7 @@ fn a_mixed_scene_has_no_wrong_ranges() {
     let mut channel = Channel::of(&echoes, 6);
     channel.log.owned = 4..shots - 4;
     let sampling = Sampling { blank_ticks: 15, ..sampling() };
-    let receiver = Receiver { sampling: Some(sampling), ..receiver() };
+    let receiver = receiver_of(sampling);
     let returns = decode(&receiver, &channel);
     let (errors, wrong) = errors(&returns, &channel);
     let in_gate = (4..shots - 4).filter(|shot| echoes[*shot].1 > 0.0 && echoes[*shot].0 < 2502.0);
@@ -205,7 +202,7 @@ fn what_bright_light_hides_is_found_in_what_is_left() {
             ];
             // Nor may another mark of the same echo be blind.
             let sampling = Sampling { recovery_ticks: 10, ..sampling() };
-            let returns = decode(&Receiver { sampling: Some(sampling), ..receiver() }, &channel);
+            let returns = decode(&receiver_of(sampling), &channel);
             let what = format!("{light} {beside} ticks beside {photons}");
             assert_eq!(
                 (returns.shot.as_slice(), returns.peak.as_slice()),
@@ -242,14 +239,13 @@ fn marks_that_are_blanked_do_not_count() {
     let ticks = 2.0 * PERIOD as f64 + first + 6.0;
     let mut channel = Channel::of(&[(0.0, 0.0); 6], 9);
     channel.echoes = vec![Echo { shot: 1, ticks, photons: 1000.0 }];
-    let sampling = Sampling { blank_ticks: 15, ..sampling() };
-    let blanked = Receiver { sampling: Some(sampling), ..receiver() };
-    let gate = Receiver { gate_ticks: (8, 4000), ..blanked.clone() };
-    let returns = decode(&gate, &channel);
+    let blanked = |least_marks| {
+        let sampling = Sampling { blank_ticks: 15, least_marks, ..sampling() };
+        Receiver { gate_ticks: (8, 4000), ..receiver_of(sampling) }
+    };
+    let returns = decode(&blanked(2), &channel);
     assert_eq!((returns.shot.as_slice(), returns.peak.as_slice()), (&[1][..], &[2][..]));
-    let strict = Sampling { least_marks: 3, ..gate.sampling.clone().unwrap() };
-    let strict = Receiver { sampling: Some(strict), ..gate };
-    assert!(decode(&strict, &channel).is_empty());
+    assert!(decode(&blanked(3), &channel).is_empty());
 }
 
 /// Own stray light: whatever the samples are while the channel is blind, and however it rises.
@@ -257,7 +253,7 @@ fn marks_that_are_blanked_do_not_count() {
 fn own_light_is_not_taken_for_that_of_others() {
     let channel = wall(FAINT, 200, 15);
     let blind = Sampling { blank_ticks: 15, ..sampling() };
-    let receiver = Receiver { sampling: Some(blind), ..receiver() };
+    let receiver = receiver_of(blind);
     let clean = channel.samples();
     let mut lit = clean.clone();
     let book = codebook();
@@ -279,8 +275,7 @@ fn own_light_is_not_taken_for_that_of_others() {
     assert_eq!(wrong, 0);
     assert!(with.len() + 4 >= without.len(), "{} of {}", with.len(), without.len());
     // Negative control: who does not know of it takes it for light.
-    let sampling = Sampling { blank_ticks: 0, ..receiver.sampling.clone().unwrap() };
-    let deceived = Receiver { gate_ticks: (0, 2502), sampling: Some(sampling), ..receiver };
+    let deceived = Receiver { gate_ticks: (0, 2502), ..receiver_of(sampling()) };
     let returns = deceived.decode(&book, &channel.log, &lit).unwrap();
     assert!(errors(&returns, &channel).1 > 100, "{}", errors(&returns, &channel).1);
 }

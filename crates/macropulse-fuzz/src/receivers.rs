@@ -3,16 +3,8 @@
 use std::sync::LazyLock;
 
 use macropulse::codec::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse::codec::decode::{Effort, Pick, Receiver, ReceiverKind};
+use macropulse::codec::decode::{Bitwise, Correlation, Effort, Method, Opening, Pick, Receiver};
 use macropulse::codec::{ShotLog, Ticks};
-
-const KINDS: [ReceiverKind; 5] = [
-    ReceiverKind::Literal,
-    ReceiverKind::Blind,
-    ReceiverKind::Matched,
-    ReceiverKind::Balanced,
-    ReceiverKind::Direct,
-];
 
 static BOOKS: LazyLock<Vec<Codebook>> = LazyLock::new(|| {
     let payload = Payload::new(4, Crc::default(), false).ok();
@@ -66,37 +58,46 @@ impl Numbers<'_> {
 }
 
 fn receiver(numbers: &mut Numbers) -> Receiver {
-    let kind = KINDS[usize::from(numbers.byte()) % KINDS.len()];
-    let mut receiver = Receiver {
-        kind,
-        gate_ticks: (0, 2000),
+    let kind = numbers.byte() % 5;
+    let mut receiver = Receiver { gate_ticks: (0, 2000), ..Receiver::matched(1000) };
+    let mut correlation = Correlation {
         light_ticks: 3000,
         ticks_per_chip: u32::from(numbers.byte() % 4),
-        bit_threshold: 3,
-        ..Receiver::matched(1000)
+        ..Correlation::default()
     };
+    let mut bit_threshold = 3;
     let wrong = numbers.byte();
     if wrong & 1 > 0 {
         receiver.gate_ticks = (numbers.count(), numbers.count());
     }
     if wrong & 2 > 0 {
-        receiver.light_ticks = numbers.count();
+        correlation.light_ticks = numbers.count();
     }
     if wrong & 4 > 0 {
         receiver.tick_fs = numbers.time();
     }
     if wrong & 8 > 0 {
-        receiver.jitter_ticks = numbers.real();
+        correlation.jitter_ticks = numbers.real();
     }
     if wrong & 16 > 0 {
-        receiver.false_alarm = numbers.real();
+        correlation.false_alarm = numbers.real();
     }
     if wrong & 32 > 0 {
-        receiver.bit_threshold = numbers.byte().into();
-        receiver.ticks_per_chip = numbers.count();
+        bit_threshold = numbers.byte().into();
+        correlation.ticks_per_chip = numbers.count();
     }
-    receiver.photons_apart = wrong & 64 > 0;
-    receiver.effort = if wrong & 128 > 0 { Effort::Thorough } else { Effort::Quick };
+    correlation.photons_apart = wrong & 64 > 0;
+    let effort = if wrong & 128 > 0 { Effort::Thorough } else { Effort::Quick };
+    let Correlation { ticks_per_chip, jitter_ticks, .. } = correlation;
+    let bitwise =
+        |opening| Method::Bitwise(Bitwise { opening, bit_threshold, ticks_per_chip, jitter_ticks });
+    receiver.method = match kind {
+        0 => bitwise(Opening::FirstBit),
+        1 => bitwise(Opening::AnyBit),
+        2 => Method::Matched(correlation, effort),
+        3 => Method::Balanced(correlation),
+        _ => Method::Direct,
+    };
     receiver.returns = numbers.byte() % 10;
     receiver.pick = [Pick::First, Pick::Strongest, Pick::Last][usize::from(numbers.byte() % 3)];
     receiver

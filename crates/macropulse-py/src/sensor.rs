@@ -238,7 +238,7 @@ impl Sensor {
             true => design.coding.codebook.family().to_string(),
             false => "one mark a shot".to_owned(),
         };
-        let receiver = format!("{:?}", design.receiver.kind).to_lowercase();
+        let receiver = design.receiver.method.kind().name();
         let (near, far) = (design.scan.min_range, design.scan.max_range);
         format!(
             "<macropulse.Sensor {}: {rows} x {columns} pixels in {:.4} s, {code}, {receiver} \

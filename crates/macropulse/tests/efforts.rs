@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use macropulse::channel::{self, Operating, light_of_echoes};
-use macropulse::codec::decode::{Effort, Receiver, Reject, Returns};
+use macropulse::codec::decode::{Correlation, Effort, Method, Receiver, Reject, Returns};
 use macropulse::codec::{ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::detect::{Detectors, Memory};
@@ -38,6 +38,15 @@ fn ranges(returns: &Returns) -> BTreeSet<(u32, u64)> {
     returns.shot.iter().copied().zip(returns.tof.iter().map(|tof| tof.to_bits())).collect()
 }
 
+/// The matched `receiver`, but for what is changed in its settings.
+fn set(receiver: &Receiver, change: impl FnOnce(&mut Correlation, &mut Effort)) -> Receiver {
+    let mut receiver = receiver.clone();
+    if let Method::Matched(correlation, effort) = &mut receiver.method {
+        change(correlation, effort);
+    }
+    receiver
+}
+
 /// How many shots there are of which they do not give the same ranges.
 fn differ(one: &Returns, other: &Returns) -> usize {
     let (one, other) = (ranges(one), ranges(other));
@@ -52,9 +61,9 @@ fn assert_few_differ(scene: &str, band: usize, blind: f64) {
     let decode =
         |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
     let quick = decode(&design.receiver);
-    let thorough = decode(&Receiver { effort: Effort::Thorough, ..design.receiver.clone() });
+    let thorough = decode(&set(&design.receiver, |_, effort| *effort = Effort::Thorough));
     assert!(200 * differ(&quick, &thorough) <= log.owned.len(), "{}", differ(&quick, &thorough));
-    let blind = decode(&Receiver { false_alarm: blind, ..design.receiver.clone() });
+    let blind = decode(&set(&design.receiver, |it, _| it.false_alarm = blind));
     assert!(50 * differ(&blind, &thorough) > log.owned.len(), "{}", differ(&blind, &thorough));
 }
 
@@ -91,13 +100,13 @@ fn light_of_another_surface_does_not_pass_for_another_label() {
         let decode =
             |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
         let quick = decode(&design.receiver);
-        let thorough = Receiver { effort: Effort::Thorough, ..design.receiver.clone() };
+        let thorough = set(&design.receiver, |_, effort| *effort = Effort::Thorough);
         let found = decode(&thorough);
         assert_eq!(quick.rejected(Reject::LabelMismatch), 0, "{keys:?}");
         assert!(quick.len() > 1000, "{keys:?}");
         assert!(ranges(&quick) == ranges(&found), "{keys:?}");
         if keys.is_empty() {
-            let blind = decode(&Receiver { false_alarm: 1e-60, ..thorough });
+            let blind = decode(&set(&thorough, |it, _| it.false_alarm = 1e-60));
             assert!(ranges(&blind) != ranges(&found));
         }
     }

@@ -109,7 +109,7 @@ fn the_matched_receiver_finds_ground_of_which_one_mark_in_seven_is_seen() {
 fn jitter_is_averaged_over_the_marks() {
     for jitter in [0.4, 1.0, 2.0] {
         let mut sensor = Sensor::printed(Matched);
-        sensor.receiver.jitter_ticks = jitter;
+        sensor.matched().0.jitter_ticks = jitter;
         let score = sensor.score(0..2, slope, Weather { jitter, ..CLEAR });
         assert_right(&score, 99.9, &format!("jitter {jitter}"));
         // 58 marks or more, each rounded down: σ/√58, and as much again for cut off tails.
@@ -123,7 +123,7 @@ fn jitter_is_averaged_over_the_marks() {
 fn bright_shots_on_top_of_each_other_are_no_return_of_an_empty_pixel() {
     // N = 1696, one in four empty. At a jitter of a tick a mark has five places.
     let mut sensor = Sensor::printed(Matched);
-    sensor.receiver.jitter_ticks = 1.0;
+    sensor.matched().0.jitter_ticks = 1.0;
     let score = sensor.score(0..2, random, Weather { jitter: 1.0, ..CLEAR });
     assert_right(&score, 99.9, "random");
     assert_eq!(score.false_returns, 0, "{score:?}");
@@ -139,7 +139,7 @@ fn false_edges_alone_are_no_return() {
     }
     // The same with a threshold that promises nothing must find something, or the test is blind.
     let mut careless = Sensor::printed(Matched);
-    careless.receiver.false_alarm = 1e3;
+    careless.matched().0.false_alarm = 1e3;
     let log = careless.log(0..1);
     let ticks = careless.ticks(&log, sky, weather);
     let returns = careless.receiver.decode(&careless.codebook, &log, &ticks).unwrap();
@@ -243,7 +243,7 @@ fn faint_walls_are_found_without_looking_everywhere() {
         let weather = Weather { seen, ..CLEAR };
         let found = [Effort::Quick, Effort::Thorough].map(|effort| {
             let mut sensor = Sensor::printed(Matched);
-            sensor.receiver.effort = effort;
+            *sensor.matched().1 = effort;
             sensor.score(rows("random"), wall, weather)
         });
         let [quick, thorough] = found.map(|score| score.percent_right());

@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use macropulse::channel::{self, Operating, Seen, Speckle};
+use macropulse::codec::decode::Method;
 use macropulse::codec::{Given, Samples};
 use macropulse::design::Design;
 use macropulse::detect::Detectors;
@@ -255,7 +256,8 @@ fn a_baseline_that_droops_is_known_to_the_receiver() {
     let refused = Forecaster::new(&coupled("1000.0"), &day).unwrap_err().to_string();
     assert!(refused.contains("pull below the lowest code"), "{refused}");
     let mut unknowing = coupled("100.0");
-    unknowing.receiver.sampling.as_mut().unwrap().coupling = None;
+    let Method::Sampled(settings) = &mut unknowing.receiver.method else { panic!() };
+    settings.sampling.coupling = None;
     assert!(found(&unknowing, (149.0, 0.05), 9).right < 100.0);
 }
 

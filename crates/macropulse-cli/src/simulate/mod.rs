@@ -9,8 +9,10 @@ pub mod summary;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::codec::decode::ReceiverKind;
 use macropulse::memory::Estimate;
 use macropulse::scene::{Changes, Room};
 
@@ -81,8 +83,8 @@ pub struct Simulate {
     memory: MemoryLimit,
 
     /// Receiver that decodes the macropulses: short for --set receiver.kind=…
-    #[arg(long, value_name = "KIND")]
-    receiver: Option<ReceiverName>,
+    #[arg(long, value_name = "KIND", value_parser = receivers())]
+    receiver: Option<String>,
 
     /// Folder for the results, made if need be; files of the same name are replaced
     #[arg(short, long, value_name = "DIR")]
@@ -116,17 +118,12 @@ pub struct Simulate {
     json: bool,
 }
 
-/// The receivers that can be chosen for coded shots.
-#[derive(Clone, Copy, ValueEnum)]
-enum ReceiverName {
-    /// As printed in the paper: the first mark opens a macropulse
-    Literal,
-    /// Bit by bit, trying how many leading bits were dark
-    Blind,
-    /// Correlates the whole macropulse of every shot in flight
-    Matched,
-    /// The same, what is lit where the macropulse is dark counted against it
-    Balanced,
+/// The names of all receivers.
+fn receivers() -> PossibleValuesParser {
+    let named = |kind: &ReceiverKind| {
+        PossibleValue::new(kind.name()).help(kind.summary().trim_end_matches('.'))
+    };
+    ReceiverKind::ALL.iter().map(named).into()
 }
 
 impl Simulate {
@@ -134,8 +131,8 @@ impl Simulate {
     fn scenario(&self) -> Result<Scenario, Fault> {
         let mut changes = self.changes.apart(&self.surroundings)?;
         changes.of_scene.extend(self.outside.changes());
-        if let Some(kind) = self.receiver.and_then(|receiver| receiver.to_possible_value()) {
-            changes.of_sensor.push(("receiver.kind".to_owned(), kind.get_name().to_owned()));
+        if let Some(kind) = &self.receiver {
+            changes.of_sensor.push(("receiver.kind".to_owned(), kind.clone()));
         }
         let scene = self.scene.as_ref().or(self.named_scene.as_ref());
         let room = self.memory.room();

@@ -15,11 +15,11 @@ mod chance;
 mod grid;
 
 use super::timing::{self, Histogram, Known};
-use super::{Energy, GATES_PER_BLOCK, MIDDLE, Receiver, Reject, Return, Returns, window};
-use crate::ShotLog;
-use crate::Ticks;
+use super::{Correlation, Energy, GATES_PER_BLOCK, MIDDLE, Receiver, Reject, Return, Returns};
+use super::{beyond, window};
 use crate::code::Codebook;
 use crate::kernels::{Balance, Chips};
+use crate::{ShotLog, Ticks, time};
 use chance::Chance;
 use grid::Grid;
 
@@ -28,8 +28,16 @@ use grid::Grid;
 const NEAR: i64 = 1024;
 
 /// Decodes one band.
-pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &Ticks) -> Returns {
-    let mut band = Band::new(receiver, sent, ticks);
+///
+/// It looks beyond the end of the gate by the length of a macropulse: what stands there has
+/// sidelobes within the gate, and is told from them by being higher. Only then is it refused.
+pub(super) fn decode(
+    receiver: &Receiver,
+    correlation: &Correlation,
+    sent: (&Codebook, &ShotLog),
+    ticks: &Ticks,
+) -> Returns {
+    let mut band = Band::new(receiver, correlation, sent, ticks);
     let owned = sent.1.owned.clone();
     let mut returns = Returns::with_capacity(owned.len());
     for shot in owned {
@@ -38,6 +46,9 @@ pub(super) fn decode(receiver: &Receiver, sent: (&Codebook, &ShotLog), ticks: &T
             None => returns.reject(Reject::NoPeak),
         }
     }
+    let closes = time::s_from_fs((i64::from(receiver.gate_ticks.1) + 1) * receiver.tick_fs);
+    returns.refuse_beyond(closes);
+    beyond::exclude(receiver, correlation, sent, ticks, &mut returns);
     returns
 }
 
@@ -46,6 +57,9 @@ type Peak = (i64, Balance);
 
 struct Band<'a> {
     receiver: &'a Receiver,
+    correlation: &'a Correlation,
+    /// Nearest and farthest lag that is looked at.
+    gate: (i64, i64),
     codebook: &'a Codebook,
     log: &'a ShotLog,
     ticks: &'a [u32],
@@ -64,22 +78,30 @@ struct Band<'a> {
 }
 
 impl<'a> Band<'a> {
-    fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
+    fn new(
+        receiver: &'a Receiver,
+        correlation: &'a Correlation,
+        sent: (&'a Codebook, &'a ShotLog),
+        ticks: &'a Ticks,
+    ) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.fired_since(log, ticks.epoch);
-        let late = i64::from(window(receiver.jitter())) - 1;
-        let scale = i64::from(receiver.ticks_per_chip);
-        let (nearest, farthest) = gate(receiver);
-        let lags = (farthest - nearest).max(0) as f64 + 1.0;
+        let late = i64::from(window(correlation.jitter_ticks)) - 1;
+        let scale = i64::from(correlation.ticks_per_chip);
+        let (nearest, farthest) = receiver.gate_ticks;
+        let farthest = farthest.saturating_add(codebook.chips() * correlation.ticks_per_chip);
+        let lags = f64::from(farthest.saturating_sub(nearest)) + 1.0;
         Self {
             receiver,
+            correlation,
+            gate: (nearest.into(), farthest.into()),
             codebook,
             log,
             ticks: &ticks.tick,
             epoch: ticks.epoch,
             late,
             grid: Grid::new((scale, late)),
-            chance: Chance::new(lags, receiver.false_alarm, codebook.chips()),
+            chance: Chance::new(lags, correlation.false_alarm, codebook.chips()),
             fired,
             chips: Chips::default(),
             last_lag: None,
@@ -105,11 +127,11 @@ impl<'a> Band<'a> {
         let others = f64::from(peak.stray) / f64::from(dark.max(1)) * 0.999;
         let late = self.late(start, marks, others);
         let width = self.late as u32 + 1;
-        let window = timing::window(self.receiver, width, late);
+        let window = timing::window(self.correlation, width, late);
         let Energy { photons, saturated } = Energy::of((peak.found, weight.into()), others, window);
         Some(Return {
             shot,
-            tof: self.receiver.tof(fired_at_fs, start + self.epoch, late),
+            tof: self.receiver.tof(late)(fired_at_fs, start + self.epoch),
             peak: score,
             marks: weight,
             margin: score - self.grid.best_beside(start, &self.chips).clamp(0, peak.score()) as u16,
@@ -121,9 +143,9 @@ impl<'a> Band<'a> {
     /// Lays down the ticks of the gate of `shot`, and of a macropulse before it and behind it; those of
     /// the next shots with them.
     fn cover(&mut self, shot: usize) {
-        let (nearest, farthest) = gate(self.receiver);
-        let length = i64::from(self.codebook.chips() * self.receiver.ticks_per_chip);
-        let beside = length + 64 * i64::from(self.receiver.ticks_per_chip) + self.late + 1;
+        let (nearest, farthest) = self.gate;
+        let length = i64::from(self.codebook.chips() * self.correlation.ticks_per_chip);
+        let beside = length + 64 * i64::from(self.correlation.ticks_per_chip) + self.late + 1;
         let light = |shot: usize| {
             self.fired[shot] + nearest - beside..self.fired[shot] + farthest + length + beside
         };
@@ -137,7 +159,7 @@ impl<'a> Band<'a> {
 
     /// Whether chance would not leave so much of `peak`, the best of `shot`, which has so many marks.
     fn is_believed(&mut self, shot: usize, marks: u16, peak: Balance) -> bool {
-        let (nearest, farthest) = gate(self.receiver);
+        let (nearest, farthest) = self.gate;
         let gate = self.fired[shot] + nearest..self.fired[shot] + farthest + 1;
         let chips = (&self.chips, self.codebook.chips() as usize);
         let lit_about = |least, counts: &mut _| self.grid.lit_about(&gate, chips, least, counts);
@@ -147,7 +169,7 @@ impl<'a> Band<'a> {
     /// The highest balance in the gate of `shot`, the earliest of several, if it can be believed at
     /// all.
     fn peak(&mut self, shot: usize, marks: &[u16]) -> Option<Peak> {
-        let (nearest, farthest) = gate(self.receiver);
+        let (nearest, farthest) = self.gate;
         let fired = self.fired[shot];
         let gate = fired + nearest..fired + farthest + 1;
         let least = self.chance.least(marks.len() as u32) as i32;
@@ -159,10 +181,10 @@ impl<'a> Band<'a> {
 
     /// The best of the lags about that of the last shot at which the first mark is lit.
     fn near_the_last(&self, shot: usize, marks: &[u16]) -> Option<Peak> {
-        let (nearest, farthest) = gate(self.receiver);
+        let (nearest, farthest) = self.gate;
         let fired = self.fired[shot];
         let expected = fired + self.last_lag?;
-        let first = i64::from(self.receiver.ticks_per_chip) * i64::from(*marks.first()?);
+        let first = i64::from(self.correlation.ticks_per_chip) * i64::from(*marks.first()?);
         let from = expected + first - NEAR;
         let begin = self.ticks.partition_point(|&tick| i64::from(tick) < from);
         let ticks = self.ticks[begin..].iter().map(|&tick| i64::from(tick) - first);
@@ -180,7 +202,7 @@ impl<'a> Band<'a> {
         }
         let width = self.late as u32 + 1;
         let places = timing::lateness(width);
-        let scale = i64::from(self.receiver.ticks_per_chip);
+        let scale = i64::from(self.correlation.ticks_per_chip);
         let marks: Vec<i64> = marks.iter().map(|&mark| scale * i64::from(mark)).collect();
         let room = (places.end - places.start) as usize;
         let mut counts = vec![0; room];
@@ -191,11 +213,11 @@ impl<'a> Band<'a> {
             late.take_while(|late| *late < room).for_each(|late| counts[late] += 1);
         }
         let mut histogram = Histogram::default();
-        histogram.count(width, self.receiver.jitter(), |place, some| {
+        histogram.count(width, self.correlation.jitter(), |place, some| {
             some.copy_from_slice(&counts[(place - places.start) as usize..][..some.len()]);
         });
         let known = Known {
-            sigma: self.receiver.jitter(),
+            sigma: self.correlation.jitter(),
             marks: marks.len() as f64,
             others: others / f64::from(width),
             neighbours: &timing::neighbours(&marks, places.end - places.start),
@@ -204,14 +226,9 @@ impl<'a> Band<'a> {
     }
 }
 
-/// Nearest and farthest lag.
-fn gate(receiver: &Receiver) -> (i64, i64) {
-    (receiver.gate_ticks.0.into(), receiver.gate_ticks.1.into())
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::ReceiverKind;
+    use super::super::Method;
     use super::*;
     use crate::code::{Crc, Family, Keying, Payload};
     use proptest::prelude::*;
@@ -222,22 +239,14 @@ mod tests {
     /// Farthest lag, ticks.
     const GATE: u32 = 1500;
 
-    fn receiver(ticks_per_chip: u32, jitter_ticks: f64) -> Receiver {
-        Receiver {
-            kind: ReceiverKind::Balanced,
-            effort: crate::decode::Effort::Quick,
-            gate_ticks: (20, GATE),
-            light_ticks: GATE,
-            ticks_per_chip,
-            tick_fs: 1000,
-            jitter_ticks,
-            photons_apart: false,
-            false_alarm: 1e-2,
-            bit_threshold: 1,
-            returns: 1,
-            pick: crate::decode::Pick::Strongest,
-            sampling: None,
-        }
+    fn receiver(correlation: &Correlation) -> Receiver {
+        let method = Method::Balanced(correlation.clone());
+        Receiver { gate_ticks: (20, GATE), method, ..Receiver::matched(1000) }
+    }
+
+    fn correlation(ticks_per_chip: u32, jitter_ticks: f64) -> Correlation {
+        let (light_ticks, false_alarm, photons_apart) = (GATE, 1e-2, false);
+        Correlation { ticks_per_chip, light_ticks, jitter_ticks, photons_apart, false_alarm }
     }
 
     fn log(shots: u16, (period, labels, words): (u32, u16, u16)) -> ShotLog {
@@ -277,7 +286,7 @@ mod tests {
     /// every chip by itself.
     fn exhaustive(band: &Band, shot: usize) -> (i64, i32, bool) {
         let marks = band.codebook.marks(band.log.label[shot], band.log.word[shot]);
-        let scale = i64::from(band.receiver.ticks_per_chip);
+        let scale = i64::from(band.correlation.ticks_per_chip);
         let mut lit = vec![false; 1 << 16];
         for tick in band.ticks.iter().map(|&tick| i64::from(tick)) {
             ((tick - band.late).max(0)..=tick).for_each(|place| lit[place as usize] = true);
@@ -290,7 +299,7 @@ mod tests {
             let of_marks = seen.iter().filter(|of_mark| **of_mark).count();
             [of_marks, seen.len()]
         };
-        let (nearest, farthest) = gate(band.receiver);
+        let (nearest, farthest) = band.gate;
         let at: Vec<[usize; 2]> = (nearest..=farthest).map(found).collect();
         let score = |[found, lit]: [usize; 2]| 2 * found as i32 - lit as i32;
         let best = (0..at.len()).rev().max_by_key(|&lag| score(at[lag])).unwrap();
@@ -303,7 +312,7 @@ mod tests {
             (found..=lit).map(of).sum::<f64>() / choose(all, lit)
         };
         let as_lit = |lit: usize| at.iter().filter(|at| at[1] >= lit).count() as f64;
-        let accepted = band.receiver.false_alarm;
+        let accepted = band.correlation.false_alarm;
         let least = (1..=marks.len())
             .find(|&lit| chance(lit, lit) <= accepted && as_lit(lit) * chance(lit, lit) <= accepted)
             .filter(|least| score(at[best]) >= *least as i32);
@@ -340,10 +349,11 @@ mod tests {
             seed in 0..u64::MAX,
         ) {
             let book = &books()[book];
-            let receiver = receiver(scale, jitter);
+            let correlation = correlation(scale, jitter);
+            let receiver = receiver(&correlation);
             let log = log(6, (150, book.labels() as u16, book.words() as u16));
             let ticks = ticks(book, &log, (missed, stray, scale), seed);
-            let mut band = Band::new(&receiver, (book, &log), &ticks);
+            let mut band = Band::new(&receiver, &correlation, (book, &log), &ticks);
             for shot in 0..log.len() {
                 let (lag, score, believed) = exhaustive(&band, shot);
                 let marks = book.marks(log.label[shot], log.word[shot]);
@@ -365,7 +375,8 @@ mod tests {
     #[test]
     fn light_in_step_is_believed_no_more_often_than_is_accepted() {
         let book = &books()[1];
-        let (receiver, scale) = (receiver(16, 0.0), 16);
+        let (correlation, scale) = (correlation(16, 0.0), 16);
+        let receiver = receiver(&correlation);
         let mut chance = ChaCha8Rng::seed_from_u64(6);
         let log = log(1, (1, 1, 129));
         let (mut believed, mut above_the_mean) = (0, 0);
@@ -385,7 +396,7 @@ mod tests {
                 .collect();
             let ticks = Ticks { tick, ..Ticks::default() };
             believed += receiver.decode(book, &log, &ticks).unwrap().len();
-            let mut band = Band::new(&receiver, (book, &log), &ticks);
+            let mut band = Band::new(&receiver, &correlation, (book, &log), &ticks);
             let marks = book.marks(0, word);
             band.chips.set(127, marks);
             band.cover(0);
@@ -394,7 +405,7 @@ mod tests {
             let is_rare = |peak: Balance| {
                 let tail =
                     crate::statistics::binomial_tail(marks.len(), mean, peak.score() as usize);
-                1480.0 * tail <= receiver.false_alarm
+                1480.0 * tail <= correlation.false_alarm
             };
             above_the_mean += u32::from(best.is_some_and(|(_, peak)| is_rare(peak)));
         }
@@ -405,7 +416,7 @@ mod tests {
     #[test]
     fn clear_shots_come_back_at_their_lag_with_all_their_marks() {
         let book = &books()[1];
-        let (receiver, log) = (receiver(4, 0.0), log(20, (600, 1, 129)));
+        let (receiver, log) = (receiver(&correlation(4, 0.0)), log(20, (600, 1, 129)));
         let mut tick: Vec<u32> = (0..20)
             .flat_map(|shot| {
                 let marks = book.marks(0, shot as u16).iter();
@@ -432,11 +443,12 @@ mod tests {
     #[test]
     fn a_constant_level_lifts_a_count_but_not_the_balance() {
         let book = &books()[1];
-        let (receiver, log) = (receiver(1, 0.0), log(400, (300, 1, 129)));
+        let correlation = correlation(1, 0.0);
+        let (receiver, log) = (receiver(&correlation), log(400, (300, 1, 129)));
         let mut chance = ChaCha8Rng::seed_from_u64(5);
         let tick = (0..400 * 300 + 2000).filter(|_| chance.next_u32().is_multiple_of(4)).collect();
         let ticks = Ticks { tick, ..Ticks::default() };
-        let mut band = Band::new(&receiver, (book, &log), &ticks);
+        let mut band = Band::new(&receiver, &correlation, (book, &log), &ticks);
         let [mut balance, mut count, mut marks] = [0.0; 3];
         for shot in 0..400 {
             let own = book.marks(0, log.word[shot]);
@@ -456,7 +468,7 @@ mod tests {
     #[test]
     fn an_empty_sky_and_an_empty_log_give_nothing() {
         let book = &books()[0];
-        let (receiver, log) = (receiver(2, 0.0), log(3, (100, 1, 33)));
+        let (receiver, log) = (receiver(&correlation(2, 0.0)), log(3, (100, 1, 33)));
         let returns = receiver.decode(book, &log, &Ticks::default()).unwrap();
         assert_eq!((returns.len(), returns.rejected(Reject::NoPeak)), (0, 3));
         let nothing = receiver.decode(book, &ShotLog::default(), &Ticks::default()).unwrap();

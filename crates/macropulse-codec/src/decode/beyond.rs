@@ -12,7 +12,7 @@ use std::cell::Cell;
 use std::ops::Range;
 
 use super::field::{self, Field};
-use super::{Receiver, Reject, Return, Returns};
+use super::{Correlation, Receiver, Reject, Return, Returns};
 use crate::code::Codebook;
 use crate::{ShotLog, Ticks};
 
@@ -32,20 +32,21 @@ thread_local! {
 /// Takes the returns out of `returns` that light from beyond the gate accounts for better.
 pub(super) fn exclude(
     receiver: &Receiver,
+    correlation: &Correlation,
     (codebook, log): (&Codebook, &ShotLog),
     ticks: &Ticks,
     returns: &mut Returns,
 ) {
     let is_doubtful = |one: &Return| one.peak < one.marks;
-    if receiver.light_ticks <= receiver.gate_ticks.1 || !returns.each().any(|one| is_doubtful(&one))
-    {
+    let looks_beyond = correlation.light_ticks > receiver.gate_ticks.1;
+    if !looks_beyond || !returns.each().any(|one| is_doubtful(&one)) {
         return;
     }
     let fired = receiver.fired_since(log, ticks.epoch);
     // Half of the window in which a mark is looked for, and rounding.
-    let slack = 1 + (2.0 * receiver.jitter()).ceil() as u32;
+    let slack = 1 + (2.0 * correlation.jitter()).ceil() as u32;
     let width = 2 * slack + 1;
-    let length = i64::from(codebook.chips() * receiver.ticks_per_chip);
+    let length = i64::from(codebook.chips() * correlation.ticks_per_chip);
     // What is asked of a return: its macropulse, and as much to both sides.
     let light = |shot: usize| {
         let (nearest, farthest) = receiver.gate_ticks;
@@ -66,7 +67,16 @@ pub(super) fn exclude(
         let is_other = is_doubtful(&one) && {
             field.cover(light(one.shot));
             let fired = &fired;
-            let bench = Bench { receiver, codebook, log, fired, field: &field, slack, density };
+            let bench = Bench {
+                receiver,
+                correlation,
+                codebook,
+                log,
+                fired,
+                field: &field,
+                slack,
+                density,
+            };
             bench.is_of_an_earlier_shot(&one)
         };
         match is_other {
@@ -81,6 +91,7 @@ pub(super) fn exclude(
 /// What a return is held against.
 struct Bench<'a> {
     receiver: &'a Receiver,
+    correlation: &'a Correlation,
     codebook: &'a Codebook,
     log: &'a ShotLog,
     /// Tick in which each shot was fired, from the epoch on.
@@ -98,10 +109,10 @@ impl Bench<'_> {
     fn is_of_an_earlier_shot(&self, one: &Return) -> bool {
         let lag = (one.tof * 1e15 / self.receiver.tick_fs as f64) as i64;
         let arrives = self.fired[one.shot] + lag;
-        let bit = i64::from(self.codebook.family().length() * self.receiver.ticks_per_chip);
+        let bit = i64::from(self.codebook.family().length() * self.correlation.ticks_per_chip);
         let bits = self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
         let beyond =
-            i64::from(self.receiver.gate_ticks.1) + 1..=i64::from(self.receiver.light_ticks);
+            i64::from(self.receiver.gate_ticks.1) + 1..=i64::from(self.correlation.light_ticks);
         let word = self.log.word[one.shot];
         let mut counts = Counts { word, first: arrives - bits * bit, bit, lit: [None; PLACES] };
         self.earlier(one.shot, arrives, bits * bit).any(|shot| {
@@ -186,7 +197,7 @@ impl Bench<'_> {
 
     /// Mark by mark.
     fn compared_by_marks(&self, earlier: Sent, later: Sent) -> Compared {
-        let scale = i64::from(self.receiver.ticks_per_chip);
+        let scale = i64::from(self.correlation.ticks_per_chip);
         let places = |sent: Sent| {
             self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
         };
@@ -231,7 +242,7 @@ impl Bench<'_> {
 
     /// How many of `marks` are lit if what they belong to begins at tick `begins`.
     fn lit_of(&self, marks: &[u16], begins: i64) -> usize {
-        let scale = i64::from(self.receiver.ticks_per_chip);
+        let scale = i64::from(self.correlation.ticks_per_chip);
         let is_lit = |mark: &&u16| self.has(begins + scale * i64::from(**mark));
         marks.iter().filter(is_lit).count()
     }
@@ -240,7 +251,7 @@ impl Bench<'_> {
     /// within `about` ticks of `arrives`.
     fn earlier(&self, shot: usize, arrives: i64, about: i64) -> impl Iterator<Item = usize> {
         let (_, farthest) = self.receiver.gate_ticks;
-        let opened = arrives - about - i64::from(self.receiver.light_ticks);
+        let opened = arrives - about - i64::from(self.correlation.light_ticks);
         let closed = arrives + about - i64::from(farthest);
         let range: Range<usize> = self.fired.partition_point(|fired| *fired < opened)
             ..self.fired.partition_point(|fired| *fired < closed).min(shot);
@@ -299,21 +310,17 @@ mod tests {
     use crate::code::{Crc, Family, Keying, Payload};
 
     /// Twenty shots in four words, 200 ticks apart; a gate of 700 ticks, light from 1500.
-    fn bench() -> (Receiver, Codebook, ShotLog) {
+    fn bench() -> (Receiver, Correlation, Codebook, ShotLog) {
         let payload = Payload::new(4, Crc::default(), true).unwrap();
         let codebook =
             Codebook::new(Family::prime(5).unwrap(), Some(payload), 16, Keying::OnOff).unwrap();
-        let receiver = Receiver {
-            gate_ticks: (10, 700),
-            light_ticks: 1500,
-            false_alarm: 1e-3,
-            ..Receiver::matched(1000)
-        };
+        let receiver = Receiver { gate_ticks: (10, 700), ..Receiver::matched(1000) };
+        let correlation = Correlation { light_ticks: 1500, ..Correlation::default() };
         let fired: Vec<i64> = (0..20).map(|shot| shot * 200_000).collect();
         let words: Vec<u16> = (0..20).map(|shot| 1 + shot % 4).collect();
         let mut log = ShotLog::of_one_channel(&fired, &words);
         log.label = (0..20).map(|shot| shot % 16).collect();
-        (receiver, codebook, log)
+        (receiver, correlation, codebook, log)
     }
 
     fn ticks(codebook: &Codebook, log: &ShotLog, shot: usize, lag: u32) -> Ticks {
@@ -326,7 +333,7 @@ mod tests {
     /// A faint return of shot 8 at the place where shot 4 has all of its marks.
     #[test]
     fn an_earlier_shot_that_fits_better_is_believed() {
-        let (receiver, codebook, log) = bench();
+        let (receiver, correlation, codebook, log) = bench();
         let sent = (&codebook, &log);
         let seen = ticks(&codebook, &log, 4, 900);
         let marks = codebook.marks(log.label[8], log.word[8]).len() as u16;
@@ -339,18 +346,18 @@ mod tests {
             photons: 1.0,
             saturated: false,
         };
-        let judge = |receiver: &Receiver, seen: &Ticks, one: Return| {
+        let judge = |correlation: &Correlation, seen: &Ticks, one: Return| {
             let mut returns = Returns::default();
             returns.push(one);
-            exclude(receiver, sent, seen, &mut returns);
+            exclude(&receiver, correlation, sent, seen, &mut returns);
             (returns.len(), returns.rejected(Reject::OutsideGate))
         };
-        assert_eq!(judge(&receiver, &seen, faint), (0, 1));
+        assert_eq!(judge(&correlation, &seen, faint), (0, 1));
         // Controls: light that is not followed so far, and light of the shot itself.
-        let near = Receiver { light_ticks: 700, ..receiver.clone() };
+        let near = Correlation { light_ticks: 700, ..correlation.clone() };
         assert_eq!(judge(&near, &seen, faint), (1, 0));
         let own = ticks(&codebook, &log, 8, 100);
-        assert_eq!(judge(&receiver, &own, faint), (1, 0));
+        assert_eq!(judge(&correlation, &own, faint), (1, 0));
     }
 
     /// Every shot against every later one in its word, begun at the same place and bits beside it,
@@ -358,7 +365,7 @@ mod tests {
     #[test]
     fn bit_by_bit_and_mark_by_mark_macropulses_compare_alike() {
         for family in [Family::prime(5).unwrap(), Family::gold(5).unwrap()] {
-            let (receiver, _, log) = bench();
+            let (receiver, correlation, _, log) = bench();
             let payload = Payload::new(4, Crc::default(), true).unwrap();
             let codebook = Codebook::new(family.clone(), Some(payload), 16, Keying::OnOff).unwrap();
             // Dense and irregular enough for every count to occur.
@@ -368,8 +375,9 @@ mod tests {
             let mut field = Field::new(&ticks.tick, 1, (-3000, 9000), 64, Default::default());
             field.cover(-3000..6000);
             let (codebook, log, density, slack) = (&codebook, &log, 0.25, 0);
-            let (receiver, fired, field) = (&receiver, &fired, &field);
-            let bench = Bench { receiver, codebook, log, fired, field, slack, density };
+            let (receiver, correlation, fired, field) = (&receiver, &correlation, &fired, &field);
+            let bench =
+                Bench { receiver, correlation, codebook, log, fired, field, slack, density };
             let bit = i64::from(family.length());
             for (earlier, later) in
                 (0..16).flat_map(|one| (one + 4..20).step_by(4).map(move |two| (one, two)))

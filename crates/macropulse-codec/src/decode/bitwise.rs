@@ -15,15 +15,29 @@
 use std::array;
 
 use super::field::{Field, Memory};
-use super::{Energy, MARGIN, MIDDLE, Receiver, Reject, Return, Returns, Window};
+use super::{Energy, MARGIN, MIDDLE, MOST_JITTER, Receiver, Reject, Return, Returns, Window};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
 use crate::kernels::Pattern;
 
+/// Settings of the receivers that read bit by bit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bitwise {
+    /// Which bit the opening tick may belong to.
+    pub opening: Opening,
+    /// Marks of a code word that make a 1 bit.
+    pub bit_threshold: u16,
+    /// TDC ticks per chip.
+    pub ticks_per_chip: u32,
+    /// Standard deviation of the timing of one detection event, in ticks: how far from its place a
+    /// mark is looked for.
+    pub jitter_ticks: f64,
+}
+
 /// Which bit the opening tick may belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Opening {
+pub enum Opening {
     /// The first one: the literal receiver.
     FirstBit,
     /// Whichever makes a legal payload: the blind receiver.
@@ -33,11 +47,11 @@ pub(super) enum Opening {
 /// Decodes one band.
 pub(super) fn decode(
     receiver: &Receiver,
+    settings: &Bitwise,
     sent: (&Codebook, &ShotLog),
-    heard: (&Ticks, Opening),
+    ticks: &Ticks,
 ) -> Returns {
-    let (ticks, opening) = heard;
-    let mut band = Band::new(receiver, sent, ticks);
+    let mut band = Band::new(receiver, settings, sent, ticks);
     let mut at_hand = i64::MIN;
     for tick in band.ticks.iter().map(|&tick| i64::from(tick)) {
         if tick >= at_hand {
@@ -47,7 +61,7 @@ pub(super) fn decode(
         if band.field.is_left(tick)
             && let Some(macropulse) = band.recognise(tick)
         {
-            band.settle(&macropulse, opening);
+            band.settle(&macropulse);
         }
     }
     band.returns()
@@ -90,6 +104,7 @@ fn nearest(marks: &[i64]) -> Option<[u64; NEAR]> {
 
 struct Band<'a> {
     receiver: &'a Receiver,
+    settings: &'a Bitwise,
     codebook: &'a Codebook,
     log: &'a ShotLog,
     /// Absolute time of tick 0, in ticks.
@@ -121,31 +136,37 @@ struct Band<'a> {
 }
 
 impl<'a> Band<'a> {
-    fn new(receiver: &'a Receiver, sent: (&'a Codebook, &'a ShotLog), ticks: &'a Ticks) -> Self {
+    fn new(
+        receiver: &'a Receiver,
+        settings: &'a Bitwise,
+        sent: (&'a Codebook, &'a ShotLog),
+        ticks: &'a Ticks,
+    ) -> Self {
         let (codebook, log) = sent;
         let epoch = ticks.epoch;
         let fired = receiver.fired_since(log, epoch);
-        let scale = i64::from(receiver.ticks_per_chip);
+        let scale = i64::from(settings.ticks_per_chip);
         let in_ticks = |word: usize| -> Vec<i64> {
             codebook.word(word as u16).marks.iter().map(|&mark| scale * i64::from(mark)).collect()
         };
         let words: Vec<Vec<i64>> = (0..codebook.words()).map(in_ticks).collect();
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
         // Both the opening tick and the mark jitter: √2 σ between them, of which 2 σ are allowed.
-        let slack = 8_f64.sqrt() * receiver.jitter();
-        let slack = if receiver.jitter() > 0.05 { slack.ceil() as u32 } else { 0 };
+        let jitter = settings.jitter_ticks.min(MOST_JITTER);
+        let slack = if jitter > 0.05 { (8_f64.sqrt() * jitter).ceil() as u32 } else { 0 };
         let width = 2 * slack + 1;
         let patterns = |width: u32| {
             let bits = |word: &Vec<i64>| word.iter().map(|&mark| mark as usize).collect::<Vec<_>>();
             let pattern = |word| Pattern::new(bits(word).into_iter(), width as usize);
             words.iter().map(pattern).collect()
         };
-        let ticks = in_time(receiver, codebook, (&fired, &ticks.tick));
-        let (length, bit_length) = length_of(receiver, codebook);
+        let (length, bit_length) = length_of(settings, codebook);
+        let ticks = in_time(receiver.gate_ticks, length, (&fired, &ticks.tick));
         let begin = ticks.first().map_or(0, |&tick| i64::from(tick)) - bit_length;
         let extent = (begin, STRETCH + 2 * length + 2 * i64::from(width));
         Self {
             receiver,
+            settings,
             codebook,
             log,
             epoch,
@@ -205,7 +226,7 @@ impl<'a> Band<'a> {
             }
         }
         let (found, word, start) = best;
-        if found < self.receiver.bit_threshold.max(1) {
+        if found < self.settings.bit_threshold.max(1) {
             return None;
         }
         let bit = |bit: u32| self.found(word, start + i64::from(bit) * self.bit_length);
@@ -213,8 +234,8 @@ impl<'a> Band<'a> {
     }
 
     /// Gives the macropulse to its shot, or counts why it has none.
-    fn settle(&mut self, macropulse: &Macropulse, opening: Opening) {
-        let most = if opening == Opening::FirstBit { 1 } else { self.bits };
+    fn settle(&mut self, macropulse: &Macropulse) {
+        let most = if self.settings.opening == Opening::FirstBit { 1 } else { self.bits };
         let mut best: Option<(usize, Claim, u32)> = None;
         let mut reject = Reject::Crc;
         for dark in 0..most {
@@ -240,7 +261,7 @@ impl<'a> Band<'a> {
     /// The shot of a macropulse before which `dark` bits were dark.
     fn read(&self, macropulse: &Macropulse, dark: u32) -> Result<(usize, Claim), Reject> {
         let found = &macropulse.found[..(self.bits - dark) as usize];
-        let is_lit = |found: u16| found >= self.receiver.bit_threshold;
+        let is_lit = |found: u16| found >= self.settings.bit_threshold;
         let payload = found.iter().fold(0, |bits, &found| bits << 1 | u32::from(is_lit(found)));
         let label = match self.codebook.payload() {
             Some(payload_format) => Some(payload_format.check(payload).map_err(|_| Reject::Crc)?),
@@ -278,7 +299,7 @@ impl<'a> Band<'a> {
     /// Takes the ticks of the lit bits off the queue, `dark` bits having gone before.
     fn dequeue(&mut self, macropulse: &Macropulse, dark: u32) {
         let own = macropulse.found.iter().take((self.bits - dark) as usize);
-        let is_lit = |found: u16| found >= self.receiver.bit_threshold;
+        let is_lit = |found: u16| found >= self.settings.bit_threshold;
         let lit = own.enumerate().filter(|&(_, &found)| is_lit(found));
         let first = macropulse.start - i64::from(self.slack);
         let after = Vec::from_iter(lit.map(|(bit, _)| bit as u32 * self.bit_length as u32));
@@ -316,7 +337,7 @@ impl<'a> Band<'a> {
                 Energy::of((claim.count.into(), marks.into()), 0.0, Window::WHOLE);
             self.returns.push(Return {
                 shot,
-                tof: self.receiver.tof(self.log.fired_at_fs[shot], start + self.epoch, MIDDLE),
+                tof: self.receiver.tof(MIDDLE)(self.log.fired_at_fs[shot], start + self.epoch),
                 peak: claim.count,
                 marks,
                 margin: claim.count - self.runner_up[shot],
@@ -330,13 +351,11 @@ impl<'a> Band<'a> {
 
 /// Those of the `ticks` at which light of the shots `fired` can arrive, and some more.
 fn in_time<'a>(
-    receiver: &Receiver,
-    codebook: &Codebook,
+    (nearest, farthest): (u32, u32),
+    length: i64,
     (fired, ticks): (&[i64], &'a [u32]),
 ) -> &'a [u32] {
     let (Some(first), Some(last)) = (fired.first(), fired.last()) else { return &[] };
-    let (nearest, farthest) = receiver.gate_ticks;
-    let (length, _) = length_of(receiver, codebook);
     let opens = first + i64::from(nearest) - MARGIN;
     let closes = last + i64::from(farthest) + length + 1 + MARGIN;
     let before = |end: i64| ticks.partition_point(|&tick| i64::from(tick) < end);
@@ -344,8 +363,8 @@ fn in_time<'a>(
 }
 
 /// Length of a macropulse and of a bit of it, in ticks.
-fn length_of(receiver: &Receiver, codebook: &Codebook) -> (i64, i64) {
-    let length = i64::from(codebook.chips()) * i64::from(receiver.ticks_per_chip);
+fn length_of(settings: &Bitwise, codebook: &Codebook) -> (i64, i64) {
+    let length = i64::from(codebook.chips()) * i64::from(settings.ticks_per_chip);
     let bits = codebook.payload().map_or(1, |payload| payload.bits());
     (length, length / i64::from(bits))
 }
@@ -363,7 +382,7 @@ fn rank(reject: Reject) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ReceiverKind;
+    use super::super::Method;
     use super::*;
     use crate::code::{Crc, Family, Keying, Payload};
 
@@ -398,31 +417,19 @@ mod tests {
         Ticks { tick, ..Ticks::default() }
     }
 
-    fn decode(kind: ReceiverKind, log: &ShotLog, ticks: &Ticks) -> Returns {
-        let receiver = Receiver {
-            kind,
-            effort: crate::decode::Effort::Quick,
-            gate_ticks: (0, 3000),
-            light_ticks: 3000,
-            ticks_per_chip: 1,
-            tick_fs: 2500,
-            jitter_ticks: 0.0,
-            photons_apart: false,
-            false_alarm: 1e-3,
-            bit_threshold: 6,
-            returns: 1,
-            pick: crate::decode::Pick::Strongest,
-            sampling: None,
-        };
+    fn decode(opening: Opening, log: &ShotLog, ticks: &Ticks) -> Returns {
+        let settings = Bitwise { opening, bit_threshold: 6, ticks_per_chip: 1, jitter_ticks: 0.0 };
+        let method = Method::Bitwise(settings);
+        let receiver = Receiver { gate_ticks: (0, 3000), method, ..Receiver::matched(2500) };
         receiver.decode(&codebook(), log, ticks).unwrap()
     }
 
     #[test]
     fn a_lit_first_bit_is_read_by_both() {
         let log = log(8);
-        for kind in [ReceiverKind::Literal, ReceiverKind::Blind] {
-            let returns = decode(kind, &log, &ticks(&log, 700));
-            assert_eq!(returns.shot, [0, 1, 2, 3, 4, 5, 6, 7], "{kind:?}");
+        for opening in [Opening::FirstBit, Opening::AnyBit] {
+            let returns = decode(opening, &log, &ticks(&log, 700));
+            assert_eq!(returns.shot, [0, 1, 2, 3, 4, 5, 6, 7], "{opening:?}");
             assert!(returns.tof.iter().all(|tof| (tof - 700.5 * 2.5e-12).abs() < 1e-18));
             assert_eq!(returns.peak, returns.marks);
         }
@@ -432,11 +439,11 @@ mod tests {
     fn a_dark_first_bit_is_read_by_the_blind_receiver_only() {
         let log = log(0);
         let ticks = ticks(&log, 700);
-        let literal = decode(ReceiverKind::Literal, &log, &ticks);
+        let literal = decode(Opening::FirstBit, &log, &ticks);
         assert!(literal.is_empty());
         // Label 0 makes no light; each of the others is read shifted to the front.
         assert_eq!(literal.rejects.iter().sum::<u64>(), 7);
-        let blind = decode(ReceiverKind::Blind, &log, &ticks);
+        let blind = decode(Opening::AnyBit, &log, &ticks);
         assert_eq!(blind.shot, [1, 2, 3, 4, 5, 6, 7]);
         assert!(blind.tof.iter().all(|tof| (tof - 700.5 * 2.5e-12).abs() < 1e-18));
     }
@@ -444,16 +451,16 @@ mod tests {
     #[test]
     fn what_comes_too_late_or_from_elsewhere_is_counted() {
         let log = log(8);
-        let late = decode(ReceiverKind::Literal, &log, &ticks(&log, 3001));
+        let late = decode(Opening::FirstBit, &log, &ticks(&log, 3001));
         assert!(late.is_empty());
         assert_eq!(late.rejected(Reject::OutsideGate), 8);
         let mut other = log.clone();
         other.word.rotate_left(1);
-        let mismatched = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
+        let mismatched = decode(Opening::FirstBit, &other, &ticks(&log, 700));
         assert!(mismatched.is_empty());
         assert_eq!(mismatched.rejected(Reject::LabelMismatch), 8);
         other.label = vec![0; 8];
-        let unknown = decode(ReceiverKind::Literal, &other, &ticks(&log, 700));
+        let unknown = decode(Opening::FirstBit, &other, &ticks(&log, 700));
         assert_eq!(unknown.rejected(Reject::UnknownShot), 8);
     }
 
@@ -462,7 +469,7 @@ mod tests {
         let mut log = log(0);
         let ticks = ticks(&log, 5);
         log.owned = 3..6;
-        assert_eq!(decode(ReceiverKind::Literal, &log, &ticks).rejects.iter().sum::<u64>(), 3);
-        assert_eq!(decode(ReceiverKind::Blind, &log, &ticks).shot, [3, 4, 5]);
+        assert_eq!(decode(Opening::FirstBit, &log, &ticks).rejects.iter().sum::<u64>(), 3);
+        assert_eq!(decode(Opening::AnyBit, &log, &ticks).shot, [3, 4, 5]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Coupling, Error, MOST_RETURNS, Receiver, ReceiverKind, Sampling};
+use super::{Coupling, Error, MOST_RETURNS, Method, Receiver, Sampling};
 use crate::code::Codebook;
 use crate::kernels::ascends;
 use crate::{Record, Samples, ShotLog, Ticks};
@@ -31,12 +31,6 @@ pub(super) fn check(
     settings(receiver, codebook)?;
     of_log(log)?;
     match record {
-        Record::Ticks(_) if receiver.kind == ReceiverKind::Sampled => {
-            return Err(Error::Record { wants: "samples", given: "ticks" });
-        }
-        Record::Samples(_) if receiver.kind != ReceiverKind::Sampled => {
-            return Err(Error::Record { wants: "ticks", given: "samples" });
-        }
         Record::Ticks(ticks) => of_ticks(receiver, ticks)?,
         Record::Samples(samples) => of_samples(samples)?,
     }
@@ -47,37 +41,24 @@ pub(super) fn check(
 /// Refuses settings outside their limits, and code words that the receiver does not understand or has no memory
 /// for.
 pub(super) fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), Error> {
-    let refuse = |setting: &'static str, value: String, possible: &'static str| {
-        Err(Error::Setting { setting, value, possible })
-    };
-    let (nearest, farthest) = receiver.gate_ticks;
+    let &Receiver { tick_fs, gate_ticks: (nearest, farthest), returns, ref method, .. } = receiver;
     if farthest < nearest {
         return Err(Error::Gate { nearest, farthest });
     }
-    if receiver.tick_fs < 1 {
-        return refuse("tick_fs", receiver.tick_fs.to_string(), "1 or more");
+    require(tick_fs >= 1, "tick_fs", &tick_fs, "1 or more")?;
+    require((1..=MOST_RETURNS).contains(&returns), "returns", &returns, "1 to 8")?;
+    let jitter = method.jitter_ticks();
+    let is_possible = jitter.is_finite() && jitter >= 0.0;
+    require(is_possible, "jitter_ticks", &jitter, "0 or a positive number")?;
+    if let Some(rate) = method.false_alarm() {
+        require(rate.is_finite() && rate > 0.0, "false_alarm", &rate, "a positive number")?;
     }
-    if receiver.ticks_per_chip < 1 {
-        return refuse("ticks_per_chip", receiver.ticks_per_chip.to_string(), "1 or more");
+    if let Some(known) = method.sampling() {
+        sampling(known)?;
     }
-    let jitter = receiver.jitter_ticks;
-    if !(jitter.is_finite() && jitter >= 0.0) {
-        return refuse("jitter_ticks", jitter.to_string(), "0 or a positive number");
-    }
-    let false_alarm = receiver.false_alarm;
-    if !(false_alarm.is_finite() && false_alarm > 0.0) {
-        return refuse("false_alarm", false_alarm.to_string(), "a positive number");
-    }
-    if !(1..=MOST_RETURNS).contains(&receiver.returns) {
-        return refuse("returns", receiver.returns.to_string(), "1 to 8");
-    }
-    if receiver.kind == ReceiverKind::Direct {
-        return Ok(());
-    }
-    if receiver.kind == ReceiverKind::Sampled {
-        sampling(receiver.sampling.as_ref())?;
-    }
-    if codebook.zeros_are_lit() && receiver.kind != ReceiverKind::Balanced {
+    let Some(ticks_per_chip) = method.ticks_per_chip() else { return Ok(()) };
+    require(ticks_per_chip >= 1, "ticks_per_chip", &ticks_per_chip, "1 or more")?;
+    if codebook.zeros_are_lit() && !matches!(method, Method::Balanced(_)) {
         return Err(Error::LitZeros);
     }
     let (length, reach) = (length(receiver, codebook), reach(receiver, codebook));
@@ -89,47 +70,43 @@ pub(super) fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), E
     }
 }
 
+/// Refuses the value of a setting that does not hold.
+fn require(
+    holds: bool,
+    setting: &'static str,
+    value: &dyn ToString,
+    possible: &'static str,
+) -> Result<(), Error> {
+    match holds {
+        true => Ok(()),
+        false => Err(Error::Setting { setting, value: value.to_string(), possible }),
+    }
+}
+
 /// Refuses what no signal can be like.
-fn sampling(sampling: Option<&Sampling>) -> Result<(), Error> {
-    let refuse = |setting: &'static str, value: String, possible: &'static str| {
-        Err(Error::Setting { setting, value, possible })
-    };
-    let Some(Sampling { pulse, excess, full_scale, least_marks, coupling, .. }) = sampling else {
-        return refuse("sampling", "missing".into(), "what is known of the signal that is sampled");
-    };
-    if pulse.len() % 2 == 0 || pulse.len() > Sampling::MOST_ENTRIES {
-        let entries = format!("{} entries long", pulse.len());
-        return refuse("sampling.pulse", entries, "an odd number of entries up to 16383");
+fn sampling(sampling: &Sampling) -> Result<(), Error> {
+    let &Sampling { ref pulse, excess, full_scale, least_marks, coupling, .. } = sampling;
+    let entries = format!("{} entries long", pulse.len());
+    let is_possible = pulse.len() % 2 == 1 && pulse.len() <= Sampling::MOST_ENTRIES;
+    require(is_possible, "sampling.pulse", &entries, "an odd number of entries up to 16383")?;
+    for value in pulse {
+        let is_possible = value.is_finite() && value.abs() <= 1e9;
+        require(is_possible, "sampling.pulse", value, "codes of one photon, finite and small")?;
     }
-    if let Some(value) = pulse.iter().find(|value| !value.is_finite() || value.abs() > 1e9) {
-        return refuse(
-            "sampling.pulse",
-            value.to_string(),
-            "codes of one photon, finite and small",
-        );
-    }
-    if pulse[pulse.len() / 2] < 1e-9 {
-        let middle = format!("{} in its middle", pulse[pulse.len() / 2]);
-        return refuse("sampling.pulse", middle, "a pulse that is there at the time of its mark");
-    }
-    if !(excess.is_finite() && (1.0..=1e9).contains(excess)) {
-        return refuse("sampling.excess", excess.to_string(), "1 (no excess noise) or more");
-    }
-    if *full_scale < 1 {
-        return refuse("sampling.full_scale", full_scale.to_string(), "1 to 32767");
-    }
+    let middle = pulse[pulse.len() / 2];
+    let told = format!("{middle} in its middle");
+    let possible = "a pulse that is there at the time of its mark";
+    require(middle >= 1e-9, "sampling.pulse", &told, possible)?;
+    let is_possible = excess.is_finite() && (1.0..=1e9).contains(&excess);
+    require(is_possible, "sampling.excess", &excess, "1 (no excess noise) or more")?;
+    require(full_scale >= 1, "sampling.full_scale", &full_scale, "1 to 32767")?;
     if let Some(Coupling { low_cutoff, limit }) = coupling {
-        if !(low_cutoff.is_finite() && (0.0..=1.0).contains(low_cutoff)) {
-            return refuse("sampling.coupling.low_cutoff", low_cutoff.to_string(), "0 to 1");
-        }
-        if !(limit.is_finite() && (f64::from(*full_scale)..=1e9).contains(limit)) {
-            return refuse("sampling.coupling.limit", limit.to_string(), "full_scale or more");
-        }
+        let is_possible = low_cutoff.is_finite() && (0.0..=1.0).contains(&low_cutoff);
+        require(is_possible, "sampling.coupling.low_cutoff", &low_cutoff, "0 to 1")?;
+        let is_possible = limit.is_finite() && (f64::from(full_scale)..=1e9).contains(&limit);
+        require(is_possible, "sampling.coupling.limit", &limit, "full_scale or more")?;
     }
-    match least_marks {
-        0 => refuse("sampling.least_marks", "0".into(), "1 or more"),
-        _ => Ok(()),
-    }
+    require(least_marks > 0, "sampling.least_marks", &least_marks, "1 or more")
 }
 
 /// Refuses a range gate whose lags cannot all be told one by one: a receiver that takes the first ticks
@@ -142,14 +119,14 @@ pub(super) fn check_lags(receiver: &Receiver) -> Result<(), Error> {
     }
 }
 
-/// Length of a macropulse, in ticks.
+/// Length of a macropulse, in ticks; 0 without a code.
 fn length(receiver: &Receiver, codebook: &Codebook) -> u64 {
-    u64::from(codebook.chips()) * u64::from(receiver.ticks_per_chip)
+    u64::from(codebook.chips()) * u64::from(receiver.method.ticks_per_chip().unwrap_or(0))
 }
 
 /// Ticks after firing in which light is looked for.
 fn reach(receiver: &Receiver, codebook: &Codebook) -> u64 {
-    u64::from(receiver.gate_ticks.1.max(receiver.light_ticks)) + length(receiver, codebook)
+    u64::from(receiver.gate_ticks.1.max(receiver.method.light_ticks())) + length(receiver, codebook)
 }
 
 /// Refuses columns that are not as long as the one beside them, and shots out of order.
@@ -192,8 +169,8 @@ fn of_ticks(receiver: &Receiver, ticks: &Ticks) -> Result<(), Error> {
     }
     if channels.is_empty() {
         // The matched receiver sees to it as it goes: macropulses without a gap are in order.
-        return match receiver.kind {
-            ReceiverKind::Matched => Ok(()),
+        return match receiver.method {
+            Method::Matched(..) => Ok(()),
             _ => in_order(&ticks.tick, 0..events),
         };
     }

@@ -40,7 +40,7 @@ pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Retur
             let Energy { photons, saturated } = energy(place);
             returns.push(Return {
                 shot,
-                tof: receiver.tof(log.fired_at_fs[shot], fired + lag(place), MIDDLE),
+                tof: receiver.tof(MIDDLE)(log.fired_at_fs[shot], fired + lag(place)),
                 peak: 1,
                 marks: 1,
                 margin: 1,
@@ -54,7 +54,7 @@ pub(super) fn decode(receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Retur
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Pick, ReceiverKind};
+    use super::super::{Method, Pick};
     use super::*;
     use crate::code::Codebook;
 
@@ -65,19 +65,11 @@ mod tests {
     /// Decodes with so many returns at most, and which of them.
     fn keep((returns, pick): (u8, Pick), log: &ShotLog, ticks: &Ticks) -> Returns {
         let receiver = Receiver {
-            kind: ReceiverKind::Direct,
-            effort: crate::decode::Effort::Quick,
-            gate_ticks: (10, 500),
-            light_ticks: 500,
-            ticks_per_chip: 1,
             tick_fs: 1_000_000,
-            jitter_ticks: 0.0,
-            photons_apart: false,
-            false_alarm: 1e-3,
-            bit_threshold: 1,
+            gate_ticks: (10, 500),
             returns,
             pick,
-            sampling: None,
+            method: Method::Direct,
         };
         receiver.decode(&Codebook::single(), log, ticks).unwrap()
     }

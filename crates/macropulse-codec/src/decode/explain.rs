@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::check::check_lags;
 use super::threshold::least_marks;
-use super::{Error, Receiver, ReceiverKind, Reject, window};
+use super::{Error, Method, Receiver, Reject};
 use crate::code::Codebook;
 use crate::shot_log::ShotLog;
 use crate::ticks::Ticks;
@@ -111,7 +111,10 @@ impl Receiver {
         let everyone = ShotLog { owned: 0..log.len(), ..log.clone() };
         let all = self.decode(codebook, &everyone, ticks)?;
         let bench = Bench::new(self, (codebook, log), ticks, shot);
-        let found = bench.counts(&bench.lit);
+        let lit = bench.lit_by(|_| true);
+        let found = bench.counts(&lit);
+        // Share of the places that are lit.
+        let density = lit.iter().filter(|lit| **lit).count() as f64 / lit.len().max(1) as f64;
         let mut claimed = vec![false; bench.seen.len()];
         let width = i64::from(bench.width);
         let peak = best(&found, |_| true).map(|(at, count)| (bench.lag(at), count));
@@ -133,8 +136,8 @@ impl Receiver {
             step: bench.step,
             width: bench.width,
             ticks: bench.seen.iter().copied().zip(claimed).collect(),
-            density: bench.density(),
-            threshold: bench.threshold(),
+            density,
+            threshold: bench.threshold(density),
             sidelobe,
             peak,
             found,
@@ -179,8 +182,6 @@ struct Bench<'a> {
     width: u32,
     /// Ticks of the channel in this time, after firing.
     seen: Vec<i64>,
-    /// Whether a mark is found at each place from the opening of the gate on.
-    lit: Vec<bool>,
 }
 
 impl<'a> Bench<'a> {
@@ -190,18 +191,18 @@ impl<'a> Bench<'a> {
         ticks: &Ticks,
         shot: usize,
     ) -> Self {
-        let is_direct = receiver.kind == ReceiverKind::Direct;
         let fired = receiver.fired(log, shot);
-        let chip = receiver.ticks_per_chip;
-        let of_shot = |chips: &[u16]| chips.iter().map(|mark| u32::from(*mark) * chip).collect();
-        let marks: Vec<u32> = match is_direct {
-            true => vec![0],
-            false => of_shot(codebook.marks(log.label[shot], log.word[shot])),
+        let marks: Vec<u32> = match receiver.method.ticks_per_chip() {
+            None => vec![0],
+            Some(chip) => {
+                let marks = codebook.marks(log.label[shot], log.word[shot]).iter();
+                marks.map(|mark| u32::from(*mark) * chip).collect()
+            }
         };
         let (nearest, farthest) = receiver.gate_ticks;
         let gate = i64::from(nearest)..i64::from(farthest) + 1;
         let step = ((gate.end - gate.start) as u64).div_ceil(MOST_LAGS) as i64;
-        let width = if is_direct { 1 } else { window(receiver.jitter()) };
+        let width = receiver.window_ticks();
         let length = marks.last().map_or(0, |last| i64::from(*last)) + i64::from(width);
         let until = gate.end + length;
         let of_channel =
@@ -209,21 +210,7 @@ impl<'a> Bench<'a> {
         let after = |at: usize| ticks.epoch + i64::from(ticks.tick[at]) - fired;
         let seen = (0..ticks.len()).filter(of_channel).map(after);
         let seen: Vec<i64> = seen.filter(|tick| (gate.start..until).contains(tick)).collect();
-        let mut bench = Self {
-            receiver,
-            codebook,
-            log,
-            shot,
-            fired,
-            marks,
-            gate,
-            step,
-            width,
-            seen,
-            lit: Vec::new(),
-        };
-        bench.lit = bench.lit_by(|_| true);
-        bench
+        Self { receiver, codebook, log, shot, fired, marks, gate, step, width, seen }
     }
 
     /// The lag of place `at` of a list of counts.
@@ -231,7 +218,8 @@ impl<'a> Bench<'a> {
         self.gate.start + at as i64 * self.step
     }
 
-    /// Where marks are found by those of the ticks seen that are `wanted`.
+    /// The places from the opening of the gate on at which marks are found by those of the ticks seen
+    /// that are `wanted`.
     fn lit_by(&self, wanted: impl Fn(usize) -> bool) -> Vec<bool> {
         let length = self.marks.last().map_or(0, |last| *last as usize) + self.width as usize;
         let mut lit = vec![false; (self.gate.end - self.gate.start) as usize + length];
@@ -271,8 +259,8 @@ impl<'a> Bench<'a> {
         peak: Option<(i64, u16)>,
         claimed: &mut [bool],
     ) -> Option<OtherLight> {
-        let is_coded = self.receiver.kind != ReceiverKind::Direct;
-        if !is_coded || self.log.channel[other] != self.log.channel[self.shot] {
+        let chip = self.receiver.method.ticks_per_chip()?;
+        if self.log.channel[other] != self.log.channel[self.shot] {
             return None;
         }
         let arrives_fs = self.log.fired_at_fs[other] + time::fs_from_s(tof);
@@ -283,7 +271,7 @@ impl<'a> Bench<'a> {
             .unwrap_or_default();
         let mut light = OtherLight { shot: other, begins, marks: 0, shared: 0 };
         for mark in self.codebook.marks(self.log.label[other], self.log.word[other]) {
-            let place = begins + i64::from(u32::from(*mark) * self.receiver.ticks_per_chip);
+            let place = begins + i64::from(u32::from(*mark) * chip);
             let first = self.seen.partition_point(|tick| *tick < place - early);
             let near = self.seen[first..].iter().take_while(|tick| **tick <= place + late).count();
             claimed[first..first + near].fill(true);
@@ -294,19 +282,12 @@ impl<'a> Bench<'a> {
         (light.marks > 0).then_some(light)
     }
 
-    /// Share of the places that are lit.
-    fn density(&self) -> f64 {
-        let lit = self.lit.iter().filter(|lit| **lit).count();
-        lit as f64 / self.lit.len().max(1) as f64
-    }
-
     /// The marks that chance does not reach, of a receiver that derives them.
-    fn threshold(&self) -> Option<u32> {
-        let Receiver { kind, false_alarm, .. } = *self.receiver;
+    fn threshold(&self, density: f64) -> Option<u32> {
+        let Method::Matched(correlation, _) = &self.receiver.method else { return None };
         let marks = self.marks.len() as u32;
         let lags = (self.gate.end - self.gate.start) as f64;
-        (kind == ReceiverKind::Matched && marks > 0)
-            .then(|| least_marks(lags, marks, self.density(), false_alarm))
+        (marks > 0).then(|| least_marks(lags, marks, density, correlation.false_alarm))
     }
 }
 

@@ -7,6 +7,7 @@ mod beyond;
 mod bitwise;
 mod check;
 mod direct;
+mod energy;
 mod error;
 mod explain;
 mod field;
@@ -18,12 +19,14 @@ mod threshold;
 mod timeline;
 mod timing;
 
+pub use bitwise::{Bitwise, Opening};
 pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
+pub use matched::Effort;
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 pub use sampled::{
-    CancelledEcho, Coupling, Light, MarkSeen, MarkState, Refusal, STEPS_OF_TICK,
+    CancelledEcho, Coupling, Light, MarkSeen, MarkState, Refusal, STEPS_OF_TICK, Sampled,
     SampledExplanation, Sampling, Tested,
 };
 
@@ -31,74 +34,195 @@ use serde::Deserialize;
 
 use crate::code::Codebook;
 use crate::{Record, ShotLog, Ticks, time};
+use energy::{Energy, Window};
 use returns::Return;
 
-/// Which receiver decodes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ReceiverKind {
-    /// As printed in \[KP16\]: the first mark opens a macropulse, bit by bit, checksum, look-up.
-    Literal,
-    /// Bit by bit, but tries how many leading zero bits were dark.
-    Blind,
-    /// Correlates the whole known macropulse of every shot in flight.
-    Matched,
-    /// As `Matched`, but what falls on dark chips counts against it; for words of which about half
-    /// the chips are lit.
-    Balanced,
-    /// One mark per shot, a detector of its own: the ticks in the range gate.
-    Direct,
-    /// As `Matched`, of samples: the marks of a word are added up, and what was explained is taken
-    /// away.
-    Sampled,
-}
-
-/// How much the matched receiver does for faint light.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Effort {
-    /// Searches for one shot in so many where light is faint, finds the others from there, and
-    /// passes by what lies evenly over everything: a target that is barely seen may be lost where
-    /// it stands alone or fills the whole field.
-    Quick,
-    /// Searches for every shot that is not found otherwise; takes many times as long in noise.
-    Thorough,
-}
-
-/// What the receiver is set to.
+/// A receiver, as it is set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Receiver {
-    /// Which receiver decodes.
-    pub kind: ReceiverKind,
-    /// How much the matched receiver does for faint light.
-    pub effort: Effort,
-    /// Nearest and farthest round trip accepted, in ticks.
-    pub gate_ticks: (u32, u32),
-    /// Farthest round trip from which light of the shots may come although it is not accepted, in
-    /// ticks: the matched and the sampled receiver find and cancel light up to there.
-    pub light_ticks: u32,
-    /// TDC ticks per chip.
-    pub ticks_per_chip: u32,
     /// Length of a tick, fs.
     pub tick_fs: i64,
-    /// Standard deviation of the timing of one detection event, in ticks: how far from its place a
-    /// mark is looked for.
-    pub jitter_ticks: f64,
-    /// Whether each photon of a mark makes an event at a time of its own, and not the mark one: then
-    /// one of many comes nearly always where the mark is looked for.
-    pub photons_apart: bool,
-    /// False returns accepted per shot; the matched, the balanced and the sampled receiver derive
-    /// their threshold from it.
-    pub false_alarm: f64,
-    /// Marks of a code word that make a 1 bit, for the literal and the blind receiver.
-    pub bit_threshold: u16,
-    /// Returns of a shot at most, 1 to [`MOST_RETURNS`]. The literal, the blind and the balanced
-    /// receiver give one whatever this says.
+    /// Nearest and farthest round trip accepted, in ticks.
+    pub gate_ticks: (u32, u32),
+    /// Returns of a shot at most, 1 to [`MOST_RETURNS`]. The bitwise and the balanced method give
+    /// one whatever this says.
     pub returns: u8,
     /// Which surfaces are kept if a shot has met more of them.
     pub pick: Pick,
-    /// What it knows of the signal that is sampled; of the sampled receiver, and of no other.
-    pub sampling: Option<Sampling>,
+    /// How it decodes.
+    pub method: Method,
+}
+
+/// How a receiver decodes, with the settings of that method alone.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Method {
+    /// One mark per shot, a detector of its own: takes the ticks in the range gate.
+    Direct,
+    /// Reads bit by bit, without knowing what was sent.
+    Bitwise(Bitwise),
+    /// Correlates the whole known macropulse of every shot in flight.
+    Matched(Correlation, Effort),
+    /// Correlates, and counts what falls on dark chips against the macropulse; for words of which
+    /// about half the chips are lit.
+    Balanced(Correlation),
+    /// Correlates samples: adds up the marks of a word, and takes away what was explained.
+    Sampled(Sampled),
+}
+
+/// Settings of a receiver that correlates ticks with known macropulses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correlation {
+    /// TDC ticks per chip.
+    pub ticks_per_chip: u32,
+    /// Farthest round trip from which light of the shots may come although it is not accepted, in
+    /// ticks.
+    pub light_ticks: u32,
+    /// Standard deviation of the timing of one detection event, in ticks: how far from its place a
+    /// mark is looked for.
+    pub jitter_ticks: f64,
+    /// Each photon of a mark makes an event at a time of its own, instead of the mark making one: then
+    /// one of many comes nearly always where the mark is looked for.
+    pub photons_apart: bool,
+    /// False returns accepted per shot; the threshold follows from it.
+    pub false_alarm: f64,
+}
+
+impl Correlation {
+    /// The jitter that is decoded, in ticks.
+    fn jitter(&self) -> f64 {
+        self.jitter_ticks.min(MOST_JITTER)
+    }
+}
+
+impl Default for Correlation {
+    /// A chip to a tick, exact timing, light from up to 100 000 ticks, and one false return in a
+    /// million shots.
+    fn default() -> Self {
+        Self {
+            ticks_per_chip: 1,
+            light_ticks: 100_000,
+            jitter_ticks: 0.0,
+            photons_apart: false,
+            false_alarm: 1e-6,
+        }
+    }
+}
+
+/// The list of all kinds of receivers: variant, method, name, and returns of a shot at most. Sensor
+/// files and their schema, the command line and the Python package take the names from here.
+macro_rules! kinds {
+    ($($(#[doc = $doc:literal])+ $Kind:ident, $method:pat => $name:literal, $returns:expr;)+) => {
+        /// The name of a receiver.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+        pub enum ReceiverKind {
+            $($(#[doc = $doc])+ #[serde(rename = $name)] $Kind,)+
+        }
+
+        impl ReceiverKind {
+            /// All kinds.
+            pub const ALL: &[Self] = &[$(Self::$Kind),+];
+
+            /// Its name in sensor files and commands.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Kind => $name,)+
+                }
+            }
+
+            /// A sentence that says what it does.
+            pub fn summary(self) -> &'static str {
+                match self {
+                    $(Self::$Kind => concat!($($doc),+).trim_ascii_start(),)+
+                }
+            }
+
+            /// Returns of a shot that it can give at most.
+            pub fn most_returns(self) -> u8 {
+                match self {
+                    $(Self::$Kind => $returns,)+
+                }
+            }
+        }
+
+        impl Method {
+            /// The kind of receiver that has this method.
+            pub fn kind(&self) -> ReceiverKind {
+                match self {
+                    $($method => ReceiverKind::$Kind,)+
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// As the paper prints it: bit by bit from the first light on.
+    Literal, Self::Bitwise(Bitwise { opening: Opening::FirstBit, .. }) => "literal", 1;
+    /// Bit by bit, but tries how many leading zero bits were dark.
+    Blind, Self::Bitwise(Bitwise { opening: Opening::AnyBit, .. }) => "blind", 1;
+    /// Correlates the whole known macropulse of every shot in flight.
+    Matched, Self::Matched(..) => "matched", matched::MOST_RETURNS;
+    /// As `matched`, but what falls on dark chips counts against it; for words of which about half
+    /// the chips are lit.
+    Balanced, Self::Balanced(_) => "balanced", 1;
+    /// For shots without a code: the ticks in the range gate.
+    Direct, Self::Direct => "direct", MOST_RETURNS;
+    /// As `matched`, of a sampled detector: adds up the samples of the marks of every shot in flight.
+    Sampled, Self::Sampled(_) => "sampled", MOST_RETURNS;
+}
+
+impl Method {
+    /// Settings of its correlation, if it correlates ticks.
+    pub fn correlation(&self) -> Option<&Correlation> {
+        match self {
+            Self::Matched(correlation, _) | Self::Balanced(correlation) => Some(correlation),
+            _ => None,
+        }
+    }
+
+    /// The signal as it knows it, if it is given samples.
+    pub fn sampling(&self) -> Option<&Sampling> {
+        match self {
+            Self::Sampled(Sampled { sampling, .. }) => Some(sampling),
+            _ => None,
+        }
+    }
+
+    /// Ticks per chip of the code words; `None` without a code.
+    pub fn ticks_per_chip(&self) -> Option<u32> {
+        match self {
+            Self::Direct => None,
+            Self::Bitwise(settings) => Some(settings.ticks_per_chip),
+            Self::Matched(settings, _) | Self::Balanced(settings) => Some(settings.ticks_per_chip),
+            Self::Sampled(settings) => Some(settings.ticks_per_chip),
+        }
+    }
+
+    /// Farthest round trip, in ticks, from which it looks for light beyond the gate; 0 if it does not.
+    fn light_ticks(&self) -> u32 {
+        match self {
+            Self::Sampled(settings) => settings.light_ticks,
+            _ => self.correlation().map_or(0, |correlation| correlation.light_ticks),
+        }
+    }
+
+    /// Standard deviation of the timing of an event, in ticks; 0 if it looks for a mark in its place
+    /// alone.
+    fn jitter_ticks(&self) -> f64 {
+        match self {
+            Self::Bitwise(settings) => settings.jitter_ticks,
+            _ => self.correlation().map_or(0.0, |correlation| correlation.jitter_ticks),
+        }
+    }
+
+    /// False returns accepted per shot, if its threshold follows from them.
+    fn false_alarm(&self) -> Option<f64> {
+        match self {
+            Self::Sampled(settings) => Some(settings.false_alarm),
+            _ => self.correlation().map(|correlation| correlation.false_alarm),
+        }
+    }
 }
 
 /// The shots that are fired while light passes the gate so many times are decoded together: so many
@@ -115,35 +239,16 @@ const MIDDLE: f64 = 0.5;
 /// and the ticks that are looked at are limited thereby.
 const MOST_JITTER: f64 = 255.0;
 
-impl ReceiverKind {
-    /// Returns of a shot that this receiver can give at most.
-    pub fn most_returns(self) -> u8 {
-        match self {
-            Self::Literal | Self::Blind | Self::Balanced => 1,
-            Self::Matched => matched::MOST_RETURNS,
-            Self::Direct | Self::Sampled => MOST_RETURNS,
-        }
-    }
-}
-
 impl Receiver {
     /// A matched receiver of ticks of `tick_fs` femtoseconds, a chip to a tick, timed exact to the
     /// tick, a gate from 0 to 100 000 ticks, and one false return in a million shots accepted.
     pub fn matched(tick_fs: i64) -> Self {
         Self {
-            kind: ReceiverKind::Matched,
-            effort: Effort::Quick,
-            gate_ticks: (0, 100_000),
-            light_ticks: 100_000,
-            ticks_per_chip: 1,
             tick_fs,
-            jitter_ticks: 0.0,
-            photons_apart: false,
-            false_alarm: 1e-6,
-            bit_threshold: 1,
+            gate_ticks: (0, 100_000),
             returns: 1,
             pick: Pick::Strongest,
-            sampling: None,
+            method: Method::Matched(Correlation::default(), Effort::Quick),
         }
     }
 
@@ -158,7 +263,7 @@ impl Receiver {
 
     /// For how many ticks from its earliest place on a mark is looked for.
     pub fn window_ticks(&self) -> u32 {
-        window(self.jitter())
+        window(self.method.jitter_ticks())
     }
 
     /// The returns of the owned shots of `log`, out of all the ticks or samples of its band, the
@@ -183,40 +288,39 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let record = record.into();
         check::check(self, (codebook, log), record)?;
-        match (record, &self.sampling) {
-            (Record::Ticks(ticks), _) => self.decode_checked(codebook, log, ticks),
-            (Record::Samples(samples), Some(sampling)) if !samples.is_empty() => {
-                Ok(sampled::decode(self, codebook, (log, samples), sampling))
-            }
-            (Record::Samples(_), _) => Ok(self.nothing_of(log.owned.len())),
+        match record {
+            Record::Ticks(ticks) => self.decode_ticks(codebook, log, ticks),
+            Record::Samples(samples) => match &self.method {
+                Method::Sampled(_) if samples.is_empty() => Ok(self.nothing_of(log.owned.len())),
+                Method::Sampled(settings) => {
+                    Ok(sampled::decode(self, settings, (codebook, log), samples))
+                }
+                _ => Err(Error::Record { wants: "ticks", given: "samples" }),
+            },
         }
     }
 
-    /// The returns, of what was checked but for the order of what the matched receiver is given.
-    fn decode_checked(
+    /// The returns of ticks that were checked, but for their order where the method sees to it.
+    fn decode_ticks(
         &self,
         codebook: &Codebook,
         log: &ShotLog,
         ticks: &Ticks,
     ) -> Result<Returns, Error> {
-        if ticks.tick.is_empty() || log.is_empty() {
-            check::in_order(&ticks.tick, 0..ticks.tick.len())?;
-            return Ok(self.nothing_of(log.owned.len()));
-        }
-        if self.kind != ReceiverKind::Direct && !ticks.channel.is_empty() {
-            return self.decode_each_channel(codebook, log, ticks);
-        }
-        Ok(match self.kind {
-            ReceiverKind::Direct => direct::decode(self, log, ticks),
-            ReceiverKind::Sampled => self.nothing_of(log.owned.len()),
-            ReceiverKind::Matched => matched::decode(self, (codebook, log), ticks)?,
-            ReceiverKind::Balanced => self.balance(codebook, log, ticks),
-            ReceiverKind::Literal => {
-                bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::FirstBit))
+        let sent = (codebook, log);
+        Ok(match &self.method {
+            Method::Sampled(_) => return Err(Error::Record { wants: "samples", given: "ticks" }),
+            _ if ticks.tick.is_empty() || log.is_empty() => {
+                check::in_order(&ticks.tick, 0..ticks.tick.len())?;
+                self.nothing_of(log.owned.len())
             }
-            ReceiverKind::Blind => {
-                bitwise::decode(self, (codebook, log), (ticks, bitwise::Opening::AnyBit))
+            Method::Direct => direct::decode(self, log, ticks),
+            _ if !ticks.channel.is_empty() => self.decode_each_channel(codebook, log, ticks)?,
+            Method::Bitwise(settings) => bitwise::decode(self, settings, sent, ticks),
+            Method::Matched(settings, effort) => {
+                matched::decode(self, settings, *effort, sent, ticks)?
             }
+            Method::Balanced(settings) => balanced::decode(self, settings, sent, ticks),
         })
     }
 
@@ -224,7 +328,7 @@ impl Receiver {
     /// counts none of them.
     fn nothing_of(&self, shots: usize) -> Returns {
         let mut returns = Returns::default();
-        if !matches!(self.kind, ReceiverKind::Literal | ReceiverKind::Blind) {
+        if !matches!(self.method, Method::Bitwise(_)) {
             returns.rejects[Reject::NoPeak as usize] = shots as u64;
         }
         returns
@@ -249,7 +353,7 @@ impl Receiver {
                 channel: Vec::new(),
                 amplitude: ticks.amplitude.get(from..to).map(<[f32]>::to_vec).unwrap_or_default(),
             };
-            let of_channel = self.decode_checked(codebook, &log, &seen)?;
+            let of_channel = self.decode_ticks(codebook, &log, &seen)?;
             found.extend(of_channel.each().map(|one| Return { shot: shots[one.shot], ..one }));
             returns.add_rejects(&of_channel);
         }
@@ -257,27 +361,6 @@ impl Receiver {
         found.sort_by_key(|one| one.shot);
         found.into_iter().for_each(|one| returns.push(one));
         Ok(returns)
-    }
-
-    /// The returns of the balanced receiver.
-    ///
-    /// It looks beyond the end of the gate by the length of a macropulse: what stands there has
-    /// sidelobes within the gate, and is told from them by being higher. Only then is it refused.
-    fn balance(&self, codebook: &Codebook, log: &ShotLog, ticks: &Ticks) -> Returns {
-        let (nearest, farthest) = self.gate_ticks;
-        let length = codebook.chips() * self.ticks_per_chip;
-        let gate_ticks = (nearest, farthest.saturating_add(length));
-        let wide = Self { gate_ticks, ..self.clone() };
-        let mut returns = balanced::decode(&wide, (codebook, log), ticks);
-        let closes = time::s_from_fs((i64::from(farthest) + 1) * self.tick_fs);
-        returns.refuse_beyond(closes);
-        beyond::exclude(self, (codebook, log), ticks, &mut returns);
-        returns
-    }
-
-    /// The jitter that is decoded, in ticks.
-    fn jitter(&self) -> f64 {
-        self.jitter_ticks.min(MOST_JITTER)
     }
 
     /// The absolute tick in which `shot` was fired.
@@ -304,14 +387,9 @@ impl Receiver {
         log.fired_at_fs.iter().map(ticks).collect()
     }
 
-    /// Two-way time of flight, s, of light that left at `fired_at_fs` and came `late` ticks after
-    /// `tick` began: half a tick, where no more is known.
-    fn tof(&self, fired_at_fs: i64, tick: i64, late: f64) -> f64 {
-        self.tofs(late)(fired_at_fs, tick)
-    }
-
-    /// The same for many that come as `late`: what they have in common is worked out once.
-    fn tofs(&self, late: f64) -> impl Fn(i64, i64) -> f64 + use<> {
+    /// Two-way time of flight, s, of light that left at one time, fs, and came `late` ticks after a tick
+    /// began, by these two: half a tick, where no more is known.
+    fn tof(&self, late: f64) -> impl Fn(i64, i64) -> f64 + use<> {
         let (tick_fs, late) = (self.tick_fs, late * time::s_from_fs(self.tick_fs));
         move |fired_at_fs, tick| time::s_from_fs(tick * tick_fs - fired_at_fs) + late
     }
@@ -320,51 +398,8 @@ impl Receiver {
 /// For how many ticks from its earliest place on a mark is looked for: ±2 σ of the jitter and the
 /// tick itself, which holds 19 of 20 marks. Below σ = 1/20 tick hardly any mark leaves its tick.
 fn window(jitter: f64) -> u32 {
+    let jitter = jitter.min(MOST_JITTER);
     if jitter > 0.05 { 1 + (4.0 * jitter).ceil() as u32 } else { 1 }
-}
-
-/// The energy of a return as a count of marks tells it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Energy {
-    /// Mean number of photons detected per mark.
-    photons: f32,
-    /// Whether it may be more: no mark was missed.
-    saturated: bool,
-}
-
-impl Energy {
-    /// Of `peak` of `marks` found where a share `density` of all places is lit anyway.
-    ///
-    /// A share p = (k/N − d)/(1 − d) of the marks shows a photon at least in the `window` they are
-    /// looked for in, which holds a share c of what they make. Where each makes one event, p/c of them
-    /// do, and μ = −ln(1 − p/c) photons were detected on average (Poisson); where each photon makes one,
-    /// μ = −ln(1 − p)/c. From N − ½ marks on the count tells no more: μ is a lower bound.
-    fn of((peak, marks): (u32, u32), density: f64, window: Window) -> Self {
-        let all = f64::from(marks);
-        let most = (all - 0.5) / all;
-        let (of_marks, of_photons) = match window.photons_apart {
-            true => (1.0, window.coverage),
-            false => (window.coverage, 1.0),
-        };
-        let lit = (f64::from(peak) / all - density) / (1.0 - density) / of_marks;
-        let saturated = peak >= marks || lit >= most;
-        let share = if saturated { most } else { lit.max(0.0) };
-        Self { photons: (-libm::log1p(-share) / of_photons) as f32, saturated }
-    }
-}
-
-/// Where the events of a mark are looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Window {
-    /// Share of them that come there.
-    coverage: f64,
-    /// As [`Receiver::photons_apart`].
-    photons_apart: bool,
-}
-
-impl Window {
-    /// Holds all of them.
-    const WHOLE: Self = Self { coverage: 1.0, photons_apart: false };
 }
 
 #[cfg(test)]
@@ -373,21 +408,7 @@ mod tests {
 
     #[test]
     fn shots_are_fired_in_the_tick_that_holds_their_time() {
-        let receiver = Receiver {
-            kind: ReceiverKind::Matched,
-            effort: Effort::Quick,
-            gate_ticks: (0, 1),
-            light_ticks: 1,
-            ticks_per_chip: 1,
-            tick_fs: 2497,
-            jitter_ticks: 0.0,
-            photons_apart: false,
-            false_alarm: 0.1,
-            bit_threshold: 1,
-            returns: 1,
-            pick: Pick::Strongest,
-            sampling: None,
-        };
+        let receiver = Receiver::matched(2497);
         for first in [0, 7, -2498, 10_i64.pow(17) + 1] {
             let times = [0, 1, 2489, 2490, 2496, 2497, -1, -2497, 2497 * 2497, 1 << 51, 1 << 53];
             let fired_at_fs: Vec<i64> = times.iter().map(|time| first + time).collect();
@@ -400,44 +421,5 @@ mod tests {
     #[test]
     fn the_window_grows_with_the_jitter() {
         assert_eq!([0.0, 0.05, 0.1, 0.4, 1.0, 2.0].map(window), [1, 1, 2, 3, 5, 9]);
-    }
-
-    #[test]
-    fn photons_follow_from_the_share_of_marks_seen() {
-        let photons = |found, density| Energy::of((found, 100), density, Window::WHOLE).photons;
-        approx::assert_relative_eq!(photons(63, 0.0), 0.994, max_relative = 1e-3);
-        // Half of the places are lit anyway: 75 of 100 lit are 50 of 100 seen.
-        let ln_2 = std::f32::consts::LN_2;
-        approx::assert_relative_eq!(photons(75, 0.5), ln_2, max_relative = 1e-3);
-        // Half of the marks fall within the window: 25 of 100 found are 50 of 100 seen.
-        let half = |photons_apart| Window { coverage: 0.5, photons_apart };
-        let half_covered = Energy::of((25, 100), 0.0, half(false));
-        approx::assert_relative_eq!(half_covered.photons, ln_2, max_relative = 1e-3);
-        assert!(!half_covered.saturated);
-        // Half of the photons do: where half of the marks show one there, there were 2·ln 2 of each.
-        let thinned = Energy::of((50, 100), 0.0, half(true));
-        approx::assert_relative_eq!(thinned.photons, 2.0 * ln_2, max_relative = 1e-3);
-        assert_eq!(photons(1, 0.2), 0.0);
-    }
-
-    #[test]
-    fn where_no_mark_is_missed_the_count_tells_a_lower_bound() {
-        let whole = Energy::of((100, 100), 0.0, Window::WHOLE);
-        assert!(whole.saturated);
-        approx::assert_relative_eq!(whole.photons, 200_f32.ln(), max_relative = 1e-6);
-        let most = Window { coverage: 0.95, photons_apart: false };
-        // 94 of the 95 that the window holds are not all of them; the 95th would be.
-        assert_eq!(
-            [94, 95].map(|found| Energy::of((found, 100), 0.0, most).saturated),
-            [false, true]
-        );
-        assert_eq!(
-            Energy::of((1, 1), 0.0, Window::WHOLE),
-            Energy { photons: ln_2(), saturated: true }
-        );
-    }
-
-    fn ln_2() -> f32 {
-        std::f32::consts::LN_2
     }
 }

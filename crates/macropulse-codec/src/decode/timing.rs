@@ -26,7 +26,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use super::{Receiver, Window};
+use super::{Correlation, Window};
 use crate::statistics::{normal_quantile, normal_tail};
 
 /// Steps of the scoring at most. From the fullest places on it takes two or three; more where
@@ -154,10 +154,10 @@ impl Histogram {
     }
 }
 
-/// The `width` ticks in which `receiver` looks for what a mark makes, if its light is `late` ticks behind
+/// The `width` ticks in which a receiver looks for what a mark makes, if its light is `late` ticks behind
 /// the beginning of the first.
-pub(super) fn window(receiver: &Receiver, width: u32, late: f64) -> Window {
-    let (sigma, photons_apart) = (receiver.jitter(), receiver.photons_apart);
+pub(super) fn window(correlation: &Correlation, width: u32, late: f64) -> Window {
+    let (sigma, photons_apart) = (correlation.jitter(), correlation.photons_apart);
     let coverage = match width {
         // Jitter that hardly leaves a tick.
         1 => 1.0,

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use macropulse_codec::code::{Codebook, Family, Keying, Separated};
-use macropulse_codec::decode::{Receiver, ReceiverKind, STEPS_OF_TICK, Sampling};
+use macropulse_codec::decode::{Method, Receiver, STEPS_OF_TICK, Sampled, Sampling};
 use macropulse_codec::{Samples, ShotLog};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -144,14 +144,14 @@ pub fn sampling() -> Sampling {
 
 /// A gate of 150 m, and light up to 300 m.
 pub fn receiver() -> Receiver {
-    Receiver {
-        kind: ReceiverKind::Sampled,
-        gate_ticks: (8, 2502),
-        light_ticks: 5003,
-        false_alarm: 2.5e-6,
-        sampling: Some(sampling()),
-        ..Receiver::matched(TICK_FS)
-    }
+    receiver_of(sampling())
+}
+
+/// The same that knows this of the signal.
+pub fn receiver_of(sampling: Sampling) -> Receiver {
+    let (ticks_per_chip, light_ticks, false_alarm) = (1, 5003, 2.5e-6);
+    let method = Method::Sampled(Sampled { ticks_per_chip, light_ticks, false_alarm, sampling });
+    Receiver { gate_ticks: (8, 2502), method, ..Receiver::matched(TICK_FS) }
 }
 
 /// So many shots one behind the other.

@@ -1,7 +1,7 @@
 //! What a budget says, as text for people.
 
 use macropulse::channel::idealised as idealised_in;
-use macropulse::codec::decode::{Effort, ReceiverKind};
+use macropulse::codec::decode::{Effort, Method};
 use macropulse::design::safety::{ASSUMED, TELESCOPE};
 use macropulse::environment::Environment;
 
@@ -163,8 +163,8 @@ impl Figures<'_> {
             "  photons a shot, detected a mark; range of Pd {pd} in {}, and at night\n",
             self.environment.name
         );
-        let receiver = &self.design.receiver;
-        let is_quick = receiver.kind == ReceiverKind::Matched && receiver.effort == Effort::Quick;
+        let method = &self.design.receiver.method;
+        let is_quick = matches!(method, Method::Matched(_, Effort::Quick));
         if let Some(aside) = self.there.aside.filter(|aside| aside.share >= RARELY) {
             text += &format!(
                 "  on a sidelobe {:.1e} of the returns at the rated range, {:.0} mm off (rms), apart from \
@@ -173,7 +173,7 @@ impl Figures<'_> {
                 aside.rms * 1e3
             );
         }
-        if self.design.is_coded() && is_quick && self.there.pd < LIKELY {
+        if is_quick && self.there.pd < LIKELY {
             text += "  Pd is that of receiver.effort = \"thorough\": a quick one finds fewer so faint shots\n";
         }
         text

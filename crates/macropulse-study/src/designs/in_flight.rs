@@ -45,7 +45,7 @@ impl InFlight {
         // Blanked no longer than a coded one: what leaves later is in flight with the echoes.
         let waiting = &Candidate { is_late: false, ..waiting.clone() };
         let design = waiting.unlimited(required)?;
-        let Some(blind) = design.receiver.sampling.as_ref().and_then(Blind::at_most) else {
+        let Some(blind) = design.receiver.method.sampling().and_then(Blind::at_most) else {
             return Ok(None);
         };
         let blind = f64::from(blind.between_ticks().ticks()) * design.tdc.tick_fs as f64 * 1e-15;

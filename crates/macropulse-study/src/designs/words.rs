@@ -69,7 +69,7 @@ impl Requirements {
         }
         // When a channel is blind does not depend on what it sends.
         let design = bare.unlimited(self)?;
-        let blind = design.receiver.sampling.as_ref().and_then(Blind::at_most);
+        let blind = design.receiver.method.sampling().and_then(Blind::at_most);
         let chips = |time: f64| (time / self.chip() * (1.0 - 1e-12)).ceil() as u32;
         // Of a Gaussian low-pass 0.312 over its bandwidth (full width at half maximum).
         let mark = bare.pulse.hypot(0.312 / bare.bandwidth);
@@ -127,7 +127,7 @@ impl Requirements {
 
     /// How many shots of `design`, if it sent these `words` in turn, are lost to own light.
     fn lost(&self, design: &Design, words: &[CodeWord]) -> Lost {
-        let sampling = design.receiver.sampling.as_ref();
+        let sampling = design.receiver.method.sampling();
         let none = Lost { at_worst: 0, in_all: 0 };
         let Some(sampling) = sampling else { return none };
         let Some(blind) = Blind::at_most(sampling) else { return none };

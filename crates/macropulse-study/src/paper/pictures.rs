@@ -3,12 +3,13 @@
 use super::Error;
 use super::experiment::{DISTANCES, SENSORS, Trial};
 use super::geometry::{elevations, pitch};
-use super::receivers::Comparison;
+use super::receivers::{Comparison, RECEIVERS};
 use crate::view::{
     AmplitudePicture, Axis, BitPicture, Chart, CloudPicture, Crop, Figure, Flight, Hue, Lane,
     Layout, Line, Note, RangePicture, ScaleBar, Span, Style, Timeline, Viewpoint,
 };
 use macropulse::codec::code::CodeWord;
+use macropulse::codec::decode::ReceiverKind;
 use macropulse::design::Design;
 use macropulse::emit::{bands, shot_of_pixel};
 use macropulse::points::Outcome;
@@ -285,7 +286,7 @@ pub(super) fn receivers(comparisons: &[Comparison]) -> Figure {
     detectors.dedup();
     let y = Axis::linear("right, % of the pixels with an echo").limits(0.0, 105.0);
     let mut chart = Chart::new("Receivers compared", Axis::categories("", &detectors), y);
-    for receiver in ["literal", "blind", "matched"] {
+    for receiver in RECEIVERS.map(ReceiverKind::name) {
         let points = detectors.iter().enumerate().filter_map(|(at, detector)| {
             let found = own.iter().find(|c| c.receiver == receiver && c.detector == *detector)?;
             Some([at as f64, (1000.0 * found.share(Outcome::Right)).round() / 10.0])

@@ -1,6 +1,7 @@
 //! The three receivers side by side, with and without missed marks.
 
 use super::Error;
+use macropulse::codec::decode::ReceiverKind;
 use macropulse::design::Design;
 use macropulse::emit::{Band, short_bands};
 use macropulse::points::Outcome;
@@ -9,7 +10,8 @@ use macropulse::score::Score;
 use macropulse::sim::{self, Watch};
 
 /// The receivers compared.
-const RECEIVERS: [&str; 3] = ["literal", "blind", "matched"];
+pub(super) const RECEIVERS: [ReceiverKind; 3] =
+    [ReceiverKind::Literal, ReceiverKind::Blind, ReceiverKind::Matched];
 
 /// Detectors under which they are compared: a name, and the keys that make it.
 const DETECTORS: [(&str, &[(&str, &str)]); 3] = [
@@ -87,7 +89,7 @@ pub(super) fn compare(seed: u64, watch: &Watch) -> Result<Vec<Comparison>, Error
     let mut rows = Vec::new();
     for sensor in COMPARED {
         for (detector, keys) in DETECTORS {
-            for receiver in RECEIVERS {
+            for receiver in RECEIVERS.map(ReceiverKind::name) {
                 if (watch.stop)() {
                     return Err(Error::Stopped);
                 }

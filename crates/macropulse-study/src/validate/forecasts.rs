@@ -1,7 +1,7 @@
 //! Forecasts beside what is simulated: walls all around a ready sensor, of such a reflectance that one
 //! shot in ten, half of them, four in five, and nearly all are to be seen.
 
-use macropulse::codec::decode::ReceiverKind;
+use macropulse::codec::decode::Method;
 use macropulse::design::Design;
 use macropulse::emit::{Band, short_bands};
 use macropulse::environment::Environment;
@@ -118,9 +118,9 @@ impl Place {
 /// Where the sensor cannot be simulated there.
 pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Error> {
     let ready = Design::open(sensor, &[])?;
-    let design = match ready.receiver.kind {
+    let design = match ready.receiver.method {
         // What is forecast is what is there to be found.
-        ReceiverKind::Matched => {
+        Method::Matched(..) => {
             Design::open(sensor, &[("receiver.effort".into(), "\"thorough\"".into())])?
         }
         _ => ready,

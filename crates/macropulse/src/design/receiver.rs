@@ -8,7 +8,7 @@ use super::limits::Check;
 use super::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
 use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::decode::{
-    self, Effort, MOST_RETURNS, Pick, Receiver, ReceiverKind, Sampling,
+    self, Bitwise, Correlation, Effort, MOST_RETURNS, Method, Opening, Pick, Receiver, ReceiverKind,
 };
 
 /// Marks by which a receiver of samples decides at least if its file does not say: one alone may be that of
@@ -20,7 +20,7 @@ const LEAST_MARKS: u32 = 2;
 #[serde(deny_unknown_fields)]
 pub(super) struct ReceiverFile {
     /// How ticks become returns.
-    pub kind: ReceiverKindFile,
+    pub kind: ReceiverKind,
     /// How much the receiver `matched` does for faint light.
     effort: Effort,
     /// False returns accepted per shot (matched, balanced, sampled).
@@ -50,23 +50,19 @@ pub(super) struct ReceiverFile {
     recovery_ns: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum ReceiverKindFile {
-    /// As the paper prints it: bit by bit from the first light on.
-    Literal,
-    /// Bit by bit, but tries how many leading zero bits were dark.
-    Blind,
-    /// Correlates the whole known macropulse of every shot in flight.
-    Matched,
-    /// As `matched`, but what falls on dark chips counts against it; for words of which about half
-    /// the chips are lit.
-    Balanced,
-    /// For shots without a code: the ticks in the range gate.
-    Direct,
-    /// As `matched`, of a sampled detector: adds up the samples of the marks of every shot in flight.
-    Sampled,
-}
+/// The keys that only some kinds of receivers have: which, whose, and why no others.
+pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 4] = {
+    use ReceiverKind::{Balanced, Blind, Literal, Matched, Sampled};
+    let of_samples = &["receiver.least_marks", "receiver.blank_ns", "receiver.recovery_ns"];
+    let correlating = "only `matched`, `balanced` and `sampled` derive their threshold from it";
+    let bitwise = "only `literal` and `blind` decide bit by bit";
+    [
+        (&["receiver.bit_threshold"], &[Literal, Blind], bitwise),
+        (&["receiver.false_alarm"], &[Matched, Balanced, Sampled], correlating),
+        (of_samples, &[Sampled], "only `sampled` is given samples"),
+        (&["receiver.effort"], &[Matched], "only `matched` searches"),
+    ]
+};
 
 /// What a receiver is given beside its own section of the file.
 pub(super) struct Inputs<'a> {
@@ -76,23 +72,21 @@ pub(super) struct Inputs<'a> {
     pub coding: &'a Coding,
     /// Standard deviation of the time of a mark, s.
     pub timing: f64,
-    /// As [`Receiver::photons_apart`].
+    /// As [`Correlation::photons_apart`].
     pub photons_apart: bool,
     /// The detector, where it is sampled.
     pub sampled: Option<&'a Sampled>,
 }
 
 impl Check<'_> {
-    pub(super) fn receiver(&self, file: &ReceiverFile, inputs: &Inputs) -> Result<Receiver, Error> {
-        let &Inputs { detector, scan, tdc, coding, timing, photons_apart, sampled } = inputs;
-        let kind = match file.kind {
-            ReceiverKindFile::Literal => ReceiverKind::Literal,
-            ReceiverKindFile::Blind => ReceiverKind::Blind,
-            ReceiverKindFile::Matched => ReceiverKind::Matched,
-            ReceiverKindFile::Balanced => ReceiverKind::Balanced,
-            ReceiverKindFile::Direct => ReceiverKind::Direct,
-            ReceiverKindFile::Sampled => ReceiverKind::Sampled,
-        };
+    /// The receiver; `None` without the sampled detector that it has to know.
+    pub(super) fn receiver(
+        &self,
+        file: &ReceiverFile,
+        inputs: &Inputs,
+    ) -> Result<Option<Receiver>, Error> {
+        let &Inputs { detector, scan, tdc, coding, .. } = inputs;
+        let kind = file.kind;
         let samples = detector.only().is_some_and(|only| only.file.sample_ps().is_some());
         if samples != (kind == ReceiverKind::Sampled) {
             return self.refuse(
@@ -108,44 +102,16 @@ impl Check<'_> {
             );
         }
         self.can_read(kind, coding)?;
-        let (returns, pick) = self.returns(file, detector, kind)?;
-        let (threshold, lightest) = (file.bit_threshold, coding.codebook.lightest_word() as u32);
+        let (returns, pick) = self.returns(file, detector)?;
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         let light = ticks(scan.light_range);
         if light >= i64::from(u32::MAX / PARTS_OF_TICK) {
             return self.too_fine(samples);
         }
-        let Ok(ticks_per_chip) = u32::try_from(coding.chip_fs / tdc.tick_fs) else {
-            let most = u32::MAX;
-            let message = format!("is more than {most} ticks: use longer ticks or shorter chips");
-            return self.refuse("code.chip_ps", message);
-        };
-        let receiver = Receiver {
-            kind,
-            effort: file.effort,
-            gate_ticks: (gate.0 as u32, gate.1 as u32),
-            light_ticks: light as u32,
-            ticks_per_chip,
-            tick_fs: tdc.tick_fs,
-            jitter_ticks: timing * 1e15 / tdc.tick_fs as f64,
-            photons_apart,
-            false_alarm: self.within("receiver.false_alarm", file.false_alarm, 1e-30, 0.5)?,
-            bit_threshold: match kind {
-                ReceiverKind::Literal | ReceiverKind::Blind => {
-                    self.count("receiver.bit_threshold", threshold, 1, lightest)? as u16
-                }
-                // The others ask for none: a light word may have fewer marks than the default.
-                _ => threshold.clamp(1, lightest.max(1)) as u16,
-            },
-            returns,
-            pick,
-            sampling: self.sampling(file, coding, sampled)?,
-        };
-        // A detector that was refused leaves open what the receiver knows of it.
-        if samples && sampled.is_none() {
-            return Ok(receiver);
-        }
+        let Some(method) = self.method(file, inputs, light as u32)? else { return Ok(None) };
+        let gate_ticks = (gate.0 as u32, gate.1 as u32);
+        let receiver = Receiver { tick_fs: tdc.tick_fs, gate_ticks, returns, pick, method };
         // What the receiver itself asks before it decodes; the keys ask most of it already.
         match receiver.check(&coding.codebook) {
             Err(decode::Error::TooLong { what, ticks, possible }) => self.refuse(
@@ -156,47 +122,73 @@ impl Check<'_> {
                 ),
             ),
             Err(why) => self.refuse("receiver", why.to_string()),
-            Ok(()) => Ok(receiver),
+            Ok(()) => Ok(Some(receiver)),
         }
     }
 
-    /// What a receiver of samples knows of a `sampled` detector.
-    fn sampling(
+    /// How it decodes, of light that is followed for so many ticks.
+    fn method(
         &self,
         file: &ReceiverFile,
-        coding: &Coding,
-        sampled: Option<&Sampled>,
-    ) -> Result<Option<Sampling>, Error> {
-        let Some(sampled) = sampled else { return Ok(None) };
-        let most = coding.codebook.lightest_word() as u32;
-        let least = match file.least_marks {
-            Some(typed) => self.count("receiver.least_marks", typed, 1, most)?,
-            None => LEAST_MARKS.min(most),
+        inputs: &Inputs,
+        light_ticks: u32,
+    ) -> Result<Option<Method>, Error> {
+        let &Inputs { tdc, coding, timing, photons_apart, sampled, .. } = inputs;
+        let Ok(ticks_per_chip) = u32::try_from(coding.chip_fs / tdc.tick_fs) else {
+            let most = u32::MAX;
+            let message = format!("is more than {most} ticks: use longer ticks or shorter chips");
+            return self.refuse("code.chip_ps", message);
         };
-        let blank = self.within("receiver.blank_ns", file.blank_ns, 0.0, 1e6)? * 1e-9;
-        let recovery = self.within("receiver.recovery_ns", file.recovery_ns, 0.0, 1e6)? * 1e-9;
-        Ok(Some(sampled.sampling((blank, recovery), least as u16)))
+        let jitter_ticks = timing * 1e15 / tdc.tick_fs as f64;
+        let false_alarm = self.within("receiver.false_alarm", file.false_alarm, 1e-30, 0.5)?;
+        let lightest = coding.codebook.lightest_word() as u32;
+        let bitwise = |opening| -> Result<Method, Error> {
+            let threshold =
+                self.count("receiver.bit_threshold", file.bit_threshold, 1, lightest)?;
+            let bit_threshold = threshold as u16;
+            Ok(Method::Bitwise(Bitwise { opening, bit_threshold, ticks_per_chip, jitter_ticks }))
+        };
+        let correlation =
+            Correlation { ticks_per_chip, light_ticks, jitter_ticks, photons_apart, false_alarm };
+        Ok(Some(match file.kind {
+            ReceiverKind::Literal => bitwise(Opening::FirstBit)?,
+            ReceiverKind::Blind => bitwise(Opening::AnyBit)?,
+            ReceiverKind::Matched => Method::Matched(correlation, file.effort),
+            ReceiverKind::Balanced => Method::Balanced(correlation),
+            ReceiverKind::Direct => Method::Direct,
+            ReceiverKind::Sampled => {
+                let Some(sampled) = sampled else { return Ok(None) };
+                let least = match file.least_marks {
+                    Some(typed) => self.count("receiver.least_marks", typed, 1, lightest)?,
+                    None => LEAST_MARKS.min(lightest),
+                };
+                let ns = |key, value| -> Result<f64, Error> {
+                    Ok(self.within(key, value, 0.0, 1e6)? * 1e-9)
+                };
+                let blank = ns("receiver.blank_ns", file.blank_ns)?;
+                let recovery = ns("receiver.recovery_ns", file.recovery_ns)?;
+                let sampling = sampled.sampling((blank, recovery), least as u16);
+                Method::Sampled(decode::Sampled {
+                    ticks_per_chip,
+                    light_ticks,
+                    false_alarm,
+                    sampling,
+                })
+            }
+        }))
     }
 
     /// How many returns a shot may have at most, and which are kept of more.
-    fn returns(
-        &self,
-        file: &ReceiverFile,
-        detector: &DetectorFile,
-        kind: ReceiverKind,
-    ) -> Result<(u8, Pick), Error> {
+    fn returns(&self, file: &ReceiverFile, detector: &DetectorFile) -> Result<(u8, Pick), Error> {
+        let (kind, name, most) = (file.kind, file.kind.name(), file.kind.most_returns());
         let wanted = self.count("receiver.returns", file.returns, 1, MOST_RETURNS.into())?;
         let one_event = detector.given().find(|given| given.file.is_single_stop());
-        let of_receiver =
-            |name: &str| Some(format!("receiver.kind = \"{name}\" gives one return per shot"));
         let one_only = match kind {
             ReceiverKind::Direct => {
                 one_event.map(|given| format!("detector.{} gives one event per shot", given.name))
             }
-            ReceiverKind::Matched | ReceiverKind::Sampled => None,
-            ReceiverKind::Literal => of_receiver("literal"),
-            ReceiverKind::Blind => of_receiver("blind"),
-            ReceiverKind::Balanced => of_receiver("balanced"),
+            _ if most == 1 => Some(format!("receiver.kind = \"{name}\" gives one return per shot")),
+            _ => None,
         };
         if let Some(why) = one_only {
             if wanted > 1 {
@@ -208,10 +200,9 @@ impl Check<'_> {
                     .refuse("receiver.pick", format!("has no effect, as {why}: leave it out"));
             }
         }
-        let most = kind.most_returns();
         if wanted > most.into() {
             let message = format!(
-                "is {wanted}, but receiver.kind = \"matched\" finds {most} returns of a shot at most"
+                "is {wanted}, but receiver.kind = \"{name}\" finds {most} returns of a shot at most"
             );
             return self.refuse("receiver.returns", message);
         }

@@ -14,7 +14,7 @@
 use crate::channel::{Link, Operating};
 use crate::design::Design;
 use crate::design::detector::Lit;
-use macropulse_codec::decode::ReceiverKind;
+use macropulse_codec::decode::Method;
 
 /// The law of a detector is asked for at so many photons, evenly spaced in their logarithm …
 const PLACES: i32 = 640;
@@ -41,8 +41,7 @@ pub struct Scale {
 impl Scale {
     /// That of `design` where it is `operating`.
     pub fn of(design: &Design, operating: &Operating) -> Self {
-        let kind = design.receiver.kind;
-        let measures = matches!(kind, ReceiverKind::Direct | ReceiverKind::Sampled);
+        let measures = matches!(design.receiver.method, Method::Direct | Method::Sampled(_));
         let law = if measures { Vec::new() } else { law(design, operating) };
         Self { link: operating.link, law }
     }

@@ -13,6 +13,7 @@
 
 use std::collections::BTreeMap;
 
+use macropulse_codec::decode::Correlation;
 use macropulse_codec::statistics::{binomial, hypergeometric_tail, normal_tail};
 
 use super::matched::{Chances, Found, Place, lags};
@@ -23,13 +24,14 @@ use crate::units::s_from_fs;
 /// after `tof` seconds.
 pub(super) fn chances(
     design: &Design,
+    correlation: &Correlation,
     weights: &BTreeMap<usize, usize>,
     found: &Found,
     tof: f64,
 ) -> Chances {
     let labels: usize = weights.values().sum();
     let late = (tof / s_from_fs(design.tdc.tick_fs)).fract();
-    let gate = Gate::of(design, weights, found, late);
+    let gate = Gate::of(design, correlation, (weights, found), late);
     let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
         let share = count as f64 / labels as f64;
@@ -74,11 +76,15 @@ struct Gate {
 impl Gate {
     /// The gate of a shot while all shots meet the same range; their light comes `late` in a tick, a share
     /// of it.
-    fn of(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found, late: f64) -> Self {
-        let receiver = &design.receiver;
+    fn of(
+        design: &Design,
+        correlation: &Correlation,
+        (weights, found): (&BTreeMap<usize, usize>, &Found),
+        late: f64,
+    ) -> Self {
         let chips = design.coding.codebook.chips() as usize;
         let width = Place::ticks(design) as i32;
-        let phases = phases(design, (weights, found), (width, late));
+        let phases = phases(design, correlation, (weights, found), (width, late));
         // Farther chips than the first and the last lit one may be passed by without loss.
         let own = |lit: usize| f64::from(width) * (1.0 + 2.0 * chips as f64 / (lit as f64 + 1.0));
         let mut as_lit: Vec<f64> = (0..=chips).map(own).collect();
@@ -86,7 +92,7 @@ impl Gate {
             let tails = beyond(&binomial(chips, phase.density));
             as_lit.iter_mut().zip(&tails).for_each(|(sum, tail)| *sum += phase.lags * tail);
         }
-        Self { chips, false_alarm: receiver.false_alarm, phases, as_lit }
+        Self { chips, false_alarm: correlation.false_alarm, phases, as_lit }
     }
 
     /// What so many marks must come to.
@@ -105,15 +111,15 @@ impl Gate {
 /// ticks.
 fn phases(
     design: &Design,
+    correlation: &Correlation,
     (weights, found): (&BTreeMap<usize, usize>, &Found),
     (width, late): (i32, f64),
 ) -> Vec<Phase> {
-    let receiver = &design.receiver;
-    let scale = receiver.ticks_per_chip as i32;
+    let scale = correlation.ticks_per_chip as i32;
     let codebook = &design.coding.codebook;
     // The receiver looks beyond the gate by a macropulse.
-    let lags = lags(design) + f64::from(codebook.chips() * receiver.ticks_per_chip);
-    let sigma = receiver.jitter_ticks.max(f64::MIN_POSITIVE);
+    let lags = lags(design) + f64::from(codebook.chips() * correlation.ticks_per_chip);
+    let sigma = correlation.jitter_ticks.max(f64::MIN_POSITIVE);
     let marks: usize = weights.iter().map(|(marks, count)| marks * count).sum();
     let mean = marks as f64 / weights.values().sum::<usize>() as f64;
     let chip = s_from_fs(design.coding.chip_fs);
@@ -221,11 +227,13 @@ mod tests {
     #[test]
     fn light_in_step_lies_in_few_phases() {
         let design = Design::open("bipolar-gold", &[]).unwrap();
+        let correlation = design.receiver.method.correlation().unwrap();
         let found = Found { seen: 0.4, density: 1e-3, false_density: 1e-6 };
         // Light in the middle of a tick is found where either of two begins; at its edge it is found where
         // the one before it begins, and half of it one earlier and one later.
         for (late, expected) in [(0.5, [0.4, 0.4, 0.0]), (0.0, [0.4, 0.2, 0.2])] {
-            let phases = phases(&design, (&BTreeMap::from([(64, 1)]), &found), (2, late));
+            let phases =
+                phases(&design, correlation, (&BTreeMap::from([(64, 1)]), &found), (2, late));
             let lags: f64 = phases.iter().map(|phase| phase.lags).sum();
             // 149.5 m and a macropulse of 2.5 ps ticks.
             assert!((lags / 415_200.0 - 1.0).abs() < 1e-4, "{lags}");

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use macropulse_codec::decode::{ReceiverKind, Sampling};
+use macropulse_codec::decode::{self, Method};
 
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
@@ -30,7 +30,7 @@ pub enum Error {
         /// The sensor.
         sensor: String,
         /// What has no closed form.
-        what: &'static str,
+        what: String,
         /// What to do instead.
         remedy: String,
     },
@@ -122,9 +122,9 @@ impl<'a> Forecaster<'a> {
         let channel_period = design.scan.shortest_period();
         let mean_weight = codebook.mean_weight();
         let (light, background) = (1.0, 1.0);
-        let is_matched = design.is_coded() && design.receiver.kind == ReceiverKind::Matched;
+        let is_matched = matches!(design.receiver.method, Method::Matched(..));
         let sidelobes = is_matched.then(|| Sidelobes::of(design));
-        let sampling = design.receiver.sampling.as_ref();
+        let sampling = design.receiver.method.sampling();
         let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
         Ok(Self {
             design,
@@ -188,15 +188,19 @@ impl<'a> Forecaster<'a> {
         worst
     }
 
+    /// The detector and its receiver, if it is sampled.
+    fn sampled(&self) -> Option<(&Sampled, &decode::Sampled)> {
+        match (&self.design.detector, &self.design.receiver.method) {
+            (Detector::Sampled(detector), Method::Sampled(settings)) => Some((detector, settings)),
+            _ => None,
+        }
+    }
+
     /// What the channels are blind with, if they are sampled, for echoes from so many metres at most.
     fn own_light(&self, farthest: f64) -> Option<OwnLight> {
-        let (Detector::Sampled(detector), Some(sampling)) =
-            (&self.design.detector, &self.design.receiver.sampling)
-        else {
-            return None;
-        };
+        let (detector, settings) = self.sampled()?;
         let background = self.background * self.operating.background;
-        let blind = sampled::blind(detector, sampling, background);
+        let blind = sampled::blind(detector, &settings.sampling, background);
         Some(OwnLight::of(self.design, blind, tof_from_range(farthest)))
     }
 
@@ -223,10 +227,8 @@ impl<'a> Forecaster<'a> {
     /// The same of an echo that is as bright as it is on average.
     fn of_brightness(&self, reflectance: f64, range: f64, told: &[usize]) -> Forecast {
         let (design, operating) = (self.design, &self.operating);
-        if let (Detector::Sampled(detector), Some(sampling)) =
-            (&design.detector, &design.receiver.sampling)
-        {
-            return self.of_samples((detector, sampling), reflectance, range, told);
+        if let Some(sampled) = self.sampled() {
+            return self.of_samples(sampled, reflectance, range, told);
         }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
@@ -255,18 +257,17 @@ impl<'a> Forecaster<'a> {
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - at_the_lag);
 
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
-        let chances = match design.is_coded() {
-            true => {
-                let found = matched::Found { seen: mark_pd, density, false_density };
-                match design.receiver.kind {
-                    ReceiverKind::Balanced => {
-                        balanced::chances(design, &self.weights, &found, tof_from_range(range))
-                    }
-                    _ => matched::chances(design, &self.weights, &found),
-                }
+        let found = matched::Found { seen: mark_pd, density, false_density };
+        let chances = match &design.receiver.method {
+            Method::Matched(correlation, _) => {
+                matched::chances(design, correlation, &self.weights, &found)
+            }
+            Method::Balanced(correlation) => {
+                let tof = tof_from_range(range);
+                balanced::chances(design, correlation, &self.weights, &found, tof)
             }
             // The first event in the gate is taken.
-            false => {
+            _ => {
                 let awaited = Awaited {
                     since: since_opening(design, range),
                     photons: detected,
@@ -331,7 +332,7 @@ impl<'a> Forecaster<'a> {
     /// that of the amplifier and of steady light; `background` counts for that.
     fn of_samples(
         &self,
-        (detector, sampling): (&Sampled, &Sampling),
+        (detector, settings): (&Sampled, &decode::Sampled),
         reflectance: f64,
         range: f64,
         told: &[usize],
@@ -339,7 +340,7 @@ impl<'a> Forecaster<'a> {
         let (design, mean_weight) = (self.design, self.mean_weight);
         let detected = self.light * self.operating.link.photons(reflectance, range);
         let background = self.background * self.operating.background;
-        let parts = (design, detector, sampling);
+        let parts = (design, detector, settings);
         let chances = sampled::chances(parts, &self.points, background, detected, told);
         let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
         let mark = Lit { photons: detected, background, falling: 0.0 };
@@ -356,7 +357,7 @@ impl<'a> Forecaster<'a> {
             pd: chances.pd,
             false_per_shot: match stray_room(design) {
                 Some(room) if room < 1.0 => 1.0,
-                _ => design.receiver.false_alarm,
+                _ => settings.false_alarm,
             },
             precision: (chances.pd * FEWEST >= 1.0)
                 .then_some(SPEED_OF_LIGHT / 2.0 * chances.timing),
@@ -386,7 +387,7 @@ impl<'a> Forecaster<'a> {
     pub fn farthest(&self, pd: f64, reflectance: f64) -> Option<f64> {
         let scan = &self.design.scan;
         // Nearer, a sampled channel is blind with the mark it has just sent.
-        let sampling = self.design.receiver.sampling.as_ref();
+        let sampling = self.design.receiver.method.sampling();
         let blank = sampling.map_or(0, |known| i64::from(known.blank_ticks) + 2);
         let blind = s_from_fs(blank * self.design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0;
         let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
@@ -417,20 +418,16 @@ fn brightnesses(cells: f64) -> Vec<(f64, f64)> {
 }
 
 /// What of `design` where it is `operating` has no closed form, and what to do instead.
-fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str, String)> {
-    if design.is_coded()
-        && design.receiver.sampling.is_none()
-        && !matches!(design.receiver.kind, ReceiverKind::Matched | ReceiverKind::Balanced)
-    {
-        return Some((
-            "receivers that decide bit by bit",
-            "simulate it, or --set receiver.kind='\"matched\"'".to_owned(),
-        ));
+fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, String)> {
+    let method = &design.receiver.method;
+    if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
+        let what = format!("the receiver `{}`", method.kind().name());
+        return Some((what, "simulate it, or --set receiver.kind='\"matched\"'".to_owned()));
     }
     if let Detector::Sampled(detector) = &design.detector {
         if design.coding.codebook.max_weight() > sampled::MOST_MARKS {
             return Some((
-                "sampled words of more than 64 marks",
+                "sampled words of more than 64 marks".to_owned(),
                 "simulate it, or take a code of fewer marks".to_owned(),
             ));
         }
@@ -449,7 +446,7 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
     let chip = s_from_fs(design.coding.chip_fs);
     (least < needed).then(|| {
         (
-            "marks that merge behind the amplifier",
+            "marks that merge behind the amplifier".to_owned(),
             format!(
                 "marks of a word follow each other by {:.0} ps and are told apart from {:.0} ps on; \
                  simulate it, or take a code with {:.0} chips from mark to mark, as a sparse one \
@@ -464,13 +461,13 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(&'static str,
 
 /// Whether the sensor's own marks pull the baseline of a sampled `detector` below the lowest code: above
 /// that a receiver that knows the coupling adds to the samples what it took from them.
-fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(&'static str, String)> {
+fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(String, String)> {
     let deepest = sampled::deepest_baseline(design, detector);
     let room = detector.below_zero();
     let most = room - SEEN_BELOW * detector.rms_noise(background);
     (deepest > most.max(0.0)).then(|| {
         (
-            "a baseline that the sensor's own marks pull below the lowest code",
+            "a baseline that the sensor's own marks pull below the lowest code".to_owned(),
             format!(
                 "they pull it down by {deepest:.0} photons, of {room:.0} that the converter tells; \
                  simulate it, or take a lower `low_cutoff_khz`, more `isolation_db` or a shorter \

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use macropulse_codec::decode::ReceiverKind;
+use macropulse_codec::decode::Correlation;
 use macropulse_codec::statistics::{
     binomial, binomial_tail, binomial_up_to, normal_quantile, normal_tail, poisson,
 };
@@ -53,7 +53,7 @@ impl Place {
 
     /// Its length in ticks: one where events are exact, else one more than four deviations, rounded up.
     pub fn ticks(design: &Design) -> f64 {
-        if design.is_coded() { design.receiver.window_ticks().into() } else { 1.0 }
+        design.receiver.window_ticks().into()
     }
 }
 
@@ -112,8 +112,13 @@ pub(super) struct Chances {
 }
 
 /// What comes of shots by the marks of labels, of which so many have so many.
-pub(super) fn chances(design: &Design, weights: &BTreeMap<usize, usize>, found: &Found) -> Chances {
-    let gate = Gate::of(design);
+pub(super) fn chances(
+    design: &Design,
+    correlation: &Correlation,
+    weights: &BTreeMap<usize, usize>,
+    found: &Found,
+) -> Chances {
+    let gate = Gate::of(design, correlation);
     let labels: usize = weights.values().sum();
     let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
@@ -156,7 +161,7 @@ const MOST_LIT: f64 = 1.0 - 1e-6;
 const MANY: f64 = 100.0;
 
 impl Gate {
-    fn of(design: &Design) -> Self {
+    fn of(design: &Design, correlation: &Correlation) -> Self {
         let lags = lags(design);
         let tick = s_from_fs(design.tdc.tick_fs);
         let chips = i64::from(design.coding.codebook.chips());
@@ -166,7 +171,7 @@ impl Gate {
             lags,
             event: ticks * tick / (lags * tick + macropulse),
             ticks,
-            false_alarm: design.receiver.false_alarm,
+            false_alarm: correlation.false_alarm,
         }
     }
 
@@ -236,10 +241,8 @@ impl Timing {
         let jitter = detector.mark_jitter(mark);
         let spread = libm::hypot(light.pulse * RMS_OF_FWHM, jitter);
         let sigma = libm::hypot(detector.mark_displacement(mark, light), jitter);
-        let known = design.receiver.jitter_ticks;
-        let correlates =
-            matches!(design.receiver.kind, ReceiverKind::Matched | ReceiverKind::Balanced);
-        let undoes_rounding = correlates && known > 0.05 && known < NARROW;
+        let known = design.receiver.method.correlation().map(|known| known.jitter_ticks);
+        let undoes_rounding = known.is_some_and(|known| known > 0.05 && known < NARROW);
         Self { spread, sigma: sigma / tick, tick, undoes_rounding }
     }
 

@@ -58,7 +58,7 @@ impl Blind {
 /// A channel listens again when its marks are no longer blanked. Where each shot is alone, its gate may open later.
 pub fn stray_room(design: &Design) -> Option<f64> {
     let Detector::Sampled(detector) = &design.detector else { return None };
-    let sampling = design.receiver.sampling.as_ref().filter(|it| it.blank_ticks > 0)?;
+    let sampling = design.receiver.method.sampling().filter(|it| it.blank_ticks > 0)?;
     let scan = &design.scan;
     let is_alone = scan.shortest_period() >= tof_from_range(scan.light_range);
     let opens = if is_alone { design.receiver.gate_ticks.0 } else { 0 };
@@ -230,7 +230,7 @@ mod tests {
 
     /// At the worst tick from `nearest` metres to 150, and at all together, shots of which less than two marks are told.
     fn lost(design: &Design, nearest: f64) -> [usize; 2] {
-        let sampling = design.receiver.sampling.as_ref().unwrap();
+        let sampling = design.receiver.method.sampling().unwrap();
         let blind = Blind::at_most(sampling).map(Blind::between_ticks);
         let own = OwnLight::of(design, blind, tof_from_range(150.0));
         own.each_told(nearest, 150.0).fold([0, 0], |[most, all], (_, told)| {
@@ -247,7 +247,7 @@ mod tests {
             let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
             let changes: Vec<_> = changes.iter().map(owned).collect();
             let design = Design::open("coded-32", &changes).unwrap();
-            Blind::at_most(design.receiver.sampling.as_ref().unwrap())
+            Blind::at_most(design.receiver.method.sampling().unwrap())
         };
         assert_eq!(of(&[]), Some(Blind { before: 6, behind: 15 }));
         assert_eq!(of(&[]).unwrap().between_ticks().ticks(), 23);
@@ -284,7 +284,7 @@ mod tests {
         let [most, all] = lost(&narrow, 5.0);
         assert_eq!(most, SHOTS / 5);
         approx::assert_relative_eq!(all as f64 / (2418 * SHOTS) as f64, 0.01204, epsilon = 5e-6);
-        let blind = Blind::at_most(narrow.receiver.sampling.as_ref().unwrap()).unwrap();
+        let blind = Blind::at_most(narrow.receiver.method.sampling().unwrap()).unwrap();
         let family =
             Separated { length: 300, weight: 3, words: 10, gap: 20, apart: 5, later: 4, seed: 39 };
         let words = Family::separated(family).unwrap().words();

@@ -6,7 +6,7 @@
 //! judged as the receiver does it: none counts much more than the least, their mean must exceed the
 //! threshold. That is summed over points that fill the cube of all probabilities evenly.
 
-use macropulse_codec::decode::Sampling;
+use macropulse_codec::decode::{self, Sampling};
 use macropulse_codec::statistics::{normal_quantile, normal_tail};
 
 use super::own_light::{Blind, SHOTS, own_marks};
@@ -135,16 +135,17 @@ pub(super) fn blind(sampled: &Sampled, sampling: &Sampling, background: f64) -> 
 /// What the receiver of `design` finds of marks of so many `photons`, under `background` detections per second, of
 /// some shots of which so many marks each are `told`.
 pub(super) fn chances(
-    (design, sampled, sampling): (&Design, &Sampled, &Sampling),
+    (design, sampled, settings): (&Design, &Sampled, &decode::Sampled),
     points: &[Points],
     background: f64,
     photons: f64,
     told: &[usize],
 ) -> Chances {
+    let decode::Sampled { false_alarm, sampling, .. } = settings;
     let filtered = Filtered::of(sampled, sampling, background);
     let (nearest, farthest) = design.receiver.gate_ticks;
     let lags = f64::from(farthest - nearest) + 1.0;
-    let threshold = -normal_quantile(design.receiver.false_alarm / lags);
+    let threshold = -normal_quantile(false_alarm / lags);
     let weight = design.coding.codebook.max_weight();
     let per_tick = weight as f64 * sampled.sample / design.scan.shortest_period();
     let estimated = filtered.estimated(photons, per_tick);

@@ -114,7 +114,7 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
             "{factor:.3} times the energy, or an aperture {:.2} times as wide",
             factor.sqrt()
         ),
-        None if night.design().receiver.sampling.is_some() => {
+        None if night.design().receiver.method.sampling().is_some() => {
             "no amount of light would do: own light hides too many marks there".to_owned()
         }
         None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
@@ -144,7 +144,7 @@ pub fn missed(pd: f64, wanted: f64) -> f64 {
 /// Whether enough is found at the range up to the one wanted at which own light hides most marks; `None` of a
 /// channel that it does not blind.
 fn own_light(night: &Forecaster, wanted: &Wanted) -> Option<Check> {
-    Blind::at_most(night.design().receiver.sampling.as_ref()?)?;
+    Blind::at_most(night.design().receiver.method.sampling()?)?;
     let worst = night.worst(wanted.reflectance, wanted.range);
     Some(Check {
         name: "own light",
@@ -192,7 +192,7 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
 
 fn converters(design: &Design, forecast: &Forecast) -> Check {
     let loss = forecast.bank_loss;
-    let finding = match design.receiver.sampling {
+    let finding = match design.receiver.method.sampling() {
         Some(_) => "every detector has an ADC of its own, which is never busy".to_owned(),
         None => format!(
             "{:.2} % of detection events find all {} of a detector's bank busy",

@@ -5,7 +5,9 @@ use std::ops::Range;
 use macropulse::codec::ShotLog;
 use macropulse::codec::Ticks;
 use macropulse::codec::code::{Codebook, Crc, Family, Keying, Payload};
-use macropulse::codec::decode::{Effort, Pick, Receiver, ReceiverKind, Returns};
+use macropulse::codec::decode::{
+    Bitwise, Correlation, Effort, Method, Opening, Receiver, ReceiverKind, Returns,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -86,27 +88,32 @@ impl Sensor {
 
     fn with_payload(kind: ReceiverKind, payload: Payload) -> Self {
         let labels = COLUMNS;
+        let correlation = Correlation { light_ticks: GATE, ..Correlation::default() };
+        let bitwise = |opening| {
+            let (bit_threshold, ticks_per_chip, jitter_ticks) = (15, 1, 0.0);
+            Method::Bitwise(Bitwise { opening, bit_threshold, ticks_per_chip, jitter_ticks })
+        };
+        let method = match kind {
+            ReceiverKind::Literal => bitwise(Opening::FirstBit),
+            ReceiverKind::Blind => bitwise(Opening::AnyBit),
+            _ => Method::Matched(correlation, Effort::Quick),
+        };
         Self {
             codebook: Codebook::new(Family::prime(29).unwrap(), Some(payload), 1024, Keying::OnOff)
                 .unwrap(),
-            receiver: Receiver {
-                kind,
-                effort: Effort::Quick,
-                gate_ticks: (0, GATE),
-                light_ticks: GATE,
-                ticks_per_chip: 1,
-                tick_fs: TICK_FS,
-                jitter_ticks: 0.0,
-                photons_apart: false,
-                false_alarm: 1e-6,
-                bit_threshold: 15,
-                returns: 1,
-                pick: Pick::Strongest,
-                sampling: None,
-            },
+            receiver: Receiver { gate_ticks: (0, GATE), method, ..Receiver::matched(TICK_FS) },
             first_label: 0,
             labels,
         }
+    }
+
+    /// The settings of its matched receiver.
+    pub fn matched(&mut self) -> (&mut Correlation, &mut Effort) {
+        let settings = match &mut self.receiver.method {
+            Method::Matched(correlation, effort) => Some((correlation, effort)),
+            _ => None,
+        };
+        settings.unwrap()
     }
 
     /// The shots of `rows`, with 26 guard shots at both ends.

@@ -135,7 +135,7 @@ fn fewest_without_a_gap(sent: &Sent, ticks: &[u32]) -> u32 {
     let time = time.map_or(0, |(last, first)| last.saturating_sub(*first));
     let density = ticks.len() as f64 / f64::from(time.max(1));
     let lags = (sent.gate().end - sent.gate().start) as f64;
-    let rarity = libm::log(sent.receiver.false_alarm / lags);
+    let rarity = libm::log(sent.correlation.false_alarm / lags);
     (rarity / libm::log(density.clamp(1e-9, 0.999))).ceil().max(2.0) as u32
 }
 

@@ -42,7 +42,7 @@ impl Chance {
     /// For the shots `sent`. What is `known` from a band before is kept if it was asked in as many places.
     pub fn new(sent: &Sent, known: Option<Self>) -> Self {
         let gate = sent.gate();
-        let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.receiver.false_alarm);
+        let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.correlation.false_alarm);
         let bits = sent.bits_of_payload() as f64;
         let new = Self {
             in_gate: Thresholds::new(lags, false_alarm),

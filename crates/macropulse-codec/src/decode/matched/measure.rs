@@ -22,11 +22,11 @@ impl Band<'_> {
                 Energy::of(
                     (detection.count, marks),
                     density,
-                    timing::window(self.sent.receiver, self.sent.width, late),
+                    timing::window(self.sent.correlation, self.sent.width, late),
                 )
             }
         };
-        let tof = sent.receiver.tof(sent.log.fired_at_fs[shot], start, late);
+        let tof = sent.receiver.tof(late)(sent.log.fired_at_fs[shot], start);
         Return { shot, tof, peak, marks: marks as u16, margin, photons, saturated }
     }
 
@@ -42,10 +42,10 @@ impl Band<'_> {
             let start = light.start + place;
             self.field.seen().lit_in_row(start, lit_bits, &bits.pattern, counts);
         };
-        self.histogram.count(sent.width, sent.receiver.jitter(), count);
+        self.histogram.count(sent.width, sent.correlation.jitter(), count);
         let beside = self.field.density_without(&light, detection.count, 0);
         let known = Known {
-            sigma: sent.receiver.jitter(),
+            sigma: sent.correlation.jitter(),
             marks: f64::from(sent.weight(shot)),
             others: beside / f64::from(sent.width),
             neighbours: &bits.neighbours,
@@ -80,7 +80,7 @@ impl Sent<'_> {
         let (first, all) = (returns.len(), returns.len() + clear.len());
         // Column by column: entry by entry takes twice as long.
         returns.shot.extend(clear.iter().map(|(shot, _)| *shot));
-        let tof = self.receiver.tofs(MIDDLE);
+        let tof = self.receiver.tof(MIDDLE);
         returns.tof.extend(clear.drain(..).map(|(shot, lag)| {
             let start = self.fired[shot as usize] + lag + self.epoch;
             tof(self.log.fired_at_fs[shot as usize], start)

@@ -34,10 +34,12 @@ mod verify;
 use std::cell::Cell;
 use std::ops::Range;
 
+use serde::Deserialize;
+
 use super::field::{self, Field};
 use super::timeline::Timeline;
 use super::timing::Histogram;
-use super::{Error, GATES_PER_BLOCK, Receiver, Returns};
+use super::{Correlation, Error, GATES_PER_BLOCK, Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
 use crate::code::Codebook;
@@ -49,17 +51,33 @@ use measure::Photons;
 use pace::{Paced, Usual};
 use sent::{Sent, Words};
 
+/// How much the matched receiver does for faint light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Effort {
+    /// Searches for one shot in so many where light is faint, finds the others from there, and
+    /// passes by what lies evenly over everything: a target that is barely seen may be lost where
+    /// it stands alone or fills the whole field.
+    Quick,
+    /// Searches for every shot that is not found otherwise; takes many times as long in noise.
+    Thorough,
+}
+
 /// Decodes one band.
 ///
 /// # Errors
 /// If the ticks do not ascend.
 pub(super) fn decode(
     receiver: &Receiver,
+    correlation: &Correlation,
+    effort: Effort,
     sent: (&Codebook, &ShotLog),
     ticks: &Ticks,
 ) -> Result<Returns, Error> {
     let mut memory = MEMORY.take();
-    let sent = Sent::new(receiver, sent, (ticks.epoch, std::mem::take(&mut memory.words)));
+    let words = std::mem::take(&mut memory.words);
+    let sent = Sent::new(receiver, (correlation, effort), sent, (ticks.epoch, words));
     let mut returns = Returns::with_capacity(sent.log.owned.len());
     let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.timelines)?;
     let memory = match cancelled {

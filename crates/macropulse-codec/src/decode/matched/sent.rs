@@ -9,12 +9,14 @@ use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timing;
-use crate::decode::{Effort, Pick, Receiver, window};
+use crate::decode::{Correlation, Effort, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
 
 /// What was sent.
 pub(super) struct Sent<'a> {
     pub receiver: &'a Receiver,
+    pub correlation: &'a Correlation,
+    effort: Effort,
     pub codebook: &'a Codebook,
     pub log: &'a ShotLog,
     /// Absolute time of tick 0, in ticks.
@@ -156,28 +158,31 @@ pub(super) struct Bits {
 impl<'a> Sent<'a> {
     pub fn new(
         receiver: &'a Receiver,
+        (correlation, effort): (&'a Correlation, Effort),
         sent: (&'a Codebook, &'a ShotLog),
         (epoch, words): (i64, Words),
     ) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.fired_since(log, epoch);
-        let width = window(receiver.jitter());
-        let words = words.of(codebook, receiver.ticks_per_chip, width);
+        let &Correlation { ticks_per_chip, light_ticks, jitter_ticks, .. } = correlation;
+        let width = window(jitter_ticks);
+        let words = words.of(codebook, ticks_per_chip, width);
         let weight = |(label, word): (&u16, &u16)| {
             words.lit(*label).len() as u32 * words.words[usize::from(*word)].marks
         };
         let weights = log.label.iter().zip(&log.word).map(weight).collect();
         let bits = codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
-        let length = i64::from(codebook.chips()) * i64::from(receiver.ticks_per_chip);
+        let length = i64::from(codebook.chips()) * i64::from(ticks_per_chip);
         let bit_length = length / bits;
         let bits_about = (0..3 * bits).map(|bit| (bit * bit_length) as u32).collect();
         let (nearest, farthest) = receiver.gate_ticks;
-        let light = i64::from(receiver.light_ticks);
-        let end = light.max(i64::from(farthest) + length) + 1;
+        let end = i64::from(light_ticks).max(i64::from(farthest) + length) + 1;
         let reach = (i64::from(nearest) - length).max(0)..end;
         Self {
             reach,
             receiver,
+            correlation,
+            effort,
             codebook,
             log,
             epoch,
@@ -222,7 +227,7 @@ impl<'a> Sent<'a> {
     pub fn bits(&self, shot: usize) -> &Bits {
         self.code_word(shot).bits.get_or_init(|| {
             let word = self.codebook.word(self.log.word[shot]);
-            let scale = self.receiver.ticks_per_chip;
+            let scale = self.correlation.ticks_per_chip;
             let marks = self.word(shot).ticks();
             let pattern =
                 |width: u32| Pattern::new(marks.iter().map(|&mark| mark as usize), width as usize);
@@ -386,12 +391,12 @@ impl<'a> Sent<'a> {
 
     /// How often chance may be taken for light: as often as false returns are accepted, but hardly ever.
     pub fn accepted(&self) -> f64 {
-        self.receiver.false_alarm.min(BY_CHANCE)
+        self.correlation.false_alarm.min(BY_CHANCE)
     }
 
     /// Whether every shot is searched for in all of its gate.
     pub fn is_thorough(&self) -> bool {
-        self.receiver.effort == Effort::Thorough
+        self.effort == Effort::Thorough
     }
 
     /// Whether surfaces of a shot beside the strongest one are looked for wherever they may be: they are

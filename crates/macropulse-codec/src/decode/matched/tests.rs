@@ -10,10 +10,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::sent::{Sent, Words};
-use super::{Band, Memory, decode};
+use super::{Band, Memory};
 use crate::code::{Codebook, Crc, Family, Keying, Payload, Sparse};
 use crate::decode::field::Source;
-use crate::decode::{Effort, Receiver, Returns};
+use crate::decode::{Correlation, Effort, Method, Receiver, Returns};
 use crate::{ShotLog, Ticks};
 
 /// A sensor of one tick a chip.
@@ -75,13 +75,24 @@ impl Sensor {
     }
 
     fn receiver(&self, jitter_ticks: f64) -> Receiver {
-        Receiver {
-            gate_ticks: (50, self.gate),
-            light_ticks: self.gate,
-            jitter_ticks,
-            false_alarm: 1e-2,
-            ..Receiver::matched(2500)
-        }
+        self.set_to(Effort::Quick, self.correlation(jitter_ticks))
+    }
+
+    fn set_to(&self, effort: Effort, correlation: Correlation) -> Receiver {
+        let method = Method::Matched(correlation, effort);
+        Receiver { gate_ticks: (50, self.gate), method, ..Receiver::matched(2500) }
+    }
+
+    fn correlation(&self, jitter_ticks: f64) -> Correlation {
+        let (light_ticks, false_alarm) = (self.gate, 1e-2);
+        Correlation { light_ticks, jitter_ticks, false_alarm, ..Correlation::default() }
+    }
+
+    /// What is sent, as the matched `receiver` knows it.
+    fn sent<'a>(&'a self, receiver: &'a Receiver, log: &'a ShotLog) -> Sent<'a> {
+        let Method::Matched(correlation, effort) = &receiver.method else { panic!() };
+        let words = Words::default();
+        Sent::new(receiver, (correlation, *effort), (&self.book, log), (0, words))
     }
 
     fn log(&self, shots: u16) -> ShotLog {
@@ -169,7 +180,7 @@ impl Sensor {
     }
 
     fn decode(&self, receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Returns {
-        decode(receiver, (&self.book, log), ticks).unwrap()
+        receiver.decode(&self.book, log, ticks).unwrap()
     }
 }
 
@@ -193,12 +204,13 @@ impl Crowd {
         let log = sensor.log(12);
         let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
         let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
-        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(jitter) };
+        let correlation = Correlation { ticks_per_chip: scale, ..sensor.correlation(jitter) };
+        let receiver = sensor.set_to(Effort::Quick, correlation);
         Self { sensor, log, ticks, surfaces, receiver }
     }
 
     fn sent(&self) -> Sent<'_> {
-        Sent::new(&self.receiver, (&self.sensor.book, &self.log), (0, Words::default()))
+        self.sensor.sent(&self.receiver, &self.log)
     }
 
     /// With all ticks at hand.
@@ -221,7 +233,7 @@ fn counter<'a>(sent: &'a Sent, ticks: &[u32], shot: usize) -> impl Fn(i64) -> u3
         let places = (tick + 1).saturating_sub(sent.width)..=tick;
         places.for_each(|place| lit[place as usize] = true);
     }
-    let scale = i64::from(sent.receiver.ticks_per_chip);
+    let scale = i64::from(sent.correlation.ticks_per_chip);
     move |lag: i64| {
         let start = sent.fired[shot] + lag;
         let places = marks_of(sent, shot).iter().map(|&mark| start + scale * i64::from(mark));
@@ -259,7 +271,7 @@ fn marks_with_ticks(sent: &Sent, ticks: &[u32], shot: usize, lag: i64) -> u32 {
             is_free
         })
     }
-    let scale = i64::from(sent.receiver.ticks_per_chip);
+    let scale = i64::from(sent.correlation.ticks_per_chip);
     let near = |mark: &u16| -> Vec<u32> {
         let first = sent.fired[shot] + lag + scale * i64::from(*mark);
         let here = first..first + i64::from(sent.width);
@@ -333,10 +345,11 @@ proptest! {
         let weather = Weather { missed, false_ticks, late, roughness, panes: 0 };
         let log = sensor.log(48);
         let (ticks, surfaces) = sensor.ticks(&log, weather, seed);
-        let receiver = sensor.receiver(if late > 0 { 0.2 } else { 0.0 });
-        let receiver = Receiver { effort: Effort::Thorough, false_alarm: 1e-4, ..receiver };
+        let correlation = sensor.correlation(if late > 0 { 0.2 } else { 0.0 });
+        let correlation = Correlation { false_alarm: 1e-4, ..correlation };
+        let receiver = sensor.set_to(Effort::Thorough, correlation);
         let returns = sensor.decode(&receiver, &log, &ticks);
-        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let sent = sensor.sent(&receiver, &log);
         for (place, &shot) in returns.shot.iter().enumerate() {
             let shot = shot as usize;
             let count = counter(&sent, &ticks.tick, shot);
@@ -407,11 +420,13 @@ fn a_quick_receiver_differs_hardly_ever_from_a_thorough_one() {
             })
             .collect()
     };
-    let quick = Receiver { false_alarm: 1e-6, ..sensor.receiver(0.1) };
-    let thorough = Receiver { effort: Effort::Thorough, ..quick.clone() };
+    let set_to = |effort, false_alarm| {
+        sensor.set_to(effort, Correlation { false_alarm, ..sensor.correlation(0.1) })
+    };
+    let (quick, thorough) = (set_to(Effort::Quick, 1e-6), set_to(Effort::Thorough, 1e-6));
     let found = differ(&quick, &thorough);
     assert!(found.iter().all(|&differ| differ <= 2), "{found:?}");
-    let other = Receiver { false_alarm: 1e-60, ..thorough.clone() };
+    let other = set_to(Effort::Thorough, 1e-60);
     assert!(differ(&other, &thorough).iter().any(|&differ| differ > 20));
 }
 
@@ -423,7 +438,7 @@ fn shots_in_flight_do_not_hide_each_others_maximum() {
     let weather = Weather { missed: 10, roughness: 4000, ..CLEAR };
     let (ticks, surfaces) = sensor.ticks(&log, weather, 4);
     let returns = sensor.decode(&receiver, &log, &ticks);
-    let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+    let sent = sensor.sent(&receiver, &log);
     let found = returns.shot.iter().zip(returns.tof.iter().zip(&returns.peak));
     let mut wrong = 0;
     for (&shot, (&tof, &peak)) in found {
@@ -451,7 +466,8 @@ fn shots_far_apart_are_found() {
                 }
             }
         }
-        let receiver = Receiver { ticks_per_chip: scale, ..sensor.receiver(0.4) };
+        let correlation = Correlation { ticks_per_chip: scale, ..sensor.correlation(0.4) };
+        let receiver = sensor.set_to(Effort::Quick, correlation);
         let returns = sensor.decode(&receiver, &log, &ticks);
         let lit = surfaces.iter().filter(|lags| !lags.is_empty()).count();
         assert!(returns.len() + 1 >= lit, "{scale}: {} of {lit}", returns.len());

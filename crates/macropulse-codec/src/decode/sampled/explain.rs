@@ -8,10 +8,10 @@ use super::coupling::Restored;
 use super::filter::{Filtered, merged, own_marks};
 use super::pulse::Pulse;
 use super::search::{Candidate, Search, candidates};
-use super::{Band, Rule, Sampling, look_at};
+use super::{Band, Rule, look_at};
 use crate::code::Codebook;
 use crate::decode::explain::{MOST_LAGS, Verdict};
-use crate::decode::{Error, Receiver, Returns, check};
+use crate::decode::{Error, Method, Receiver, Returns, check};
 use crate::{Samples, ShotLog};
 
 /// Ticks of the signal that are told before the first mark and behind the last one.
@@ -154,14 +154,15 @@ impl Receiver {
         (log, samples): (&ShotLog, &Samples),
         shot: usize,
     ) -> Result<SampledExplanation, Error> {
+        let Method::Sampled(settings) = &self.method else {
+            return Err(Error::Record { wants: "ticks", given: "samples" });
+        };
         let owned = ShotLog { owned: shot..shot.saturating_add(1), ..log.clone() };
         check::check(self, (codebook, &owned), samples.into())?;
         check::check_lags(self)?;
         let channels = owned.each_channel();
         let of_channel = channels.iter().find(|(shots, _)| shots.contains(&shot));
-        let (Some((shots, log)), Some(sampling)) = (of_channel, &self.sampling) else {
-            return Err(Error::NoSuchShot { shot });
-        };
+        let Some((shots, log)) = of_channel else { return Err(Error::NoSuchShot { shot }) };
         // Where there are no samples nothing but the shot matters, and its own tick is the epoch: that of the
         // samples, and the times of other shots, may be too far away to be counted.
         let alone;
@@ -169,16 +170,15 @@ impl Receiver {
             alone = log.part(log.owned.clone());
             (&alone, self.fired(&alone, 0), self.nothing_of(1))
         } else {
-            let decoded = super::decode(self, codebook, (log, samples), sampling);
+            let decoded = super::decode(self, settings, (codebook, log), samples);
             (log, samples.epoch, decoded)
         };
         let place = log.owned.start;
-        let fired = self.fired_since(log, epoch);
-        let band = Band { receiver: self, codebook, log, fired, lags: super::lags(self, codebook) };
+        let band = Band::new(self, settings, (codebook, log), epoch);
         let codes = samples.of(log.channel[place]);
-        let restored = Restored::of(codes, sampling);
+        let restored = Restored::of(codes, &settings.sampling);
         let parts = Restored::parts(&restored, codes);
-        let explained = Bench::new(&band, (parts, sampling), place).explained(epoch);
+        let explained = Bench::new(&band, parts, place).explained(epoch);
         let told = |echo: &CancelledEcho| CancelledEcho { shot: shots[echo.shot], ..*echo };
         Ok(SampledExplanation {
             shot,
@@ -194,7 +194,6 @@ struct Bench<'a> {
     band: &'a Band<'a>,
     /// Codes, and what each is more than that: see [`Restored::parts`].
     parts: (&'a [i16], &'a [f32]),
-    sampling: &'a Sampling,
     pulse: Pulse,
     shot: usize,
     /// The marks of the shot at a lag of 0, in the samples.
@@ -204,25 +203,23 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(
-        band: &'a Band<'a>,
-        (parts, sampling): ((&'a [i16], &'a [f32]), &'a Sampling),
-        shot: usize,
-    ) -> Self {
+    fn new(band: &'a Band<'a>, parts: (&'a [i16], &'a [f32]), shot: usize) -> Self {
+        let sampling = &band.settings.sampling;
         let pulse = Pulse::new(sampling);
         let marks = band.marks(shot).map(|mark| band.fired[shot] + mark).collect();
         let core = pulse.core() as i64;
         let own = own_marks(parts.0, (&pulse, core), band, sampling.blank_ticks);
         let own = own.into_iter().map(|blind| blind.start - core..blind.end + core);
-        Self { band, parts, sampling, shot, marks, own: merged(own), pulse }
+        Self { band, parts, shot, marks, own: merged(own), pulse }
     }
 
     /// All but the verdict, of samples from the absolute tick `epoch` on.
     fn explained(&self, epoch: i64) -> SampledExplanation {
-        let Self { band, sampling, pulse, shot, .. } = self;
-        let filtered = Filtered::of(self.parts, pulse, band, sampling);
+        let Self { band, pulse, shot, .. } = self;
+        let sampling = &band.settings.sampling;
+        let filtered = Filtered::of(self.parts, pulse, band);
         let (sigma, whole) = (filtered.sigma, filtered.signal.clone());
-        let rule = Rule::new(band, sampling, sigma);
+        let rule = Rule::new(band, sigma);
         let candidates = candidates((band, &rule), &filtered);
         let gate = self.gate();
         let step = ((gate.end - gate.start) as u64).div_ceil(MOST_LAGS).max(1) as i64;

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::Band;
 use super::pulse::Pulse;
-use super::{Band, Sampling};
 use crate::kernels::filter;
 
 /// Filtered samples that the noise is estimated from, at most.
@@ -31,14 +31,10 @@ impl Filtered {
     /// Samples are blind from where a mark of the channel's own rises until it is over, and behind clipped
     /// ones; they are taken for dark ones. A tick tells nothing if the middle of the pulse
     /// that would come there is blind.
-    pub(super) fn of(
-        (codes, rest): (&[i16], &[f32]),
-        pulse: &Pulse,
-        band: &Band,
-        sampling: &Sampling,
-    ) -> Self {
+    pub(super) fn of((codes, rest): (&[i16], &[f32]), pulse: &Pulse, band: &Band) -> Self {
         let mut doubt = vec![0.0; codes.len()];
         let core = pulse.core() as i64;
+        let sampling = &band.settings.sampling;
         let leaves = own_marks(codes, (pulse, core), band, sampling.blank_ticks);
         let within = |range: &Range<i64>, more: i64| {
             let within = |at: i64| at.clamp(0, codes.len() as i64) as usize;
@@ -189,6 +185,7 @@ const ONE_BELOW: f64 = 0.158_655_253_931_457_05;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decode::{Sampled, Sampling};
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -251,15 +248,16 @@ mod tests {
             coupling: None,
         };
         let pulse = Pulse::new(&sampling);
+        let settings =
+            Sampled { ticks_per_chip: 1, light_ticks: 100_000, false_alarm: 1e-6, sampling };
         let log = crate::ShotLog::of_one_channel(&[50, 80], &[0, 0]);
         let receiver = crate::decode::Receiver::matched(1);
         let codebook = crate::code::Codebook::single();
-        let (fired, lags) = (vec![50, 80], 100);
-        let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
+        let band = Band::new(&receiver, &settings, (&codebook, &log), 0);
         assert_eq!(own_marks(&codes, (&pulse, 1), &band, 15), [46..65, 79..95]);
         assert!(own_marks(&codes, (&pulse, 1), &band, 0).is_empty());
         // A tick tells nothing if the sample beside it is blind.
-        let filtered = Filtered::of((&codes, &[]), &pulse, &band, &sampling);
+        let filtered = Filtered::of((&codes, &[]), &pulse, &band);
         let open: Vec<usize> = (0..100).filter(|at| filtered.doubt[*at] == 0.0).collect();
         let expected: Vec<usize> = (0..45).chain(66..78).chain(96..100).collect();
         assert_eq!(open, expected);

@@ -44,6 +44,20 @@ pub use coupling::Coupling;
 /// Steps of a tick in which [`Sampling::pulse`] is given.
 pub const STEPS_OF_TICK: usize = 16;
 
+/// Settings of the receiver of samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sampled {
+    /// Samples per chip.
+    pub ticks_per_chip: u32,
+    /// Farthest round trip from which light of the shots may come although it is not accepted, in
+    /// ticks.
+    pub light_ticks: u32,
+    /// False returns accepted per shot; the threshold follows from it.
+    pub false_alarm: f64,
+    /// The signal as it knows it.
+    pub sampling: Sampling,
+}
+
 /// What a receiver knows of the signal that is sampled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampling {
@@ -109,18 +123,17 @@ impl Sampling {
 /// The returns of the owned shots of `log`, of what was checked.
 pub(super) fn decode(
     receiver: &Receiver,
-    codebook: &Codebook,
-    (log, samples): (&ShotLog, &Samples),
-    sampling: &Sampling,
+    settings: &Sampled,
+    (codebook, log): (&Codebook, &ShotLog),
+    samples: &Samples,
 ) -> Returns {
     let mut all: Vec<Return> = Vec::new();
     let mut returns = Returns::default();
-    let pulse = Pulse::new(sampling);
+    let pulse = Pulse::new(&settings.sampling);
     for (shots, log) in log.each_channel() {
         let codes = log.channel.first().map_or(&[][..], |channel| samples.of(*channel));
-        let fired = receiver.fired_since(&log, samples.epoch);
-        let band = Band { receiver, codebook, log: &log, fired, lags: lags(receiver, codebook) };
-        let mut found = find(&band, codes, &pulse, sampling);
+        let band = Band::new(receiver, settings, (codebook, &log), samples.epoch);
+        let mut found = find(&band, codes, &pulse);
         found.sort_by(|one, other| one.shot.cmp(&other.shot).then(one.at().total_cmp(&other.at())));
         for shot in log.owned.clone() {
             let from = found.partition_point(|one| one.shot < shot);
@@ -136,7 +149,7 @@ pub(super) fn decode(
             let tick = samples.epoch + band.fired[shot];
             all.extend(within.iter().map(|one| Return {
                 shot: shots[shot],
-                tof: receiver.tof(log.fired_at_fs[shot], tick + one.lag, one.late),
+                tof: receiver.tof(one.late)(log.fired_at_fs[shot], tick + one.lag),
                 peak: one.marks,
                 marks: band.marks(shot).count() as u16,
                 margin: one.margin,
@@ -151,16 +164,6 @@ pub(super) fn decode(
     returns
 }
 
-/// Lags that are looked at: the next one behind the last is needed to tell whether that is a peak.
-///
-/// Light from beyond the gate is looked for where a word tells whose it is. Shots of a single mark are all
-/// alike: what comes is taken for an echo in the gate, as every lidar takes it that waits for its echoes.
-fn lags(receiver: &Receiver, codebook: &Codebook) -> i64 {
-    let tells = codebook.words() > 1 || codebook.max_weight() > 1;
-    let beyond = if tells { receiver.light_ticks } else { 0 };
-    i64::from(receiver.gate_ticks.1.max(beyond)) + 2
-}
-
 /// Whether the whole tick next to where light was found is in the gate.
 fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
     let (nearest, farthest) = receiver.gate_ticks;
@@ -168,11 +171,12 @@ fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
 }
 
 /// All light of the shots of a `band` that is told from noise.
-fn find(band: &Band, codes: &[i16], pulse: &Pulse, sampling: &Sampling) -> Vec<Found> {
+fn find(band: &Band, codes: &[i16], pulse: &Pulse) -> Vec<Found> {
+    let sampling = &band.settings.sampling;
     let restored = Restored::of(codes, sampling);
     let (codes, rest) = Restored::parts(&restored, codes);
-    let filtered = Filtered::of((codes, rest), pulse, band, sampling);
-    let rule = Rule::new(band, sampling, filtered.sigma);
+    let filtered = Filtered::of((codes, rest), pulse, band);
+    let rule = Rule::new(band, filtered.sigma);
     let candidates = search::candidates((band, &rule), &filtered);
     let mut residual = Residual::new((codes, sampling), pulse, filtered);
     let mut found = Vec::new();
@@ -204,6 +208,7 @@ fn look_at(
 /// The shots that one channel listens to.
 struct Band<'a> {
     receiver: &'a Receiver,
+    settings: &'a Sampled,
     codebook: &'a Codebook,
     log: &'a ShotLog,
     /// When each shot was fired, in ticks from the first sample on.
@@ -212,10 +217,27 @@ struct Band<'a> {
     lags: i64,
 }
 
-impl Band<'_> {
+impl<'a> Band<'a> {
+    /// The shots of `log`, of samples from the absolute tick `epoch` on.
+    ///
+    /// One lag behind the last is needed to tell whether that is a peak. Light from beyond the gate is looked
+    /// for where a word tells whose it is. Shots of a single mark are all alike: what comes is taken for an echo
+    /// in the gate, as every lidar takes it that waits for its echoes.
+    fn new(
+        receiver: &'a Receiver,
+        settings: &'a Sampled,
+        (codebook, log): (&'a Codebook, &'a ShotLog),
+        epoch: i64,
+    ) -> Self {
+        let tells = codebook.words() > 1 || codebook.max_weight() > 1;
+        let beyond = if tells { settings.light_ticks } else { 0 };
+        let lags = i64::from(receiver.gate_ticks.1.max(beyond)) + 2;
+        Self { receiver, settings, codebook, log, fired: receiver.fired_since(log, epoch), lags }
+    }
+
     /// When the marks of `shot` leave, in ticks after it was fired.
     fn marks(&self, shot: usize) -> impl Iterator<Item = i64> + Clone {
-        let chip = i64::from(self.receiver.ticks_per_chip);
+        let chip = i64::from(self.settings.ticks_per_chip);
         let marks = self.codebook.marks(self.log.label[shot], self.log.word[shot]);
         marks.iter().map(move |mark| i64::from(*mark) * chip)
     }
@@ -300,10 +322,11 @@ impl Rule {
     /// together without one being the peak: their number bounds that of independent ones closely. That
     /// marks are capped makes false returns rarer: of words of three marks 0.5 to 0.8 of what is accepted
     /// were found in noise alone, and half of that where a sixth of the marks was blanked.
-    fn new(band: &Band, sampling: &Sampling, sigma: f32) -> Self {
+    fn new(band: &Band, sigma: f32) -> Self {
+        let Sampled { false_alarm, sampling, .. } = band.settings;
         let (nearest, farthest) = band.receiver.gate_ticks;
         let lags = f64::from(farthest - nearest) + 1.0;
-        let false_alarm = (band.receiver.false_alarm / lags).min(MOST_FALSE);
+        let false_alarm = (false_alarm / lags).min(MOST_FALSE);
         let least_of = |weight: usize| match weight {
             0 => 0.0,
             _ => normal_order(1.0, weight as f64).0 as f32,

@@ -4,10 +4,12 @@
 //! where `--set` does not change what makes them meaningless. What a file inherits by `extends` may
 //! lie idle.
 
+use macropulse_codec::decode::ReceiverKind;
+
 use super::SensorFile;
 use crate::design::document::Typed;
 use crate::design::limits::{Check, Idle};
-use crate::design::receiver::ReceiverKindFile;
+use crate::design::receiver::OWN_KEYS;
 use crate::design::{Effect, Error, Label};
 
 const FOOTPRINT: &str = "the beam has no width while \"footprint\" is in this list: \
@@ -65,32 +67,11 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
         }
     }
     let kind = file.receiver.kind;
-    let bitwise = matches!(kind, ReceiverKindFile::Literal | ReceiverKindFile::Blind);
-    let sampled = kind == ReceiverKindFile::Sampled;
-    let correlating =
-        sampled || matches!(kind, ReceiverKindFile::Matched | ReceiverKindFile::Balanced);
-    add(
-        !bitwise,
-        &["receiver.bit_threshold"],
-        "receiver.kind",
-        "only `literal` and `blind` decide bit by bit",
-    );
-    add(
-        !correlating,
-        &["receiver.false_alarm"],
-        "receiver.kind",
-        "only `matched`, `balanced` and `sampled` derive their threshold from it",
-    );
-    let of_samples = ["receiver.least_marks", "receiver.blank_ns", "receiver.recovery_ns"];
-    add(!sampled, &of_samples, "receiver.kind", "only `sampled` is given samples");
-    let tdc = ["tdc"];
-    add(sampled, &tdc, "receiver.kind", "a sampled detector has no converters of events");
-    add(
-        kind != ReceiverKindFile::Matched,
-        &["receiver.effort"],
-        "receiver.kind",
-        "only `matched` searches",
-    );
+    for (keys, kinds, why) in OWN_KEYS {
+        add(!kinds.contains(&kind), keys, "receiver.kind", why);
+    }
+    let sampled = kind == ReceiverKind::Sampled;
+    add(sampled, &["tdc"], "receiver.kind", "a sampled detector has no converters of events");
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
     let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
     add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");

@@ -195,7 +195,7 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
             _ => None,
         }),
     };
-    let receiver = faults.keep(check.receiver(&file.receiver, &inputs));
+    let receiver = faults.keep(check.receiver(&file.receiver, &inputs)).flatten();
     if !faults.is_empty() {
         return None;
     }

@@ -12,7 +12,7 @@ fn clear_light_is_cancelled_whatever_was_sent_before() {
     let (ticks, _) = sensor.ticks(&all, CLEAR, 3);
     let log = ShotLog { owned: 12..32, ..all.part(8..60) };
     let receiver = sensor.receiver(0.0);
-    let sent = Sent::new(&receiver, (&sensor.book, &log), (ticks.epoch, Words::default()));
+    let sent = sensor.sent(&receiver, &log);
     let left = |ticks: &[u32]| {
         cancel(&sent, ticks, &mut Default::default()).unwrap().map(|cancelled| cancelled.residual)
     };
@@ -37,7 +37,7 @@ fn a_macropulse_that_begins_under_another_one_is_cancelled() {
     let mut cases = 0;
     for case in 0..15 * 15 * 4 {
         log.label = vec![1 + case / 60, 1 + case / 4 % 15];
-        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let sent = sensor.sent(&receiver, &log);
         let lags = [900, 890 + u32::from(case % 4) * sent.bit_length() as u32];
         let mut chance = ChaCha8Rng::seed_from_u64(1);
         let ticks = sensor.ticks_of(&log, &lags.map(|lag| vec![lag]), CLEAR, &mut chance).tick;
@@ -74,7 +74,7 @@ fn a_macropulse_that_begins_under_another_one_is_cancelled() {
 fn overlapping_light_is_cancelled_however_far_from_other_light_it_is() {
     let sensor = Sensor::crowded(codebook());
     let (receiver, log) = (sensor.receiver(0.0), sensor.log(120));
-    let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+    let sent = sensor.sent(&receiver, &log);
     for away in (4..109).step_by(3) {
         let mut surfaces = vec![vec![]; 120];
         for first in [3, 3 + away] {

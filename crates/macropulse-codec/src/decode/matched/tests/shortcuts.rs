@@ -96,7 +96,7 @@ fn shots_that_are_too_dark_to_be_found_are_passed_by() {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         ticks.tick.retain(|_| chance.next_u32().is_multiple_of(kept));
         let receiver = sensor.receiver(if seed % 3 == 0 { 0.6 } else { 0.0 });
-        let sent = Sent::new(&receiver, (&sensor.book, &log), (0, Words::default()));
+        let sent = sensor.sent(&receiver, &log);
         let decoded = |more: Option<usize>| {
             let mut band = Band::new(&sent, (&ticks.tick, None), Memory::default());
             band.at_hand = Band::span(&sent, 0..96);

@@ -4,7 +4,8 @@ use super::*;
 use crate::decode::Pick;
 
 fn several(sensor: &Sensor, jitter: f64) -> Receiver {
-    Receiver { returns: 2, false_alarm: 1e-4, ..sensor.receiver(jitter) }
+    let correlation = Correlation { false_alarm: 1e-4, ..sensor.correlation(jitter) };
+    Receiver { returns: 2, ..sensor.set_to(Effort::Quick, correlation) }
 }
 
 #[test]

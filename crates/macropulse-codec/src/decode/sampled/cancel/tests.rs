@@ -4,7 +4,7 @@ use super::super::STEPS_OF_TICK;
 use super::*;
 use crate::code::{Codebook, Family, Keying, Separated};
 use crate::decode::Receiver;
-use crate::{ShotLog, decode::ReceiverKind};
+use crate::{ShotLog, decode::Sampled};
 
 /// Noise, in photons, none of which is in the signal.
 const SIGMA: f32 = 36.0;
@@ -59,10 +59,9 @@ fn tested_in(
     let codebook = Codebook::new(family, None, 1, Keying::OnOff).unwrap();
     let (sampling, log) = (sampling(), ShotLog::of_one_channel(&[0], &[0]));
     let pulse = Pulse::new(&sampling);
-    let kind = ReceiverKind::Sampled;
-    let receiver = Receiver { kind, false_alarm: 1e-5, ..Receiver::matched(1) };
-    let (fired, lags) = (vec![0], 200);
-    let band = Band { receiver: &receiver, codebook: &codebook, log: &log, fired, lags };
+    let settings = Sampled { ticks_per_chip: 1, light_ticks: 200, false_alarm: 1e-5, sampling };
+    let receiver = Receiver::matched(1);
+    let band = Band::new(&receiver, &settings, (&codebook, &log), 0);
     let (mut signal, mut doubt, mut codes) = (vec![0.0; 300], vec![0.0; 300], vec![0; 300]);
     for (at, late) in [4, 4, -4].into_iter().enumerate() {
         let mark = 100 + band.marks(0).nth(at).unwrap();
@@ -80,9 +79,9 @@ fn tested_in(
             (false, _) => 0.0,
         };
     }
-    let rule = Rule::new(&band, &sampling, SIGMA);
+    let rule = Rule::new(&band, SIGMA);
     let filtered = Filtered { signal, doubt, dark: Vec::new(), sigma: SIGMA };
-    let mut residual = Residual::new((&codes, &sampling), &pulse, filtered);
+    let mut residual = Residual::new((&codes, &settings.sampling), &pulse, filtered);
     if is_again {
         residual.look_again();
     }
