@@ -19,11 +19,6 @@ use crate::{ShotLog, Ticks};
 /// One return in so many that is held against an earlier shot may be given up wrongly.
 const ODDS: f64 = 1000.0;
 
-/// Places, in bits beside the begin of a return, at which its code word may be looked for: those of
-/// the bits of an earlier shot that begins up to a payload before or behind it. A payload has 25 bits
-/// at most.
-const PLACES: usize = 3 * 25;
-
 thread_local! {
     /// Kept from band to band: fresh memory costs more than what is done with it.
     static MEMORY: Cell<field::Memory> = Cell::default();
@@ -48,14 +43,13 @@ pub(super) fn exclude(
     let width = 2 * slack + 1;
     let length = i64::from(codebook.chips() * correlation.ticks_per_chip);
     // What is asked of a return: its macropulse, and as much to both sides.
-    let light = |shot: usize| {
-        let (nearest, farthest) = receiver.gate_ticks;
-        let fired: i64 = fired[shot];
+    let (nearest, farthest) = receiver.gate_ticks;
+    let light = |fired: i64| {
         fired + i64::from(nearest) - 2 * length..fired + i64::from(farthest) + 3 * length
     };
-    let first = light(returns.shot[0] as usize);
+    let first = light(fired[returns.shot[0] as usize]);
     let extent = (first.start, first.end - first.start);
-    let mut field = Field::new(&ticks.tick, width, extent, length, MEMORY.take());
+    let field = Field::new(&ticks.tick, width, extent, length, MEMORY.take());
     // At most so many are lit: neighbours overlap.
     let lit = ticks.tick.len() as f64 * f64::from(width);
     let ends = ticks.tick.last().zip(ticks.tick.first());
@@ -63,20 +57,10 @@ pub(super) fn exclude(
     let density = (lit / lasts).clamp(1e-6, 0.999);
     let mut kept = Returns::with_capacity(returns.len());
     kept.add_rejects(returns);
+    let mut bench = Bench { receiver, correlation, codebook, log, fired, field, slack, density };
     for one in returns.each() {
         let is_other = is_doubtful(&one) && {
-            field.cover(light(one.shot));
-            let fired = &fired;
-            let bench = Bench {
-                receiver,
-                correlation,
-                codebook,
-                log,
-                fired,
-                field: &field,
-                slack,
-                density,
-            };
+            bench.field.cover(light(bench.fired[one.shot]));
             bench.is_of_an_earlier_shot(&one)
         };
         match is_other {
@@ -85,7 +69,7 @@ pub(super) fn exclude(
         }
     }
     *returns = kept;
-    MEMORY.set(field.into_memory());
+    MEMORY.set(bench.field.into_memory());
 }
 
 /// What a return is held against.
@@ -95,9 +79,9 @@ struct Bench<'a> {
     codebook: &'a Codebook,
     log: &'a ShotLog,
     /// Tick in which each shot was fired, from the epoch on.
-    fired: &'a [i64],
+    fired: Vec<i64>,
     /// A place is lit if light came so many ticks behind it, or so many about that.
-    field: &'a Field<'a>,
+    field: Field<'a>,
     slack: u32,
     /// Share of the ticks that are.
     density: f64,
@@ -113,39 +97,25 @@ impl Bench<'_> {
         let bits = self.codebook.payload().map_or(1, |payload| i64::from(payload.bits()));
         let beyond =
             i64::from(self.receiver.gate_ticks.1) + 1..=i64::from(self.correlation.light_ticks);
-        let word = self.log.word[one.shot];
-        let mut counts = Counts { word, first: arrives - bits * bit, bit, lit: [None; PLACES] };
+        let later = Sent { shot: one.shot, begins: arrives };
         self.earlier(one.shot, arrives, bits * bit).any(|shot| {
             (1 - bits..bits).any(|shift| {
                 let begins = arrives + shift * bit;
                 beyond.contains(&(begins - self.fired[shot]))
-                    && self.begins_like(shot, begins, one, &mut counts)
-                    && self.is_rather(
-                        Sent { shot, begins },
-                        Sent { shot: one.shot, begins: arrives },
-                        &mut counts,
-                    )
+                    && self.begins_like(shot, begins, one)
+                    && self.is_rather(Sent { shot, begins }, later)
             })
         })
     }
 
     /// Whether the first bit of `shot`, begun at tick `begins`, is lit at least half as much as the
     /// marks of `one` are. Nearly every shot is refused here.
-    fn begins_like(&self, shot: usize, begins: i64, one: &Return, counts: &mut Counts) -> bool {
+    fn begins_like(&self, shot: usize, begins: i64, one: &Return) -> bool {
         let first = self.first_bit(shot);
-        let lit = match self.bits(shot).next() {
-            Some(bit) if !self.codebook.zeros_are_lit() => {
-                self.lit_at(counts, begins + counts.bit * bit)
-            }
-            _ => self.lit_of(first, begins),
-        };
+        let scale = i64::from(self.correlation.ticks_per_chip);
+        let is_lit = |mark: &&u16| self.has(begins + scale * i64::from(**mark));
+        let lit = first.iter().filter(is_lit).count();
         2 * lit * usize::from(one.marks) >= first.len() * usize::from(one.peak)
-    }
-
-    /// The numbers of the bits of `shot` that are lit, the one sent first being 0; ascending.
-    fn bits(&self, shot: usize) -> impl Iterator<Item = i64> {
-        let first_chips = self.codebook.lit_bits(self.log.label[shot]).iter();
-        first_chips.map(|chip| i64::from(chip / self.codebook.family().length()))
     }
 
     /// The marks of the first bit of `shot` that is lit.
@@ -156,11 +126,8 @@ impl Bench<'_> {
     }
 
     /// Whether light is rather of the `earlier` macropulse than of the `later` one.
-    fn is_rather(&self, earlier: Sent, later: Sent, counts: &mut Counts) -> bool {
-        let Compared { both, of_earlier, of_later } = match self.codebook.zeros_are_lit() {
-            true => self.compared_by_marks(earlier, later),
-            false => self.compared_by_bits(earlier, later, counts),
-        };
+    fn is_rather(&self, earlier: Sent, later: Sent) -> bool {
+        let [both, of_earlier, of_later] = self.compared(earlier, later);
         let lit = (both.lit as f64 + 0.5) / (both.all as f64 + 1.0);
         if lit <= self.density {
             return false;
@@ -173,78 +140,32 @@ impl Bench<'_> {
         speaks(of_earlier) - speaks(of_later) > libm::log(ODDS)
     }
 
-    /// Bit by bit, where a bit that is 0 is dark: both are in the same word, so that what is lit of
-    /// it at a place is counted once for all shots.
-    fn compared_by_bits(&self, earlier: Sent, later: Sent, counts: &mut Counts) -> Compared {
-        let all_bits = |sent: Sent| self.bits(sent.shot).fold(0_u64, |all, bit| all | 1 << bit);
-        let (of_earlier, of_later) = (all_bits(earlier), all_bits(later));
-        let shift = (earlier.begins - later.begins) / counts.bit;
-        let has = |bits: u64, bit: i64| (0..64).contains(&bit) && bits >> bit & 1 == 1;
-        let all = self.codebook.word(counts.word).weight();
-        let mut compared = Compared::default();
-        for bit in self.bits(later.shot) {
-            let lit = self.lit_at(counts, later.begins + counts.bit * bit);
-            let shared = has(of_earlier, bit - shift);
-            let marks = if shared { &mut compared.both } else { &mut compared.of_later };
-            marks.add(Marks { lit, all });
-        }
-        for bit in self.bits(earlier.shot).filter(|bit| !has(of_later, bit + shift)) {
-            let lit = self.lit_at(counts, earlier.begins + counts.bit * bit);
-            compared.of_earlier.add(Marks { lit, all });
-        }
-        compared
-    }
-
-    /// Mark by mark.
-    fn compared_by_marks(&self, earlier: Sent, later: Sent) -> Compared {
+    /// The marks of both, and of either alone.
+    fn compared(&self, earlier: Sent, later: Sent) -> [Marks; 3] {
         let scale = i64::from(self.correlation.ticks_per_chip);
-        let places = |sent: Sent| {
-            self.marks(sent.shot).iter().map(move |mark| sent.begins + scale * i64::from(*mark))
+        let places = |sent: Sent| -> Vec<i64> {
+            let marks = self.marks(sent.shot).iter();
+            marks.map(|mark| sent.begins + scale * i64::from(*mark)).collect()
         };
-        let mut compared = Compared::default();
-        let mark = |place: i64| Marks { lit: usize::from(self.has(place)), all: 1 };
-        let (mut earlier, mut later) = (places(earlier).peekable(), places(later).peekable());
-        loop {
-            match (earlier.peek().copied(), later.peek().copied()) {
-                (None, None) => return compared,
-                (Some(one), Some(other)) if one == other => {
-                    compared.both.add(mark(one));
-                    earlier.next();
-                    later.next();
-                }
-                (Some(one), other) if other.is_none_or(|other| one < other) => {
-                    compared.of_earlier.add(mark(one));
-                    earlier.next();
-                }
-                (_, Some(other)) => {
-                    compared.of_later.add(mark(other));
-                    later.next();
-                }
-                (Some(_), None) => return compared,
+        let (earlier, later) = (places(earlier), places(later));
+        let count = |of: &[i64], others: &[i64], are_shared: bool| {
+            let is_of = |place: &&i64| others.binary_search(place).is_ok() == are_shared;
+            let places = of.iter().filter(is_of);
+            Marks {
+                lit: places.clone().filter(|place| self.has(**place)).count(),
+                all: places.count(),
             }
-        }
+        };
+        [
+            count(&earlier, &later, true),
+            count(&earlier, &later, false),
+            count(&later, &earlier, false),
+        ]
     }
 
     /// Whether light came about tick `place`.
     fn has(&self, place: i64) -> bool {
         self.field.lit().has(place - i64::from(self.slack))
-    }
-
-    /// How many marks are lit of the code word of `counts` if it begins at tick `begins`.
-    fn lit_at(&self, counts: &mut Counts, begins: i64) -> usize {
-        let count = || self.lit_of(&self.codebook.word(counts.word).marks, begins);
-        let place = usize::try_from((begins - counts.first) / counts.bit).ok();
-        match place.and_then(|place| counts.lit.get_mut(place)) {
-            Some(known) => *known.get_or_insert_with(count),
-            None => count(),
-        }
-    }
-
-    /// How many of `marks` are lit if what they belong to begins at tick `begins`.
-    fn lit_of(&self, marks: &[u16], begins: i64) -> usize {
-        let scale = i64::from(self.correlation.ticks_per_chip);
-        let is_lit = |mark: &&u16| self.has(begins + scale * i64::from(**mark));
-        marks.iter().filter(is_lit).count()
     }
 
     /// The shots before `shot`, in the same word, of which light from beyond the gate can arrive
@@ -263,38 +184,11 @@ impl Bench<'_> {
     }
 }
 
-/// How many marks of a code word are lit where it begins whole bits beside a return, as far as
-/// they were counted.
-struct Counts {
-    /// Index of the code word.
-    word: u16,
-    /// The first place, in ticks.
-    first: i64,
-    /// From place to place, in ticks.
-    bit: i64,
-    lit: [Option<usize>; PLACES],
-}
-
 /// Marks, and how many of them are lit.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Clone, Copy)]
 struct Marks {
     lit: usize,
     all: usize,
-}
-
-impl Marks {
-    fn add(&mut self, more: Self) {
-        self.lit += more.lit;
-        self.all += more.all;
-    }
-}
-
-/// The marks of two macropulses.
-#[derive(Debug, Default, PartialEq)]
-struct Compared {
-    both: Marks,
-    of_earlier: Marks,
-    of_later: Marks,
 }
 
 /// A macropulse: of which shot, and when it begins to arrive, in ticks.
@@ -358,43 +252,5 @@ mod tests {
         assert_eq!(judge(&near, &seen, faint), (1, 0));
         let own = ticks(&codebook, &log, 8, 100);
         assert_eq!(judge(&correlation, &own, faint), (1, 0));
-    }
-
-    /// Every shot against every later one in its word, begun at the same place and bits beside it,
-    /// among random ticks; of words that differ in weight, too.
-    #[test]
-    fn bit_by_bit_and_mark_by_mark_macropulses_compare_alike() {
-        for family in [Family::prime(5).unwrap(), Family::gold(5).unwrap()] {
-            let (receiver, correlation, _, log) = bench();
-            let payload = Payload::new(4, Crc::default(), true).unwrap();
-            let codebook = Codebook::new(family.clone(), Some(payload), 16, Keying::OnOff).unwrap();
-            // Dense and irregular enough for every count to occur.
-            let tick = (0..6000_u32).filter(|tick| tick.wrapping_mul(0x9E37_79B9) >> 30 == 0);
-            let ticks = Ticks { tick: tick.collect(), ..Ticks::default() };
-            let fired = receiver.fired_since(&log, 0);
-            let mut field = Field::new(&ticks.tick, 1, (-3000, 9000), 64, Default::default());
-            field.cover(-3000..6000);
-            let (codebook, log, density, slack) = (&codebook, &log, 0.25, 0);
-            let (receiver, correlation, fired, field) = (&receiver, &correlation, &fired, &field);
-            let bench =
-                Bench { receiver, correlation, codebook, log, fired, field, slack, density };
-            let bit = i64::from(family.length());
-            for (earlier, later) in
-                (0..16).flat_map(|one| (one + 4..20).step_by(4).map(move |two| (one, two)))
-            {
-                let begins = 200 * later as i64 + 100;
-                let word = log.word[later];
-                let mut counts = Counts { word, first: begins - 8 * bit, bit, lit: [None; PLACES] };
-                for shift in -7..8 {
-                    let earlier = Sent { shot: earlier, begins: begins + shift * bit };
-                    let later = Sent { shot: later, begins };
-                    assert_eq!(
-                        bench.compared_by_bits(earlier, later, &mut counts),
-                        bench.compared_by_marks(earlier, later),
-                        "{family:?}: {shift} bits"
-                    );
-                }
-            }
-        }
     }
 }
