@@ -5,7 +5,7 @@ use macropulse::formats::{
     Clouds, Format, Names, read_cloud, read_pcd, read_range_png, write_cloud,
 };
 use macropulse::points::{
-    Exact, NO_OBJECT, Outcome, Pick, PointCloud, Surface, Surfaces, Truth, Viewpoint,
+    NO_OBJECT, Outcome, Pick, PointCloud, Surface, Surfaces, Truth, Viewpoint,
 };
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
@@ -73,12 +73,11 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
         peak: count(3),
         marks: count(5),
         margin: count(2),
-        exact: Exact::default(),
-        stamp_ns: None,
         photons: vec![f32::NAN; all.len()],
         saturated: all.iter().map(|point| place(point) % 3 == 1).collect(),
         fired_ns,
         truth,
+        ..PointCloud::default()
     }
 }
 

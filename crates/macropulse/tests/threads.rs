@@ -4,7 +4,7 @@
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands, short_bands};
 use macropulse::formats::{Format, Names, write_cloud};
-use macropulse::points::{PointCloud, Truth};
+use macropulse::points::{Attribute, PointCloud, Truth};
 use macropulse::scene::Scene;
 use macropulse::sim::{self, Scan, Tally};
 
@@ -45,51 +45,21 @@ fn pcd(cloud: &PointCloud) -> Vec<u8> {
 
 /// Every column of the cloud, as bits: NaN equals itself, and 0 is not −0.
 fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
-    let PointCloud {
-        scan,
-        rows,
-        columns,
-        viewpoint,
-        returns_per_shot,
-        pick,
-        row,
-        column,
-        return_number,
-        number_of_returns,
-        x,
-        y,
-        z,
-        exact: _,
-        stamp_ns: _,
-        intensity,
-        range,
-        time_ns,
-        peak,
-        marks,
-        margin,
-        photons,
-        saturated,
-        fired_ns,
-        truth: Truth { returns, pixels },
-    } = cloud;
-    let reals = [x, y, z, intensity, range, photons];
-    let reals = reals.into_iter().chain([&returns.range, &returns.cosine]);
-    let reals = reals.chain([&pixels.range, &pixels.cosine]);
-    let counts = [row, column, peak, marks, margin, &returns.object, &returns.material];
-    let counts = counts.into_iter().chain([&pixels.object, &pixels.material]);
-    let numbers = [return_number, number_of_returns];
-    let times = [time_ns, fired_ns];
-    let outcomes = [&returns.outcome, &pixels.outcome];
+    let PointCloud { scan, rows, columns, viewpoint, returns_per_shot, pick, .. } = cloud;
+    let Truth { returns, pixels } = &cloud.truth;
+    let attributes = Attribute::ALL.into_iter().filter_map(|attribute| attribute.entries(cloud));
+    let of_returns = attributes
+        .map(|entries| (0..cloud.returns()).map(|at| entries.number(at).to_bits()).collect());
+    let reals = [&returns.cosine, &pixels.range, &pixels.cosine];
+    let counts = [&pixels.object, &pixels.material];
     let shape = vec![*scan, *rows as u64, *columns as u64, *returns_per_shot as u64, *pick as u64];
     let seen_from = viewpoint.position.iter().chain(&viewpoint.turn).map(|value| value.to_bits());
-    [shape, seen_from.collect()]
+    [shape, seen_from.collect(), cloud.fired_ns.iter().map(|time| time.to_bits()).collect()]
         .into_iter()
+        .chain(of_returns)
         .chain(reals.map(|column| column.iter().map(|value| u64::from(value.to_bits())).collect()))
         .chain(counts.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
-        .chain(numbers.map(|column| column.iter().map(|&value| u64::from(value)).collect()))
-        .chain([saturated.iter().map(|&is_bound| u64::from(is_bound)).collect()])
-        .chain(times.map(|column| column.iter().map(|value| value.to_bits()).collect()))
-        .chain(outcomes.map(|column| column.iter().map(|&outcome| outcome as u64).collect()))
+        .chain([pixels.outcome.iter().map(|&outcome| outcome as u64).collect()])
         .collect()
 }
 

@@ -1,8 +1,9 @@
-//! What is written of each point: one table for all point formats.
+//! What is written of each point, by the table of attributes.
 
 use super::Error;
 use super::number::Kind;
-use crate::points::{Outcome, PointCloud, Surface};
+pub(super) use crate::points::Attribute;
+use crate::points::{Extent, Field, Outcome, PointCloud, Storage, angle};
 
 /// Rows or columns that 16 bits can number.
 const MOST_ROWS: usize = 1 << 16;
@@ -16,31 +17,6 @@ pub(super) enum Point {
     Unanswered(usize),
 }
 
-/// One attribute of a point, in the order of the files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) enum Attribute {
-    X,
-    Y,
-    Z,
-    Intensity,
-    Range,
-    TimeNs,
-    Row,
-    Column,
-    Ring,
-    Peak,
-    Marks,
-    Margin,
-    ReturnNumber,
-    NumberOfReturns,
-    Flags,
-    TrueRange,
-    Object,
-    Material,
-    Incidence,
-    Outcome,
-}
-
 /// A value with the width it has in binary files.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
@@ -51,190 +27,75 @@ pub(super) enum Value {
     U4(u32),
 }
 
-/// Attributes of the measurement; the others are truth.
-const MEASURED: usize = 15;
-
 impl Attribute {
-    /// All attributes, the truth at the end.
-    pub const ALL: [Self; 20] = [
-        Self::X,
-        Self::Y,
-        Self::Z,
-        Self::Intensity,
-        Self::Range,
-        Self::TimeNs,
-        Self::Row,
-        Self::Column,
-        Self::Ring,
-        Self::Peak,
-        Self::Marks,
-        Self::Margin,
-        Self::ReturnNumber,
-        Self::NumberOfReturns,
-        Self::Flags,
-        Self::TrueRange,
-        Self::Object,
-        Self::Material,
-        Self::Incidence,
-        Self::Outcome,
-    ];
-
     /// What is written of `cloud`: the attributes that it has, the truth at the end.
-    pub fn of(cloud: &PointCloud) -> Vec<Self> {
-        Self::ALL.into_iter().filter(|attribute| attribute.is_in(cloud)).collect()
-    }
-
-    /// Whether `cloud` has it.
-    fn is_in(self, cloud: &PointCloud) -> bool {
-        let has = |entries: usize| cloud.has(entries);
-        match self {
-            Self::X | Self::Y | Self::Z => true,
-            Self::Intensity => has(cloud.intensity.len()),
-            Self::Range => has(cloud.range.len()),
-            Self::TimeNs => has(cloud.time_ns.len()),
-            // A row without a column is the ring of a driver.
-            Self::Row => has(cloud.row.len()) && has(cloud.column.len()),
-            Self::Column => has(cloud.column.len()),
-            Self::Ring => has(cloud.row.len()),
-            Self::Peak => has(cloud.peak.len()),
-            Self::Marks => has(cloud.marks.len()),
-            Self::Margin => has(cloud.margin.len()),
-            Self::ReturnNumber => has(cloud.return_number.len()),
-            Self::NumberOfReturns => has(cloud.number_of_returns.len()),
-            Self::Flags => has(cloud.marks.len()) || has(cloud.saturated.len()),
-            Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
-                has_truth(cloud)
-            }
-        }
-    }
-
-    /// Whether it is known from the scene alone.
-    pub fn is_true(self) -> bool {
-        !Self::ALL[..MEASURED].contains(&self)
-    }
-
-    /// The attribute of this name in binary or text files.
-    pub fn named(name: &str) -> Option<Self> {
-        let is_named =
-            |known: &Self| known.name() == name || known.name_with_unit().as_str() == name;
-        Self::ALL.into_iter().find(is_named)
-    }
-
-    /// Name in binary files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::X => "x",
-            Self::Y => "y",
-            Self::Z => "z",
-            Self::Intensity => "intensity",
-            Self::Range => "range",
-            Self::TimeNs => "time_ns",
-            Self::Row => "row",
-            Self::Column => "column",
-            Self::Ring => "ring",
-            Self::Peak => "peak",
-            Self::Marks => "marks",
-            Self::Margin => "margin",
-            Self::ReturnNumber => "return_number",
-            Self::NumberOfReturns => "number_of_returns",
-            Self::Flags => "flags",
-            Self::TrueRange => "true_range",
-            Self::Object => "object",
-            Self::Material => "material",
-            Self::Incidence => "incidence",
-            Self::Outcome => "outcome",
-        }
+    pub(super) fn of(cloud: &PointCloud) -> Vec<Self> {
+        Self::in_files().filter(|attribute| attribute.is_in(cloud)).collect()
     }
 
     /// Name in text files: with its unit.
-    pub fn name_with_unit(self) -> String {
-        let unit = match self {
-            Self::X | Self::Y | Self::Z | Self::Range | Self::TrueRange => "_m",
-            Self::Incidence => "_rad",
-            _ => "",
-        };
-        format!("{}{unit}", self.name())
+    pub(super) fn name_with_unit(self) -> String {
+        let (name, unit) = (self.name(), self.unit().replace('/', "_"));
+        let is_told = unit.is_empty() || name.ends_with(&format!("_{unit}"));
+        if is_told { name.to_owned() } else { format!("{name}_{unit}") }
     }
 
-    /// A value of the attribute's type in `cloud`, to ask its width of, and what stands for no return.
-    pub fn blank(self, cloud: &PointCloud) -> Value {
-        match self {
-            Self::X | Self::Y | Self::Z if !cloud.exact.x.is_empty() => Value::F8(f64::NAN),
-            Self::Range if !cloud.exact.range.is_empty() => Value::F8(f64::NAN),
-            Self::TimeNs => Value::F8(f64::NAN),
-            Self::Outcome | Self::Flags => Value::U1(0),
-            Self::ReturnNumber | Self::NumberOfReturns => Value::U1(0),
-            Self::X | Self::Y | Self::Z | Self::Intensity | Self::Range => Value::F4(f32::NAN),
-            Self::TrueRange | Self::Incidence => Value::F4(f32::NAN),
-            _ => Value::U2(0),
+    /// What its values in `cloud` are stored as.
+    pub(super) fn kind(self, cloud: &PointCloud) -> Kind {
+        match self.storage() {
+            Storage::Length(_, exact) if !exact.of(cloud).is_empty() => Kind::F8,
+            Storage::Length(..) | Storage::Real(_) | Storage::Cosine(_) => Kind::F4,
+            Storage::Time(_) => Kind::F8,
+            Storage::Byte(_) | Storage::Bit(_) | Storage::Code(_) => Kind::U1,
+            Storage::Count(_) => Kind::U2,
         }
     }
 
     /// The attribute, one of [`Attribute::of`], of `point` in a cloud that passed [`check_even`].
     ///
-    /// Object and material of a point without a surface are `NO_OBJECT`; the incidence angle is
-    /// acos of the cosine, in radians. A pixel without a return has the first surface along its beam.
-    pub fn value(self, cloud: &PointCloud, point: Point) -> Value {
-        match point {
-            Point::Return(at) => self.of_return(cloud, at),
-            Point::Unanswered(pixel) => self.of_unanswered(cloud, pixel),
-        }
-    }
-
-    fn of_return(self, cloud: &PointCloud, at: usize) -> Value {
-        let length = |single: &[f32], exact: &[f64]| {
-            exact.get(at).map_or_else(|| Value::F4(single[at]), |&exact| Value::F8(exact))
-        };
-        match self {
-            Self::X => length(&cloud.x, &cloud.exact.x),
-            Self::Y => length(&cloud.y, &cloud.exact.y),
-            Self::Z => length(&cloud.z, &cloud.exact.z),
-            Self::Intensity => Value::F4(cloud.intensity[at]),
-            Self::Range => length(&cloud.range, &cloud.exact.range),
-            Self::TimeNs => Value::F8(cloud.time_ns[at]),
-            Self::Row | Self::Ring => Value::U2(cloud.row[at]),
-            Self::Column => Value::U2(cloud.column[at]),
-            Self::Peak => Value::U2(cloud.peak[at]),
-            Self::Marks => Value::U2(cloud.marks[at]),
-            Self::Margin => Value::U2(cloud.margin[at]),
-            Self::ReturnNumber => Value::U1(cloud.return_number[at]),
-            Self::NumberOfReturns => Value::U1(cloud.number_of_returns[at]),
-            Self::Flags => Value::U1(cloud.flags(at)),
-            Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
-                self.of_surface(&cloud.truth.returns.at(at))
+    /// Object and material of a point without a surface are `NO_OBJECT`. A pixel without a return has
+    /// the first surface along its beam.
+    pub(super) fn value(self, cloud: &PointCloud, point: Point) -> Value {
+        match (self, point) {
+            (Self::Row | Self::Ring, Point::Unanswered(pixel)) => {
+                return Value::U2((pixel / cloud.columns) as u16);
             }
-        }
-    }
-
-    fn of_unanswered(self, cloud: &PointCloud, pixel: usize) -> Value {
-        match self {
-            Self::TimeNs => Value::F8(cloud.fired_ns.get(pixel).copied().unwrap_or(f64::NAN)),
-            Self::Row | Self::Ring => Value::U2((pixel / cloud.columns) as u16),
-            Self::Column => Value::U2((pixel % cloud.columns) as u16),
-            Self::TrueRange | Self::Object | Self::Material | Self::Incidence | Self::Outcome => {
-                self.of_surface(&cloud.truth.pixels.at(pixel))
+            (Self::Column, Point::Unanswered(pixel)) => {
+                return Value::U2((pixel % cloud.columns) as u16);
             }
-            _ => self.blank(cloud),
+            _ => {}
         }
-    }
-
-    /// An attribute of the truth.
-    fn of_surface(self, surface: &Surface) -> Value {
-        match self {
-            Self::TrueRange => Value::F4(surface.range),
-            Self::Object => Value::U2(surface.object),
-            Self::Material => Value::U2(surface.material),
-            Self::Incidence => {
-                let cosine = f64::from(surface.cosine).clamp(0.0, 1.0);
-                Value::F4(libm::acos(cosine) as f32)
-            }
-            _ => Value::U1(surface.outcome as u8),
+        match self.storage() {
+            Storage::Length(single, exact) => match exact.of(cloud).is_empty() {
+                true => Value::F4(entry(single, cloud, point)),
+                false => Value::F8(entry(exact, cloud, point)),
+            },
+            Storage::Real(field) => Value::F4(entry(field, cloud, point)),
+            Storage::Time(field) => Value::F8(entry(field, cloud, point)),
+            Storage::Byte(field) => Value::U1(entry(field, cloud, point)),
+            Storage::Count(field) => Value::U2(entry(field, cloud, point)),
+            Storage::Bit(_) => Value::U1(match point {
+                Point::Return(at) => cloud.flags(at),
+                Point::Unanswered(_) => 0,
+            }),
+            Storage::Cosine(field) => Value::F4(angle(entry(field, cloud, point))),
+            Storage::Code(field) => Value::U1(entry(field, cloud, point) as u8),
         }
     }
 }
 
+/// The entry of `point` in the columns of `field`.
+fn entry<T: Copy>(field: &Field<T>, cloud: &PointCloud, point: Point) -> T {
+    let entry = match point {
+        Point::Return(at) => field.of(cloud).get(at),
+        Point::Unanswered(pixel) => field.pixels(cloud).get(pixel),
+    };
+    entry.copied().unwrap_or(field.none)
+}
+
 impl Value {
     /// What it is stored as.
+    #[cfg(test)]
     pub fn kind(self) -> Kind {
         match self {
             Self::U1(_) => Kind::U1,
@@ -273,11 +134,6 @@ impl Value {
     }
 }
 
-/// Whether the truth stands beside the measurement.
-pub(super) fn has_truth(cloud: &PointCloud) -> bool {
-    !(cloud.truth.pixels.outcome.is_empty() && cloud.truth.returns.outcome.is_empty())
-}
-
 /// All returns, in the order of the list.
 pub(super) fn returns(cloud: &PointCloud) -> impl Iterator<Item = Point> + '_ {
     (0..cloud.returns()).map(Point::Return)
@@ -299,59 +155,21 @@ pub(super) fn outcome_from_code(code: u8) -> Option<Outcome> {
 /// Refuses a cloud with a column that is not empty and has not one entry per return or pixel, or with too
 /// many pixels to number: after this, indexing the columns that the cloud has is safe.
 pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
-    let coordinates = [("y", cloud.y.len()), ("z", cloud.z.len())];
-    let exact = [
-        ("exact.x", cloud.exact.x.len()),
-        ("exact.y", cloud.exact.y.len()),
-        ("exact.z", cloud.exact.z.len()),
-    ];
-    let of_returns = [
-        ("range", cloud.range.len()),
-        ("exact.range", cloud.exact.range.len()),
-        ("intensity", cloud.intensity.len()),
-        ("time_ns", cloud.time_ns.len()),
-        ("row", cloud.row.len()),
-        ("column", cloud.column.len()),
-        ("return_number", cloud.return_number.len()),
-        ("number_of_returns", cloud.number_of_returns.len()),
-        ("peak", cloud.peak.len()),
-        ("marks", cloud.marks.len()),
-        ("margin", cloud.margin.len()),
-        ("photons", cloud.photons.len()),
-        ("saturated", cloud.saturated.len()),
-    ];
-    let (seen, first) = (&cloud.truth.returns, &cloud.truth.pixels);
-    let true_returns = [
-        ("truth.returns.range", seen.range.len()),
-        ("truth.returns.object", seen.object.len()),
-        ("truth.returns.material", seen.material.len()),
-        ("truth.returns.cosine", seen.cosine.len()),
-        ("truth.returns.outcome", seen.outcome.len()),
-    ];
-    let true_pixels = [
-        ("truth.pixels.range", first.range.len()),
-        ("truth.pixels.object", first.object.len()),
-        ("truth.pixels.material", first.material.len()),
-        ("truth.pixels.cosine", first.cosine.len()),
-        ("truth.pixels.outcome", first.outcome.len()),
-    ];
     let (rows, columns) = (cloud.rows, cloud.columns);
     if rows.max(columns) > MOST_ROWS {
         return Err(Error::TooLarge { rows, columns });
     }
-    let is_there = |(_, entries): &(&str, usize)| *entries > 0;
-    let with_truth = true_returns.iter().chain(&true_pixels).any(is_there);
-    let with_exact = exact.iter().any(is_there);
-    let (returns, pixels) = (cloud.returns(), rows.saturating_mul(columns));
-    let per_return = coordinates.into_iter().chain(of_returns.into_iter().filter(is_there));
-    let per_return = per_return.chain(exact.into_iter().filter(|_| with_exact));
-    let per_return = per_return.chain(true_returns.into_iter().filter(|_| with_truth));
-    let per_pixel = true_pixels.into_iter().filter(|_| with_truth);
-    let per_pixel = per_pixel.chain(Some(("fired_ns", cloud.fired_ns.len())).filter(is_there));
-    let wanted = per_return.map(|column| (column, returns, "returns"));
-    let mut wanted = wanted.chain(per_pixel.map(|column| (column, pixels, "pixels")));
-    match wanted.find(|((_, found), needed, _)| found != needed) {
-        Some(((column, found), needed, of)) => Err(Error::Uneven { column, found, needed, of }),
+    let extents: Vec<Extent> =
+        Attribute::stored().flat_map(|attribute| attribute.extents(cloud)).collect();
+    let is_there = |group| extents.iter().any(|column| column.group == group && column.found > 0);
+    let is_uneven = |column: &&Extent| {
+        let is_wanted = column.found > 0 || column.group.is_some() && is_there(column.group);
+        is_wanted && column.found != column.needed
+    };
+    match extents.iter().find(is_uneven) {
+        Some(&Extent { name, found, needed, of, .. }) => {
+            Err(Error::Uneven { column: name, found, needed, of })
+        }
         None => Ok(()),
     }
 }
@@ -363,25 +181,50 @@ mod tests {
     use crate::points::Truth;
 
     #[test]
-    fn blank_has_the_type_of_every_value() {
+    fn every_value_is_of_the_kind_of_its_attribute() {
         let cloud = sample_cloud();
         for attribute in Attribute::of(&cloud) {
             for point in [Point::Return(0), Point::Unanswered(2)] {
-                let [blank, value] = [attribute.blank(&cloud), attribute.value(&cloud, point)];
-                assert_eq!(std::mem::discriminant(&blank), std::mem::discriminant(&value));
+                assert_eq!(attribute.value(&cloud, point).kind(), attribute.kind(&cloud));
             }
         }
     }
 
+    /// The table of fields in docs/formats.md has each attribute with its type and unit, the truth
+    /// behind the line that begins it.
     #[test]
-    fn an_attribute_is_found_by_its_name_with_or_without_a_unit() {
-        for attribute in Attribute::ALL {
-            assert_eq!(Attribute::named(attribute.name()), Some(attribute));
-            assert_eq!(Attribute::named(&attribute.name_with_unit()), Some(attribute));
-        }
-        assert_eq!(Attribute::named("nir"), None);
-        let truth = Attribute::ALL.into_iter().filter(|attribute| attribute.is_true());
-        assert_eq!(truth.count(), 5);
+    fn the_documentation_has_every_attribute() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md");
+        let documented = std::fs::read_to_string(path).unwrap();
+        let (_, table) = documented.split_once("| field | type | unit | meaning |\n").unwrap();
+        let (table, _) = table.split_once("\n\n").unwrap();
+        let (measured, truth) = table.split_once("| with `--truth`: |").unwrap();
+        let rows = |part: &str| {
+            let mut rows = Vec::new();
+            for line in part.lines() {
+                let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+                let names =
+                    cells[1..].first().map_or(Vec::new(), |names| names.split(", ").collect());
+                let named = names.into_iter().filter(|name| name.starts_with('`'));
+                rows.extend(named.map(|name| [name, cells[2], cells[3]].map(str::to_owned)));
+            }
+            rows
+        };
+        let declared = |is_true: bool| {
+            let attributes = Attribute::in_files().filter(|one| one.is_true() == is_true);
+            let declared = attributes.map(|attribute| {
+                let kind = match attribute.kind(&PointCloud::default()) {
+                    Kind::F4 => "float 4",
+                    Kind::F8 => "float 8",
+                    Kind::U1 => "unsigned 1",
+                    _ => "unsigned 2",
+                };
+                [&format!("`{}`", attribute.name()), kind, attribute.unit()].map(str::to_owned)
+            });
+            declared.collect::<Vec<_>>()
+        };
+        assert_eq!(rows(measured), declared(false));
+        assert_eq!(rows(truth), declared(true));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use super::Names;
 use super::about::{list_line, name_lines, scan_line, stamp_line};
 use super::attributes::{Attribute, Value, returns};
+use super::number::Kind;
 use crate::points::{PointCloud, Viewpoint};
 use e57::{
     DateTime, E57Writer, Extension, Quaternion, RawValues, Record, RecordDataType, RecordName,
@@ -83,12 +84,11 @@ pub(super) fn name(attribute: Attribute) -> RecordName {
 }
 
 fn record(attribute: Attribute, cloud: &PointCloud) -> Record {
-    let data_type = match attribute.blank(cloud) {
-        Value::F4(_) => RecordDataType::F32,
-        Value::F8(_) => RecordDataType::F64,
-        Value::U1(_) => RecordDataType::Integer { min: 0, max: 255 },
-        Value::U2(_) => RecordDataType::Integer { min: 0, max: 65_535 },
-        Value::U4(_) => RecordDataType::Integer { min: 0, max: i64::from(u32::MAX) },
+    let data_type = match attribute.kind(cloud) {
+        Kind::F4 => RecordDataType::F32,
+        Kind::F8 => RecordDataType::F64,
+        Kind::U1 => RecordDataType::Integer { min: 0, max: 255 },
+        _ => RecordDataType::Integer { min: 0, max: 65_535 },
     };
     Record { name: name(attribute), data_type }
 }

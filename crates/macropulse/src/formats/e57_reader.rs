@@ -170,7 +170,7 @@ impl Columns {
             RecordName::SphericalAzimuth => Some(Meaning::Angle(0)),
             RecordName::SphericalElevation => Some(Meaning::Angle(1)),
             known => {
-                let ours = Attribute::ALL.into_iter().find(|&ours| name(ours) == *known);
+                let ours = Attribute::in_files().find(|&ours| name(ours) == *known);
                 ours.map(Meaning::Of)
             }
         };

@@ -91,20 +91,22 @@ impl Meaning {
         if let (Some((_, ns)), None) = (TIMES.iter().find(|(known, _)| *known == name), unit) {
             return Some(Self::scaled(Attribute::TimeNs, *ns));
         }
-        let own = Attribute::named(name);
+        let mut attributes = Attribute::in_files();
+        let own = attributes.find(|own| own.name() == name || own.name_with_unit() == name);
         let alias = || ALIASES.iter().find(|(_, names)| names.contains(&name)).map(|known| known.0);
         let attribute = own.or_else(alias)?;
         let is_whole = kind.is_some_and(Kind::is_whole);
-        let unit = match (attribute, unit) {
-            (Attribute::X | Attribute::Y | Attribute::Z | Attribute::Range, Some(unit)) => {
-                Unit::Times(metres(unit)?)
-            }
-            // Drivers store whole millimetres, and whole nanoseconds or seconds as floats.
-            (Attribute::Range, None) if is_whole && !name.ends_with("_m") => Unit::Times(1e-3),
-            (Attribute::TimeNs, Some(unit)) => Unit::Times(nanoseconds(unit)?),
-            (Attribute::TimeNs, None) if own.is_none() && !is_whole => Unit::Clock,
-            (_, None) => Unit::Times(1.0),
+        let unit = match (attribute.unit(), unit) {
+            ("m", Some(unit)) => Unit::Times(metres(unit)?),
+            ("ns", Some(unit)) => Unit::Times(nanoseconds(unit)?),
+            (own, Some(unit)) if own == unit => Unit::Times(1.0),
             (_, Some(_)) => return None,
+            // Drivers store whole millimetres, and whole nanoseconds or seconds as floats.
+            _ if attribute == Attribute::Range && is_whole && !name.ends_with("_m") => {
+                Unit::Times(1e-3)
+            }
+            ("ns", None) if own.is_none() && !is_whole => Unit::Clock,
+            (_, None) => Unit::Times(1.0),
         };
         Some(Self { attribute, unit })
     }
@@ -164,8 +166,8 @@ mod tests {
 
     #[test]
     fn every_own_name_is_understood_in_its_own_unit() {
-        for attribute in Attribute::ALL {
-            let kind = Some(attribute.blank(&PointCloud::default()).kind());
+        for attribute in Attribute::in_files() {
+            let kind = Some(attribute.kind(&PointCloud::default()));
             for name in [attribute.name().to_owned(), attribute.name_with_unit()] {
                 let meaning = Meaning::of_heading(&name, kind).unwrap();
                 assert_eq!((meaning.attribute, meaning.number(3.0)), (attribute, 3.0), "{name}");

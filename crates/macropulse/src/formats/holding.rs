@@ -73,7 +73,7 @@ impl Format {
         if matches!(self, Self::Png | Self::RangeNpy) {
             return Vec::new();
         }
-        let truth = Attribute::ALL.into_iter().filter(|attribute| attribute.is_true());
+        let truth = Attribute::in_files().filter(|attribute| attribute.is_true());
         let left_out = truth.filter(|attribute| self.holds(*attribute) == Holding::Not);
         left_out.map(Attribute::name).collect()
     }
@@ -190,7 +190,7 @@ mod tests {
         columns.iter().for_each(|(name, _)| text += &format!(" | {name}"));
         text += &format!(" |\n|---{}|\n", "|---".repeat(columns.len()));
         let mut remarks: Vec<&str> = Vec::new();
-        for attribute in Attribute::ALL {
+        for attribute in Attribute::in_files() {
             text += &format!("| `{}`", attribute.name());
             for (_, format) in columns {
                 text += &match format.holds(attribute) {

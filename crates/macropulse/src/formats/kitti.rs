@@ -3,7 +3,7 @@
 
 use super::CloudRoom;
 use super::about::About;
-use super::attributes::{Attribute, returns};
+use super::attributes::{Attribute, Value, returns};
 use super::number::Kind;
 use super::table::{self, Layout};
 use crate::points::PointCloud;
@@ -20,7 +20,7 @@ pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     let value = |attribute: Attribute, point| match has.contains(&attribute) {
         true => attribute.value(cloud, point),
         // Each point has room for a reflectance.
-        false => attribute.blank(cloud),
+        false => Value::F4(f32::NAN),
     };
     let mut bytes = Vec::with_capacity(16);
     for point in returns(cloud) {

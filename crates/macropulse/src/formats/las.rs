@@ -89,7 +89,7 @@ fn builder(
     builder.system_identifier = "SIMULATION".to_owned();
     builder.point_format = las::point::Format::new(6).map_err(io::Error::other)?;
     builder.point_format.is_compressed = compress;
-    let size = extra.iter().map(|attribute| attribute.blank(cloud).kind().size()).sum::<usize>();
+    let size = extra.iter().map(|attribute| attribute.kind(cloud).size()).sum::<usize>();
     builder.point_format.extra_bytes = size as u16;
     builder.transforms = transforms(cloud);
     let described = extra.iter().flat_map(|attribute| description(*attribute, cloud)).collect();
@@ -113,8 +113,12 @@ fn description(attribute: Attribute, cloud: &PointCloud) -> [u8; DESCRIPTION] {
         bytes[at..at + text.len()].copy_from_slice(text);
     };
     put(4, extra_name(attribute).unwrap_or_default());
-    put(160, attribute.unit());
-    let kind = attribute.blank(cloud).kind();
+    let unit = match attribute {
+        Attribute::Intensity => "1 = white Lambertian",
+        other => other.unit(),
+    };
+    put(160, unit);
+    let kind = attribute.kind(cloud);
     bytes[2] = KINDS.iter().position(|known| *known == kind).map_or(0, |at| at as u8 + 1);
     bytes
 }
@@ -178,19 +182,6 @@ fn point_of(cloud: &PointCloud, at: usize, extra_bytes: Vec<u8>) -> Point {
         gps_time: Some(cloud.time_ns.get(at).map_or(0.0, |time| time * 1e-9)),
         extra_bytes,
         ..Point::default()
-    }
-}
-
-impl Attribute {
-    /// Its unit, for the descriptions of fields; nothing where it has none.
-    fn unit(self) -> &'static str {
-        match self {
-            Self::X | Self::Y | Self::Z | Self::Range | Self::TrueRange => "m",
-            Self::TimeNs => "ns",
-            Self::Incidence => "rad",
-            Self::Intensity => "1 = white Lambertian",
-            _ => "",
-        }
     }
 }
 

@@ -287,7 +287,7 @@ fn extra(header: &Header, left_out: &mut LeftOut) -> Vec<Extra> {
             continue;
         };
         let name = String::from_utf8_lossy(name);
-        let ours = Attribute::ALL.into_iter().find(|known| extra_name(*known) == Some(&*name));
+        let ours = Attribute::in_files().find(|known| extra_name(*known) == Some(&*name));
         // Scaled dimensions are those of others.
         let meaning = ours.map(Meaning::of).or_else(|| of_others(&name, kind));
         match meaning.filter(|_| bytes[3] & 0b11000 == 0) {

@@ -126,7 +126,7 @@ pub fn write_csv_lines(
 /// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.
 #[cfg(test)]
 fn sample_cloud() -> PointCloud {
-    use crate::points::{Exact, NO_OBJECT, Outcome, Pick, Surfaces, Truth, Viewpoint};
+    use crate::points::{NO_OBJECT, Outcome, Pick, Surfaces, Truth, Viewpoint};
     let nan = f32::NAN;
     let fired_ns = vec![0.0, 40.946_5, 81.893, 122.84, 163.786, 204.732_5];
     PointCloud {
@@ -149,8 +149,6 @@ fn sample_cloud() -> PointCloud {
         peak: vec![174, 170, 60, 174, 58],
         marks: vec![174, 174, 174, 174, 58],
         margin: vec![80, 70, 3, 81, 20],
-        exact: Exact::default(),
-        stamp_ns: None,
         photons: vec![nan; 5],
         saturated: vec![false; 5],
         fired_ns,
@@ -183,6 +181,7 @@ fn sample_cloud() -> PointCloud {
                 ],
             },
         },
+        ..PointCloud::default()
     }
 }
 

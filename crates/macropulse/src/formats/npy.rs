@@ -46,7 +46,7 @@ pub(super) fn write_range(cloud: &PointCloud, out: &mut dyn Write) -> io::Result
 }
 
 fn descr(attribute: Attribute, cloud: &PointCloud) -> String {
-    let kind = attribute.blank(cloud).kind();
+    let kind = attribute.kind(cloud);
     let order = if kind.size() == 1 { "|" } else { "<" };
     format!("{order}{}{}", kind.letter().to_lowercase(), kind.size())
 }

@@ -40,7 +40,7 @@ fn encode(cloud: &PointCloud, names: &Names) -> Result<Vec<u8>> {
     for attribute in attributes {
         let Some(mut column) = rows.next_column()? else { break };
         let values = returns(cloud).map(|point| attribute.value(cloud, point));
-        match attribute.blank(cloud).kind() {
+        match attribute.kind(cloud) {
             Kind::F4 => put::<FloatType>(&mut column, values.map(|value| value.number() as f32)),
             Kind::F8 => put::<DoubleType>(&mut column, values.map(Value::number)),
             _ => put::<Int32Type>(&mut column, values.map(|value| value.number() as i32)),
@@ -61,7 +61,7 @@ fn put<T: DataType>(
 
 fn field(attribute: Attribute, cloud: &PointCloud) -> Result<TypePtr> {
     let unsigned = |bit_width| Some(LogicalType::integer(bit_width, false));
-    let (physical, logical) = match attribute.blank(cloud).kind() {
+    let (physical, logical) = match attribute.kind(cloud) {
         Kind::F4 => (Physical::FLOAT, None),
         Kind::F8 => (Physical::DOUBLE, None),
         Kind::U1 => (Physical::INT32, unsigned(8)),

@@ -51,8 +51,8 @@ fn write_header(
     }
     writeln!(out, "VERSION 0.7")?;
     writeln!(out, "FIELDS {}", row(&|attribute| attribute.name().to_owned()))?;
-    writeln!(out, "SIZE {}", row(&|attribute| attribute.blank(cloud).kind().size().to_string()))?;
-    writeln!(out, "TYPE {}", row(&|attribute| attribute.blank(cloud).kind().letter().to_owned()))?;
+    writeln!(out, "SIZE {}", row(&|attribute| attribute.kind(cloud).size().to_string()))?;
+    writeln!(out, "TYPE {}", row(&|attribute| attribute.kind(cloud).letter().to_owned()))?;
     writeln!(out, "COUNT {}", row(&|_| "1".to_owned()))?;
     writeln!(out, "WIDTH {columns}\nHEIGHT {rows}")?;
     writeln!(out, "VIEWPOINT {}", viewpoint_text(&cloud.viewpoint))?;

@@ -7,6 +7,7 @@
 use super::Names;
 use super::about::all_lines;
 use super::attributes::{Attribute, Value, returns};
+use super::number::Kind;
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
@@ -40,11 +41,11 @@ pub(super) fn write(
     }
     writeln!(out, "element vertex {}", cloud.returns())?;
     for attribute in &attributes {
-        let kind = match attribute.blank(cloud) {
-            Value::U1(_) => "uchar",
-            Value::U2(_) | Value::U4(_) => "int",
-            Value::F4(_) => "float",
-            Value::F8(_) => "double",
+        let kind = match attribute.kind(cloud) {
+            Kind::U1 => "uchar",
+            Kind::F4 => "float",
+            Kind::F8 => "double",
+            _ => "int",
         };
         let is_known =
             matches!(attribute, Attribute::X | Attribute::Y | Attribute::Z | Attribute::Intensity);

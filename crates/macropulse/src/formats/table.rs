@@ -6,7 +6,7 @@ use super::headings::Meaning;
 use super::left_out::NoPoint;
 use super::number::Kind;
 use super::room::CloudRoom;
-use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Surface, Surfaces, Truth};
+use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Storage, Surface, Surfaces, Truth};
 use std::collections::BTreeMap;
 
 /// Pixels that a cloud is given at most, so that a file that lies about its size costs no memory: as
@@ -215,12 +215,11 @@ impl Record {
     /// # Errors
     /// If the number is none that this attribute can have.
     pub fn set(&mut self, at: usize, attribute: Attribute, value: f64) -> Result<(), String> {
-        use Attribute::{Column, Margin, Marks, Material, Object, Outcome, Peak, Ring, Row};
-        let most = match attribute {
-            Row | Column | Ring | Peak | Marks | Margin => 65_535.0,
-            Object | Material if value.is_nan() => return Ok(()),
-            Object | Material => 65_535.0,
-            Attribute::ReturnNumber | Attribute::NumberOfReturns | Outcome => 255.0,
+        let most = match attribute.storage() {
+            // No object is no number.
+            Storage::Count(_) if attribute.is_true() && value.is_nan() => return Ok(()),
+            Storage::Count(_) => 65_535.0,
+            Storage::Byte(_) | Storage::Code(_) => 255.0,
             _ => f64::INFINITY,
         };
         let name = attribute.name();
@@ -229,8 +228,8 @@ impl Record {
                 "point {at} has the {name} {value}; whole numbers from 0 to {most} are read"
             ));
         }
-        if attribute == Outcome && outcome_from_code(value as u8).is_none() {
-            let last = crate::points::Outcome::ALL.len() - 1;
+        if attribute == Attribute::Outcome && outcome_from_code(value as u8).is_none() {
+            let last = Outcome::ALL.len() - 1;
             return Err(format!("point {at} has the outcome {value}; known are 0 to {last}"));
         }
         self.0[attribute as usize] = value;
@@ -318,7 +317,7 @@ impl Gathered {
             ..PointCloud::default()
         };
         let has_row = attributes.contains(&Attribute::Row);
-        let mut unique: Vec<Attribute> = Vec::new();
+        let mut unique = vec![Attribute::X, Attribute::Y, Attribute::Z];
         for &attribute in attributes {
             // The ring is the row; where both are there, the row counts.
             let is_row = attribute == Attribute::Ring && has_row;
@@ -385,39 +384,26 @@ impl Gathered {
         }
         let cloud = &mut self.cloud;
         self.is_full = self.room.check(cloud.x.len() as u64 + 1).is_err();
-        let [x, y, z] = record.position();
-        cloud.x.push(x as f32);
-        cloud.y.push(y as f32);
-        cloud.z.push(z as f32);
-        if self.digits != Digits::Single {
-            cloud.exact.x.push(x);
-            cloud.exact.y.push(y);
-            cloud.exact.z.push(z);
-        }
         for &attribute in &self.attributes {
             let value = record.get(attribute);
-            match attribute {
-                Attribute::Intensity => cloud.intensity.push(value as f32),
-                Attribute::Range => {
-                    cloud.range.push(value as f32);
-                    cloud.exact.range.push(value);
+            match attribute.storage() {
+                Storage::Code(_) => cloud.truth.returns.push(record.surface()),
+                // The truth is added with the outcome.
+                _ if attribute.is_true() => {}
+                Storage::Length(single, exact) => {
+                    single.of_mut(cloud).push(value as f32);
+                    if self.digits != Digits::Single || attribute == Attribute::Range {
+                        exact.of_mut(cloud).push(value);
+                    }
                 }
-                Attribute::TimeNs => cloud.time_ns.push(value),
-                Attribute::Row | Attribute::Ring => cloud.row.push(value as u16),
-                Attribute::Column => cloud.column.push(value as u16),
-                Attribute::Peak => cloud.peak.push(value as u16),
-                Attribute::Marks => cloud.marks.push(value as u16),
-                Attribute::Margin => cloud.margin.push(value as u16),
-                Attribute::ReturnNumber => cloud.return_number.push(value as u8),
-                Attribute::NumberOfReturns => cloud.number_of_returns.push(value as u8),
+                Storage::Real(field) | Storage::Cosine(field) => {
+                    field.of_mut(cloud).push(value as f32);
+                }
+                Storage::Time(field) => field.of_mut(cloud).push(value),
+                Storage::Byte(field) => field.of_mut(cloud).push(value as u8),
+                Storage::Count(field) => field.of_mut(cloud).push(value as u16),
                 // The others follow from the columns beside them, and not every writer's are ours.
-                Attribute::Flags => cloud.saturated.push(value as u8 & SATURATED != 0),
-                Attribute::Outcome => cloud.truth.returns.push(record.surface()),
-                Attribute::X | Attribute::Y | Attribute::Z => {}
-                Attribute::TrueRange
-                | Attribute::Object
-                | Attribute::Material
-                | Attribute::Incidence => {}
+                Storage::Bit(field) => field.of_mut(cloud).push(value as u8 & SATURATED != 0),
             }
         }
     }

@@ -4,10 +4,13 @@
 //! pixel's shot. What an organised image shows of it is a view, [`Image`]: one return of each pixel,
 //! the first, the strongest or the last one ([`Pick`]).
 
+mod columns;
 mod image;
 mod piece;
 mod scale;
 
+pub use columns::{Attribute, Entries};
+pub(crate) use columns::{Extent, Field, Storage, angle};
 pub use image::Image;
 pub use macropulse_codec::decode::Pick;
 pub use piece::Piece;
@@ -297,6 +300,11 @@ impl PointCloud {
     /// returns are.
     pub fn has(&self, entries: usize) -> bool {
         entries > 0 || self.returns() == 0
+    }
+
+    /// Whether the truth stands beside the measurement.
+    pub fn has_truth(&self) -> bool {
+        !(self.truth.pixels.outcome.is_empty() && self.truth.returns.outcome.is_empty())
     }
 
     /// Coordinates x, y, z of return `at`, m, with all digits that are known.

@@ -4,11 +4,12 @@
 //! another. The pieces in the order of the bands are the cloud; who wants it as one list has them
 //! joined.
 
-use super::{Outcome, PointCloud, Scale, Truth};
+use super::{Attribute, PointCloud, Scale};
 use crate::design::Design;
 use crate::units::range_from_tof;
 use macropulse_codec::ShotLog;
 use macropulse_codec::decode::Returns;
+use rayon::prelude::*;
 
 /// The points of one band.
 #[derive(Debug, Clone, Default)]
@@ -102,7 +103,7 @@ impl Piece {
     }
 
     /// Puts `values`, an entry for each owned shot, at their pixels in `column`.
-    fn scatter<T: Copy>(&self, values: &[T], column: &mut [T]) {
+    pub(super) fn scatter<T: Copy>(&self, values: &[T], column: &mut [T]) {
         let Some(&first) = self.pixel.first() else { return };
         let row = first as usize..first as usize + values.len();
         match column.get_mut(row).filter(|_| self.in_a_row) {
@@ -127,125 +128,21 @@ impl PointCloud {
     /// other, and their pixels at their places; pixels that are in none of them are empty.
     pub fn joined(frame: &Self, pieces: &[Piece]) -> Self {
         let pixels = frame.rows * frame.columns;
+        let fields: Vec<_> = Attribute::fields().collect();
+        // Each field by itself: which thread takes which makes no difference.
+        let joined: Vec<_> = fields
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|field| field.joined(pieces, pixels))
+            .collect();
         let mut cloud = frame.clone();
-        cloud.fired_ns.resize(pixels, f64::NAN);
-        cloud.truth.pixels.blank(pixels);
-        let Columns { bytes, bits, counts, reals, times, outcomes } = cloud.columns();
-        // Each column by itself: which thread takes which makes no difference.
-        rayon::scope(|scope| {
-            bytes.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
-            bits.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
-            counts.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
-            reals.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
-            times.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
-            outcomes.into_iter().for_each(|column| scope.spawn(|_| column.join(pieces)));
-        });
+        joined.into_iter().for_each(|columns| columns(&mut cloud));
         cloud
     }
 
     /// Empties all columns, and keeps their memory.
     fn clear(&mut self) {
-        let Columns { bytes, bits, counts, reals, times, outcomes } = self.columns();
-        bytes.into_iter().for_each(|column| column.entries.clear());
-        bits.into_iter().for_each(|column| column.entries.clear());
-        counts.into_iter().for_each(|column| column.entries.clear());
-        reals.into_iter().for_each(|column| column.entries.clear());
-        times.into_iter().for_each(|column| column.entries.clear());
-        outcomes.into_iter().for_each(|column| column.entries.clear());
-    }
-
-    /// All columns: the one place where they are listed to be emptied and joined.
-    fn columns(&mut self) -> Columns<'_> {
-        use Each::{Pixel, Return};
-        let Truth { returns: seen, pixels: first } = &mut self.truth;
-        Columns {
-            bytes: [
-                Column::new(Return, &mut self.return_number, |points| &points.return_number),
-                Column::new(Return, &mut self.number_of_returns, |points| {
-                    &points.number_of_returns
-                }),
-            ],
-            bits: [Column::new(Return, &mut self.saturated, |points| &points.saturated)],
-            counts: [
-                Column::new(Return, &mut self.row, |points| &points.row),
-                Column::new(Return, &mut self.column, |points| &points.column),
-                Column::new(Return, &mut self.peak, |points| &points.peak),
-                Column::new(Return, &mut self.marks, |points| &points.marks),
-                Column::new(Return, &mut self.margin, |points| &points.margin),
-                Column::new(Return, &mut seen.object, |points| &points.truth.returns.object),
-                Column::new(Return, &mut seen.material, |points| &points.truth.returns.material),
-                Column::new(Pixel, &mut first.object, |points| &points.truth.pixels.object),
-                Column::new(Pixel, &mut first.material, |points| &points.truth.pixels.material),
-            ],
-            reals: [
-                Column::new(Return, &mut self.x, |points| &points.x),
-                Column::new(Return, &mut self.y, |points| &points.y),
-                Column::new(Return, &mut self.z, |points| &points.z),
-                Column::new(Return, &mut self.intensity, |points| &points.intensity),
-                Column::new(Return, &mut self.range, |points| &points.range),
-                Column::new(Return, &mut self.photons, |points| &points.photons),
-                Column::new(Return, &mut seen.range, |points| &points.truth.returns.range),
-                Column::new(Return, &mut seen.cosine, |points| &points.truth.returns.cosine),
-                Column::new(Pixel, &mut first.range, |points| &points.truth.pixels.range),
-                Column::new(Pixel, &mut first.cosine, |points| &points.truth.pixels.cosine),
-            ],
-            times: [
-                Column::new(Return, &mut self.time_ns, |points| &points.time_ns),
-                Column::new(Pixel, &mut self.fired_ns, |points| &points.fired_ns),
-            ],
-            outcomes: [
-                Column::new(Return, &mut seen.outcome, |points| &points.truth.returns.outcome),
-                Column::new(Pixel, &mut first.outcome, |points| &points.truth.pixels.outcome),
-            ],
-        }
-    }
-}
-
-/// The columns of a cloud by the type of their entries.
-struct Columns<'a> {
-    bytes: [Column<'a, u8>; 2],
-    bits: [Column<'a, bool>; 1],
-    counts: [Column<'a, u16>; 9],
-    reals: [Column<'a, f32>; 10],
-    times: [Column<'a, f64>; 2],
-    outcomes: [Column<'a, Outcome>; 2],
-}
-
-/// What a column has an entry for.
-#[derive(Clone, Copy)]
-enum Each {
-    Return,
-    Pixel,
-}
-
-/// A column of a cloud.
-struct Column<'a, T> {
-    each: Each,
-    entries: &'a mut Vec<T>,
-    /// The same column of another cloud.
-    of: fn(&PointCloud) -> &Vec<T>,
-}
-
-impl<'a, T: Copy> Column<'a, T> {
-    fn new(each: Each, entries: &'a mut Vec<T>, of: fn(&PointCloud) -> &Vec<T>) -> Self {
-        Self { each, entries, of }
-    }
-
-    /// Adds the entries of all `pieces`: those of returns behind each other, those of pixels at
-    /// their places.
-    fn join(self, pieces: &[Piece]) {
-        let Self { each, entries, of } = self;
-        match each {
-            Each::Return => {
-                entries.reserve_exact(pieces.iter().map(|piece| of(&piece.points).len()).sum());
-                for piece in pieces {
-                    entries.extend_from_slice(of(&piece.points));
-                }
-            }
-            Each::Pixel => {
-                pieces.iter().for_each(|piece| piece.scatter(of(&piece.points), entries));
-            }
-        }
+        Attribute::fields().for_each(|field| field.clear(self));
     }
 }
 

@@ -203,7 +203,7 @@ fn points(cloud: &PointCloud, time: Time) -> Points {
     let attributes = Attribute::of(cloud);
     let mut stride = 0;
     let field = |attribute: &Attribute| {
-        let (offset, kind) = (stride, attribute.blank(cloud).kind());
+        let (offset, kind) = (stride, attribute.kind(cloud));
         stride += kind.size() as u32;
         PackedElementField { name: attribute.name().to_owned(), offset, kind: number(kind) }
     };

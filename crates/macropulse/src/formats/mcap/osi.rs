@@ -1,6 +1,5 @@
 //! The messages of ASAM OSI 3.7: what the lidar detected and, with the truth, what it might have.
 
-use super::super::attributes::has_truth;
 use super::protobuf::{Described, Of, Package, descriptor_set};
 use super::{Payload, Topic, stamp_ns};
 use crate::points::{NO_OBJECT, Outcome, PointCloud};
@@ -309,7 +308,7 @@ pub(super) fn payloads(cloud: &PointCloud) -> io::Result<Vec<Payload>> {
         feature_data: Some(FeatureData { version, lidar_sensor }),
     };
     let mut payloads = vec![(0, data.encode_to_vec())];
-    if has_truth(cloud) {
+    if cloud.has_truth() {
         let lidar_sensor_view = vec![LidarSensorView { reflection: reflections(cloud) }];
         let view = SensorView { version, timestamp, sensor_id, lidar_sensor_view };
         payloads.push((1, view.encode_to_vec()));

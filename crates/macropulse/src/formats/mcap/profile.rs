@@ -115,7 +115,7 @@ pub(super) fn fields(profile: Profile, cloud: &PointCloud) -> (usize, Vec<Field>
             let mut step = 0;
             let place = |attribute: &Attribute| {
                 let offset = step;
-                step += attribute.blank(cloud).kind().size();
+                step += attribute.kind(cloud).size();
                 Field { name: attribute.name(), offset, quantity: Quantity::Of(*attribute) }
             };
             let fields = Attribute::of(cloud).iter().map(place).collect();
@@ -172,7 +172,7 @@ impl Quantity {
     /// The kind of its numbers in messages of `cloud`.
     pub fn kind(self, cloud: &PointCloud) -> Kind {
         match self {
-            Self::Of(attribute) => attribute.blank(cloud).kind(),
+            Self::Of(attribute) => attribute.kind(cloud),
             Self::Float(_) => Kind::F4,
             Self::PercentU1 | Self::LineU1 | Self::LivoxTag | Self::ReturnType => Kind::U1,
             Self::PercentU2 | Self::RingFromBelow | Self::ZeroU2 => Kind::U2,
