@@ -1,7 +1,7 @@
 //! One cloud of the page.
 
 use macropulse::formats::Names;
-use macropulse::points::{NO_OBJECT, PointCloud};
+use macropulse::points::{Attribute, Entries, NO_OBJECT, PointCloud};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -36,9 +36,9 @@ impl Scan {
         let every = cloud.returns().div_ceil(MOST_POINTS).max(1);
         let has_image = matches!(cloud.rows.checked_mul(cloud.columns), Some(1..=MOST_PIXELS));
         let attributes = attributes(cloud, has_image);
-        let packed = attributes.into_par_iter().filter_map(|(kept, value)| {
-            let values: Vec<f64> = (0..cloud.returns()).step_by(every).map(value).collect();
-            Column::of(kept, &values)
+        let packed = attributes.into_par_iter().filter_map(|(kept, entries)| {
+            let places = (0..cloud.returns()).step_by(every);
+            Column::of(kept, &places.map(|at| entries.number(at)).collect::<Vec<f64>>())
         });
         let outcomes = &cloud.truth.pixels.outcome;
         let pixels = match has_image && outcomes.len() == cloud.rows * cloud.columns {
@@ -70,66 +70,42 @@ impl Scan {
     }
 }
 
-/// The value of the return at a place of the list.
-type Value<'a> = Box<dyn Fn(usize) -> f64 + Send + Sync + 'a>;
-
-fn value<T: Copy + Into<f64> + Sync>(column: &[T]) -> Value<'_> {
-    Box::new(move |at| column.get(at).map_or(f64::NAN, |&value| value.into()))
-}
-
-/// What is kept of each return, under the names that it has in the files. A list of another program
-/// has neither pixels nor marks, and says nothing of them.
-fn attributes(cloud: &PointCloud, has_image: bool) -> Vec<(Kept, Value<'_>)> {
-    let [length, share, whole] = [1e-4, 1e-4, 1.0];
-    let kept = |name, unit, step| Kept { name, unit, step };
-    let mut list = vec![
-        (kept("x", "m", length), Box::new(|at| cloud.position(at)[0]) as Value),
-        (kept("y", "m", length), Box::new(|at| cloud.position(at)[1])),
-        (kept("z", "m", length), Box::new(|at| cloud.position(at)[2])),
-        (kept("range", "m", length), Box::new(|at| cloud.distance(at))),
-        (kept("intensity", "", share), value(&cloud.intensity)),
-        (kept("time_ns", "ns", 0.1), value(&cloud.time_ns)),
-    ];
-    if has_image {
-        list.extend([
-            (kept("row", "", whole), value(&cloud.row)),
-            (kept("column", "", whole), value(&cloud.column)),
-        ]);
-    }
-    list.extend([
-        (kept("return_number", "", whole), value(&cloud.return_number)),
-        (kept("number_of_returns", "", whole), value(&cloud.number_of_returns)),
-    ]);
-    if cloud.marks.iter().any(|&marks| marks > 0) {
-        list.extend([
-            (kept("peak", "", whole), value(&cloud.peak)),
-            (kept("marks", "", whole), value(&cloud.marks)),
-            (kept("margin", "", whole), value(&cloud.margin)),
-            (kept("flags", "", whole), Box::new(|at| f64::from(cloud.flags(at)))),
-        ]);
-    }
+/// What is kept of each return: the attributes that files have, and which returns the image shows. The
+/// ring is the row, and a list has no pixels.
+fn attributes(cloud: &PointCloud, has_image: bool) -> Vec<(Kept, Entries<'_>)> {
+    let is_kept = |attribute: &Attribute| match attribute {
+        Attribute::Ring => false,
+        Attribute::Row | Attribute::Column => has_image,
+        _ => true,
+    };
+    let kept = |attribute: Attribute| {
+        let entries = match attribute {
+            Attribute::Range => {
+                Entries::F8((0..cloud.returns()).map(|at| cloud.distance(at)).collect())
+            }
+            _ => attribute.entries(cloud)?,
+        };
+        let step = match (&entries, attribute.unit()) {
+            (Entries::U1(_) | Entries::U2(_), _) => 1.0,
+            (_, "ns") => 0.1,
+            _ => 1e-4,
+        };
+        let entries = match entries {
+            Entries::U2(numbers) if attribute.is_true() => {
+                let number =
+                    |number: u16| if number == NO_OBJECT { f32::NAN } else { number.into() };
+                Entries::F4(numbers.iter().copied().map(number).collect())
+            }
+            entries => entries,
+        };
+        Some((Kept { name: attribute.name(), unit: attribute.unit(), step }, entries))
+    };
+    let mut list: Vec<_> = Attribute::in_files().filter(is_kept).filter_map(kept).collect();
     if cloud.returns_per_shot > 1 && has_image {
         let image = cloud.image(cloud.pick);
         let mut shown = vec![0_u8; cloud.returns()];
         image.iter().flatten().for_each(|at| shown[at] = 1);
-        list.push((kept("shown", "", whole), Box::new(move |at| f64::from(shown[at]))));
-    }
-    let truth = &cloud.truth.returns;
-    let index = |column: &'_ [u16], at: usize| match column.get(at) {
-        Some(&index) if index != NO_OBJECT => f64::from(index),
-        _ => f64::NAN,
-    };
-    if truth.outcome.len() == cloud.returns() {
-        list.extend([
-            (kept("true_range", "m", length), value(&truth.range)),
-            (kept("object", "", whole), Box::new(move |at| index(&truth.object, at)) as Value),
-            (kept("material", "", whole), Box::new(move |at| index(&truth.material, at))),
-            (
-                kept("incidence", "rad", share),
-                Box::new(|at| libm::acos(f64::from(truth.cosine[at]).clamp(0.0, 1.0))),
-            ),
-            (kept("outcome", "", whole), Box::new(|at| f64::from(truth.outcome[at] as u8))),
-        ]);
+        list.push((Kept { name: "shown", unit: "", step: 1.0 }, Entries::U1(shown.into())));
     }
     list
 }
