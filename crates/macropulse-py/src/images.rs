@@ -1,10 +1,9 @@
 //! Columns as images.
 
-use macropulse::points::Pick;
+use macropulse::points::{Entries, Pick};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::columns::{Column, angle};
 use crate::error::wrong;
 use crate::scan::Scan;
 
@@ -18,47 +17,25 @@ pub fn image<'py>(
     name: &str,
     pick: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let column = scan.known(name)?;
+    let attribute = scan.known(name)?;
     let cloud = &scan.cloud;
-    let shape = [cloud.rows, cloud.columns];
     let image = cloud.image(picked(cloud.pick, pick)?);
     if image.is_empty() {
         return Err(wrong("the scan is a list of points without rows and columns of pixels"));
     }
-    let surface = |pixel: usize| image.surface(cloud, pixel);
-    let pixels = 0..image.len();
-    Ok(match (name, column) {
-        ("true_range", _) => {
-            let values = pixels.map(|pixel| surface(pixel).range).collect();
-            PyArray1::from_vec(py, values).reshape(shape)?.into_any()
+    let shape = [cloud.rows, cloud.columns];
+    Ok(match attribute.image(cloud, &image) {
+        Entries::F4(values) => {
+            PyArray1::from_vec(py, values.into_owned()).reshape(shape)?.into_any()
         }
-        ("incidence", _) => {
-            let values = pixels.map(|pixel| angle(surface(pixel).cosine)).collect();
-            PyArray1::from_vec(py, values).reshape(shape)?.into_any()
+        Entries::F8(values) => {
+            PyArray1::from_vec(py, values.into_owned()).reshape(shape)?.into_any()
         }
-        ("object", _) => {
-            let values = pixels.map(|pixel| surface(pixel).object).collect();
-            PyArray1::from_vec(py, values).reshape(shape)?.into_any()
+        Entries::U1(values) => {
+            PyArray1::from_vec(py, values.into_owned()).reshape(shape)?.into_any()
         }
-        ("material", _) => {
-            let values = pixels.map(|pixel| surface(pixel).material).collect();
-            PyArray1::from_vec(py, values).reshape(shape)?.into_any()
-        }
-        (_, Column::Outcomes(_)) => {
-            let values = pixels.map(|pixel| surface(pixel).outcome as u8).collect();
-            PyArray1::from_vec(py, values).reshape(shape)?.into_any()
-        }
-        (_, Column::F4(entries)) => {
-            PyArray1::from_vec(py, image.spread(entries, f32::NAN)).reshape(shape)?.into_any()
-        }
-        (_, Column::F8(entries)) => {
-            PyArray1::from_vec(py, image.spread(entries, f64::NAN)).reshape(shape)?.into_any()
-        }
-        (_, Column::U1(entries)) => {
-            PyArray1::from_vec(py, image.spread(entries, 0)).reshape(shape)?.into_any()
-        }
-        (_, Column::U2(entries)) => {
-            PyArray1::from_vec(py, image.spread(entries, 0)).reshape(shape)?.into_any()
+        Entries::U2(values) => {
+            PyArray1::from_vec(py, values.into_owned()).reshape(shape)?.into_any()
         }
     })
 }

@@ -54,6 +54,7 @@ mod _native {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("OUTCOMES", pyo3::types::PyTuple::new(module.py(), scan::outcomes())?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        columns::add_properties(module.py())?;
         // Refuses a set of instructions that is misspelt or that this machine does not have.
         macropulse::codec::level::asked_for().map(|_| ()).map_err(error::wrong)
     }

@@ -5,14 +5,14 @@ use std::sync::{Arc, OnceLock};
 
 use macropulse::design::Design;
 use macropulse::names::nearest;
-use macropulse::points::{Outcome, PointCloud};
+use macropulse::points::{Attribute, Entries, Outcome, PointCloud};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyImportError, PyModuleNotFoundError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
 
-use crate::columns::{Column, Computed, MEASURED, TRUE, lent};
+use crate::columns::lent;
 use crate::error::wrong;
 use crate::sensor::Sensor;
 use crate::values::from_json;
@@ -28,7 +28,8 @@ use crate::{files, images, show};
 pub struct Scan {
     /// The points.
     pub cloud: PointCloud,
-    computed: OnceLock<Computed>,
+    /// Columns that the cloud does not have as such, each computed when it is first asked for.
+    computed: [OnceLock<Entries<'static>>; Attribute::ALL.len()],
     /// What has measured it.
     sensor: Option<Arc<Design>>,
     /// Names of the scene's objects.
@@ -55,195 +56,74 @@ impl Scan {
     /// The scan of these points.
     pub fn new(cloud: PointCloud, about: About) -> Self {
         let About { sensor, objects, materials, manifest } = about;
-        Self { cloud, computed: OnceLock::new(), sensor, objects, materials, manifest }
+        let computed = std::array::from_fn(|_| OnceLock::new());
+        Self { cloud, computed, sensor, objects, materials, manifest }
     }
 
-    /// What follows from the columns.
-    pub fn computed(&self) -> &Computed {
-        self.computed.get_or_init(|| Computed::of(&self.cloud))
+    /// The attributes that it has.
+    fn attributes(&self) -> impl Iterator<Item = Attribute> + '_ {
+        Attribute::ALL.into_iter().filter(|attribute| attribute.is_in(&self.cloud))
     }
 
-    /// Whether the truth stands beside the points.
-    pub fn has_truth(&self) -> bool {
-        let truth = &self.cloud.truth;
-        !(truth.pixels.outcome.is_empty() && truth.returns.outcome.is_empty())
-    }
-
-    /// Names of all its columns.
-    fn names(&self) -> impl Iterator<Item = &'static str> + '_ {
-        let all = MEASURED.iter().chain(&TRUE).copied();
-        all.filter(|name| self.column(name).is_some())
-    }
-
-    /// The column called `name`.
+    /// The attribute called `name`, which it has.
     ///
     /// # Errors
     /// If there is none; the message names the nearest.
-    pub fn known(&self, name: &str) -> PyResult<Column<'_>> {
-        self.column(name).ok_or_else(|| {
-            if TRUE.contains(&name) {
-                return wrong(format!(
-                    "there is no {name}: the scan has no truth beside its points, as one that was \
-                     decoded or read from a file without it"
-                ));
+    pub fn known(&self, name: &str) -> PyResult<Attribute> {
+        match Attribute::named(name) {
+            Some(attribute) if attribute.is_in(&self.cloud) => Ok(attribute),
+            Some(attribute) => Err(absent(attribute)),
+            None => {
+                let known: Vec<&str> = self.attributes().map(Attribute::name).collect();
+                let hint = nearest(name, known.iter().copied())
+                    .map(|near| format!("did you mean `{near}`? "))
+                    .unwrap_or_default();
+                let known = known.join(", ");
+                Err(wrong(format!("there is no column `{name}`; {hint}known are {known}")))
             }
-            if MEASURED.contains(&name) {
-                return wrong(format!("there is no {name}: the file of the scan does not have it"));
-            }
-            let hint = nearest(name, self.names())
-                .map(|near| format!("did you mean `{near}`? "))
-                .unwrap_or_default();
-            let known: Vec<&str> = self.names().collect();
-            wrong(format!("there is no column `{name}`; {hint}known are {}", known.join(", ")))
-        })
+        }
     }
-}
 
-/// The documentation of each column stands at its getter.
-macro_rules! column {
-    ($slf:expr, $name:literal) => {
-        lent($slf, &$slf.get().known($name)?)
-    };
+    /// The column of an attribute as an array, which lends the memory of `slf`. For a range that it does
+    /// not have stands the distance of the point from the origin.
+    ///
+    /// # Errors
+    /// If it does not have the attribute.
+    pub fn array<'py>(slf: &Bound<'py, Self>, attribute: Attribute) -> Array<'py> {
+        let Self { cloud, computed, .. } = slf.get();
+        let kept = &computed[attribute as usize];
+        if let Some(entries) = kept.get() {
+            return lent(slf, entries);
+        }
+        match attribute.entries(cloud) {
+            Some(entries) if attribute.is_computed() => {
+                lent(slf, kept.get_or_init(|| entries.into_owned()))
+            }
+            Some(entries) => lent(slf, &entries),
+            None if attribute == Attribute::Range => {
+                lent(slf, kept.get_or_init(|| Entries::F4(cloud.distances().into_owned().into())))
+            }
+            None => Err(absent(attribute)),
+        }
+    }
 }
 
 type Array<'py> = PyResult<Bound<'py, PyAny>>;
 
+/// Why a scan does not have an attribute.
+fn absent(attribute: Attribute) -> PyErr {
+    let name = attribute.name();
+    wrong(match attribute.is_true() {
+        true => format!(
+            "there is no {name}: the scan has no truth beside its points, as one that was decoded or \
+             read from a file without it"
+        ),
+        false => format!("there is no {name}: the file of the scan does not have it"),
+    })
+}
+
 #[pymethods]
 impl Scan {
-    /// Forward, m.
-    #[getter]
-    fn x<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "x")
-    }
-
-    /// Left, m.
-    #[getter]
-    fn y<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "y")
-    }
-
-    /// Up, m.
-    #[getter]
-    fn z<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "z")
-    }
-
-    /// Apparent reflectance: 1 is a white surface that faces the sensor. A detector that counts marks
-    /// and measures no amplitude cannot tell bright from brighter: where `peak` equals `marks` this is
-    /// a lower bound, and of near surfaces far too low. All are 1 if it never misses a mark.
-    #[getter]
-    fn intensity<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "intensity")
-    }
-
-    /// One-way range, m; of a scan whose file has none, the distance of each point from the origin.
-    #[getter]
-    fn range<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        let scan = slf.get();
-        let distance = || Column::F4(&scan.computed().distance);
-        lent(slf, &scan.column("range").unwrap_or_else(distance))
-    }
-
-    /// Time at which the shot was fired, ns from the beginning of the first scan.
-    #[getter]
-    fn time_ns<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "time_ns")
-    }
-
-    /// Row of the pixel, 0 at the top.
-    #[getter]
-    fn row<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "row")
-    }
-
-    /// Column of the pixel, 0 at the left.
-    #[getter(column)]
-    fn column_of_pixel<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "column")
-    }
-
-    /// The row, as drivers of lidars call it.
-    #[getter]
-    fn ring<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "ring")
-    }
-
-    /// Marks found at their place.
-    #[getter]
-    fn peak<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "peak")
-    }
-
-    /// Marks that the macropulse has.
-    #[getter]
-    fn marks<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "marks")
-    }
-
-    /// Peak minus the best other lag that the receiver looked at.
-    #[getter]
-    fn margin<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "margin")
-    }
-
-    /// Number among the returns of the shot, from 1, the nearest first.
-    #[getter]
-    fn return_number<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "return_number")
-    }
-
-    /// Returns of the shot.
-    #[getter]
-    fn number_of_returns<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "number_of_returns")
-    }
-
-    /// Bits: 1 for a return with fewer than half of its marks, 2 for one for which another lag had
-    /// as many, 4 for one whose intensity is a lower bound: no mark was missed, and no amplitude is
-    /// measured.
-    #[getter]
-    fn flags<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "flags")
-    }
-
-    /// Energy as the receiver can tell it, in detected photons per mark; files do not have it.
-    #[getter]
-    fn photons<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "photons")
-    }
-
-    /// Truth: range of the surface that the return came from, or else of the first one along the
-    /// beam, m; NaN where there is none.
-    #[getter]
-    fn true_range<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "true_range")
-    }
-
-    /// Truth: index of the object in `objects`; 65535 where there is none.
-    #[getter]
-    fn object<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "object")
-    }
-
-    /// Truth: index of the material in `materials`; 65535 where there is none.
-    #[getter]
-    fn material<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "material")
-    }
-
-    /// Truth: angle of incidence, rad; NaN where there is no surface.
-    #[getter]
-    fn incidence<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "incidence")
-    }
-
-    /// Truth: how the return came out, an index into `macropulse.OUTCOMES`: 1 right, 2 near, 3
-    /// wrong, 5 false, 6 edge.
-    #[getter]
-    fn outcome<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        column!(slf, "outcome")
-    }
-
     /// All columns by name that the scan has: a simulated one all, with the truth; one that was read
     /// those of its file.
     ///
@@ -251,8 +131,8 @@ impl Scan {
     ///     A dictionary of arrays, as `pandas.DataFrame` and `numpy.savez` take it.
     fn columns<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let columns = PyDict::new(slf.py());
-        for name in slf.get().names() {
-            columns.set_item(name, lent(slf, &slf.get().known(name)?)?)?;
+        for attribute in slf.get().attributes() {
+            columns.set_item(attribute.name(), Self::array(slf, attribute)?)?;
         }
         Ok(columns)
     }
@@ -386,14 +266,17 @@ impl Scan {
         let tensor = open3d.getattr("core")?.getattr("Tensor")?;
         let point = cloud.getattr("point")?;
         point.set_item("positions", tensor.call1((slf.get().xyz(py)?,))?)?;
-        let columns =
-            [("intensity", "float32"), ("range", "float32"), ("ring", "int32")].into_iter();
-        for (name, kind) in columns {
-            let Some(column) = slf.get().column(name) else { continue };
-            let column = lent(slf, &column)?;
-            let column = column.call_method1("astype", (kind,))?;
-            let column = column.call_method1("reshape", (-1, 1))?;
-            point.set_item(name, tensor.call1((column,))?)?;
+        let columns = [
+            (Attribute::Intensity, "float32"),
+            (Attribute::Range, "float32"),
+            (Attribute::Ring, "int32"),
+        ];
+        for (attribute, kind) in columns {
+            if attribute.is_in(&slf.get().cloud) {
+                let column = Self::array(slf, attribute)?.call_method1("astype", (kind,))?;
+                let column = column.call_method1("reshape", (-1, 1))?;
+                point.set_item(attribute.name(), tensor.call1((column,))?)?;
+            }
         }
         Ok(cloud)
     }

@@ -275,7 +275,7 @@ pub fn score<'py>(scan: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         )));
     };
     let this = scan.get();
-    if !this.has_truth() {
+    if !this.cloud.has_truth() {
         return Err(wrong(
             "the scan has no truth to be judged by; simulate it, or write its file with truth=True",
         ));
