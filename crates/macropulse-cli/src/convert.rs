@@ -9,13 +9,13 @@ use macropulse::formats::{Clouds, Format, Reading, Recording};
 use macropulse::opened::{is_standard_output, is_written_through};
 use macropulse::points::PointCloud;
 
-use crate::fault::{Fault, note, warn};
+use crate::fault::Fault;
 use crate::folder::{Folder, Outputs, check_file};
 use crate::interrupt::Interrupt;
 use crate::memory::MemoryLimit;
 use crate::options::Common;
 use crate::simulate::Formats;
-use crate::text::{counted, print};
+use crate::text::{counted, print, warn};
 
 /// Convert point clouds to another format
 ///
@@ -261,7 +261,7 @@ pub fn run(options: &Convert, common: &Common) -> Result<(), Fault> {
         let told = format!(
             "{moved} {begin} no later than the one before: written with a stamp 0.1 s after it"
         );
-        note(&told, common);
+        common.note(&told);
     }
     if points == 0 {
         warn("not a single point: there is none in what was read");
@@ -321,7 +321,7 @@ impl Conversion<'_> {
             let (name, left_out) = (format.name(), left_out.join(", "));
             let told = format!("{name} cannot hold {left_out}: left out");
             if !left_out.is_empty() && self.said.insert(told.clone()) {
-                note(&told, self.common);
+                self.common.note(&told);
             }
         }
         let scan = cloud.scan;
@@ -350,11 +350,11 @@ impl Conversion<'_> {
 pub fn say_left_out(input: &Path, clouds: &Clouds, reading: &Reading, common: &Common) {
     let (input, left_out) = (input.display(), clouds.left_out());
     if !left_out.is_empty() {
-        note(&format!("{input}: left out: {left_out}"), common);
+        common.note(&format!("{input}: left out: {left_out}"));
     }
     let topics = clouds.topics();
     if topics.len() > 1 && reading.topic.is_none() {
         let topics = topics.join(", ");
-        note(&format!("{input}: has clouds on {topics}; --topic chooses one"), common);
+        common.note(&format!("{input}: has clouds on {topics}; --topic chooses one"));
     }
 }

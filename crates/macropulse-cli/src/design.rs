@@ -6,12 +6,12 @@ use clap::Args;
 use macropulse::sim::Watch;
 use macropulse_study::designs::{PAGE, Requirements, Search, make_room};
 
-use crate::fault::{Fault, warn};
+use crate::fault::Fault;
 use crate::folder::{Folder, Outputs};
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::text::{print, print_json};
+use crate::text::{print, print_json, warn};
 
 /// Find lidars that do what is required, coded and waiting, and where each of them wins
 ///

@@ -4,10 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use crate::fault::{Fault, warn};
-
-/// What a shell expects of a program ended by Ctrl-C.
-pub const EXIT_CODE: u8 = 130;
+use crate::fault::{Fault, INTERRUPTED};
+use crate::text::warn;
 
 /// Held while files are written.
 static WRITING: Mutex<()> = Mutex::new(());
@@ -25,7 +23,7 @@ impl Interrupt {
         signals::heed(move || {
             if raised.swap(true, Ordering::SeqCst) {
                 let _whole = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
-                std::process::exit(i32::from(EXIT_CODE));
+                std::process::exit(i32::from(INTERRUPTED));
             }
             warn("stopping; Ctrl-C again stops at once");
         })

@@ -29,9 +29,11 @@ mod simulate;
 mod speed;
 mod sweep;
 mod text;
+mod usage;
 mod validate;
 mod view;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -39,6 +41,7 @@ use clap_complete::CompleteEnv;
 
 use fault::Fault;
 use options::Common;
+use text::complain;
 
 /// The workbench for pulse-coded lidar: design a code, fire it into a 3-D scene, detect it, decode
 /// it, get a point cloud.
@@ -87,17 +90,34 @@ fn main() -> ExitCode {
     }));
     // A shell that completes a line calls the program once more, with this in its environment.
     CompleteEnv::with_factory(Options::command).var(completions::VARIABLE).complete();
-    // -1 is no option: what wants a number refuses it in its own words.
-    let command = Options::command().mut_subcommands(|one| one.allow_negative_numbers(true));
-    let parsed = command.try_get_matches().and_then(|typed| Options::from_arg_matches(&typed));
-    let done = match parsed {
+    let words: Vec<OsString> = std::env::args_os().collect();
+    let done = match parse(&words) {
         Ok(options) => {
             let ready = interrupt::outlast_limits().and_then(|()| kernels());
             ready.and_then(|()| options.common.use_threads()).and_then(|()| run(&options))
         }
-        Err(usage) => fault::usage(&usage),
+        Err(error) => answer(&error, &words),
     };
-    done.map_or_else(|fault| fault.report(), |()| ExitCode::SUCCESS)
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => {
+            complain(&fault);
+            ExitCode::from(fault.exit_code())
+        }
+    }
+}
+
+fn parse(words: &[OsString]) -> Result<Options, clap::Error> {
+    // -1 is no option: what wants a number refuses it in its own words.
+    let command = Options::command().mut_subcommands(|one| one.allow_negative_numbers(true));
+    command.try_get_matches_from(words).and_then(|typed| Options::from_arg_matches(&typed))
+}
+
+/// Prints help, or refuses the `words` that are no line of this program.
+fn answer(error: &clap::Error, words: &[OsString]) -> Result<(), Fault> {
+    let program = Options::command();
+    let mut before = words.iter().skip(1).take_while(|word| *word != "--");
+    usage::answer(error, before.find_map(|word| program.find_subcommand(word)))
 }
 
 /// Refuses a set of instructions that is misspelt or that this machine does not have.
@@ -170,13 +190,12 @@ mod tests {
             let line = mutator.next(&examples, 200);
             let line = String::from_utf8_lossy(&line);
             let words = std::iter::once("macropulse").chain(line.split_whitespace());
-            let command =
-                Options::command().mut_subcommands(|one| one.allow_negative_numbers(true));
-            match command.try_get_matches_from(words).and_then(|m| Options::from_arg_matches(&m)) {
+            let words: Vec<OsString> = words.map(OsString::from).collect();
+            match parse(&words) {
                 Ok(_) => understood += 1,
                 Err(help) if !help.use_stderr() => understood += 1,
                 Err(wrong) => {
-                    let told = fault::usage(&wrong);
+                    let told = answer(&wrong, &words);
                     assert!(matches!(told, Err(Fault::Wrong(_) | Fault::Told)), "{line}");
                     refused += 1;
                 }

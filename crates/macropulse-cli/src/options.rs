@@ -1,5 +1,9 @@
 //! What every command understands.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
 use clap::{Args, ValueEnum};
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::design::{self, WITH, WITHOUT};
@@ -9,6 +13,7 @@ use macropulse::scene;
 
 use crate::completions;
 use crate::fault::Fault;
+use crate::text::warn;
 
 /// Options of every command.
 #[derive(Args)]
@@ -24,7 +29,7 @@ pub struct Common {
 
     /// Threads to compute with; 0 is one per core. The results do not depend on it
     #[arg(short = 'j', long, global = true, value_name = "N", default_value_t = 0)]
-    #[arg(value_parser = clap::value_parser!(u16).range(0..=MOST_THREADS as i64))]
+    #[arg(value_parser = whole(0..=MOST_THREADS))]
     pub threads: u16,
 
     /// How progress is shown on stderr
@@ -33,7 +38,7 @@ pub struct Common {
 }
 
 /// Threads at most.
-const MOST_THREADS: u64 = 1024;
+const MOST_THREADS: u16 = 1024;
 
 /// The variable by which rayon is asked for threads.
 const RAYON_THREADS: &str = "RAYON_NUM_THREADS";
@@ -50,12 +55,20 @@ pub enum ProgressKind {
 }
 
 impl Common {
+    /// Says on stderr, as one sentence, what a user should know although all went as asked, unless
+    /// the program is to be quiet.
+    pub fn note(&self, sentence: &str) {
+        if !self.quiet {
+            warn(sentence);
+        }
+    }
+
     /// Lets rayon use as many threads as asked for, with `--threads` or, if that is 0, by its own
     /// RAYON_NUM_THREADS.
     pub fn use_threads(&self) -> Result<(), Fault> {
         let asked = (self.threads == 0).then(|| std::env::var(RAYON_THREADS).ok()).flatten();
         if let Some(asked) =
-            asked.filter(|asked| asked.parse().is_ok_and(|n: u64| n > MOST_THREADS))
+            asked.filter(|asked| asked.parse().is_ok_and(|n: u64| n > u64::from(MOST_THREADS)))
         {
             let message =
                 format!("{RAYON_THREADS} is {asked}; it must be from 0 to {MOST_THREADS}");
@@ -65,6 +78,20 @@ impl Common {
             .num_threads(usize::from(self.threads))
             .build_global()
             .map_err(|error| Fault::Ours(format!("cannot start the threads: {error}")))
+    }
+}
+
+/// A parser of whole numbers within `limits`.
+pub fn whole<T>(limits: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone
+where
+    T: FromStr + PartialOrd + Display + Clone,
+{
+    move |typed| match typed.parse() {
+        Ok(number) if limits.contains(&number) => Ok(number),
+        _ => {
+            let (least, most) = (limits.start(), limits.end());
+            Err(format!("it must be a whole number from {least} to {most}"))
+        }
     }
 }
 

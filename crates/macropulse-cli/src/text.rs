@@ -1,9 +1,11 @@
 //! What is printed: to stdout, with counts and durations one can read, and to stderr. Nothing else in the
 //! program writes to either.
 
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Write, stderr};
 
+use anstyle::AnsiColor;
 use macropulse::formats::versioned;
+use macropulse_study::text::broken;
 pub use macropulse_study::text::{Columns, NO_BREAK, grouped, section, short};
 
 use crate::fault::Fault;
@@ -33,6 +35,54 @@ pub fn pour(bytes: &[u8]) -> Result<bool, Fault> {
 /// what is said there is not what was asked for, and its loss ends no run.
 pub fn say(line: &str) {
     let _ = writeln!(anstream::stderr(), "{line}");
+}
+
+/// Says on stderr the reasons of a `fault`, one sentence each.
+pub fn complain(fault: &Fault) {
+    fault.sentences().iter().for_each(|sentence| tell(sentence, AnsiColor::Red));
+}
+
+/// Says on stderr, as one sentence, that something went otherwise than was asked for: a result
+/// without a point, a run that was stopped.
+pub fn warn(sentence: &str) {
+    tell(sentence, AnsiColor::Yellow);
+}
+
+/// A sentence on stderr, with the name of the program before it: on a terminal in colour and broken
+/// at its width, elsewhere one line.
+fn tell(sentence: &str, colour: AnsiColor) {
+    let text = format!("macropulse: {}", one_line(sentence));
+    let text = match terminal_size::terminal_size_of(stderr()) {
+        Some((terminal_size::Width(width), _)) => broken(&text, usize::from(width)).join("\n  "),
+        None => text,
+    };
+    let rest = text.strip_prefix("macropulse:").unwrap_or(&text);
+    let name = colour.on_default().bold();
+    // Without colour where stderr is no terminal, or NO_COLOR is set.
+    say(&format!("{name}macropulse:{name:#}{rest}"));
+}
+
+/// A text in one line: names and files that it repeats may have several, and signs that a terminal
+/// would obey.
+fn one_line(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let text = lines.collect::<Vec<_>>().join(" ").replace('\t', " ");
+    clipped(harmless(&text, |_| char::REPLACEMENT_CHARACTER.to_string()))
+}
+
+/// Most letters of a sentence, at its beginning and at its end: a word of a file may have millions.
+const MOST_LETTERS: [usize; 2] = [3000, 1000];
+
+/// A sentence without its middle where that is too long.
+fn clipped(text: String) -> String {
+    let [head, tail] = MOST_LETTERS;
+    let place = |letter: Option<(usize, char)>| letter.map(|(place, _)| place);
+    let from = place(text.char_indices().nth(head));
+    let to = place(text.char_indices().rev().nth(tail));
+    match (from, to) {
+        (Some(from), Some(to)) if from < to => format!("{} … {}", &text[..from], &text[to..]),
+        _ => text,
+    }
 }
 
 /// A text in which every sign that a terminal would obey is `replaced`: control characters, and those that
@@ -106,6 +156,20 @@ pub fn counted(number: u64, one: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_terminal_is_told_nothing_to_obey() {
+        assert_eq!(one_line(" a\u{1b}[31mb\u{7}\tc\n\n d"), "a\u{fffd}[31mb\u{fffd} c d");
+    }
+
+    #[test]
+    fn a_word_of_millions_of_letters_is_told_by_its_beginning_and_its_end() {
+        let told = one_line(&format!("a.obj: line 1 has {}; mend it", "\u{e9}".repeat(1_000_000)));
+        assert!(told.starts_with("a.obj: line 1 has \u{e9}") && told.ends_with("\u{e9}; mend it"));
+        assert!(told.chars().count() < 4100 && told.contains(" … "));
+        let whole = "\u{e9}".repeat(4000);
+        assert_eq!(one_line(&whole), whole);
+    }
 
     #[test]
     fn a_schema_is_not_named_where_it_is_not() {

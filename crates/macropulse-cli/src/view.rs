@@ -12,7 +12,7 @@ use macropulse_study::view::Explorer;
 use serde_json::Value;
 
 use crate::convert::say_left_out;
-use crate::fault::{Fault, note};
+use crate::fault::Fault;
 use crate::folder::{Outputs, check_file};
 use crate::memory::MemoryLimit;
 use crate::options::Common;
@@ -158,7 +158,7 @@ fn of_folder(
             "{folder}: {first} leads out of the folder ({count} such in all) and is not shown; name the \
              file itself to see it"
         );
-        note(&told, reader.common);
+        reader.common.note(&told);
     }
     if left.is_unfinished {
         let folder = folder.display();
@@ -166,7 +166,7 @@ fn of_folder(
             "{folder}: the run that writes into it is not over, or was killed: what is shown may be of \
              several runs"
         );
-        note(&told, reader.common);
+        reader.common.note(&told);
     }
     let clouds = left.clouds();
     if clouds.is_empty() {

@@ -21,7 +21,7 @@ use crate::kind::Kind;
 use crate::memory::{self, MemoryLimit, told};
 use crate::options::{Changes, Common, Outside, Surroundings};
 use crate::simulate::scenario::Scenario;
-use crate::text::{Columns, counted, print, print_json};
+use crate::text::{Columns, complain, counted, print, print_json};
 
 /// Check sensors, scenes and scenarios, and print what follows from them
 ///
@@ -62,7 +62,7 @@ pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
         match Report::of(file, &changes, options) {
             Ok(report) => reports.push(report),
             Err(fault) => {
-                fault.report();
+                complain(&fault);
                 wrong = true;
             }
         }

@@ -14,12 +14,12 @@ use macropulse_study::record::{self, Decoded, PAGE, Page};
 use serde_json::Value;
 
 use crate::explain::{self, Pixel};
-use crate::fault::{Fault, note, warn};
+use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
-use crate::text::pour;
+use crate::text::{pour, warn};
 
 /// Where the points go.
 pub enum Sink {
@@ -251,7 +251,7 @@ impl<'a> Run<'a> {
         if let Sink::Folder(folder, ..) = sink
             && let Some(older) = folder.warning_of_older(&self.files)
         {
-            note(&older, common);
+            common.note(&older);
             self.warnings.push(older);
         }
     }

@@ -15,11 +15,12 @@ use serde_json::Value;
 use super::recorded::{RecordFiles, Recorded};
 use super::scenario::Scenario;
 use crate::explain::{self, Explained, Pixel};
-use crate::fault::{Fault, note, warn};
+use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
 use crate::options::Common;
 use crate::progress::Progress;
+use crate::text::warn;
 
 /// A run that is over, with all that was counted.
 pub struct Run<'a> {
@@ -259,7 +260,7 @@ impl<'a> Run<'a> {
         found.extend(folder.and_then(|folder| folder.warning_of_older(&self.files)));
         let named = |warning: &String| format!("{}: {warning}", self.design.name);
         wrong.iter().for_each(|warning| warn(&named(warning)));
-        found.iter().for_each(|warning| note(&named(warning), common));
+        found.iter().for_each(|warning| common.note(&named(warning)));
         self.warnings.extend(wrong.into_iter().chain(found));
     }
 

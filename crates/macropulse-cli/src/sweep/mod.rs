@@ -2,6 +2,7 @@
 
 mod summary;
 
+use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -12,15 +13,15 @@ use macropulse::sim::Watch;
 use macropulse_study::sweep::{Axis, Error, FILES, Job, Metric, Plan, Request, Shard};
 
 use crate::completions;
-use crate::fault::{Fault, warn};
+use crate::fault::Fault;
 use crate::folder::{Outputs, refuse_no_folder};
 use crate::input::STREAM;
 use crate::interrupt::Interrupt;
 use crate::kind;
 use crate::memory::MemoryLimit;
-use crate::options::{Changes, Common, Outside, Surroundings};
+use crate::options::{Changes, Common, Outside, Surroundings, whole};
 use crate::progress::Progress;
-use crate::text::{NO_BREAK, counted, print};
+use crate::text::{NO_BREAK, counted, print, warn};
 
 /// Vary a key of a sensor and draw how well it does, with 95 % intervals
 ///
@@ -74,17 +75,17 @@ pub struct Sweep {
 
     /// Scans of each value, with a seed each
     #[arg(long, value_name = "N", default_value_t = 8)]
-    #[arg(value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(value_parser = whole(1..=10_000_u64))]
     seeds: u64,
 
     /// First seed
     #[arg(long, value_name = "N", default_value_t = 1)]
-    #[arg(value_parser = clap::value_parser!(u64).range(..=1 << 62))]
+    #[arg(value_parser = whole(0..=1_u64 << 62))]
     seed: u64,
 
     /// Measure only about so many shots of each scan, in whole bands, evenly over it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    shots: Option<u64>,
+    #[arg(long, value_name = "N")]
+    shots: Option<NonZeroU64>,
 
     /// Do only every n-th scan from the i-th: for several machines on one sweep
     #[arg(long, value_name = "I/N")]
@@ -153,7 +154,7 @@ impl Sweep {
             set,
             vary: self.vary.clone(),
             seeds: self.seed..self.seed + self.seeds,
-            shots: self.shots,
+            shots: self.shots.map(NonZeroU64::get),
         })
     }
 }
