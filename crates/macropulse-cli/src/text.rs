@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Write, stderr};
 use anstyle::AnsiColor;
 use macropulse::formats::versioned;
 use macropulse_study::text::broken;
-pub use macropulse_study::text::{Columns, NO_BREAK, grouped, section, short};
+pub use macropulse_study::text::{Columns, NO_BREAK, counted, grouped, section, short};
 
 use crate::fault::Fault;
 
@@ -141,16 +141,6 @@ pub fn lasted(seconds: f64) -> String {
 /// The first sentence of a text.
 pub fn first_sentence(text: &str) -> &str {
     text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.')
-}
-
-/// `1 file`, `2 files`.
-pub fn counted(number: u64, one: &str) -> String {
-    let ending = match one {
-        _ if number == 1 => "",
-        "echo" => "es",
-        _ => "s",
-    };
-    format!("{} {one}{ending}", grouped(number))
 }
 
 #[cfg(test)]

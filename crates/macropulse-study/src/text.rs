@@ -26,6 +26,14 @@ impl Columns {
         }
     }
 
+    /// As [`Self::push_list`] of the first `most` entries as `say` prints them, and the number of
+    /// further ones.
+    pub fn push_some<T>(&mut self, name: &str, all: &[T], most: usize, say: impl Fn(&T) -> String) {
+        let more = all.len().saturating_sub(most);
+        let more = (more > 0).then(|| format!("and {more} more"));
+        self.push_list(name, all.iter().take(most).map(say).chain(more));
+    }
+
     /// All lines, indented by two, with plain blanks, as wide as the terminal that standard output
     /// is.
     pub fn text(&self) -> String {
@@ -87,6 +95,16 @@ pub fn short(number: f64) -> String {
     } else {
         text
     }
+}
+
+/// `1 file`, `2 files`.
+pub fn counted(number: u64, one: &str) -> String {
+    let ending = match one {
+        _ if number == 1 => "",
+        "echo" => "es",
+        _ => "s",
+    };
+    format!("{} {one}{ending}", grouped(number))
 }
 
 /// 1234567 as `1 234 567`, with blanks that keep it on its line.

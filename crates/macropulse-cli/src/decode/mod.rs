@@ -11,10 +11,10 @@ use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
 use macropulse::channel::Operating;
 use macropulse::formats::Format;
-use macropulse_study::record::{MANIFEST, PAGE};
+use macropulse_study::record::{MANIFEST, PAGE, Pixel, explanation_files};
 
 use crate::completions;
-use crate::explain::{self, Pixel};
+use crate::explain;
 use crate::fault::Fault;
 use crate::folder::{Folder, Outputs};
 use crate::input::STREAM;
@@ -125,7 +125,7 @@ impl Decode {
         let (formats, pixels) = (formats.to_vec(), self.explain.clone());
         let fixed = [Some(MANIFEST), has_page.then_some(PAGE)];
         let outputs = Outputs::of_scans(fixed.into_iter().flatten(), move |scan| {
-            let explained = pixels.iter().flat_map(|pixel| explain::names(scan, *pixel));
+            let explained = pixels.iter().flat_map(|pixel| explanation_files(scan, *pixel));
             files_of_scan(&formats, scan).chain(explained).collect()
         });
         outputs.beside(&[self.shots.as_path(), &self.record, Path::new(&self.sensor)])

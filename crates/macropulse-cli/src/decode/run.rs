@@ -10,10 +10,10 @@ use macropulse::environment::Environment;
 use macropulse::formats::{Format, State, write_csv_lines, write_manifest};
 use macropulse::points::{PointCloud, Scale};
 use macropulse_study::decoding::{Band, Decoding};
-use macropulse_study::record::{self, Decoded, PAGE, Page};
+use macropulse_study::record::{self, Decoded, PAGE, Page, Pixel, PixelExplanation};
 use serde_json::Value;
 
-use crate::explain::{self, Pixel};
+use crate::explain;
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
@@ -208,13 +208,14 @@ impl<'a> Run<'a> {
             let shot = explain::shot_of(&band.log, *pixel);
             let Some(shot) = shot else { continue };
             let given = (&band.log, &band.given);
-            let explained = explain::Explained::of(self.setting.design, given, shot)?;
-            self.explained.push((explained.text(), explained.json()));
+            let design = self.setting.design;
+            let explained = PixelExplanation::new(design, given, shot, |_| None)?;
             if let Sink::Folder(folder, ..) = sink {
                 folder.make_once()?;
-                self.files.extend(explained.write(folder.path())?);
+                self.files.extend(explained.write(folder.path(), design)?);
                 folder.keep();
             }
+            self.explained.push((explained.text(), explained.summary()));
         }
         match sink {
             Sink::Lines => self.print(&band.piece.points),

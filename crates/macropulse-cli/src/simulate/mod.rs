@@ -15,6 +15,7 @@ use clap_complete::engine::ArgValueCompleter;
 use macropulse::codec::decode::ReceiverKind;
 use macropulse::memory::Estimate;
 use macropulse::scene::{Changes, Room};
+use macropulse_study::record::Pixel;
 
 use crate::completions;
 use crate::explain;
@@ -111,7 +112,7 @@ pub struct Simulate {
 
     /// Say why the shot to this pixel was decided as it was, in the first scan; repeatable
     #[arg(long = "explain", value_name = "ROW,COLUMN", value_parser = explain::pixel)]
-    explain: Vec<explain::Pixel>,
+    explain: Vec<Pixel>,
 
     /// Print what was counted as JSON: an object, or an array of them for several sensors
     #[arg(long)]

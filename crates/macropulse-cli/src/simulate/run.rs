@@ -8,13 +8,13 @@ use macropulse::formats::{Format, Manifest, State};
 use macropulse::points::Truth;
 use macropulse::scene::Scene;
 use macropulse::score::Score;
-use macropulse::sim::{Record, Scans, Tally, Watch};
-use macropulse_study::record::{self, COLOUR, PAGE, Page};
+use macropulse::sim::{Record, Scans, Stretch, Tally, Watch};
+use macropulse_study::record::{self, COLOUR, PAGE, Page, Pixel, PixelExplanation};
 use serde_json::Value;
 
 use super::recorded::{RecordFiles, Recorded};
 use super::scenario::Scenario;
-use crate::explain::{self, Explained, Pixel};
+use crate::explain;
 use crate::fault::Fault;
 use crate::folder::Folder;
 use crate::interrupt::Interrupt;
@@ -180,13 +180,12 @@ impl<'a> Run<'a> {
                 self.warnings.push("a pixel of --explain has no shot".to_owned());
                 continue;
             };
-            let explained = Explained::of(self.design, (&log, &given), shot)?;
-            let arrivals = scans.arrivals(&band, &explained.stretch());
-            let explained = explained.with(arrivals);
-            self.explained.push((explained.text(), explained.json()));
+            let arrivals = |stretch: &Stretch| Some(scans.arrivals(&band, stretch));
+            let explained = PixelExplanation::new(self.design, (&log, &given), shot, arrivals)?;
             if let Some(folder) = folder {
-                self.files.extend(explained.write(folder.path())?);
+                self.files.extend(explained.write(folder.path(), self.design)?);
             }
+            self.explained.push((explained.text(), explained.summary()));
         }
         Ok(())
     }

@@ -10,12 +10,11 @@ use macropulse::emit::most_scans;
 use macropulse::formats::Format;
 use macropulse::scene::{Changes, Room, Scene};
 use macropulse::told;
-use macropulse_study::record::{MANIFEST, PAGE, colour_name};
+use macropulse_study::record::{MANIFEST, PAGE, Pixel, colour_name, explanation_files};
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::formats::{Formats, Records};
-use crate::explain::{self, Pixel};
 use crate::fault::Fault;
 use crate::folder::Outputs;
 use crate::input::{self, STREAM};
@@ -81,7 +80,7 @@ impl Scenario {
                 return Vec::new();
             }
             let explained = explain.iter().filter(|_| scan == 0);
-            let explained = explained.flat_map(|pixel| explain::names(scan, *pixel));
+            let explained = explained.flat_map(|pixel| explanation_files(scan, *pixel));
             let records = kept.into_iter().flat_map(|kept| kept.names(scan));
             files_of_scan(&formats, scan).chain(records).chain(explained).collect()
         })

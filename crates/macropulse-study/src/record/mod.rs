@@ -1,9 +1,9 @@
 //! What a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
 
 mod decoded;
+mod explanation;
 mod folder;
 mod page;
-mod pixel;
 
 use std::path::{Path, PathBuf};
 
@@ -26,9 +26,9 @@ use macropulse::sim::Tally;
 use serde_json::json;
 
 pub use decoded::Decoded;
+pub use explanation::{Pixel, PixelExplanation, explanation_files};
 pub use folder::{CloudsAt, Left};
 pub use page::{MANIFEST, PAGE, Page, describe, explain, title};
-pub use pixel::picture as pixel_picture;
 
 /// How the names of range images in colour end.
 pub const COLOUR: &str = "-colour.png";

@@ -8,7 +8,7 @@ use macropulse::points::PointCloud;
 use macropulse::scene::Scene;
 use serde_json::Value;
 
-use super::pixel;
+use super::explanation;
 use crate::text::grouped;
 use crate::view::Explorer;
 
@@ -88,8 +88,8 @@ fn titled(sensor: &str, scene: Option<&str>) -> String {
 /// Adds what was sent and received of a pixel, if the file at `path` explains one.
 pub fn explain(page: &mut Explorer, path: &Path) {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    if pixel::is_explanation(&name)
-        && let Some(section) = pixel::section(path)
+    if explanation::is_explanation(&name)
+        && let Some(section) = explanation::section(path)
     {
         page.section(section);
     }
