@@ -1,5 +1,8 @@
 //! Help with misspelt names, places in texts, and values typed on a command line.
 
+use std::ops::Range;
+
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
@@ -33,19 +36,45 @@ pub(crate) fn line_column(text: &str, offset: usize) -> (usize, usize) {
     (line, column)
 }
 
+/// A step from a value to one below it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Step {
+    /// To the value of a key of a table.
+    Key(String),
+    /// To an entry of a list.
+    Entry(usize),
+}
+
+/// Bytes, in a TOML `text`, of the value to which the `steps` lead, or of its key.
+pub(crate) fn span_of(text: &str, steps: &[Step], of_key: bool) -> Option<Range<usize>> {
+    let root = DeTable::parse(text).ok()?;
+    let (mut value, mut span) = (None::<&Spanned<DeValue>>, 0..0);
+    for step in steps {
+        let below = match step {
+            Step::Key(key) => {
+                let table = match value {
+                    None => root.get_ref(),
+                    Some(value) => value.get_ref().as_table()?,
+                };
+                let (name, below) = table.iter().find(|(name, _)| name.get_ref() == key)?;
+                span = if of_key { name.span() } else { below.span() };
+                below
+            }
+            Step::Entry(at) => {
+                let below = value?.get_ref().as_array()?.get(*at)?;
+                span = below.span();
+                below
+            }
+        };
+        value = Some(below);
+    }
+    Some(span)
+}
+
 /// Byte offset, in a TOML `text`, of the key at the dotted `path`.
 pub(crate) fn offset_of_key(text: &str, path: &str) -> Option<usize> {
-    let root = DeTable::parse(text).ok()?;
-    let mut table = root.get_ref();
-    let mut keys = path.split('.').peekable();
-    while let Some(key) = keys.next() {
-        let (name, value) = table.iter().find(|(name, _)| name.get_ref().as_ref() == key)?;
-        if keys.peek().is_none() {
-            return Some(name.span().start);
-        }
-        table = value.get_ref().as_table()?;
-    }
-    None
+    let steps: Vec<Step> = path.split('.').map(|key| Step::Key(key.to_owned())).collect();
+    span_of(text, &steps, true).map(|span| span.start)
 }
 
 /// The key, or the element of a list, that stands around the byte at `offset` of a TOML `text`, as

@@ -3,20 +3,33 @@
 //! A schema follows from the types that read the file: keys, kinds of value, limits and what is said
 //! of each are theirs.
 
+mod misfit;
+mod read;
+
 use schemars::generate::SchemaSettings;
 use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema, json_schema};
 use serde_json::{Map, Value};
 
-use crate::told;
+pub(crate) use misfit::{Fault, Misfit};
+pub(crate) use read::read;
+pub use read::{Refusal, read_file, read_text};
 
 /// The schema of files that are read as a `T`, in one piece, called `title`.
 pub fn of<T: JsonSchema>(title: &str) -> Schema {
+    let mut schema = of_reader::<T>();
+    let without_widths = |schema: &mut Schema| drop(schema.remove("format"));
+    RecursiveTransform(without_widths).transform(&mut schema);
+    schema.insert("title".to_owned(), title.into());
+    schema
+}
+
+/// As [`of`], with the widths of numbers.
+fn of_reader<T: JsonSchema>() -> Schema {
     let mut settings = SchemaSettings::draft07();
     settings.inline_subschemas = true;
     let mut schema = settings.into_generator().into_root_schema_for::<T>();
     RecursiveTransform(tidied).transform(&mut schema);
-    schema.insert("title".to_owned(), title.into());
     schema
 }
 
@@ -39,40 +52,9 @@ pub(crate) fn explained(words: impl IntoIterator<Item = (&'static str, &'static 
     json_schema!({ "oneOf": words.collect::<Vec<_>>() })
 }
 
-/// What stands at `path` in a file of this `schema`, as at `object[0].shape`.
-pub(crate) fn at<'a>(schema: &'a Value, path: &str) -> Option<&'a Value> {
-    let mut keys = path.split(['.', '[']).filter(|key| !key.is_empty());
-    keys.try_fold(schema, |node, key| match key.ends_with(']') {
-        true => node.get("items"),
-        false => member(node, key),
-    })
-}
-
-/// What is wrong at `path` in a file of this `schema`, from what the parser `said` of it. Gives the
-/// path, too: of one of several kinds that was named without its value the parser knows the kind,
-/// and what is wrong is where it was named.
-pub(crate) fn told(schema: &Value, path: &str, said: &str) -> (String, String) {
-    let is_choice = |node: &Value| node.get("oneOf").is_some() && node.get("properties").is_none();
-    let above = path
-        .rsplit_once('.')
-        .map(|(above, _)| above)
-        .filter(|above| said.contains(" variant") && at(schema, above).is_some_and(is_choice));
-    let path = above.unwrap_or(path);
-    let wanted = at(schema, path).and_then(wanted);
-    (path.to_owned(), told::wrong(said, wanted.as_deref()))
-}
-
-/// The schema of a `key` of a table, be it of one variant.
-fn member<'a>(node: &'a Value, key: &str) -> Option<&'a Value> {
-    let variants = ["oneOf", "anyOf"].into_iter().filter_map(|kind| node.get(kind)?.as_array());
-    let mut tables = std::iter::once(node).chain(variants.flatten());
-    tables.find_map(|table| table.get("properties")?.get(key))
-}
-
 /// What must stand where `node` is the schema, in words: its kind, its limits, its choices.
 pub(crate) fn wanted(node: &Value) -> Option<String> {
-    let choices = ["oneOf", "anyOf"].into_iter().find_map(|kind| node.get(kind)?.as_array());
-    if let Some(choices) = choices.filter(|_| node.get("properties").is_none()) {
+    if let Some(choices) = choices(node) {
         let choices: Vec<String> = choices.iter().filter_map(choice).collect();
         return Some(choices.join(" or "));
     }
@@ -100,6 +82,12 @@ pub(crate) fn wanted(node: &Value) -> Option<String> {
         "object" => table(node),
         _ => return None,
     })
+}
+
+/// The schemas of which a value must fit one.
+fn choices(node: &Value) -> Option<&[Value]> {
+    let choices = ["oneOf", "anyOf"].into_iter().find_map(|kind| node.get(kind)?.as_array());
+    choices.filter(|_| node.get("properties").is_none()).map(Vec::as_slice)
 }
 
 /// One of several things that may stand somewhere.
@@ -145,11 +133,9 @@ fn homes_below(node: &Value, key: &str, path: &str, found: &mut Vec<String>) {
     }
 }
 
-/// What Rust says and TOML or its editors do not know: absence as a value, widths of numbers, lines
-/// of comments.
+/// What Rust says and TOML or its editors do not know: absence as a value, lines of comments.
 fn tidied(schema: &mut Schema) {
     let Some(keywords) = schema.as_object_mut() else { return };
-    keywords.remove("format");
     if keywords.get("default").is_some_and(Value::is_null) {
         keywords.remove("default");
     }

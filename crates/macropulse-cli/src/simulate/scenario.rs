@@ -9,8 +9,9 @@ use macropulse::design::{Design, preset_text};
 use macropulse::emit::most_scans;
 use macropulse::formats::Format;
 use macropulse::scene::{Changes, Room, Scene};
-use macropulse::told;
+use macropulse::schema::read_text;
 use macropulse_study::record::{MANIFEST, PAGE, Pixel, colour_name, explanation_files};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -49,16 +50,22 @@ pub fn files_of_scan(formats: &[Format], scan: u64) -> impl Iterator<Item = Stri
 }
 
 /// A scenario file as typed.
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ScenarioFile {
+    #[schemars(with = "i64")]
     version: Spanned<i64>,
+    #[schemars(with = "Option<String>")]
     sensor: Option<Spanned<String>>,
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     sensors: Vec<Spanned<String>>,
+    #[schemars(with = "String")]
     scene: Spanned<String>,
+    #[schemars(with = "Option<u64>")]
     scans: Option<Spanned<u64>>,
     seed: Option<u64>,
+    #[schemars(with = "Option<Vec<String>>")]
     formats: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     truth: bool,
@@ -132,7 +139,7 @@ impl Scenario {
         let (text, origin) = input::text(name)?;
         let source = Source { text: &text, origin: &origin };
         let file: ScenarioFile =
-            toml::from_str(&text).map_err(|error| source.typed_wrongly(&error))?;
+            read_text(&text).map_err(|refusal| source.fault(refusal.span, &refusal.message))?;
         if *file.version.get_ref() != VERSION {
             let message = format!(
                 "version is {}, but this program reads version {VERSION}",
@@ -238,14 +245,6 @@ impl Source<'_> {
         let line = before.matches('\n').count() + 1;
         let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
         Fault::Wrong(format!("{}:{line}:{column}: {message}", self.origin))
-    }
-
-    fn typed_wrongly(&self, error: &toml::de::Error) -> Fault {
-        let message = match self.text.parse::<toml::Table>() {
-            Ok(_) => told::wrong(error.message(), None),
-            Err(syntax) => told::syntax(self.text, &syntax),
-        };
-        self.fault(error.span().unwrap_or(0..0), &message)
     }
 }
 

@@ -201,7 +201,7 @@ const OTHERS: &[Row] = &[
     ("codes prime=1", &["1 is not an odd prime", "3"]),
     ("codes prime=1000000", &["the largest possible prime is 251"]),
     ("codes m-sequence=2", &["use 3 to 15"]),
-    ("codes orthogonal=5", &["as { key = value }"]),
+    ("codes orthogonal=5", &["is 5", "{ length = …, weight = … }"]),
     ("codes orthogonal={length=10}", &["`weight` is missing"]),
     ("codes orthogonal={length=10,weight=11}", &["use 1 to 10"]),
     ("codes sparse={length=100000,weight=3,words=9,seed=1}", &["use 1 to 65535"]),

@@ -19,7 +19,7 @@ const ROWS: &[Row] = &[
     ),
     (
         "[[object]]\nmesh = \"a.obj\"\nunit = 1",
-        &["mine.toml:4:8:", "`unit` must be \"m\" or \"cm\""],
+        &["mine.toml:4:8:", "`unit` is 1, but must be \"m\" or \"cm\""],
     ),
     ("[[object]]\nmesh = \"a.obj\"\nup = \"Z\"", &["mine.toml:4:6:", "did you mean `z`?"]),
     (
@@ -60,7 +60,7 @@ const ROWS: &[Row] = &[
     ("[[object]]\nshape = { plane = { normal = [0, 0, 0] } }", &["mine.toml:3:9:", "not zero"]),
     (
         "[[object]]\nshape = { sphere = { radius_m = 1 }, box = { size_m = [1, 1, 1] } }",
-        &["mine.toml:3:9:", "must be"],
+        &["mine.toml:3:9:", "exactly one, as { sphere = … }"],
     ),
     ("[[object]]\ncar = true", &["mine.toml:3:7:", "`car` is true", "a table, as {}"]),
     (

@@ -58,8 +58,11 @@ const ROWS: &[Row] = &[
 /// Behind three lines that extend a raster with a code.
 const OF_CODES: &[Row] = &[
     ("[code]\nfamily = \"prime\"", &["mine.toml:5:1:", "code.family: must be { prime = … } or"]),
-    ("[code]\nfamily = { prime = 29, gold = 7 }", &["mine.toml:5:1:", "exactly one family"]),
-    ("[code]\nfamily = { primes = 29 }", &["mine.toml:5:1:", "did you mean `prime`?"]),
+    (
+        "[code]\nfamily = { prime = 29, gold = 7 }",
+        &["mine.toml:5:1:", "exactly one, as { prime = … }"],
+    ),
+    ("[code]\nfamily = { primes = 29 }", &["mine.toml:5:12:", "did you mean `prime`?"]),
     ("[code]\nfamily = { prime = \"29\" }", &["mine.toml:5:12:", "take the quotes away"]),
     ("[code]\nfamily = { prime = 28 }", &["mine.toml:5:", "28 is not an odd prime", "29"]),
     ("[code]\nfamily = { gold = 8 }", &["mine.toml:5:1:", "use 5, 6, 7, 9, 10 or 11"]),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use macropulse::environment::Environment;
+use macropulse::schema::read_file;
 use macropulse::{opened, told};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -200,7 +201,7 @@ impl Requirements {
     /// # Errors
     /// As [`Requirements::open`].
     pub fn from_toml(text: &str, origin: &str, folder: &Path) -> Result<Self, Error> {
-        let file: File = told::typed(text, origin).map_err(Error::Asked)?;
+        let file: File = read_file(text, origin).map_err(Error::Asked)?;
         let refused =
             |path: &str, message: &str| Error::Asked(told::at(text, origin, path, message));
         let refuse = |path: &str, message: &str| Err(refused(path, message));

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::Error;
 use crate::names::nearest;
-use crate::told;
+use crate::schema;
 use macropulse_codec::code::{self, Family, Separated, Sparse};
 
 /// Code families by the names they have in a sensor file.
@@ -161,8 +161,7 @@ pub fn family_from_toml(text: &str) -> Result<Family, Error> {
         let known = FAMILIES.join(", ");
         return Err(wrong(format!("`{name}` is no code family; {hint}known are {known}")));
     }
-    let file = FamilyFile::deserialize(toml::Value::Table(table.clone()))
-        .map_err(|error: toml::de::Error| wrong(told::wrong(error.message(), None)))?;
+    let file: FamilyFile = schema::read(&table).map_err(|misfit| wrong(misfit.message()))?;
     family(file).map_err(|error| wrong(error.to_string()))
 }
 

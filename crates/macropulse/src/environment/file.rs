@@ -6,6 +6,7 @@ use toml::{Table, Value};
 
 use super::{DEFAULT, Effect, Environment, Error, Sunlight, ready};
 use crate::names::nearest;
+use crate::schema;
 
 /// The key of a change that takes an effect off the list `idealised`.
 pub const WITH: &str = "with";
@@ -137,8 +138,8 @@ fn unknown(key: &str, name: &str) -> Error {
 
 impl Typed {
     fn of(table: &Table) -> Result<Self, Error> {
-        serde_path_to_error::deserialize(Value::Table(table.clone()))
-            .map_err(|error| typed_wrongly(&error))
+        schema::read(table)
+            .map_err(|misfit| Error { key: misfit.path(), message: misfit.message() })
     }
 
     fn of_ready(name: &str) -> Result<Self, Error> {
@@ -251,16 +252,6 @@ impl Typed {
         }
         Ok(())
     }
-}
-
-/// Turns serde's words into a key and a sentence.
-fn typed_wrongly(error: &serde_path_to_error::Error<toml::de::Error>) -> Error {
-    let path = error.path().to_string();
-    let path = if path == "." { String::new() } else { path };
-    let said = error.inner().message();
-    let wrong = said.split('`').nth(1).filter(|_| said.starts_with("unknown field"));
-    let (path, message) = crate::schema::told(&super::schema(), &path, said);
-    Error { key: wrong.map_or(path, str::to_owned), message }
 }
 
 #[cfg(test)]

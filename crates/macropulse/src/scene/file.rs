@@ -13,7 +13,7 @@ use super::error::Error;
 use super::schema;
 use super::spanned::{Spanned, Triple};
 use crate::names::{key_at, line_column, offset_of_key};
-use crate::told;
+use crate::schema::{Refusal, read_text};
 
 /// Keys whose tables are many, each with a header in two brackets.
 const LISTS: [&str; 3] = ["material", "object", "interferers"];
@@ -403,32 +403,27 @@ impl<'a> Source<'a> {
 
     /// Reads the file.
     pub(super) fn parse(&self) -> Result<SceneFile, Error> {
-        toml::from_str(self.text).map_err(|fault| {
-            let span = fault.span().unwrap_or(0..0);
-            let message = match self.text.parse::<Table>() {
-                Ok(_) => self.wrong_value(span.start, fault.message()),
-                Err(syntax) => told::syntax(self.text, &syntax),
-            };
-            self.fault(span, message)
+        read_text(self.text).map_err(|refusal| {
+            let message = self.sentence(&refusal);
+            self.fault(refusal.span, message)
         })
     }
 
-    /// What is wrong with a value that TOML allows, from what the parser `said` of it.
-    fn wrong_value(&self, at: usize, said: &str) -> String {
-        let path = key_at(self.text, at).unwrap_or_default();
-        if LISTS.contains(&path.as_str()) && said.ends_with("expected a sequence") {
-            return match self.place {
-                Place::Line => format!("write [[{path}]], in two brackets: there may be several"),
-                Place::Key => "must be a list: there may be several".to_owned(),
-            };
+    /// The sentence about a fault at its place.
+    fn sentence(&self, Refusal { path, message, .. }: &Refusal) -> String {
+        match (LISTS.contains(&path.as_str()), self.place) {
+            (true, Place::Line) => {
+                return format!("write [[{path}]], in two brackets: there may be several");
+            }
+            (true, Place::Key) => return "must be a list: there may be several".to_owned(),
+            (false, _) => {}
         }
-        let (path, message) = crate::schema::told(&schema::schema(), &path, said);
         // The place is the key itself where the text is not of a file.
         let key = path.rsplit('.').next().unwrap_or_default();
         let is_of_a_key = ["is ", "has ", "must "].iter().any(|begin| message.starts_with(begin));
         match is_of_a_key && !key.is_empty() && self.place == Place::Line {
             true => format!("`{key}` {message}"),
-            false => message,
+            false => message.clone(),
         }
     }
 

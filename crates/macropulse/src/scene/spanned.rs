@@ -47,8 +47,7 @@ impl TryFrom<Vec<f64>> for Triple {
 
     fn try_from(list: Vec<f64>) -> Result<Self, String> {
         let length = list.len();
-        // In the words of the parser, which are told in ours.
-        let refused = |_| format!("invalid length {length}, expected an array of length 3");
+        let refused = |_| format!("has {length} entries, but must have 3");
         list.try_into().map(Self).map_err(refused)
     }
 }

@@ -17,8 +17,8 @@ use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
 use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
 use crate::design::tdc::TdcFile;
-use crate::schema;
-use crate::told;
+use crate::names::nearest;
+use crate::schema::{self, Fault, Misfit};
 use crate::units::{range_from_tof, s_from_fs};
 use macropulse_codec::decode::Receiver;
 
@@ -71,8 +71,7 @@ const OF_SCENES: [&str; 4] = ["object", "ground", "material", "interferers"];
 pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     refuse_moved(chain)?;
     let file: SensorFile =
-        serde_path_to_error::deserialize(toml::Value::Table(chain.merged.clone()))
-            .map_err(|error| typed_wrongly(chain, &error))?;
+        schema::read(&chain.merged).map_err(|misfit| typed_wrongly(chain, &misfit))?;
     if file.version != VERSION {
         let message = format!("is {}, but this program reads version {VERSION}", file.version);
         return Err(chain.error("version", message));
@@ -253,42 +252,28 @@ fn refuse_moved(chain: &Chain) -> Result<(), Error> {
     Ok(())
 }
 
-/// Turns serde's words into a sentence with a place and the nearest known key.
-fn typed_wrongly(chain: &Chain, error: &serde_path_to_error::Error<toml::de::Error>) -> Error {
-    let path = error.path().to_string();
-    let said = error.inner().message();
-    let path = if path == "." { String::new() } else { path };
-    if path == "code.family" && said.starts_with("wanted exactly 1 element") {
-        return chain.error(&path, "needs exactly one family, as { prime = 29 }");
+/// The error of a file that does not fit, with the tables in which an unknown key may stand.
+fn typed_wrongly(chain: &Chain, misfit: &Misfit) -> Error {
+    let (path, message, key) = (misfit.path(), misfit.message(), misfit.key());
+    let known = match &misfit.fault {
+        Fault::MissingKey(_) => return chain.lacks(&path, &message),
+        Fault::UnknownKey { known } => known.iter().map(String::as_str),
+        Fault::Value(_) => return chain.error(&path, message),
+    };
+    if nearest(key, known).is_some() {
+        return chain.error(&path, message);
     }
-    let schema = super::schema();
-    let wrong = said.split('`').nth(1).filter(|_| said.starts_with("unknown field"));
-    let Some(wrong) = wrong else {
-        let (path, message) = schema::told(&schema, &path, said);
-        return match said.starts_with("missing field") {
-            true => chain.lacks(&path, &message),
-            false => chain.error(&path, message),
-        };
-    };
-    let place = match path.as_str() {
-        "" => wrong.to_owned(),
-        inside if inside.ends_with(wrong) => path.clone(),
-        inside => format!("{inside}.{wrong}"),
-    };
-    let message = told::wrong(said, None);
     // A key that stands in another table is no misspelt one.
-    let homes = schema::homes(&schema, wrong);
+    let homes = schema::homes(&super::schema(), key);
     let elsewhere: Vec<String> = homes.iter().take(3).map(|home| format!("[{home}]")).collect();
-    let message = match (message.split_once("; known are "), &elsewhere[..]) {
-        (Some((unknown, _)), [_, ..]) => {
-            format!("{unknown} here; it belongs in {}", elsewhere.join(" or "))
+    let message = match &elsewhere[..] {
+        [_, ..] => format!("unknown key `{key}` here; it belongs in {}", elsewhere.join(" or ")),
+        [] if OF_SCENES.contains(&key) => {
+            format!("unknown key `{key}` of a sensor; it is one of a scene, as --set scene:{key}…")
         }
-        (Some((unknown, _)), []) if OF_SCENES.contains(&wrong) => {
-            format!("{unknown} of a sensor; it is one of a scene, as --set scene:{wrong}…")
-        }
-        _ => message,
+        [] => message,
     };
-    chain.error(&place, message)
+    chain.error(&path, message)
 }
 
 impl Check<'_> {
@@ -307,7 +292,7 @@ impl Check<'_> {
                 }
                 None => {
                     let known: Vec<&str> = Effect::ALL.iter().map(|e| e.name()).collect();
-                    let hint = crate::names::nearest(name, known.iter().copied())
+                    let hint = nearest(name, known.iter().copied())
                         .map(|near| format!("did you mean `{near}`? "))
                         .unwrap_or_default();
                     let message =

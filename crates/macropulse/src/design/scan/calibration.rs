@@ -92,9 +92,6 @@ pub(super) fn read(path: &Path) -> Result<Calibration, String> {
 
 /// What is wrong with the YAML of a calibration.
 fn in_words(error: &Yaml) -> String {
-    let wrong = |unexpected: &str, expected: &str| {
-        told::wrong(&format!("invalid type: {unexpected}, expected {expected}"), None)
-    };
     match error {
         Yaml::AliasError { error, .. } => in_words(error),
         Yaml::SerdeUnknownField { field, expected, .. } => told::unknown("key", field, expected),
@@ -102,8 +99,9 @@ fn in_words(error: &Yaml) -> String {
         Yaml::DuplicateMappingKey { key: Some(key), .. } => {
             format!("the key `{key}` stands twice: leave one of them out")
         }
-        Yaml::SerdeInvalidType { unexpected, expected, .. }
-        | Yaml::SerdeInvalidValue { unexpected, expected, .. } => wrong(unexpected, expected),
+        Yaml::SerdeInvalidType { .. } | Yaml::SerdeInvalidValue { .. } => {
+            "must be a number: an angle in rad, a length in m, or the number of a laser".to_owned()
+        }
         Yaml::InvalidScalar { ty: "boolean", .. } | Yaml::InvalidBooleanStrict { .. } => {
             "must be true or false".to_owned()
         }
