@@ -90,7 +90,9 @@ impl Kind for SingleStopSetting {
                 let response: f64 = StandardNormal.sample(&mut stream);
                 let photons = flash.measures(fired, &mut stream);
                 let walk_fs = if fired.follow.is_some() { flash.walk_fs(photons) } else { 0 };
-                let time_fs = fired.time_fs + fs_from_s(response * self.jitter) - walk_fs;
+                // A detector that hardly ever fires by itself does so after the end of time.
+                let late_fs = fs_from_s(response * self.jitter) - walk_fs;
+                let time_fs = fired.time_fs.saturating_add(late_fs);
                 if gate.contains(&time_fs) {
                     events.push((clock.time(time_fs) as u32, photons as f32));
                 }
@@ -268,7 +270,7 @@ mod tests {
             .iter()
             .flat_map(|(log, found)| -> Vec<i64> {
                 let fs =
-                    |time: &u32| (64 * found.epoch + i64::from(*time)) * design.tdc.tick_fs / 64;
+                    |time: &u32| (64 * found.epoch + i64::from(*time)) * design.clock.tick_fs / 64;
                 let times = found.time.iter().map(fs).zip(&found.channel);
                 times
                     .filter_map(|(time, channel)| {
@@ -296,7 +298,7 @@ mod tests {
             let parts = (found.time.iter()).map(|time| 64 * found.epoch + i64::from(*time));
             for (parts, channel) in parts.zip(&found.channel) {
                 let shot = log.channel.iter().position(|other| other == channel).unwrap();
-                let time_fs = parts as f64 / 64.0 * design.tdc.tick_fs as f64;
+                let time_fs = parts as f64 / 64.0 * design.clock.tick_fs as f64;
                 late.push((time_fs - log.fired_at_fs[shot] as f64 - 4e8) / rms);
             }
             amplitudes.extend(found.amplitude);
