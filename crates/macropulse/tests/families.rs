@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use macropulse::channel::{Operating, Seen};
-use macropulse::design::Design;
+use macropulse::design::{Coding, Design, Emission};
 use macropulse::detect::Detectors;
 use macropulse::points::Outcome;
 use macropulse::random::Chance;
@@ -176,7 +176,7 @@ fn what_does_not_fit_together_is_refused() {
         &["1000000000 chips", "1 to 65535"],
     );
     refused(&[(FAMILY, "{ golf = 7 }")], &["golf", "did you mean `gold`"]);
-    refused(&[(FAMILY, "{ prime = 29, gold = 7 }")], &["code.family", "exactly one family"]);
+    refused(&[(FAMILY, "{ prime = 29, gold = 7 }")], &["code.family", "exactly one"]);
     refused(
         &[(FAMILY, "{ quadratic-congruence = 29 }"), (WORD, "{ first = 0, modulus = 29 }")],
         &["code.word.modulus", "between 1 and 28"],
@@ -233,7 +233,8 @@ fn other_words_are_not_found() {
     };
     let (mut design, other) = (gold("0"), gold("29"));
     assert!(scanned(&design).right_fraction() > 0.99);
-    design.coding.codebook = other.coding.codebook.clone();
+    let codebook = other.emission.coding().codebook.clone();
+    design.emission = Emission::Marks(Coding { codebook, ..design.emission.coding().clone() });
     let scene = Scene::from_toml(SCENE, "steps.toml", Path::new("")).unwrap();
     let log = macropulse::emit::bands(&design, 0).next().unwrap().shot_log(&design);
     let operating = Operating::of(&design, &scene.environment).unwrap();
@@ -247,7 +248,9 @@ fn other_words_are_not_found() {
     let detectors = Detectors::new(&design, &operating, Chance::new(1));
     let detections = detectors.detections(&log, &light, &mut Default::default());
     let ticks = macropulse::tdc::ticks(&design, detections, macropulse::tdc::Wanted::ALL).ticks;
-    let found = |log| design.receiver.decode(&design.coding.codebook, log, &ticks).unwrap().len();
+    let found = |log| {
+        design.receiver.decode(&design.emission.coding().codebook, log, &ticks).unwrap().len()
+    };
     let mut wrong = log.clone();
     wrong.word.iter_mut().for_each(|word| *word = (*word + 50) % 100);
     assert!(found(&log) > log.owned.len() * 9 / 10);

@@ -230,7 +230,7 @@ fn trials(rule: &Rule, key: &str, old: &Value) -> Vec<Trial> {
             }
             let more = with(&|table| drop(table.insert("no_such_key".into(), json!(1))));
             // Beside one of several kinds it is the second one.
-            let told = if key == "shape" { "must be { plane = … }" } else { "no_such_key" };
+            let told = if key == "shape" { "must have exactly one" } else { "no_such_key" };
             trials.push(Trial::refused(more, [told]));
         }
     }

@@ -173,8 +173,8 @@ impl Walk {
                     }
                     (1, ..) => self.refuse(Fault::Value(format!("must be {}", must_be(node)))),
                     (count, _, known) => {
-                        let example = known.or(variants.first()).map(|(_, table)| must_be(table));
-                        let example = example.unwrap_or_default();
+                        let example =
+                            known.map_or_else(|| must_be(node), |(_, table)| must_be(table));
                         self.refuse(Fault::Value(format!(
                             "has {count} keys, but must have exactly one, as {example}"
                         )))
