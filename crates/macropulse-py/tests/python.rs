@@ -48,7 +48,8 @@ fn wheel() -> &'static Path {
         // The builder is one of the requirements: nothing is fetched.
         pip.args(["--no-build-isolation", "--no-deps", "--no-index", "--wheel-dir"]);
         pip.arg(&folder).arg(here().join("../.."));
-        pip.env("CARGO_TARGET_DIR", target().unwrap()).env("MATURIN_PEP517_ARGS", "--profile dev");
+        pip.env("CARGO_TARGET_DIR", target().unwrap())
+            .env("MATURIN_PEP517_ARGS", "--profile dev --features as-in-tests");
         // The builder stands beside the interpreter.
         let beside = interpreter.parent().unwrap().display().to_string();
         pip.env("PATH", format!("{beside}:{}", std::env::var("PATH").unwrap_or_default()));
