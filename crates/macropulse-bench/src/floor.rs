@@ -102,7 +102,7 @@ struct Labels {
 
 impl Labels {
     fn of(sample: &Sample) -> Self {
-        let book = &sample.design.coding.codebook;
+        let book = &sample.design.emission.coding().codebook;
         let scale = sample.design.receiver.method.ticks_per_chip().unwrap_or(1);
         let word = |word: usize| WordMarks::new(&book.word(word as u16).marks, scale);
         let bits = book.payload().map_or(1, |payload| payload.bits());

@@ -35,14 +35,14 @@ impl<'a> Sought<'a> {
         let fired = log.fired_at_fs[shot].div_euclid(receiver.tick_fs);
         let opens = fired + i64::from(nearest);
         let scale = receiver.method.ticks_per_chip().unwrap_or(1);
-        let length = i64::from(design.coding.codebook.chips() * scale);
+        let length = i64::from(design.emission.coding().codebook.chips() * scale);
         let closes = fired + i64::from(farthest) + length;
         let absolute = ticks.tick.iter().map(|&tick| ticks.epoch + i64::from(tick));
         let lit = absolute.filter(|tick| (opens..closes).contains(tick));
         // A tick is taken for its middle.
         let came = returns.tof[at] * 1e15 + log.fired_at_fs[shot] as f64;
         let came = (came / receiver.tick_fs as f64).floor() as i64;
-        let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+        let marks = design.emission.coding().codebook.marks(log.label[shot], log.word[shot]);
         Self {
             lit: lit.map(|tick| (tick - opens) as usize).collect(),
             lags: (farthest - nearest) as usize + 1,

@@ -177,7 +177,7 @@ impl Sample {
 
     /// The echoes from within the range gate, band by band, in the order of their arrival.
     pub fn echoes(&self) -> Vec<Vec<Echo>> {
-        let Design { receiver, coding, scan, tdc, .. } = &self.design;
+        let Design { receiver, emission, scan, clock, .. } = &self.design;
         let scale = receiver.method.ticks_per_chip().unwrap_or(1);
         let of_band = |(band, hits): &(Band, Hits)| {
             let log = band.shot_log(&self.design);
@@ -189,8 +189,8 @@ impl Sample {
                 let arrives =
                     log.fired_at_fs[shot] + units::fs_from_s(units::tof_from_range(*range));
                 let (label, word) = (log.label[shot], log.word[shot]);
-                let marks = coding.codebook.marks(label, word);
-                let start = arrives.div_euclid(tdc.tick_fs) - epoch;
+                let marks = emission.coding().codebook.marks(label, word);
+                let start = arrives.div_euclid(clock.tick_fs) - epoch;
                 let marks = marks.iter().map(|mark| scale * u32::from(*mark)).collect();
                 Echo { start: start.max(0) as usize, marks, word, label }
             };
@@ -210,8 +210,11 @@ impl Sample {
 
     /// What it makes of that.
     pub fn decode(&self, given: &[Given]) -> Result<Vec<Returns>, decode::Error> {
-        let Design { receiver, coding, .. } = &self.design;
-        given.iter().map(|(log, ticks)| receiver.decode(&coding.codebook, log, ticks)).collect()
+        let Design { receiver, emission, .. } = &self.design;
+        given
+            .iter()
+            .map(|(log, ticks)| receiver.decode(&emission.coding().codebook, log, ticks))
+            .collect()
     }
 
     /// The same, and the seconds of this thread that it takes.
@@ -288,7 +291,7 @@ impl Score {
             let own = hits.shot.partition_point(|&other| (other as usize) < met)
                 ..hits.shot.partition_point(|&other| other as usize <= met);
             let ranges = hits.range[own].iter().filter(|range| gate.contains(range));
-            let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+            let marks = design.emission.coding().codebook.marks(log.label[shot], log.word[shot]);
             let has_echo = ranges.clone().next().is_some() && !marks.is_empty();
             self.echoes += usize::from(has_echo);
             let Ok(at) = returns.shot.binary_search(&(shot as u32)) else { continue };

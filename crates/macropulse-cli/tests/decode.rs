@@ -19,8 +19,11 @@ fn again(
     rest: &str,
     scans: usize,
 ) -> (serde_json::Value, serde_json::Value) {
-    let (record, ending) =
-        if sensor.contains(MINI) { ("samples", "mpw") } else { ("ticks", "mpt") };
+    let (record, ending) = match sensor {
+        _ if sensor.contains(MINI) => ("samples", "mpw"),
+        _ if sensor.contains(FLASH) => ("histograms", "mph"),
+        _ => ("ticks", "mpt"),
+    };
     let formats = "--format pcd,csv,png";
     let line = format!("simulate {sensor} {rest} {formats},{record} -o out --json -j 1");
     let simulated = desk.json(&format!("{line} --scans {scans}"));
@@ -53,6 +56,47 @@ const ROWS: &str = "--set scan.raster.rows";
 
 /// A sampled sensor of few shots and no pauses, so that its bands overlap.
 const MINI: &str = "mini.toml";
+
+/// A sensor that counts bursts in histograms.
+const FLASH: &str = "flash.toml";
+
+/// The text of [`FLASH`].
+const FLASH_TEXT: &str = "version = 1\nname = \"flash\"\nidealised = [\"footprint\", \"mirror-motion\", \"eye-safety\"]\n\
+    [scan]\nscans_per_s = 10.0\nmax_range_m = 30.0\n\
+    [scan.flash]\nrows = 12\ncolumns = 16\nhorizontal_deg = 16.0\nvertical_deg = 12.0\n\
+    [light]\nwavelength_nm = 940.0\nbeam_diameter_mm = 3.0\npulse_ps = 1000.0\n\
+    energy = { shot_nj = 4000.0 }\n\
+    [optics]\naperture_mm = 3.0\ntransmission = 0.7\nfilter_nm = 20.0\nfield = \"descanned\"\n\
+    [detector.geiger]\nefficiency = 0.15\ncells = 4\narming = \"once-per-pulse\"\n\
+    [burst]\npulses = 2000\ninterval_ns = 250.0\n[histogram]\nbin_ps = 250.0\nbins = 820\n\
+    [receiver]\nkind = \"histogram\"\nreturns = 2\nright_within_m = 0.05\n";
+
+#[test]
+fn histograms_decode_to_the_points_of_the_simulation() {
+    let desk = Desk::new();
+    desk.put(FLASH, FLASH_TEXT);
+    let (simulated, _) =
+        again(&desk, &format!("--sensor {FLASH}"), "--scene street --environment night", 2);
+    assert!(simulated["counts"]["counts"].as_u64().unwrap() > 10_000, "{simulated}");
+    let shots = "decode --sensor flash.toml out/shots-000000.mps";
+    for (bins, words) in
+        [("810", "histograms of 820 bins, where those of the sensor have 810"), ("820", "")]
+    {
+        let line = format!(
+            "{shots} --set histogram.bins={bins} out/histograms-000000.mph -o b --format none"
+        );
+        match words {
+            "" => assert_eq!(desk.run(&line).code, Some(0)),
+            words => desk.refused(&line, &[words]),
+        }
+    }
+    let line = "simulate flash.toml street --environment night --explain 11,8 --format none -o e";
+    let ran = desk.run(line);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let told = fs::read_to_string(desk.path().join("e/explain-000000-11-8.txt")).unwrap();
+    assert!(told.contains("A return was accepted at") && told.contains("2 000 pulses"), "{told}");
+    desk.refused("simulate flash.toml street --format ticks -o b", &["flash records histograms"]);
+}
 
 /// The line of the pixel that was explained, in a table of points.
 fn point_of<'a>(points: &'a str, told: &serde_json::Value) -> Option<&'a str> {
@@ -126,11 +170,11 @@ fn what_is_wrong_with_samples_is_one_sentence_with_its_place() {
     let coarse = format!("decode --sensor mini.toml --set detector.sampled.bits=10 {files} -o a");
     desk.refused(&coarse, &["codes from -204 to 1843, where those of the sensor are -102 to 921"]);
     let line = "simulate mini.toml wall --format pcd,ticks -o b";
-    desk.refused(line, &["--format: mini is sampled and has no ticks; ask for `samples`"]);
+    desk.refused(line, &["--format: mini records samples and nothing else; ask for `samples`"]);
     let line = "simulate peregrine wall --format samples -o b";
-    desk.refused(line, &["--format: peregrine is not sampled; ask for `ticks`"]);
+    desk.refused(line, &["--format: peregrine records ticks and nothing else; ask for `ticks`"]);
     let line = "encode mini.toml --wall-m 30 -o b";
-    desk.refused(line, &["--wall-m: mini is sampled"]);
+    desk.refused(line, &["--wall-m: mini records samples"]);
 }
 
 #[test]

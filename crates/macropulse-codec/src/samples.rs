@@ -36,60 +36,6 @@ impl Samples {
     }
 }
 
-/// What a receiver is given beside its shot log.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Record<'a> {
-    /// Of time-to-digital converters.
-    Ticks(&'a crate::Ticks),
-    /// Of analogue-to-digital converters.
-    Samples(&'a Samples),
-}
-
-impl<'a> From<&'a crate::Ticks> for Record<'a> {
-    fn from(ticks: &'a crate::Ticks) -> Self {
-        Self::Ticks(ticks)
-    }
-}
-
-impl<'a> From<&'a Samples> for Record<'a> {
-    fn from(samples: &'a Samples) -> Self {
-        Self::Samples(samples)
-    }
-}
-
-/// The same, owned.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Given {
-    /// Of time-to-digital converters.
-    Ticks(crate::Ticks),
-    /// Of analogue-to-digital converters.
-    Samples(Samples),
-}
-
-impl Given {
-    /// How many ticks there are, or samples of all channels.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Ticks(ticks) => ticks.len(),
-            Self::Samples(samples) => samples.code.len(),
-        }
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-impl<'a> From<&'a Given> for Record<'a> {
-    fn from(given: &'a Given) -> Self {
-        match given {
-            Given::Ticks(ticks) => Self::Ticks(ticks),
-            Given::Samples(samples) => Self::Samples(samples),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

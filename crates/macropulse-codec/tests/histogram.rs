@@ -3,7 +3,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use macropulse_codec::decode::histogram::{HistogramReceiver, PileUp, Pulse, coates, decode};
+use macropulse_codec::decode::histogram::{
+    HistogramMethod, HistogramReceiver, PileUp, Pulse, coates, decode,
+};
 use macropulse_codec::decode::{Error, Pick, Reject, Returns};
 use macropulse_codec::files::{HistogramHeader, HistogramReader, HistogramWriter};
 use macropulse_codec::{Histograms, ShotLog};
@@ -143,7 +145,10 @@ fn pile_up_brings_a_surface_nearer_and_coates_takes_it_back() {
     let receiver = HistogramReceiver::new(gaussian(10.0 / 12_f64.sqrt()));
     let (found, error) = shift(&lags(&decoded(&receiver, CYCLES, &counts)));
     assert!((found + 12.29).abs() < error + 0.1, "{found} ± {error}");
-    let receiver = HistogramReceiver { pile_up: PileUp::Coates, ..receiver };
+    let receiver = HistogramReceiver {
+        method: HistogramMethod { pile_up: PileUp::Coates, ..receiver.method.clone() },
+        ..receiver
+    };
     let returns = decoded(&receiver, CYCLES, &counts);
     let (found, _) = shift(&lags(&returns));
     assert!(found.abs() < 0.1 * MM_PER_BIN, "{found}");
@@ -220,8 +225,13 @@ fn false_returns_are_as_rare_as_stated() {
     for (background, least) in [(0.01, 1), (0.1, 12), (1.0, 12), (30.0, 12)] {
         let counts: Vec<Vec<u32>> =
             (0..ALL).map(|_| drawn(&vec![background; 256], &mut rng)).collect();
-        let receiver =
-            HistogramReceiver { false_alarm: 0.02, ..HistogramReceiver::new(gaussian(2.0)) };
+        let receiver = HistogramReceiver {
+            method: HistogramMethod {
+                false_alarm: 0.02,
+                ..HistogramReceiver::new(gaussian(2.0)).method
+            },
+            ..HistogramReceiver::new(gaussian(2.0))
+        };
         let returns = decoded(&receiver, 0, &counts);
         let found = returns.len();
         assert!((least..155).contains(&found), "{background}: {found}");
@@ -304,8 +314,11 @@ fn with_tails(surfaces: &[(usize, f64)], all: usize, seed: u64) -> Vec<Vec<u32>>
 #[test]
 fn two_surfaces_are_resolved() {
     let pulse = Pulse::Measured { counts: tailed(), origin: 0.0 };
-    let receiver =
-        HistogramReceiver { returns: 8, false_alarm: 1e-4, ..HistogramReceiver::new(pulse) };
+    let receiver = HistogramReceiver {
+        method: HistogramMethod { false_alarm: 1e-4, ..HistogramMethod::new(pulse.clone()) },
+        returns: 8,
+        ..HistogramReceiver::new(pulse)
+    };
     let cases = [(7, [(60, 20_000.0), (72, 1500.0)]), (8, [(60, 2000.0), (65, 2000.0)])];
     for (seed, surfaces) in cases {
         let counts = with_tails(&surfaces, 300, seed);
@@ -326,7 +339,10 @@ fn two_surfaces_are_resolved() {
     // One surface is one return; to a receiver that does not know of the tail it is several.
     let one = with_tails(&[(60, 20_000.0)], 300, 9);
     assert_eq!(decoded(&receiver, 0, &one).len(), 300);
-    let unaware = HistogramReceiver { pulse: gaussian(2.0), ..receiver };
+    let unaware = HistogramReceiver {
+        method: HistogramMethod { pulse: gaussian(2.0), ..receiver.method.clone() },
+        ..receiver
+    };
     assert!(decoded(&unaware, 0, &one).len() > 600);
 }
 
@@ -338,7 +354,10 @@ fn an_error_of_the_shape_makes_no_further_returns() {
     let mean = expected(256, 5.0, 2.2, &[(128.4, 1e5)]);
     let counts: Vec<Vec<u32>> = (0..50).map(|_| drawn(&mean, &mut rng)).collect();
     let strict = HistogramReceiver { returns: 8, ..HistogramReceiver::new(gaussian(2.0)) };
-    let lenient = HistogramReceiver { shape_error: 0.2, least_share: 0.01, ..strict.clone() };
+    let lenient = HistogramReceiver {
+        method: HistogramMethod { shape_error: 0.2, least_share: 0.01, ..strict.method.clone() },
+        ..strict
+    };
     assert_eq!(decoded(&lenient, 0, &counts).len(), 50);
     assert!(decoded(&strict, 0, &counts).len() > 100);
 }
@@ -376,8 +395,11 @@ fn a_file_of_histograms_becomes_distances() {
         read.counts.extend(one.counts);
     }
     let pulse = Pulse::Measured { counts: tailed(), origin: 0.0 };
-    let receiver =
-        HistogramReceiver { pile_up: PileUp::Coates, returns: 2, ..HistogramReceiver::new(pulse) };
+    let receiver = HistogramReceiver {
+        method: HistogramMethod { pile_up: PileUp::Coates, ..HistogramMethod::new(pulse.clone()) },
+        returns: 2,
+        ..HistogramReceiver::new(pulse)
+    };
     let log = ShotLog::of_one_channel(&[0; 200], &[0; 200]);
     let returns = decode(&receiver, &log, &read).unwrap();
     let truth: Vec<f64> = (0..200)
@@ -404,7 +426,11 @@ fn a_return_is_picked_within_the_gate() {
         assert_eq!(found(HistogramReceiver { pick, ..base.clone() }), [at]);
     }
     assert_eq!(found(HistogramReceiver { returns: 8, ..base.clone() }), [50.0, 90.0, 200.0]);
-    let faint = HistogramReceiver { returns: 8, least_share: 0.2, ..base.clone() };
+    let faint = HistogramReceiver {
+        method: HistogramMethod { least_share: 0.2, ..base.method.clone() },
+        returns: 8,
+        ..base
+    };
     assert_eq!(found(faint), [90.0, 200.0]);
     let gate_fs = (100 * BIN_FS, 195 * BIN_FS);
     assert_eq!(found(HistogramReceiver { gate_fs, ..base }), [0.0; 0]);
@@ -418,7 +444,10 @@ fn what_cannot_be_decoded_is_refused() {
     let refused = |receiver: &HistogramReceiver, record: &Histograms| {
         decode(receiver, &log, record).unwrap_err()
     };
-    let coates = HistogramReceiver { pile_up: PileUp::Coates, ..base.clone() };
+    let coates = HistogramReceiver {
+        method: HistogramMethod { pile_up: PileUp::Coates, ..base.method.clone() },
+        ..base
+    };
     assert_eq!(
         refused(&coates, &record),
         Error::MoreThanCycles { shot: 1, counted: 11, cycles: 10 }
@@ -429,9 +458,27 @@ fn what_cannot_be_decoded_is_refused() {
     for (receiver, setting) in [
         (HistogramReceiver { returns: 9, ..base.clone() }, "returns"),
         (HistogramReceiver { gate_fs: (2, 1), ..base.clone() }, "gate_fs"),
-        (HistogramReceiver { false_alarm: f64::NAN, ..base.clone() }, "false_alarm"),
-        (HistogramReceiver { shape_error: -0.1, ..base.clone() }, "shape_error"),
-        (HistogramReceiver { least_share: 2.0, ..base.clone() }, "least_share"),
+        (
+            HistogramReceiver {
+                method: HistogramMethod { false_alarm: f64::NAN, ..base.method.clone() },
+                ..base
+            },
+            "false_alarm",
+        ),
+        (
+            HistogramReceiver {
+                method: HistogramMethod { shape_error: -0.1, ..base.method.clone() },
+                ..base
+            },
+            "shape_error",
+        ),
+        (
+            HistogramReceiver {
+                method: HistogramMethod { least_share: 2.0, ..base.method.clone() },
+                ..base
+            },
+            "least_share",
+        ),
         (HistogramReceiver::new(Pulse::Gaussian { rms_fs: 0.0 }), "pulse.rms_fs"),
         (HistogramReceiver::new(Pulse::Gaussian { rms_fs: 1e12 }), "pulse.rms_fs"),
         (HistogramReceiver::new(Pulse::Measured { counts: vec![], origin: 0.0 }), "pulse.counts"),

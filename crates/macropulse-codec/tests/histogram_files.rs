@@ -3,7 +3,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use macropulse_codec::decode::histogram::{HistogramReceiver, PileUp, Pulse, decode};
+use macropulse_codec::decode::histogram::{
+    HistogramMethod, HistogramReceiver, PileUp, Pulse, decode,
+};
 use macropulse_codec::files::{
     Digest, Error, Histogram, HistogramHeader, HistogramReader, HistogramWriter,
 };
@@ -196,7 +198,9 @@ prop_compose! {
         };
         let pile_up = if stops { PileUp::Coates } else { PileUp::None };
         let base = HistogramReceiver::new(pulse);
-        HistogramReceiver { gate_fs, pile_up, false_alarm, shape_error, least_share, returns, ..base }
+        let method =
+            HistogramMethod { pile_up, false_alarm, shape_error, least_share, ..base.method };
+        HistogramReceiver { gate_fs, returns, pick: base.pick, method }
     }
 }
 

@@ -6,7 +6,9 @@
 use std::path::PathBuf;
 
 use macropulse_codec::decode::Returns;
-use macropulse_codec::decode::histogram::{HistogramReceiver, PileUp, Pulse, coates, decode};
+use macropulse_codec::decode::histogram::{
+    HistogramMethod, HistogramReceiver, PileUp, Pulse, coates, decode,
+};
 use macropulse_codec::{Histograms, ShotLog};
 use serde_json::Value;
 
@@ -94,10 +96,13 @@ impl Recording {
     fn decoded(&self) -> Vec<Vec<(f64, f64)>> {
         let bin_fs = 95_400;
         let receiver = HistogramReceiver {
+            method: HistogramMethod {
+                pile_up: PileUp::Coates,
+                shape_error: 0.05,
+                least_share: 0.005,
+                ..HistogramReceiver::new(self.pulse()).method
+            },
             gate_fs: (-2 * bin_fs, 45 * bin_fs),
-            pile_up: PileUp::Coates,
-            shape_error: 0.05,
-            least_share: 0.005,
             returns: 8,
             ..HistogramReceiver::new(self.pulse())
         };

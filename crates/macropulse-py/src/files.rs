@@ -1,4 +1,4 @@
-//! Scans to files, and back; and scan after scan, out of files of points or of shots and ticks or samples.
+//! Scans to files, and back; and scan after scan, out of files of points or of shots and ticks, samples or histograms.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -61,7 +61,7 @@ fn format_of(path: &Path, named: Option<&str>) -> PyResult<Format> {
 enum Source {
     /// Points.
     Clouds(CloudsAt),
-    /// Shots and ticks or samples, which the receiver of a sensor decodes.
+    /// Shots and ticks, samples or histograms, which the receiver of a sensor decodes.
     Recorded(Box<Decoding>, Arc<Design>, Box<Scale>),
 }
 

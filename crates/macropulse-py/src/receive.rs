@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use macropulse::channel::Operating;
-use macropulse::codec::{Given, Samples, ShotLog, Ticks};
+use macropulse::codec::{Given, Histograms, RecordKind, Samples, ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
 use macropulse::points::{Piece, PointCloud, Scale, Truth};
@@ -31,6 +31,7 @@ const SHOTS: [&str; 8] =
     ["first", "owned", "fired_at_fs", "row", "column", "label", "word", "channel"];
 const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
 const SAMPLES: [&str; 3] = ["epoch", "channel", "code"];
+const HISTOGRAMS: [&str; 4] = ["bin_fs", "offset_fs", "cycles", "counts"];
 
 /// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`, or samples.
 #[pyclass(frozen, module = "macropulse")]
@@ -68,6 +69,7 @@ impl Records {
         let given = match given {
             Given::Ticks(ticks) => told_of_ticks(py, ticks)?,
             Given::Samples(samples) => told_of_samples(py, samples)?,
+            Given::Histograms(histograms) => told_of_histograms(py, histograms)?,
         };
         Ok(Some((told_of_shots(py, log)?, given)))
     }
@@ -154,7 +156,17 @@ fn told_of_samples(py: Python<'_>, samples: Samples) -> PyResult<Bound<'_, PyDic
     Ok(told)
 }
 
-/// Decodes ticks or samples, from a simulation or from hardware, with no scene: out of arrays, or out of files as
+fn told_of_histograms(py: Python<'_>, histograms: Histograms) -> PyResult<Bound<'_, PyDict>> {
+    let told = PyDict::new(py);
+    let shape = [histograms.len(), histograms.bins as usize];
+    told.set_item("bin_fs", histograms.bin_fs)?;
+    told.set_item("offset_fs", histograms.offset_fs)?;
+    told.set_item("cycles", PyArray1::from_vec(py, histograms.cycles))?;
+    told.set_item("counts", PyArray1::from_vec(py, histograms.counts).reshape(shape)?)?;
+    Ok(told)
+}
+
+/// Decodes ticks, samples or histograms, from a simulation or from hardware, with no scene: out of arrays, or out of files as
 /// `macropulse decode` does.
 ///
 /// Args:
@@ -205,12 +217,13 @@ pub fn decode(
     }
     check_keys(shots, "shots", &SHOTS)?;
     let log = shot_log(&design, shots)?;
-    let given = match design.is_sampled() {
-        true => Given::Samples(samples_of(&design, ticks)?),
-        false => Given::Ticks(ticks_of(&design, ticks)?),
+    let given = match design.records() {
+        RecordKind::Samples => Given::Samples(samples_of(&design, ticks)?),
+        RecordKind::Ticks => Given::Ticks(ticks_of(&design, ticks)?),
+        RecordKind::Histograms => Given::Histograms(histograms_of(&design, ticks)?),
     };
     if given.is_empty() {
-        let recorded = if design.is_sampled() { "samples" } else { "ticks" };
+        let recorded = design.records().name();
         warned(py, format!("not a single point: there are no {recorded}"))?;
     } else if log.row.is_empty() {
         warned(py, "not a single point: there are no shots")?;
@@ -218,7 +231,7 @@ pub fn decode(
     let receiver = Arc::clone(&design);
     let cloud = work::done(py, 0, move |_| {
         let design = &*receiver;
-        let returns = design.receiver.decode(&design.coding.codebook, &log, &given)?;
+        let returns = design.receive(&log, &given)?;
         let piece = Piece::of(design, &Scale::of(design, &operating), &log, &returns);
         let frame = PointCloud::empty(design, piece.points.scan);
         let cloud = PointCloud::joined(&frame, &[piece]);
@@ -268,7 +281,7 @@ fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBu
     match (shots.extract(), ticks.extract()) {
         (Ok(shots), Ok(ticks)) => Ok([shots, ticks]),
         _ => Err(wrong(
-            "shots and ticks or samples: give two dictionaries of columns, or the paths of two files",
+            "shots and ticks, samples or histograms: give two dictionaries of columns, or the paths of two files",
         )),
     }
 }
@@ -489,4 +502,42 @@ fn quietly<'py, T>(
     let outcome = made();
     quiet.call_method1("__exit__", (py.None(), py.None(), py.None()))?;
     outcome
+}
+
+fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histograms> {
+    check_keys(given, "histograms", &HISTOGRAMS)?;
+    let Some(counts) = given.get_item("counts")? else {
+        return Err(wrong("histograms: there is no column `counts`"));
+    };
+    let typed = given.py().import("numpy")?.call_method1("asarray", (&counts,))?;
+    let shape: Vec<usize> = typed.getattr("shape")?.extract()?;
+    let [rows, bins] = shape[..] else {
+        return Err(wrong(format!(
+            "histograms: `counts` has {} dimensions; give it a row for each shot and a column for each bin",
+            shape.len()
+        )));
+    };
+    let tick_fs = design.clock.tick_fs;
+    let bin_fs: i64 =
+        entry(given, ("histograms", "bin_fs", "a whole number, of femtoseconds"), || tick_fs)?;
+    if bin_fs != tick_fs {
+        return Err(wrong(format!(
+            "histograms: bins of {bin_fs} fs, but those of {} are {tick_fs} fs wide",
+            design.name
+        )));
+    }
+    let flat = PyDict::new(given.py());
+    flat.set_item("counts", typed.call_method0("ravel")?)?;
+    let pulses = design.emission.burst().map_or(1, |burst| burst.pulses);
+    Ok(Histograms {
+        bin_fs,
+        offset_fs: entry(
+            given,
+            ("histograms", "offset_fs", "a whole number, of femtoseconds"),
+            || 0,
+        )?,
+        bins: bins as u32,
+        cycles: column(given, ("histograms", "cycles"), Some(vec![pulses; rows]))?,
+        counts: column(&flat, ("histograms", "counts"), None)?,
+    })
 }

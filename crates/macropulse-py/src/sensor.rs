@@ -183,7 +183,7 @@ impl Sensor {
     /// Length of a tick of its converters, fs.
     #[getter]
     fn tick_fs(&self) -> i64 {
-        self.design.tdc.tick_fs
+        self.design.clock.tick_fs
     }
 
     /// Whether its shots carry a code.
@@ -235,7 +235,7 @@ impl Sensor {
         let design = &*self.design;
         let (rows, columns) = (design.scan.rows, design.scan.columns);
         let code = match design.is_coded() {
-            true => design.coding.codebook.family().to_string(),
+            true => design.emission.coding().codebook.family().to_string(),
             false => "one mark a shot".to_owned(),
         };
         let receiver = design.receiver.method.kind().name();

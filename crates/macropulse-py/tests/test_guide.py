@@ -53,6 +53,8 @@ def test_the_python_of_a_page_does_what_it_says(page, program, tmp_path, monkeyp
         pytest.skip(f"{page} needs {package}, which is not installed")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "macropulse").symlink_to(program.path)
+    # The examples of the repository, as beside the reader.
+    (tmp_path / "docs").symlink_to(ROOT / "docs")
     path = f"{tmp_path}:{os.environ['PATH']}"
     names, printed = {"__name__": page}, None
     for language, body in blocks(page):

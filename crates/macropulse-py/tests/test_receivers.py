@@ -73,6 +73,45 @@ def test_samples_decode_to_the_points_of_the_simulation():
         mp.decode(sensor, samples, shots)
 
 
+FLASH = """version = 1
+name = "flash"
+idealised = ["footprint", "mirror-motion", "eye-safety"]
+scan = { scans_per_s = 10.0, max_range_m = 30.0, flash = { rows = 6, columns = 8, \
+horizontal_deg = 8.0, vertical_deg = 6.0 } }
+light = { wavelength_nm = 940.0, beam_diameter_mm = 3.0, pulse_ps = 1000.0, \
+energy = { shot_nj = 4000.0 } }
+optics = { aperture_mm = 3.0, transmission = 0.7, filter_nm = 20.0, field = "descanned" }
+detector.geiger = { efficiency = 0.15 }
+burst = { pulses = 2000, interval_ns = 250.0 }
+histogram = { bin_ps = 250.0, bins = 820 }
+receiver = { kind = "histogram", right_within_m = 0.05 }
+"""
+
+
+def test_histograms_decode_to_the_points_of_the_simulation(tmp_path):
+    (tmp_path / "flash.toml").write_text(FLASH.replace("\\\n", ""))
+    sensor, scene = mp.Sensor(str(tmp_path / "flash.toml")), mp.Scene("wall")
+    whole = mp.simulate(sensor, scene, seed=5)
+    [(shots, histograms)] = mp.record(sensor, scene, seed=5)
+    assert sorted(histograms) == ["bin_fs", "counts", "cycles", "offset_fs"]
+    counts = histograms["counts"]
+    assert counts.dtype == np.uint32 and counts.shape == (48, 820)
+    decoded = mp.decode(sensor, shots, histograms, environment="clear-day")
+    for column in ("x", "range", "intensity", "row", "column", "margin", "photons"):
+        np.testing.assert_array_equal(getattr(decoded, column), getattr(whole, column))
+    assert len(mp.decode(sensor, shots, {"counts": counts})) == len(whole) > 20
+
+    def told(**changed):
+        with pytest.raises(mp.Error) as raised:
+            mp.decode(sensor, shots, {**histograms, **changed})
+        return str(raised.value)
+
+    assert "1 dimensions" in told(counts=counts.ravel())
+    assert "bins of 1000 fs" in told(bin_fs=1000)
+    assert "cycles" in told(cycles=[1, 2])
+    assert "did you mean `counts`" in told(count=counts)
+
+
 def test_ticks_that_were_made_by_hand():
     """A single echo, laid out mark by mark here: its range is known."""
     sensor = mp.Sensor("kim-park-2016-fixed")

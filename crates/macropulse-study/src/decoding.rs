@@ -1,4 +1,4 @@
-//! Points out of recorded shots and ticks, or samples, without a scene: from files, streams, or hardware.
+//! Points out of recorded shots and ticks, samples or histograms, without a scene: from files, streams, or hardware.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -8,16 +8,16 @@ use std::path::Path;
 
 use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::files::{
-    self, Digest, SampleReader, ShotHeader, ShotReader, Stream, TickReader, What,
+    self, Digest, HistogramReader, SampleReader, ShotHeader, ShotReader, Stream, TickReader, What,
 };
-use macropulse::codec::{Given, ShotLog};
+use macropulse::codec::{Given, RecordKind, ShotLog};
 use macropulse::design::Design;
 use macropulse::emit;
 use macropulse::opened;
 use macropulse::points::{Piece, PointCloud, Scale, Truth, Viewpoint};
 use rayon::prelude::*;
 
-/// Why recorded shots and ticks or samples cannot be decoded.
+/// Why recorded shots and ticks, samples or histograms cannot be decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The world would not give a file.
@@ -67,7 +67,7 @@ pub enum Error {
     },
 }
 
-/// What the shots, and the ticks or samples, are called in messages.
+/// What the shots, and the ticks, samples or histograms, are called in messages.
 #[derive(Debug, Clone)]
 pub struct Names([String; 2]);
 
@@ -120,13 +120,13 @@ impl Band {
         (log, given): (ShotLog, Given),
         (design, scale): (&Design, &Scale),
     ) -> Result<Self, decode::Error> {
-        let returns = design.receiver.decode(&design.coding.codebook, &log, &given)?;
+        let returns = design.receive(&log, &given)?;
         let piece = Piece::of(design, scale, &log, &returns);
         Ok(Self { log, given, returns, piece })
     }
 }
 
-/// Shots and ticks or samples that are decoded, scan after scan, in the memory of one.
+/// Shots and ticks, samples or histograms that are decoded, scan after scan, in the memory of one.
 pub struct Decoding {
     stream: Stream<Box<dyn Read + Send>, Box<dyn Read + Send>>,
     names: Names,
@@ -140,7 +140,7 @@ pub struct Decoding {
 }
 
 impl Decoding {
-    /// The decoding of `shots` and of the ticks or samples that were recorded of them, `record`, all of the
+    /// The decoding of `shots` and of their record that were recorded of them, `record`, all of the
     /// sensor `design`.
     ///
     /// # Errors
@@ -152,14 +152,19 @@ impl Decoding {
         let shots = ShotReader::new(shots.bytes, design.limits()).map_err(invalid)?;
         let ShotHeader { position, turn, digest: of_shots, .. } = *shots.header();
         let (cut, channels) = (design.cut(), design.channels());
-        let (stream, of_record) = match design.sample_header() {
-            Some(wanted) => {
+        let (stream, of_record) = match (design.sample_header(), design.histogram_header()) {
+            (Some(wanted), _) => {
                 let samples = SampleReader::new(record.bytes, &wanted).map_err(invalid)?;
                 let digest = samples.header().digest;
                 (Stream::of_samples(cut, shots, samples), digest)
             }
-            None => {
-                let tick_fs = design.tdc.tick_fs;
+            (None, Some(wanted)) => {
+                let histograms = HistogramReader::new(record.bytes, &wanted).map_err(invalid)?;
+                let digest = histograms.header().digest;
+                (Stream::of_histograms(cut, shots, histograms), digest)
+            }
+            (None, None) => {
+                let tick_fs = design.clock.tick_fs;
                 let ticks = TickReader::new(record.bytes, tick_fs, channels).map_err(invalid)?;
                 let digest = ticks.header().digest;
                 (Stream::new(cut, shots, ticks, channels > 1), digest)
@@ -174,7 +179,7 @@ impl Decoding {
             }
         }
         // Samples of a band are many: each thread holds those of one.
-        let bands_per_thread = if design.is_sampled() { 1 } else { 2 };
+        let bands_per_thread = if design.records() == RecordKind::Samples { 1 } else { 2 };
         let together = if is_live { 1 } else { bands_per_thread * rayon::current_num_threads() };
         Ok(Self {
             stream,

@@ -68,7 +68,7 @@ impl<'a> Macropulse<'a> {
             let last = most_scans(design).saturating_sub(1);
             Error::Scan { scan, sensor: sensor(), last }
         })?;
-        let codebook = &design.coding.codebook;
+        let codebook = &design.emission.coding().codebook;
         Ok(Self {
             row,
             column,

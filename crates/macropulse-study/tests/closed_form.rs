@@ -62,7 +62,7 @@ fn pixels(
     let measured = (0..cloud.fired_ns.len()).filter(|&at| !cloud.fired_ns[at].is_nan());
     let with_light = measured.filter(|at| {
         let label = if design.is_coded() { at % cloud.columns } else { 0 };
-        !design.coding.codebook.marks(label as u16, 0).is_empty()
+        !design.emission.coding().codebook.marks(label as u16, 0).is_empty()
     });
     let seen = with_light.filter_map(|at| {
         let aim = design.directions().of((at / cloud.columns) as u16, (at % cloud.columns) as u16);

@@ -46,7 +46,7 @@ mod words {
 
     #[test]
     fn the_prime_code_over_29_has_29_words_of_841_chips_and_29_marks() {
-        let family = DESIGN.coding.codebook.family();
+        let family = DESIGN.emission.coding().codebook.family();
         assert_eq!((family.count(), family.length(), family.weight()), (29, 841, 29));
         reported("prime-code", Holds, &["29 words, 841 chips, weight 29"]);
         // Mean, variance and maximum are counted in laws.rs.
@@ -56,7 +56,7 @@ mod words {
 
     #[test]
     fn correlations_go_round_with_a_minus() {
-        let words = DESIGN.coding.codebook.family().words();
+        let words = DESIGN.emission.coding().codebook.family().words();
         let lit = |word: usize, chip: i32| words[word].marks.iter().any(|&m| i32::from(m) == chip);
         let met = |shift: &dyn Fn(i32) -> i32| {
             (0..841).filter(|&n| lit(3, n) && lit(7, shift(n))).count()
@@ -72,7 +72,7 @@ mod words {
 
     #[test]
     fn own_sidelobes_are_nearly_as_high_as_the_peak() {
-        let words = DESIGN.coding.codebook.family().words();
+        let words = DESIGN.emission.coding().codebook.family().words();
         let periodic: Vec<u16> =
             words.iter().map(|word| periodic_sidelobe(word).unwrap().height).collect();
         assert_eq!(periodic[0], 29);
@@ -98,18 +98,18 @@ mod payload {
     use super::*;
 
     fn leading_zeros() -> usize {
-        let payload = DESIGN.coding.codebook.payload().unwrap();
+        let payload = DESIGN.emission.coding().codebook.payload().unwrap();
         (0..848).filter(|&label| payload.text(label).starts_with('0')).count()
     }
 
     #[test]
     fn thirteen_bits_make_10_933_chips_that_last_27_3325_ns() {
-        let codebook = &DESIGN.coding.codebook;
+        let codebook = &DESIGN.emission.coding().codebook;
         assert_eq!(codebook.payload().unwrap().bits(), 13);
         assert_eq!(codebook.chips(), 10_933);
         assert_relative_eq!(DERIVED.macropulse, 27.3325e-9, max_relative = 1e-12);
         // What is printed would be this many chips.
-        let chips = 27.4875e-9 / s_from_fs(DESIGN.coding.chip_fs);
+        let chips = 27.4875e-9 / s_from_fs(DESIGN.emission.coding().chip_fs);
         assert_relative_eq!(chips, 10_995.0, max_relative = 1e-12);
         reported("payload", Holds, &["13 bits"]);
         reported("macropulse-chips", Holds, &["10933 chips"]);
@@ -118,7 +118,7 @@ mod payload {
 
     #[test]
     fn macropulses_have_58_to_319_marks_and_never_377() {
-        let codebook = &DESIGN.coding.codebook;
+        let codebook = &DESIGN.emission.coding().codebook;
         let weights = || codebook.weights().map(|(_, most)| most);
         let lit = || weights().filter(|&weight| weight > 0);
         assert_eq!((lit().min(), lit().max()), (Some(58), Some(319)));
@@ -140,7 +140,7 @@ mod payload {
 
     #[test]
     fn column_0_has_no_light_and_must_be_allowed_to() {
-        let codebook = &DESIGN.coding.codebook;
+        let codebook = &DESIGN.emission.coding().codebook;
         let dark: Vec<u16> = (0..848).filter(|&l| codebook.marks(l, 1).is_empty()).collect();
         assert_eq!(dark, [0]);
         reported("dark-column", Fails, &["[0]", "13 zeros"]);
@@ -151,7 +151,7 @@ mod payload {
 
     #[test]
     fn the_checksum_has_distance_2_and_passes_a_tenth_of_all_words() {
-        let payload = DESIGN.coding.codebook.payload().unwrap();
+        let payload = DESIGN.emission.coding().codebook.payload().unwrap();
         assert_eq!(payload.distance(), 2);
         assert_relative_eq!(payload.legal_fraction(848), 0.1035, max_relative = 1e-3);
         assert_eq!(payload.shift_aliases(848).len(), 337);
@@ -161,7 +161,7 @@ mod payload {
     #[test]
     fn a_sync_bit_and_crc_init_7_repair_it_within_the_dwell() {
         let fixed = Design::open("kim-park-2016-fixed", &[]).unwrap();
-        let payload = fixed.coding.codebook.payload().unwrap();
+        let payload = fixed.emission.coding().codebook.payload().unwrap();
         assert_eq!((payload.bits(), payload.crc().init), (14, 7));
         assert!((0..848).all(|label| !payload.is_dark(label)));
         assert!(payload.shift_aliases(848).is_empty());
@@ -169,7 +169,10 @@ mod payload {
         assert_relative_eq!(derived.macropulse, 29.435e-9, max_relative = 1e-12);
         assert!(derived.macropulse < derived.pixel_period);
         // C0, which repeats itself, is not sent.
-        assert_eq!((fixed.coding.first_word, fixed.coding.word_modulus), (1, 28));
+        assert_eq!(
+            (fixed.emission.coding().first_word, fixed.emission.coding().word_modulus),
+            (1, 28)
+        );
         reported("fixed-payload", Unsaid, &["14 bits, 29.435 ns", "0 dark columns"]);
     }
 }
@@ -181,7 +184,7 @@ mod timing {
     fn light_from_150_m_is_24_44_shots_late() {
         assert_relative_eq!(DERIVED.gate, 1.0007e-6, max_relative = 1e-5);
         assert_relative_eq!(DERIVED.pixel_period, 40.946e-9, max_relative = 1e-5);
-        let chips = DERIVED.pixel_period / s_from_fs(DESIGN.coding.chip_fs);
+        let chips = DERIVED.pixel_period / s_from_fs(DESIGN.emission.coding().chip_fs);
         assert_relative_eq!(chips, 16_378.41, max_relative = 1e-6);
         let flying = shots_in_flight(150.0, DERIVED.pixel_period);
         assert_relative_eq!(flying, 24.44, max_relative = 1e-4);
@@ -213,7 +216,7 @@ mod timing {
     #[test]
     fn a_scan_has_73_million_marks() {
         assert_relative_eq!(DERIVED.marks_per_scan as f64, 73.16e6, max_relative = 1e-4);
-        let chips = DESIGN.scan_period() / s_from_fs(DESIGN.coding.chip_fs);
+        let chips = DESIGN.scan_period() / s_from_fs(DESIGN.emission.coding().chip_fs);
         assert_relative_eq!(chips, 6.67e9, max_relative = 1e-3);
         let density = DERIVED.marks_per_scan as f64 / chips;
         assert_relative_eq!(density, 0.0110, max_relative = 5e-3);
@@ -222,10 +225,10 @@ mod timing {
 
     #[test]
     fn the_bank_of_converters_is_sized_for_macropulses_without_zeros() {
-        let rate = 25.0 * 29.0 / 841.0 / s_from_fs(DESIGN.tdc.tick_fs);
+        let rate = 25.0 * 29.0 / 841.0 / s_from_fs(DESIGN.clock.tick_fs);
         assert_relative_eq!(rate, 345e9, max_relative = 1e-3);
         assert_relative_eq!(rate * 3.333e-9, 1149.0, max_relative = 1e-3);
-        assert_eq!(DESIGN.tdc.converters, 1150);
+        assert_eq!(DESIGN.bank().unwrap().converters, 1150);
         reported("converters", Partly, &["345 Gcps", "344.8 on average"]);
         reported("dead-time-rate", Holds, &["3.333 ns", "1149", "1138"]);
     }
@@ -243,9 +246,9 @@ mod timing {
     #[test]
     fn counters_roll_over() {
         let ticks = 2_f64.powi(32);
-        let clock = ticks * s_from_fs(DESIGN.tdc.clock_fs);
+        let clock = ticks * s_from_fs(DESIGN.clock.period_fs);
         assert_relative_eq!(clock, 429.5e-3, max_relative = 1e-4);
-        let tick = ticks * s_from_fs(DESIGN.tdc.tick_fs);
+        let tick = ticks * s_from_fs(DESIGN.clock.tick_fs);
         assert_relative_eq!(tick, 10.7e-3, max_relative = 5e-3);
         assert!(tick < DESIGN.scan_period());
         reported("rollover", Holds, &["429.5 ms", "10.7 ms"]);
@@ -355,7 +358,7 @@ mod light {
         let per_mark = photons / DERIVED.marks.1;
         assert_relative_eq!(per_mark, 0.0988, max_relative = 0.01);
         let background = budget.background(day.irradiance(WAVELENGTH).unwrap(), day.albedo)
-            * s_from_fs(DESIGN.coding.chip_fs);
+            * s_from_fs(DESIGN.emission.coding().chip_fs);
         assert_relative_eq!(background, 969.0, max_relative = 2e-3);
         // Instead, white at 150 m is declared to be seen with 0.99 a mark: −ln 0.01 photons.
         assert_relative_eq!(DERIVED.reference_photons, -0.01_f64.ln(), max_relative = 1e-9);

@@ -5,7 +5,7 @@
 //! `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Effect};
+use crate::design::{Design, Effect, Histogram, Readout};
 use crate::emit::bands;
 use crate::environment::Environment;
 use crate::scene::{PER_TRIANGLE, Scene};
@@ -47,6 +47,9 @@ const PER_SAMPLE: f64 = 4.0;
 /// and what the receiver weighs of it.
 const PER_SAMPLE_AT_WORK: f64 = 40.0;
 
+/// Of a bin of a histogram: its count, and the same once more where it is written.
+const PER_BIN: f64 = 8.0;
+
 /// The memory of a run, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Estimate {
@@ -69,7 +72,7 @@ impl Estimate {
     /// As [`Operating::of`].
     pub fn of(design: &Design, environment: &Environment) -> Result<Self, Error> {
         let operating = Operating::of(design, environment)?;
-        let codebook = &design.coding.codebook;
+        let codebook = &design.emission.coding().codebook;
         let in_words: usize = codebook.weights().map(|(_, most)| most).sum();
         let marks = in_words as u64 * codebook.words() as u64;
         // Few shots meet a second surface, and hardly any a third one.
@@ -118,7 +121,7 @@ fn band(design: &Design, operating: &Operating) -> u64 {
     let Some(band) = bands(design, 1).next() else { return 0 };
     let cut = design.cut();
     let (seen, _) = band.ticks(design);
-    let tick = s_from_fs(design.tdc.tick_fs);
+    let tick = s_from_fs(design.clock.tick_fs);
     let before = s_from_fs((cut.history_fs - cut.lead_fs).max(0));
     let lasts = (seen.end - seen.start) as f64 * tick + before;
     let shots = (lasts / design.derived().pixel_period).max(band.shots as f64);
@@ -126,12 +129,15 @@ fn band(design: &Design, operating: &Operating) -> u64 {
         true => PER_SHOT,
         false => PER_MOVING_SHOT,
     };
-    let marks = shots * design.coding.codebook.mean_weight();
+    let marks = shots * design.emission.mean_pulses();
     // A slot of the converters' time is lit or not: noise beyond that is not kept.
-    let noise = (operating.false_rate * lasts).min(lasts / tick) * f64::from(design.channels());
-    let sampled = match design.is_sampled() {
-        true => lasts / tick * (f64::from(design.channels()) * PER_SAMPLE + PER_SAMPLE_AT_WORK),
-        false => 0.0,
+    let channels = f64::from(design.channels());
+    let noise = (operating.false_rate * lasts).min(lasts / tick) * channels;
+    let events = marks * PER_MARK_SEEN + noise * PER_NOISE;
+    let recorded = match design.readout {
+        Readout::Tdc(_) => events,
+        Readout::Adc => events + lasts / tick * (channels * PER_SAMPLE + PER_SAMPLE_AT_WORK),
+        Readout::Histogram(Histogram { bins }) => band.shots as f64 * f64::from(bins) * PER_BIN,
     };
-    (shots * per_shot + marks * PER_MARK_SEEN + noise * PER_NOISE + sampled) as u64
+    (shots * per_shot + recorded) as u64
 }

@@ -41,6 +41,8 @@ pub enum Stage {
     Scenery = 12,
     /// How bright an echo is with speckle. Indexed by shot and ray.
     Speckle = 13,
+    /// The counts of a histogram. Indexed by shot.
+    Histogram = 14,
 }
 
 /// The counter at which a run of random numbers begins.

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use crate::channel;
 use crate::channel::{Light, Operating, Seen};
 use crate::design::Design;
 use crate::detect::{Detectors, Memory};
@@ -17,8 +18,6 @@ use crate::processor::thread_seconds;
 use crate::random::Chance;
 use crate::scene::{Pose, Scene, Traced};
 use crate::score::{self, Score};
-use crate::tdc::{Converted, Wanted};
-use crate::{channel, tdc};
 use macropulse_codec::decode::{self, MOST_RETURNS, Reject, Returns};
 use macropulse_codec::{Given, ShotLog};
 
@@ -252,11 +251,11 @@ pub struct Record<'a> {
     pub band: &'a Band,
     /// Its shots, guard shots included.
     pub log: &'a ShotLog,
-    /// All ticks, or samples, that belong to it ([`Band::ticks`]).
+    /// All ticks, samples or histograms, that belong to it ([`Band::ticks`]).
     pub given: macropulse_codec::Record<'a>,
 }
 
-/// What is kept of a band: the receiver's side, and the truth to judge it by.
+/// A band that was measured: the receiver's side, and the truth to judge it by.
 struct Measured<'a> {
     log: ShotLog,
     traced: Traced,
@@ -277,6 +276,43 @@ impl Measured<'_> {
         self.tally.seconds[POINTS] += began.elapsed().as_secs_f64();
         (score, self.tally, self.given)
     }
+
+    /// Counts what the owned shots of the band met and gave.
+    fn count(&mut self, design: &Design) {
+        let Self { log, traced, light, returns, tally, .. } = self;
+        tally.shots = log.owned.len() as u64;
+        tally.surfaces = surfaces(design, log, traced);
+        let owned = log.first + log.owned.start as u64..log.first + log.owned.end as u64;
+        for (transmitter, shot) in light.trains.transmitter.iter().zip(&light.trains.shot) {
+            match transmitter {
+                0 => tally.echoes += u64::from(owned.contains(shot)),
+                _ => tally.interferer_shots += 1,
+            }
+        }
+        tally.returns = returns.shot.len() as u64;
+        for number in &returns.number {
+            tally.by_number[usize::from(number - 1)] += 1;
+        }
+        tally.rejects = returns.rejects;
+    }
+}
+
+/// Surfaces that the owned shots of `log` met within the range gate.
+fn surfaces(design: &Design, log: &ShotLog, traced: &Traced) -> u64 {
+    let hits = &traced.middle;
+    let gates = design.scan.gates();
+    let before = |shot: usize| hits.shot.partition_point(|other| (*other as usize) < shot);
+    let met = before(log.owned.start)..before(log.owned.end);
+    let ranges = hits.range[met.clone()].iter();
+    let met = match gates.of_all() {
+        Some(gate) => ranges.filter(|range| gate.contains(range)).count(),
+        None => {
+            let surfaces = hits.shot[met].iter().zip(ranges);
+            let gate = |shot: u32| gates.of(log.row[shot as usize]);
+            surfaces.filter(|(shot, range)| gate(**shot).contains(range)).count()
+        }
+    };
+    met as u64
 }
 
 /// What all bands of a run have in common.
@@ -286,87 +322,66 @@ struct Setup<'a> {
 }
 
 /// Measures a band of a scan of which it is `known` that so many converters were busy at once.
-///
-/// The seconds of its stages are those of the wall clock: to ask for the processor time of a thread after each
-/// stage takes a thirtieth of a clean scan.
 fn measure<'a>(
     setup: &Setup<'a>,
     memory: &mut Memory,
     (band, known): (&Band, u32),
 ) -> Result<Measured<'a>, Error> {
-    let Setup { seen: Seen { design, scene, .. }, detectors } = *setup;
-    let mut tally = Tally::default();
-    let mut began = Instant::now();
-    let mut stages = 0..POINTS;
-    let mut lap = |tally: &mut Tally| {
-        let stage = stages.next().unwrap_or(POINTS);
-        let ended = Instant::now();
-        tally.seconds[stage] += (ended - began).as_secs_f64();
-        began = ended;
-    };
-    let log = band.shot_log(design);
-    lap(&mut tally);
-    let traced = scene.trace(design, &log);
-    lap(&mut tally);
-    let light = channel::light(&setup.seen, &log, &traced);
-    lap(&mut tally);
-    let given = match detectors.samples(&log, &light, &band.ticks(design).0) {
-        Some(samples) => {
-            lap(&mut tally);
-            tally.samples = samples.code.len() as u64;
-            Given::Samples(samples)
-        }
-        None => {
-            let response = detectors.response(&log, &light, memory);
-            lap(&mut tally);
-            let from = band.ticks(design).0.start;
-            let wanted = Wanted { known_busy: known, from };
-            let mut converted = tdc::ticks(design, response, wanted);
-            tally.ticks = converted.made;
-            record::cut(setup, memory, (band, &log), &mut converted);
-            let Converted { ticks, peak_busy, lost, merged, .. } = converted;
-            tally.detections = tally.ticks + merged + lost;
-            (tally.merged, tally.lost, tally.peak_busy) = (merged, lost, peak_busy);
-            Given::Ticks(ticks)
-        }
-    };
-    lap(&mut tally);
-    let known = design.cut().known(&log);
-    let mut returns = design.receiver.decode(&design.coding.codebook, &known, &given)?;
-    let unknown = (known.first - log.first) as u32;
-    returns.shot.iter_mut().for_each(|shot| *shot += unknown);
-    lap(&mut tally);
-    let hits = &traced.middle;
-    let gates = design.scan.gates();
-    let before = |shot: usize| hits.shot.partition_point(|other| (*other as usize) < shot);
-    let met = before(log.owned.start)..before(log.owned.end);
-    let ranges = hits.range[met.clone()].iter();
-    tally.surfaces = match gates.of_all() {
-        Some(gate) => ranges.filter(|range| gate.contains(range)).count(),
-        None => {
-            let surfaces = hits.shot[met].iter().zip(ranges);
-            let gate = |shot: u32| gates.of(log.row[shot as usize]);
-            surfaces.filter(|(shot, range)| gate(**shot).contains(range)).count()
-        }
-    } as u64;
-    tally.shots = log.owned.len() as u64;
-    let owned = log.first + log.owned.start as u64..log.first + log.owned.end as u64;
-    for (transmitter, shot) in light.trains.transmitter.iter().zip(&light.trains.shot) {
-        match transmitter {
-            0 => tally.echoes += u64::from(owned.contains(shot)),
-            _ => tally.interferer_shots += 1,
-        }
-    }
-    tally.returns = returns.shot.len() as u64;
-    for number in &returns.number {
-        tally.by_number[usize::from(number - 1)] += 1;
-    }
-    tally.rejects = returns.rejects;
-    Ok(Measured { log, traced, light, given, returns, tally })
+    let Setup { seen: Seen { design, scene, .. }, .. } = *setup;
+    let mut stages = Stages::begin();
+    let log = stages.done(EMIT, band.shot_log(design));
+    let traced = stages.done(SCENE, scene.trace(design, &log));
+    let light = stages.done(CHANNEL, channel::light(&setup.seen, &log, &traced));
+    let record::Recorded { given, mut tally } =
+        record::recorded(setup, memory, (band, &log, &light), known, &mut stages);
+    let returns = stages.done(DECODE, receive(design, &log, &given)?);
+    tally.seconds = stages.seconds;
+    let mut measured = Measured { log, traced, light, given, returns, tally };
+    measured.count(design);
+    Ok(measured)
 }
 
-/// The last stage, after those of a band: its points and their score.
+/// What the receiver of `design` makes of the record `given` of the shots of `log`.
+///
+/// # Errors
+/// As [`Receiver::decode`](macropulse_codec::decode::Receiver::decode).
+fn receive(design: &Design, log: &ShotLog, given: &Given) -> Result<Returns, decode::Error> {
+    let known = design.known(log);
+    let mut returns = design.receive(&known, given)?;
+    let unknown = (known.first - log.first) as u32;
+    returns.shot.iter_mut().for_each(|shot| *shot += unknown);
+    Ok(returns)
+}
+
+/// The stages of a band, as places in [`Tally::STAGES`].
+const EMIT: usize = 0;
+const SCENE: usize = 1;
+const CHANNEL: usize = 2;
+const DETECT: usize = 3;
+const READOUT: usize = 4;
+const DECODE: usize = 5;
 const POINTS: usize = 6;
+
+/// Takes the time of each stage, by the wall clock: to ask for the processor time of a thread after each stage takes a
+/// thirtieth of a clean scan.
+struct Stages {
+    began: Instant,
+    seconds: [f64; POINTS + 1],
+}
+
+impl Stages {
+    fn begin() -> Self {
+        Self { began: Instant::now(), seconds: [0.0; POINTS + 1] }
+    }
+
+    /// Counts the time since the end of the stage before as that of `stage`, whose `result` is there.
+    fn done<T>(&mut self, stage: usize, result: T) -> T {
+        let ended = Instant::now();
+        self.seconds[stage] += (ended - self.began).as_secs_f64();
+        self.began = ended;
+        result
+    }
+}
 
 /// Counts of a run, stage by stage. Those of interferers, detection events and ticks include the
 /// guard shots of the bands; the others are of owned shots alone.
@@ -386,6 +401,8 @@ pub struct Tally {
     pub ticks: u64,
     /// Samples that reached it.
     pub samples: u64,
+    /// Counts in the histograms that reached it.
+    pub counts: u64,
     /// Detection events that fell into the tick of another one.
     pub merged: u64,
     /// Detection events that found every converter busy.
@@ -418,6 +435,7 @@ impl Tally {
             (&mut self.detections, other.detections),
             (&mut self.ticks, other.ticks),
             (&mut self.samples, other.samples),
+            (&mut self.counts, other.counts),
             (&mut self.merged, other.merged),
             (&mut self.lost, other.lost),
             (&mut self.returns, other.returns),
@@ -444,6 +462,10 @@ impl Tally {
             _ if self.samples > 0 => Some(
                 "the receiver found none of the echoes in the samples: too little light for the noise, or \
                  the channel was blind with its own light",
+            ),
+            _ if self.counts > 0 => Some(
+                "the receiver found none of the echoes in the histograms: too little light for the \
+                 background",
             ),
             _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")

@@ -13,6 +13,7 @@ mod designs;
 mod efforts;
 mod families;
 mod fence;
+mod histograms;
 mod intensity;
 mod interference;
 mod judging;

@@ -139,8 +139,8 @@ fn marks_of_sampled_sensors_stand_apart_and_so_do_their_distances() {
     let apart = |distances: &[u16]| distances.windows(2).map(|two| two[1] - two[0]).min().unwrap();
     for (name, chips) in [("coded-32", 340), ("coded-16", 300)] {
         let design = Design::open(name, &[]).unwrap();
-        let words = design.coding.codebook.family().words();
-        assert_size(design.coding.codebook.family(), chips, 3, 10);
+        let words = design.emission.coding().codebook.family().words();
+        assert_size(design.emission.coding().codebook.family(), chips, 3, 10);
         let (all, gap) = distances(&words);
         assert_eq!(all.len(), 30, "{name}");
         assert!(gap >= 20 && apart(&all) >= 5, "{name}: {gap}, {}", apart(&all));

@@ -79,7 +79,7 @@ fn coded_designs_see_what_stands_square_on() {
 fn bipolar_gold_has_slow_chips_and_sees_the_street() {
     let gold = Design::open("bipolar-gold", &[]).unwrap();
     let paper = Design::open("kim-park-2016", &[]).unwrap();
-    assert!(gold.coding.chip_fs >= 30 * paper.coding.chip_fs);
+    assert!(gold.emission.grid_fs() >= 30 * paper.emission.grid_fs());
     let scan = measure(&gold, &Scene::open("street").unwrap(), 24);
     assert!(scan.score.right_fraction() > 0.95, "{}", scan.score.right_fraction());
     let wrong = scan.score.count(Outcome::Wrong) + scan.score.count(Outcome::False);

@@ -58,8 +58,9 @@ fn differ(one: &Returns, other: &Returns) -> usize {
 fn assert_few_differ(scene: &str, band: usize, blind: f64) {
     let design = Design::open("kim-park-2016", &[]).unwrap();
     let (log, ticks) = given(&design, scene, band);
-    let decode =
-        |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
+    let decode = |receiver: &Receiver| {
+        receiver.decode(&design.emission.coding().codebook, &log, &ticks).unwrap()
+    };
     let quick = decode(&design.receiver);
     let thorough = decode(&set(&design.receiver, |_, effort| *effort = Effort::Thorough));
     assert!(200 * differ(&quick, &thorough) <= log.owned.len(), "{}", differ(&quick, &thorough));
@@ -97,8 +98,9 @@ fn light_of_another_surface_does_not_pass_for_another_label() {
         // The only band in which a pane and what is behind it are so far apart that light of the one falls upon dark
         // bits of the other.
         let (log, ticks) = given(&design, "street", 144);
-        let decode =
-            |receiver: &Receiver| receiver.decode(&design.coding.codebook, &log, &ticks).unwrap();
+        let decode = |receiver: &Receiver| {
+            receiver.decode(&design.emission.coding().codebook, &log, &ticks).unwrap()
+        };
         let quick = decode(&design.receiver);
         let thorough = set(&design.receiver, |_, effort| *effort = Effort::Thorough);
         let found = decode(&thorough);

@@ -67,7 +67,7 @@ fn told(sensor: &str, environment: &str, [reflectance, range]: [f64; 2]) -> Told
          [[material]]\nname = \"matt\"\ndiffuse = {reflectance:.2}\n"
     );
     let scene = Scene::from_toml(&text, "wall", Path::new("")).unwrap();
-    let is_sharp = design.budget.is_some() && design.tdc.tick_fs < 10_000;
+    let is_sharp = design.budget.is_some() && design.clock.tick_fs < 10_000;
     let cloud = match design.is_coded() {
         true => {
             let rows = middle(&design, ROWS[usize::from(is_sharp)]);

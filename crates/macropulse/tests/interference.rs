@@ -246,7 +246,7 @@ fn detections_of_interferers_come_at_the_rate_that_theory_says() {
             let [x, ..] = design.directions().of(187, column);
             // n₀ is that of white at 150 m: nine times that at 50 m, where cos i/R² falls as x³.
             let photons = design.derived().reference_photons * 0.02 * 9.0 * x.powi(3) * brighter;
-            let marks = design.coding.codebook.marks(column, 1).len() as f64;
+            let marks = design.emission.coding().codebook.marks(column, 1).len() as f64;
             events_per_second(2.0, marks, photons, 1.0)
         };
         (0..848).map(of_column).sum()

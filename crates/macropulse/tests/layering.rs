@@ -42,12 +42,13 @@ const CODEC: Layers = Layers {
         },
         Rule { module: "shot_log", may_name: &[], because: "the log is columns" },
         Rule { module: "ticks", may_name: &[], because: "ticks are columns" },
-        Rule {
-            module: "samples",
-            may_name: &["ticks"],
-            because: "samples are columns, and a record is those or ticks",
-        },
+        Rule { module: "samples", may_name: &[], because: "samples are columns" },
         Rule { module: "histograms", may_name: &[], because: "histograms are columns" },
+        Rule {
+            module: "record",
+            may_name: &["histograms", "samples", "ticks"],
+            because: "a record is one of them",
+        },
         Rule {
             module: "cut",
             may_name: &["shot_log"],
@@ -55,7 +56,7 @@ const CODEC: Layers = Layers {
         },
         Rule {
             module: "files",
-            may_name: &["cut", "histograms", "samples", "shot_log", "ticks"],
+            may_name: &["cut", "histograms", "record", "samples", "shot_log", "ticks"],
             because: "files hold shots and what was recorded of them, whoever made them and whatever decodes them",
         },
         Rule {
@@ -64,6 +65,7 @@ const CODEC: Layers = Layers {
                 "code",
                 "histograms",
                 "kernels",
+                "record",
                 "samples",
                 "shot_log",
                 "statistics",
@@ -399,7 +401,8 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
     let home = |name: &str| match name {
         "ShotLog" => "shot_log".to_owned(),
         "Tick" | "Ticks" => "ticks".to_owned(),
-        "Record" | "Samples" => "samples".to_owned(),
+        "Given" | "Record" | "RecordKind" => "record".to_owned(),
+        "Samples" => "samples".to_owned(),
         "Histograms" => "histograms".to_owned(),
         "Cut" => "cut".to_owned(),
         _ => name.to_owned(),

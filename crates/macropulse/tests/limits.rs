@@ -95,7 +95,7 @@ fn steps(design: &Design) -> f64 {
     let of_ticks = match &design.detector {
         Detector::Sampled(sampled) => (around * 1e-15 + sampled.recovery) / sampled.sample,
         detector => {
-            let rate = detector.model().false_rate(1e9).min(1e15 / design.tdc.tick_fs as f64);
+            let rate = detector.model().false_rate(1e9).min(1e15 / design.clock.tick_fs as f64);
             around * 1e-15 * rate
         }
     };
@@ -103,7 +103,7 @@ fn steps(design: &Design) -> f64 {
         Detector::Geiger(geiger) => f64::from(geiger.cells),
         _ => 1.0,
     };
-    of_ticks * channels + shots * design.coding.codebook.mean_weight() * 5.0 * cells
+    of_ticks * channels + shots * design.emission.coding().codebook.mean_weight() * 5.0 * cells
 }
 
 /// Simulates a few shots of the second scan in a white room; says what is wrong with what comes of it.

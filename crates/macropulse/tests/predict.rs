@@ -188,7 +188,9 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
                 .label
                 .iter()
                 .zip(&log.word)
-                .map(|(&label, &word)| design.coding.codebook.marks(label, word).len() as u64)
+                .map(|(&label, &word)| {
+                    design.emission.coding().codebook.marks(label, word).len() as u64
+                })
                 .sum();
             let detectors = Detectors::new(&design, &in_the_dark(&design), Chance::new(2));
             let found = detectors.detections(&log, &light, &mut Memory::default());
@@ -255,7 +257,7 @@ fn a_small_bank_loses_what_erlang_says() {
             events += ticks.ticks.tick.len() as u64 + ticks.lost;
             lost += ticks.lost;
         }
-        let mut bank = design.tdc.clone();
+        let mut bank = design.bank().unwrap();
         // Losses come in runs: so many independent ones are in the count.
         let independent = events / 10;
         assert!(

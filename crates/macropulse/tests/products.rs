@@ -132,7 +132,7 @@ fn beams_side_by_side_see_what_is_forecast() {
     ];
     let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let design = Design::open("coded-practical", &keys).unwrap();
-    assert_eq!((design.channels(), design.converters_per_channel()), (16, 16));
+    assert_eq!((design.channels(), design.bank().unwrap().converters), (16, 16));
     let sky = day();
     let forecaster = Forecaster::new(&design, &sky).unwrap();
     let mut rejected = 0;

@@ -65,7 +65,7 @@ fn errors(
 ) -> (Vec<Sums>, HashMap<u16, Sums>) {
     let all: Vec<Band> = short_bands(design, 0).collect();
     let (mut of_range, mut of_word) = (Vec::new(), HashMap::<u16, Sums>::new());
-    let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
+    let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     for (number, range) in RANGES.into_iter().enumerate() {
         let part: Vec<Band> =
             all.iter().skip(number % all.len()).step_by(11).take(count).copied().collect();
@@ -136,7 +136,7 @@ fn coded_sensors_measure_ranges_without_bias() {
 /// Errors of range in ticks at each of the ranges, in whole scans, each range with a seed of its own.
 fn errors_of_scans(design: &Design, material: &str, scans: u64) -> [Sums; 10] {
     let all: Vec<Band> = (0..scans).flat_map(|scan| bands(design, scan)).collect();
-    let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
+    let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     let mut seed = 0;
     RANGES.map(|range| {
         seed += 1;
@@ -187,7 +187,7 @@ fn points_are_as_precise_as_forecast() {
 fn against_forecast(design: &Design, environment: &str, of_range: &[Sums]) -> f64 {
     let around = Environment::named(environment).unwrap();
     let forecaster = Forecaster::new(design, &around).unwrap();
-    let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
+    let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     let told = RANGES.iter().zip(of_range).filter(|(_, sums)| sums.0 > 1000.0);
     let pairs: Vec<[f64; 2]> = told
         .map(|(range, sums)| {
@@ -240,7 +240,7 @@ fn errors_of_paint(design: &Design, part: &[Band], (paint, range): (f64, f64)) -
     );
     let scene = Scene::from_toml(&text, "room", Path::new("")).unwrap();
     let cloud = sim::scan_part(design, &scene, 1, part).unwrap().cloud();
-    let metres = design.tdc.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
+    let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     let mut sums = Sums::default();
     let errors = cloud.range.iter().map(|found| f64::from(*found) - range);
     let right = errors.filter(|error| error.abs() <= design.right_within);

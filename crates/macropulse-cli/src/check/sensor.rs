@@ -199,7 +199,7 @@ fn light(design: &Design, derived: &Derived) -> Columns {
     if design.is_coded() {
         let (fewest, mean, most) = derived.marks;
         let chips = counted(u64::from(derived.chips), "chip");
-        let chip = short(design.coding.chip_fs as f64 * 1e-3);
+        let chip = short(design.emission.coding().chip_fs as f64 * 1e-3);
         let length = short(derived.macropulse * 1e9);
         columns.push("macropulse", format!("{chips} of {chip} ps = {length} ns"));
         columns
@@ -208,7 +208,7 @@ fn light(design: &Design, derived: &Derived) -> Columns {
         columns.push("marks", lit);
         columns.push("", format!("{} in a scan", grouped(derived.marks_per_scan)));
         let mut labels = BTreeMap::new();
-        for marks in design.coding.codebook.weights() {
+        for marks in design.emission.coding().codebook.weights() {
             *labels.entry(marks).or_insert(0_u64) += 1;
         }
         let labels = labels.iter().map(|((fewest, most), count)| match fewest == most {
@@ -267,13 +267,13 @@ fn json(design: &Design, derived: &Derived) -> Value {
         "unambiguous_range_m": derived.unambiguous_range,
         "tick_mm": derived.tick_range * 1e3,
         "right_within_mm": design.right_within * 1e3,
-        "chip_ps": design.coding.chip_fs as f64 * 1e-3,
+        "chip_ps": design.emission.coding().chip_fs as f64 * 1e-3,
         "macropulse_chips": derived.chips,
         "macropulse_ns": derived.macropulse * 1e9,
         "marks_min": fewest,
         "marks_mean": mean,
         "marks_max": most,
-        "marks_per_label": design.coding.codebook.weights().map(|(_, most)| most).collect::<Vec<_>>(),
+        "marks_per_label": design.emission.coding().codebook.weights().map(|(_, most)| most).collect::<Vec<_>>(),
         "marks_per_scan": derived.marks_per_scan,
         "mean_overlap": derived.mean_overlap,
         "reference_photons": derived.reference_photons.is_finite().then_some(derived.reference_photons),

@@ -9,7 +9,7 @@ use macropulse_study::decoding::{Decoding, Input};
 use crate::fault::Fault;
 use crate::input::STREAM;
 
-/// The decoding of the shots and of the ticks or samples, the `record`, at these paths, `-` for stdin, of
+/// The decoding of the shots and of their record, the `record`, at these paths, `-` for stdin, of
 /// the sensor `design`; and what they are called.
 pub fn open(
     shots: &Path,

@@ -13,7 +13,7 @@ impl Run<'_> {
         let environment = self.setting.environment;
         let mut columns = Columns::default();
         columns.push("shots", grouped(self.shots));
-        let recorded = if self.setting.design.is_sampled() { "samples" } else { "ticks" };
+        let recorded = self.setting.design.records().name();
         columns.push(recorded, grouped(self.recorded));
         columns.push("returns", grouped(self.returns));
         let kinds = Reject::ALL.into_iter().zip(self.rejects).filter(|(_, count)| *count > 0);

@@ -131,7 +131,7 @@ fn text(macropulse: &Macropulse, design: &Design) -> String {
         }
         None => columns.push("payload", "none: this sensor sends one mark per shot"),
     }
-    let chip_ps = design.coding.chip_fs as f64 * 1e-3;
+    let chip_ps = design.emission.coding().chip_fs as f64 * 1e-3;
     columns.push("chips", format!("{} of {chip_ps} ps", macropulse.chips));
     let list: Vec<String> = macropulse.marks.iter().map(u16::to_string).collect();
     columns.push("marks", format!("{} lit chips, counted from 0:", macropulse.marks.len()));

@@ -62,10 +62,11 @@ pub fn write(
             design.name, design.scan.light_range
         )));
     }
-    if wall.is_some() && design.is_sampled() {
+    if wall.is_some() && design.bank().is_none() {
+        let record = design.records().name();
         return Err(Fault::Wrong(format!(
-            "--wall-m: {} is sampled and has no ticks; leave it out, and simulate samples with `macropulse \
-             simulate --format samples`",
+            "--wall-m: {} records {record} and no ticks; leave it out, and simulate {record} with `macropulse \
+             simulate --format {record}`",
             design.name
         )));
     }
@@ -132,7 +133,7 @@ fn wall(
     range: f64,
     write: &mut dyn FnMut(Tick) -> io::Result<()>,
 ) -> io::Result<()> {
-    let (coding, tick_fs) = (&design.coding, design.tdc.tick_fs);
+    let (coding, tick_fs) = (design.emission.coding(), design.clock.tick_fs);
     let delay_fs = fs_from_s(tof_from_range(range));
     let mut waiting: BinaryHeap<Reverse<(i64, u16)>> = BinaryHeap::new();
     let mut last = None;

@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use macropulse::codec::RecordKind;
 use macropulse::codec::files::Form;
 use macropulse::design::Design;
 use macropulse::formats::{self, Format};
@@ -18,6 +19,7 @@ pub struct Records {
     /// Ticks, and in which form.
     pub ticks: Option<Form>,
     pub samples: bool,
+    pub histograms: bool,
 }
 
 impl Records {
@@ -29,22 +31,27 @@ impl Records {
     /// Takes the record that is called `name`; `false` if none is.
     pub fn add(&mut self, name: &str) -> bool {
         let form = form(name);
-        let is_samples = name.trim().eq_ignore_ascii_case("samples");
+        let is = |kind: RecordKind| name.trim().eq_ignore_ascii_case(kind.name());
+        let (samples, histograms) = (is(RecordKind::Samples), is(RecordKind::Histograms));
         // Both forms hold the same: the last one named counts.
         self.ticks = form.or(self.ticks);
-        self.samples |= is_samples;
-        is_samples || form.is_some()
+        self.samples |= samples;
+        self.histograms |= histograms;
+        samples || histograms || form.is_some()
     }
 
     /// Which of them `design` has, if any is asked for; or the sentence that says why none.
     pub fn of(self, design: &Design) -> Result<Option<Kept>, String> {
         let name = &design.name;
-        match (design.is_sampled(), self.ticks) {
-            (true, _) if self.samples => Ok(Some(Kept::Samples)),
-            (false, Some(form)) => Ok(Some(Kept::Ticks(form))),
+        match (design.records(), self.ticks) {
+            (RecordKind::Samples, _) if self.samples => Ok(Some(Kept::Samples)),
+            (RecordKind::Histograms, _) if self.histograms => Ok(Some(Kept::Histograms)),
+            (RecordKind::Ticks, Some(form)) => Ok(Some(Kept::Ticks(form))),
             _ if self.is_none() => Ok(None),
-            (true, _) => Err(format!("{name} is sampled and has no ticks; ask for `samples`")),
-            (false, None) => Err(format!("{name} is not sampled; ask for `ticks`")),
+            (record, _) => {
+                let record = record.name();
+                Err(format!("{name} records {record} and nothing else; ask for `{record}`"))
+            }
         }
     }
 }
@@ -71,8 +78,8 @@ impl Formats {
             |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();
         let (known, default) = (names(Format::ALL), names(&Self::default().0));
         format!(
-            "Formats to write: {}, ticks, ticks-csv, samples (shots, and ticks or samples, for \
-             `decode`), with commas between them, or none [default: {}]",
+            "Formats to write: {}, ticks, ticks-csv, samples, histograms (shots, and what the \
+             receiver is given of them, for `decode`), with commas between them, or none [default: {}]",
             known.join(", "),
             default.join(",")
         )
@@ -109,7 +116,7 @@ mod tests {
         assert_eq!(Formats::from_str("pcd,PLY,pcd").unwrap().0, [Format::Pcd, Format::Ply]);
         assert!(Formats::from_str("none").unwrap().0.is_empty());
         let with_ticks = Formats::from_str("ticks-csv,pcd").unwrap();
-        let ticks = Records { ticks: Some(Form::Text), samples: false };
+        let ticks = Records { ticks: Some(Form::Text), ..Records::default() };
         assert_eq!(with_ticks, Formats(vec![Format::Pcd], ticks));
         assert!(Formats::from_str("").is_err());
         assert!(Formats::from_str("pcd,none").is_err());

@@ -1,4 +1,4 @@
-//! Shots and ticks, or samples, beside the points: what `decode` needs to find them again.
+//! Shots and their record, ticks, samples or histograms, beside the points: what `decode` needs to find them again.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -7,7 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 use macropulse::codec;
 use macropulse::codec::files::{
-    Form, SampleHeader, SampleWriter, Shot, ShotHeader, ShotWriter, TickHeader, TickWriter,
+    Form, HistogramHeader, HistogramWriter, SampleHeader, SampleWriter, Shot, ShotHeader,
+    ShotWriter, TickHeader, TickWriter,
 };
 use macropulse::design::Design;
 use macropulse::emit::{logs, scan_begins_fs, shots_of_scan};
@@ -24,6 +25,8 @@ pub enum Kept {
     Ticks(Form),
     /// Samples; they and the shots in their binary form.
     Samples,
+    /// Histograms; they and the shots in their binary form.
+    Histograms,
 }
 
 impl Kept {
@@ -31,16 +34,17 @@ impl Kept {
     pub fn form(self) -> Form {
         match self {
             Self::Ticks(form) => form,
-            Self::Samples => Form::Binary,
+            Self::Samples | Self::Histograms => Form::Binary,
         }
     }
 
-    /// The names of the files of a scan: shots, and ticks or samples.
+    /// The names of the files of a scan: shots, and their record.
     pub fn names(self, scan: u64) -> [String; 2] {
         let [shots, record] = match self {
             Self::Ticks(Form::Binary) => [("shots", "mps"), ("ticks", "mpt")],
             Self::Ticks(Form::Text) => [("shots", "csv"), ("ticks", "csv")],
             Self::Samples => [("shots", "mps"), ("samples", "mpw")],
+            Self::Histograms => [("shots", "mps"), ("histograms", "mph")],
         };
         [shots, record].map(|(name, ending)| format!("{name}-{scan:06}.{ending}"))
     }
@@ -55,7 +59,7 @@ pub struct Recorded<'a> {
 }
 
 impl Recorded<'_> {
-    /// The names of its files of shots, and of ticks or samples.
+    /// The names of its files of shots, and of their record.
     pub fn names(&self) -> [String; 2] {
         self.kept.names(self.number)
     }
@@ -97,7 +101,7 @@ impl Recorded<'_> {
     /// What is said of its ticks, as many as are known.
     pub fn header(&self, measured: bool, count: u64) -> TickHeader {
         TickHeader {
-            tick_fs: self.design.tdc.tick_fs,
+            tick_fs: self.design.clock.tick_fs,
             several: self.design.channels() > 1,
             measured,
             digest: Some(self.design.recorded_digest()),
@@ -110,10 +114,11 @@ impl Recorded<'_> {
 enum Header {
     Ticks(TickHeader, Form),
     Samples(SampleHeader),
+    Histograms(HistogramHeader),
 }
 
 impl Header {
-    /// Writes it, with so many ticks, or blocks of samples, to come.
+    /// Writes it, with `count` ticks, blocks of samples or histograms to come.
     fn write(&mut self, out: &mut WholeFile, count: u64) -> io::Result<()> {
         match self {
             Self::Ticks(header, form) => {
@@ -124,13 +129,17 @@ impl Header {
                 header.count = Some(count);
                 SampleWriter::new(out, header).map(|_| ())
             }
+            Self::Histograms(header) => {
+                header.count = Some(count);
+                HistogramWriter::new(out, header).map(|_| ())
+            }
         }
     }
 
-    /// Appends what was `given` before the absolute tick `end` to `bytes`, and gives how many ticks, or
-    /// blocks of samples, that is.
-    fn append(&self, given: codec::Record, end: i64, bytes: &mut Vec<u8>) -> io::Result<u64> {
-        match (self, given) {
+    /// Appends what was recorded before the absolute tick `end` to `bytes`, and gives the number of ticks,
+    /// blocks of samples, or histograms.
+    fn append(&self, record: &Record, end: i64, bytes: &mut Vec<u8>) -> io::Result<u64> {
+        match (self, record.given) {
             (Self::Ticks(header, form), codec::Record::Ticks(ticks)) => {
                 let mut stream = ticks.stream();
                 stream.truncate(stream.partition_point(|tick| tick.tick < end));
@@ -141,13 +150,18 @@ impl Header {
             (Self::Samples(_), codec::Record::Samples(samples)) => {
                 SampleWriter::behind(bytes).write(samples, end)
             }
+            (Self::Histograms(_), codec::Record::Histograms(histograms)) => {
+                let first = record.log.first + record.log.owned.start as u64;
+                HistogramWriter::behind(bytes).write(histograms, first)?;
+                Ok(histograms.len() as u64)
+            }
             // A sensor gives what it is asked for, or it is not asked.
             _ => Ok(0),
         }
     }
 }
 
-/// The files of a scan under way: its shots, and its ticks or samples.
+/// The files of a scan under way: its shots, and their record.
 pub struct RecordFiles<'a> {
     recorded: Recorded<'a>,
     header: Header,
@@ -179,10 +193,12 @@ impl<'a> RecordFiles<'a> {
         let pose = scene.sensor.at(scan_begins_fs(recorded.design, recorded.number));
         let written = recorded.write_shots(&mut shots, (pose.position, pose.quaternion()));
         written.map_err(|cause| shots.failed(cause))?;
-        let mut header = match (recorded.kept, recorded.design.sample_header()) {
-            (Kept::Samples, Some(header)) => Header::Samples(header),
-            (kept, _) => Header::Ticks(recorded.header(scans.measure(), 0), kept.form()),
-        };
+        let design = recorded.design;
+        let samples = design.sample_header().map(Header::Samples);
+        let histograms = design.histogram_header().map(Header::Histograms);
+        let mut header = samples.or(histograms).unwrap_or_else(|| {
+            Header::Ticks(recorded.header(scans.measure(), 0), recorded.kept.form())
+        });
         header.write(&mut file, 0).map_err(|cause| file.failed(cause))?;
         let waiting = Waiting { file, next: 0, early: BTreeMap::new(), count: 0, failed: None };
         Ok(Self { recorded, header, shots, record: Mutex::new(waiting) })
@@ -197,7 +213,7 @@ impl<'a> RecordFiles<'a> {
         let end = if is_last { seen.end } else { own.end };
         let mut bytes = Vec::new();
         // Memory takes all that is written to it.
-        let appended = self.header.append(record.given, end, &mut bytes);
+        let appended = self.header.append(record, end, &mut bytes);
         let mut waiting = self.record.lock().unwrap_or_else(PoisonError::into_inner);
         match appended {
             Ok(count) => waiting.count += count,

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use macropulse::channel::idealised;
+use macropulse::codec::RecordKind;
 use macropulse::codec::decode::Reject;
 use macropulse::points::Outcome;
 use macropulse_study::record::PAGE;
@@ -49,7 +50,7 @@ impl Run<'_> {
                 .push("on target", format!("{} of {}", counted(points, "point"), grouped(samples)));
         }
         columns.push("rejects", self.rejects());
-        if !design.is_sampled() {
+        if design.bank().is_some() {
             columns.push("converters", self.converters());
         }
         let stages = self.stages().map(|(stage, s)| format!("{stage}{NO_BREAK}{}", lasted(s)));
@@ -90,9 +91,10 @@ impl Run<'_> {
 
     fn light(&self) -> String {
         let tally = &self.tally;
-        let recorded = match self.design.is_sampled() {
-            true => counted(tally.samples, "sample"),
-            false => {
+        let recorded = match self.design.records() {
+            RecordKind::Samples => counted(tally.samples, "sample"),
+            RecordKind::Histograms => counted(tally.counts, "count"),
+            RecordKind::Ticks => {
                 format!(
                     "{}, {}",
                     counted(tally.detections, "detection"),
@@ -139,7 +141,7 @@ impl Run<'_> {
     }
 
     fn converters(&self) -> String {
-        let per_channel = self.design.converters_per_channel();
+        let per_channel = self.design.bank().map_or(0, |bank| bank.converters);
         let of = if self.design.channels() == 1 { "" } else { " per detector" };
         format!(
             "at most {} of {}{of} busy; {} lost, {} merged",

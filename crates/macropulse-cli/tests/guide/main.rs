@@ -47,6 +47,7 @@ pages! {
     explore: "docs/guide/explore.md",
     first_scan: "docs/guide/first-scan.md",
     golden_model: "docs/guide/golden-model.md",
+    histograms: "docs/guide/histograms.md",
     interference: "docs/guide/interference.md",
     never_waiting: "docs/guide/never-waiting.md",
     own_code: "docs/guide/own-code.md",

@@ -22,6 +22,7 @@ mod timing;
 pub use bitwise::{Bitwise, Opening};
 pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
+pub use histogram::HistogramMethod;
 pub use matched::Effort;
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
@@ -33,7 +34,7 @@ pub use sampled::{
 use serde::Deserialize;
 
 use crate::code::Codebook;
-use crate::{Record, ShotLog, Ticks, time};
+use crate::{Record, RecordKind, ShotLog, Ticks, time};
 use energy::{Energy, Window};
 use returns::Return;
 
@@ -67,6 +68,8 @@ pub enum Method {
     Balanced(Correlation),
     /// Correlates samples: adds up the marks of a word, and takes away what was explained.
     Sampled(Sampled),
+    /// Finds pulses in histograms of counts.
+    Histogram(HistogramMethod),
 }
 
 /// Settings of a receiver that correlates ticks with known macropulses.
@@ -170,6 +173,8 @@ kinds! {
     Direct, Self::Direct => "direct", MOST_RETURNS;
     /// As `matched`, of a sampled detector: adds up the samples of the marks of every shot in flight.
     Sampled, Self::Sampled(_) => "sampled", MOST_RETURNS;
+    /// For bursts of pulses that are counted in a histogram: the pulses that stand out of its background.
+    Histogram, Self::Histogram(_) => "histogram", MOST_RETURNS;
 }
 
 impl Method {
@@ -189,10 +194,19 @@ impl Method {
         }
     }
 
+    /// The kind of record that it decodes.
+    pub fn record(&self) -> RecordKind {
+        match self {
+            Self::Sampled(_) => RecordKind::Samples,
+            Self::Histogram(_) => RecordKind::Histograms,
+            _ => RecordKind::Ticks,
+        }
+    }
+
     /// Ticks per chip of the code words; `None` without a code.
     pub fn ticks_per_chip(&self) -> Option<u32> {
         match self {
-            Self::Direct => None,
+            Self::Direct | Self::Histogram(_) => None,
             Self::Bitwise(settings) => Some(settings.ticks_per_chip),
             Self::Matched(settings, _) | Self::Balanced(settings) => Some(settings.ticks_per_chip),
             Self::Sampled(settings) => Some(settings.ticks_per_chip),
@@ -220,6 +234,7 @@ impl Method {
     fn false_alarm(&self) -> Option<f64> {
         match self {
             Self::Sampled(settings) => Some(settings.false_alarm),
+            Self::Histogram(settings) => Some(settings.false_alarm),
             _ => self.correlation().map(|correlation| correlation.false_alarm),
         }
     }
@@ -266,7 +281,7 @@ impl Receiver {
         window(self.method.jitter_ticks())
     }
 
-    /// The returns of the owned shots of `log`, out of all the ticks or samples of its band, the
+    /// The returns of the owned shots of `log`, out of all the ticks, samples or histograms of its band, the
     /// `record`, ordered by shot, those of one shot by range.
     ///
     /// The record must cover the whole time in which light of an owned shot can arrive. Guard shots
@@ -295,7 +310,13 @@ impl Receiver {
                 Method::Sampled(settings) => {
                     Ok(sampled::decode(self, settings, (codebook, log), samples))
                 }
-                _ => Err(Error::Record { wants: "ticks", given: "samples" }),
+                method => Err(Error::Record { wants: method.record().name(), given: "samples" }),
+            },
+            Record::Histograms(histograms) => match &self.method {
+                Method::Histogram(settings) => {
+                    histogram::decode_band(self, settings, log, histograms)
+                }
+                method => Err(Error::Record { wants: method.record().name(), given: "histograms" }),
             },
         }
     }
@@ -309,7 +330,9 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let sent = (codebook, log);
         Ok(match &self.method {
-            Method::Sampled(_) => return Err(Error::Record { wants: "samples", given: "ticks" }),
+            Method::Sampled(_) | Method::Histogram(_) => {
+                return Err(Error::Record { wants: self.method.record().name(), given: "ticks" });
+            }
             _ if ticks.tick.is_empty() || log.is_empty() => {
                 check::in_order(&ticks.tick, 0..ticks.tick.len())?;
                 self.nothing_of(log.owned.len())

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::Range;
 
-use super::{Error, SampleBlock, SampleReader, TickReader};
-use crate::samples::{Given, Samples};
+use super::{Error, Histogram, HistogramReader, SampleBlock, SampleReader, TickReader};
 use crate::ticks::{Tick, Ticks};
+use crate::{Given, Histograms, Samples};
 
 /// Ticks of a band at most: 400 MB of them.
 const MOST_TICKS: usize = 1 << 24;
@@ -14,18 +14,28 @@ const MOST_TICKS: usize = 1 << 24;
 /// Samples of a band at most: 512 MB of them.
 const MOST_SAMPLES: usize = 1 << 28;
 
+/// Counts of a band at most: 512 MB of them.
+const MOST_COUNTS: usize = 1 << 27;
+
 /// A record under way.
 #[derive(Debug)]
 pub(super) enum AtHand<R> {
     Ticks(TicksAtHand<R>),
     Samples(SamplesAtHand<R>),
+    Histograms(HistogramsAtHand<R>),
 }
 
 impl<R: Read> AtHand<R> {
-    /// What is of the absolute ticks of `span`, which lie behind those asked for before; times of ticks
-    /// are counted from `epoch` on.
-    pub fn of(&mut self, span: &Range<i64>, epoch: i64) -> Result<Given, Error> {
+    /// The record of the shots with the ids `owned`: that of the absolute ticks of `span`, which lie behind
+    /// those asked for before, times of ticks being counted from `epoch` on; or the histograms of these shots.
+    pub fn of(
+        &mut self,
+        owned: &Range<u64>,
+        span: &Range<i64>,
+        epoch: i64,
+    ) -> Result<Given, Error> {
         match self {
+            Self::Histograms(histograms) => Ok(Given::Histograms(histograms.of(owned)?)),
             Self::Ticks(ticks) => Ok(Given::Ticks(ticks.of(span, epoch)?)),
             Self::Samples(samples) => Ok(Given::Samples(samples.of(span)?)),
         }
@@ -36,8 +46,55 @@ impl<R: Read> AtHand<R> {
         match self {
             Self::Ticks(ticks) => while ticks.reader.next_tick()?.is_some() {},
             Self::Samples(samples) => while samples.reader.next_block()?.is_some() {},
+            Self::Histograms(histograms) => while histograms.reader.next_histogram()?.is_some() {},
         }
         Ok(())
+    }
+}
+
+/// Histograms under way.
+#[derive(Debug)]
+pub(super) struct HistogramsAtHand<R> {
+    reader: HistogramReader<R>,
+    /// The one behind those that were asked for.
+    next: Option<Histogram>,
+}
+
+impl<R: Read> HistogramsAtHand<R> {
+    pub fn new(reader: HistogramReader<R>) -> Self {
+        Self { reader, next: None }
+    }
+
+    /// Those of the shots `owned`: empty of a shot without one.
+    fn of(&mut self, owned: &Range<u64>) -> Result<Histograms, Error> {
+        let header = *self.reader.header();
+        let shots = (owned.end - owned.start) as usize;
+        let bins = header.bins as usize;
+        if shots.saturating_mul(bins) > MOST_COUNTS {
+            return self.reader.refuse(format!(
+                "more than {MOST_COUNTS} bins belong to shots that are decoded together"
+            ));
+        }
+        let mut found = Histograms {
+            bin_fs: header.bin_fs,
+            offset_fs: header.offset_fs,
+            bins: header.bins,
+            cycles: vec![0; shots],
+            counts: vec![0; shots * bins],
+        };
+        loop {
+            if self.next.is_none() {
+                self.next = self.reader.next_histogram()?;
+            }
+            let Some(one) = self.next.take_if(|one| one.shot < owned.end) else {
+                return Ok(found);
+            };
+            if let Some(at) = one.shot.checked_sub(owned.start) {
+                let at = at as usize;
+                found.cycles[at] = one.cycles;
+                found.counts[at * bins..(at + 1) * bins].copy_from_slice(&one.counts);
+            }
+        }
     }
 }
 

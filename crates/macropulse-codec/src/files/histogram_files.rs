@@ -82,6 +82,11 @@ impl<R: Read> HistogramReader<R> {
         &self.header
     }
 
+    /// An error about what was read last.
+    pub(super) fn refuse<T>(&self, message: impl Into<String>) -> Result<T, Error> {
+        self.source.refuse(message)
+    }
+
     /// The next histogram; `None` behind the last one.
     ///
     /// # Errors

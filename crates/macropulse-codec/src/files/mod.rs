@@ -6,7 +6,7 @@
 //! tells them apart by their first byte. Samples and histograms are binary. `docs/formats.md` has them byte by byte.
 //!
 //! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
-//! record, and keep none. [`Stream`] reads shots and ticks, or samples, at once and cuts them into bands
+//! record, and keep none. [`Stream`] reads shots and ticks, samples or histograms, at once and cuts them into bands
 //! to be decoded.
 //! What is wrong is told with the line or the byte where it stands.
 

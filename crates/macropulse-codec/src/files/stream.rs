@@ -4,16 +4,16 @@
 use std::io::Read;
 use std::ops::Range;
 
-use super::at_hand::{AtHand, SamplesAtHand, TicksAtHand};
-use super::{Error, SampleReader, Shot, ShotReader, TickReader};
+use super::at_hand::{AtHand, HistogramsAtHand, SamplesAtHand, TicksAtHand};
+use super::{Error, HistogramReader, SampleReader, Shot, ShotReader, TickReader};
+use crate::Given;
 use crate::cut::Cut;
-use crate::samples::Given;
 use crate::shot_log::ShotLog;
 
 /// Shots of a band at most, guard shots included.
 const MOST_SHOTS: usize = 1 << 20;
 
-/// A shot log and ticks or samples under way; of both no more is kept than belongs to one band.
+/// A shot log and ticks, samples or histograms under way; of both no more is kept than belongs to one band.
 #[derive(Debug)]
 pub struct Stream<S, R> {
     cut: Cut,
@@ -39,6 +39,11 @@ impl<S: Read, R: Read> Stream<S, R> {
         Self::of(cut, shots, AtHand::Samples(SamplesAtHand::new(samples)))
     }
 
+    /// The bands of `shots` and `histograms`, which are of a sensor that is `cut` so.
+    pub fn of_histograms(cut: Cut, shots: ShotReader<S>, histograms: HistogramReader<R>) -> Self {
+        Self::of(cut, shots, AtHand::Histograms(HistogramsAtHand::new(histograms)))
+    }
+
     fn of(cut: Cut, shots: ShotReader<S>, record: AtHand<R>) -> Self {
         let first = shots.header().first;
         let left = shots.header().owned.clone().unwrap_or(first..u64::MAX);
@@ -54,7 +59,7 @@ impl<S: Read, R: Read> Stream<S, R> {
     }
 
     /// The next band, whose owned shots end before the shot that `until` says of their first one; its
-    /// shots, and its ticks or samples. `None` behind the last one. What a file of samples does not reach
+    /// shots, and its record. `None` behind the last one. What a file of samples does not reach
     /// at its beginning or end is left out.
     ///
     /// # Errors
@@ -88,7 +93,12 @@ impl<S: Read, R: Read> Stream<S, R> {
         self.at_hand.drain(..past);
         self.first += past as u64;
         let is_guard = |shot: &Shot| shot.fired_fs <= *fired_fs.end();
+        let ids = owned.clone();
         let log = self.log(self.at_hand.partition_point(is_guard), owned);
+        if let AtHand::Histograms(_) = self.record {
+            let given = self.record.of(&ids, &(0..0), 0)?;
+            return Ok(Some((log.part(log.owned.clone()), given)));
+        }
         let span = self.cut.ticks(begins, ends);
         let epoch = self.cut.epoch(log.fired_at_fs[0]);
         if span.end.saturating_sub(epoch) > i64::from(u32::MAX) {
@@ -99,7 +109,7 @@ impl<S: Read, R: Read> Stream<S, R> {
                 self.left.start - 1
             ));
         }
-        Ok(Some((self.cut.known(&log), self.record.of(&span, epoch)?)))
+        Ok(Some((self.cut.known(&log), self.record.of(&ids, &span, epoch)?)))
     }
 
     /// The id behind the last shot at hand.

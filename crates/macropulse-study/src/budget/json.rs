@@ -13,7 +13,7 @@ impl Figures<'_> {
     pub fn json(&self) -> Value {
         let there = &self.there;
         let budget = self.design.budget.as_ref();
-        let marks = self.design.coding.codebook.mean_weight();
+        let marks = self.design.emission.mean_pulses();
         let class = Class1::at(self.design.light.wavelength);
         let alone = |limit: &&Limit| limit.rule == Rule::SingleShot;
         let limits = self.design.eye_limits();

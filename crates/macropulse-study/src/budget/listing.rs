@@ -57,7 +57,7 @@ impl Figures<'_> {
                 columns.push("energy", "unknown: the sensor is declared by what it can see");
             }
             Some(budget) => {
-                let marks = self.design.coding.codebook.mean_weight();
+                let marks = self.design.emission.mean_pulses();
                 let power = budget.energy / self.design.derived().pixel_period;
                 columns.push(
                     "energy",

@@ -112,7 +112,7 @@ impl<'a> Figures<'a> {
     /// Photons of sunlight that reach the detector during a chip; of a sensor without a code during
     /// a tick. 0 where the sensor has no link budget.
     pub fn background_per_chip(&self) -> f64 {
-        let chip = s_from_fs(self.design.coding.chip_fs);
+        let chip = s_from_fs(self.design.emission.coding().chip_fs);
         let detected = self.chosen.operating().background * chip;
         self.design.budget.as_ref().map_or(0.0, |budget| detected / budget.efficiency)
     }

@@ -72,7 +72,7 @@ impl Bill {
             channels: it.beams,
             converter,
             samples_per_s: match converter {
-                Converter::AdcAndCanceller => channels * 1e15 / design.tdc.tick_fs as f64,
+                Converter::AdcAndCanceller => channels * 1e15 / design.clock.tick_fs as f64,
                 Converter::ComparatorAndTdc => 0.0,
             },
             photodiodes: channels * it.aperture.powi(2) * field(&design),

@@ -48,7 +48,7 @@ impl InFlight {
         let Some(blind) = design.receiver.method.sampling().and_then(Blind::at_most) else {
             return Ok(None);
         };
-        let blind = f64::from(blind.between_ticks().ticks()) * design.tdc.tick_fs as f64 * 1e-15;
+        let blind = f64::from(blind.between_ticks().ticks()) * design.clock.tick_fs as f64 * 1e-15;
         let least_period = blind / (1.0 - wanted.pd);
         let with = |beams: u32| {
             let holds =

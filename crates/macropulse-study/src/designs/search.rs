@@ -359,7 +359,7 @@ const USUAL_PULSE: f64 = 0.8e-9;
 
 /// From sample to sample, s.
 fn sample(design: &Design) -> f64 {
-    design.tdc.tick_fs as f64 * 1e-15
+    design.clock.tick_fs as f64 * 1e-15
 }
 
 /// Simulates candidates of so many marks, with the largest aperture, until it is known with how few beams they

@@ -74,7 +74,7 @@ impl Requirements {
         // Of a Gaussian low-pass 0.312 over its bandwidth (full width at half maximum).
         let mark = bare.pulse.hypot(0.312 / bare.bandwidth);
         let apart = chips(APART * mark);
-        let tick = design.tdc.tick_fs as f64 * 1e-15;
+        let tick = design.clock.tick_fs as f64 * 1e-15;
         let ticks = blind.map_or(0, |blind| blind.between_ticks().ticks());
         let gap = chips(f64::from(ticks) * tick).max(apart);
         let weight = bare.marks;

@@ -41,7 +41,7 @@ pub(super) fn code_words(words: &[CodeWord]) -> Result<Figure, Error> {
 
 /// Fig. 4: the payload of a column and its chips.
 pub(super) fn payload(design: &Design, (row, column): (u16, u16)) -> Option<Figure> {
-    let codebook = &design.coding.codebook;
+    let codebook = &design.emission.coding().codebook;
     let payload = codebook.payload()?;
     let word = shot_of_pixel(design, 0, row.into(), column.into())?.word;
     let text = payload.text(column);

@@ -83,7 +83,7 @@ fn summary(findings: &Findings) -> Section {
 
 fn codes(findings: &Findings) -> Result<Section, Error> {
     let design = &findings.designs[0];
-    let family = design.coding.codebook.family();
+    let family = design.emission.coding().codebook.family();
     let mut section = Section::new("Codes: Tables 1 and 2, Fig. 4")
         .paragraph(
             "Prime sequences over GF(29), s(i, j) = i\u{b7}j mod 29. Code word C(i) has a mark at \

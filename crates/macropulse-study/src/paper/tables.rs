@@ -94,7 +94,8 @@ pub(super) fn parameters(designs: &[Design]) -> Table {
     });
     row("detector", &|d| d.detector.model().summary());
     row("converters", &|d| {
-        format!("{} of {} ps", d.tdc.converters, s_from_fs(d.tdc.tick_fs) * 1e12)
+        let converters = d.readout.tdc().map_or(0, |tdc| tdc.converters);
+        format!("{converters} of {} ps", s_from_fs(d.clock.tick_fs) * 1e12)
     });
     table
 }

@@ -8,14 +8,14 @@ use serde_json::{Value, json};
 
 use super::{defaults, named, surroundings};
 
-/// Shots, and ticks or samples, that were decoded, with what was counted.
+/// Shots, and ticks, samples or histograms, that were decoded, with what was counted.
 #[derive(Debug, Clone, Copy)]
 pub struct Decoded<'a> {
     /// The sensor.
     pub design: &'a Design,
     /// Sun and air by which intensity is measured.
     pub environment: &'a Environment,
-    /// What the shots, and the ticks or samples, were read from.
+    /// What the shots, and the ticks, samples or histograms, were read from.
     pub inputs: [&'a str; 2],
     /// How far the run has come.
     pub state: State,
@@ -45,7 +45,7 @@ impl Decoded<'_> {
             rejects.push(kind.name(), count);
         }
         let [shots, record] = self.inputs;
-        let kind = if self.design.is_sampled() { "samples" } else { "ticks" };
+        let kind = self.design.records().name();
         versioned(json!({
             "state": self.state,
             "version": env!("CARGO_PKG_VERSION"),

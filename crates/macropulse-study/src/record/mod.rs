@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::view::{Layout, RangePicture};
 use macropulse::channel::idealised;
+use macropulse::codec::RecordKind;
 use macropulse::codec::decode::Reject;
 use macropulse::design::Design;
 use macropulse::emit::scan_begins_fs;
@@ -212,9 +213,10 @@ pub fn manifest(run: &Run) -> Manifest {
     ] {
         manifest.counts.push(name, count);
     }
-    let recorded = match design.is_sampled() {
-        true => &[("samples", tally.samples)][..],
-        false => &[("detections", tally.detections), ("ticks", tally.ticks)],
+    let recorded = match design.records() {
+        RecordKind::Samples => &[("samples", tally.samples)][..],
+        RecordKind::Ticks => &[("detections", tally.detections), ("ticks", tally.ticks)],
+        RecordKind::Histograms => &[("counts", tally.counts)],
     };
     for (name, count) in recorded.iter().chain(&[("returns", tally.returns)]) {
         manifest.counts.push(*name, *count);
@@ -234,7 +236,7 @@ pub fn manifest(run: &Run) -> Manifest {
     for (kind, count) in Reject::ALL.into_iter().zip(tally.rejects) {
         manifest.rejects.push(kind.name(), count);
     }
-    if !design.is_sampled() {
+    if design.bank().is_some() {
         manifest.converters.push("peak_busy", u64::from(tally.peak_busy));
         manifest.converters.push("lost", tally.lost);
         manifest.converters.push("merged", tally.merged);

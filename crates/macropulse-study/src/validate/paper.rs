@@ -77,7 +77,7 @@ fn words() -> Result<Vec<Figure>, Error> {
 /// Payloads and macropulses.
 fn macropulses(design: &Design, derived: &Derived) -> Vec<Figure> {
     let mut figures = Figures::of("macropulses", APART);
-    let weight = design.coding.codebook.family().weight() as f64;
+    let weight = design.emission.coding().codebook.family().weight() as f64;
     let (least, mean, most) = derived.marks;
     figures.add(
         "kim-park-2016: chips of 13 bits, ns",
@@ -88,7 +88,7 @@ fn macropulses(design: &Design, derived: &Derived) -> Vec<Figure> {
     figures.add("marks of a macropulse, the fewest", 58.0, least as f64, Within::Exactly);
     figures.add("the most", 319.0, most as f64, Within::Exactly);
     figures.add("lit bits, the mean", 6.198, mean / weight, Within::Absolute(1e-3));
-    if let Some(payload) = design.coding.codebook.payload() {
+    if let Some(payload) = design.emission.coding().codebook.payload() {
         let dark = (0..848).filter(|label| payload.text(*label).starts_with('0')).count();
         figures.add(
             "labels of 848 that begin with a dark bit",
@@ -131,7 +131,12 @@ fn scan(design: &Design, derived: &Derived) -> Result<Vec<Figure>, Error> {
         Within::Exactly,
     );
     figures.add("chips of 13 bits", 10_933.0, derived.chips.into(), Within::Exactly);
-    figures.add("converters", 1150.0, design.tdc.converters.into(), Within::Exactly);
+    figures.add(
+        "converters",
+        1150.0,
+        design.bank().map_or(f64::NAN, |bank| bank.converters.into()),
+        Within::Exactly,
+    );
     let mut all = figures.done();
     let mut figures = Figures::of("scanners", APART);
     figures.add("shots in flight", 24.44, derived.shots_in_flight, Within::Absolute(5e-3));

@@ -58,7 +58,15 @@ pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, 
         for open in listening(design, log, around_fs) {
             let channel = |pixel| channel_of(design, log, pixel);
             let (transmitter, trains) = (number as u16 + 1, &mut light.trains);
-            let mut arrivals = Arrivals { transmitter, link, channel: &channel, trains };
+            let pulses = pulses_of(other);
+            let mut arrivals = Arrivals {
+                transmitter,
+                link,
+                channel: &channel,
+                pulses,
+                open: open.clone(),
+                trains,
+            };
             for theirs in other.clock.shots(&other.design, open.start - longest_fs..open.end) {
                 let look = |shot: usize, direction, way: f64| {
                     let arrives_fs = theirs.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
@@ -81,10 +89,18 @@ pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, 
 /// How long light may arrive before and after the first chip of a shot, fs: the micropulse has some
 /// before it, and behind the last chip.
 fn around_fs(other: &Interferer) -> (i64, i64) {
-    let Design { coding, light, .. } = &other.design;
-    let chips = f64::from(coding.codebook.chips()) * coding.chip_fs as f64;
+    let Design { emission, light, .. } = &other.design;
+    let length = emission.length_fs() as f64;
     let micropulse = fs_from_s(FLANKS * light.pulse);
-    (micropulse, (chips * other.clock.stretch()) as i64 + micropulse)
+    (micropulse, (length * other.clock.stretch()) as i64 + micropulse)
+}
+
+/// Pulses of a burst of `other`, and the interval between two by the clock of the receiver, fs; a single one
+/// of a macropulse.
+fn pulses_of(other: &Interferer) -> (u64, f64) {
+    other.design.emission.burst().map_or((1, 0.0), |burst| {
+        (burst.pulses.into(), burst.interval_fs as f64 * other.clock.stretch())
+    })
 }
 
 /// When first chips may arrive that the receiver of `log` can see light of, fs, if there is light
@@ -189,6 +205,10 @@ struct Arrivals<'a> {
     link: Link,
     /// The channel that looks at a pixel.
     channel: &'a dyn Fn((u16, u16)) -> u16,
+    /// As [`pulses_of`]: each becomes a train of its own.
+    pulses: (u64, f64),
+    /// When first chips may arrive, fs.
+    open: Range<i64>,
     trains: &'a mut PulseTrains,
 }
 
@@ -236,17 +256,26 @@ impl Arrivals<'_> {
         if photons < FAINTEST {
             return;
         }
-        self.trains.push(PulseTrain {
+        let (pulses, interval_fs) = self.pulses;
+        let first_fs = log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
+        let train = PulseTrain {
             transmitter: self.transmitter,
             channel: (self.channel)(pixel),
-            arrives_fs: log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT),
+            arrives_fs: first_fs,
             photons,
             label: log.label[shot],
             word: log.word[shot],
             marks: ALL_MARKS,
             shot: log.first.wrapping_add(shot as u64),
             way: ray as u16,
-        });
+        };
+        for pulse in 0..pulses {
+            let arrives_fs = first_fs + (pulse as f64 * interval_fs) as i64;
+            if self.open.contains(&arrives_fs) {
+                let shot = train.shot.wrapping_mul(pulses).wrapping_add(pulse);
+                self.trains.push(PulseTrain { arrives_fs, shot, ..train });
+            }
+        }
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Transmitter<'a> {
 impl<'a> Transmitter<'a> {
     /// The transmitter of `design`, whose clock runs `stretch` times slower than the receiver's.
     pub fn of(design: &'a Design, stretch: f64) -> Self {
-        let coding = &design.coding;
+        let coding = design.emission.coding();
         Self {
             codebook: &coding.codebook,
             chip_fs: coding.chip_fs as f64 * stretch,

@@ -159,7 +159,7 @@ fn echoes_of_sub_macropulses(
     each: &[Hits],
     speckled: Option<(Speckle, Chance)>,
 ) {
-    let codebook = &design.coding.codebook;
+    let codebook = &design.emission.coding().codebook;
     let drawn = |hits| speckled.iter().flat_map(|it| factors(it, log, hits)).collect();
     let factors: Vec<Vec<f64>> = each.iter().map(drawn).collect();
     let mut order: Vec<(u32, u8, usize)> = Vec::new();

@@ -4,7 +4,7 @@
 //! its guard shots, and their echoes.
 
 use super::Design;
-use macropulse_codec::Cut;
+use macropulse_codec::{Cut, RecordKind};
 
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
@@ -22,7 +22,7 @@ pub(super) const TOO_FINE: &str = "is too fine for so long a range gate: three g
 impl Design {
     /// Length of a macropulse, fs.
     pub fn macropulse_fs(&self) -> i64 {
-        i64::from(self.coding.codebook.chips()) * self.coding.chip_fs
+        self.emission.length_fs()
     }
 
     /// How long the receiver listens to a shot, from its firing on, fs: to the end of a macropulse
@@ -44,17 +44,21 @@ impl Design {
     /// detector and the converters to forget the state they are started in.
     pub fn cut(&self) -> Cut {
         let jitter_fs = self.most_jitter_fs();
-        // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows.
-        let lead_fs = 2 * self.listening_fs() + jitter_fs;
+        // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows. A
+        // histogram has the light of its own shot, and nothing before it.
+        let lead_fs = match self.records() {
+            RecordKind::Ticks | RecordKind::Samples => 2 * self.listening_fs() + jitter_fs,
+            RecordKind::Histograms => 0,
+        };
         let model = self.detector.model();
         let under_way_fs = self.light_fs() + jitter_fs + model.settles_fs();
         Cut {
-            tick_fs: self.tdc.tick_fs,
-            clock_fs: self.tdc.clock_fs,
+            tick_fs: self.clock.tick_fs,
+            clock_fs: self.clock.period_fs,
             jitter_fs,
             listening_fs: self.listening_fs(),
             lead_fs,
-            history_fs: lead_fs + under_way_fs.max(model.memory_fs()).max(self.tdc.memory_fs()),
+            history_fs: lead_fs + under_way_fs.max(model.memory_fs()).max(self.readout.memory_fs()),
         }
     }
 
@@ -73,12 +77,15 @@ impl Design {
     }
 
     /// The longest time from the first to the last shot of a band without its guard shots, fs; negative
-    /// where not even one shot has room.
+    /// where not even one shot has room. Histograms are no events that are timed.
     pub fn longest_band_fs(&self) -> i64 {
-        let counted = i64::from(u32::MAX / PARTS_OF_TICK).saturating_mul(self.tdc.tick_fs);
+        if self.records() == RecordKind::Histograms {
+            return i64::MAX;
+        }
+        let counted = i64::from(u32::MAX / PARTS_OF_TICK).saturating_mul(self.clock.tick_fs);
         let around = self.around_fs() + self.light_fs();
         // The clock starts at one of its own periods, and jitter goes both ways.
-        counted - around - 2 * self.most_jitter_fs() - 2 * self.tdc.clock_fs
+        counted - around - 2 * self.most_jitter_fs() - 2 * self.clock.period_fs
     }
 }
 

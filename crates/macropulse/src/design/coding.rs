@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::family::{FamilyFile, family};
 use super::limits::Check;
-use super::{Error, Scan, Tdc};
+use super::{Clock, Error, Scan};
 use macropulse_codec::code::{Codebook, Crc, Keying, Payload};
 
 /// `[code]` as typed.
@@ -106,12 +106,12 @@ impl Check<'_> {
         &self,
         file: Option<&CodeFile>,
         scan: &Scan,
-        tdc: &Tdc,
+        clock: Clock,
     ) -> Result<Coding, Error> {
         let Some(file) = file else {
             return Ok(Coding {
                 codebook: Codebook::single(),
-                chip_fs: tdc.tick_fs,
+                chip_fs: clock.tick_fs,
                 label: None,
                 first_word: 0,
                 word_modulus: 1,
@@ -120,7 +120,7 @@ impl Check<'_> {
         let family = family(file.family.clone())
             .or_else(|error| self.refuse("code.family", error.to_string()))?;
         let chip_fs = self.whole_fs("code.chip_ps", file.chip_ps)?;
-        if chip_fs % tdc.tick_fs != 0 {
+        if chip_fs % clock.tick_fs != 0 {
             return self.refuse("code.chip_ps", "must be a whole number of TDC ticks");
         }
         let keying = match file.keying {

@@ -43,9 +43,9 @@ impl Derived {
         let shots = design.shots_per_scan();
         let pixel_period = design.scan_period() / shots as f64;
         let gate = tof_from_range(design.scan.max_range);
-        let codebook = &design.coding.codebook;
+        let codebook = &design.emission.coding().codebook;
         let mean = codebook.mean_weight();
-        let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
+        let macropulse = s_from_fs(design.emission.length_fs());
         let at_once = f64::from(design.channels());
         let channel_period = design.scan.channel_period();
         Self {
@@ -66,7 +66,7 @@ impl Derived {
             unambiguous_range: design
                 .is_coded()
                 .then(|| range_from_tof(word_period(design, channel_period))),
-            tick_range: range_from_tof(s_from_fs(design.tdc.tick_fs)),
+            tick_range: range_from_tof(s_from_fs(design.clock.tick_fs)),
             idle_listening_rate: at_once / (gate * shots as f64),
             reference_photons: design.detector.model().sensitivity().photons,
         }
@@ -79,5 +79,5 @@ fn word_period(design: &Design, channel_period: f64) -> f64 {
     if u64::from(design.channels()) == design.shots_per_scan() {
         return channel_period;
     }
-    f64::from(design.coding.word_modulus) * channel_period
+    f64::from(design.emission.coding().word_modulus) * channel_period
 }

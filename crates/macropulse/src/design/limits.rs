@@ -1,8 +1,8 @@
 //! What every section of a sensor file asks of its values.
 
-use super::Error;
 use super::band::TOO_FINE;
 use super::document::Chain;
+use super::{Error, Readout};
 
 /// A key without effect, the key of the setting that makes it so, and how.
 pub(super) struct Idle {
@@ -49,9 +49,8 @@ impl Check<'_> {
     }
 
     /// Ticks, or samples, of which 2²⁶ do not hold the echoes of a shot and of those in flight with it.
-    pub(super) fn too_fine<T>(&self, is_sampled: bool) -> Result<T, Error> {
-        let key = if is_sampled { "detector.sampled.sample_ps" } else { "tdc.resolution_ps" };
-        self.refuse(key, TOO_FINE)
+    pub(super) fn too_fine<T>(&self, readout: &Readout) -> Result<T, Error> {
+        self.refuse(readout.tick_key(), TOO_FINE)
     }
 
     /// A duration that must be a whole, positive number of femtoseconds.

@@ -16,16 +16,17 @@ mod derived;
 pub mod detector;
 mod document;
 mod effect;
+mod emission;
 mod family;
 mod light;
 mod limits;
 mod presets;
+mod readout;
 mod receiver;
 mod recorded;
 pub mod safety;
 mod scan;
 mod schema;
-mod tdc;
 mod work;
 
 use std::path::Path;
@@ -38,15 +39,16 @@ pub use derived::Derived;
 pub use detector::Detector;
 pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
+pub use emission::{Burst, Emission};
 pub use family::family_from_toml;
 pub use light::Light;
 pub use presets::{names as preset_names, text as preset_text};
+pub use readout::{Clock, Histogram, Readout, Tdc};
 pub use scan::{
     Directions, Extent, Firing, Flash, Gates, Grid, Laser, Mirror, Pattern, Polygon, Prism, Raster,
     Rosette, Scan, Spinning, Table,
 };
 pub use schema::schema;
-pub use tdc::Tdc;
 pub use work::SHOTS_OF_BAND;
 
 use crate::digest::Digest;
@@ -63,14 +65,16 @@ pub struct Design {
     pub scan: Scan,
     /// The light it sends.
     pub light: Light,
-    /// The language its shots speak; a single mark where they are not coded.
-    pub coding: Coding,
+    /// What a shot sends.
+    pub emission: Emission,
     /// Where the photons come from; `None` where the detector is declared by its sensitivity.
     pub budget: Option<Budget>,
     /// From light to detection events.
     pub detector: Detector,
-    /// From detection events to ticks.
-    pub tdc: Tdc,
+    /// What the receiver counts in.
+    pub clock: Clock,
+    /// From what the detector puts out to the record.
+    pub readout: Readout,
     /// From ticks to returns.
     pub receiver: Receiver,
     /// Range error up to which a return counts as right, m.
@@ -131,7 +135,7 @@ impl Design {
 
     /// Whether shots carry a code.
     pub fn is_coded(&self) -> bool {
-        self.coding.label.is_some()
+        self.emission.is_coded()
     }
 
     /// Number of separate detectors.
@@ -139,9 +143,9 @@ impl Design {
         self.scan.channels()
     }
 
-    /// Converters of the bank that each detector has.
-    pub fn converters_per_channel(&self) -> u32 {
-        self.tdc.converters / self.channels()
+    /// The time-to-digital converters of each detector; `None` where events are not timed.
+    pub fn bank(&self) -> Option<Tdc> {
+        self.readout.tdc().map(|tdc| tdc.share(self.channels()))
     }
 
     /// Shots in one scan.
@@ -158,8 +162,8 @@ impl Design {
     /// the detector is declared by its sensitivity. Where eye safety is idealised it is worked out when
     /// first asked for.
     pub fn eye_limits(&self) -> &[safety::Limit] {
-        let Self { scan, light, coding, .. } = self;
-        self.budget.as_ref().map_or(&[], |budget| budget.limits(scan, light, coding))
+        let Self { scan, light, emission, .. } = self;
+        self.budget.as_ref().map_or(&[], |budget| budget.limits(scan, light, emission))
     }
 
     /// Duration of one scan, s.

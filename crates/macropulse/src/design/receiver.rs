@@ -3,12 +3,14 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::detector::{DetectorFile, Sampled};
+use super::detector::{Arming, DetectorFile, Geiger, Sampled};
 use super::limits::Check;
-use super::{Coding, Error, Label, PARTS_OF_TICK, Scan, Tdc};
-use crate::units::{fs_from_s, tof_from_range};
+use super::{Clock, Coding, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
+use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+use macropulse_codec::decode::histogram::{PileUp, Pulse};
 use macropulse_codec::decode::{
-    self, Bitwise, Correlation, Effort, MOST_RETURNS, Method, Opening, Pick, Receiver, ReceiverKind,
+    self, Bitwise, Correlation, Effort, HistogramMethod, MOST_RETURNS, Method, Opening, Pick,
+    Receiver, ReceiverKind,
 };
 
 /// Marks by which a receiver of samples decides at least if its file does not say: one alone may be that of
@@ -23,7 +25,7 @@ pub(super) struct ReceiverFile {
     pub kind: ReceiverKind,
     /// How much the receiver `matched` does for faint light.
     effort: Effort,
-    /// False returns accepted per shot (matched, balanced, sampled).
+    /// False returns accepted per shot (matched, balanced, sampled, histogram).
     #[schemars(range(min = 1e-30, max = 0.5))]
     false_alarm: f64,
     /// Marks that make a bit a 1 (literal, blind).
@@ -48,18 +50,40 @@ pub(super) struct ReceiverFile {
     /// For how long behind a clipped sample none counts, ns (sampled).
     #[schemars(range(min = 0, max = 1e6))]
     recovery_ns: f64,
+    /// How photons that a cell missed behind others of the same pulse are made up for (histogram): `coates`
+    /// with arming = "once-per-pulse" unless it is given, else `none`.
+    pile_up: Option<PileUpFile>,
+    /// Standard deviation of the shape of a pulse, as a share of its height (histogram); 0 if it is not given.
+    #[schemars(range(min = 0, max = 1))]
+    shape_error: Option<f64>,
+    /// A return with less than this share of the photons of the strongest one is not given (histogram); 0 if it
+    /// is not given.
+    #[schemars(range(min = 0, max = 1))]
+    least_share: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum PileUpFile {
+    /// Counts are taken as they are.
+    None,
+    /// By the counts of the bins before, of cells that count once a pulse.
+    Coates,
 }
 
 /// The keys that only some kinds of receivers have: which, whose, and why no others.
-pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 4] = {
-    use ReceiverKind::{Balanced, Blind, Literal, Matched, Sampled};
+pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 5] = {
+    use ReceiverKind::{Balanced, Blind, Histogram, Literal, Matched, Sampled};
     let of_samples = &["receiver.least_marks", "receiver.blank_ns", "receiver.recovery_ns"];
-    let correlating = "only `matched`, `balanced` and `sampled` derive their threshold from it";
+    let of_counts = &["receiver.pile_up", "receiver.shape_error", "receiver.least_share"];
+    let deciding =
+        "only `matched`, `balanced`, `sampled` and `histogram` derive their threshold from it";
     let bitwise = "only `literal` and `blind` decide bit by bit";
     [
         (&["receiver.bit_threshold"], &[Literal, Blind], bitwise),
-        (&["receiver.false_alarm"], &[Matched, Balanced, Sampled], correlating),
+        (&["receiver.false_alarm"], &[Matched, Balanced, Sampled, Histogram], deciding),
         (of_samples, &[Sampled], "only `sampled` is given samples"),
+        (of_counts, &[Histogram], "only `histogram` is given counts"),
         (&["receiver.effort"], &[Matched], "only `matched` searches"),
     ]
 };
@@ -68,14 +92,19 @@ pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 4] = {
 pub(super) struct Inputs<'a> {
     pub detector: &'a DetectorFile,
     pub scan: &'a Scan,
-    pub tdc: &'a Tdc,
-    pub coding: &'a Coding,
+    pub clock: Clock,
+    pub readout: &'a Readout,
+    pub emission: &'a Emission,
     /// Standard deviation of the time of a mark, s.
     pub timing: f64,
     /// As [`Correlation::photons_apart`].
     pub photons_apart: bool,
     /// The detector, where it is sampled.
     pub sampled: Option<&'a Sampled>,
+    /// The detector, where it counts photons in cells.
+    pub counting: Option<&'a Geiger>,
+    /// rms length of a pulse of light with the jitter, s.
+    pub pulse: f64,
 }
 
 impl Check<'_> {
@@ -85,17 +114,23 @@ impl Check<'_> {
         file: &ReceiverFile,
         inputs: &Inputs,
     ) -> Result<Option<Receiver>, Error> {
-        let &Inputs { detector, scan, tdc, coding, .. } = inputs;
+        let &Inputs { detector, scan, clock, readout, emission, .. } = inputs;
+        let coding = emission.coding();
         let kind = file.kind;
-        let samples = detector.only().is_some_and(|only| only.file.sample_ps().is_some());
-        if samples != (kind == ReceiverKind::Sampled) {
+        let fits = match readout {
+            Readout::Adc => kind == ReceiverKind::Sampled,
+            Readout::Histogram(_) => kind == ReceiverKind::Histogram,
+            Readout::Tdc(_) => !matches!(kind, ReceiverKind::Sampled | ReceiverKind::Histogram),
+        };
+        if !fits {
             return self.refuse(
                 "receiver.kind",
-                "`sampled` is for [detector.sampled], the other receivers for other detectors",
+                "`sampled` is for [detector.sampled], `histogram` for a [histogram], the other receivers \
+                 for other detectors",
             );
         }
         let is_coded = coding.label.is_some();
-        if !samples && (kind == ReceiverKind::Direct) == is_coded {
+        if readout.tdc().is_some() && (kind == ReceiverKind::Direct) == is_coded {
             return self.refuse(
                 "receiver.kind",
                 "`direct` is for shots without [code], the other receivers for shots with it",
@@ -103,15 +138,15 @@ impl Check<'_> {
         }
         self.can_read(kind, coding)?;
         let (returns, pick) = self.returns(file, detector)?;
-        let ticks = |range: f64| fs_from_s(tof_from_range(range)) / tdc.tick_fs;
+        let ticks = |range: f64| fs_from_s(tof_from_range(range)) / clock.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         let light = ticks(scan.light_range);
         if light >= i64::from(u32::MAX / PARTS_OF_TICK) {
-            return self.too_fine(samples);
+            return self.too_fine(readout);
         }
         let Some(method) = self.method(file, inputs, light as u32)? else { return Ok(None) };
         let gate_ticks = (gate.0 as u32, gate.1 as u32);
-        let receiver = Receiver { tick_fs: tdc.tick_fs, gate_ticks, returns, pick, method };
+        let receiver = Receiver { tick_fs: clock.tick_fs, gate_ticks, returns, pick, method };
         // What the receiver itself asks before it decodes; the keys ask most of it already.
         match receiver.check(&coding.codebook) {
             Err(decode::Error::TooLong { what, ticks, possible }) => self.refuse(
@@ -133,13 +168,14 @@ impl Check<'_> {
         inputs: &Inputs,
         light_ticks: u32,
     ) -> Result<Option<Method>, Error> {
-        let &Inputs { tdc, coding, timing, photons_apart, sampled, .. } = inputs;
-        let Ok(ticks_per_chip) = u32::try_from(coding.chip_fs / tdc.tick_fs) else {
+        let &Inputs { clock, emission, timing, photons_apart, sampled, .. } = inputs;
+        let coding = emission.coding();
+        let Ok(ticks_per_chip) = u32::try_from(coding.chip_fs / clock.tick_fs) else {
             let most = u32::MAX;
             let message = format!("is more than {most} ticks: use longer ticks or shorter chips");
             return self.refuse("code.chip_ps", message);
         };
-        let jitter_ticks = timing * 1e15 / tdc.tick_fs as f64;
+        let jitter_ticks = timing * 1e15 / clock.tick_fs as f64;
         let false_alarm = self.within("receiver.false_alarm", file.false_alarm, 1e-30, 0.5)?;
         let lightest = coding.codebook.lightest_word() as u32;
         let bitwise = |opening| -> Result<Method, Error> {
@@ -156,6 +192,7 @@ impl Check<'_> {
             ReceiverKind::Matched => Method::Matched(correlation, file.effort),
             ReceiverKind::Balanced => Method::Balanced(correlation),
             ReceiverKind::Direct => Method::Direct,
+            ReceiverKind::Histogram => self.of_histograms(file, inputs, false_alarm)?,
             ReceiverKind::Sampled => {
                 let Some(sampled) = sampled else { return Ok(None) };
                 let least = match file.least_marks {
@@ -175,6 +212,36 @@ impl Check<'_> {
                     sampling,
                 })
             }
+        }))
+    }
+
+    /// How it decodes histograms: of a pulse that the length of the light and the jitter spread.
+    fn of_histograms(
+        &self,
+        file: &ReceiverFile,
+        inputs: &Inputs,
+        false_alarm: f64,
+    ) -> Result<Method, Error> {
+        let cells = inputs.counting.map_or(1, |geiger| geiger.cells);
+        let piles_up = inputs.counting.is_some_and(|geiger| geiger.arming == Arming::OncePerPulse);
+        let pile_up = match (file.pile_up, piles_up) {
+            (Some(PileUpFile::Coates), false) => {
+                return self.refuse(
+                    "receiver.pile_up",
+                    "`coates` corrects cells that count once a pulse: arming = \"once-per-pulse\", or \"none\"",
+                );
+            }
+            (Some(PileUpFile::None), _) | (None, false) => PileUp::None,
+            (Some(PileUpFile::Coates) | None, true) => PileUp::Coates,
+        };
+        let share = |key, typed: Option<f64>| self.within(key, typed.unwrap_or(0.0), 0.0, 1.0);
+        Ok(Method::Histogram(HistogramMethod {
+            pile_up,
+            cells,
+            pulse: Pulse::Gaussian { rms_fs: inputs.pulse * FS_PER_S as f64 },
+            false_alarm,
+            shape_error: share("receiver.shape_error", file.shape_error)?,
+            least_share: share("receiver.least_share", file.least_share)?,
         }))
     }
 

@@ -1,9 +1,11 @@
 //! What recorded shots, ticks and samples are held against before they are decoded.
 
-use macropulse_codec::files::{Digest, Limits, SampleHeader};
+use macropulse_codec::decode::{self, Returns};
+use macropulse_codec::files::{Digest, HistogramHeader, Limits, SampleHeader};
+use macropulse_codec::{Record, RecordKind, ShotLog};
 
-use super::Design;
 use super::detector::Detector;
+use super::{Design, Histogram, Readout};
 
 /// Shots of a scan whose places and times go into the digest.
 const SAMPLES: u64 = 256;
@@ -11,7 +13,7 @@ const SAMPLES: u64 = 256;
 impl Design {
     /// How many rows, labels, words, … its shots may have.
     pub fn limits(&self) -> Limits {
-        let codebook = &self.coding.codebook;
+        let codebook = &self.emission.coding().codebook;
         Limits {
             rows: self.scan.rows,
             columns: self.scan.columns,
@@ -21,9 +23,34 @@ impl Design {
         }
     }
 
-    /// Whether it records samples, and no ticks.
-    pub fn is_sampled(&self) -> bool {
-        matches!(self.detector, Detector::Sampled(_))
+    /// What its receiver is given beside the shot log.
+    pub fn records(&self) -> RecordKind {
+        match self.readout {
+            Readout::Tdc(_) => RecordKind::Ticks,
+            Readout::Adc => RecordKind::Samples,
+            Readout::Histogram(_) => RecordKind::Histograms,
+        }
+    }
+
+    /// The part of the `log` of a band that its receiver is given with the record: the shots all of whose light is in
+    /// it. A histogram is that of its own shot, so that no others are.
+    pub fn known(&self, log: &ShotLog) -> ShotLog {
+        match self.records() {
+            RecordKind::Ticks | RecordKind::Samples => self.cut().known(log),
+            RecordKind::Histograms => log.part(log.owned.clone()),
+        }
+    }
+
+    /// What its receiver makes of a record of the shots of `log`: returns of the owned ones, by their place in it.
+    ///
+    /// # Errors
+    /// As [`Receiver::decode`](macropulse_codec::decode::Receiver::decode).
+    pub fn receive<'a>(
+        &self,
+        log: &ShotLog,
+        record: impl Into<Record<'a>>,
+    ) -> Result<Returns, decode::Error> {
+        self.receiver.decode(&self.emission.coding().codebook, log, record)
     }
 
     /// What is said of its samples before they come, their number left open; `None` of a sensor that
@@ -31,10 +58,22 @@ impl Design {
     pub fn sample_header(&self) -> Option<SampleHeader> {
         let Detector::Sampled(sampled) = &self.detector else { return None };
         Some(SampleHeader {
-            tick_fs: self.tdc.tick_fs,
+            tick_fs: self.clock.tick_fs,
             channels: self.channels(),
             codes: sampled.codes,
             step_photons: Some(sampled.step),
+            digest: Some(self.recorded_digest()),
+            count: None,
+        })
+    }
+
+    /// What is said of its histograms before they come, their number left open; `None` of a sensor that records none.
+    pub fn histogram_header(&self) -> Option<HistogramHeader> {
+        let Histogram { bins } = self.readout.histogram()?;
+        Some(HistogramHeader {
+            bin_fs: self.clock.tick_fs,
+            offset_fs: 0,
+            bins,
             digest: Some(self.recorded_digest()),
             count: None,
         })
@@ -48,13 +87,17 @@ impl Design {
         let mut numbers = |values: &[u64]| {
             values.iter().for_each(|value| hash.bytes(&value.to_le_bytes()));
         };
-        let (scan, tdc, codebook) = (&self.scan, &self.tdc, &self.coding.codebook);
-        let lengths = [self.coding.chip_fs, tdc.tick_fs, tdc.clock_fs].map(|fs| fs as u64);
+        let (scan, clock, codebook) = (&self.scan, self.clock, &self.emission.coding().codebook);
+        let lengths =
+            [self.emission.coding().chip_fs, clock.tick_fs, clock.period_fs].map(|fs| fs as u64);
         numbers(&lengths);
         numbers(&[scan.rows.into(), scan.columns.into(), scan.rate_millihertz]);
         numbers(&[self.shots_per_scan(), self.channels().into(), codebook.chips().into()]);
         numbers(&[codebook.zeros_are_lit().into(), codebook.words() as u64]);
-        numbers(&[self.coding.first_word.into(), self.coding.word_modulus.into()]);
+        numbers(&[
+            self.emission.coding().first_word.into(),
+            self.emission.coding().word_modulus.into(),
+        ]);
         for word in 0..codebook.words() {
             let marks = &codebook.word(word as u16).marks;
             numbers(&[marks.len() as u64]);
@@ -66,9 +109,12 @@ impl Design {
             bits.iter().for_each(|bit| numbers(&[(*bit).into()]));
         }
         for column in 0..scan.columns as u16 {
-            numbers(&[self.coding.label_of(column).into()]);
+            numbers(&[self.emission.coding().label_of(column).into()]);
         }
         let (pattern, shots) = (scan.model(), self.shots_per_scan());
+        if let Some(burst) = self.emission.burst() {
+            numbers(&[burst.pulses.into(), burst.interval_fs as u64]);
+        }
         for sample in 0..SAMPLES.min(shots) {
             let order = sample * shots / SAMPLES.min(shots);
             let (row, column) = pattern.pixel(order);

@@ -40,10 +40,13 @@ impl Design {
     /// A detector that fires once a shot draws the first of them alone; of the others converters make no more
     /// than one event a tick, and no more are drawn.
     pub fn too_many_counts(&self, per_s: f64) -> Option<String> {
-        if self.is_sampled() || matches!(self.detector, Detector::SingleStop(_)) {
+        if let Some(burst) = self.emission.burst() {
+            return self.too_many_in_a_burst(per_s * s_from_fs(burst.interval_fs), burst.pulses);
+        }
+        if self.bank().is_none() || matches!(self.detector, Detector::SingleStop(_)) {
             return None;
         }
-        let ticks = FS_PER_S as f64 / self.tdc.tick_fs as f64;
+        let ticks = FS_PER_S as f64 / self.clock.tick_fs as f64;
         let counts = per_s.min(ticks) * self.band_lasts() * f64::from(self.channels());
         (counts > MOST_COUNTS).then(|| {
             format!(
@@ -51,6 +54,19 @@ impl Design {
                  shots of one band are listened to, more than the {MOST_COUNTS:.1e} that are followed: \
                  fewer dark counts, less sunlight, or a shorter range gate",
                 self.channels()
+            )
+        })
+    }
+}
+
+impl Design {
+    /// The same of histograms of bursts of so many `pulses`, with `per_cycle` counts from one to the next.
+    fn too_many_in_a_burst(&self, per_cycle: f64, pulses: u32) -> Option<String> {
+        let counts = per_cycle * f64::from(pulses);
+        (counts > MOST_COUNTS).then(|| {
+            format!(
+                "{counts:.1e} counts come while a shot sends its {pulses} pulses, more than the \
+                 {MOST_COUNTS:.1e} that are followed: fewer dark counts, less sunlight, or fewer pulses"
             )
         })
     }

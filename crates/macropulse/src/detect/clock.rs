@@ -17,7 +17,7 @@ impl Clock {
     /// The clock of a band whose first shot is fired at `first_fs`. It starts early enough for an
     /// event that jitter puts before that.
     pub fn new(design: &Design, first_fs: i64) -> Self {
-        let (tick_fs, epoch) = (design.tdc.tick_fs, design.cut().epoch(first_fs));
+        let (tick_fs, epoch) = (design.clock.tick_fs, design.cut().epoch(first_fs));
         Self { epoch, epoch_fs: epoch * tick_fs, ruler: Ruler::new(PARTS_OF_TICK, tick_fs) }
     }
 
@@ -62,8 +62,8 @@ mod tests {
         fn parts_are_rounded_down(fs in 0..1_000_000_000_000_i64, tick in 0..3_usize) {
             let design = &designs()[tick];
             let clock = Clock::new(design, 1_234_567_890);
-            prop_assert_eq!(clock.parts(fs), fs * 64 / design.tdc.tick_fs);
-            prop_assert_eq!(clock.epoch_fs % design.tdc.clock_fs, 0);
+            prop_assert_eq!(clock.parts(fs), fs * 64 / design.clock.tick_fs);
+            prop_assert_eq!(clock.epoch_fs % design.clock.period_fs, 0);
             prop_assert!(clock.time(1_234_567_890) >= 0);
         }
     }

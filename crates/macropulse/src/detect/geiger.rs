@@ -203,8 +203,8 @@ mod tests {
             let band = crate::emit::Band { scan: 1, first: 848 * n, shots: 20 };
             let log = band.shot_log(design);
             let found = detectors.detections(&log, &Light::default(), &mut Memory::default());
-            let part = s_from_fs(design.tdc.tick_fs) / f64::from(crate::design::PARTS_OF_TICK);
-            let epoch = found.epoch as f64 * s_from_fs(design.tdc.tick_fs);
+            let part = s_from_fs(design.clock.tick_fs) / f64::from(crate::design::PARTS_OF_TICK);
+            let epoch = found.epoch as f64 * s_from_fs(design.clock.tick_fs);
             let owned = s_from_fs(log.fired_at_fs[log.owned.start]);
             let times = found.time.iter().map(|time| epoch + f64::from(*time) * part - owned);
             times.filter(|time| *time >= 0.0).collect()

@@ -47,7 +47,8 @@ pub(crate) struct ExactWords {
 impl ExactWords {
     /// The `words` of `design`.
     pub(super) fn of(words: Words, design: &Design) -> Self {
-        let bits = design.coding.codebook.payload().map_or(1, |payload| payload.bits());
-        Self { busiest: words.most_within(design.tdc.dead_ticks(), bits), words }
+        let bits = design.emission.coding().codebook.payload().map_or(1, |payload| payload.bits());
+        let dead = design.readout.tdc().map_or(0, |tdc| tdc.dead_ticks(design.clock));
+        Self { busiest: words.most_within(dead, bits), words }
     }
 }

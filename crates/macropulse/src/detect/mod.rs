@@ -9,6 +9,7 @@ mod clock;
 mod colour;
 mod first_photon;
 mod geiger;
+mod histogram;
 mod jitter;
 mod linear;
 mod marks;
@@ -25,11 +26,12 @@ use std::ops::Range;
 
 pub use marks::{Marks, Response};
 
-use macropulse_codec::{Samples, ShotLog};
+use macropulse_codec::{Histograms, Samples, ShotLog};
 
 use channel::{Arrangement, Channel};
 use clock::Clock;
 use geiger::Cells;
+use histogram::Accumulator;
 use linear::Thresholding;
 use marks::ExactWords;
 use photon_counting::Counting;
@@ -72,6 +74,8 @@ enum Work {
     Events(Box<dyn Kind>),
     /// Samples.
     Samples(Box<Sampler>),
+    /// Histograms of counts.
+    Histograms(Box<Accumulator>),
 }
 
 /// A kind of detector at work.
@@ -103,7 +107,15 @@ impl<'a> Detectors<'a> {
         let sunlight = operating.background;
         let kind: Box<dyn Kind> = match &design.detector {
             Detector::PhotonCounting(counting) => Box::new(Counting::new(counting, design)),
-            Detector::Geiger(geiger) => Box::new(Cells::new(geiger)),
+            Detector::Geiger(geiger) => {
+                if let (Some(burst), Some(histogram)) =
+                    (design.emission.burst(), design.readout.histogram())
+                {
+                    let work = Box::new(Accumulator::new(geiger, (burst, histogram), design));
+                    return Self { design, chance, shape: None, work: Work::Histograms(work) };
+                }
+                Box::new(Cells::new(geiger))
+            }
             Detector::Linear(linear) => {
                 let setting = linear.setting(sunlight);
                 match setting.comparator {
@@ -142,10 +154,18 @@ impl<'a> Detectors<'a> {
     /// fired; `None` of detectors that are not sampled.
     pub fn samples(&self, log: &ShotLog, light: &Light, span: &Range<i64>) -> Option<Samples> {
         match &self.work {
-            Work::Events(_) => None,
+            Work::Events(_) | Work::Histograms(_) => None,
             Work::Samples(sampler) => {
                 Some(sampler.samples((self.design, &self.chance), (log, light), span))
             }
+        }
+    }
+
+    /// The histograms of the owned shots of `log`; `None` of detectors whose counts go into none.
+    pub fn histograms(&self, log: &ShotLog, light: &Light) -> Option<Histograms> {
+        match &self.work {
+            Work::Events(_) | Work::Samples(_) => None,
+            Work::Histograms(work) => Some(work.histograms(&self.chance, log, light)),
         }
     }
 
@@ -285,8 +305,8 @@ mod tests {
             let light = Light { background, ..Light::default() };
             let detectors = Detectors::in_the_dark(&design, Chance::new(9));
             let found = detectors.detections(&log, &light, &mut Memory::default());
-            let part = design.tdc.tick_fs as f64 / f64::from(crate::design::PARTS_OF_TICK);
-            let epoch_fs = found.epoch * design.tdc.tick_fs;
+            let part = design.clock.tick_fs as f64 / f64::from(crate::design::PARTS_OF_TICK);
+            let epoch_fs = found.epoch * design.clock.tick_fs;
             for time in &found.time {
                 let fs = epoch_fs + (f64::from(*time) * part) as i64;
                 assert!((from_fs - FS_PER_S / 1_000_000_000_000..=until_fs).contains(&fs));

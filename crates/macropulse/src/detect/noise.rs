@@ -56,12 +56,12 @@ impl Noise {
         if rate <= 0.0 {
             return None;
         }
-        let in_tick = rate * design.tdc.tick_fs as f64 / FS_PER_S as f64;
+        let in_tick = rate * design.clock.tick_fs as f64 / FS_PER_S as f64;
         if in_tick > CROWDED {
             let dark = libm::exp(-in_tick) * 2_f64.powi(32);
             return Some(Self::Crowded { dark: dark.round() as u32 });
         }
-        let mean = FS_PER_S as f64 / rate * f64::from(PARTS_OF_TICK) / design.tdc.tick_fs as f64;
+        let mean = FS_PER_S as f64 / rate * f64::from(PARTS_OF_TICK) / design.clock.tick_fs as f64;
         let mut shift = 0;
         while mean * f64::from(1_u32 << shift) < FINENESS && shift < 20 {
             shift += 1;

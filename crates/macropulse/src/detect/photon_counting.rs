@@ -47,8 +47,8 @@ pub(super) struct Counting {
 
 impl Counting {
     pub fn new(counting: &PhotonCounting, design: &Design) -> Self {
-        let codebook = &design.coding.codebook;
-        let chip = (design.coding.chip_fs / design.tdc.tick_fs) as u32;
+        let codebook = &design.emission.coding().codebook;
+        let chip = (design.emission.coding().chip_fs / design.clock.tick_fs) as u32;
         let words = |chip: u32| {
             let family = codebook.family();
             let marks = (0..codebook.words()).map(|word| &codebook.word(word as u16).marks[..]);
@@ -58,7 +58,7 @@ impl Counting {
             Some(payload) => payload.encode(label as u16).reverse_bits() >> (32 - payload.bits()),
             None => 1,
         };
-        let parts = FS_PER_S as f64 / design.tdc.tick_fs as f64 * f64::from(PARTS_OF_TICK);
+        let parts = FS_PER_S as f64 / design.clock.tick_fs as f64 * f64::from(PARTS_OF_TICK);
         let is_exact = counting.jitter <= 0.0 && counting.missed_marks <= 0.0;
         let is_exact = is_exact && counting.dark <= 0.0 && !codebook.zeros_are_lit();
         let exact = || ExactWords::of(words(chip), design);
@@ -158,7 +158,7 @@ impl Counting {
         let transmitter = usize::from(trains.transmitter[index]);
         let is_own = transmitter == 0;
         let is_whole = trains.marks[index] == ALL_MARKS;
-        if is_own && is_whole && !channel.design.coding.codebook.zeros_are_lit() {
+        if is_own && is_whole && !channel.design.emission.coding().codebook.zeros_are_lit() {
             append_train(&self.words.train(&self.macropulse(trains, index, start)), time);
         } else {
             let counted = channel.arrivals(index, &mut memory.arrivals);
@@ -294,7 +294,9 @@ mod tests {
 
     fn marks(design: &Design) -> usize {
         let log = four_lines(design);
-        (0..log.len()).map(|i| design.coding.codebook.marks(log.label[i], log.word[i]).len()).sum()
+        (0..log.len())
+            .map(|i| design.emission.coding().codebook.marks(log.label[i], log.word[i]).len())
+            .sum()
     }
 
     fn absolute(found: &Detections) -> Vec<i64> {
@@ -327,7 +329,8 @@ mod tests {
             .flat_map(|i| {
                 let Echo { shot, delay_fs, .. } = echoes[i];
                 let arrival = (log.fired_at_fs[shot] + delay_fs) * 64 / 2500;
-                let marks = design.coding.codebook.marks(log.label[shot], log.word[shot]);
+                let marks =
+                    design.emission.coding().codebook.marks(log.label[shot], log.word[shot]);
                 marks.iter().map(move |mark| arrival + i64::from(*mark) * 64)
             })
             .collect();

@@ -65,7 +65,7 @@ pub(super) struct Sampler {
 impl Sampler {
     pub fn new(sampled: &Sampled, design: &Design, background: f64) -> Self {
         let front_end = &sampled.front_end;
-        let tick_fs = design.tdc.tick_fs;
+        let tick_fs = design.clock.tick_fs;
         let in_ticks = |time: f64| time * FS_PER_S as f64 / tick_fs as f64;
         let share = |slice: i32| libm::exp(-0.5 * (f64::from(slice) * SLICE).powi(2));
         let total: f64 = (-SLICES..=SLICES).map(share).sum();
@@ -142,14 +142,14 @@ impl Sampler {
 
     /// Stray light of own marks: so much of it that its photons need not be drawn.
     fn add_stray(&self, channel: &Channel, signal: &mut Signal) {
-        let codebook = &channel.design.coding.codebook;
+        let codebook = &channel.design.emission.coding().codebook;
         let front_end = &self.sampled.front_end;
         let (rms, height) = (front_end.mark_rms() / s_from_fs(self.tick_fs), self.sampled.stray);
         for shot in channel.shots.iter().map(|shot| *shot as usize) {
             let (label, word) = (channel.log.label[shot], channel.log.word[shot]);
             for mark in codebook.marks(label, word) {
                 let at_fs = channel.log.fired_at_fs[shot]
-                    + i64::from(*mark) * channel.design.coding.chip_fs;
+                    + i64::from(*mark) * channel.design.emission.coding().chip_fs;
                 signal.add(self.in_ticks(at_fs), (height, rms), NEGLIGIBLE * self.sampled.step);
             }
         }

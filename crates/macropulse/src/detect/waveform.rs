@@ -395,8 +395,8 @@ mod tests {
             let light = light_of_echoes(design, &log, std::iter::once(echo));
             let detectors = Detectors::in_the_dark(design, Chance::new(7));
             let events = detectors.detections(&log, &light, &mut Memory::default());
-            let part = design.tdc.tick_fs as f64 / f64::from(crate::design::PARTS_OF_TICK);
-            let fired = (log.fired_at_fs[own] - events.epoch * design.tdc.tick_fs) as f64;
+            let part = design.clock.tick_fs as f64 / f64::from(crate::design::PARTS_OF_TICK);
+            let fired = (log.fired_at_fs[own] - events.epoch * design.clock.tick_fs) as f64;
             let ns = |time: &u32| (f64::from(*time) * part - fired) * 1e-6;
             found.push(events.time.iter().map(ns).collect());
         }

@@ -227,8 +227,11 @@ fn add_lines(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
         let pixels = column..column + run as u16;
         log.row.extend(repeat_n(row, run));
         log.column.extend(pixels.clone());
-        log.label.extend(pixels.map(|column| design.coding.label_of(column)));
-        let (first, modulus) = (design.coding.first_word as u16, design.coding.word_modulus as u16);
+        log.label.extend(pixels.map(|column| design.emission.coding().label_of(column)));
+        let (first, modulus) = (
+            design.emission.coding().first_word as u16,
+            design.emission.coding().word_modulus as u16,
+        );
         let mut word = word(design, row, column);
         log.word.extend((0..run).map(|_| {
             let now = word;
@@ -249,7 +252,7 @@ fn add_pixels(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
         let (row, column) = pattern.pixel(order);
         log.row.push(row);
         log.column.push(column);
-        log.label.push(design.coding.label_of(column));
+        log.label.push(design.emission.coding().label_of(column));
         log.word.push(word(design, row, column));
         log.channel.push(pattern.channel_of(order, row));
     }
@@ -258,7 +261,7 @@ fn add_pixels(design: &Design, shots: Range<u64>, log: &mut ShotLog) {
 /// `first_word + pixel mod word_modulus`, the pixel counted row by row.
 pub(super) fn word(design: &Design, row: u16, column: u16) -> u16 {
     let pixel = u32::from(row) * design.scan.columns + u32::from(column);
-    (design.coding.first_word + pixel % design.coding.word_modulus) as u16
+    (design.emission.coding().first_word + pixel % design.emission.coding().word_modulus) as u16
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ pub fn shot_of_pixel(design: &Design, scan: u64, row: u32, column: u32) -> Optio
     let (row, column) = (row as u16, column as u16);
     Some(Shot {
         fired_at_fs: fired_at_fs(design, scan, design.scan.model().order_of(row, column)),
-        label: design.coding.label_of(column),
+        label: design.emission.coding().label_of(column),
         word: word(design, row, column),
     })
 }

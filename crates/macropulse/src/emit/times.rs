@@ -10,7 +10,7 @@ use crate::units::{FS_PER_S, fs_from_s};
 pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
     let moment = design.scan.model().moment(order, design.scan_period());
     let fs = fraction_of_scan(design, scan, moment.shots) + fs_from_s(moment.then);
-    fs - fs.rem_euclid(design.coding.chip_fs)
+    fs - fs.rem_euclid(design.emission.grid_fs())
 }
 
 /// The times of consecutive shots, where all of them are equally far apart: those of
@@ -55,7 +55,7 @@ impl EqualSteps {
 impl Run {
     /// Every so many shots from number `first` on.
     fn new(design: &Design, first: u64) -> Self {
-        let (parts, chip_fs) = (parts_of_fs(design), design.coding.chip_fs);
+        let (parts, chip_fs) = (parts_of_fs(design), design.emission.grid_fs());
         let whole = |shots: u64| (u128::from(shots) * NUMERATOR / parts) as i64;
         let rest = |shots: u64| (u128::from(shots) * NUMERATOR % parts) as u64;
         let apart = SIDE_BY_SIDE as u64;

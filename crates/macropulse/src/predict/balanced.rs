@@ -30,7 +30,7 @@ pub(super) fn chances(
     tof: f64,
 ) -> Chances {
     let labels: usize = weights.values().sum();
-    let late = (tof / s_from_fs(design.tdc.tick_fs)).fract();
+    let late = (tof / s_from_fs(design.clock.tick_fs)).fract();
     let gate = Gate::of(design, correlation, (weights, found), late);
     let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
     for (&marks, &count) in weights {
@@ -82,7 +82,7 @@ impl Gate {
         (weights, found): (&BTreeMap<usize, usize>, &Found),
         late: f64,
     ) -> Self {
-        let chips = design.coding.codebook.chips() as usize;
+        let chips = design.emission.coding().codebook.chips() as usize;
         let width = Place::ticks(design) as i32;
         let phases = phases(design, correlation, (weights, found), (width, late));
         // Farther chips than the first and the last lit one may be passed by without loss.
@@ -116,13 +116,13 @@ fn phases(
     (width, late): (i32, f64),
 ) -> Vec<Phase> {
     let scale = correlation.ticks_per_chip as i32;
-    let codebook = &design.coding.codebook;
+    let codebook = &design.emission.coding().codebook;
     // The receiver looks beyond the gate by a macropulse.
     let lags = lags(design) + f64::from(codebook.chips() * correlation.ticks_per_chip);
     let sigma = correlation.jitter_ticks.max(f64::MIN_POSITIVE);
     let marks: usize = weights.iter().map(|(marks, count)| marks * count).sum();
     let mean = marks as f64 / weights.values().sum::<usize>() as f64;
-    let chip = s_from_fs(design.coding.chip_fs);
+    let chip = s_from_fs(design.emission.coding().chip_fs);
     let seen = found.seen * (mean * chip / design.scan.shortest_period()).min(1.0);
     let farthest = (4.0 * sigma).ceil() as i32;
     let mut dark: BTreeMap<i32, f64> = BTreeMap::new();

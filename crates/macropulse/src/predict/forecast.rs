@@ -14,7 +14,7 @@ use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
-use crate::design::{Design, Detector, Tdc};
+use crate::design::{Design, Detector};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs, tof_from_range};
 
@@ -111,7 +111,7 @@ impl<'a> Forecaster<'a> {
         if let Some((what, remedy)) = not_modelled(design, &operating) {
             return Err(Error::NotModelled { sensor: design.name.clone(), what, remedy });
         }
-        let codebook = &design.coding.codebook;
+        let codebook = &design.emission.coding().codebook;
         let mut weights = BTreeMap::new();
         let sent = (0..codebook.labels() as u16)
             .flat_map(|label| (0..codebook.words() as u16).map(move |word| (label, word)))
@@ -239,11 +239,10 @@ impl<'a> Forecaster<'a> {
         let mark = Lit { photons: detected, background: operating.background, falling };
         let false_events = false_rate * detector.ready_share(falling);
         // Events that share a tick keep a single converter busy.
-        let tick = s_from_fs(design.tdc.tick_fs);
+        let tick = s_from_fs(design.clock.tick_fs);
         let own = matched::ticks_lit(design, &mark) * mean_weight / channel_period;
         let events = -libm::expm1(-(false_events + own) * tick) / tick;
-        let share = Tdc { converters: design.converters_per_channel(), ..design.tdc.clone() };
-        let loss = bank_loss(&share, events);
+        let loss = design.bank().map_or(0.0, |share| bank_loss(&share, events));
         let place = matched::Place::of(design, &mark);
         // Where the bank is overrun, all is lit until the last converter is taken: what is lost
         // then makes the rest no clearer.
@@ -251,8 +250,7 @@ impl<'a> Forecaster<'a> {
         let seen = place.seen(design, &mark) * (1.0 - loss);
         // Shots that meet the same range overlap where a macropulse is longer than the time to the next.
         let false_density = -libm::expm1(-false_events * place.width);
-        let codebook = &design.coding.codebook;
-        let macropulse = s_from_fs(i64::from(codebook.chips()) * design.coding.chip_fs);
+        let macropulse = s_from_fs(design.emission.length_fs());
         let at_the_lag = if macropulse <= channel_period { false_density } else { density };
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - at_the_lag);
 
@@ -389,7 +387,7 @@ impl<'a> Forecaster<'a> {
         // Nearer, a sampled channel is blind with the mark it has just sent.
         let sampling = self.design.receiver.method.sampling();
         let blank = sampling.map_or(0, |known| i64::from(known.blank_ticks) + 2);
-        let blind = s_from_fs(blank * self.design.tdc.tick_fs) * SPEED_OF_LIGHT / 2.0;
+        let blind = s_from_fs(blank * self.design.clock.tick_fs) * SPEED_OF_LIGHT / 2.0;
         let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
         let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
         match bisect(nearest, farthest, lost) {
@@ -425,7 +423,7 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
         return Some((what, "simulate it, or --set receiver.kind='\"matched\"'".to_owned()));
     }
     if let Detector::Sampled(detector) = &design.detector {
-        if design.coding.codebook.max_weight() > sampled::MOST_MARKS {
+        if design.emission.coding().codebook.max_weight() > sampled::MOST_MARKS {
             return Some((
                 "sampled words of more than 64 marks".to_owned(),
                 "simulate it, or take a code of fewer marks".to_owned(),
@@ -436,14 +434,14 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
     let Detector::Linear(linear) = &design.detector else { return None };
     let setting = linear.setting(operating.background);
     let needed = setting.comparator?.apart(&setting, TOLD_APART * setting.threshold);
-    let codebook = &design.coding.codebook;
+    let codebook = &design.emission.coding().codebook;
     let labels = 0..codebook.labels() as u16;
     let sent = labels.flat_map(|label| (0..codebook.words() as u16).map(move |word| (label, word)));
     let gaps = sent.filter_map(|(label, word)| {
         codebook.marks(label, word).windows(2).map(|pair| pair[1] - pair[0]).min()
     });
-    let least = s_from_fs(i64::from(gaps.min()?) * design.coding.chip_fs);
-    let chip = s_from_fs(design.coding.chip_fs);
+    let least = s_from_fs(i64::from(gaps.min()?) * design.emission.coding().chip_fs);
+    let chip = s_from_fs(design.emission.coding().chip_fs);
     (least < needed).then(|| {
         (
             "marks that merge behind the amplifier".to_owned(),

@@ -41,7 +41,7 @@ pub(super) struct Place {
 impl Place {
     /// That of a receiver, for a mark whose own deviation may be less than that which it looks for.
     pub fn of(design: &Design, mark: &Lit) -> Self {
-        let tick = s_from_fs(design.tdc.tick_fs);
+        let tick = s_from_fs(design.clock.tick_fs);
         let ticks = Self::ticks(design);
         if ticks <= 1.0 {
             return Self { width: tick, share: 1.0 };
@@ -80,7 +80,7 @@ pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
     let Some(spread) = design.light.spread_at(&design.detector) else {
         return pd_of_share(design, mark, 1.0);
     };
-    let width = spread / s_from_fs(design.tdc.tick_fs);
+    let width = spread / s_from_fs(design.clock.tick_fs);
     let below = |place: f64| normal_tail(-place / width);
     let share = |tick: f64| below(tick + 0.5) - below(tick - 0.5);
     let pd = |tick: f64| pd_of_share(design, mark, share(tick));
@@ -163,9 +163,8 @@ const MANY: f64 = 100.0;
 impl Gate {
     fn of(design: &Design, correlation: &Correlation) -> Self {
         let lags = lags(design);
-        let tick = s_from_fs(design.tdc.tick_fs);
-        let chips = i64::from(design.coding.codebook.chips());
-        let macropulse = s_from_fs(chips * design.coding.chip_fs);
+        let tick = s_from_fs(design.clock.tick_fs);
+        let macropulse = s_from_fs(design.emission.length_fs());
         let ticks = Place::ticks(design);
         Self {
             lags,
@@ -237,7 +236,7 @@ pub(super) struct Timing {
 impl Timing {
     pub fn of(design: &Design, mark: &Lit) -> Self {
         let (detector, light) = (design.detector.model(), &design.light);
-        let tick = s_from_fs(design.tdc.tick_fs);
+        let tick = s_from_fs(design.clock.tick_fs);
         let jitter = detector.mark_jitter(mark);
         let spread = libm::hypot(light.pulse * RMS_OF_FWHM, jitter);
         let sigma = libm::hypot(detector.mark_displacement(mark, light), jitter);

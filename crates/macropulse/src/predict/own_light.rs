@@ -107,7 +107,7 @@ impl OwnLight {
         };
         let mut shots: Vec<Vec<i64>> = (0..SHOTS).map(&marks).collect();
         let longest = shots.iter().map(lasts).max().unwrap_or(0);
-        let macropulse = s_from_fs(longest * design.tdc.tick_fs);
+        let macropulse = s_from_fs(longest * design.clock.tick_fs);
         let around = (((tof + macropulse) / period).ceil() as usize + 1).min(SHOTS);
         shots.extend((SHOTS..SHOTS + 2 * around).map(marks));
         let over = blind.map_or(1, |blind| blind.behind + 1);
@@ -196,7 +196,7 @@ impl OwnLight {
 
 /// When the marks of `shot`, counted along a line, leave, in ticks since the line began.
 pub(super) fn own_marks(design: &Design, shot: usize) -> impl Iterator<Item = i64> {
-    let coding = &design.coding;
+    let coding = design.emission.coding();
     let column = shot as u32 % design.scan.columns;
     let word = coding.first_word + shot as u32 % coding.word_modulus;
     leave(design, shot, coding.codebook.marks(coding.label_of(column as u16), word as u16))
@@ -209,7 +209,7 @@ fn leave<'a>(
     marks: &'a [u16],
 ) -> impl Iterator<Item = i64> + use<'a> {
     let fired = in_ticks(design, shot as f64 * design.scan.shortest_period());
-    let chip = design.coding.chip_fs / design.tdc.tick_fs;
+    let chip = design.emission.coding().chip_fs / design.clock.tick_fs;
     marks.iter().map(move |mark| fired + chip * i64::from(*mark))
 }
 
@@ -219,7 +219,7 @@ fn in_ticks(design: &Design, time: f64) -> i64 {
 }
 
 fn ticks_per_s(design: &Design) -> f64 {
-    FS_PER_S as f64 / design.tdc.tick_fs as f64
+    FS_PER_S as f64 / design.clock.tick_fs as f64
 }
 
 #[cfg(test)]

@@ -146,7 +146,7 @@ pub(super) fn chances(
     let (nearest, farthest) = design.receiver.gate_ticks;
     let lags = f64::from(farthest - nearest) + 1.0;
     let threshold = -normal_quantile(false_alarm / lags);
-    let weight = design.coding.codebook.max_weight();
+    let weight = design.emission.coding().codebook.max_weight();
     let per_tick = weight as f64 * sampled.sample / design.scan.shortest_period();
     let estimated = filtered.estimated(photons, per_tick);
     let by_count: Vec<Seen> = (0..=weight)
@@ -191,7 +191,7 @@ pub(super) struct Points {
 impl Points {
     /// For each number of marks that may count of the words of `design`; empty where none is enough.
     pub(super) fn of(design: &Design, sampling: &Sampling) -> Vec<Self> {
-        let weight = design.coding.codebook.max_weight();
+        let weight = design.emission.coding().codebook.max_weight();
         let points = |count: usize| {
             let mut points = Self { late: Vec::new(), deviates: Vec::new() };
             let enough = count >= fewest(sampling, weight);

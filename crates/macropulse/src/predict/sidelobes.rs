@@ -34,7 +34,7 @@ pub(super) struct Sidelobes {
 impl Sidelobes {
     /// Those of `design`.
     pub fn of(design: &Design) -> Self {
-        let codebook = &design.coding.codebook;
+        let codebook = &design.emission.coding().codebook;
         let words = codebook.words();
         let sent = |index: usize| codebook.marks((index / words) as u16, (index % words) as u16);
         let all = codebook.labels() as usize * words;
@@ -42,7 +42,7 @@ impl Sidelobes {
         let step = (all / SAMPLE).max(1) | 1;
         let sample: Vec<&[u16]> =
             (0..all).step_by(step).map(sent).filter(|marks| !marks.is_empty()).collect();
-        let per_chip = SPEED_OF_LIGHT / 2.0 * s_from_fs(design.coding.chip_fs);
+        let per_chip = SPEED_OF_LIGHT / 2.0 * s_from_fs(design.emission.coding().chip_fs);
         let mut own: Vec<(f64, f64)> = Vec::new();
         for marks in &sample {
             for (shift, common) in (0..).zip(correlation(marks)).skip(1) {

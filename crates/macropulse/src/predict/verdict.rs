@@ -83,7 +83,7 @@ pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Ve
 /// misses.
 pub fn mark_by_mark(forecaster: &Forecaster, wanted: &Wanted) -> Option<f64> {
     let design = forecaster.design();
-    let marks = design.coding.codebook.mean_weight();
+    let marks = design.emission.coding().codebook.mean_weight();
     let needed = -libm::log1p(-libm::pow(0.99, 1.0 / marks));
     let forecast = forecaster.forecast(wanted.reflectance, wanted.range);
     let is_told = design.is_coded() && forecast.detected_per_mark.is_finite();
@@ -192,12 +192,12 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
 
 fn converters(design: &Design, forecast: &Forecast) -> Check {
     let loss = forecast.bank_loss;
-    let finding = match design.receiver.method.sampling() {
-        Some(_) => "every detector has an ADC of its own, which is never busy".to_owned(),
-        None => format!(
+    let finding = match design.bank() {
+        None => "every detector has an ADC of its own, which is never busy".to_owned(),
+        Some(bank) => format!(
             "{:.2} % of detection events find all {} of a detector's bank busy",
             loss * 100.0,
-            design.converters_per_channel()
+            bank.converters
         ),
     };
     Check {
@@ -218,7 +218,7 @@ pub fn slant(design: &Design, range: f64) -> Option<Check> {
     let swept = swept(design) * range;
     let depth = spot_depth(libm::hypot(spot, swept), FRAC_PI_4);
     let chip = match design.is_coded() {
-        true => s_from_fs(design.coding.chip_fs),
+        true => s_from_fs(design.emission.coding().chip_fs),
         false => design.light.pulse,
     };
     let chip = chip.max(design.detector.model().response()) * SPEED_OF_LIGHT / 2.0;

@@ -146,7 +146,13 @@ mod tests {
         assert_eq!((first.name.as_str(), second.name.as_str()), ("kim-park-2016 1", "van"));
         assert_eq!(first.pose.position, [50.0, 0.0, 2.0]);
         assert_eq!(first.clock, Clock { phase_fs: 1_234_500_000, drift: 20_000_000 });
-        assert_eq!((first.design.coding.first_word, first.design.coding.word_modulus), (3, 26));
+        assert_eq!(
+            (
+                first.design.emission.coding().first_word,
+                first.design.emission.coding().word_modulus
+            ),
+            (3, 26)
+        );
         assert_eq!(second.clock, Clock::default());
         let assumed = scene.notes.join("\n");
         assert!(assumed.contains("van: no phase_ns given"), "{assumed}");

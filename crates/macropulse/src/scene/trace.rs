@@ -107,8 +107,7 @@ impl Mirror<'_> {
         let next = Some(shot + beams).filter(in_line);
         let before = shot.checked_sub(beams).filter(in_line);
         let Some(other) = next.or(before) else { return axis };
-        let macropulse =
-            i64::from(self.design.coding.codebook.chips()) * self.design.coding.chip_fs;
+        let macropulse = self.design.emission.length_fs();
         let apart = log.fired_at_fs[other] - log.fired_at_fs[shot];
         let after = (f64::from(sub) + 0.5) / f64::from(SUB_MACROPULSES) - 0.5;
         let pixels = after * macropulse as f64 / apart as f64;

@@ -31,8 +31,9 @@ pub fn ghosts(piece: &Piece, design: &Design, log: &ShotLog, light: &Light) -> u
         let measured = f64::from(points.range[at]) - design.scan.gates().offset(log.row[shot]);
         let tof_fs = fs_from_s(tof_from_range(measured));
         let begins_fs = log.fired_at_fs[shot] + tof_fs;
-        let own = design.coding.codebook.marks(log.label[shot], log.word[shot]);
-        let own = own.iter().map(|mark| begins_fs + i64::from(*mark) * design.coding.chip_fs);
+        let own = design.emission.coding().codebook.marks(log.label[shot], log.word[shot]);
+        let own =
+            own.iter().map(|mark| begins_fs + i64::from(*mark) * design.emission.coding().chip_fs);
         2 * interference.met(own, log.channel[shot]) >= u64::from(points.peak[at]).max(1)
     };
     (0..piece.shot.len()).filter(is_ghost).count() as u64
@@ -61,7 +62,7 @@ impl<'a> Interference<'a> {
             light.arrivals_fs(*train).last().map_or(0, |last| last - trains.arrives_fs[*train])
         };
         let longest_fs = order.iter().map(lasts).max().unwrap_or(0);
-        let tolerance_fs = design.tdc.tick_fs + jitter_fs as i64 + fs_from_s(pulse);
+        let tolerance_fs = design.clock.tick_fs + jitter_fs as i64 + fs_from_s(pulse);
         Self { light, order, longest_fs, tolerance_fs }
     }
 

@@ -171,7 +171,8 @@ pub fn judge(
             _ => pixels.outcome[pixel] = outcome,
         }
         score.points_on_target += u64::from(shown.is_some_and(|(.., on_target)| on_target));
-        let is_dark = || design.coding.codebook.marks(log.label[shot], log.word[shot]).is_empty();
+        let is_dark =
+            || design.emission.coding().codebook.marks(log.label[shot], log.word[shot]).is_empty();
         score.dark += u64::from(outcome == Outcome::Missed && is_dark());
         score.pixels[outcome as usize] += 1;
     }

@@ -52,7 +52,7 @@ pub(super) fn arrivals(setup: &Setup, band: &Band, stretch: &Stretch) -> Arrival
     let traced = seen.scene.trace(design, &log);
     let light = channel::light(seen, &log, &traced);
     let found = detectors.detections(&log, &light, &mut Memory::default());
-    let tick_fs = design.tdc.tick_fs;
+    let tick_fs = design.clock.tick_fs;
     let after = |fs: i64| (fs - stretch.from * tick_fs) as f64 / tick_fs as f64;
     let (opens, closes) = (stretch.ticks.start as f64, stretch.ticks.end as f64);
     let is_within = |tick: &f64| (opens..closes).contains(tick);

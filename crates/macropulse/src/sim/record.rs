@@ -11,25 +11,60 @@
 
 use macropulse_codec::{Given, ShotLog, Tick, Ticks};
 
-use super::Setup;
+use super::{DETECT, READOUT, Setup, Stages, Tally};
 use crate::channel::{self, Light, Seen};
 use crate::detect::Memory;
 use crate::emit::Band;
 use crate::tdc::{self, Converted, Wanted};
 
-/// What the receiver is given of `band`: its shots, and its ticks or samples.
+/// The record of a band.
+pub(super) struct Recorded {
+    /// What the receiver is given beside its shot log.
+    pub given: Given,
+    /// What was counted on the way.
+    pub tally: Tally,
+}
+
+/// The shots of `band` that its receiver knows, and their record.
 pub(super) fn of(setup: &Setup, band: &Band) -> (ShotLog, Given) {
     let design = setup.seen.design;
     let log = band.shot_log(design);
-    let known = design.cut().known(&log);
     let light = light(setup, &log);
-    if let Some(samples) = setup.detectors.samples(&log, &light, &band.ticks(design).0) {
-        return (known, Given::Samples(samples));
-    }
     let mut memory = Memory::default();
-    let mut converted = converted(setup, &mut memory, (&log, &light));
-    cut(setup, &mut memory, (band, &log), &mut converted);
-    (known, Given::Ticks(converted.ticks))
+    let recorded = recorded(setup, &mut memory, (band, &log, &light), 0, &mut Stages::begin());
+    (design.known(&log), recorded.given)
+}
+
+/// What the detectors and the readout make of the `light` of the shots of `log`, those of `band` with its guard
+/// shots, in a scan of which it is `known` that so many converters were busy at once.
+pub(super) fn recorded(
+    setup: &Setup,
+    memory: &mut Memory,
+    (band, log, light): (&Band, &ShotLog, &Light),
+    known: u32,
+    stages: &mut Stages,
+) -> Recorded {
+    let (design, detectors) = (setup.seen.design, setup.detectors);
+    let mut tally = Tally::default();
+    if let Some(histograms) = detectors.histograms(log, light) {
+        tally.counts = histograms.counts.iter().map(|count| u64::from(*count)).sum();
+        tally.detections = tally.counts;
+        return Recorded { given: stages.done(DETECT, Given::Histograms(histograms)), tally };
+    }
+    let span = band.ticks(design).0;
+    if let Some(samples) = detectors.samples(log, light, &span) {
+        tally.samples = samples.code.len() as u64;
+        return Recorded { given: stages.done(DETECT, Given::Samples(samples)), tally };
+    }
+    let response = stages.done(DETECT, detectors.response(log, light, memory));
+    let wanted = Wanted { known_busy: known, from: span.start };
+    let mut converted = tdc::ticks(design, response, wanted);
+    tally.ticks = converted.made;
+    cut(setup, memory, (band, log), &mut converted);
+    let Converted { ticks, peak_busy, lost, merged, .. } = converted;
+    tally.detections = tally.ticks + merged + lost;
+    (tally.merged, tally.lost, tally.peak_busy) = (merged, lost, peak_busy);
+    Recorded { given: stages.done(READOUT, Given::Ticks(ticks)), tally }
 }
 
 /// The light of the shots of `log`, and of all others.
@@ -44,7 +79,7 @@ fn converted(setup: &Setup, memory: &mut Memory, (log, light): (&ShotLog, &Light
 }
 
 /// Leaves of what was `converted` of a band, with its guard shots, the ticks that belong to it.
-pub(super) fn cut(
+fn cut(
     setup: &Setup,
     memory: &mut Memory,
     (band, log): (&Band, &ShotLog),
@@ -59,7 +94,7 @@ pub(super) fn cut(
     }
     let next = band.next(design).shot_log(design);
     // What is fired while gates are open of shots whose light is looked at.
-    let closes_fs = seen.end * design.tdc.tick_fs + design.cut().listening_fs;
+    let closes_fs = seen.end * design.clock.tick_fs + design.cut().listening_fs;
     let shots = next.fired_at_fs.partition_point(|fired| *fired <= closes_fs);
     let next = next.part(0..shots);
     let mut later = self::converted(setup, memory, (&next, &light(setup, &next))).ticks;

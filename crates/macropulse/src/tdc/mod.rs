@@ -15,7 +15,7 @@ use macropulse_codec::Ticks;
 
 use bank::Bank;
 
-use crate::design::{Design, Tdc};
+use crate::design::{Clock, Design};
 use crate::detect::{Detections, Response};
 
 /// What the bank of converters makes of the detection events of a band.
@@ -44,18 +44,18 @@ pub struct Reading {
 
 impl Reading {
     /// The reading for an event at absolute time `time_fs`.
-    pub fn at(tdc: &Tdc, time_fs: i64) -> Self {
+    pub fn at(clock: Clock, time_fs: i64) -> Self {
         Self {
-            clock: time_fs.div_euclid(tdc.clock_fs) as u32,
-            fine: (time_fs.rem_euclid(tdc.clock_fs) / tdc.tick_fs) as u32,
+            clock: time_fs.div_euclid(clock.period_fs) as u32,
+            fine: (time_fs.rem_euclid(clock.period_fs) / clock.tick_fs) as u32,
         }
     }
 
     /// Ticks from the clock count `epoch_clock` to this reading, however often the counter has
     /// rolled over since power-up; right for intervals shorter than one roll-over.
-    pub fn ticks_since(self, tdc: &Tdc, epoch_clock: u32) -> i64 {
+    pub fn ticks_since(self, clock: Clock, epoch_clock: u32) -> i64 {
         let clocks = self.clock.wrapping_sub(epoch_clock);
-        i64::from(clocks) * (tdc.clock_fs / tdc.tick_fs) + i64::from(self.fine)
+        i64::from(clocks) * (clock.period_fs / clock.tick_fs) + i64::from(self.fine)
     }
 }
 
@@ -75,11 +75,13 @@ impl Wanted {
     pub const ALL: Self = Self { known_busy: 0, from: i64::MIN };
 }
 
-/// What is `wanted` of the `response` of the detectors to one band, in the memory that it had.
+/// What is `wanted` of the `response` of the detectors to one band, in the memory that it had; nothing where
+/// the sensor has no converters.
 pub fn ticks<'a>(design: &Design, response: impl Into<Response<'a>>, wanted: Wanted) -> Converted {
-    let converters = design.converters_per_channel() as usize;
+    let Some(share) = design.bank() else { return Converted::default() };
+    let converters = share.converters as usize;
     let peak = converters.min(wanted.known_busy as usize);
-    let mut bank = Bank { converters, dead: design.tdc.dead_ticks(), peak };
+    let mut bank = Bank { converters, dead: share.dead_ticks(design.clock), peak };
     let Taken { ticks, made, found, merged } = match response.into() {
         Response::Events(events) => of_events(&mut bank, events),
         Response::Marks(marks) => marks::ticks(&mut bank, marks, wanted.from),
@@ -112,6 +114,7 @@ fn of_events(bank: &mut Bank, events: Detections) -> Taken {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::{Readout, Tdc};
     use proptest::prelude::*;
     use std::collections::VecDeque;
     use std::sync::LazyLock;
@@ -138,14 +141,14 @@ mod tests {
     /// rolls over on the way.
     #[test]
     fn the_counter_rolls_over_unnoticed() {
-        let tdc = &sensor(&[]).tdc;
-        let rollover = (1_i64 << 32) * tdc.clock_fs;
+        let clock = sensor(&[]).clock;
+        let rollover = (1_i64 << 32) * clock.period_fs;
         approx::assert_relative_eq!(rollover as f64 * 1e-15, 0.4295, max_relative = 1e-4);
-        assert_eq!(Reading::at(tdc, rollover).clock, 0);
-        let epoch = rollover / tdc.clock_fs - 50;
+        assert_eq!(Reading::at(clock, rollover).clock, 0);
+        let epoch = rollover / clock.period_fs - 50;
         for tick in [0, 1, 1999, 2000, 2001, 67_000_000] {
-            let time_fs = epoch * tdc.clock_fs + tick * tdc.tick_fs;
-            assert_eq!(Reading::at(tdc, time_fs).ticks_since(tdc, epoch as u32), tick);
+            let time_fs = epoch * clock.period_fs + tick * clock.tick_fs;
+            assert_eq!(Reading::at(clock, time_fs).ticks_since(clock, epoch as u32), tick);
         }
     }
 
@@ -174,7 +177,8 @@ mod tests {
 
     /// The bank as one would tell it: every converter remembers when it is free again.
     fn told(design: &Design, times: &[u32]) -> Converted {
-        let dead = (design.tdc.dead_fs as u64).div_ceil(design.tdc.tick_fs as u64);
+        let bank = design.bank().unwrap();
+        let dead = (bank.dead_fs as u64).div_ceil(design.clock.tick_fs as u64);
         let mut busy_until: VecDeque<u64> = VecDeque::new();
         let (mut found, mut before) = (Converted::default(), None);
         for tick in times.iter().map(|time| time / 64) {
@@ -185,7 +189,7 @@ mod tests {
             while busy_until.front().is_some_and(|until| *until <= u64::from(tick)) {
                 busy_until.pop_front();
             }
-            if busy_until.len() == design.tdc.converters as usize {
+            if busy_until.len() == bank.converters as usize {
                 found.lost += 1;
                 continue;
             }
@@ -205,7 +209,7 @@ mod tests {
     /// A sensor with a bank of so many converters. Reading its file for each takes a second for twenty.
     fn with_bank(converters: u32, dead_fs: i64) -> Design {
         let mut design = sensor_alone().clone();
-        (design.tdc.converters, design.tdc.dead_fs) = (converters, dead_fs);
+        design.readout = Readout::Tdc(Tdc { converters, dead_fs });
         design
     }
 
@@ -238,7 +242,7 @@ mod tests {
             converters in 1..60_u32,
         ) {
             times.sort_unstable();
-            let design = with_bank(converters, sensor_alone().tdc.dead_fs);
+            let design = with_bank(converters, sensor_alone().bank().unwrap().dead_fs);
             let without = timed(&design, 0, times.clone());
             let amplitude: Vec<f32> = times.iter().map(|time| (time / 64) as f32).collect();
             let detections = Detections { time: times, amplitude, ..Detections::default() };

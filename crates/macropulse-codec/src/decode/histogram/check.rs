@@ -29,7 +29,7 @@ pub(super) fn settings(receiver: &HistogramReceiver) -> Result<(), Error> {
         let value = format!("{nearest} to {farthest}");
         return refuse("gate_fs", value, "a gate that does not end before it begins");
     }
-    match &receiver.pulse {
+    match &receiver.method.pulse {
         Pulse::Gaussian { rms_fs } if !is_length(*rms_fs) => {
             return refuse("pulse.rms_fs", rms_fs.to_string(), "1 to 1e15");
         }
@@ -43,10 +43,13 @@ pub(super) fn settings(receiver: &HistogramReceiver) -> Result<(), Error> {
         }
         Pulse::Gaussian { .. } => {}
     }
-    if !(receiver.false_alarm > 0.0 && receiver.false_alarm.is_finite()) {
-        return refuse("false_alarm", receiver.false_alarm.to_string(), "a positive number");
+    if !(receiver.method.false_alarm > 0.0 && receiver.method.false_alarm.is_finite()) {
+        return refuse("false_alarm", receiver.method.false_alarm.to_string(), "a positive number");
     }
-    let shares = [("shape_error", receiver.shape_error), ("least_share", receiver.least_share)];
+    let shares = [
+        ("shape_error", receiver.method.shape_error),
+        ("least_share", receiver.method.least_share),
+    ];
     if let Some((setting, share)) =
         shares.into_iter().find(|(_, share)| !(0.0..=1.0).contains(share))
     {
@@ -85,12 +88,12 @@ pub(super) fn record(
             return Err(Error::Column { column, length, wanted, of, or: "" });
         }
     }
-    if receiver.pile_up == PileUp::None {
+    if receiver.method.pile_up == PileUp::None {
         return Ok(());
     }
     for shot in log.owned.clone() {
         let counted: u64 = histograms.of(shot).iter().map(|count| u64::from(*count)).sum();
-        let cycles = cycles[shot];
+        let cycles = super::trials(receiver, cycles[shot]);
         if counted > u64::from(cycles) {
             return Err(Error::MoreThanCycles { shot, counted, cycles });
         }

@@ -17,7 +17,7 @@ mod search;
 pub use pile_up::{PileUp, coates};
 pub use pulse::Pulse;
 
-use super::{Error, MOST_RETURNS, Pick, Reject, Return, Returns, Strength};
+use super::{Error, MOST_RETURNS, Pick, Receiver, Reject, Return, Returns, Strength};
 use crate::{Histograms, ShotLog, time};
 use chance::Chance;
 use model::{Light, Model};
@@ -25,13 +25,13 @@ use pile_up::Exposed;
 use pulse::{Kernel, STEPS};
 use search::Search;
 
-/// What a receiver of histograms is set to.
+/// Settings of a receiver of histograms.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HistogramReceiver {
-    /// Nearest and farthest two-way time of flight accepted, fs.
-    pub gate_fs: (i64, i64),
+pub struct HistogramMethod {
     /// How photons that the detector missed behind others are made up for.
     pub pile_up: PileUp,
+    /// Cells of a detector, each of which counts one photon per laser pulse where pile-up is corrected.
+    pub cells: u32,
     /// The emitted pulse as the detector responds to it.
     pub pulse: Pulse,
     /// False returns accepted per histogram.
@@ -43,25 +43,45 @@ pub struct HistogramReceiver {
     /// A return with less than this share of the photons of the strongest one of its histogram is not
     /// given. Reflections within the optics look like faint returns.
     pub least_share: f64,
-    /// Returns of a histogram at most, 1 to [`MOST_RETURNS`].
-    pub returns: u8,
-    /// Which returns are kept if there are more.
-    pub pick: Pick,
 }
 
-impl HistogramReceiver {
-    /// A receiver of `pulse` that takes counts as they are and knows the shape exactly: a gate of 10 µs,
-    /// one false return in a thousand histograms, and the strongest return.
+impl HistogramMethod {
+    /// Takes counts of `pulse` as they are and knows its shape exactly, with one false return in a
+    /// thousand histograms.
     pub fn new(pulse: Pulse) -> Self {
         Self {
-            gate_fs: (0, 10_000_000_000),
             pile_up: PileUp::None,
+            cells: 1,
             pulse,
             false_alarm: 1e-3,
             shape_error: 0.0,
             least_share: 0.0,
+        }
+    }
+}
+
+/// A receiver of histograms whose gate may begin before the laser pulse.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HistogramReceiver {
+    /// Nearest and farthest two-way time of flight accepted, fs.
+    pub gate_fs: (i64, i64),
+    /// Returns of a histogram at most, 1 to [`MOST_RETURNS`].
+    pub returns: u8,
+    /// Which returns are kept if there are more.
+    pub pick: Pick,
+    /// How it decodes.
+    pub method: HistogramMethod,
+}
+
+impl HistogramReceiver {
+    /// A receiver of `pulse` as [`HistogramMethod::new`] has it: a gate of 10 µs, and the strongest
+    /// return.
+    pub fn new(pulse: Pulse) -> Self {
+        Self {
+            gate_fs: (0, 10_000_000_000),
             returns: 1,
             pick: Pick::Strongest,
+            method: HistogramMethod::new(pulse),
         }
     }
 }
@@ -84,15 +104,16 @@ pub fn decode(
 ) -> Result<Returns, Error> {
     check::settings(receiver)?;
     check::record(receiver, log, histograms)?;
-    let Some(kernel) = Kernel::new(&receiver.pulse, histograms.bin_fs) else {
-        return Err(check::unusable(&receiver.pulse));
+    let Some(kernel) = Kernel::new(&receiver.method.pulse, histograms.bin_fs) else {
+        return Err(check::unusable(&receiver.method.pulse));
     };
     check::work(&kernel, histograms)?;
     let search = Search::new(&kernel, histograms, receiver.gate_fs);
     let mut returns = Returns::default();
     for shot in log.owned.clone() {
         let counts = histograms.of(shot);
-        let exposed = Exposed::of(counts, histograms.cycles[shot], receiver.pile_up);
+        let exposed =
+            Exposed::of(counts, trials(receiver, histograms.cycles[shot]), receiver.method.pile_up);
         let mut found = lights(receiver, &search, &exposed);
         if found.is_empty() {
             returns.reject(Reject::NoPeak);
@@ -115,6 +136,34 @@ pub fn decode(
     Ok(returns)
 }
 
+/// The same with the gate and the returns of `receiver`; the photons of a return are those of a laser pulse
+/// on average, where the number of pulses is known.
+pub(super) fn decode_band(
+    receiver: &Receiver,
+    method: &HistogramMethod,
+    log: &ShotLog,
+    histograms: &Histograms,
+) -> Result<Returns, Error> {
+    let (nearest, farthest) = receiver.gate_ticks;
+    let fs = |ticks: u32| i64::from(ticks).saturating_mul(receiver.tick_fs);
+    let receiver = HistogramReceiver {
+        gate_fs: (fs(nearest), fs(farthest.saturating_add(1))),
+        returns: receiver.returns,
+        pick: receiver.pick,
+        method: method.clone(),
+    };
+    let mut returns = decode(&receiver, log, histograms)?;
+    for (photons, shot) in returns.photons.iter_mut().zip(&returns.shot) {
+        *photons /= histograms.cycles[*shot as usize].max(1) as f32;
+    }
+    Ok(returns)
+}
+
+/// First photons that a detector could have counted in so many laser pulses.
+fn trials(receiver: &HistogramReceiver, cycles: u32) -> u32 {
+    cycles.saturating_mul(receiver.method.cells)
+}
+
 /// Two-way time of flight, s, of light whose kernel begins `lag` bins after the first bin.
 fn tof(kernel: &Kernel, histograms: &Histograms, lag: f64) -> f64 {
     let bins = lag + kernel.origin;
@@ -123,13 +172,13 @@ fn tof(kernel: &Kernel, histograms: &Histograms, lag: f64) -> f64 {
 
 /// The pulses in one histogram, in the order in which they were found.
 fn lights(receiver: &HistogramReceiver, search: &Search, exposed: &Exposed) -> Vec<Light> {
-    let Some(mut model) = Model::new(search.kernel, exposed, receiver.shape_error) else {
+    let Some(mut model) = Model::new(search.kernel, exposed, receiver.method.shape_error) else {
         return Vec::new();
     };
     for _ in 0..MOST_RETURNS {
         let Some(step) = search.strongest(&model) else { break };
         let chance = Chance::of(&model, step);
-        let Some(margin) = chance.margin(search, receiver.false_alarm) else { break };
+        let Some(margin) = chance.margin(search, receiver.method.false_alarm) else { break };
         let lag = step as f64 / STEPS as f64;
         model.add(Light { step, lag, photons: chance.photons, margin });
     }
@@ -137,7 +186,7 @@ fn lights(receiver: &HistogramReceiver, search: &Search, exposed: &Exposed) -> V
     let mut lights = model.lights;
     let strongest = lights.iter().fold(0.0, |most: f64, light| most.max(light.photons));
     lights.retain(|light| {
-        light.photons >= receiver.least_share * strongest && search.is_in_gate(light.lag)
+        light.photons >= receiver.method.least_share * strongest && search.is_in_gate(light.lag)
     });
     lights
 }

@@ -60,12 +60,12 @@ pub struct Words {
 
 impl Words {
     pub(super) fn of(design: &Design) -> Result<Self, Error> {
-        let family = design.coding.codebook.family();
+        let family = design.emission.coding().codebook.family();
         let words = family.words();
         let weight = family.weight();
         let cross = CrossCorrelation::of(&words);
         let lobes = words.iter().filter_map(aperiodic_sidelobe).map(|lobe| lobe.height);
-        let chip = s_from_fs(design.coding.chip_fs);
+        let chip = s_from_fs(design.emission.coding().chip_fs);
         let aligned =
             MultipleAccess::prime(weight as u32, USERS, Which::All).map_err(Error::Code)?;
         let unaligned = MultipleAccess::new(weight, USERS, Hits::of_unaligned_words(&words));
@@ -164,7 +164,7 @@ pub struct Repaired {
 
 impl Payloads {
     pub(super) fn of(design: &Design) -> Self {
-        let codebook = &design.coding.codebook;
+        let codebook = &design.emission.coding().codebook;
         let derived = design.derived();
         let columns = design.scan.columns;
         let payload = codebook.payload();
@@ -172,13 +172,13 @@ impl Payloads {
         let first_bit =
             |payload: &Payload, label| payload.encode(label) >> (payload.bits() - 1) & 1;
         let of = |f: &dyn Fn(&Payload) -> usize| payload.map_or(0, f);
-        let modulus = design.coding.word_modulus;
+        let modulus = design.emission.coding().word_modulus;
         Self {
             bits: payload.map_or(0, Payload::bits),
             of_511: payload.map_or_else(String::new, |payload| payload.text(511)),
             chips: codebook.chips(),
             macropulse: derived.macropulse,
-            chip: s_from_fs(design.coding.chip_fs),
+            chip: s_from_fs(design.emission.coding().chip_fs),
             marks: derived.marks,
             weight: codebook.family().weight(),
             marks_per_scan: derived.marks_per_scan,
@@ -206,10 +206,10 @@ fn column_clash(columns: u32, modulus: u32) -> u32 {
 
 fn repaired(payload: &Payload, design: &Design) -> Option<Repaired> {
     let fixed = Payload::new(payload.label_bits(), Crc { init: 7, ..payload.crc() }, true).ok()?;
-    let chips = fixed.bits() * design.coding.codebook.family().length();
+    let chips = fixed.bits() * design.emission.coding().codebook.family().length();
     Some(Repaired {
         bits: fixed.bits(),
-        macropulse: f64::from(chips) * s_from_fs(design.coding.chip_fs),
+        macropulse: f64::from(chips) * s_from_fs(design.emission.coding().chip_fs),
         dark: (0..design.scan.columns as u16).filter(|&label| fixed.is_dark(label)).count(),
     })
 }

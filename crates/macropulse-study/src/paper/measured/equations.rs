@@ -43,7 +43,7 @@ pub struct Equations {
 
 impl Equations {
     pub(super) fn of(design: &Design) -> Self {
-        let words = design.coding.codebook.family().words();
+        let words = design.emission.coding().codebook.family().words();
         let (mut tried, mut wrong_with_minus, mut wrong_with_plus) = (0, 0, 0);
         for (a, b) in words.iter().flat_map(|a| words.iter().map(move |b| (a, b))) {
             let once = aperiodic(a, b);

@@ -55,7 +55,7 @@ impl OnPaper {
             payloads: Payloads::of(design),
             equations: Equations::of(design),
             timing: Timing::of(design),
-            converters: Converters::of(design),
+            converters: Converters::of(design)?,
             light: Light::of(design)?,
             head: Head::of(&Design::open("hdl-64e", &[])?),
             outlook: Outlook::of(design)?,

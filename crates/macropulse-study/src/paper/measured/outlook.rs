@@ -97,7 +97,8 @@ impl Outlook {
             left - right
         };
         let (walsh_in_step, walsh) = greatest(&walsh_words(), 64);
-        let gold: Vec<Signs> = slow.coding.codebook.family().words().iter().map(signs).collect();
+        let gold: Vec<Signs> =
+            slow.emission.coding().codebook.family().words().iter().map(signs).collect();
         Ok(Self {
             field: width(design),
             directions: (design.scan.columns, design.scan.rows, 1.0 / design.scan_period()),
@@ -106,8 +107,8 @@ impl Outlook {
             practical_pd: Forecaster::new(&practical, &day)?.forecast(0.1, range).pd,
             practical_macropulse: derived.macropulse / derived.pixel_period,
             practical_words: derived.unambiguous_range.unwrap_or(f64::INFINITY),
-            slower: slow.coding.chip_fs as f64 / design.coding.chip_fs as f64,
-            gold: greatest(&gold, slow.coding.codebook.family().length()).1,
+            slower: slow.emission.coding().chip_fs as f64 / design.emission.coding().chip_fs as f64,
+            gold: greatest(&gold, slow.emission.coding().codebook.family().length()).1,
             walsh_in_step,
             walsh,
             closing: ["coded-32", "coded-16"]

@@ -74,7 +74,7 @@ pub struct Timing {
 impl Timing {
     pub(super) fn of(design: &Design) -> Self {
         let derived = design.derived();
-        let tick = s_from_fs(design.tdc.tick_fs);
+        let tick = s_from_fs(design.clock.tick_fs);
         let columns = f64::from(design.scan.columns);
         Self {
             pixel_period: derived.pixel_period,
@@ -89,11 +89,11 @@ impl Timing {
             range_of_25: word_reuse_range(IN_FLIGHT as u32, derived.pixel_period),
             column_range: range_from_tof(columns * derived.pixel_period),
             tick,
-            clock: s_from_fs(design.tdc.clock_fs),
+            clock: s_from_fs(design.clock.period_fs),
             conversion_range: f64::from(1 << CONVERTER_BITS) * tick,
             scan: design.scan_period(),
             resonant_dwell: derived.pixel_period * 2.0 / PI,
-            chip_rate: 1.0 / s_from_fs(design.coding.chip_fs),
+            chip_rate: 1.0 / s_from_fs(design.emission.coding().chip_fs),
             noise_first: -libm::log(0.9) / derived.gate,
             noise_printed: -libm::log(0.9) / derived.macropulse,
             noise_matched: -libm::log1p(-bearable(derived.marks.0, derived.gate / tick)) / tick,
@@ -133,26 +133,27 @@ pub struct Converters {
 }
 
 impl Converters {
-    pub(super) fn of(design: &Design) -> Self {
-        let family = design.coding.codebook.family();
+    pub(super) fn of(design: &Design) -> Result<Self, Error> {
+        let family = design.emission.coding().codebook.family();
         let density = family.weight() as f64 / f64::from(family.length());
-        let tick = s_from_fs(design.tdc.tick_fs);
-        let dead_time = s_from_fs(design.tdc.dead_fs);
-        let ticks = design.tdc.dead_ticks();
-        Self {
-            number: design.tdc.converters,
+        let tick = s_from_fs(design.clock.tick_fs);
+        let tdc = design.readout.tdc().ok_or(Error::Sensor)?;
+        let dead_time = s_from_fs(tdc.dead_fs);
+        let ticks = tdc.dead_ticks(design.clock);
+        Ok(Self {
+            number: tdc.converters,
             dead_time,
             conversion: 1.0 / CONVERSIONS_PER_S,
             load: IN_FLIGHT as f64 * density / tick,
             most_marks: most_marks(design, ticks),
             ticks,
-        }
+        })
     }
 }
 
 /// Most marks of [`IN_FLIGHT`] successive shots, of each those of its densest `chips` chips.
 fn most_marks(design: &Design, chips: u32) -> u32 {
-    let coding = &design.coding;
+    let coding = design.emission.coding();
     let (columns, modulus) = (u64::from(design.scan.columns), u64::from(coding.word_modulus));
     // Where a row begins with the word of another one that came before, all comes again.
     let shots = columns * modulus + IN_FLIGHT as u64;
@@ -293,7 +294,8 @@ impl Light {
             photons,
             photons_per_mark: per_mark,
             photons_declared: derived.reference_photons,
-            sunlight: budget.background(irradiance, day.albedo) * s_from_fs(design.coding.chip_fs),
+            sunlight: budget.background(irradiance, day.albedo)
+                * s_from_fs(design.emission.coding().chip_fs),
             pd_by_day: by_day.forecast(1.0, range).pd,
             pd_by_night: seen_by_night(range)?,
             range_by_night: farthest(range, |range| Ok(seen_by_night(range)? >= 0.9))?,

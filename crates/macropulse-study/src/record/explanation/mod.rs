@@ -3,6 +3,7 @@
 //! A kind of record is a variant of [`Record`] with a file of its own.
 
 mod curve;
+mod histograms;
 mod light;
 mod samples;
 mod ticks;
@@ -20,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use self::curve::Scale;
+use self::histograms::Counts;
 use self::light::Light;
 use self::samples::Samples;
 use self::ticks::Ticks;
@@ -77,6 +79,7 @@ struct Return {
 enum Record {
     Ticks(Ticks),
     Samples(Samples),
+    Histograms(Counts),
 }
 
 impl Record {
@@ -85,6 +88,7 @@ impl Record {
         match self {
             Self::Ticks(ticks) => ticks.push(marks, columns),
             Self::Samples(samples) => samples.push(columns),
+            Self::Histograms(counts) => counts.push(columns),
         }
     }
 
@@ -93,6 +97,7 @@ impl Record {
         match self {
             Self::Ticks(ticks) => ticks.whole.as_ref().map(|whole| &whole.correlation.scale),
             Self::Samples(samples) => samples.whole.as_ref().map(|whole| &whole.correlation.scale),
+            Self::Histograms(counts) => Some(&counts.scale),
         }
     }
 
@@ -101,6 +106,7 @@ impl Record {
         match self {
             Self::Ticks(ticks) => ticks.whole = None,
             Self::Samples(samples) => samples.whole = None,
+            Self::Histograms(counts) => counts.counts = None,
         }
     }
 }
@@ -146,7 +152,7 @@ struct Decision<'a> {
 }
 
 impl PixelExplanation {
-    /// Explains shot number `shot` of a band out of its ticks or samples. `arrivals` gives the light
+    /// Explains shot number `shot` of a band out of its record. `arrivals` gives the light
     /// of a stretch of time, from the shot, or where its gate opens, to the end of the last
     /// macropulse within the gate; `None` where it is not known.
     ///
@@ -161,6 +167,7 @@ impl PixelExplanation {
         let Decision { shot, marks, gate, width, verdict, why, record } = match given {
             Given::Ticks(ticks) => ticks::decision(design, (log, ticks), shot)?,
             Given::Samples(samples) => samples::decision(design, (log, samples), shot)?,
+            Given::Histograms(counts) => histograms::decision(design, (log, counts), shot)?,
         };
         let lasts = marks.last().map_or(0, |last| last + width);
         let light = arrivals(&Stretch {
@@ -223,6 +230,7 @@ impl PixelExplanation {
         let (recorded, has_events) = match self.record {
             Record::Ticks(_) => ("ticks", true),
             Record::Samples(_) => ("samples", false),
+            Record::Histograms(_) => ("histograms", false),
         };
         columns.push(
             "light",
@@ -256,6 +264,7 @@ impl PixelExplanation {
         match &self.record {
             Record::Ticks(ticks) => ticks.charts(&self.marks_ticks, self.light.as_ref()),
             Record::Samples(samples) => samples.charts(),
+            Record::Histograms(counts) => counts.charts(&self.returns),
         }
     }
 

@@ -118,13 +118,14 @@ pub(super) fn decision<'a>(
     (log, samples): (&'a ShotLog, &codec::Samples),
     at: usize,
 ) -> Result<Decision<'a>, decode::Error> {
-    let told = design.receiver.explain_samples(&design.coding.codebook, (log, samples), at)?;
+    let told =
+        design.receiver.explain_samples(&design.emission.coding().codebook, (log, samples), at)?;
     // A sample stands for its beginning.
     let shot = Shot {
         log,
         at,
         fired_tick: told.fired_tick,
-        tick_fs: design.tdc.tick_fs,
+        tick_fs: design.clock.tick_fs,
         within_tick_fs: 0,
     };
     let why = Reasons { told: &told, shot: &shot }.text();

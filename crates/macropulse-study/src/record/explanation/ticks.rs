@@ -79,8 +79,8 @@ pub(super) fn decision<'a>(
     (log, ticks): (&'a ShotLog, &codec::Ticks),
     at: usize,
 ) -> Result<Decision<'a>, decode::Error> {
-    let told = design.receiver.explain(&design.coding.codebook, (log, ticks), at)?;
-    let tick_fs = design.tdc.tick_fs;
+    let told = design.receiver.explain(&design.emission.coding().codebook, (log, ticks), at)?;
+    let tick_fs = design.clock.tick_fs;
     // A tick stands for its middle.
     let shot = Shot { log, at, fired_tick: told.fired_tick, tick_fs, within_tick_fs: tick_fs / 2 };
     let why = Reasons { told: &told, shot: &shot }.text();

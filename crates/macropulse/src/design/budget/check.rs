@@ -11,7 +11,7 @@ use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
 use crate::design::limits::Check;
 use crate::design::safety::{Limit, strictest};
-use crate::design::{Coding, Effect, Error, Light, Scan};
+use crate::design::{Effect, Emission, Error, Light, Scan};
 use crate::units::tof_from_range;
 
 /// `[optics]` as typed.
@@ -75,7 +75,7 @@ pub(in crate::design) struct BudgetFile<'a> {
 pub(in crate::design) struct Parts<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
-    pub coding: &'a Coding,
+    pub emission: &'a Emission,
     pub idealised: &'a [Effect],
 }
 
@@ -114,8 +114,8 @@ impl Check<'_> {
         let eye = Eye { distance, count_groups: safety.count_lines };
         let limits = OnceLock::new();
         let allowed = || {
-            let Parts { scan, light, coding, .. } = parts;
-            limits.get_or_init(|| eye.limits(scan, light, coding)).as_slice()
+            let Parts { scan, light, emission, .. } = parts;
+            limits.get_or_init(|| eye.limits(scan, light, emission)).as_slice()
         };
         let energy = self.energy(file.energy, allowed, off(Effect::EyeSafety))?;
         Ok(Some(Budget {

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 pub(in crate::design) use check::{BudgetFile, OpticsFile, Parts, SafetyFile};
 
 use super::safety::{Class1, Condition, Limit, Sender, exposure, limits, strictest_of_each};
-use super::{Coding, Light, Scan};
+use super::{Emission, Light, Scan};
 use crate::units::{PLANCK, SPEED_OF_LIGHT};
 
 /// What an honest link is made of. SI units.
@@ -63,8 +63,8 @@ pub struct CoScanned {
 
 impl Budget {
     /// What class 1 allows to a shot; empty where no rule fits the wavelength or the scan.
-    pub(super) fn limits(&self, scan: &Scan, light: &Light, coding: &Coding) -> &[Limit] {
-        self.limits.get_or_init(|| self.eye.limits(scan, light, coding))
+    pub(super) fn limits(&self, scan: &Scan, light: &Light, emission: &Emission) -> &[Limit] {
+        self.limits.get_or_init(|| self.eye.limits(scan, light, emission))
     }
 
     /// Area of the aperture, m².
@@ -105,11 +105,11 @@ impl Budget {
 
 impl Eye {
     /// What class 1 allows to a shot before the bare eye, and before one behind a telescope.
-    fn limits(self, scan: &Scan, light: &Light, coding: &Coding) -> Vec<Limit> {
+    fn limits(self, scan: &Scan, light: &Light, emission: &Emission) -> Vec<Limit> {
         let Some(class) = Class1::at(light.wavelength) else { return Vec::new() };
         let Self { distance, count_groups } = self;
         let all = [Condition::bare_eye(distance), class.telescope()].map(|condition| {
-            let sender = Sender { scan, light, coding, condition, count_groups };
+            let sender = Sender { scan, light, emission, condition, count_groups };
             limits(&class, &exposure(&class, &sender))
         });
         strictest_of_each(&all.concat())

@@ -72,6 +72,8 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     }
     let sampled = kind == ReceiverKind::Sampled;
     add(sampled, &["tdc"], "receiver.kind", "a sampled detector has no converters of events");
+    let is_counted = file.histogram.is_some();
+    add(is_counted, &["tdc"], "histogram", "counts go into bins, and no converter times them");
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
     let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
     add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");

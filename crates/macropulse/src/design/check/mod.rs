@@ -11,15 +11,16 @@ use super::budget::{self, BudgetFile, OpticsFile, SafetyFile};
 use super::coding::CodeFile;
 use super::detector::{Before, DetectorFile, Efficiency};
 use super::document::Chain;
+use super::emission::BurstFile;
 use super::light::LightFile;
 use super::limits::Check;
+use super::readout::{HistogramFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::{Budget, Coding, Design, Detector, Effect, Error, Light, Scan, Tdc};
-use crate::design::tdc::TdcFile;
+use super::{Budget, Clock, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
 use crate::names::nearest;
 use crate::schema::{self, Fault, Misfit};
-use crate::units::{range_from_tof, s_from_fs};
+use crate::units::{RMS_OF_FWHM, fs_from_s, range_from_tof, s_from_fs, tof_from_range};
 use macropulse_codec::decode::Receiver;
 
 /// A sensor file as typed: keys with units, nothing checked yet but names and types.
@@ -43,6 +44,8 @@ pub(in crate::design) struct SensorFile {
     pub light: LightFile,
     /// What its shots carry; leave the table out for shots without a code.
     pub code: Option<CodeFile>,
+    /// Pulses that a shot without a code repeats; leave the table out for single ones.
+    pub burst: Option<BurstFile>,
     /// From light to detection events: one kind of detector.
     pub detector: DetectorFile,
     /// The optics of the receiver; with a link budget.
@@ -51,7 +54,9 @@ pub(in crate::design) struct SensorFile {
     pub safety: Option<SafetyFile>,
     /// From detection events to ticks: the bank of converters.
     pub tdc: TdcFile,
-    /// From ticks to returns.
+    /// From counts to histograms; leave the table out where detection events are timed or sampled.
+    pub histogram: Option<HistogramFile>,
+    /// From ticks, samples or histograms to returns.
     pub receiver: ReceiverFile,
 }
 
@@ -84,8 +89,18 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         return Err(faults.into_error(chain));
     };
     let idle = effectless::idle_keys(&file, &parts.idealised);
-    let Parts { idealised, scan, tdc, coding, light, budget, detector, receiver, right_within } =
-        parts;
+    let Parts {
+        idealised,
+        scan,
+        clock,
+        readout,
+        emission,
+        light,
+        budget,
+        detector,
+        receiver,
+        right_within,
+    } = parts;
     // What has no effect belongs neither to the sensor nor to its digest.
     let said = chain.clone().without(&idle);
     let warnings = scan.model().notes().to_vec();
@@ -94,10 +109,11 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         summary: file.summary,
         scan,
         light,
-        coding,
+        emission,
         budget,
         detector,
-        tdc,
+        clock,
+        readout,
         receiver,
         right_within,
         idealised,
@@ -119,8 +135,9 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
 struct Parts {
     idealised: Vec<Effect>,
     scan: Scan,
-    tdc: Tdc,
-    coding: Coding,
+    clock: Clock,
+    readout: Readout,
+    emission: Emission,
     light: Light,
     budget: Option<Budget>,
     detector: Detector,
@@ -137,16 +154,20 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let moves = effects.is_some() && !off(Effect::MirrorMotion);
     let scan = faults.keep(check.scan(&file.scan, moves));
     let sampled = file.detector.only().and_then(|only| only.file.sample_ps());
-    let tdc = faults.keep(match sampled {
-        Some(sample_ps) => check.sampling_clock(sample_ps),
-        None => check.tdc(&file.tdc),
+    let timing = faults.keep(match (&file.histogram, sampled) {
+        (Some(histogram), _) => check.histogram(histogram),
+        (None, Some(sample_ps)) => check.adc(sample_ps),
+        (None, None) => check.tdc(&file.tdc),
     });
-    let coding = match (&scan, &tdc) {
-        (Some(scan), Some(tdc)) => {
-            if sampled.is_none() {
-                faults.keep(check.share(tdc, scan));
+    let emission = match (&scan, &timing) {
+        (Some(scan), Some((clock, readout))) => {
+            faults.keep(check.share(readout, scan));
+            let emission = faults.keep(check.emission(file, scan, *clock));
+            if let Some(emission) = &emission {
+                faults.keep(check.cycles(file, emission, (*clock, readout), scan));
+                faults.keep(check.stands(emission, scan, moves));
             }
-            faults.keep(check.coding(file.code.as_ref(), scan, tdc))
+            emission
         }
         _ => None,
     };
@@ -161,9 +182,10 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
         }
         None => Some(None),
     };
-    let (idealised, scan, tdc, coding, light) = (effects?, scan?, tdc?, coding?, light?);
+    let (idealised, scan, (clock, readout)) = (effects?, scan?, timing?);
+    let (emission, light) = (emission?, light?);
     let before =
-        budget::Parts { scan: &scan, light: &light, coding: &coding, idealised: &idealised };
+        budget::Parts { scan: &scan, light: &light, emission: &emission, idealised: &idealised };
     let efficiency = Efficiency::of(&file.detector);
     let typed = BudgetFile {
         optics: file.optics.as_ref(),
@@ -174,7 +196,8 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let before = Before {
         scan: &scan,
         light: &light,
-        coding: &coding,
+        emission: &emission,
+        readout: &readout,
         budget: budget.as_ref().and_then(Option::as_ref),
     };
     let detector =
@@ -185,22 +208,39 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let inputs = Inputs {
         detector: &file.detector,
         scan: &scan,
-        tdc: &tdc,
-        coding: &coding,
+        clock,
+        readout: &readout,
+        emission: &emission,
         timing: libm::hypot(jitter, spread.unwrap_or(0.0)),
         photons_apart: spread.is_some(),
         sampled: detector.as_ref().and_then(|detector| match detector {
             Detector::Sampled(sampled) => Some(sampled),
             _ => None,
         }),
+        counting: detector.as_ref().and_then(|detector| match detector {
+            Detector::Geiger(geiger) => Some(geiger),
+            _ => None,
+        }),
+        pulse: libm::hypot(jitter, light.pulse * RMS_OF_FWHM),
     };
     let receiver = faults.keep(check.receiver(&file.receiver, &inputs)).flatten();
     if !faults.is_empty() {
         return None;
     }
     let (budget, detector, receiver) = (budget?, detector?, receiver?);
-    let right_within = right_within?.unwrap_or_else(|| resolved(&detector, &light, &tdc));
-    Some(Parts { idealised, scan, tdc, coding, light, budget, detector, receiver, right_within })
+    let right_within = right_within?.unwrap_or_else(|| resolved(&detector, &light, clock));
+    Some(Parts {
+        idealised,
+        scan,
+        clock,
+        readout,
+        emission,
+        light,
+        budget,
+        detector,
+        receiver,
+        right_within,
+    })
 }
 
 /// What was found wrong so far.
@@ -229,9 +269,9 @@ impl Faults {
 /// c/2 · 4·√(σ² + tick²)
 ///
 /// σ the jitter with the length of a micropulse as far as it matters to the detector.
-fn resolved(detector: &Detector, light: &Light, tdc: &Tdc) -> f64 {
+fn resolved(detector: &Detector, light: &Light, clock: Clock) -> f64 {
     let sigma = detector.model().resolution(light);
-    range_from_tof(4.0 * libm::hypot(sigma, s_from_fs(tdc.tick_fs))).min(WIDEST)
+    range_from_tof(4.0 * libm::hypot(sigma, s_from_fs(clock.tick_fs))).min(WIDEST)
 }
 
 /// Refuses keys of sun and air, and says where they live.
@@ -277,6 +317,66 @@ fn typed_wrongly(chain: &Chain, misfit: &Misfit) -> Error {
 }
 
 impl Check<'_> {
+    /// What a shot sends.
+    fn emission(&self, file: &SensorFile, scan: &Scan, clock: Clock) -> Result<Emission, Error> {
+        let coding = self.coding(file.code.as_ref(), scan, clock)?;
+        let Some(burst) = &file.burst else { return Ok(Emission::Marks(coding)) };
+        if file.code.is_some() {
+            return self.refuse("burst", "repeats single pulses: leave out [code], or [burst]");
+        }
+        Ok(Emission::Burst(self.burst(burst, coding, clock)?))
+    }
+
+    /// Whether bursts and histograms go together: who repeats pulses adds up their counts, in bins that lie within
+    /// a cycle and hold the range gate.
+    fn cycles(
+        &self,
+        file: &SensorFile,
+        emission: &Emission,
+        (clock, readout): (Clock, &Readout),
+        scan: &Scan,
+    ) -> Result<(), Error> {
+        let (burst, histogram) = match (emission.burst(), readout.histogram()) {
+            (None, None) => return Ok(()),
+            (Some(_), None) => {
+                return self.refuse("burst", "is added up in a [histogram], which is missing");
+            }
+            (None, Some(_)) => {
+                let message = "adds up the pulses of a [burst], which is missing";
+                return Err(self.chain.lacks("histogram", message));
+            }
+            (Some(burst), Some(histogram)) => (burst, histogram),
+        };
+        if file.detector.only().is_none_or(|only| only.name != "geiger") {
+            return self.refuse("detector", "must be `geiger` where counts go into a [histogram]");
+        }
+        let last_fs = i64::from(histogram.bins) * clock.tick_fs;
+        if last_fs > burst.interval_fs {
+            let most = burst.interval_fs / clock.tick_fs;
+            let message = format!("is {}, but between two pulses lie {most} bins", histogram.bins);
+            return self.refuse("histogram.bins", message);
+        }
+        let last = fs_from_s(tof_from_range(scan.max_range)) / clock.tick_fs;
+        if last >= i64::from(histogram.bins) {
+            let message = format!(
+                "is {}, but the range gate ends in bin {last}: more bins, or a shorter max_range_m",
+                histogram.bins
+            );
+            return self.refuse("histogram.bins", message);
+        }
+        Ok(())
+    }
+
+    /// Whether the beam stands while a burst is sent, as it is simulated: where it `moves`, that has to be idealised.
+    fn stands(&self, emission: &Emission, scan: &Scan, moves: bool) -> Result<(), Error> {
+        if emission.burst().is_none() || !moves || scan.is_one_flash() {
+            return Ok(());
+        }
+        let message = "the beam is not followed while it sends a [burst]: put \"mirror-motion\" on this \
+                       list, or --without mirror-motion";
+        self.refuse("idealised", message)
+    }
+
     fn effects(&self, names: &[String]) -> Result<Vec<Effect>, Error> {
         let mut found = Vec::new();
         for name in names {
@@ -308,7 +408,7 @@ impl Check<'_> {
     /// one go.
     fn clock(&self, design: &Design) -> Result<(), Error> {
         if design.longest_band_fs() < 0 {
-            return self.too_fine(design.is_sampled());
+            return self.too_fine(&design.readout);
         }
         Ok(())
     }
@@ -338,6 +438,18 @@ impl Check<'_> {
     /// A macropulse must end before the next one that the same detector sees begins.
     fn timing(&self, design: &mut Design) -> Result<(), Error> {
         let derived = design.derived();
+        if let Some(burst) = design.emission.burst() {
+            let lasts = s_from_fs(i64::from(burst.pulses) * burst.interval_fs);
+            if lasts > derived.channel_period {
+                let message = format!(
+                    "lasts {:.3} µs with the interval behind its last pulse, longer than the {:.3} µs between \
+                     two shots of a detector: fewer pulses, a shorter interval, or a slower scan",
+                    lasts * 1e6,
+                    derived.channel_period * 1e6
+                );
+                return self.refuse("burst", message);
+            }
+        }
         if design.is_coded() && derived.macropulse > derived.channel_period {
             let of = match design.channels() {
                 1 => "of a pixel",
@@ -387,7 +499,7 @@ mod tests {
             ("peregrine", 0.15),
         ] {
             let design = Design::open(name, &[]).unwrap();
-            let found = super::resolved(&design.detector, &design.light, &design.tdc);
+            let found = super::resolved(&design.detector, &design.light, design.clock);
             assert!((0.7..1.4).contains(&(found / typed)), "{name}: {found} m, not {typed} m");
         }
     }

@@ -41,7 +41,31 @@ pub(super) struct File {
     /// Timing jitter, ps rms.
     #[schemars(range(min = 0, max = 1e6))]
     jitter_ps: f64,
+    /// When a cell counts again; with [histogram]. Left out: `free-running`.
+    arming: Option<Arming>,
+    /// Probability that a count leaves an afterpulse; with [histogram].
+    #[schemars(range(min = 0, max = 0.9))]
+    afterpulsing: Option<f64>,
+    /// Mean delay of an afterpulse, ns: exponential; with [histogram].
+    #[schemars(range(min = 0.001, max = 1e6))]
+    afterpulse_ns: Option<f64>,
+    /// Probability that a count makes another cell count at once, optical crosstalk; with [histogram].
+    #[schemars(range(min = 0, max = 0.9))]
+    crosstalk: Option<f64>,
 }
+
+/// When a cell that has counted counts again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Arming {
+    /// After its dead time.
+    FreeRunning,
+    /// When the next pulse is sent: one count of each cell and pulse ("single stop").
+    OncePerPulse,
+}
+
+/// Mean delay of an afterpulse, ns, if the file does not say it.
+const AFTERPULSE_NS: f64 = 30.0;
 
 /// Cells in Geiger mode that share the light: each is blind for a while after it has fired.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +82,14 @@ pub struct Geiger {
     pub background: f64,
     /// Standard deviation of the timing, s.
     pub jitter: f64,
+    /// When a cell counts again.
+    pub arming: Arming,
+    /// Probability that a count leaves an afterpulse.
+    pub afterpulsing: f64,
+    /// Mean delay of an afterpulse, fs.
+    pub afterpulse_fs: i64,
+    /// Probability that a count makes another cell count.
+    pub crosstalk: f64,
 }
 
 impl Typed for File {
@@ -82,6 +114,10 @@ impl Typed for File {
         let dark = table.dark(self.dark_counts_hz)?;
         let background = table.background(self.background_hz)?;
         let dead = table.within("dead_time_ns", self.dead_time_ns, 0.0, 1e6)?;
+        self.only_with_histograms(table)?;
+        let share = |key, typed: Option<f64>| table.within(key, typed.unwrap_or(0.0), 0.0, 0.9);
+        let delay = self.afterpulse_ns.unwrap_or(AFTERPULSE_NS);
+        let delay = table.within("afterpulse_ns", delay, 1e-3, 1e6)?;
         Ok(Detector::Geiger(Geiger {
             sensitivity,
             cells: table.count("cells", self.cells, 1, 1 << 20)?,
@@ -89,7 +125,43 @@ impl Typed for File {
             dark,
             background,
             jitter: table.jitter(self.jitter_ps)?,
+            arming: self.arming.unwrap_or(Arming::FreeRunning),
+            afterpulsing: share("afterpulsing", self.afterpulsing)?,
+            afterpulse_fs: fs_from_s(delay * 1e-9),
+            crosstalk: share("crosstalk", self.crosstalk)?,
         }))
+    }
+}
+
+impl File {
+    /// Refuses keys that only a histogram follows, and such as need another.
+    fn only_with_histograms(&self, table: &Table) -> Result<(), Error> {
+        let typed = [
+            ("arming", self.arming.is_some()),
+            ("afterpulsing", self.afterpulsing.is_some()),
+            ("afterpulse_ns", self.afterpulse_ns.is_some()),
+            ("crosstalk", self.crosstalk.is_some()),
+        ];
+        let key = |named: &str| typed.iter().find(|(key, is_typed)| *is_typed && *key == named);
+        let refuse = |key: &str, why: &str| table.refuse_key(key, why.to_owned());
+        if table.before.readout.histogram().is_none() {
+            let first = typed.iter().find(|(_, is_typed)| *is_typed);
+            return first.map_or(Ok(()), |(key, _)| {
+                refuse(key, "is followed where counts go into a [histogram] alone: leave it out")
+            });
+        }
+        if key("afterpulse_ns").is_some() && self.afterpulsing.is_none() {
+            return refuse("afterpulse_ns", "has no effect without `afterpulsing`");
+        }
+        let is_never_blind = self.dead_time_ns == 0.0 && self.arming != Some(Arming::OncePerPulse);
+        match key("afterpulsing").or(key("crosstalk")) {
+            Some((key, _)) if is_never_blind => refuse(
+                key,
+                "is that of cells that are blind behind a count: write dead_time_ns, or arming = \
+                 \"once-per-pulse\"",
+            ),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -28,7 +28,7 @@ pub use comparator::{
     Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, Timing,
 };
 pub use front_end::FrontEnd;
-pub use geiger::Geiger;
+pub use geiger::{Arming, Geiger};
 pub use linear::{Linear, LinearSetting};
 pub use photon_counting::PhotonCounting;
 pub use sampled::{BASELINE_BLOCK, Sampled};

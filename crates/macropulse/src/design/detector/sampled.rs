@@ -169,7 +169,7 @@ impl Typed for File {
         let codes = f64::from(1 << bits);
         let low_cutoff = self.low_cutoff(table, &front_end, (sample, codes))?;
         let isolation = within("isolation_db", self.isolation_db, 300.0)?;
-        let mark = budget.energy / table.before.coding.codebook.mean_weight();
+        let mark = budget.energy / table.before.emission.mean_pulses();
         let detected = mark / budget.photon_energy() * budget.efficiency;
         Ok(Detector::Sampled(Sampled {
             sensitivity: table.honest(budget),

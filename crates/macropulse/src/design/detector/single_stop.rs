@@ -85,7 +85,7 @@ impl Typed for File {
     }
 
     fn check(&self, table: &Table) -> Result<Detector, Error> {
-        if table.before.coding.codebook.max_weight() > 1 {
+        if table.before.emission.coding().codebook.max_weight() > 1 {
             return table.refuse(
                 "fires once per shot, but a coded shot has several marks: use \
                  [detector.geiger], [detector.linear] or [detector.photon-counting], or leave \

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::Sensitivity;
 use crate::design::budget::Budget;
 use crate::design::limits::Check;
-use crate::design::{Coding, Error, Light, Scan};
+use crate::design::{Emission, Error, Light, Readout, Scan};
 
 /// The most dark counts, or declared background counts, per second.
 pub(super) const MOST_COUNTS: f64 = 1e12;
@@ -30,7 +30,8 @@ pub(in crate::design) struct SensitivityFile {
 pub(in crate::design) struct Before<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
-    pub coding: &'a Coding,
+    pub emission: &'a Emission,
+    pub readout: &'a Readout,
     pub budget: Option<&'a Budget>,
 }
 
@@ -121,8 +122,8 @@ impl Table<'_> {
 
     /// What is detected per mark of the budget: of a white target at the rated range in clear air.
     pub(super) fn honest(&self, budget: &Budget) -> Sensitivity {
-        let Before { scan, coding, .. } = self.before;
-        let energy = budget.energy / coding.codebook.mean_weight();
+        let Before { scan, emission, .. } = self.before;
+        let energy = budget.energy / emission.mean_pulses();
         let range = scan.rated_range;
         let photons = budget.photons(energy, 1.0, range) * budget.efficiency;
         Sensitivity { photons, range, reflectance: 1.0 }

@@ -23,7 +23,7 @@ struct Shot {
 }
 
 fn shots(design: &Design) -> Vec<Shot> {
-    let (scan, coding) = (&design.scan, &design.coding);
+    let (scan, coding) = (&design.scan, design.emission.coding());
     let book = &coding.codebook;
     let words = coding.first_word..coding.first_word + coding.word_modulus;
     let marks = |label: u16| words.clone().map(|word| book.marks(label, word as u16).len()).max();
@@ -206,9 +206,9 @@ fn brute(design: &Design, condition: Condition, only: Option<&[f64]>) -> [f64; 4
 }
 
 fn found(design: &Design, condition: Condition) -> [f64; 4] {
-    let Design { scan, light, coding, .. } = design;
+    let Design { scan, light, emission, .. } = design;
     let class = Class1::at(light.wavelength).unwrap();
-    let sender = Sender { scan, light, coding, condition, count_groups: true };
+    let sender = Sender { scan, light, emission, condition, count_groups: true };
     let limits = limits(&class, &exposure(&class, &sender));
     [Rule::Group, Rule::Scan, Rule::Repeated, Rule::Average].map(|rule| {
         let limit = limits.iter().find(|limit| limit.rule == rule);

@@ -9,7 +9,7 @@ use super::scattered::Scattered;
 use super::share::Share;
 use super::worst::worst;
 use crate::design::budget::solid_angle;
-use crate::design::{Coding, Light, Scan};
+use crate::design::{Coding, Emission, Light, Scan};
 use crate::units::s_from_fs;
 
 /// What is sent in a scan, as eye safety counts it.
@@ -27,7 +27,7 @@ pub(crate) enum Beams {
 pub(in crate::design) struct Sender<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
-    pub coding: &'a Coding,
+    pub emission: &'a Emission,
     /// Where the eye is, and what it looks through.
     pub condition: Condition,
     /// Whether groups of shots that cross the eye count as repeated exposures.
@@ -36,9 +36,8 @@ pub(in crate::design) struct Sender<'a> {
 
 /// What `sender` sends to an eye, where that sees most of it.
 pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
-    let Sender { scan, light, coding, .. } = sender;
-    let chips = i64::from(coding.codebook.chips());
-    let energies = Energies::of(scan, coding);
+    let Sender { scan, light, emission, .. } = sender;
+    let energies = Energies::of(scan, emission.coding());
     let Condition { distance, widened } = sender.condition;
     let wide = |one: Opening| Opening { diameter: widened * one.diameter, ..one };
     let openings: Vec<Opening> = class.openings().into_iter().map(wide).collect();
@@ -48,11 +47,12 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
     let mut exposure = Exposure {
         distance,
         scan_period: scan.period(),
-        shot: light.pulse.max(s_from_fs(chips * coding.chip_fs)),
+        shot: light.pulse.max(s_from_fs(emission.length_fs())),
         mark: light.pulse,
         brightest_shot: passed * energies.most(),
-        brightest_mark: passed / coding.codebook.mean_weight(),
+        brightest_mark: passed / emission.mean_pulses(),
         count_groups: sender.count_groups,
+        counted_as_one: emission.share_within(class.counted_as_one()),
         places: Vec::new(),
     };
     let beams = scan.model().beams();
@@ -66,7 +66,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
                 // A flash has no shot alone.
                 if exposure.places.is_empty() {
                     exposure.brightest_shot = flash.energy;
-                    exposure.brightest_mark = flash.share / coding.codebook.mean_weight();
+                    exposure.brightest_mark = flash.share / emission.mean_pulses();
                 }
                 vec![vec![flash]]
             }

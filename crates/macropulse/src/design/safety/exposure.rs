@@ -44,6 +44,8 @@ pub struct Exposure {
     pub brightest_shot: f64,
     /// The same of one mark.
     pub brightest_mark: f64,
+    /// The largest share of a shot's energy within T_i.
+    pub counted_as_one: f64,
     /// Whether groups of shots that cross the eye count as repeated exposures, which brings in C5.
     pub count_groups: bool,
     /// The shots that cross the eye, by aperture and where the eye is.
@@ -242,14 +244,17 @@ impl<'a> Train<'a> {
         if longest > self.exposure.scan_period || !self.judges(longest) {
             return None;
         }
-        let groups = self.groups(longest) as f64 * LONGEST / self.exposure.scan_period;
+        let together = longest.max(self.exposure.shot);
+        let groups = self.groups(together) as f64 * (together / longest) * LONGEST
+            / self.exposure.scan_period;
         let counts = self.exposure.count_groups;
         let factor = if counts { self.class.c5(groups.ceil()) } else { 1.0 };
         let runs = self.runs(longest);
         let brightest = runs.max_by(|a, b| self.sum(*a)[1].total_cmp(&self.sum(*b)[1]));
         brightest.map(|run| {
             // The duration is for people to read: the limit is that of T_i.
-            let limit = self.limit(Rule::Group, self.sum(run), (longest, factor));
+            let sum = self.sum(run).map(|sum| sum * self.exposure.counted_as_one);
+            let limit = self.limit(Rule::Group, sum, (longest, factor));
             Limit { duration: self.duration(run), ..limit }
         })
     }
@@ -368,6 +373,7 @@ mod tests {
                 mark: 1e-9,
                 brightest_shot: 1.0,
                 brightest_mark: 1.0,
+                counted_as_one: 1.0,
                 count_groups,
                 places: vec![Crossings { durations: [0.0, f64::INFINITY], shots }],
             },

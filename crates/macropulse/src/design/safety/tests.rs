@@ -10,10 +10,10 @@ fn open(name: &str, set: &[(&str, &str)]) -> Design {
 }
 
 fn of(design: &Design, count_groups: bool) -> Vec<Limit> {
-    let Design { scan, light, coding, .. } = design;
+    let Design { scan, light, emission, .. } = design;
     let class = Class1::at(light.wavelength).unwrap();
     let condition = Condition::bare_eye(0.1);
-    let sender = Sender { scan, light, coding, condition, count_groups };
+    let sender = Sender { scan, light, emission, condition, count_groups };
     limits(&class, &exposure(&class, &sender))
 }
 

@@ -142,9 +142,11 @@ impl Unmodelled {
                 ))
             }
             Self::Afterpulsing => match design.detector {
+                // Histograms follow it.
+                _ if design.readout.histogram().is_some() => None,
                 Detector::PhotonCounting(_) | Detector::Geiger(_) => Some(format!(
                     "each per cent of it adds {} false detections to the marks of a shot",
-                    rounded(0.01 * design.coding.codebook.mean_weight())
+                    rounded(0.01 * design.emission.coding().codebook.mean_weight())
                 )),
                 _ => None,
             },

@@ -57,7 +57,7 @@ impl<'a> Sized<'a> {
     /// detector, √(π/(4·ln 2)) of its full width for a Gaussian.
     pub fn air_reach(&self) -> Option<f64> {
         let design = self.design;
-        let tick = s_from_fs(design.tdc.tick_fs);
+        let tick = s_from_fs(design.clock.tick_fs);
         let width = design.detector.model().response().max(design.light.pulse).max(tick);
         let depth = SPEED_OF_LIGHT / 2.0 * width * (PI / (4.0 * LN_2)).sqrt();
         let reflectance = PI * self.backscatter * depth;
@@ -183,7 +183,7 @@ mod tests {
             let model = design.detector.model();
             let threshold = model.noise(operating.background).unwrap().threshold;
             let budget = design.budget.as_ref().unwrap();
-            let energy = budget.energy / design.coding.codebook.mean_weight().max(1.0);
+            let energy = budget.energy / design.emission.mean_pulses().max(1.0);
             assert_relative_eq!(energy, beam, max_relative = 0.1);
             let extinction = 3.912 / 50.0;
             let (mut sum, step) = (0.0, 1e-3);

@@ -1,0 +1,77 @@
+//! What a receiver is given beside its shot log.
+
+use crate::{Histograms, Samples, Ticks};
+
+/// Declares the kinds of record: variant, type, name.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $Kind:ident, $name:literal;)+) => {
+        /// A kind of record.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum RecordKind {
+            $($(#[$doc])* $Kind,)+
+        }
+
+        impl RecordKind {
+            /// Its name in the plural, as in files, formats and messages.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$Kind => $name,)+ }
+            }
+        }
+
+        /// What a receiver is given beside its shot log.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Record<'a> {
+            $($(#[$doc])* $Kind(&'a $Kind),)+
+        }
+
+        impl Record<'_> {
+            /// Which kind of record it is.
+            pub fn kind(&self) -> RecordKind {
+                match self { $(Self::$Kind(_) => RecordKind::$Kind,)+ }
+            }
+        }
+
+        /// The same, owned.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Given {
+            $($(#[$doc])* $Kind($Kind),)+
+        }
+
+        impl<'a> From<&'a Given> for Record<'a> {
+            fn from(given: &'a Given) -> Self {
+                match given { $(Given::$Kind(record) => Self::$Kind(record),)+ }
+            }
+        }
+
+        $(impl<'a> From<&'a $Kind> for Record<'a> {
+            fn from(record: &'a $Kind) -> Self {
+                Self::$Kind(record)
+            }
+        })+
+    };
+}
+
+kinds! {
+    /// Of time-to-digital converters.
+    Ticks, "ticks";
+    /// Of analogue-to-digital converters.
+    Samples, "samples";
+    /// Of counters, added up over the pulses of a burst.
+    Histograms, "histograms";
+}
+
+impl Given {
+    /// How many ticks there are, or samples of all channels, or bins of all histograms.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Ticks(ticks) => ticks.len(),
+            Self::Samples(samples) => samples.code.len(),
+            Self::Histograms(histograms) => histograms.counts.len(),
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}

@@ -1,0 +1,111 @@
+//! What a shot sends: a macropulse, or a burst of equal pulses, `[burst]`.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::limits::Check;
+use super::{Clock, Coding, Error};
+use crate::units::fs_from_s;
+
+/// What a shot sends.
+#[derive(Debug, Clone)]
+pub enum Emission {
+    /// One macropulse: the pulses ("marks") of a code word, a single one where shots are not coded.
+    Marks(Coding),
+    /// A single pulse again and again.
+    Burst(Burst),
+}
+
+/// Equal pulses at a fixed interval.
+#[derive(Debug, Clone)]
+pub struct Burst {
+    /// The pulse, as a code word of one mark.
+    pub pulse: Coding,
+    /// Pulses of a shot.
+    pub pulses: u32,
+    /// Time from pulse to pulse, fs: a whole number of ticks.
+    pub interval_fs: i64,
+}
+
+impl Emission {
+    /// The code words, or the single pulse, that are sent once or repeatedly.
+    pub fn coding(&self) -> &Coding {
+        match self {
+            Self::Marks(coding) => coding,
+            Self::Burst(burst) => &burst.pulse,
+        }
+    }
+
+    /// The burst, if it is one.
+    pub fn burst(&self) -> Option<&Burst> {
+        match self {
+            Self::Marks(_) => None,
+            Self::Burst(burst) => Some(burst),
+        }
+    }
+
+    /// Whether shots carry a code.
+    pub fn is_coded(&self) -> bool {
+        self.coding().label.is_some()
+    }
+
+    /// Time from the beginning of a shot's first chip to the end of its last one, fs.
+    pub fn length_fs(&self) -> i64 {
+        let coding = self.coding();
+        let word = i64::from(coding.codebook.chips()) * coding.chip_fs;
+        let repeated =
+            self.burst().map_or(0, |burst| i64::from(burst.pulses - 1) * burst.interval_fs);
+        repeated + word
+    }
+
+    /// Moments at which shots are fired are multiples of this, fs.
+    pub fn grid_fs(&self) -> i64 {
+        self.coding().chip_fs
+    }
+
+    /// Pulses of a shot, the mean over its labels and words.
+    pub fn mean_pulses(&self) -> f64 {
+        let repeats = self.burst().map_or(1, |burst| burst.pulses);
+        self.coding().codebook.mean_weight() * f64::from(repeats)
+    }
+
+    /// The largest share of a shot's energy that is sent within `seconds`, taking all of its marks
+    /// together: 1 of a macropulse.
+    pub fn share_within(&self, seconds: f64) -> f64 {
+        self.burst().map_or(1.0, |burst| {
+            let within = fs_from_s(seconds) / burst.interval_fs + 1;
+            (within as f64 / f64::from(burst.pulses)).min(1.0)
+        })
+    }
+}
+
+/// `[burst]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BurstFile {
+    /// Pulses of a shot.
+    #[schemars(range(min = 1, max = 16777216))]
+    pulses: u32,
+    /// Time from pulse to pulse, ns: a whole number of ticks.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    interval_ns: f64,
+}
+
+impl Check<'_> {
+    /// The burst of `pulse`.
+    pub(super) fn burst(
+        &self,
+        file: &BurstFile,
+        pulse: Coding,
+        clock: Clock,
+    ) -> Result<Burst, Error> {
+        let key = "burst.interval_ns";
+        let interval_fs =
+            self.whole_fs(key, self.within(key, file.interval_ns, 1e-3, 1e6)? * 1e3)?;
+        if interval_fs % clock.tick_fs != 0 {
+            return self.refuse(key, "must be a whole number of ticks, of which a bin is one");
+        }
+        let pulses = self.count("burst.pulses", file.pulses, 1, 1 << 24)?;
+        Ok(Burst { pulse, pulses, interval_fs })
+    }
+}

@@ -1,0 +1,189 @@
+//! What a sensor records, and the clock by which it does: `[tdc]`.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::limits::Check;
+use super::{Error, Scan};
+use crate::units::fs_from_s;
+
+/// `[tdc]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TdcFile {
+    /// Converters of the whole bank, divided evenly among the detectors: one for each at least.
+    #[schemars(range(min = 1, max = 16777216))]
+    converters: u32,
+    /// Length of a tick, ps: a whole number of femtoseconds.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    resolution_ps: Option<f64>,
+    /// Period of the coarse counter, ps: a whole number of ticks.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    clock_ps: f64,
+    /// Bits of the fine counter, which must hold the ticks of one period.
+    #[schemars(range(min = 1, max = 16))]
+    bits: u32,
+    /// Time for which a converter is busy with an event, ns.
+    #[schemars(range(min = 0, max = 1e6))]
+    dead_time_ns: f64,
+}
+
+/// The clock of a sensor, in whose ticks its receiver counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Clock {
+    /// Length of a tick, fs: the resolution of a time-to-digital converter, or the time from sample to
+    /// sample.
+    pub tick_fs: i64,
+    /// Period of the counter of whole clock ticks, fs: a whole number of ticks.
+    pub period_fs: i64,
+}
+
+/// What stands behind the detectors and makes the record that the receiver is given.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Readout {
+    /// Time-to-digital converters (TDC): the ticks of detection events.
+    Tdc(Tdc),
+    /// An analogue-to-digital converter (ADC) for each detector: samples of its signal.
+    Adc,
+    /// Counters for each detector, one for each bin of time since a pulse was sent: histograms.
+    Histogram(Histogram),
+}
+
+impl Readout {
+    /// The bank of time-to-digital converters, if it is one.
+    pub fn tdc(&self) -> Option<&Tdc> {
+        match self {
+            Self::Tdc(tdc) => Some(tdc),
+            Self::Adc | Self::Histogram(_) => None,
+        }
+    }
+
+    /// The histogram of each shot, if counts go into one.
+    pub fn histogram(&self) -> Option<Histogram> {
+        match self {
+            Self::Histogram(histogram) => Some(*histogram),
+            Self::Tdc(_) | Self::Adc => None,
+        }
+    }
+
+    /// The key that says how long a tick is.
+    pub(super) fn tick_key(&self) -> &'static str {
+        match self {
+            Self::Tdc(_) => "tdc.resolution_ps",
+            Self::Adc => "detector.sampled.sample_ps",
+            Self::Histogram(_) => "histogram.bin_ps",
+        }
+    }
+
+    /// Time, fs, for which its state depends on the events that it was given.
+    pub(super) fn memory_fs(&self) -> i64 {
+        self.tdc().map_or(0, Tdc::memory_fs)
+    }
+}
+
+/// The histogram of a shot. Its bins are ticks of the sensor's clock; the first begins with each pulse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Histogram {
+    /// Bins.
+    pub bins: u32,
+}
+
+/// A bank of time-to-digital converters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tdc {
+    /// Converters in the bank, for all detectors together.
+    pub converters: u32,
+    /// Time for which a converter is busy with one event, fs.
+    pub dead_fs: i64,
+}
+
+/// `[histogram]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HistogramFile {
+    /// Width of a bin, ps: a whole number of femtoseconds; the tick of this sensor.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    bin_ps: f64,
+    /// Bins, the first of which begins when a pulse is sent.
+    #[schemars(range(min = 1, max = 65536))]
+    bins: u32,
+}
+
+/// Converters start so many dead times before the first ticks of a band, as Geiger cells do.
+const DEAD_TIMES: i64 = 4;
+
+impl Tdc {
+    /// Ticks of `clock` for which a converter is busy with one event, rounded up.
+    pub fn dead_ticks(&self, clock: Clock) -> u32 {
+        u32::try_from((self.dead_fs + clock.tick_fs - 1) / clock.tick_fs).unwrap_or(u32::MAX)
+    }
+
+    /// The part of the bank that each of `channels` detectors has.
+    pub fn share(&self, channels: u32) -> Self {
+        Self { converters: self.converters / channels, ..*self }
+    }
+
+    /// Time, fs, for which the state of the bank depends on the events that it was given. All converters are
+    /// free in the beginning, which they are after each dead time in which few events come.
+    fn memory_fs(&self) -> i64 {
+        DEAD_TIMES * self.dead_fs
+    }
+}
+
+impl Check<'_> {
+    /// Clock and readout of a detector whose signal is sampled every `sample_ps` picoseconds.
+    pub(super) fn adc(&self, sample_ps: f64) -> Result<(Clock, Readout), Error> {
+        let tick_fs = self.whole_fs("detector.sampled.sample_ps", sample_ps)?;
+        Ok((Clock { tick_fs, period_fs: tick_fs }, Readout::Adc))
+    }
+
+    /// Clock and readout of a detector whose counts go into a histogram.
+    pub(super) fn histogram(&self, file: &HistogramFile) -> Result<(Clock, Readout), Error> {
+        let tick_fs = self.whole_fs("histogram.bin_ps", file.bin_ps)?;
+        let bins = self.count("histogram.bins", file.bins, 1, 65_536)?;
+        let clock = Clock { tick_fs, period_fs: tick_fs };
+        Ok((clock, Readout::Histogram(Histogram { bins })))
+    }
+
+    /// Clock and readout of a detector whose events are timed.
+    pub(super) fn tdc(&self, file: &TdcFile) -> Result<(Clock, Readout), Error> {
+        let Some(resolution) = file.resolution_ps else {
+            let message = "missing field `resolution_ps`";
+            return Err(self.chain.lacks("tdc.resolution_ps", message));
+        };
+        let tick_fs = self.whole_fs("tdc.resolution_ps", resolution)?;
+        let period_fs = self.whole_fs("tdc.clock_ps", file.clock_ps)?;
+        let bits = self.count("tdc.bits", file.bits, 1, 16)?;
+        if period_fs % tick_fs != 0 {
+            return self.refuse("tdc.clock_ps", "must be a whole number of ticks (resolution_ps)");
+        }
+        if period_fs / tick_fs > 1 << bits {
+            let message = format!(
+                "{bits} bits hold {} ticks, but a clock period has {}",
+                1 << bits,
+                period_fs / tick_fs
+            );
+            return self.refuse("tdc.bits", message);
+        }
+        let dead = self.within("tdc.dead_time_ns", file.dead_time_ns, 0.0, 1e6)?;
+        let tdc = Tdc {
+            converters: self.count("tdc.converters", file.converters, 1, 1 << 24)?,
+            dead_fs: fs_from_s(dead * 1e-9),
+        };
+        Ok((Clock { tick_fs, period_fs }, Readout::Tdc(tdc)))
+    }
+
+    /// Whether each detector of `scan` has a converter.
+    pub(super) fn share(&self, readout: &Readout, scan: &Scan) -> Result<(), Error> {
+        let Some(&Tdc { converters, .. }) = readout.tdc() else { return Ok(()) };
+        let channels = scan.channels();
+        if converters >= channels {
+            return Ok(());
+        }
+        let message = format!(
+            "is {converters}, but the bank is divided evenly among {channels} detectors: write \
+             {channels}, or more"
+        );
+        self.refuse("tdc.converters", message)
+    }
+}

@@ -1,0 +1,172 @@
+//! Photon counts of bursts, in histograms: SPAD cells behind a readout that adds up the cycles of a burst.
+//!
+//! 1. Each pulse of a burst begins a cycle. A count goes into the bin of the time since that pulse.
+//! 2. The light of a cycle is a rate: pulses of all paths, and what shines without pulses. A path of the
+//!    burst itself comes in every cycle but the first ⌊delay/interval⌋; light of other shots and of other
+//!    lidars comes in those cycles that it meets.
+//! 3. Cycles with the same light are drawn together ([`draw`]).
+//!
+//! The length of a pulse and the timing jitter spread the light over bins. So the order of two photons is
+//! that of their times behind the jitter; the light between two bins of a cycle is even over the bin.
+
+mod draw;
+
+use macropulse_codec::statistics::normal_tail;
+use macropulse_codec::{Histograms, ShotLog};
+
+use self::draw::Cells;
+use crate::channel::Light;
+use crate::design::detector::{Geiger, PLENTY};
+use crate::design::{Burst, Design, Histogram};
+use crate::random::{Chance, Stage};
+use crate::units::{FS_PER_S, RMS_OF_FWHM, s_from_fs};
+
+/// A pulse is followed to this many of its rms lengths: 2·10⁻⁹ of it lies beyond.
+const REACH: f64 = 6.0;
+
+/// SPAD cells and the histogram behind them, at work.
+#[derive(Debug)]
+pub(super) struct Accumulator {
+    geiger: Geiger,
+    cells: Cells,
+    burst: Burst,
+    histogram: Histogram,
+    bin_fs: i64,
+}
+
+/// Pulses that come at the same time in each of some cycles.
+#[derive(Debug, Clone, Copy)]
+struct Pulses {
+    /// First cycle and the one behind the last.
+    cycles: [i64; 2],
+    /// Middle of the pulse, fs since the beginning of the cycle.
+    middle_fs: f64,
+    /// rms length of the light and of the timing together, fs.
+    rms_fs: f64,
+    /// Detected photons of each.
+    photons: f64,
+}
+
+impl Accumulator {
+    pub fn new(geiger: &Geiger, (burst, histogram): (&Burst, Histogram), design: &Design) -> Self {
+        let bin_fs = design.clock.tick_fs;
+        let cells = Cells::new(geiger, burst.interval_fs, bin_fs, histogram.bins);
+        Self { geiger: *geiger, cells, burst: burst.clone(), histogram, bin_fs }
+    }
+
+    /// The histograms of the owned shots of `log`, in their order.
+    pub fn histograms(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Histograms {
+        let mut counts = Vec::with_capacity(log.owned.len() * self.histogram.bins as usize);
+        let order = by_channel(light);
+        for shot in log.owned.clone() {
+            let pulses = self.pulses(&order, light, (log.channel[shot], log.fired_at_fs[shot]));
+            let steady = self.geiger.dark + light.background.steady;
+            let in_bin = steady * s_from_fs(self.bin_fs);
+            let mut stream = chance.at(Stage::Histogram, log.first + shot as u64);
+            let segments = segments(&pulses, self.burst.pulses);
+            let lit = segments.map(|(cycles, pulses)| (cycles, self.rates(&pulses, in_bin)));
+            self.cells.count(lit, in_bin, &mut stream, &mut counts);
+        }
+        Histograms {
+            bin_fs: self.bin_fs,
+            offset_fs: 0,
+            bins: self.histogram.bins,
+            cycles: vec![self.burst.pulses; log.owned.len()],
+            counts,
+        }
+    }
+
+    /// The pulses of all light that meets the cycles of a shot fired at `fired_fs`, as its `channel` sees it.
+    fn pulses(
+        &self,
+        order: &[(u16, i64, usize)],
+        light: &Light,
+        (channel, fired_fs): (u16, i64),
+    ) -> Vec<Pulses> {
+        let mut found = Vec::new();
+        let interval = self.burst.interval_fs;
+        let lasts = interval * i64::from(self.burst.pulses);
+        let from = order.partition_point(|(of, arrives, _)| {
+            (*of, *arrives) < (channel, fired_fs.saturating_sub(lasts))
+        });
+        let seen = order[from..].iter().take_while(|(of, arrives, _)| {
+            *of == channel && *arrives < fired_fs.saturating_add(lasts)
+        });
+        for &(_, _, train) in seen {
+            let trains = &light.trains;
+            let transmitter = trains.transmitter[train];
+            let pulse = light.transmitters[usize::from(transmitter)].pulse * RMS_OF_FWHM;
+            let repeats = if transmitter == 0 { i64::from(self.burst.pulses) } else { 1 };
+            for arrives_fs in light.arrivals_fs(train) {
+                let since = arrives_fs - fired_fs;
+                let first = since.div_euclid(interval);
+                found.push(Pulses {
+                    cycles: [first, first + repeats],
+                    middle_fs: since.rem_euclid(interval) as f64,
+                    rms_fs: libm::hypot(pulse, self.geiger.jitter) * FS_PER_S as f64,
+                    photons: trains.photons[train].min(PLENTY),
+                });
+            }
+        }
+        let all = i64::from(self.burst.pulses);
+        let spilled = found.clone();
+        for pulse in spilled {
+            // What reaches over the end of a cycle lies in the next one, and the other way round.
+            let (middle, reach) = (pulse.middle_fs, REACH * pulse.rms_fs);
+            for (cycles_on, over) in [(1, middle + reach > interval as f64), (-1, middle < reach)] {
+                if over {
+                    found.push(Pulses {
+                        cycles: pulse.cycles.map(|cycle| cycle + cycles_on),
+                        middle_fs: middle - (cycles_on * interval) as f64,
+                        ..pulse
+                    });
+                }
+            }
+        }
+        found.iter_mut().for_each(|pulse| pulse.cycles = pulse.cycles.map(|at| at.clamp(0, all)));
+        found.retain(|pulse| pulse.cycles[0] < pulse.cycles[1]);
+        found
+    }
+
+    /// Mean detections in each bin of a cycle with these `pulses` and `steady` ones in each bin.
+    fn rates(&self, pulses: &[Pulses], steady: f64) -> Vec<f64> {
+        let mut rates = vec![steady; self.cells.bins_of_cycle()];
+        for pulse in pulses {
+            let bin = self.bin_fs as f64;
+            let sigma = pulse.rms_fs.max(f64::MIN_POSITIVE);
+            let first = ((pulse.middle_fs - REACH * sigma) / bin).floor().max(0.0) as usize;
+            let last = ((pulse.middle_fs + REACH * sigma) / bin).floor().max(-1.0) as i64;
+            let end = usize::try_from(last + 1).unwrap_or(0).min(rates.len());
+            let above = |edge: usize| normal_tail((edge as f64 * bin - pulse.middle_fs) / sigma);
+            let mut beyond = above(first);
+            for (rate, edge) in rates.iter_mut().take(end).skip(first).zip(first + 1..) {
+                let next = above(edge);
+                *rate += pulse.photons * (beyond - next);
+                beyond = next;
+            }
+        }
+        rates
+    }
+}
+
+/// Channel, arrival and place of each pulse train, in this order.
+fn by_channel(light: &Light) -> Vec<(u16, i64, usize)> {
+    let trains = &light.trains;
+    let mut order: Vec<_> =
+        (0..trains.len()).map(|at| (trains.channel[at], trains.arrives_fs[at], at)).collect();
+    order.sort_unstable();
+    order
+}
+
+/// Runs of cycles in which the same of these `pulses` come: how many cycles, and the pulses.
+fn segments(pulses: &[Pulses], cycles: u32) -> impl Iterator<Item = (u32, Vec<Pulses>)> {
+    let mut edges: Vec<i64> = pulses.iter().flat_map(|pulse| pulse.cycles).collect();
+    edges.extend([0, i64::from(cycles)]);
+    edges.sort_unstable();
+    edges.dedup();
+    let runs: Vec<[i64; 2]> = edges.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+    runs.into_iter().map(move |[from, until]| {
+        let comes = |pulse: &&Pulses| pulse.cycles[0] <= from && until <= pulse.cycles[1];
+        ((until - from) as u32, pulses.iter().filter(comes).copied().collect())
+    })
+}
