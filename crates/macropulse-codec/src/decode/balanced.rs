@@ -29,8 +29,8 @@ const NEAR: i64 = 1024;
 
 /// Decodes one band.
 ///
-/// It looks beyond the end of the gate by the length of a macropulse: what stands there has
-/// sidelobes within the gate, and is told from them by being higher. Only then is it refused.
+/// It looks beyond the end of the gate by the length of a macropulse. An echo there has sidelobes
+/// within the gate. The echo is higher than its sidelobes, so it wins over them, and is then refused.
 pub(super) fn decode(
     receiver: &Receiver,
     correlation: &Correlation,

@@ -5,12 +5,13 @@
 pub(super) struct Energy {
     /// Mean number of photons detected per mark.
     pub photons: f32,
-    /// Whether it may be more: no mark was missed.
+    /// The true number may be larger, because no mark was missed.
     pub saturated: bool,
 }
 
 impl Energy {
-    /// Of `peak` of `marks` found where a share `density` of all places is lit anyway.
+    /// The energy of a return with `peak` of its `marks` found, where a share `density` of all places is
+    /// lit by chance.
     ///
     /// A share p = (k/N − d)/(1 − d) of the marks shows a photon at least in the `window` they are
     /// looked for in, which holds a share c of what they make. Where each makes one event, p/c of them
@@ -30,7 +31,7 @@ impl Energy {
     }
 }
 
-/// Where the events of a mark are looked for.
+/// The window in which the events of a mark are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Window {
     /// Share of them that come there.

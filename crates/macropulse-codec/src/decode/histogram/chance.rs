@@ -9,7 +9,7 @@ use crate::statistics::normal_quantile;
 /// Halvings of the interval in which the likeliest share of a pulse lies.
 const HALVINGS: usize = 48;
 
-/// What speaks for a pulse at one lag, beside a model without it.
+/// The evidence for a pulse at one lag, against a model without it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Chance {
     /// The photons of greatest likelihood.

@@ -1,4 +1,4 @@
-//! What the receiver of histograms must be given; all else is refused before it is looked at.
+//! Checks of settings, shot log and histograms before the receiver decodes them.
 
 use super::pile_up::PileUp;
 use super::pulse::{Kernel, Pulse, is_length};

@@ -30,7 +30,8 @@ use search::Search;
 pub struct HistogramMethod {
     /// How photons that the detector missed behind others are made up for.
     pub pile_up: PileUp,
-    /// Cells of a detector, each of which counts one photon per laser pulse where pile-up is corrected.
+    /// Number of cells of the detector. Coates' correction takes each to count one photon per laser pulse at
+    /// most.
     pub cells: u32,
     /// The emitted pulse as the detector responds to it.
     pub pulse: Pulse,
@@ -159,7 +160,7 @@ pub(super) fn decode_band(
     Ok(returns)
 }
 
-/// First photons that a detector could have counted in so many laser pulses.
+/// The most photons that a detector can count in `cycles` laser pulses if each cell stops at its first one.
 fn trials(receiver: &HistogramReceiver, cycles: u32) -> u32 {
     cycles.saturating_mul(receiver.method.cells)
 }

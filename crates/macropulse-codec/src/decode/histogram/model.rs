@@ -1,4 +1,4 @@
-//! What a histogram is described by: an even background and pulses, fitted by maximum likelihood.
+//! The model of a histogram: an even background and pulses, fitted by maximum likelihood.
 
 use libm::log1p;
 
@@ -23,7 +23,7 @@ const FAINTEST: f64 = 1e-6;
 /// A pulse of light in a histogram.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Light {
-    /// Where its kernel begins, in steps of a bin from the first bin on.
+    /// The beginning of its kernel, in steps of a bin from the first bin on.
     pub step: i64,
     /// The same in bins, to a fraction of a step.
     pub lag: f64,
@@ -155,7 +155,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// What is expected without the light of one pulse.
+    /// The mean counts without the light of one pulse.
     fn without(&self, at: usize) -> Vec<f64> {
         let light = self.lights[at];
         let mut rest = self.expected.clone();

@@ -34,7 +34,7 @@ pub fn coates(counts: &[u32], cycles: u32) -> Vec<f64> {
 pub(super) struct Exposed {
     pub count: Vec<f64>,
     pub exposure: Vec<f64>,
-    /// Whether every cycle was counted before the last bin.
+    /// True if every cycle had its count before the last bin.
     pub is_exhausted: bool,
 }
 
