@@ -177,7 +177,23 @@ kinds! {
     Histogram, Self::Histogram(_) => "histogram", MOST_RETURNS;
 }
 
+impl ReceiverKind {
+    /// The kind of record that it decodes.
+    pub fn record(self) -> RecordKind {
+        match self {
+            Self::Sampled => RecordKind::Samples,
+            Self::Histogram => RecordKind::Histograms,
+            _ => RecordKind::Ticks,
+        }
+    }
+}
+
 impl Method {
+    /// The kind of record that it decodes.
+    fn record(&self) -> RecordKind {
+        self.kind().record()
+    }
+
     /// Settings of its correlation, if it correlates ticks.
     pub fn correlation(&self) -> Option<&Correlation> {
         match self {
@@ -191,15 +207,6 @@ impl Method {
         match self {
             Self::Sampled(Sampled { sampling, .. }) => Some(sampling),
             _ => None,
-        }
-    }
-
-    /// The kind of record that it decodes.
-    pub fn record(&self) -> RecordKind {
-        match self {
-            Self::Sampled(_) => RecordKind::Samples,
-            Self::Histogram(_) => RecordKind::Histograms,
-            _ => RecordKind::Ticks,
         }
     }
 

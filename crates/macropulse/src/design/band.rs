@@ -20,15 +20,10 @@ pub(super) const TOO_FINE: &str = "is too fine for so long a range gate: three g
      use longer ticks, a shorter max_range_m or a shorter dead time";
 
 impl Design {
-    /// Length of a macropulse, fs.
-    pub fn macropulse_fs(&self) -> i64 {
-        self.emission.length_fs()
-    }
-
     /// How long the receiver listens to a shot, from its firing on, fs: to the end of a macropulse
     /// that begins at the end of the range gate.
     pub fn listening_fs(&self) -> i64 {
-        fs_from_s(tof_from_range(self.scan.max_range)) + self.macropulse_fs()
+        fs_from_s(tof_from_range(self.scan.max_range)) + self.emission.length_fs()
     }
 
     /// From the firing of a shot to the last of its light that is followed, fs: for the clock that
@@ -36,7 +31,7 @@ impl Design {
     pub fn light_fs(&self) -> i64 {
         let offsets = self.scan.model().range_offsets().iter();
         let early = offsets.map(|offset| -offset).fold(0.0, f64::max);
-        fs_from_s(tof_from_range(self.scan.light_range + early)) + self.macropulse_fs()
+        fs_from_s(tof_from_range(self.scan.light_range + early)) + self.emission.length_fs()
     }
 
     /// How a band is cut out of a stream of shots and ticks. Before its first owned shot light must be

@@ -1,5 +1,6 @@
 //! What a sensor records, and the clock by which it does: `[tdc]`.
 
+use macropulse_codec::RecordKind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -63,6 +64,15 @@ impl Readout {
         match self {
             Self::Histogram(histogram) => Some(*histogram),
             Self::Tdc(_) | Self::Adc => None,
+        }
+    }
+
+    /// The kind of record that it makes.
+    pub fn records(&self) -> RecordKind {
+        match self {
+            Self::Tdc(_) => RecordKind::Ticks,
+            Self::Adc => RecordKind::Samples,
+            Self::Histogram(_) => RecordKind::Histograms,
         }
     }
 

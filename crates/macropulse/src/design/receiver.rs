@@ -7,6 +7,7 @@ use super::detector::{Arming, DetectorFile, Geiger, Sampled};
 use super::limits::Check;
 use super::{Clock, Coding, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+use macropulse_codec::RecordKind;
 use macropulse_codec::decode::histogram::{PileUp, Pulse};
 use macropulse_codec::decode::{
     self, Bitwise, Correlation, Effort, HistogramMethod, MOST_RETURNS, Method, Opening, Pick,
@@ -117,12 +118,7 @@ impl Check<'_> {
         let &Inputs { detector, scan, clock, readout, emission, .. } = inputs;
         let coding = emission.coding();
         let kind = file.kind;
-        let fits = match readout {
-            Readout::Adc => kind == ReceiverKind::Sampled,
-            Readout::Histogram(_) => kind == ReceiverKind::Histogram,
-            Readout::Tdc(_) => !matches!(kind, ReceiverKind::Sampled | ReceiverKind::Histogram),
-        };
-        if !fits {
+        if kind.record() != readout.records() {
             return self.refuse(
                 "receiver.kind",
                 "`sampled` is for [detector.sampled], `histogram` for a [histogram], the other receivers \
@@ -130,7 +126,7 @@ impl Check<'_> {
             );
         }
         let is_coded = coding.label.is_some();
-        if readout.tdc().is_some() && (kind == ReceiverKind::Direct) == is_coded {
+        if readout.records() == RecordKind::Ticks && (kind == ReceiverKind::Direct) == is_coded {
             return self.refuse(
                 "receiver.kind",
                 "`direct` is for shots without [code], the other receivers for shots with it",

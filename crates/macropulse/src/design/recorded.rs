@@ -5,7 +5,7 @@ use macropulse_codec::files::{Digest, HistogramHeader, Limits, SampleHeader};
 use macropulse_codec::{Record, RecordKind, ShotLog};
 
 use super::detector::Detector;
-use super::{Design, Histogram, Readout};
+use super::{Design, Histogram};
 
 /// Shots of a scan whose places and times go into the digest.
 const SAMPLES: u64 = 256;
@@ -25,11 +25,7 @@ impl Design {
 
     /// What its receiver is given beside the shot log.
     pub fn records(&self) -> RecordKind {
-        match self.readout {
-            Readout::Tdc(_) => RecordKind::Ticks,
-            Readout::Adc => RecordKind::Samples,
-            Readout::Histogram(_) => RecordKind::Histograms,
-        }
+        self.readout.records()
     }
 
     /// The part of the `log` of a band that its receiver is given with the record: the shots all of whose light is in

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use macropulse_codec::RecordKind;
 use macropulse_codec::decode::{self, Method};
 
 use super::converters::bank_loss;
@@ -420,7 +421,11 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
     let method = &design.receiver.method;
     if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
         let what = format!("the receiver `{}`", method.kind().name());
-        return Some((what, "simulate it, or --set receiver.kind='\"matched\"'".to_owned()));
+        let remedy = match method.kind().record() {
+            RecordKind::Ticks => "simulate it, or --set receiver.kind='\"matched\"'",
+            RecordKind::Samples | RecordKind::Histograms => "simulate it",
+        };
+        return Some((what, remedy.to_owned()));
     }
     if let Detector::Sampled(detector) = &design.detector {
         if design.emission.coding().codebook.max_weight() > sampled::MOST_MARKS {

@@ -17,11 +17,10 @@ use super::limits::Check;
 use super::readout::{HistogramFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::{Budget, Clock, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
+use super::{Clock, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
 use crate::names::nearest;
 use crate::schema::{self, Fault, Misfit};
 use crate::units::{RMS_OF_FWHM, fs_from_s, range_from_tof, s_from_fs, tof_from_range};
-use macropulse_codec::decode::Receiver;
 
 /// A sensor file as typed: keys with units, nothing checked yet but names and types.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -85,44 +84,10 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
         return Err(chain.error("name", "is empty; name the sensor, as \"mine\""));
     }
     let mut faults = Faults::default();
-    let Some(parts) = parts(&Check { chain }, &file, &mut faults) else {
+    let check = Check { chain };
+    let Some(mut design) = of_sections(&check, file, &mut faults) else {
         return Err(faults.into_error(chain));
     };
-    let idle = effectless::idle_keys(&file, &parts.idealised);
-    let Parts {
-        idealised,
-        scan,
-        clock,
-        readout,
-        emission,
-        light,
-        budget,
-        detector,
-        receiver,
-        right_within,
-    } = parts;
-    // What has no effect belongs neither to the sensor nor to its digest.
-    let said = chain.clone().without(&idle);
-    let warnings = scan.model().notes().to_vec();
-    let mut design = Design {
-        name: file.name,
-        summary: file.summary,
-        scan,
-        light,
-        emission,
-        budget,
-        detector,
-        clock,
-        readout,
-        receiver,
-        right_within,
-        idealised,
-        defaults: said.defaults_used(),
-        warnings,
-        text: said.text(),
-        directions: OnceLock::new(),
-    };
-    let check = Check { chain };
     if faults.keep(check.clock(&design)).is_some() {
         faults.keep(check.work(&design));
     }
@@ -131,23 +96,11 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     if faults.is_empty() { Ok(design) } else { Err(faults.into_error(chain)) }
 }
 
-/// What the sections of a sensor file say, each checked.
-struct Parts {
-    idealised: Vec<Effect>,
-    scan: Scan,
-    clock: Clock,
-    readout: Readout,
-    emission: Emission,
-    light: Light,
-    budget: Option<Budget>,
-    detector: Detector,
-    receiver: Receiver,
-    right_within: f64,
-}
-
-/// Checks section by section; `None` if something is wrong, and then all that is, as far as it does
-/// not follow from what was wrong before, is in `faults`.
-fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts> {
+/// A sensor each section of which is right; what they ask of each other is checked behind it. `None` if
+/// something is wrong, and then all that is, as far as it does not follow from what was wrong before, is in
+/// `faults`.
+fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<Design> {
+    let file = &typed;
     let effects = faults.keep(check.effects(&file.idealised));
     let off = |effect| effects.as_ref().is_some_and(|effects| effects.contains(&effect));
     // Of a list that cannot be read nothing follows for the motion of the beam.
@@ -187,12 +140,12 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     let before =
         budget::Parts { scan: &scan, light: &light, emission: &emission, idealised: &idealised };
     let efficiency = Efficiency::of(&file.detector);
-    let typed = BudgetFile {
+    let of_budget = BudgetFile {
         optics: file.optics.as_ref(),
         safety: file.safety.as_ref(),
         energy: file.light.energy,
     };
-    let budget = faults.keep(check.budget(&typed, &before, &efficiency));
+    let budget = faults.keep(check.budget(&of_budget, &before, &efficiency));
     let before = Before {
         scan: &scan,
         light: &light,
@@ -229,17 +182,26 @@ fn parts(check: &Check, file: &SensorFile, faults: &mut Faults) -> Option<Parts>
     }
     let (budget, detector, receiver) = (budget?, detector?, receiver?);
     let right_within = right_within?.unwrap_or_else(|| resolved(&detector, &light, clock));
-    Some(Parts {
-        idealised,
+    // What has no effect belongs neither to the sensor nor to its digest.
+    let said = check.chain.clone().without(&effectless::idle_keys(file, &idealised));
+    let warnings = scan.model().notes().to_vec();
+    Some(Design {
+        name: typed.name,
+        summary: typed.summary,
         scan,
-        clock,
-        readout,
-        emission,
         light,
+        emission,
         budget,
         detector,
+        clock,
+        readout,
         receiver,
         right_within,
+        idealised,
+        defaults: said.defaults_used(),
+        warnings,
+        text: said.text(),
+        directions: OnceLock::new(),
     })
 }
 

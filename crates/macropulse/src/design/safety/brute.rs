@@ -140,7 +140,7 @@ fn brute(design: &Design, condition: Condition, only: Option<&[f64]>) -> [f64; 4
     let Design { scan, light, .. } = design;
     let class = Class1::at(light.wavelength).unwrap();
     let all = shots(design);
-    let lasts = light.pulse.max(design.macropulse_fs() as f64 * 1e-15);
+    let lasts = light.pulse.max(design.emission.length_fs() as f64 * 1e-15);
     let distance = condition.distance;
     let beam = (light.beam_diameter + light.divergence * distance) / 2.0;
     let mut least = [f64::INFINITY; 4];
