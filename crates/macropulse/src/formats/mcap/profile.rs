@@ -5,6 +5,7 @@ use super::super::holding::Holding;
 use super::super::number::Kind;
 use super::{Profile, times_from_ns};
 use crate::points::{Image, Pick, PointCloud};
+use std::f64::consts::TAU;
 
 /// A field of a point.
 pub(super) struct Field {
@@ -27,7 +28,7 @@ pub(super) enum Quantity {
     /// The same, whole, 255 at most, in one byte or two.
     PercentU1,
     PercentU2,
-    /// Apparent reflectance, white 150.
+    /// Apparent reflectance, white 150, whole, 255 at most, as a float.
     Livox150,
     /// Time since the stamp, s.
     SecondsF4,
@@ -41,11 +42,12 @@ pub(super) enum Quantity {
     LineU1,
     /// The laser, counted from the lowest one.
     RingFromBelow,
-    /// Bits 5 and 4 are the number of the return, from 0.
+    /// Bits 5 and 4 are the number of the return. The nearest surface has 1: return 0 is the light that
+    /// the optics of the sensor itself send back.
     LivoxTag,
     /// Autoware's number for the kind of return.
     ReturnType,
-    /// atan2(y, x), rad.
+    /// atan2(−y, x), from 0 to 2π: to the right, as heads turn, rad.
     Azimuth,
     /// Angle above the x-y plane, rad.
     Elevation,
@@ -191,14 +193,14 @@ impl Quantity {
             Self::Percent => (Attribute::Intensity, Partly("in percent")),
             Self::PercentTo255 => (Attribute::Intensity, Partly("in percent, 255 at most")),
             Self::PercentU1 => (Attribute::Intensity, Partly("whole percent, 255 at most")),
-            Self::Livox150 => (Attribute::Intensity, Partly("white is 150, 255 at most")),
+            Self::Livox150 => (Attribute::Intensity, Partly("whole, white is 150, 255 at most")),
             Self::SecondsF4 => (Attribute::TimeNs, Partly("s from the stamp, float")),
             Self::NanosU4 => (Attribute::TimeNs, Partly("whole ns from the stamp")),
             Self::NanosF8 => (Attribute::TimeNs, Partly("ns from the epoch")),
             Self::MillimetresU4 => (Attribute::Range, Partly("whole mm")),
             Self::LineU1 => (Attribute::Ring, Partly("255 at most")),
             Self::RingFromBelow => (Attribute::Ring, Partly("from the lowest one up")),
-            Self::LivoxTag => (Attribute::ReturnNumber, Partly("up to 4")),
+            Self::LivoxTag => (Attribute::ReturnNumber, Partly("up to 3")),
             Self::PercentU2 | Self::ReturnType => return None,
             Self::Azimuth | Self::Elevation | Self::ZeroU2 => return None,
         })
@@ -239,7 +241,7 @@ impl<'a> Source<'a> {
             Quantity::PercentU1 => Value::U1(whole(percent(), 255.0) as u8),
             Quantity::PercentU2 => Value::U2(whole(percent(), 255.0) as u16),
             Quantity::Livox150 => {
-                Value::F4((number(Attribute::Intensity) * 150.0).clamp(0.0, 255.0) as f32)
+                Value::F4(whole(number(Attribute::Intensity) * 150.0, 255.0) as f32)
             }
             Quantity::SecondsF4 => Value::F4((since() * 1e-9) as f32),
             Quantity::NanosU4 => Value::U4(whole(since(), f64::from(u32::MAX)) as u32),
@@ -255,12 +257,14 @@ impl<'a> Source<'a> {
                 Value::U2(self.lowest.saturating_sub(number(Attribute::Ring) as u16))
             }
             Quantity::LivoxTag => {
-                let before = (number(Attribute::ReturnNumber) - 1.0).clamp(0.0, 3.0);
-                Value::U1((before as u8) << 4)
+                Value::U1((whole(number(Attribute::ReturnNumber), 3.0) as u8) << 4)
             }
             Quantity::ReturnType => Value::U1(self.return_type(point)),
             Quantity::Azimuth => {
-                Value::F4(libm::atan2(number(Attribute::Y), number(Attribute::X)) as f32)
+                let to_the_right = libm::atan2(-number(Attribute::Y), number(Attribute::X));
+                let turned = if to_the_right < 0.0 { to_the_right + TAU } else { to_the_right };
+                // Rounded to a 32-bit float, an angle just below a whole turn is one.
+                Value::F4(if turned as f32 >= TAU as f32 { 0.0 } else { turned as f32 })
             }
             Quantity::Elevation => {
                 let level = libm::hypot(number(Attribute::X), number(Attribute::Y));
@@ -378,7 +382,47 @@ mod tests {
         let value = |quantity, at| source.value(quantity, Point::Return(at));
         let kinds = [0, 1, 2].map(|at| value(Quantity::ReturnType, at));
         assert_eq!(kinds, [Value::U1(3), Value::U1(6), Value::U1(7)]);
-        assert_eq!(value(Quantity::LivoxTag, 1), Value::U1(0x10));
+    }
+
+    /// The first surface is return 1 to Livox, and programs that keep the nearest return keep 0 and 1.
+    #[test]
+    fn livox_counts_returns_from_the_light_of_its_own_optics() {
+        let mut cloud = sample_cloud();
+        cloud.return_number = vec![1, 2, 3, 4, 1];
+        let source = Source::new(&cloud, 0.0);
+        let tag = |at| source.value(Quantity::LivoxTag, Point::Return(at));
+        assert_eq!([0, 1, 2, 3].map(tag), [0x10, 0x20, 0x30, 0x30].map(Value::U1));
+    }
+
+    /// White is 150 to Livox, brighter is a retroreflector, and all are whole numbers.
+    #[test]
+    fn livox_has_whole_intensities() {
+        let mut cloud = sample_cloud();
+        cloud.intensity = vec![0.1, 1.0, 1.02, 255.55, 0.103];
+        let source = Source::new(&cloud, 0.0);
+        let value = |at| source.value(Quantity::Livox150, Point::Return(at));
+        let all = [0, 1, 2, 3, 4].map(value);
+        assert_eq!(all, [15.0, 150.0, 153.0, 255.0, 15.0].map(Value::F4));
+        let Value::F4(none) = source.value(Quantity::Livox150, Point::Unanswered(2)) else {
+            panic!()
+        };
+        assert!(none.is_nan());
+    }
+
+    /// The filters of Autoware join neighbours of a ring whose azimuths grow by less than a degree.
+    #[test]
+    fn azimuths_of_autoware_grow_to_the_right() {
+        let mut cloud = sample_cloud();
+        (cloud.x, cloud.y) = (vec![1.0, 1.0, -1.0, 1.0, 1.0], vec![0.0, -1.0, 0.0, 1.0, 1e-9]);
+        let source = Source::new(&cloud, 0.0);
+        let azimuth = |at| match source.value(Quantity::Azimuth, Point::Return(at)) {
+            Value::F4(azimuth) => f64::from(azimuth).to_degrees(),
+            other => panic!("{other:?}"),
+        };
+        let all: [f64; 5] = [0, 1, 2, 3, 4].map(azimuth);
+        for (found, right) in all.into_iter().zip([0.0, 45.0, 180.0, 315.0, 0.0]) {
+            assert!((found - right).abs() < 1e-4, "{all:?}");
+        }
     }
 
     #[test]
