@@ -19,8 +19,8 @@ use crate::text::{counted, print, warn};
 
 /// Convert point clouds to another format
 ///
-/// Reads files that end in .pcd, .ply, .las, .laz, .e57 (every scan), .npy, .csv, .xyz, .txt, .pts, .bin
-/// (KITTI, nuScenes) and .mcap (every cloud of ROS 2). Says what is left out on the way in, and what an
+/// Reads files that end in .pcd, .ply, .las, .laz, .e57 and .ptx (every scan), .npy, .csv, .xyz, .txt, .pts,
+/// .bin (KITTI, nuScenes) and .mcap (every cloud of ROS 2). Says what is left out on the way in, and what an
 /// output cannot hold.
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -190,7 +190,9 @@ impl Target {
 
 /// True for containers of several clouds. The files of their clouds have numbers in their names.
 fn may_have_several(input: &Path) -> bool {
-    input.extension().is_some_and(|ending| ending == "mcap" || ending == "e57")
+    input
+        .extension()
+        .is_some_and(|ending| ["mcap", "e57", "ptx"].iter().any(|of_several| ending == *of_several))
 }
 
 /// The name of a file with the number of its scan, if it has one, as that of the first.

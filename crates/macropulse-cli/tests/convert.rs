@@ -108,6 +108,22 @@ fn files_of_others_are_read_by_their_names_and_their_points() {
 }
 
 #[test]
+fn every_scan_of_a_ptx_is_a_cloud() {
+    let desk = Desk::new();
+    let begin = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 1.5 1\n";
+    desk.put("two.ptx", &format!("1\n2\n{begin}1 2 3 0.5\n0 0 0 0.5\n1\n1\n{begin}1 2 9 0.25\n"));
+    let ran = desk.run("convert two.ptx --format pcd -o out");
+    assert!(ran.out.starts_with("2 scans, 2 points, 2 files"), "{}{}", ran.out, ran.err);
+    assert!(ran.err.contains("two.ptx: left out: 1 point at (0, 0, 0)"), "{}", ran.err);
+    for (name, z) in [("two-000000", 3.0), ("two-000001", 9.0)] {
+        let read = read_cloud(&desk.path().join(format!("out/{name}.pcd"))).unwrap();
+        assert_eq!((read.z[0], read.viewpoint.position), (z, [10.0, 20.0, 1.5]));
+    }
+    desk.put("cut.ptx", &format!("2\n2\n{begin}1 2 3 0.5\n"));
+    desk.refused("convert cut.ptx -o cut.pcd", &["cut.ptx is not a ptx file", "1 of 4 points"]);
+}
+
+#[test]
 fn what_makes_no_sense_is_refused() {
     let desk = desk();
     desk.refused("convert in/scan-000000.pcd -o points", &["says no format", "points.ply"]);

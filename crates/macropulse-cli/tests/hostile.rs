@@ -79,15 +79,15 @@ fn all_ways(desk: &Desk, name: &str, words: &[&str]) {
     ] {
         refused(desk, &line.replace("NAME", name), &words);
     }
-    for ending in ["pcd", "ply", "las", "laz", "csv", "e57", "npy", "bin", "mcap"] {
+    for ending in ["pcd", "ply", "las", "laz", "csv", "e57", "npy", "ptx", "bin", "mcap"] {
         refused(desk, &format!("view {name}.{ending} -o page.html"), &words);
         refused(desk, &format!("convert {name}.{ending} -o out.pcd"), &words);
     }
 }
 
-const ENDINGS: [&str; 14] = [
-    "obj", "stl", "ply", "glb", "gltf", "toml", "csv", "pcd", "las", "laz", "e57", "npy", "bin",
-    "mcap",
+const ENDINGS: [&str; 15] = [
+    "obj", "stl", "ply", "glb", "gltf", "toml", "csv", "pcd", "las", "laz", "e57", "npy", "ptx",
+    "bin", "mcap",
 ];
 
 #[test]
@@ -168,7 +168,7 @@ fn files_of_nothing_but_zeros() {
     let zeros = |name: &str, length| {
         fs::File::create(desk.path().join(name)).unwrap().set_len(length).unwrap();
     };
-    for ending in ["pcd", "ply", "las", "laz", "csv", "e57", "npy", "mcap"] {
+    for ending in ["pcd", "ply", "las", "laz", "csv", "e57", "npy", "ptx", "mcap"] {
         zeros(&format!("zeros.{ending}"), (8 << 30) - 1);
         refused(&desk, &format!("convert zeros.{ending} -o out.pcd"), &["zeros"]);
     }

@@ -50,6 +50,7 @@ targets! {
     cloud_npy, |bytes| clouds::read("npy", bytes), 4096;
     cloud_pcd, |bytes| clouds::read("pcd", bytes), 1 << 13;
     cloud_ply, |bytes| clouds::read("ply", bytes), 1 << 13;
+    cloud_ptx, |bytes| clouds::read("ptx", bytes), 4096;
     range_image, clouds::range_image, 4096;
     mesh_glb, |bytes| scenes::mesh("glb", bytes), 1 << 13;
     mesh_gltf, |bytes| scenes::mesh("gltf", bytes), 1 << 13;

@@ -4,7 +4,7 @@ use super::about::About;
 use super::mcap::Messages;
 use super::{
     CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57_reader, kitti, las_reader, npy,
-    pcd_reader, ply_reader,
+    pcd_reader, ply_reader, ptx_reader,
 };
 use crate::opened;
 use crate::points::PointCloud;
@@ -23,10 +23,11 @@ pub struct Reading {
     pub topic: Option<String>,
 }
 
-/// The clouds of a file, one after the other: many of an MCAP or E57 file, one of any other. Their
+/// The clouds of a file, one after the other: many of an MCAP, E57 or PTX file, one of any other. Their
 /// numbers ascend.
 pub struct Clouds {
     path: PathBuf,
+    kind: FileKind,
     source: Source,
     /// The number that the next cloud has at least.
     next: u64,
@@ -34,13 +35,53 @@ pub struct Clouds {
 
 enum Source {
     One { cloud: Option<Box<PointCloud>>, about: Box<About> },
-    Scans(Box<e57_reader::Scans>),
+    Scans(Box<dyn Scans + Send>),
     Messages(Box<Messages>),
+}
+
+/// A file of scans, each of which is a cloud.
+pub(super) trait Scans {
+    /// How many scans there are.
+    fn count(&self) -> usize;
+
+    /// What the file says beside the clouds that were read.
+    fn about(&self) -> &About;
+
+    /// The cloud of the next scan.
+    fn advance(&mut self) -> Option<Result<PointCloud, String>>;
+}
+
+/// What a file is read as.
+#[derive(Clone, Copy, PartialEq)]
+enum FileKind {
+    /// A format that is written, too.
+    Written(Format),
+    /// Scans of Leica Cyclone.
+    Ptx,
+}
+
+impl FileKind {
+    /// What the file at `path` is read as, by its ending.
+    fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension()?.to_str()?;
+        match ending.to_ascii_lowercase().as_str() {
+            "ptx" => Some(Self::Ptx),
+            "xyz" | "txt" | "pts" => Some(Self::Written(Format::Csv)),
+            _ => Format::of_extension(ending).map(Self::Written),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Written(format) => format.name(),
+            Self::Ptx => "ptx",
+        }
+    }
 }
 
 impl Clouds {
     /// Opens the file at `path`, whose ending says what it is: `pcd`, `ply`, `las`, `laz`, `e57`,
-    /// `npy`, `csv`, `xyz`, `txt`, `pts`, `bin` (KITTI, nuScenes) or `mcap` (`PointCloud2` of ROS 2).
+    /// `npy`, `csv`, `xyz`, `txt`, `pts`, `ptx`, `bin` (KITTI, nuScenes) or `mcap` (`PointCloud2` of ROS 2).
     ///
     /// Attributes that the file lacks are absent in the cloud; [`Clouds::left_out`] names those that a
     /// cloud has no column for, and counts points that are none. Truth is read if the file has the
@@ -60,19 +101,21 @@ impl Clouds {
     /// As [`Clouds::open`]; if the clouds take more memory than the limit; and [`Error::NoTopics`] if
     /// a topic is chosen in a file of a format that has none.
     pub fn open_with(path: &Path, reading: &Reading) -> Result<Self, Error> {
-        let Some(format) = format_of(path) else {
+        let Some(kind) = FileKind::of(path) else {
             // A name that is misspelt is no format that is unknown.
             std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?;
             return Err(Error::unreadable(path));
         };
-        let source = match format {
-            Format::Mcap(_) => Source::Messages(Box::new(Messages::open(path, reading)?)),
+        let source = match kind {
+            FileKind::Written(Format::Mcap(_)) => {
+                Source::Messages(Box::new(Messages::open(path, reading)?))
+            }
             _ if reading.topic.is_some() => {
                 return Err(Error::NoTopics { path: path.to_owned() });
             }
-            _ => Source::of_file(path, format, reading.room)?,
+            _ => Source::of_file(path, kind, reading.room)?,
         };
-        Ok(Self { path: path.to_owned(), source, next: 0 })
+        Ok(Self { path: path.to_owned(), kind, source, next: 0 })
     }
 
     /// Whether the file may hold several clouds.
@@ -119,7 +162,7 @@ impl Iterator for Clouds {
         let next = match &mut self.source {
             Source::One { cloud, .. } => Ok(*cloud.take()?),
             Source::Scans(scans) => {
-                let invalid = |fault| Error::invalid(&self.path, Format::E57, fault);
+                let invalid = |fault| Error::invalid(&self.path, self.kind.name(), fault);
                 scans.advance()?.map_err(invalid)
             }
             Source::Messages(messages) => messages.next()?,
@@ -135,17 +178,24 @@ impl Iterator for Clouds {
 
 impl Source {
     /// What is read at once, in a format without messages.
-    fn of_file(path: &Path, format: Format, room: CloudRoom) -> Result<Self, Error> {
-        let read = || whole(path, format).map_err(|cause| Error::read(path, cause));
-        let invalid = |fault| Error::invalid(path, format, fault);
+    fn of_file(path: &Path, kind: FileKind, room: CloudRoom) -> Result<Self, Error> {
+        let read = || whole(path, kind).map_err(|cause| Error::read(path, cause));
+        let invalid = |fault| Error::invalid(path, kind.name(), fault);
         let size = std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?.len();
         let room = room.beside(size).map_err(invalid)?;
+        let format = match kind {
+            FileKind::Written(format) => format,
+            FileKind::Ptx => {
+                let scans = ptx_reader::PtxScans::open(read()?, room).map_err(invalid)?;
+                return Ok(Self::Scans(Box::new(scans)));
+            }
+        };
         let parsed = match format {
             Format::Pcd => pcd_reader::parse(&read()?, room),
             Format::Ply => ply_reader::parse(&read()?, room),
             Format::Las | Format::Laz => las_reader::parse(read()?, room),
             Format::E57 => {
-                let scans = e57_reader::Scans::open(read()?, room).map_err(invalid)?;
+                let scans = e57_reader::E57Scans::open(read()?, room).map_err(invalid)?;
                 return Ok(Self::Scans(Box::new(scans)));
             }
             Format::Npy => npy::parse(&read()?, room),
@@ -158,27 +208,19 @@ impl Source {
     }
 }
 
-/// The format that the file at `path` is read as, by its ending.
-fn format_of(path: &Path) -> Option<Format> {
-    let ending = path.extension()?.to_str()?;
-    match ending.to_ascii_lowercase().as_str() {
-        "xyz" | "txt" | "pts" => Some(Format::Csv),
-        _ => Format::of_extension(ending),
-    }
-}
-
 /// Bytes of a file by which it is told whether it may be of its format.
 const BEGINNING: usize = 4096;
 
-/// All bytes of the file at `path`; or its beginning, if that is none of a file of this format.
-fn whole(path: &Path, format: Format) -> io::Result<Vec<u8>> {
+/// All bytes of the file at `path`; or its beginning, if that is none of a file of this kind.
+fn whole(path: &Path, kind: FileKind) -> io::Result<Vec<u8>> {
     let mut begins = Vec::with_capacity(BEGINNING);
     opened::file(path, MOST_BYTES)?.take(BEGINNING as u64).read_to_end(&mut begins)?;
-    if may_begin(&begins, format) { opened::bytes(path, MOST_BYTES) } else { Ok(begins) }
+    if may_begin(&begins, kind) { opened::bytes(path, MOST_BYTES) } else { Ok(begins) }
 }
 
-/// Whether a file of this format may begin so.
-fn may_begin(bytes: &[u8], format: Format) -> bool {
+/// Whether a file of this kind may begin so.
+fn may_begin(bytes: &[u8], kind: FileKind) -> bool {
+    let FileKind::Written(format) = kind else { return !bytes.starts_with(b"\0") };
     match format {
         Format::Las | Format::Laz => bytes.starts_with(b"LASF"),
         Format::E57 => bytes.starts_with(b"ASTM-E57"),
@@ -206,5 +248,5 @@ pub fn read_cloud(path: &Path) -> Result<PointCloud, Error> {
 pub fn read_pcd(path: &Path) -> Result<PointCloud, Error> {
     let bytes = opened::bytes(path, MOST_BYTES).map_err(|cause| Error::read(path, cause))?;
     let parsed = pcd_reader::parse(&bytes, CloudRoom::default());
-    parsed.map(|(cloud, _)| cloud).map_err(|fault| Error::invalid(path, Format::Pcd, fault))
+    parsed.map(|(cloud, _)| cloud).map_err(|fault| Error::invalid(path, Format::Pcd.name(), fault))
 }

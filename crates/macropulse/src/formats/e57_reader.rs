@@ -3,6 +3,7 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
+use super::clouds::Scans;
 use super::e57::{GPS_BEHIND_S, NAMESPACE, name};
 use super::left_out::NoPoint;
 use super::table::{Digits, Gathered, Record as Point, check_coordinates};
@@ -13,7 +14,7 @@ use ::e57::{
 use std::io::Cursor;
 
 /// The clouds of an E57 file, one for each of its scans, in the frame of the scanner.
-pub(super) struct Scans {
+pub(super) struct E57Scans {
     reader: E57Reader<Cursor<Vec<u8>>>,
     /// Bytes of the file.
     size: u64,
@@ -22,7 +23,7 @@ pub(super) struct Scans {
     about: About,
 }
 
-impl Scans {
+impl E57Scans {
     /// Reads what the file says of its scans.
     pub fn open(bytes: Vec<u8>, room: CloudRoom) -> Result<Self, String> {
         let size = bytes.len() as u64;
@@ -36,19 +37,18 @@ impl Scans {
         about.left_out.reference_system = system.map(str::to_owned);
         Ok(Self { reader, size, scans, next: 0, about })
     }
+}
 
-    /// How many scans there are.
-    pub fn count(&self) -> usize {
+impl Scans for E57Scans {
+    fn count(&self) -> usize {
         self.scans.len()
     }
 
-    /// What the file says beside the clouds that were read.
-    pub fn about(&self) -> &About {
+    fn about(&self) -> &About {
         &self.about
     }
 
-    /// The cloud of the next scan.
-    pub fn advance(&mut self) -> Option<Result<PointCloud, String>> {
+    fn advance(&mut self) -> Option<Result<PointCloud, String>> {
         let scan = self.scans.get(self.next)?.clone();
         self.next += 1;
         let place = |fault| match self.scans.len() {
@@ -297,7 +297,7 @@ mod tests {
     }
 
     fn first(bytes: Vec<u8>) -> Result<PointCloud, String> {
-        Scans::open(bytes, CloudRoom::default())?.advance().unwrap()
+        E57Scans::open(bytes, CloudRoom::default())?.advance().unwrap()
     }
 
     /// The records of a scan, and the values of its points.
@@ -347,7 +347,7 @@ mod tests {
                 vec![[877_455_581, 1, 2].map(RecordValue::ScaledInteger).to_vec()],
             ),
         ]);
-        let mut scans = Scans::open(bytes, CloudRoom::default()).unwrap();
+        let mut scans = E57Scans::open(bytes, CloudRoom::default()).unwrap();
         assert_eq!(scans.count(), 2);
         let one = scans.advance().unwrap().unwrap();
         assert_eq!((one.position(0), one.returns()), (far, 2));
@@ -379,7 +379,7 @@ mod tests {
             values
         };
         let points = vec![point(1.0, 0, 0), point(0.0, 2, 0), point(3.0, 1, 0), point(4.0, 0, 1)];
-        let mut scans = Scans::open(file(&[(records, points)]), CloudRoom::default()).unwrap();
+        let mut scans = E57Scans::open(file(&[(records, points)]), CloudRoom::default()).unwrap();
         let read = scans.advance().unwrap().unwrap();
         assert_eq!(read.x, [1.0, 4.0]);
         assert!(read.intensity[0] == 0.5 && read.intensity[1].is_nan());
@@ -411,7 +411,7 @@ mod tests {
         let cloud = sample_cloud();
         let objects = ["car <red> & more".to_owned()];
         let bytes = encode(&cloud, &Names { objects: &objects, materials: &[] }).unwrap();
-        let mut scans = Scans::open(bytes, CloudRoom::default()).unwrap();
+        let mut scans = E57Scans::open(bytes, CloudRoom::default()).unwrap();
         let read = scans.advance().unwrap().unwrap();
         assert!(scans.advance().is_none() && scans.about().left_out.is_empty());
         assert_eq!((read.scan, read.rows, read.columns, read.pick), (3, 2, 3, cloud.pick));

@@ -61,7 +61,7 @@ pub enum Error {
     },
     /// Clouds are not read from such files.
     #[error(
-        "{}: no point cloud is read from such a file; read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .xyz, .txt, .pts, .bin (KITTI, nuScenes) and .mcap (ROS 2)",
+        "{}: no point cloud is read from such a file; read are files that end in .pcd, .ply, .las, .laz, .e57, .npy, .csv, .xyz, .txt, .pts, .ptx, .bin (KITTI, nuScenes) and .mcap (ROS 2)",
         path.display()
     )]
     Unreadable {
@@ -94,9 +94,9 @@ impl Error {
     }
 
     /// What is wrong in one line, whatever a name in the file holds.
-    pub(super) fn invalid(path: &Path, format: Format, fault: impl Into<String>) -> Self {
+    pub(super) fn invalid(path: &Path, format: &'static str, fault: impl Into<String>) -> Self {
         let fault = fault.into().replace(char::is_control, " ");
-        Self::Invalid { path: path.to_owned(), format: format.name(), fault }
+        Self::Invalid { path: path.to_owned(), format, fault }
     }
 
     pub(super) fn unreadable(path: &Path) -> Self {

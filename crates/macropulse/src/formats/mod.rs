@@ -34,6 +34,7 @@ mod pcd_reader;
 mod ply;
 mod ply_reader;
 mod png16;
+mod ptx_reader;
 mod recording;
 mod room;
 mod table;

@@ -64,7 +64,7 @@ fn grey_from_range(range: f32) -> u16 {
 /// that declares this scale.
 pub fn read_range_png(path: &Path) -> Result<RangeImage, Error> {
     let file = crate::opened::file(path, MOST_BYTES).map_err(|cause| Error::read(path, cause))?;
-    decode(BufReader::new(file)).map_err(|fault| Error::invalid(path, Format::Png, fault))
+    decode(BufReader::new(file)).map_err(|fault| Error::invalid(path, Format::Png.name(), fault))
 }
 
 fn decode(file: impl io::BufRead + io::Seek) -> Result<RangeImage, String> {

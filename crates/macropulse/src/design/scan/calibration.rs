@@ -1,6 +1,6 @@
 //! The lasers of a turning head from a calibration file: the metadata of an Ouster sensor (`.json`, see
-//! [`ouster`]), or the list `lasers:` of the YAML files that drivers of Velodyne sensors read
-//! \[VelRos\].
+//! [`ouster`]), the angle corrections of a Hesai sensor (`.csv`, see [`hesai`]), or the list `lasers:` of the
+//! YAML files that drivers of Velodyne sensors read \[VelRos\].
 //!
 //! Angles are in radians, lengths in metres. With R the distance a laser measures, d its
 //! `dist_correction`, φ the azimuth of the head, clockwise, and α, ε, h, v its `rot_correction`,
@@ -21,7 +21,7 @@ use serde::Deserialize;
 use serde_saphyr::{Error as Yaml, Location, Spanned};
 
 use super::laser::{AZIMUTH, ELEVATION, Laser, Limit, MOST_LASERS, ORIGIN, RANGE_OFFSET};
-use super::ouster;
+use super::{hesai, ouster};
 use crate::digest::Digest;
 use crate::told;
 
@@ -75,14 +75,13 @@ pub(super) fn read(path: &Path) -> Result<Calibration, String> {
     let origin = path.display().to_string();
     let bytes = super::table::bytes(path, MOST_BYTES)?;
     let text = std::str::from_utf8(&bytes).map_err(|_| format!("{origin}: is no UTF-8 text"))?;
-    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let mut calibration = match is_json {
-        true => Calibration {
-            lasers: ouster::lasers(text, &origin)?,
-            notes: Vec::new(),
-            digest: String::new(),
-        },
-        false => parse(text, &origin)?,
+    let ends_in =
+        |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    let bare = |lasers| Calibration { lasers, notes: Vec::new(), digest: String::new() };
+    let mut calibration = match () {
+        () if ends_in("json") => bare(ouster::lasers(text, &origin)?),
+        () if ends_in("csv") => bare(hesai::lasers(text, &origin)?),
+        () => parse(text, &origin)?,
     };
     let mut digest = Digest::new();
     digest.bytes(&bytes);
@@ -114,8 +113,8 @@ fn in_words(error: &Yaml) -> String {
         }
         Yaml::Unexpected { expected: "mapping start", .. } => {
             "keys and their values are wanted here: a calibration is the YAML of a Velodyne driver, \
-             which begins with `lasers:`; angles of other sensors are listed under \
-             scan.spinning.lasers"
+             which begins with `lasers:`; a table of a Hesai sensor ends in .csv, and angles of other sensors \
+             are listed under scan.spinning.lasers"
                 .to_owned()
         }
         Yaml::Unexpected { .. } => "a single value is wanted here".to_owned(),

@@ -8,6 +8,7 @@ mod calibration;
 mod directions;
 mod flash;
 mod grid;
+mod hesai;
 mod laser;
 mod model;
 mod ouster;

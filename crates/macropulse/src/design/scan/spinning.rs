@@ -74,8 +74,8 @@ pub(super) struct File {
     /// Lasers one by one, in the order in which they fire; or `blocks`, or `calibration`.
     #[schemars(length(min = 1, max = 1024))]
     lasers: Option<Vec<laser::File>>,
-    /// Calibration file of the ROS driver of Velodyne sensors (YAML), or metadata of an Ouster sensor
-    /// (JSON), beside this file; or `blocks`, or `lasers`.
+    /// Calibration file of the ROS driver of Velodyne sensors (YAML), metadata of an Ouster sensor (JSON),
+    /// or angle corrections of a Hesai sensor (CSV), beside this file; or `blocks`, or `lasers`.
     calibration: Option<String>,
     /// Order within one column.
     firing: Firing,

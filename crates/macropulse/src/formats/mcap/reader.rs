@@ -3,9 +3,9 @@
 
 use super::super::about::About;
 use super::super::contained::contained;
-use super::super::{Error, Format, Reading};
+use super::super::{Error, Reading};
 use super::zstd::Zstd;
-use super::{ABOUT, METADATA, Message, Profile, point_cloud2, ros2};
+use super::{ABOUT, METADATA, point_cloud2, ros2};
 use crate::opened;
 use crate::points::PointCloud;
 use ::mcap::McapError;
@@ -17,7 +17,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What the files are called in messages to people.
-const FORMAT: Format = Format::Mcap(Message::Ros2(Profile::Extended));
+const FORMAT: &str = "mcap";
 
 /// More than this many bytes cannot come of one that is compressed.
 const MOST_COMPRESSED: u64 = 256;
