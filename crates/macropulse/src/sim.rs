@@ -241,7 +241,7 @@ impl<'a> Scans<'a> {
 
 /// The pose of a sensor as clouds have it.
 fn viewpoint(pose: &Pose) -> Viewpoint {
-    Viewpoint { position: pose.position, turn: pose.quaternion() }
+    Viewpoint { position: pose.position, turn: pose.rotation.quaternion() }
 }
 
 /// What the receiver was given of a band.

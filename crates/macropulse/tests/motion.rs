@@ -140,7 +140,7 @@ fn a_sensor_that_turns_sees_the_world_turn_the_other_way() {
          material = \"white\"\n[sensor]\nturn_rate_deg_s = 90\n",
     );
     let pose = scene.sensor.at(FS_PER_S);
-    let [w, _, _, z] = pose.quaternion();
+    let [w, _, _, z] = pose.rotation.quaternion();
     assert!((w - 0.5_f64.sqrt()).abs() < 1e-12 && (z - 0.5_f64.sqrt()).abs() < 1e-12);
     // Straight ahead after one second; to the left before.
     let ahead = pose.world_from_sensor().direction([1.0, 0.0, 0.0]);

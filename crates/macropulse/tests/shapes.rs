@@ -73,10 +73,9 @@ fn rays_meet_shapes_where_the_inside_begins() {
     let (mut met, mut missed) = (0, 0);
     for round in 0..6000 {
         let shape = SHAPES[round % SHAPES.len()];
-        let mut angle = || chance.random_range(-1.5..1.5);
-        let (yaw, pitch, roll) = (angle(), angle(), angle());
+        let angles = [0; 3].map(|_| chance.random_range(-1.5..1.5));
         let position = [0; 3].map(|_| chance.random_range(-20.0..20.0));
-        let pose = Pose { position, yaw, pitch, roll };
+        let pose = Pose::turned(position, angles);
         let solid = Solid::new(shape, pose, 3, 5);
         let direction = unit(&mut chance);
         // From 6 m before the middle or from within, aimed up to 2 m beside it.

@@ -18,6 +18,7 @@ pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
     let materials: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
     let targets: Vec<&str> =
         scene.objects.iter().filter(|o| o.is_target).map(|o| o.name.as_str()).collect();
+    let [yaw, pitch, roll] = scene.sensor.pose.rotation.angles_deg();
     let mut columns = Columns::default();
     columns.push("triangles", grouped(scene.triangles() as u64));
     columns.push("memory", format!("about {}", told_memory(estimate.scene)));
@@ -51,9 +52,9 @@ pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
             "targets": targets,
             "materials": materials,
             "sensor_position_m": scene.sensor.pose.position,
-            "sensor_yaw_deg": scene.sensor.pose.yaw.to_degrees(),
-            "sensor_pitch_deg": scene.sensor.pose.pitch.to_degrees(),
-            "sensor_roll_deg": scene.sensor.pose.roll.to_degrees(),
+            "sensor_yaw_deg": yaw,
+            "sensor_pitch_deg": pitch,
+            "sensor_roll_deg": roll,
             "moving": scene.moving.iter().map(moves).collect::<Vec<_>>(),
             "environment": surroundings(environment),
             "idealised": environment.idealised.iter().map(|e| e.name()).collect::<Vec<_>>(),
@@ -73,8 +74,7 @@ pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
 
 fn stands(pose: &Pose) -> String {
     let [x, y, z] = pose.position.map(short);
-    let [yaw, pitch, roll] =
-        [pose.yaw, pose.pitch, pose.roll].map(|angle| short(angle.to_degrees()));
+    let [yaw, pitch, roll] = pose.rotation.angles_deg().map(short);
     format!("at x {x}, y {y}, z {z} m; yaw {yaw}, pitch {pitch}, roll {roll} deg")
 }
 
@@ -96,13 +96,14 @@ fn told(other: &Interferer) -> String {
 }
 
 fn json(other: &Interferer) -> Value {
+    let [yaw, pitch, roll] = other.pose.rotation.angles_deg();
     json!({
         "name": other.name,
         "sensor": other.design.name,
         "position_m": other.pose.position,
-        "yaw_deg": other.pose.yaw.to_degrees(),
-        "pitch_deg": other.pose.pitch.to_degrees(),
-        "roll_deg": other.pose.roll.to_degrees(),
+        "yaw_deg": yaw,
+        "pitch_deg": pitch,
+        "roll_deg": roll,
         "phase_ns": phase_ns(other),
         "drift_ppm": drift_ppm(other),
     })

@@ -191,7 +191,7 @@ impl<'a> RecordFiles<'a> {
         let [shots, file] = recorded.names().map(|name| WholeFile::create(&folder.join(name)));
         let (mut shots, mut file) = (shots?, file?);
         let pose = scene.sensor.at(scan_begins_fs(recorded.design, recorded.number));
-        let written = recorded.write_shots(&mut shots, (pose.position, pose.quaternion()));
+        let written = recorded.write_shots(&mut shots, (pose.position, pose.rotation.quaternion()));
         written.map_err(|cause| shots.failed(cause))?;
         let design = recorded.design;
         let samples = design.sample_header().map(Header::Samples);

@@ -292,12 +292,13 @@ pub fn defaults(design: &Design) -> Entries<serde_json::Value> {
 fn begun(design: &Design, scene: &Scene, scan: u64) -> Begun {
     let start_fs = scan_begins_fs(design, scan);
     let pose = scene.sensor.at(start_fs);
+    let [yaw_deg, pitch_deg, roll_deg] = pose.rotation.angles_deg();
     Begun {
         scan,
         start_ns: start_fs as f64 * 1e-6,
         position_m: pose.position,
-        yaw_deg: pose.yaw.to_degrees(),
-        pitch_deg: pose.pitch.to_degrees(),
-        roll_deg: pose.roll.to_degrees(),
+        yaw_deg,
+        pitch_deg,
+        roll_deg,
     }
 }

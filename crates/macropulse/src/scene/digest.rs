@@ -38,11 +38,9 @@ impl Digest {
     }
 
     /// Takes in a pose.
-    pub(super) fn pose(&mut self, pose: &Pose) {
-        let Pose { position: [x, y, z], yaw, pitch, roll } = *pose;
-        for value in [x, y, z, yaw, pitch, roll] {
-            self.number(value);
-        }
+    pub(super) fn pose(&mut self, Pose { position, rotation }: &Pose) {
+        self.numbers(position);
+        self.numbers(&rotation.angles());
     }
 
     /// Takes in a motion: nothing but the pose of what stands still.

@@ -156,7 +156,7 @@ mod tests {
             let mut footing = Footing::of(Rc::clone(&mesh));
             for [yaw, pitch, roll] in angles {
                 for yaw in [yaw, yaw + 1.0] {
-                    let pose = Pose { position: [1.0, 2.0, height], yaw, pitch, roll };
+                    let pose = Pose::turned([1.0, 2.0, height], [yaw, pitch, roll]);
                     let place = pose.world_from_sensor();
                     let corners = &mesh.vertices[..count as usize];
                     let heights = corners.iter().map(|corner| place.point(*corner)[2]);

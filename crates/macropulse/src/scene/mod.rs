@@ -27,6 +27,7 @@ mod pose;
 mod raycast;
 mod readers;
 mod room;
+mod rotation;
 mod schema;
 mod spanned;
 mod trace;
@@ -51,6 +52,7 @@ pub use motion::{Motion, Moving};
 pub use pose::{Pose, Transform};
 pub(crate) use room::PER_TRIANGLE;
 pub use room::Room;
+pub use rotation::Rotation;
 pub use schema::schema;
 pub use trace::{SUB_MACROPULSES, Traced};
 

@@ -1,6 +1,7 @@
 //! Where something is at which time.
 
 use super::pose::Pose;
+use super::rotation::Rotation;
 use crate::units::s_from_fs;
 
 /// The fastest that a scene file may let anything go, m/s.
@@ -42,7 +43,8 @@ impl Motion {
         let [x, y, z] = self.pose.position;
         let [u, v, w] = self.velocity;
         let position = [x + u * time, y + v * time, z + w * time];
-        Pose { position, yaw: self.pose.yaw + self.turn_rate * time, ..self.pose }
+        let rotation = Rotation::about_vertical(self.turn_rate * time).after(self.pose.rotation);
+        Pose { position, rotation }
     }
 
     /// The motion in words.
@@ -71,12 +73,13 @@ mod tests {
 
     #[test]
     fn a_pose_goes_and_turns_evenly() {
-        let pose = Pose { position: [1.0, 2.0, 3.0], yaw: 0.5, pitch: 0.1, roll: -0.2 };
+        let pose = Pose::turned([1.0, 2.0, 3.0], [0.5, 0.1, -0.2]);
         let motion = Motion { pose, velocity: [30.0, -2.0, 0.5], turn_rate: 4.0 };
         assert_eq!(motion.at(0), pose);
         let quarter = motion.at(FS_PER_S / 4);
         assert_eq!(quarter.position, [8.5, 1.5, 3.125]);
-        assert_eq!((quarter.yaw, quarter.pitch, quarter.roll), (1.5, 0.1, -0.2));
+        let differ = quarter.rotation.angles().into_iter().zip([1.5, 0.1, -0.2]);
+        assert!(differ.into_iter().all(|(one, other)| (one - other).abs() < 1e-15 * 4.0));
     }
 
     #[test]

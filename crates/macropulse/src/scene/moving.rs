@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn a_mover_is_met_where_it_is_at_the_time() {
         let mut chance = ChaCha8Rng::seed_from_u64(41);
-        let pose = Pose { position: [20.0, -3.0, 1.0], yaw: 0.3, pitch: 0.2, roll: -0.4 };
+        let pose = Pose::turned([20.0, -3.0, 1.0], [0.3, 0.2, -0.4]);
         let motion = Motion { pose, velocity: [2.0, 5.0, -1.0], turn_rate: 2.5 };
         let shapes = [
             Shape::Box { half: [3.0, 1.0, 0.5] },

@@ -55,15 +55,14 @@ impl Source<'_> {
 
     /// Where something stands.
     pub(super) fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
-        let mut pose = Pose::default();
+        let mut position = [0.0; 3];
         if let Some(typed) = &stand.position_m {
-            let Triple(position) = *typed.get_ref();
+            Triple(position) = *typed.get_ref();
             if !position.iter().all(|value| is_length(*value)) {
                 let message =
                     format!("position_m must be three finite numbers, to {FARTHEST:e} m at most");
                 return Err(self.fault(typed.span(), message));
             }
-            pose.position = position;
         }
         let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
             Some(typed) if typed.get_ref().abs() <= MOST_TURNED => Ok(typed.get_ref().to_radians()),
@@ -74,10 +73,12 @@ impl Source<'_> {
             }
             None => Ok(0.0),
         };
-        pose.yaw = angle(&stand.yaw_deg, "yaw_deg")?;
-        pose.pitch = angle(&stand.pitch_deg, "pitch_deg")?;
-        pose.roll = angle(&stand.roll_deg, "roll_deg")?;
-        Ok(pose)
+        let angles = [
+            angle(&stand.yaw_deg, "yaw_deg")?,
+            angle(&stand.pitch_deg, "pitch_deg")?,
+            angle(&stand.roll_deg, "roll_deg")?,
+        ];
+        Ok(Pose::turned(position, angles))
     }
 
     /// The parts of a shape about the position of its object.

@@ -27,11 +27,9 @@ fn egg(rows: u32) -> Vec<Corners> {
 }
 
 fn poses(chance: &mut ChaCha8Rng, count: usize) -> Vec<Pose> {
-    let pose = |_| Pose {
-        position: [0; 3].map(|_| chance.random_range(-40.0..40.0)),
-        yaw: chance.random_range(-3.0..3.0),
-        pitch: chance.random_range(-1.0..1.0),
-        roll: chance.random_range(-1.0..1.0),
+    let pose = |_| {
+        let position = [0; 3].map(|_| chance.random_range(-40.0..40.0));
+        Pose::turned(position, [3.0, 1.0, 1.0].map(|most: f64| chance.random_range(-most..most)))
     };
     (0..count).map(pose).collect()
 }
@@ -43,7 +41,7 @@ fn worlds(poses: &[Pose]) -> [World; 2] {
     let solids = || {
         let solid = |shape, at, object| Solid::new(shape, Pose::at(at), 0, object);
         let turned = |shape, at| {
-            let pose = Pose { position: at, yaw: 0.7, pitch: -0.5, roll: 1.9 };
+            let pose = Pose::turned(at, [0.7, -0.5, 1.9]);
             Solid::new(shape, pose, 0, 2)
         };
         vec![
@@ -180,7 +178,7 @@ fn a_mesh_kept_once_is_met_where_its_copies_stand() {
 
 #[test]
 fn no_ray_leaks_out_of_a_mesh_that_is_kept_once() {
-    let place = Pose { position: [100.0, -50.0, 3.0], yaw: 1.0, pitch: 0.3, roll: -0.2 };
+    let place = Pose::turned([100.0, -50.0, 3.0], [1.0, 0.3, -0.2]);
     let [world, _] = worlds(&[place, Pose::at([0.0, 0.0, 300.0])]);
     let mut chance = ChaCha8Rng::seed_from_u64(13);
     let mut packet_hits = PacketHits::default();
