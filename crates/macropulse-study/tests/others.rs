@@ -69,7 +69,7 @@ impl Seen {
     fn points_on(&self, scene: &Scene, name: &str) -> Vec<Point> {
         let object = scene.objects.iter().position(|object| object.name == name).unwrap();
         let cloud = &self.scan.cloud();
-        let to_world = scene.sensor.pose.world_from_sensor();
+        let to_world = scene.sensor.at_start().world_from_sensor();
         (0..cloud.range.len())
             .filter(|&at| {
                 let seen = cloud.truth.returns.at(at);

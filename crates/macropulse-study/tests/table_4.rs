@@ -65,7 +65,7 @@ fn lowest_on_car(distance: u32) -> f64 {
         let object = seen.object;
         let (row, column) = (pixel / cloud.columns, pixel % cloud.columns);
         let [_, _, up] = design.directions().of(row as u16, column as u16);
-        let height = scene.sensor.pose.position[2] + up * f64::from(seen.range);
+        let height = scene.sensor.at_start().position[2] + up * f64::from(seen.range);
         (object != NO_OBJECT && scene.objects[usize::from(object)].is_target).then_some(height)
     });
     heights.fold(f64::INFINITY, f64::min)
@@ -78,7 +78,7 @@ fn tyres_are_cut_off_for_a_sensor_between_1_97_and_2_57_m() {
     let edge = 30.0 * (7.5_f64 / 2.0).to_radians().tan();
     assert_relative_eq!(edge, 1.97, max_relative = 3e-3);
     assert_relative_eq!(edge + 0.6, 2.57, max_relative = 3e-3);
-    let stands = Scene::open("car-30m").unwrap().sensor.pose.position[2];
+    let stands = Scene::open("car-30m").unwrap().sensor.at_start().position[2];
     assert!((edge..edge + 0.6).contains(&stands), "{stands}");
     let (near, far) = (lowest_on_car(30), lowest_on_car(50));
     assert!((stands - edge..0.6).contains(&near), "{near}");

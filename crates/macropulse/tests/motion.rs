@@ -232,6 +232,43 @@ fn a_car_that_stands_in_a_fleet_moves_alone() {
     assert_eq!(met(20.0, 3), "cars");
 }
 
+/// Known answer: of a car that goes from 10 to 30 m ahead in 2 s, pitched and rolled at both ends, and back
+/// faster, the roof is met where it is at each time; each pose of it rests on the ground.
+#[test]
+fn a_car_on_a_path_is_met_where_it_is() {
+    let scene = scene(
+        "[[object]]\ncar = {}\nrest_on_ground = true\npath = [\
+         { time_s = 0, position_m = [10, 0, 0] }, \
+         { time_s = 2, position_m = [30, 0, 0] }, \
+         { time_s = 3, position_m = [10, 0, 0], yaw_deg = 90, pitch_deg = 5, roll_deg = -3 }]\n",
+    );
+    let [moving] = scene.moving.as_slice() else { panic!("{:?}", scene.moving) };
+    let roof_at = |x: f64, tenths: i64| {
+        let ray = Ray { origin: [x, 0.0, 9.0], direction: [0.0, 0.0, -1.0] };
+        scene.cast_at(&ray, tenths * FS_PER_S / 10, (0.0, 99.0)).map(|hit| 9.0 - hit.range)
+    };
+    for (tenths, x) in [(-50, 10.0), (0, 10.0), (5, 15.0), (13, 23.0), (20, 30.0), (25, 20.0)] {
+        assert!(roof_at(x, tenths).unwrap() > 1.0 && roof_at(x + 5.0, tenths).is_none(), "{x}");
+    }
+    // Pitched by 5° and rolled, it stands on one wheel and its middle is lifted.
+    assert!(roof_at(10.0, 30).unwrap() > roof_at(10.0, 0).unwrap() + 0.1);
+    let turned = moving.motion.at(3 * FS_PER_S).rotation.angles_deg();
+    assert!(turned.iter().zip([90.0, 5.0, -3.0]).all(|(one, other)| (one - other).abs() < 1e-9));
+}
+
+#[test]
+fn a_sensor_on_a_path_looks_where_the_path_turns_it() {
+    let scene = scene(
+        "[[object]]\nshape = { sphere = { radius_m = 0.2 } }\nposition_m = [0, 10, 0]\n\
+         material = \"white\"\n[sensor]\npath = [{ time_s = 0, position_m = [0, 0, 0] }, \
+         { time_s = 2, position_m = [0, 4, 0], yaw_deg = 180 }]\n",
+    );
+    // A quarter of a turn on and 2 m nearer.
+    let hits = ahead_at(&scene, FS_PER_S);
+    assert!((hits.range[0] - 7.8).abs() < 5e-3, "{:?}", hits.range);
+    assert!(ahead_at(&scene, 0).range.is_empty());
+}
+
 #[test]
 fn the_digest_knows_what_moves() {
     let object = "[[object]]\ncar = {}\nposition_m = [20, 0, 0]\n";
@@ -247,6 +284,14 @@ fn the_digest_knows_what_moves() {
         digest("turn_rate_deg_s = 1\n", ""),
         digest("", "velocity_m_s = [1, 0, 0]\n"),
         digest("", "turn_rate_deg_s = 1\n"),
+        digest(
+            "copies = [{ path = [{ time_s = 0, position_m = [0, 0, 0] }, { time_s = 1, position_m = [0, 0, 0] }] }]\n",
+            "",
+        ),
+        digest(
+            "copies = [{ path = [{ time_s = 0, position_m = [0, 0, 0] }, { time_s = 2, position_m = [0, 0, 0] }] }]\n",
+            "",
+        ),
     ];
     for (index, one) in moving.iter().enumerate() {
         assert_ne!(*one, still);
@@ -265,6 +310,18 @@ fn a_wrong_motion_is_refused_at_its_place() {
     assert!(message.starts_with("a.toml:5:19: turn_rate_deg_s is 200000; it must be from -100000"));
     let message = told("[[object]]\ncar = {}\ncopies = [{ turn_rate_deg_s = inf }]\n");
     assert!(message.contains("turn_rate_deg_s is inf"), "{message}");
+    let path = |poses: &str| told(&format!("[sensor]\npath = [{poses}]\n"));
+    let [first, later] = [0, 1].map(|x| format!("{{ time_s = {x}, position_m = [{x}, 0, 0] }}"));
+    assert!(path(&first).ends_with("4:8: `path` needs two poses at least"), "{}", path(&first));
+    let message = path(&format!("{later}, {first}"));
+    assert!(message.contains("time_s must be later than that of the pose before it"), "{message}");
+    let message = path(&format!("{first}, {{ time_s = 1e-5, position_m = [1, 0, 0] }}"));
+    assert!(message.contains("it goes 1 m and turns 0 deg in 0.00001 s: 10000 m/s"), "{message}");
+    let message = path(&format!("{first}, {{ time_s = 9001, position_m = [1, 0, 0] }}"));
+    assert!(message.contains("time_s is 9001; it must be from -9000 to 9000"), "{message}");
+    let message = told(&format!("[sensor]\nyaw_deg = 3\npath = [{first}, {later}]\n"));
+    assert!(message.starts_with("a.toml:4:11: `path` says where it is at every time"), "{message}");
+    assert!(message.ends_with("remove `yaw_deg`"), "{message}");
     let message = told("[ground]\nmaterial = \"asphalt\"\nvelocity_m_s = [1, 0, 0]\n");
     assert!(message.starts_with("a.toml:5:16: the ground cannot move"), "{message}");
     let other = "[[interferers]]\nsensor = \"hdl-64e\"\n";

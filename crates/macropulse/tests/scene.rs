@@ -117,7 +117,7 @@ fn built_in_scenes_give_their_known_answers() {
         });
         let nearest = nearest.fold(f64::INFINITY, f64::min);
         approx::assert_abs_diff_eq!(nearest, distance, epsilon = 1e-9);
-        assert_eq!(scene.sensor.pose.position, [0.0, 0.0, 2.05]);
+        assert_eq!(scene.sensor.at_start().position, [0.0, 0.0, 2.05]);
         assert_eq!(scene.objects.iter().filter(|object| object.is_target).count(), 1);
     }
     let wall = Scene::open("wall").unwrap();

@@ -1,7 +1,8 @@
 //! The report on a scene.
 
 use macropulse::memory::{Estimate, of_scene};
-use macropulse::scene::{Interferer, Moving, Pose, Scene};
+use macropulse::scene::{Interferer, Motion, Moving, Pose, Scene};
+use macropulse::units::s_from_fs;
 use macropulse_study::record::surroundings;
 use serde_json::{Map, Value, json};
 
@@ -18,7 +19,7 @@ pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
     let materials: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
     let targets: Vec<&str> =
         scene.objects.iter().filter(|o| o.is_target).map(|o| o.name.as_str()).collect();
-    let [yaw, pitch, roll] = scene.sensor.pose.rotation.angles_deg();
+    let [yaw, pitch, roll] = scene.sensor.at_start().rotation.angles_deg();
     let mut columns = Columns::default();
     columns.push("triangles", grouped(scene.triangles() as u64));
     columns.push("memory", format!("about {}", told_memory(estimate.scene)));
@@ -26,7 +27,7 @@ pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
     columns
         .push("targets", if targets.is_empty() { "none".to_owned() } else { targets.join(", ") });
     columns.push("materials", materials.join(", "));
-    columns.push("sensor", stands(&scene.sensor.pose));
+    columns.push("sensor", stands(&scene.sensor.at_start()));
     let moving = scene.moving.iter();
     columns.push_list("moving", moving.map(|one| format!("{}: {}", one.name, one.motion.told())));
     let environment = &scene.environment;
@@ -51,7 +52,7 @@ pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
             "objects": objects,
             "targets": targets,
             "materials": materials,
-            "sensor_position_m": scene.sensor.pose.position,
+            "sensor_position_m": scene.sensor.at_start().position,
             "sensor_yaw_deg": yaw,
             "sensor_pitch_deg": pitch,
             "sensor_roll_deg": roll,
@@ -80,10 +81,27 @@ fn stands(pose: &Pose) -> String {
 
 /// Something that moves: what, and how.
 fn moves(moving: &Moving) -> Value {
+    let name = &moving.name;
+    match &moving.motion {
+        Motion::Still(_) => json!({ "name": name }),
+        Motion::Steady { velocity, turn_rate, .. } => json!({
+            "name": name, "velocity_m_s": velocity, "turn_rate_deg_s": turn_rate.to_degrees(),
+        }),
+        Motion::Path(path) => json!({
+            "name": name, "path": path.poses().map(waypoint).collect::<Vec<_>>(),
+        }),
+    }
+}
+
+/// A pose of a path and its time.
+fn waypoint((time_fs, pose): (i64, Pose)) -> Value {
+    let [yaw, pitch, roll] = pose.rotation.angles_deg();
     json!({
-        "name": moving.name,
-        "velocity_m_s": moving.motion.velocity,
-        "turn_rate_deg_s": moving.motion.turn_rate.to_degrees(),
+        "time_s": s_from_fs(time_fs),
+        "position_m": pose.position,
+        "yaw_deg": yaw,
+        "pitch_deg": pitch,
+        "roll_deg": roll,
     })
 }
 

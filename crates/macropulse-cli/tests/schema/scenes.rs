@@ -12,6 +12,11 @@ use serde_json::{Map, Value, json};
 /// stand together is in several.
 fn scenes() -> Vec<Value> {
     let at = json!([9, 0, 0]);
+    let path = || {
+        let pose =
+            json!({ "time_s": 0, "position_m": at, "yaw_deg": 1, "pitch_deg": 1, "roll_deg": 1 });
+        json!([pose, { "time_s": 9000, "position_m": at }])
+    };
     let shape = |shape: Value| json!({ "version": 1, "object": [{ "shape": shape }] });
     let environment = |keys: Value| json!({ "version": 1, "environment": keys });
     vec![
@@ -39,9 +44,14 @@ fn scenes() -> Vec<Value> {
                     }]
                 },
                 { "name": "turned", "mesh": "a.obj", "up": "x", "forward": "y", "material": "mine" },
+                {
+                    "name": "c", "car": {}, "path": path(),
+                    "copies": [{ "path": path() }]
+                },
                 { "name": "b", "car": {}, "materials": { "plastic-black": "rubber" } }
             ]
         }),
+        json!({ "version": 1, "sensor": { "path": path() } }),
         json!({
             "version": 1,
             "environment": "night",

@@ -122,7 +122,7 @@ pub(super) fn trial(
         lowest_sample: samples.iter().map(|sample| sample.height).fold(f64::NAN, f64::min),
         predicted: geometry::predict(design, &scene),
         row_apart: libm::tan(down) * f64::from(distance),
-        stands: scene.sensor.pose.position[2],
+        stands: scene.sensor.at_start().position[2],
         edge: libm::tan(-bottom) * f64::from(distance),
         bias,
         error,
@@ -167,12 +167,14 @@ fn is_target(scene: &Scene, object: u16) -> bool {
 
 /// The rays of the sensor that meet the car first, in the order of the cloud.
 fn samples_on_car(design: &Design, scene: &Scene) -> Vec<Sample> {
-    let world_from_sensor = scene.sensor.pose.world_from_sensor();
+    let world_from_sensor = scene.sensor.at_start().world_from_sensor();
     let columns = design.scan.columns as usize;
     let sample = |pixel: usize| {
         let aim = design.directions().of((pixel / columns) as u16, (pixel % columns) as u16);
-        let ray =
-            Ray { origin: scene.sensor.pose.position, direction: world_from_sensor.direction(aim) };
+        let ray = Ray {
+            origin: scene.sensor.at_start().position,
+            direction: world_from_sensor.direction(aim),
+        };
         let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range)?;
         let height = ray.origin[2] + ray.direction[2] * hit.range;
         is_target(scene, hit.object).then_some(Sample { pixel, material: hit.material, height })

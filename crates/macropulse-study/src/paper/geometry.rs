@@ -72,12 +72,12 @@ pub fn predict(design: &Design, scene: &Scene) -> Prediction {
 fn silhouette(design: &Design, scene: &Scene, window: Extent) -> Option<(Extent, usize)> {
     let at = |[from, to]: [f64; 2], i: usize| from + (to - from) * (i as f64 + 0.5) / GRID as f64;
     let half = |[from, to]: [f64; 2]| (to - from) / GRID as f64 / 2.0;
-    let world_from_sensor = scene.sensor.pose.world_from_sensor();
+    let world_from_sensor = scene.sensor.at_start().world_from_sensor();
     let meets_target = |elevation: f64, azimuth: f64| {
         let (sin_a, cos_a) = libm::sincos(azimuth);
         let (sin_e, cos_e) = libm::sincos(elevation);
         let direction = world_from_sensor.direction([cos_e * cos_a, cos_e * sin_a, sin_e]);
-        let ray = Ray { origin: scene.sensor.pose.position, direction };
+        let ray = Ray { origin: scene.sensor.at_start().position, direction };
         let hit = scene.cast(&ray, design.scan.min_range, design.scan.max_range);
         hit.is_some_and(|hit| scene.objects[usize::from(hit.object)].is_target)
     };

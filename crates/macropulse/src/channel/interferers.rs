@@ -164,14 +164,14 @@ struct Direct {
 impl Direct {
     /// `None` where something hides the other, or it is too far away.
     fn of(scene: &Scene, other: &Interferer, farthest: f64) -> Option<Self> {
-        let way =
-            [0, 1, 2].map(|axis| other.pose.position[axis] - scene.sensor.pose.position[axis]);
+        let way = [0, 1, 2]
+            .map(|axis| other.pose.position[axis] - scene.sensor.at_start().position[axis]);
         let distance = way.iter().map(|part| part * part).sum::<f64>().sqrt();
         if !(APERTURE_RADIUS..=farthest).contains(&distance) {
             return None;
         }
         let towards = way.map(|part| part / distance);
-        let back = scene.sensor.pose.sensor_from_world().direction(towards);
+        let back = scene.sensor.at_start().sensor_from_world().direction(towards);
         if !scene.sees(towards, distance) {
             return None;
         }

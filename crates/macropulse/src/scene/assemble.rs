@@ -13,7 +13,7 @@ use glam::DVec3;
 use super::car;
 use super::closed_form::{Shape, Solid};
 use super::error::Error;
-use super::file::{Axis, Ground, ObjectTyped, SceneFile, Source, Stand, Unit, object_names};
+use super::file::{Axis, Ground, ObjectTyped, SceneFile, Source, Unit, object_names};
 use super::inside;
 use super::interferer;
 use super::material::Material;
@@ -26,6 +26,7 @@ use super::pose::Pose;
 use super::readers::{self, Reach, Read, WithoutMaterials};
 use super::room::Room;
 use super::spanned::Spanned;
+use super::stand::Stand;
 use super::typed::{FARTHEST, is_length};
 use super::{Object, Scene};
 use crate::digest::Digest;
@@ -87,14 +88,14 @@ pub(super) fn scene(
     assembly.define(&file)?;
     let environment = assembly.environment(&file)?;
     let sensor = assembly.motion("sensor", &file.sensor)?;
-    if file.sensor.position_m.is_none() {
+    if file.sensor.position_m.is_none() && file.sensor.path.is_none() {
         assembly.notes.push("sensor: no position_m given, it stands at the origin".to_owned());
     }
     if sensor.moves() {
         let note = "sensor: each point is in its frame at the time of the point, not deskewed";
         assembly.notes.push(note.to_owned());
     }
-    let stands = sensor.pose.position;
+    let stands = sensor.at_start().position;
     if let Some(ground) = &file.ground {
         let height = assembly.ground(ground)?;
         let below = height - stands[2];
@@ -114,7 +115,7 @@ pub(super) fn scene(
     }
     if let (Some(other), false) = (file.interferers.first(), assembly.moving.is_empty()) {
         let message = "other lidars are not simulated where something moves; remove [[interferers]] \
-                       or every velocity_m_s and turn_rate_deg_s";
+                       or every velocity_m_s, turn_rate_deg_s and path";
         return Err(source.fault(other.span(), message));
     }
     let pose = |stand: &Stand| source.pose(stand);
@@ -185,6 +186,7 @@ impl Assembly<'_> {
         let spans = [
             ground.velocity_m_s.as_ref().map(|typed| typed.span()),
             ground.turn_rate_deg_s.as_ref().map(|typed| typed.span()),
+            ground.path.as_ref().map(|typed| typed.span()),
         ];
         if let Some(span) = spans.into_iter().flatten().next() {
             let message = "the ground cannot move; let the sensor and the objects move over it";
@@ -273,13 +275,11 @@ impl Assembly<'_> {
         }
         let mut at = Vec::new();
         let mut moving = Vec::new();
-        for mut motion in motions {
-            let place = stand(&mut known.footing, &motion.pose, written.rest_on_ground);
-            if motion.moves() {
-                motion.pose.position = place.point([0.0; 3]);
-                moving.push(motion);
-            } else {
-                at.push(place);
+        for motion in motions {
+            let mut place = |pose: &Pose| stand(&mut known.footing, pose, written.rest_on_ground);
+            match &motion {
+                Motion::Still(pose) => at.push(place(pose)),
+                _ => moving.push(motion.placed(|pose| place(pose).point([0.0; 3]))),
             }
         }
         let material_indices = self.material_indices(&name, written, &mesh)?;
@@ -357,7 +357,7 @@ impl Assembly<'_> {
         let motion = self.source.motion(stand)?;
         if motion.moves() {
             self.notes.push(format!("{name}: {}", motion.told()));
-            self.moving.push(Moving { name: name.to_owned(), motion });
+            self.moving.push(Moving { name: name.to_owned(), motion: motion.clone() });
         }
         Ok(motion)
     }

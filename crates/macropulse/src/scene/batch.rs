@@ -55,6 +55,7 @@ struct Surface {
 impl<'a> Batch<'a> {
     /// No rays yet, that are to be followed to `farthest`.
     pub(super) fn new(scene: &'a Scene, farthest: f64) -> Self {
+        let pose = scene.sensor.at_start();
         Self {
             scene,
             through: scene.materials.iter().map(|known| known.transmission as f32).collect(),
@@ -62,10 +63,10 @@ impl<'a> Batch<'a> {
             sensor_moves: scene.sensor.moves(),
             now_fs: 0,
             begin: [0.0; 3],
-            pose: scene.sensor.pose,
-            world_from_sensor: scene.sensor.pose.world_from_sensor(),
+            pose,
+            world_from_sensor: pose.world_from_sensor(),
             aims: [[0.0; LANES]; 3],
-            packet: Packet::from(scene.sensor.pose.position),
+            packet: Packet::from(pose.position),
             packet_hits: PacketHits::default(),
             count: 0,
             shot: [0; LANES],

@@ -45,11 +45,21 @@ impl Digest {
 
     /// Takes in a motion: nothing but the pose of what stands still.
     pub(super) fn motion(&mut self, motion: &Motion) {
-        self.pose(&motion.pose);
-        if motion.moves() {
-            self.bytes(b"moves");
-            motion.velocity.iter().for_each(|value| self.number(*value));
-            self.number(motion.turn_rate);
+        match motion {
+            Motion::Still(pose) => self.pose(pose),
+            Motion::Steady { pose, velocity, turn_rate } => {
+                self.pose(pose);
+                self.bytes(b"moves");
+                self.numbers(velocity);
+                self.number(*turn_rate);
+            }
+            Motion::Path(path) => {
+                self.bytes(b"path");
+                for (time_fs, pose) in path.poses() {
+                    self.bytes(&time_fs.to_le_bytes());
+                    self.pose(&pose);
+                }
+            }
         }
     }
 

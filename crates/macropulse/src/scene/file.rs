@@ -12,6 +12,7 @@ use toml::Table;
 use super::error::Error;
 use super::schema;
 use super::spanned::{Spanned, Triple};
+use super::stand::{Stand, WaypointTyped};
 use crate::names::{key_at, line_column, offset_of_key};
 use crate::schema::{Refusal, read_text};
 
@@ -97,30 +98,6 @@ impl InterfererTyped {
     }
 }
 
-/// `[sensor]`, and each entry of `copies`.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Stand {
-    /// Where it stands, m: x forward, y left, z up.
-    pub position_m: Option<Spanned<Triple>>,
-    /// Turn to the left, degrees.
-    #[schemars(range(min = -36000, max = 36000))]
-    pub yaw_deg: Option<Spanned<f64>>,
-    /// Tilt, degrees: positive looks down.
-    #[schemars(range(min = -36000, max = 36000))]
-    pub pitch_deg: Option<Spanned<f64>>,
-    /// Roll, degrees: positive lifts the left side.
-    #[schemars(range(min = -36000, max = 36000))]
-    pub roll_deg: Option<Spanned<f64>>,
-    /// Motion in the world, m/s; the position is where it is when the first scan begins.
-    #[serde(default)]
-    #[schemars(schema_with = "schema::velocity")]
-    pub velocity_m_s: Option<Spanned<Triple>>,
-    /// Turn about the vertical axis through the position, degrees per second, positive to the left.
-    #[schemars(range(min = -1e5, max = 1e5))]
-    pub turn_rate_deg_s: Option<Spanned<f64>>,
-}
-
 /// `ground = { … }`
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -135,6 +112,8 @@ pub(super) struct Ground {
     pub velocity_m_s: Option<Spanned<toml::Value>>,
     #[schemars(skip)]
     pub turn_rate_deg_s: Option<Spanned<toml::Value>>,
+    #[schemars(skip)]
+    pub path: Option<Spanned<toml::Value>>,
 }
 
 /// `[[material]]`
@@ -203,6 +182,9 @@ pub(super) struct ObjectTyped {
     /// Turn about the vertical axis through the position, degrees per second, positive to the left.
     #[schemars(range(min = -1e5, max = 1e5))]
     pub turn_rate_deg_s: Option<Spanned<f64>>,
+    /// Poses at ascending times, in place of all that is above: straight on and evenly turning in between.
+    #[schemars(length(min = 2))]
+    pub path: Option<Spanned<Vec<Spanned<WaypointTyped>>>>,
     /// Whether the object is lifted so that its lowest point is at its z.
     #[serde(default)]
     pub rest_on_ground: bool,
@@ -233,6 +215,7 @@ impl ObjectTyped {
             roll_deg: self.roll_deg.clone(),
             velocity_m_s: self.velocity_m_s.clone(),
             turn_rate_deg_s: self.turn_rate_deg_s.clone(),
+            path: self.path.clone(),
         }
     }
 }

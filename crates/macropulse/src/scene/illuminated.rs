@@ -77,7 +77,7 @@ impl Scene {
     /// Whether nothing stands between the sensor and a point `distance` metres away in the
     /// direction of the unit vector `direction`, given in the world.
     pub fn sees(&self, direction: [f64; 3], distance: f64) -> bool {
-        let ray = super::Ray { origin: self.sensor.pose.position, direction };
+        let ray = super::Ray { origin: self.sensor.at_start().position, direction };
         self.cast(&ray, 0.0, distance - BEFORE).is_none()
     }
 }
@@ -116,7 +116,7 @@ impl<'a> Light<'a> {
     ) -> Self {
         Self {
             scene,
-            to_sensor: scene.sensor.pose.sensor_from_world(),
+            to_sensor: scene.sensor.at_start().sensor_from_world(),
             farthest,
             line_of_sight,
             packet: Packet::from(interferer.pose.position),
@@ -169,7 +169,7 @@ impl<'a> Light<'a> {
         let along = DVec3::from(self.packet.along(lane));
         let there = self.packet.range[lane];
         let place = DVec3::from(self.packet.origin) + along * there;
-        let way = place - DVec3::from(self.scene.sensor.pose.position);
+        let way = place - DVec3::from(self.scene.sensor.at_start().position);
         let back = way.length();
         if !(BEFORE..=self.farthest).contains(&back) {
             return None;
@@ -190,7 +190,7 @@ impl<'a> Light<'a> {
 
     /// Casts a packet of rays from the sensor to waiting points, and keeps those that nothing hides.
     fn keep_visible(&mut self) {
-        let mut packet = Packet::from(self.scene.sensor.pose.position);
+        let mut packet = Packet::from(self.scene.sensor.at_start().position);
         let count = self.waiting.len().min(LANES);
         for (lane, (point, view)) in self.waiting[..count].iter().enumerate() {
             packet.set(lane, view.to_array(), point.ways.1 - BEFORE);

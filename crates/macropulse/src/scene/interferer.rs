@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::error::Error;
-use super::file::{InterfererTyped, Source, Stand};
+use super::file::{InterfererTyped, Source};
 use super::pose::Pose;
 use super::spanned::Spanned;
+use super::stand::Stand;
 use crate::design::{Design, preset_text};
 use crate::digest::Digest;
 use crate::emit::Clock;

@@ -41,8 +41,9 @@ impl MovingShape {
     /// The shape where it is when the first scan begins.
     pub(super) fn at_first(&self) -> Solid {
         let Self { solid, motion } = self;
-        let place = motion.pose.world_from_sensor();
-        let pose = Pose { position: place.point(solid.pose().position), ..motion.pose };
+        let first = motion.at_start();
+        let place = first.world_from_sensor();
+        let pose = Pose { position: place.point(solid.pose().position), ..first };
         Solid::new(solid.shape(), pose, solid.material(), solid.object())
     }
 }
@@ -128,7 +129,7 @@ mod tests {
     fn a_mover_is_met_where_it_is_at_the_time() {
         let mut chance = ChaCha8Rng::seed_from_u64(41);
         let pose = Pose::turned([20.0, -3.0, 1.0], [0.3, 0.2, -0.4]);
-        let motion = Motion { pose, velocity: [2.0, 5.0, -1.0], turn_rate: 2.5 };
+        let motion = Motion::steady(pose, [2.0, 5.0, -1.0], 2.5);
         let shapes = [
             Shape::Box { half: [3.0, 1.0, 0.5] },
             Shape::Sphere { radius: 2.0 },
@@ -143,8 +144,10 @@ mod tests {
             let origin = [0; 3].map(|_| chance.random_range(-9.0..9.0));
             let aim = DVec3::from(motion.at(time_fs).position) + beside - DVec3::from(origin);
             let ray = Ray { origin, direction: aim.normalize().to_array() };
-            let [one, other] =
-                [mover(shape, motion).cast(&ray, time_fs, (0.0, 1e3)), still.cast(&ray, 0.0, 1e3)];
+            let [one, other] = [
+                mover(shape, motion.clone()).cast(&ray, time_fs, (0.0, 1e3)),
+                still.cast(&ray, 0.0, 1e3),
+            ];
             assert_eq!(one.is_some(), other.is_some());
             let (Some(one), Some(other)) = (one, other) else { continue };
             met += 1;
@@ -157,7 +160,7 @@ mod tests {
 
     #[test]
     fn what_lies_outside_the_asked_ranges_is_not_met() {
-        let ball = mover(Shape::Sphere { radius: 1.0 }, Motion::still(Pose::at([10.0, 0.0, 0.0])));
+        let ball = mover(Shape::Sphere { radius: 1.0 }, Motion::Still(Pose::at([10.0, 0.0, 0.0])));
         let ray = Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0] };
         let range = |from, to| ball.cast(&ray, 0, (from, to)).map(|hit| hit.range);
         assert_eq!(range(0.0, 100.0), Some(9.0));

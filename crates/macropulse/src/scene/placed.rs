@@ -128,7 +128,8 @@ pub(super) fn movers(placed: &[Placed]) -> Vec<Mover> {
             None => Arc::new(one.model()),
         };
         let reach = one.reach();
-        let mover = |motion: &Motion| Mover::mesh((Arc::clone(&model), reach), one.object, *motion);
+        let mover =
+            |motion: &Motion| Mover::mesh((Arc::clone(&model), reach), one.object, motion.clone());
         movers.extend(one.moving.iter().map(mover));
         models.push((one, model));
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::{DMat3, DQuat};
+use glam::{DMat3, DQuat, DVec3};
 
 /// A pitch so near ±90° that yaw and roll turn about one axis, as the sine or cosine of half of what is
 /// left.
@@ -77,11 +77,39 @@ impl Rotation {
         [w, x, y, z]
     }
 
+    /// The turn about one axis that carries this rotation over to `other` the shorter way: its axis in
+    /// the frame of this rotation, and its angle, rad, from 0 to π.
+    pub(super) fn way_to(self, other: Self) -> Turn {
+        let between = self.0.conjugate() * other.0;
+        let (across, along) = (between.xyz().length(), between.w);
+        let half = libm::atan2(across, along.abs());
+        let sign = if along < 0.0 { -1.0 } else { 1.0 };
+        let axis = between.xyz().try_normalize().unwrap_or(DVec3::ZERO) * sign;
+        Turn { axis, angle: 2.0 * half }
+    }
+
+    /// This rotation after `turn` in its own frame.
+    #[inline]
+    pub(super) fn turned(self, turn: &Turn, share: f64) -> Self {
+        let (sin, cos) = libm::sincos(turn.angle * share / 2.0);
+        let [x, y, z] = (turn.axis * sin).to_array();
+        Self(self.0 * DQuat::from_xyzw(x, y, z, cos))
+    }
+
     /// The matrix of the rotation.
     #[inline]
     pub(super) fn matrix(&self) -> DMat3 {
         DMat3::from_quat(self.0)
     }
+}
+
+/// A turn about one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Turn {
+    /// Unit vector; zero where there is no turn.
+    axis: DVec3,
+    /// rad, from 0 to π.
+    pub angle: f64,
 }
 
 /// `angle` from −π to π.
@@ -96,7 +124,6 @@ fn wrapped(angle: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -148,5 +175,22 @@ mod tests {
             assert!((turn * axis).abs_diff_eq(rotation.matrix() * axis, 1e-15));
         }
         assert_eq!(Rotation::default().quaternion(), [1.0, 0.0, 0.0, 0.0]);
+    }
+
+    /// Known answer: a turn about one axis is as far along as the share of its angle; of two ways round
+    /// the shorter one is taken.
+    #[test]
+    fn a_turn_goes_the_shorter_way_evenly() {
+        let axis = DVec3::new(1.0, -2.0, 0.5).normalize();
+        let first = Rotation::from_angles([0.4, 0.3, -0.9]);
+        let by = |angle| Rotation(first.0 * DQuat::from_axis_angle(axis, angle));
+        for (angle, shorter) in [(1.2, 1.2), (4.0, 4.0 - TAU), (0.0, 0.0)] {
+            let way = first.way_to(by(angle));
+            assert!((way.angle - shorter.abs()).abs() < 1e-15 * 8.0);
+            for share in [0.0, 0.25, 0.7, 1.0] {
+                let there = first.turned(&way, share).matrix();
+                assert!(there.abs_diff_eq(by(share * shorter).matrix(), 1e-14));
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What single keys of a scene file mean, and what they may be: poses, motions, shapes, numbers.
+//! What single keys of a scene file mean, and what they may be: shapes, numbers.
 
 use std::ops::Range;
 
@@ -6,10 +6,8 @@ use glam::DVec3;
 
 use super::closed_form::Shape;
 use super::error::Error;
-use super::file::{ObjectTyped, ShapeTyped, Source, Stand};
-use super::motion::{FASTEST, FASTEST_TURN_DEG, Motion};
+use super::file::{ObjectTyped, ShapeTyped, Source};
 use super::person::{self, Part};
-use super::pose::Pose;
 use super::spanned::{Spanned, Triple};
 
 /// Coordinates and sizes are no more than this, m: 250 times round the Earth, so that a map
@@ -17,70 +15,12 @@ use super::spanned::{Spanned, Triple};
 /// multiplied.
 pub(super) const FARTHEST: f64 = 1e10;
 
-/// Angles are no more than this, degrees: a hundred turns.
-const MOST_TURNED: f64 = 36_000.0;
-
 /// Whether `length` is a coordinate or a size that something may have.
 pub(super) fn is_length(length: f64) -> bool {
     length.abs() <= FARTHEST
 }
 
 impl Source<'_> {
-    /// Where something stands and how it moves.
-    pub(super) fn motion(&self, stand: &Stand) -> Result<Motion, Error> {
-        let mut motion = Motion::still(self.pose(stand)?);
-        if let Some(typed) = &stand.velocity_m_s {
-            let Triple(velocity) = *typed.get_ref();
-            let speed = DVec3::from(velocity).length();
-            if !(0.0..=FASTEST).contains(&speed) {
-                let message = format!(
-                    "velocity_m_s must be three finite numbers, {FASTEST} m/s together at most"
-                );
-                return Err(self.fault(typed.span(), message));
-            }
-            motion.velocity = velocity;
-        }
-        if let Some(typed) = &stand.turn_rate_deg_s {
-            let rate = *typed.get_ref();
-            if !(-FASTEST_TURN_DEG..=FASTEST_TURN_DEG).contains(&rate) {
-                let most = FASTEST_TURN_DEG;
-                let message =
-                    format!("turn_rate_deg_s is {rate}; it must be from -{most} to {most}");
-                return Err(self.fault(typed.span(), message));
-            }
-            motion.turn_rate = rate.to_radians();
-        }
-        Ok(motion)
-    }
-
-    /// Where something stands.
-    pub(super) fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
-        let mut position = [0.0; 3];
-        if let Some(typed) = &stand.position_m {
-            Triple(position) = *typed.get_ref();
-            if !position.iter().all(|value| is_length(*value)) {
-                let message =
-                    format!("position_m must be three finite numbers, to {FARTHEST:e} m at most");
-                return Err(self.fault(typed.span(), message));
-            }
-        }
-        let angle = |typed: &Option<Spanned<f64>>, key: &str| match typed {
-            Some(typed) if typed.get_ref().abs() <= MOST_TURNED => Ok(typed.get_ref().to_radians()),
-            Some(typed) => {
-                let message =
-                    format!("{key} must be a number from -{MOST_TURNED} to {MOST_TURNED}");
-                Err(self.fault(typed.span(), message))
-            }
-            None => Ok(0.0),
-        };
-        let angles = [
-            angle(&stand.yaw_deg, "yaw_deg")?,
-            angle(&stand.pitch_deg, "pitch_deg")?,
-            angle(&stand.roll_deg, "roll_deg")?,
-        ];
-        Ok(Pose::turned(position, angles))
-    }
-
     /// The parts of a shape about the position of its object.
     pub(super) fn shape(&self, typed: &Spanned<ShapeTyped>) -> Result<Vec<Part>, Error> {
         let fault = |message: &str| self.fault(typed.span(), message);
@@ -184,36 +124,5 @@ impl Source<'_> {
                 Err(self.fault(typed.span(), message))
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn motion(keys: &str) -> Result<Motion, String> {
-        let text = format!("version = 1\n[sensor]\n{keys}");
-        let source = Source::typed(&text, "a.toml");
-        let file = source.parse().unwrap();
-        source.motion(&file.sensor).map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn a_motion_is_read_in_si_units() {
-        let read =
-            motion("position_m = [1, 2, 3]\nvelocity_m_s = [4, 5, 6]\nturn_rate_deg_s = -90");
-        let turn_rate = -std::f64::consts::FRAC_PI_2;
-        let pose = Pose::at([1.0, 2.0, 3.0]);
-        assert_eq!(read, Ok(Motion { pose, velocity: [4.0, 5.0, 6.0], turn_rate }));
-        assert_eq!(motion(""), Ok(Motion::default()));
-    }
-
-    #[test]
-    fn the_fastest_motion_is_read_and_nothing_faster() {
-        let told = |keys| motion(keys).unwrap_err();
-        assert!(motion("velocity_m_s = [-1e4, 0, 0]\nturn_rate_deg_s = -1e5").is_ok());
-        assert!(told("velocity_m_s = [0, 1.0001e4, 0]").contains("10000 m/s together at most"));
-        assert!(told("turn_rate_deg_s = -1.0001e5").contains("from -100000 to 100000"));
-        assert!(told("turn_rate_deg_s = nan").contains("turn_rate_deg_s is NaN"));
     }
 }

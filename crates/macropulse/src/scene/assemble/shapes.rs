@@ -36,19 +36,21 @@ impl Assembly<'_> {
             });
         }
         for motion in motions {
-            let mut motion = *motion;
-            if written.rest_on_ground {
-                let depth = |part: &Part| part.depth_below(&motion.pose);
-                let deepest = parts.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
-                motion.pose.position[2] += deepest;
-            }
+            let motion = motion.placed(|pose| {
+                let [x, y, z] = pose.position;
+                if !written.rest_on_ground {
+                    return [x, y, z];
+                }
+                let depth = |part: &Part| part.depth_below(pose);
+                [x, y, z + parts.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)]
+            });
             for (part, &material) in parts.iter().zip(&materials) {
                 let solid = |pose| Solid::new(part.shape, pose, material, object);
-                if motion.moves() {
-                    let solid = solid(Pose::at(part.at));
-                    self.moving_shapes.push(MovingShape { solid, motion });
+                if let Motion::Still(pose) = &motion {
+                    self.solids.push(solid(part.pose(pose)));
                 } else {
-                    self.solids.push(solid(part.pose(&motion.pose)));
+                    let solid = solid(Pose::at(part.at));
+                    self.moving_shapes.push(MovingShape { solid, motion: motion.clone() });
                 }
             }
         }

@@ -121,7 +121,7 @@ fn a_packet_meets_movers_at_the_times_of_its_rays() {
     let facets = egg(20).iter().map(facet).collect();
     let model = std::sync::Arc::new(Facets::new(facets, [0.0; 3]));
     let poses = poses(&mut chance, 20);
-    let motion = |pose: &Pose| Motion { pose: *pose, velocity: [9.0, -5.0, 2.0], turn_rate: 3.0 };
+    let motion = |pose: &Pose| Motion::steady(*pose, [9.0, -5.0, 2.0], 3.0);
     let mover = |(object, pose): (u16, &Pose)| {
         Mover::mesh((std::sync::Arc::clone(&model), 2.0), object, motion(pose))
     };
