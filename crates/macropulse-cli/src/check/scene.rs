@@ -109,16 +109,17 @@ fn waypoint((time_fs, pose): (i64, Pose)) -> Value {
 fn told(other: &Interferer) -> String {
     let (phase, drift) = (phase_ns(other), short(drift_ppm(other)));
     let (name, sensor) = (&other.name, &other.design.name);
-    let stands = stands(&other.pose);
+    let stands = stands(&other.motion.at_start());
     format!("{name}: {sensor}, {stands}; reads 0 at {phase} ns of ours, {drift} ppm fast")
 }
 
 fn json(other: &Interferer) -> Value {
-    let [yaw, pitch, roll] = other.pose.rotation.angles_deg();
+    let pose = other.motion.at_start();
+    let [yaw, pitch, roll] = pose.rotation.angles_deg();
     json!({
         "name": other.name,
         "sensor": other.design.name,
-        "position_m": other.pose.position,
+        "position_m": pose.position,
         "yaw_deg": yaw,
         "pitch_deg": pitch,
         "roll_deg": roll,

@@ -57,9 +57,9 @@ fn scenes() -> Vec<Value> {
             "environment": "night",
             "interferers": [{
                 "sensor": "peregrine", "name": "c", "set": { "scan.max_range_m": 9 },
-                "position_m": at, "yaw_deg": 1, "pitch_deg": 1, "roll_deg": 1, "phase_ns": 1,
-                "drift_ppm": 1
-            }]
+                "position_m": at, "yaw_deg": 1, "pitch_deg": 1, "roll_deg": 1,
+                "velocity_m_s": [1, 0, 0], "turn_rate_deg_s": 1, "phase_ns": 1, "drift_ppm": 1
+            }, { "sensor": "vlp-16", "path": path() }]
         }),
         environment(json!({
             "base": "clear-day", "sky": "day", "sun_elevation_deg": 30, "albedo": 0.2,

@@ -14,20 +14,22 @@
 //!
 //!    n = K · exp(−r²/s²) · exp(−σ·D) / s², s² = a² + b²/2
 //!
-//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ from D metres away. The edge of the
+//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ that begins D metres away. The edge of the
 //!    aperture is taken to be Gaussian, so that the formula holds for a beam that is narrower than
-//!    the aperture as for one that is wider.
+//!    the aperture as for one that is wider. a is that of the sensor's link budget ([`aperture_radius`]).
+//!
+//! All of it is where it is when the shot is fired.
 
 use std::ops::Range;
 
-use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains, Transmitter};
+use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains};
 use crate::design::Design;
 use crate::emit::shot_at;
-use crate::scene::{Finish, Illuminated, Interferer, LineOfSight, Scene};
+use crate::scene::{Ends, Finish, Illuminated, LineOfSight, Mount, Pair, Ray, Scene};
 use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
 use macropulse_codec::ShotLog;
 
-/// Radius of every aperture, m: what sensor files leave unsaid.
+/// Radius of the aperture of a sensor without a link budget, m: what its file leaves unsaid.
 pub const APERTURE_RADIUS: f64 = 12.5e-3;
 
 /// Light that brings fewer photons per mark is left out.
@@ -42,64 +44,69 @@ const FLANKS: f64 = 4.0;
 /// Number of the direct way; those before it are the rays of a footprint.
 const DIRECT: u32 = 31;
 
-/// Adds the light of the scene's interferers that reaches the sensor `design` while it listens to
+/// Adds the light of the transmitter of this `number` that reaches the sensor of its `pair` while that listens to
 /// the shots of `log`.
-pub(super) fn add<'a>(light: &mut Light<'a>, design: &Design, scene: &'a Scene, log: &ShotLog) {
-    for (number, other) in scene.interferers.iter().enumerate() {
-        light.transmitters.push(Transmitter::of(&other.design, other.clock.stretch()));
-        let Some(link) = Link::of_interferer(design, &other.design, &scene.environment) else {
-            continue;
+pub(super) fn add(
+    light: &mut Light<'_>,
+    number: u16,
+    pair: Pair<'_>,
+    scene: &Scene,
+    log: &ShotLog,
+) {
+    let (design, other) = (pair.to.design, pair.from.design);
+    let Some(link) = Link::of_interferer(design, other, &scene.environment) else { return };
+    let around_fs = around_fs(&pair.from);
+    let farthest = design.scan.light_range.max(other.scan.light_range);
+    let mut direct = Direct::of(scene, pair, 2.0 * farthest);
+    let finishes = scene.finishes(other.light.wavelength);
+    let longest_fs = fs_from_s(2.0 * farthest / SPEED_OF_LIGHT);
+    for open in listening(design, log, around_fs) {
+        let channel = |pixel| channel_of(design, log, pixel);
+        let mut arrivals = Arrivals {
+            transmitter: number,
+            link,
+            channel: &channel,
+            pulses: pulses_of(&pair.from),
+            open: open.clone(),
+            trains: &mut light.trains,
         };
-        let around_fs = around_fs(other);
-        let farthest = design.scan.light_range.max(other.design.scan.light_range);
-        let direct = Direct::of(scene, other, 2.0 * farthest);
-        let finishes = scene.finishes(other.design.light.wavelength);
-        let longest_fs = fs_from_s(2.0 * farthest / SPEED_OF_LIGHT);
-        for open in listening(design, log, around_fs) {
-            let channel = |pixel| channel_of(design, log, pixel);
-            let (transmitter, trains) = (number as u16 + 1, &mut light.trains);
-            let pulses = pulses_of(other);
-            let mut arrivals = Arrivals {
-                transmitter,
-                link,
-                channel: &channel,
-                pulses,
-                open: open.clone(),
-                trains,
-            };
-            for theirs in other.clock.shots(&other.design, open.start - longest_fs..open.end) {
-                let look = |shot: usize, direction, way: f64| {
-                    let arrives_fs = theirs.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
-                    if !open.contains(&arrives_fs) {
-                        return None;
-                    }
-                    let pixel = design.scan.pixel_at(direction)?;
-                    listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
-                };
-                let lit = scene.illuminated(other, &theirs, farthest, &look);
-                arrivals.add_reflected(&finishes, &theirs, &lit);
-                if let Some(direct) = &direct {
-                    arrivals.add_direct((other, direct), &theirs, &look);
+        for theirs in pair.from.begins.shots(other, open.start - longest_fs..open.end) {
+            let look = |shot: usize, direction, way: f64| {
+                let arrives_fs = theirs.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
+                if !open.contains(&arrives_fs) {
+                    return None;
                 }
-            }
+                let pixel = design.scan.pixel_at(direction)?;
+                listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
+            };
+            let lit = scene.illuminated(pair, &theirs, farthest, &look);
+            arrivals.add_reflected(&finishes, &theirs, &lit);
+            arrivals.add_direct(&mut direct, &theirs, &look);
         }
     }
 }
 
+/// Radius of the aperture of `ours`, m. Without a link budget its receiver is taken to be like that of the
+/// `other` lidar, and if that has none either the aperture is [`APERTURE_RADIUS`].
+fn aperture_radius(ours: &Design, other: &Design) -> f64 {
+    let known = ours.budget.as_ref().or(other.budget.as_ref());
+    known.map_or(APERTURE_RADIUS, |budget| budget.aperture / 2.0)
+}
+
 /// How long light may arrive before and after the first chip of a shot, fs: the micropulse has some
 /// before it, and behind the last chip.
-fn around_fs(other: &Interferer) -> (i64, i64) {
-    let Design { emission, light, .. } = &other.design;
+fn around_fs(other: &Mount<'_>) -> (i64, i64) {
+    let Design { emission, light, .. } = other.design;
     let length = emission.length_fs() as f64;
     let micropulse = fs_from_s(FLANKS * light.pulse);
-    (micropulse, (length * other.clock.stretch()) as i64 + micropulse)
+    (micropulse, (length * other.begins.stretch()) as i64 + micropulse)
 }
 
 /// Pulses of a burst of `other`, and the interval between two by the clock of the receiver, fs; a single one
 /// of a macropulse.
-fn pulses_of(other: &Interferer) -> (u64, f64) {
+fn pulses_of(other: &Mount<'_>) -> (u64, f64) {
     other.design.emission.burst().map_or((1, 0.0), |burst| {
-        (burst.pulses.into(), burst.interval_fs as f64 * other.clock.stretch())
+        (burst.pulses.into(), burst.interval_fs as f64 * other.begins.stretch())
     })
 }
 
@@ -150,39 +157,76 @@ fn channel_of(design: &Design, log: &ShotLog, pixel: (u16, u16)) -> u16 {
     }
 }
 
-/// The aperture as another lidar sees it, with nothing in between.
-struct Direct {
+/// The aperture of the sensor as the beams of another lidar see it, one after the other.
+struct Direct<'a> {
+    scene: &'a Scene,
+    pair: Pair<'a>,
+    aperture: f64,
+    farthest: f64,
+    /// Where both are.
+    ends: Ends,
+    /// Where the beam begins, in the frame of the other, m.
+    begin: [f64; 3],
+    /// The way from there; `None` if it is too long.
+    sight: Option<Sight>,
+}
+
+/// From where a beam begins to the aperture.
+struct Sight {
     /// Unit vector in the frame of the other.
     direction: [f64; 3],
     distance: f64,
-    /// Unit vector in our own frame, back to the other.
-    back: [f64; 3],
+    /// From the aperture back to where the beam begins, in the world.
+    back: Ray,
+    /// The same way in the frame of the sensor.
+    looks: [f64; 3],
     /// a² + b²/2, m².
     spread: f64,
 }
 
-impl Direct {
-    /// `None` where something hides the other, or it is too far away.
-    fn of(scene: &Scene, other: &Interferer, farthest: f64) -> Option<Self> {
-        let way = [0, 1, 2]
-            .map(|axis| other.pose.position[axis] - scene.sensor.at_start().position[axis]);
+impl<'a> Direct<'a> {
+    fn of(scene: &'a Scene, pair: Pair<'a>, farthest: f64) -> Self {
+        let aperture = aperture_radius(pair.to.design, pair.from.design);
+        let (ends, begin) = (pair.at(0), [0.0; 3]);
+        let direct = Self { scene, pair, aperture, farthest, ends, begin, sight: None };
+        Self { sight: direct.sight(), ..direct }
+    }
+
+    /// Goes on to a beam that leaves at `time_fs` and begins at this place in the frame of the other.
+    fn go_on(&mut self, time_fs: i64, begin: [f64; 3]) {
+        match self.pair.moves() {
+            true => self.ends = self.pair.at(time_fs),
+            false if begin == self.begin => return,
+            false => {}
+        }
+        self.begin = begin;
+        self.sight = self.sight();
+    }
+
+    fn sight(&self) -> Option<Sight> {
+        let Ends { from, to } = &self.ends;
+        let (begins, origin) = (from.to_world.point(self.begin), to.position);
+        let way = [0, 1, 2].map(|axis| begins[axis] - origin[axis]);
         let distance = way.iter().map(|part| part * part).sum::<f64>().sqrt();
-        if !(APERTURE_RADIUS..=farthest).contains(&distance) {
+        if !(self.aperture..=self.farthest).contains(&distance) {
             return None;
         }
         let towards = way.map(|part| part / distance);
-        let back = scene.sensor.at_start().sensor_from_world().direction(towards);
-        if !scene.sees(towards, distance) {
-            return None;
-        }
-        let light = &other.design.light;
+        let light = &self.pair.from.design.light;
         let radius = light.beam_diameter / 2.0 + distance * light.divergence / 2.0;
-        let direction = other.pose.sensor_from_world().direction(towards.map(|part| -part));
-        let spread = APERTURE_RADIUS.powi(2) + radius * radius / 2.0;
-        Some(Self { direction, distance, back, spread })
+        Some(Sight {
+            direction: from.from_world.direction(towards.map(|part| -part)),
+            distance,
+            back: Ray { origin, direction: towards },
+            looks: to.from_world.direction(towards),
+            spread: self.aperture.powi(2) + radius * radius / 2.0,
+        })
     }
+}
 
-    /// Photons per mark of a shot along the unit vector `axis`, in the frame of the other.
+impl Sight {
+    /// Photons per mark of a shot along the unit vector `axis`, in the frame of the other, if nothing is in
+    /// its way.
     fn photons(&self, link: &Link, axis: [f64; 3]) -> f64 {
         let [x, y, z] = axis;
         let [u, v, w] = self.direction;
@@ -227,20 +271,18 @@ impl Arrivals<'_> {
 
     /// Adds light of the shots in `log` that shine into the aperture while the sensor looks back along
     /// the line of sight `look`.
-    fn add_direct(
-        &mut self,
-        (other, direct): (&Interferer, &Direct),
-        log: &ShotLog,
-        look: &LineOfSight,
-    ) {
-        let directions = other.design.directions();
+    fn add_direct(&mut self, direct: &mut Direct<'_>, log: &ShotLog, look: &LineOfSight) {
+        let directions = direct.pair.from.design.directions();
         for shot in 0..log.len() {
-            let axis = directions.of(log.row[shot], log.column[shot]);
-            let photons = direct.photons(&self.link, axis);
+            let time_fs = log.fired_at_fs[shot];
+            direct.go_on(time_fs, directions.origin(log.row[shot], log.column[shot]));
+            let Some(sight) = &direct.sight else { continue };
+            let photons = sight.photons(&self.link, directions.of_shot(log, shot));
             if photons > 0.0
-                && let Some(pixel) = look(shot, direct.back, direct.distance)
+                && let Some(pixel) = look(shot, sight.looks, sight.distance)
+                && direct.scene.sees(&sight.back, sight.distance, time_fs)
             {
-                self.add((log, shot), DIRECT, (direct.distance, photons), pixel);
+                self.add((log, shot), DIRECT, (sight.distance, photons), pixel);
             }
         }
     }
@@ -298,7 +340,9 @@ mod tests {
         // 20 lines: 0.7 ms, in which all but the last few of its shots are fired.
         let log = crate::emit::Band { scan: 0, first: 0, shots: 20 * 848 }.shot_log(&design);
         let mut light = Light::default();
-        add(&mut light, &design, &scene, &log);
+        let rig = scene.rig(&design);
+        let pair = Pair { from: rig.mounts[1], to: rig.mounts[0] };
+        add(&mut light, 1, pair, &scene, &log);
         assert!(light.trains.transmitter.iter().all(|transmitter| *transmitter == 1));
         light.trains
     }

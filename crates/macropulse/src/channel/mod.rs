@@ -30,7 +30,7 @@ use macropulse_codec::ShotLog;
 
 use crate::design::Design;
 use crate::random::Chance;
-use crate::scene::{Finish, Hits, SUB_MACROPULSES, Scene, Traced};
+use crate::scene::{Finish, Hits, Mount, Pair, SUB_MACROPULSES, Scene, Traced};
 use crate::units::{fs_from_s, tof_from_range, tof_fs_from_ranges};
 
 /// A sensor in a scene, at work in the environment of the scene.
@@ -49,8 +49,10 @@ pub struct Seen<'a> {
 /// The light that reaches a sensor while it listens to the shots of `log`, which have met `traced`.
 pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
     let Seen { design, scene, operating, chance } = *seen;
+    let rig = scene.rig(design);
+    let transmitter = |mount: &Mount<'a>| Transmitter::of(mount.design, mount.begins.stretch());
     let mut light = Light {
-        transmitters: vec![Transmitter::of(design, 1.0)],
+        transmitters: rig.mounts.iter().map(transmitter).collect(),
         background: Background { steady: operating.background, ..Background::default() },
         ..Light::default()
     };
@@ -64,7 +66,11 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
         }
     }
     start_late(&mut light.trains, design, log);
-    interferers::add(&mut light, design, scene, log);
+    let interferers = (0..).zip(&rig.mounts).filter(|(_, mount)| !mount.records);
+    for (number, &from) in interferers {
+        let pair = Pair { from, to: rig.mounts[0] };
+        interferers::add(&mut light, number, pair, scene, log);
+    }
     light
 }
 

@@ -49,21 +49,17 @@ impl Operating {
     /// The sensor `design` in `scene`.
     ///
     /// # Errors
-    /// As [`Operating::of`]; and if the scene has other lidars and either they or the sensor have a
-    /// scan pattern that is no lattice: which pixel looks where is known of lattices alone.
+    /// As [`Operating::of`]; and if the scene has other lidars and the sensor has a scan pattern that is no
+    /// lattice: which pixel looks where is known of lattices alone.
     pub fn in_scene(design: &Design, scene: &Scene) -> Result<Self, Error> {
-        let scattered = |design: &&Design| !design.scan.model().is_lattice();
-        let others = scene.interferers.iter().map(|other| &other.design);
-        let first = std::iter::once(design).chain(others).find(scattered);
-        if let Some(first) = first.filter(|_| !scene.interferers.is_empty()) {
+        if !scene.interferers.is_empty() && !design.scan.model().is_lattice() {
             return Err(Error {
                 sensor: design.name.clone(),
                 environment: scene.name.clone(),
-                message: format!(
-                    "other lidars are simulated for scan patterns of rows and columns alone, not \
-                     for that of {}: take [[interferers]] out of the scene, or choose another sensor",
-                    first.name
-                ),
+                message:
+                    "light of other lidars is received by scan patterns of rows and columns alone: \
+                          take [[interferers]] out of the scene, or choose another sensor"
+                        .to_owned(),
             });
         }
         Self::of(design, &scene.environment)

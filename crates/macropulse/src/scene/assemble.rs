@@ -113,13 +113,12 @@ pub(super) fn scene(
     if shapes == 0 && assembly.placed.is_empty() {
         assembly.notes.push("the scene is empty: every ray goes to the sky".to_owned());
     }
-    if let (Some(other), false) = (file.interferers.first(), assembly.moving.is_empty()) {
-        let message = "other lidars are not simulated where something moves; remove [[interferers]] \
-                       or every velocity_m_s, turn_rate_deg_s and path";
-        return Err(source.fault(other.span(), message));
+    let motion = |stand: &Stand| source.motion(stand);
+    let (interferers, assumed) =
+        interferer::interferers((source, base), &file.interferers, motion)?;
+    for interferer in &interferers {
+        assembly.enter(&interferer.name, &interferer.motion);
     }
-    let pose = |stand: &Stand| source.pose(stand);
-    let (interferers, assumed) = interferer::interferers((source, base), &file.interferers, pose)?;
     assembly.notes.extend(assumed);
     let Assembly { materials, objects, solids, placed, moving_shapes, moving, meshes, .. } =
         assembly;
@@ -355,11 +354,16 @@ impl Assembly<'_> {
     /// Where the thing called `name` stands and how it moves; enters it among what moves.
     fn motion(&mut self, name: &str, stand: &Stand) -> Result<Motion, Error> {
         let motion = self.source.motion(stand)?;
+        self.enter(name, &motion);
+        Ok(motion)
+    }
+
+    /// Enters the thing called `name` among what moves, if it does.
+    fn enter(&mut self, name: &str, motion: &Motion) {
         if motion.moves() {
             self.notes.push(format!("{name}: {}", motion.told()));
             self.moving.push(Moving { name: name.to_owned(), motion: motion.clone() });
         }
-        Ok(motion)
     }
 
     fn object(&mut self, name: String, is_target: bool, at: Range<usize>) -> Result<u16, Error> {

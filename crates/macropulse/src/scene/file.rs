@@ -47,7 +47,7 @@ pub(super) struct SceneFile {
     /// What stands in the scene.
     #[serde(default, rename = "object")]
     pub objects: Vec<Spanned<ObjectTyped>>,
-    /// Other lidars that shine into the scene; not where anything moves.
+    /// Other lidars that shine into the scene.
     #[serde(default)]
     #[schemars(length(max = 255))]
     pub interferers: Vec<Spanned<InterfererTyped>>,
@@ -77,6 +77,16 @@ pub(super) struct InterfererTyped {
     /// Roll, degrees: positive lifts the left side.
     #[schemars(range(min = -36000, max = 36000))]
     pub roll_deg: Option<Spanned<f64>>,
+    /// Motion in the world, m/s; the position is where it is when the first scan begins.
+    #[serde(default)]
+    #[schemars(schema_with = "schema::velocity")]
+    pub velocity_m_s: Option<Spanned<Triple>>,
+    /// Turn about the vertical axis through the position, degrees per second, positive to the left.
+    #[schemars(range(min = -1e5, max = 1e5))]
+    pub turn_rate_deg_s: Option<Spanned<f64>>,
+    /// Poses at ascending times, in place of position, angles and motion: straight on and evenly turning in between.
+    #[schemars(length(min = 2))]
+    pub path: Option<Spanned<Vec<Spanned<WaypointTyped>>>>,
     /// Time of ours at which its clock reads 0, ns.
     #[schemars(range(min = -1e12, max = 1e12))]
     pub phase_ns: Option<Spanned<f64>>,
@@ -86,14 +96,16 @@ pub(super) struct InterfererTyped {
 }
 
 impl InterfererTyped {
-    /// Where the lidar stands.
+    /// Where the lidar stands, and how it moves.
     pub(super) fn stand(&self) -> Stand {
         Stand {
             position_m: self.position_m.clone(),
             yaw_deg: self.yaw_deg.clone(),
             pitch_deg: self.pitch_deg.clone(),
             roll_deg: self.roll_deg.clone(),
-            ..Stand::default()
+            velocity_m_s: self.velocity_m_s.clone(),
+            turn_rate_deg_s: self.turn_rate_deg_s.clone(),
+            path: self.path.clone(),
         }
     }
 }
@@ -182,7 +194,7 @@ pub(super) struct ObjectTyped {
     /// Turn about the vertical axis through the position, degrees per second, positive to the left.
     #[schemars(range(min = -1e5, max = 1e5))]
     pub turn_rate_deg_s: Option<Spanned<f64>>,
-    /// Poses at ascending times, in place of all that is above: straight on and evenly turning in between.
+    /// Poses at ascending times, in place of position, angles and motion: straight on and evenly turning in between.
     #[schemars(length(min = 2))]
     pub path: Option<Spanned<Vec<Spanned<WaypointTyped>>>>,
     /// Whether the object is lifted so that its lowest point is at its z.

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::error::Error;
 use super::file::{InterfererTyped, Source};
-use super::pose::Pose;
+use super::motion::Motion;
 use super::spanned::Spanned;
 use super::stand::Stand;
 use crate::design::{Design, preset_text};
@@ -29,8 +29,8 @@ pub struct Interferer {
     pub name: String,
     /// What it is.
     pub design: Design,
-    /// Where it stands and looks.
-    pub pose: Pose,
+    /// Where it is and looks, at any time.
+    pub motion: Motion,
     /// When it fires.
     pub clock: Clock,
 }
@@ -39,18 +39,18 @@ impl Digest {
     /// Takes in a lidar.
     pub(super) fn interferer(&mut self, interferer: &Interferer) {
         self.bytes(interferer.design.text.as_bytes());
-        self.pose(&interferer.pose);
+        self.motion(&interferer.motion);
         self.bytes(&interferer.clock.phase_fs.to_le_bytes());
         self.bytes(&interferer.clock.drift.to_le_bytes());
     }
 }
 
-/// Reads `[[interferers]]`; `pose` reads where one stands, sensor files are looked for in `base`.
+/// Reads `[[interferers]]`; `motion` reads where one is, sensor files are looked for in `base`.
 /// Gives what was assumed, too.
 pub(super) fn interferers(
     (source, base): (Source<'_>, &Path),
     typed: &[Spanned<InterfererTyped>],
-    pose: impl Fn(&Stand) -> Result<Pose, Error>,
+    motion: impl Fn(&Stand) -> Result<Motion, Error>,
 ) -> Result<(Vec<Interferer>, Vec<String>), Error> {
     if let Some(one_more) = typed.get(MOST) {
         let message = format!("a scene holds at most {MOST} other lidars");
@@ -64,7 +64,7 @@ pub(super) fn interferers(
             let alike = |interferer: &&Interferer| interferer.design.name == design.name;
             format!("{} {}", design.name, interferers.iter().filter(alike).count() + 1)
         });
-        if typed.position_m.is_none() {
+        if typed.position_m.is_none() && typed.path.is_none() {
             notes.push(format!("{name}: no position_m given, it stands at the origin"));
         }
         if typed.phase_ns.is_none() {
@@ -85,13 +85,13 @@ pub(super) fn interferers(
             phase_fs: (phase_ns * 1e6).round() as i64,
             drift: (drift_ppm * 1e6).round() as i64,
         };
-        let pose = pose(&typed.stand())?;
-        interferers.push(Interferer { name, design, pose, clock });
+        let motion = motion(&typed.stand())?;
+        interferers.push(Interferer { name, design, motion, clock });
     }
     if !interferers.is_empty() {
         notes.push(
             "other lidars: their light is as strong in our receiver as their own sensitivity has \
-             it in theirs, through the same aperture and optics"
+             it in theirs, through the same aperture and optics, unless both have a link budget"
                 .to_owned(),
         );
     }
@@ -140,12 +140,12 @@ mod tests {
             "[[interferers]]\nsensor = \"kim-park-2016\"\nposition_m = [50, 0, 2]\nyaw_deg = 180\n\
              phase_ns = 1234.5\ndrift_ppm = 20.0\n\
              set = { \"code.word.first\" = 3, code.word.modulus = 26 }\n\
-             [[interferers]]\nsensor = \"hdl-64e\"\nname = \"van\"\n",
+             [[interferers]]\nsensor = \"hdl-64e\"\nname = \"van\"\nvelocity_m_s = [-9, 0, 0]\n",
         )
         .unwrap();
         let [first, second] = scene.interferers.as_slice() else { unreachable!() };
         assert_eq!((first.name.as_str(), second.name.as_str()), ("kim-park-2016 1", "van"));
-        assert_eq!(first.pose.position, [50.0, 0.0, 2.0]);
+        assert_eq!(first.motion.at_start().position, [50.0, 0.0, 2.0]);
         assert_eq!(first.clock, Clock { phase_fs: 1_234_500_000, drift: 20_000_000 });
         assert_eq!(
             (
@@ -155,6 +155,8 @@ mod tests {
             (3, 26)
         );
         assert_eq!(second.clock, Clock::default());
+        assert!(!first.motion.moves() && second.motion.moves());
+        assert_eq!(scene.moving.iter().map(|one| one.name.as_str()).collect::<Vec<_>>(), ["van"]);
         let assumed = scene.notes.join("\n");
         assert!(assumed.contains("van: no phase_ns given"), "{assumed}");
         assert!(!assumed.contains("kim-park-2016 1: no phase_ns"), "{assumed}");
@@ -185,6 +187,7 @@ mod tests {
         assert_ne!(one, digest(""));
         assert_ne!(one, digest("[[interferers]]\nsensor = \"hdl-64e\"\ndrift_ppm = 1\n"));
         assert_ne!(one, digest("[[interferers]]\nsensor = \"peregrine\"\n"));
+        assert_ne!(one, digest("[[interferers]]\nsensor = \"hdl-64e\"\nturn_rate_deg_s = 1\n"));
         assert_eq!(one, digest("[[interferers]]\nsensor = \"hdl-64e\"\nphase_ns = 0\n"));
     }
 }

@@ -50,11 +50,12 @@ pub(super) enum Way {
 }
 
 impl Path {
-    /// The direction of shot `number`, counted from the first one of the first scan.
+    /// The direction of shot `number`, counted from the first one of the first scan; before it numbers are
+    /// negative.
     #[inline]
-    fn at(&self, number: u64) -> [f64; 3] {
+    fn at(&self, number: i64) -> [f64; 3] {
         match &self.way {
-            Way::List(list) => list[(number % list.len().max(1) as u64) as usize],
+            Way::List(list) => list[number.rem_euclid(list.len().max(1) as i64) as usize],
             Way::Prisms(prisms, step) => deflected(prisms, number as f64 * step),
         }
     }
@@ -145,17 +146,19 @@ impl Directions {
                 let [sin_a, cos_a] = azimuths.at(row, column);
                 [cos_e * cos_a, cos_e * sin_a, sin_e]
             }
-            Course::Path(path) => path.at(column as u64 * path.rows + row as u64),
+            Course::Path(path) => path.at(column as i64 * path.rows as i64 + row as i64),
         }
     }
 
-    /// The unit vector along which a shot of `log` is sent.
+    /// The unit vector along which a shot of `log` is sent. Shots before the first scan have numbers that
+    /// wrap.
     #[inline(always)]
     pub fn of_shot(&self, log: &ShotLog, shot: usize) -> [f64; 3] {
         let (row, column) = (log.row[shot], log.column[shot]);
         let Course::Path(path) = &self.course else { return self.of(row, column) };
-        let scan = (log.first + shot as u64) / path.per_scan;
-        path.at(scan * path.per_scan + u64::from(column) * path.rows + u64::from(row))
+        let (per_scan, rows) = (path.per_scan as i64, path.rows as i64);
+        let scan = log.first.wrapping_add(shot as u64).cast_signed().div_euclid(per_scan);
+        path.at(scan * per_scan + i64::from(column) * rows + i64::from(row))
     }
 
     /// Whether beams begin elsewhere than at the origin of the sensor.
