@@ -66,12 +66,12 @@ WORDS_OF_THE_STUDY = (
 # One change of coded-16 at a time; words of as many chips as they need.
 CHANGES = [
     ("nothing", {}),
-    ("amplifier of 24 pA/√Hz", {"detector.sampled.amplifier_pa_rthz": "24.0"}),
-    ("a strip of 6 pF", {"detector.sampled.capacitance_pf": "6.0"}),
-    ("dark current of 20 nA", {"detector.sampled.dark_current_na": "20.0"}),
-    ("no excess noise", {"detector.sampled.ionisation_ratio": "0.0"}),
+    ("amplifier of 24 pA/√Hz", {"detector.photodiode.amplifier_pa_rthz": "24.0"}),
+    ("a strip of 6 pF", {"detector.photodiode.capacitance_pf": "6.0"}),
+    ("dark current of 20 nA", {"detector.photodiode.dark_current_na": "20.0"}),
+    ("no excess noise", {"detector.photodiode.ionisation_ratio": "0.0"}),
     ("own light blinds for 20 ns", {"receiver.blank_ns": "20.0"}),
-    ("no stray light", {"receiver.blank_ns": "0.0", "detector.sampled.isolation_db": "300.0"}),
+    ("no stray light", {"receiver.blank_ns": "0.0", "detector.photodiode.isolation_db": "300.0"}),
     (
         "gaps from 0.8 ns",
         {"code.family": "{separated={length=60,weight=3,words=10,gap=2,apart=1,seed=1}}"},

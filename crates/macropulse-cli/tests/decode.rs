@@ -167,7 +167,7 @@ fn what_is_wrong_with_samples_is_one_sentence_with_its_place() {
     let files = "out/shots-000000.mps out/samples-000000.mpw";
     let other = format!("decode --sensor peregrine {files} -o a");
     desk.refused(&other, &["samples-000000.mpw: byte 0: these are samples", "records ticks"]);
-    let coarse = format!("decode --sensor mini.toml --set detector.sampled.bits=10 {files} -o a");
+    let coarse = format!("decode --sensor mini.toml --set adc.bits=10 {files} -o a");
     desk.refused(&coarse, &["codes from -204 to 1843, where those of the sensor are -102 to 921"]);
     let line = "simulate mini.toml wall --format pcd,ticks -o b";
     desk.refused(line, &["--format: mini records samples and nothing else; ask for `samples`"]);

@@ -79,7 +79,7 @@ fn what_is_wrong_in_a_file_is_said_with_its_place() {
         ),
         (
             ("[parts]", "[parts]\nsensor = \"hdl-64e\""),
-            "mine.toml:14:1: parts.sensor: hdl-64e is not a raster with a code and [detector.sampled]; coded-32 is one",
+            "mine.toml:14:1: parts.sensor: hdl-64e is not a raster with a code and an [adc]; coded-32 is one",
         ),
         (
             ("[parts]", "environment = \"noon\"\n[parts]"),

@@ -271,13 +271,9 @@ impl Layers {
     }
 }
 
-/// Path and text of every source file of `module`.
-fn sources(layers: &Layers, module: &str) -> Vec<(String, String)> {
-    let root = layers.root().join("src");
-    let mut found = Vec::new();
-    let mut folders = vec![root.join(module)];
-    let alone = root.join(format!("{module}.rs"));
-    let mut files: Vec<PathBuf> = alone.is_file().then_some(alone).into_iter().collect();
+/// Every Rust source in `folder` and below.
+fn sources_below(folder: PathBuf) -> Vec<PathBuf> {
+    let (mut folders, mut files) = (vec![folder], Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).into_iter().flatten() {
             let path = entry.unwrap().path();
@@ -288,10 +284,21 @@ fn sources(layers: &Layers, module: &str) -> Vec<(String, String)> {
             }
         }
     }
-    for path in files {
-        let name = path.strip_prefix(&root).unwrap().display().to_string();
-        found.push((name, fs::read_to_string(&path).unwrap()));
-    }
+    files
+}
+
+/// Path and text of every source file of `module`.
+fn sources(layers: &Layers, module: &str) -> Vec<(String, String)> {
+    let root = layers.root().join("src");
+    let alone = root.join(format!("{module}.rs"));
+    let alone = alone.is_file().then_some(alone);
+    let files = alone.into_iter().chain(sources_below(root.join(module)));
+    let found: Vec<(String, String)> = files
+        .map(|path| {
+            let name = path.strip_prefix(&root).unwrap().display().to_string();
+            (name, fs::read_to_string(&path).unwrap())
+        })
+        .collect();
     assert!(!found.is_empty(), "{module} has no source");
     found
 }
@@ -414,6 +421,32 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
 fn breaches(text: &str, rule: &Rule, known: &[String]) -> Vec<String> {
     let named = modules_named(text, rule.module, known);
     named.into_iter().filter(|name| !rule.may_name.contains(&name.as_str())).collect()
+}
+
+/// Where the speed of light is named beside `units`, and for what.
+const OF_LIGHT: [(&str, &str); 3] = [
+    ("macropulse/src/channel/interferers.rs", "one way from an interferer"),
+    ("macropulse/src/channel/speckle.rs", "wave numbers"),
+    ("macropulse/src/design/budget/mod.rs", "the energy of a photon"),
+];
+
+/// Ranges follow from times of flight, and times from ranges, by the functions of `units` alone: the factor 2
+/// stands nowhere else.
+#[test]
+fn the_speed_of_light_is_named_by_few() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folders =
+        ["macropulse", "macropulse-codec", "macropulse-study", "macropulse-cli", "macropulse-py"];
+    let all = folders.iter().flat_map(|folder| sources_below(crates.join(folder).join("src")));
+    let names_it = |path: &PathBuf| {
+        words(&bare(&fs::read_to_string(path).unwrap())).any(|word| word == "SPEED_OF_LIGHT")
+    };
+    let naming = all.filter(names_it);
+    let name = |path: PathBuf| path.strip_prefix(&crates).unwrap().display().to_string();
+    let mut naming: Vec<String> =
+        naming.map(name).filter(|name| !name.ends_with("units.rs")).collect();
+    naming.sort();
+    assert_eq!(naming, OF_LIGHT.map(|(name, _)| name));
 }
 
 #[test]

@@ -267,24 +267,22 @@ fn what_a_receiver_refuses_is_refused_with_its_key() {
     };
     let long = [
         ("light.pulse_ps", "1e5"),
-        ("detector.sampled.bandwidth_mhz", "1"),
-        ("detector.sampled.sample_ps", "1"),
-        ("detector.sampled.step_photons", "1e9"),
+        ("detector.photodiode.bandwidth_mhz", "1"),
+        ("adc.sample_ps", "1"),
+        ("adc.step_photons", "1e9"),
         ("code.chip_ps", "400"),
-        ("detector.sampled.low_cutoff_khz", "0"),
+        ("detector.photodiode.low_cutoff_khz", "0"),
     ];
     let said = told("coded-32", &long);
-    assert!(said.contains("detector.sampled.sample_ps: is 1 ps, too short for a mark"), "{said}");
+    assert!(said.contains("adc.sample_ps: is 1 ps, too short for a mark"), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
     let said = told("kim-park-2016", &[("scan.raster.columns", "1")]);
     assert!(said.contains("code.allow_dark: no label of this sensor sends any light"), "{said}");
-    let said = told("coded-32", &[("detector.sampled.step_photons", "1e12")]);
-    assert!(said.contains("detector.sampled.step_photons: is 1000000000000, but must"), "{said}");
-    let said = told(
-        "coded-32",
-        &[("detector.sampled.recovery_ns", "1e6"), ("detector.sampled.sample_ps", "25")],
-    );
-    assert!(said.contains("detector.sampled.recovery_ns: is 1000000 ns, more than"), "{said}");
+    let said = told("coded-32", &[("adc.step_photons", "1e12")]);
+    assert!(said.contains("adc.step_photons: is 1000000000000, but must"), "{said}");
+    let said =
+        told("coded-32", &[("detector.photodiode.recovery_ns", "1e6"), ("adc.sample_ps", "25")]);
+    assert!(said.contains("detector.photodiode.recovery_ns: is 1000000 ns, more than"), "{said}");
 }
 
 /// A line of two shots lasts longer than the clock of a band counts, and so does the time from its end to the

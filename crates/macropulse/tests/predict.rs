@@ -172,8 +172,8 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
     let detectors = [
         "[detector.photon-counting]\nefficiency = 0.25\nmissed_marks = 0.1\njitter_ps = 0.0",
         "[detector.geiger]\nefficiency = 0.25\ncells = 1000000\ndead_time_ns = 5.0",
-        "[detector.linear]\nefficiency = 0.8\ngain = 100.0\nionisation_ratio = 0.02\n\
-         bandwidth_mhz = 176000.0\namplifier_pa_rthz = 20.0\nfalse_alarm_hz = 1.0",
+        "[comparator]\nfalse_alarm_hz = 1.0\n[detector.photodiode]\nefficiency = 0.8\ngain = 100.0\n\
+         ionisation_ratio = 0.02\nbandwidth_mhz = 124800.0\namplifier_pa_rthz = 23.0",
     ];
     for lines in detectors {
         let design = with_detector(lines);

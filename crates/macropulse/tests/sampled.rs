@@ -239,7 +239,7 @@ fn the_worst_range_is_forecast_as_it_is_found() {
 #[test]
 fn a_baseline_that_droops_is_known_to_the_receiver() {
     let day = Environment::named("clear-day").unwrap();
-    let coupled = |khz| design(&[("detector.sampled.low_cutoff_khz", khz)]);
+    let coupled = |khz| design(&[("detector.photodiode.low_cutoff_khz", khz)]);
     let pd = |design: &Design| {
         let found = found(design, (149.0, 0.05), 9);
         assert!(found.wrong / found.pixels < 1e-3, "{} wrong", found.wrong);
@@ -271,7 +271,7 @@ fn forecasts_of_speckle_hold() {
         ("idealised", "['eye-safety']"),
         ("optics.aperture_mm", "8.0"),
         ("light.energy", "{ shot_nj = 3000.0 }"),
-        ("detector.sampled.isolation_db", "65.0"),
+        ("detector.photodiode.isolation_db", "65.0"),
     ];
     let speckled = design(&[&lens[..], &[("light.linewidth_ghz", "0.1")]].concat());
     let even = design(&lens);
@@ -296,7 +296,7 @@ fn forecasts_of_speckle_hold() {
 fn a_baseline_is_the_same_in_both_bands_that_see_it() {
     // Two lines, one behind the other.
     let design = design(&[
-        ("detector.sampled.low_cutoff_khz", "10.0"),
+        ("detector.photodiode.low_cutoff_khz", "10.0"),
         ("scan.scans_per_s", "1200.0"),
         ("scan.raster.mirror", "uniform"),
         ("scan.raster.duty", "1.0"),
@@ -344,13 +344,13 @@ fn bands_side_by_side_are_those_one_after_the_other() {
 #[test]
 fn keys_without_effect_and_parts_that_do_not_fit_are_refused() {
     for (key, value, wanted) in [
-        ("tdc.converters", "3", "has no effect because of `receiver.kind`"),
-        ("receiver.kind", "matched", "`sampled` is for [detector.sampled]"),
+        ("tdc.converters", "3", "has no effect because of `adc`"),
+        ("receiver.kind", "matched", "`sampled` is for an [adc]"),
         ("light.pulse_ps", "100.0", "too long for a mark"),
         ("receiver.least_marks", "4", "must lie between 1 and 3"),
         ("without", "inter-chip", "samples the sum of all pulses"),
-        ("detector.sampled.low_cutoff_khz", "0.1", "must be 0 or lie between 0.247 and 5500"),
-        ("detector.sampled.low_cutoff_khz", "6000", "must be 0 or lie between 0.247 and 5500"),
+        ("detector.photodiode.low_cutoff_khz", "0.1", "must be 0 or lie between 0.247 and 5500"),
+        ("detector.photodiode.low_cutoff_khz", "6000", "must be 0 or lie between 0.247 and 5500"),
     ] {
         let told = Design::open("coded-32", &[(key.to_owned(), value.to_owned())]).unwrap_err();
         assert!(told.to_string().contains(wanted), "{key}: {told}");

@@ -96,7 +96,7 @@ fn bands_of_the_coded_sensor_with_several_returns() {
 /// One whose baseline remembers light of long before a band.
 #[test]
 fn the_sampled_sensor_behind_a_capacitor() {
-    let key = "coded-32 detector.sampled.low_cutoff_khz=20.0";
+    let key = "coded-32 detector.photodiode.low_cutoff_khz=20.0";
     assert_same_on_any_pool(key, Part::First(2));
 }
 

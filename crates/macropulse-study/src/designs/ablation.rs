@@ -23,14 +23,14 @@ pub(super) const ABLATIONS: usize = 8;
 fn changes(marks: u32, energy_nj: f64) -> [Change; ABLATIONS] {
     [
         ("half the light", vec![("light.energy", half(energy_nj))]),
-        ("amplifier of 24 pA/√Hz", vec![("detector.sampled.amplifier_pa_rthz", 24.0.into())]),
-        ("6 pF at the amplifier", vec![("detector.sampled.capacitance_pf", 6.0.into())]),
-        ("dark current of 20 nA", vec![("detector.sampled.dark_current_na", 20.0.into())]),
+        ("amplifier of 24 pA/√Hz", vec![("detector.photodiode.amplifier_pa_rthz", 24.0.into())]),
+        ("6 pF at the amplifier", vec![("detector.photodiode.capacitance_pf", 6.0.into())]),
+        ("dark current of 20 nA", vec![("detector.photodiode.dark_current_na", 20.0.into())]),
         ("own stray light blinds for 20 ns", vec![("receiver.blank_ns", 20.0.into())]),
         (
             "no own stray light",
             vec![
-                ("detector.sampled.isolation_db", 200.0.into()),
+                ("detector.photodiode.isolation_db", 200.0.into()),
                 ("receiver.blank_ns", 0.0.into()),
             ],
         ),

@@ -174,13 +174,13 @@ impl Candidate {
             set(&format!("{POLYGON}.facets"), i64::from(polygon.facets).into());
             set(&format!("{POLYGON}.diameter_mm"), (polygon.diameter * 1e3).into());
         }
-        set("detector.sampled.efficiency", self.part.efficiency.into());
-        set("detector.sampled.gain", self.part.gain.into());
-        set("detector.sampled.ionisation_ratio", self.part.ionisation_ratio.into());
-        set("detector.sampled.dark_current_na", self.part.dark_current_na.into());
-        set("detector.sampled.capacitance_pf", self.part.capacitance_pf.into());
-        set("detector.sampled.bandwidth_mhz", (self.bandwidth * 1e-6).into());
-        set("detector.sampled.step_photons", step.into());
+        set("detector.photodiode.efficiency", self.part.efficiency.into());
+        set("detector.photodiode.gain", self.part.gain.into());
+        set("detector.photodiode.ionisation_ratio", self.part.ionisation_ratio.into());
+        set("detector.photodiode.dark_current_na", self.part.dark_current_na.into());
+        set("detector.photodiode.capacitance_pf", self.part.capacitance_pf.into());
+        set("detector.photodiode.bandwidth_mhz", (self.bandwidth * 1e-6).into());
+        set("adc.step_photons", step.into());
         if self.is_late {
             let usual = number(&required.template, "receiver.blank_ns").unwrap_or(0.0);
             set("receiver.blank_ns", usual.max(LATE).into());
@@ -242,7 +242,7 @@ pub(super) fn template(name_or_file: &str, folder: &Path) -> Result<(Table, Path
         || !design.is_coded()
     {
         return Err(format!(
-            "{name_or_file} is not a raster with a code and [detector.sampled]; coded-32 is one"
+            "{name_or_file} is not a raster with a code and an [adc]; coded-32 is one"
         ));
     }
     let table = design.text.parse().map_err(|error: toml::de::Error| error.to_string())?;

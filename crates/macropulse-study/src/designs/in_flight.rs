@@ -5,7 +5,7 @@
 //! in closed form and no design that was simulated.
 
 use macropulse::predict::Blind;
-use macropulse::units::{SPEED_OF_LIGHT, tof_from_range};
+use macropulse::units::{range_from_tof, tof_from_range};
 
 use super::Error;
 use super::bill::Bill;
@@ -80,7 +80,7 @@ impl InFlight {
 /// the ranges between which staggering spreads them.
 fn by_chance(precision: f64, period: f64) -> f64 {
     let window = 2.0 * AGREE * std::f64::consts::SQRT_2 * precision;
-    (window / (STAGGER * period * SPEED_OF_LIGHT / 2.0)).min(1.0)
+    (window / range_from_tof(STAGGER * period)).min(1.0)
 }
 
 /// Neighbours of which each agrees `by_chance`, so that all of them do for one of so many `pulses` no more often than

@@ -5,7 +5,7 @@ use macropulse::told;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A photodiode with its amplifier: the keys of `[detector.sampled]`.
+/// A photodiode with its amplifier: the keys of `[detector.photodiode]`.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Part {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use macropulse::codec::statistics::erlang_b;
 use macropulse::design::Design;
-use macropulse::design::detector::Amplifier;
+use macropulse::design::detector::threshold_over_noise;
 use macropulse::design::safety::Class1;
 use macropulse::emit::{Band, bands, short_bands};
 use macropulse::environment::Environment;
@@ -151,15 +151,9 @@ fn eyes() -> Vec<Figure> {
 /// Detectors and converters.
 pub(super) fn detectors() -> Vec<Figure> {
     let mut noise = Figures::of("detectors", "KP18");
-    let pulse = Amplifier {
-        gain: 1.0,
-        ionisation: 0.0,
-        bandwidth: 1e15,
-        current_noise: 0.0,
-        dark_current: 0.0,
-        pulse: 5e-9,
-    };
-    let ratio = pulse.threshold_for(5e5).unwrap_or(f64::NAN);
+    // White noise in a band of 1/(2·pulse), as the source has it, crosses its mean 1/(2√3·pulse) times a second.
+    let memory = 3_f64.sqrt() / std::f64::consts::PI * 5e-9;
+    let ratio = threshold_over_noise(memory, 5e5).unwrap_or(f64::NAN);
     let what = "threshold to noise of 5\u{b7}10\u{2075} false alarms a second, 5 ns pulses, dB";
     noise.add(what, 9.776, 20.0 * ratio.log10(), Within::Absolute(2e-3));
     let mut all = noise.done();

@@ -26,7 +26,7 @@ use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains};
 use crate::design::Design;
 use crate::emit::shot_at;
 use crate::scene::{Ends, Finish, Illuminated, LineOfSight, Mount, Pair, Ray, Scene};
-use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs};
+use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs, tof_from_range};
 use macropulse_codec::ShotLog;
 
 /// Radius of the aperture of a sensor without a link budget, m: what its file leaves unsaid.
@@ -59,7 +59,7 @@ pub(super) fn add(
     let farthest = design.scan.light_range.max(other.scan.light_range);
     let mut direct = Direct::of(scene, pair, 2.0 * farthest);
     let finishes = scene.finishes(other.light.wavelength);
-    let longest_fs = fs_from_s(2.0 * farthest / SPEED_OF_LIGHT);
+    let longest_fs = fs_from_s(tof_from_range(farthest));
     for open in listening(design, log, around_fs) {
         let channel = |pixel| channel_of(design, log, pixel);
         let mut arrivals = Arrivals {

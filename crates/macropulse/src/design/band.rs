@@ -102,7 +102,7 @@ mod tests {
     fn a_band_begins_as_early_as_its_detector_and_converters_remember() {
         for (name, key, ns) in [
             ("kim-park-2016", "tdc.dead_time_ns", 10_000),
-            ("coded-32", "detector.sampled.recovery_ns", 10_000),
+            ("coded-32", "detector.photodiode.recovery_ns", 10_000),
         ] {
             let history_fs = |ns: i64| {
                 let set = [(key.to_owned(), ns.to_string())];

@@ -39,6 +39,9 @@ pub(super) const ALTERNATIVES: [(&str, &[&str]); 5] = [
     ("spinning", &["azimuth_step_deg", "cycle_us"]),
 ];
 
+/// Tables of which the stronger document's replaces the weaker one's other: what stands behind a photodiode.
+const BEHIND_A_PHOTODIODE: [&str; 2] = ["comparator", "adc"];
+
 /// One TOML text with its origin.
 #[derive(Debug, Clone)]
 struct Document {
@@ -127,6 +130,11 @@ impl Chain {
             let mut table = document.table.clone();
             if number > own {
                 table.remove(PROSE);
+            }
+            if BEHIND_A_PHOTODIODE.iter().any(|kind| merged.contains_key(*kind)) {
+                table.retain(|key, _| {
+                    merged.contains_key(key) || !BEHIND_A_PHOTODIODE.contains(&key)
+                });
             }
             fill_in(&mut merged, &table);
         }

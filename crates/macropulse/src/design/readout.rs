@@ -1,4 +1,4 @@
-//! What a sensor records, and the clock by which it does: `[tdc]`.
+//! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]` or `[histogram]`.
 
 use macropulse_codec::RecordKind;
 use schemars::JsonSchema;
@@ -80,7 +80,7 @@ impl Readout {
     pub(super) fn tick_key(&self) -> &'static str {
         match self {
             Self::Tdc(_) => "tdc.resolution_ps",
-            Self::Adc => "detector.sampled.sample_ps",
+            Self::Adc => "adc.sample_ps",
             Self::Histogram(_) => "histogram.bin_ps",
         }
     }
@@ -105,6 +105,21 @@ pub struct Tdc {
     pub converters: u32,
     /// Time for which a converter is busy with one event, fs.
     pub dead_fs: i64,
+}
+
+/// `[adc]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AdcFile {
+    /// From sample to sample, ps: a whole number of femtoseconds; the tick of this sensor.
+    #[schemars(range(min = 0.001, max = 1e9))]
+    pub sample_ps: f64,
+    /// Bits of a code, the level without light at a tenth of the range.
+    #[schemars(range(min = 4, max = 15))]
+    pub bits: u32,
+    /// One step of a code, in the height of a mark of so many detected photons.
+    #[schemars(range(min = 1e-6, max = 1e9))]
+    pub step_photons: f64,
 }
 
 /// `[histogram]` as typed.
@@ -141,9 +156,9 @@ impl Tdc {
 }
 
 impl Check<'_> {
-    /// Clock and readout of a detector whose signal is sampled every `sample_ps` picoseconds.
-    pub(super) fn adc(&self, sample_ps: f64) -> Result<(Clock, Readout), Error> {
-        let tick_fs = self.whole_fs("detector.sampled.sample_ps", sample_ps)?;
+    /// Clock and readout of a detector whose signal is sampled.
+    pub(super) fn adc(&self, file: &AdcFile) -> Result<(Clock, Readout), Error> {
+        let tick_fs = self.whole_fs("adc.sample_ps", file.sample_ps)?;
         Ok((Clock { tick_fs, period_fs: tick_fs }, Readout::Adc))
     }
 

@@ -121,8 +121,8 @@ impl Check<'_> {
         if kind.record() != readout.records() {
             return self.refuse(
                 "receiver.kind",
-                "`sampled` is for [detector.sampled], `histogram` for a [histogram], the other receivers \
-                 for other detectors",
+                "`sampled` is for an [adc], `histogram` for a [histogram], the other receivers for events \
+                 that a [tdc] times",
             );
         }
         let is_coded = coding.label.is_some();

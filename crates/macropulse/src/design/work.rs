@@ -101,7 +101,7 @@ impl Check<'_> {
                      recovery_ns or memory of the baseline",
                     design.channels()
                 );
-                return self.refuse("detector.sampled.sample_ps", message);
+                return self.refuse("adc.sample_ps", message);
             }
         }
         Ok(())

@@ -10,7 +10,7 @@
 //! So it is where the list `idealised` names `inter-chip`: the light of one shot that comes within
 //! the response of the amplifier adds up, light of several shots does not, marks of one word that
 //! follow each other sooner are told apart, and the walk of the crossing with the amplitude is taken
-//! to be calibrated out. Else it is [`super::waveform`] (docs/physics.md#linear).
+//! to be calibrated out. Else it is [`super::waveform`] (docs/physics.md#photodiode-and-comparator).
 
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
@@ -138,7 +138,7 @@ mod tests {
     /// are seven. N = 8 marks of one shot, seed 1.
     #[test]
     fn light_that_comes_together_adds_up() {
-        let quiet = [("detector.linear.false_alarm_hz", "1.0"), ("without", "inter-chip")];
+        let quiet = [("comparator.false_alarm_hz", "1.0"), ("without", "inter-chip")];
         let quiet = quiet.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let design = Design::open("coded-practical", &quiet).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 1 }.shot_log(&design);

@@ -248,8 +248,8 @@ mod tests {
 
     const COUNTING: &str = "[detector.photon-counting]\nefficiency = 1.0";
     const CELLS: &str = "[detector.geiger]\nefficiency = 1.0\ncells = 100";
-    const LINEAR: &str = "[detector.linear]\nefficiency = 1.0\nbandwidth_mhz = 1e5\n\
-                          amplifier_pa_rthz = 1.0\nfalse_alarm_hz = 1.0";
+    const LINEAR: &str = "[comparator]\nfalse_alarm_hz = 1.0\n[detector.photodiode]\nefficiency = 1.0\n\
+                          bandwidth_mhz = 7e4\namplifier_pa_rthz = 1.0";
 
     /// Control: marks with a hundred-thousandth of a photon are seen by none.
     #[test]

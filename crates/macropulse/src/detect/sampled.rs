@@ -13,7 +13,7 @@
 //! 6. The converter rounds to its steps and stops at its limits.
 //!
 //! Steady light has no level of its own: the amplifier lets no direct current through
-//! (docs/physics.md#sampled).
+//! (docs/physics.md#photodiode-and-adc).
 
 use std::ops::Range;
 

@@ -3,15 +3,17 @@
 //! 1. A mark of mean n detected photons brings k of them, Poisson; multiplication makes an amplitude
 //!    k + √(k·(F − 1))·g of them, F the excess noise factor.
 //! 2. Behind the amplifier it is a Gaussian of the response. Pulses add up, whoever sent them.
-//! 3. Noise is added: independent numbers, smoothed with a Gaussian, so that it crosses the threshold
-//!    as often as that was set for.
+//! 3. Noise is added: independent numbers, smoothed with a Gaussian to the memory that the noise has behind
+//!    the amplifier, so that it crosses the threshold as often as that was set for.
 //! 4. The comparator makes an event where the sum crosses the threshold, and none before the sum has
 //!    fallen below the hysteresis again. It tells the crossing itself, or the constant fraction.
 //! 5. An event is displaced by the jitter of the input.
 //!
-//! The sum is worked out in steps of an eighth of the response where there are pulses, and crossings
-//! are interpolated. Elsewhere noise crosses the threshold at the rate that it was set for.
-//! The amplifier neither clips nor has a steady level that moves (docs/physics.md#linear).
+//! The sum is worked out in steps of an eighth of the response where there are pulses, or of a quarter of the
+//! noise's memory if that is shorter, and crossings are interpolated. Elsewhere noise crosses the threshold at the rate that it was set for.
+//! The amplifier neither clips nor has a steady level that moves (docs/physics.md#photodiode-and-comparator).
+
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
@@ -27,10 +29,14 @@ use crate::kernels::GROUP;
 use crate::random::{Address, Chance, Stage};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s};
 
-/// Steps in a response. Of 4000 pulses with the noise of one crossing in 10⁴ responses the times that 8
+/// Steps in a response at least. Of 4000 pulses with the noise of one crossing in 10⁴ responses the times that 8
 /// and 16 steps tell differ by 0.008 of a response, rms, at the threshold, and by 0.004 at five times
 /// the threshold. Whether pulses cross is told between the steps, see [`peak`].
 const STEPS: f64 = 8.0;
+
+/// Steps in the memory of the noise at least: with as many it crosses the threshold within a percent as often as
+/// noise in finer steps does, the parabolas of [`peak`] included.
+const STEPS_OF_MEMORY: f64 = 4.0;
 
 /// A pulse is followed to where it is less than this share of the noise.
 const NEGLIGIBLE: f64 = 1.0 / 16.0;
@@ -53,6 +59,8 @@ pub(super) struct Waveform {
     measures: bool,
     /// A step, fs.
     step_fs: i64,
+    /// Steps in the delay of the comparator.
+    delay: i64,
     /// rms length of a pulse, in steps.
     rms: f64,
     /// How much later than the peak the moment is told, fs.
@@ -102,9 +110,11 @@ struct Stretch {
 
 impl Waveform {
     pub fn new(linear: LinearSetting, comparator: Comparator, design: &Design) -> Self {
-        let step_fs = fs_from_s(linear.response / STEPS).max(1);
+        // The delay is a whole number of them.
+        let steps = (STEPS_OF_MEMORY * linear.response / linear.memory).max(STEPS).ceil();
+        let step_fs = fs_from_s(linear.response / steps).max(1);
         let in_steps = |seconds: f64| seconds * FS_PER_S as f64 / step_fs as f64;
-        let smoothing = in_steps(Comparator::smoothing(linear.response));
+        let smoothing = in_steps(linear.memory * FRAC_1_SQRT_2);
         let half = (CUT * smoothing).ceil() as i32;
         let weight = |at: i32| libm::exp(-0.5 * (f64::from(at) / smoothing).powi(2));
         let squares: f64 = (-half..=half).map(|at| weight(at).powi(2)).sum();
@@ -118,6 +128,7 @@ impl Waveform {
             comparator,
             measures: !design.is_coded(),
             step_fs,
+            delay: (steps * COMPARATOR_DELAY) as i64,
             rms: in_steps(linear.response * RMS_OF_FWHM),
             late_fs: fs_from_s(late),
             kernel,
@@ -162,7 +173,7 @@ impl Waveform {
     /// comparator looks back upon.
     fn steps(&self, pulse: &Pulse) -> (i64, i64) {
         let (at, reach) = (pulse.peak_fs.div_euclid(self.step_fs), self.reach(pulse));
-        let delay = (STEPS * COMPARATOR_DELAY) as i64;
+        let delay = self.delay;
         (at - reach - delay, at + reach + delay)
     }
 
@@ -194,7 +205,7 @@ impl Waveform {
     fn compare(&self, stretch: &Stretch, events: &mut Vec<Event>) {
         let threshold = self.linear.threshold;
         let release = (1.0 - self.comparator.hysteresis) * threshold;
-        let delay = (STEPS * COMPARATOR_DELAY) as usize;
+        let delay = self.delay as usize;
         let signal = &stretch.signal;
         // What the delay lets through less the fraction of what comes in.
         let fraction = |at: usize| {
@@ -377,8 +388,8 @@ mod tests {
              [code]\nchip_ps = 100.0\nword = {{ first = 0, modulus = 1 }}\n\
              family = {{ sparse = {{ length = {length}, weight = {marks}, words = 1, gap = {gap}, \
              seed = 1 }} }}\n\
-             [detector.linear]\nbandwidth_mhz = 1000.0\nfalse_alarm_hz = 1.0\njitter_ps = 0.0\n\
-             timing = \"{timing}\"\n[tdc]\nresolution_ps = 6.25\nclock_ps = 100.0\n"
+             [detector.photodiode]\nbandwidth_mhz = 709.158\njitter_ps = 0.0\n\
+             [comparator]\nfalse_alarm_hz = 1.0\ntiming = \"{timing}\"\n[tdc]\nresolution_ps = 6.25\nclock_ps = 100.0\n"
         );
         Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap()
     }

@@ -17,7 +17,7 @@ use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
 use crate::design::{Design, Detector};
 use crate::environment::Environment;
-use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs, tof_from_range};
+use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs, tof_from_range};
 
 /// There is no forecast of a sensor: why, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -313,7 +313,7 @@ impl<'a> Forecaster<'a> {
                 .as_ref()
                 .filter(|_| is_seen)
                 .map(|sidelobes| sidelobes.aside(found, at_the_lag)),
-            bound: SPEED_OF_LIGHT / 2.0 * timing.spread / photons.sqrt(),
+            bound: range_from_tof(timing.spread) / photons.sqrt(),
         }
     }
 
@@ -358,10 +358,9 @@ impl<'a> Forecaster<'a> {
                 Some(room) if room < 1.0 => 1.0,
                 _ => settings.false_alarm,
             },
-            precision: (chances.pd * FEWEST >= 1.0)
-                .then_some(SPEED_OF_LIGHT / 2.0 * chances.timing),
+            precision: (chances.pd * FEWEST >= 1.0).then(|| range_from_tof(chances.timing)),
             aside: None,
-            bound: SPEED_OF_LIGHT / 2.0 * design.light.pulse * RMS_OF_FWHM / photons.sqrt(),
+            bound: range_from_tof(design.light.pulse * RMS_OF_FWHM) / photons.sqrt(),
         }
     }
 
@@ -388,7 +387,7 @@ impl<'a> Forecaster<'a> {
         // Nearer, a sampled channel is blind with the mark it has just sent.
         let sampling = self.design.receiver.method.sampling();
         let blank = sampling.map_or(0, |known| i64::from(known.blank_ticks) + 2);
-        let blind = s_from_fs(blank * self.design.clock.tick_fs) * SPEED_OF_LIGHT / 2.0;
+        let blind = range_from_tof(s_from_fs(blank * self.design.clock.tick_fs));
         let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
         let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
         match bisect(nearest, farthest, lost) {

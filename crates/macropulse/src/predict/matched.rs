@@ -14,7 +14,7 @@ use macropulse_codec::statistics::{
 
 use crate::design::Design;
 use crate::design::detector::Lit;
-use crate::units::{RMS_OF_FWHM, SPEED_OF_LIGHT, s_from_fs};
+use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs};
 
 /// Terms of the sum over harmonics of a tick.
 const HARMONICS: u32 = 16;
@@ -256,7 +256,7 @@ impl Timing {
             true => beside_an_edge(self.sigma, marks),
             false => self.of_mean(marks),
         };
-        SPEED_OF_LIGHT / 2.0 * self.tick * variance.sqrt()
+        range_from_tof(self.tick * variance.sqrt())
     }
 
     /// Variance of the mean of `marks` events, square ticks.
@@ -300,6 +300,7 @@ fn beside_an_edge(sigma: f64, marks: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::tof_from_range;
     use approx::assert_relative_eq;
 
     #[test]
@@ -318,7 +319,7 @@ mod tests {
     fn rounding_alone_has_the_variance_of_a_twelfth() {
         let undoes_rounding = false;
         let timing =
-            |sigma| Timing { spread: 0.0, sigma, tick: 2.0 / SPEED_OF_LIGHT, undoes_rounding };
+            |sigma| Timing { spread: 0.0, sigma, tick: tof_from_range(1.0), undoes_rounding };
         let rounding = 12_f64.sqrt().recip();
         assert_relative_eq!(timing(0.0).precision(100.0), rounding, max_relative = 1e-12);
         assert_relative_eq!(timing(1e-3).precision(1e9), rounding, max_relative = 0.02);

@@ -251,7 +251,8 @@ mod tests {
         };
         assert_eq!(of(&[]), Some(Blind { before: 6, behind: 15 }));
         assert_eq!(of(&[]).unwrap().between_ticks().ticks(), 23);
-        let shorter = of(&[("light.pulse_ps", "510"), ("detector.sampled.bandwidth_mhz", "519")]);
+        let shorter =
+            of(&[("light.pulse_ps", "510"), ("detector.photodiode.bandwidth_mhz", "519")]);
         assert_eq!(shorter, Some(Blind { before: 5, behind: 15 }));
         assert_eq!(of(&[("receiver.blank_ns", "0")]), None);
     }
@@ -265,7 +266,7 @@ mod tests {
             let changes: Vec<_> = changes.iter().map(owned).collect();
             stray_room(&Design::open("coded-32", &changes).unwrap())
         };
-        let slow = ("detector.sampled.bandwidth_mhz", "129");
+        let slow = ("detector.photodiode.bandwidth_mhz", "129");
         let bright = ("light.energy", "{ shot_nj = 4260.0 }");
         assert!(room(&[]).unwrap() > 10.0);
         let eyes = ("idealised", "['eye-safety']");

@@ -2,14 +2,14 @@
 //!
 //! Only the first one is simulated; the other two are here so that the equation can be checked.
 
-use crate::units::SPEED_OF_LIGHT;
+use crate::units::range_from_tof;
 
 /// Pulsed: R = c·Δt/2, Δt in s.
 pub use crate::units::range_from_tof as pulsed;
 
 /// Amplitude-modulated: R = φ·c/(4π·f), `phase` φ in rad, `modulation` f in Hz.
 pub fn amplitude_modulated(phase: f64, modulation: f64) -> f64 {
-    phase * SPEED_OF_LIGHT / (4.0 * std::f64::consts::PI * modulation)
+    range_from_tof(phase / (std::f64::consts::TAU * modulation))
 }
 
 /// Frequency-modulated with a triangular sweep: R = c·f_b·T/(4·Δf), `beat` f_b in Hz, `period` T
@@ -18,7 +18,7 @@ pub fn amplitude_modulated(phase: f64, modulation: f64) -> f64 {
 /// \[KP16\] calls B the beat frequency and Δf the difference of frequencies, which would be the
 /// beat frequency again; the equation is right with Δf the excursion.
 pub fn frequency_modulated(beat: f64, period: f64, excursion: f64) -> f64 {
-    SPEED_OF_LIGHT * beat * period / (4.0 * excursion)
+    range_from_tof(beat * period / (2.0 * excursion))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 use macropulse_codec::statistics::binomial;
 
 use crate::design::Design;
-use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 
 /// Macropulses that stand for all: every so many-th of them.
 const SAMPLE: usize = 64;
@@ -42,7 +42,7 @@ impl Sidelobes {
         let step = (all / SAMPLE).max(1) | 1;
         let sample: Vec<&[u16]> =
             (0..all).step_by(step).map(sent).filter(|marks| !marks.is_empty()).collect();
-        let per_chip = SPEED_OF_LIGHT / 2.0 * s_from_fs(design.emission.coding().chip_fs);
+        let per_chip = range_from_tof(s_from_fs(design.emission.coding().chip_fs));
         let mut own: Vec<(f64, f64)> = Vec::new();
         for marks in &sample {
             for (shift, common) in (0..).zip(correlation(marks)).skip(1) {

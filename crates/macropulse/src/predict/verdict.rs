@@ -7,7 +7,7 @@ use super::link::spot_depth;
 use super::own_light::{Blind, stray_room};
 use crate::design::Design;
 use crate::design::safety::strictest;
-use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 
 /// Share of converters' work that may be lost.
 const LOSS: f64 = 0.01;
@@ -221,7 +221,7 @@ pub fn slant(design: &Design, range: f64) -> Option<Check> {
         true => s_from_fs(design.emission.coding().chip_fs),
         false => design.light.pulse,
     };
-    let chip = chip.max(design.detector.model().response()) * SPEED_OF_LIGHT / 2.0;
+    let chip = range_from_tof(chip.max(design.detector.model().response()));
     Some(Check {
         name: "slant",
         shortfall: depth / chip,

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use macropulse::codec::code::correlation::{aperiodic, periodic};
 use macropulse::design::Design;
 use macropulse::predict::ranging::{amplitude_modulated, frequency_modulated};
-use macropulse::units::SPEED_OF_LIGHT;
+use macropulse::units::{range_from_tof, tof_from_range};
 
 /// A target, m.
 const RANGE: f64 = 42.0;
@@ -59,7 +59,7 @@ impl Equations {
         let kept = |is_left: &dyn Fn(u32) -> bool| {
             word.marks.iter().filter(|&&mark| is_left(u32::from(mark))).count() as u32
         };
-        let flight = 2.0 * RANGE / SPEED_OF_LIGHT;
+        let flight = tof_from_range(RANGE);
         let (period, excursion) = SWEEP;
         // Halfway up, the sweep has moved on by this much while the light was away.
         let sent = |time: f64| excursion * time / (period / 2.0);
@@ -67,7 +67,7 @@ impl Equations {
         Self {
             range: RANGE,
             amplitude: amplitude_modulated(phase(flight), MODULATION),
-            phase_wraps: SPEED_OF_LIGHT / (2.0 * MODULATION),
+            phase_wraps: range_from_tof(MODULATION.recip()),
             frequency: frequency_modulated(beat, period, excursion),
             frequency_printed: frequency_modulated(beat, period, beat),
             peak_printed: kept(&|mark| mark > word.length),

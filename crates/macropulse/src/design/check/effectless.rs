@@ -4,14 +4,16 @@
 //! where `--set` does not change what makes them meaningless. What a file inherits by `extends` may
 //! lie idle.
 
-use macropulse_codec::decode::ReceiverKind;
-
 use super::SensorFile;
+use crate::design::detector::OF_SAMPLES;
 use crate::design::document::Typed;
 use crate::design::limits::{Check, Idle};
 use crate::design::receiver::OWN_KEYS;
 use crate::design::{Effect, Error, Label};
 
+const ALONE: &str = "every mark is judged alone while \"inter-chip\" is in this list: --with inter-chip \
+                     sums their pulses";
+const NO_SIGNAL: &str = "only a photodiode puts out a signal that is compared or sampled";
 const FOOTPRINT: &str = "the beam has no width while \"footprint\" is in this list: \
                          --with footprint simulates it";
 const BUDGET: &str = "the receiver is declared by its sensitivity while \"link-budget\" is in this \
@@ -70,8 +72,18 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     for (keys, kinds, why) in OWN_KEYS {
         add(!kinds.contains(&kind), keys, "receiver.kind", why);
     }
-    let sampled = kind == ReceiverKind::Sampled;
-    add(sampled, &["tdc"], "receiver.kind", "a sampled detector has no converters of events");
+    let compared = ["comparator.timing", "comparator.hysteresis"];
+    add(off(Effect::InterChip), &compared, "idealised", ALONE);
+    add(!file.has_signal(), &["comparator", "adc"], "detector", NO_SIGNAL);
+    let of_events = ["tdc", "comparator"];
+    add(file.adc().is_some(), &of_events, "adc", "samples are taken of the signal, and no events");
+    let is_compared = file.has_signal() && file.adc().is_none();
+    add(
+        is_compared,
+        &OF_SAMPLES,
+        "comparator",
+        "events do not show it, only the samples of an [adc]",
+    );
     let is_counted = file.histogram.is_some();
     add(is_counted, &["tdc"], "histogram", "counts go into bins, and no converter times them");
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);

@@ -9,12 +9,12 @@ use serde::Deserialize;
 
 use super::budget::{self, BudgetFile, OpticsFile, SafetyFile};
 use super::coding::CodeFile;
-use super::detector::{Before, DetectorFile, Efficiency};
+use super::detector::{Before, ComparatorFile, DetectorFile, Efficiency};
 use super::document::Chain;
 use super::emission::BurstFile;
 use super::light::LightFile;
 use super::limits::Check;
-use super::readout::{HistogramFile, TdcFile};
+use super::readout::{AdcFile, HistogramFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
 use super::{Clock, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
@@ -45,18 +45,34 @@ pub(in crate::design) struct SensorFile {
     pub code: Option<CodeFile>,
     /// Pulses that a shot without a code repeats; leave the table out for single ones.
     pub burst: Option<BurstFile>,
-    /// From light to detection events: one kind of detector.
+    /// From light to detection events, or to a signal: one kind of detector.
     pub detector: DetectorFile,
+    /// From the signal of a photodiode to detection events.
+    pub comparator: Option<ComparatorFile>,
     /// The optics of the receiver; with a link budget.
     pub optics: Option<OpticsFile>,
     /// How the energy that laser class 1 allows is worked out.
     pub safety: Option<SafetyFile>,
     /// From detection events to ticks: the bank of converters.
     pub tdc: TdcFile,
+    /// From the signal of a photodiode to samples, in place of comparator and converters of events.
+    pub adc: Option<AdcFile>,
     /// From counts to histograms; leave the table out where detection events are timed or sampled.
     pub histogram: Option<HistogramFile>,
     /// From ticks, samples or histograms to returns.
     pub receiver: ReceiverFile,
+}
+
+impl SensorFile {
+    /// Whether its detector puts out a signal, for a comparator or an ADC.
+    fn has_signal(&self) -> bool {
+        self.detector.only().is_some_and(|only| only.file.has_signal())
+    }
+
+    /// The ADC, where there is a signal for it.
+    fn adc(&self) -> Option<&AdcFile> {
+        self.adc.as_ref().filter(|_| self.has_signal())
+    }
 }
 
 /// The format this program reads.
@@ -69,11 +85,27 @@ const WIDEST: f64 = 0.35;
 /// what to say of each.
 const MOVED: [&str; 3] = ["sun", "atmosphere", "environment"];
 
+/// Detectors that are described by parts now: their former names, and what to write.
+const FORMER: [(&str, &str); 2] = [
+    (
+        "linear",
+        "is a [detector.photodiode] with a [comparator] now: false_alarm_hz, timing and hysteresis belong in \
+         [comparator], the other keys in [detector.photodiode], where bandwidth_mhz is the electrical one, \
+         0.709 times what stood here",
+    ),
+    (
+        "sampled",
+        "is a [detector.photodiode] with an [adc] now: sample_ps, bits and step_photons belong in [adc], the \
+         other keys in [detector.photodiode]",
+    ),
+];
+
 /// Keys of a scene file, of which a sensor has none.
 const OF_SCENES: [&str; 4] = ["object", "ground", "material", "interferers"];
 
 pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     refuse_moved(chain)?;
+    refuse_former(chain)?;
     let file: SensorFile =
         schema::read(&chain.merged).map_err(|misfit| typed_wrongly(chain, &misfit))?;
     if file.version != VERSION {
@@ -106,10 +138,10 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     // Of a list that cannot be read nothing follows for the motion of the beam.
     let moves = effects.is_some() && !off(Effect::MirrorMotion);
     let scan = faults.keep(check.scan(&file.scan, moves));
-    let sampled = file.detector.only().and_then(|only| only.file.sample_ps());
-    let timing = faults.keep(match (&file.histogram, sampled) {
+    let adc = file.adc();
+    let timing = faults.keep(match (&file.histogram, adc) {
         (Some(histogram), _) => check.histogram(histogram),
-        (None, Some(sample_ps)) => check.adc(sample_ps),
+        (None, Some(adc)) => check.adc(adc),
         (None, None) => check.tdc(&file.tdc),
     });
     let emission = match (&scan, &timing) {
@@ -152,6 +184,8 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
         emission: &emission,
         readout: &readout,
         budget: budget.as_ref().and_then(Option::as_ref),
+        comparator: file.comparator.as_ref(),
+        adc,
     };
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
@@ -252,6 +286,13 @@ fn refuse_moved(chain: &Chain) -> Result<(), Error> {
         return Err(chain.error(&path, message));
     }
     Ok(())
+}
+
+/// Refuses detectors by their former names.
+fn refuse_former(chain: &Chain) -> Result<(), Error> {
+    let detector = chain.merged.get("detector").and_then(toml::Value::as_table);
+    let former = FORMER.iter().find(|(name, _)| detector.is_some_and(|it| it.contains_key(*name)));
+    former.map_or(Ok(()), |(name, now)| Err(chain.error(&format!("detector.{name}"), *now)))
 }
 
 /// The error of a file that does not fit, with the tables in which an unknown key may stand.
@@ -447,7 +488,43 @@ impl Check<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::design::Design;
+    use std::path::Path;
+
+    use crate::design::{Design, Readout};
+
+    #[test]
+    fn detectors_by_their_former_names_are_told_the_new_ones() {
+        for (name, now) in [("linear", "[comparator]"), ("sampled", "[adc]")] {
+            let set = [(format!("detector.{name}.gain"), "2".to_owned())];
+            let told = Design::open("coded-practical", &set).unwrap_err().to_string();
+            let begins = format!("--set: detector.{name}: is a [detector.photodiode] with ");
+            assert!(told.starts_with(&begins) && told.contains(now), "{told}");
+        }
+    }
+
+    /// What a file puts behind a photodiode replaces what the sensor has there that it extends.
+    #[test]
+    fn a_comparator_replaces_an_adc_and_an_adc_a_comparator() {
+        let open = |extends: &str, text: &str| {
+            let text = format!("version = 1\nextends = \"{extends}\"\nname = \"mine\"\n{text}");
+            Design::from_toml(&text, "mine.toml", Path::new(""), &[])
+                .map_err(|error| error.to_string())
+        };
+        let events = "[comparator]\nfalse_alarm_hz = 1e5\n[tdc]\nconverters = 32\n\
+                      resolution_ps = 100.0\n[receiver]\nkind = \"matched\"\n";
+        let design = open("coded-32", events).unwrap();
+        assert!(matches!(design.readout, Readout::Tdc(_)) && !design.text.contains("[adc]"));
+        let samples = "[detector.photodiode]\nisolation_db = 60.0\n[adc]\nsample_ps = 125.0\n\
+                       bits = 11\nstep_photons = 15.0\n[receiver]\nkind = \"sampled\"\n";
+        let design = open("coded-practical", samples).unwrap();
+        assert_eq!(design.readout, Readout::Adc);
+        assert!(!design.text.contains("[comparator]") && !design.text.contains("[tdc]"));
+        let told = open("coded-practical", "[detector.photodiode]\nisolation_db = 60.0\n");
+        let told = told.unwrap_err();
+        assert!(told.contains("isolation_db: has no effect because of `comparator`"), "{told}");
+        let told = open("kim-park-2016", "[comparator]\nfalse_alarm_hz = 1.0\n").unwrap_err();
+        assert!(told.contains("comparator: has no effect because of `detector`"), "{told}");
+    }
 
     /// What the files of the ready sensors say, or what followed for those that did not: 1.5 mm of the
     /// paper's. Each is reproduced to a third.

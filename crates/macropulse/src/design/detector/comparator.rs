@@ -1,10 +1,11 @@
-//! What makes detection events of the signal behind an amplifier: a comparator with a threshold.
+//! What makes detection events of the signal behind an amplifier: a comparator with a threshold,
+//! `[comparator]`.
 //!
-//! A pulse of amplitude A is A·exp(−t²/2s²), s the response over √(8·ln 2), and has noise on it whose
-//! autocorrelation is exp(−t²/2v²): crossings of a level are then as frequent as the threshold was
-//! set for, 1/(2π·v) = 1/(2√3·τ), τ the response \[Rice44\].
+//! A pulse of amplitude A is A·exp(−t²/2s²), s the response over √(8·ln 2), and has noise on it that is taken
+//! to have the autocorrelation exp(−t²/2v²), v its memory: it crosses the threshold, TNR times its rms,
+//! exp(−TNR²/2)/(2π·v) times per second \[Rice44\]. White noise behind the amplifier has just that.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -23,6 +24,29 @@ pub enum Timing {
     LeadingEdge,
 }
 
+/// `[comparator]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(in crate::design) struct ComparatorFile {
+    /// Crossings by noise per second: sets the threshold.
+    #[schemars(range(min = 0.001, max = 1e12))]
+    pub false_alarm_hz: f64,
+    /// Which moment of a pulse the comparator tells; not where the list `idealised` names
+    /// `inter-chip`.
+    pub timing: Option<Timing>,
+    /// The comparator is armed again where the signal has fallen below 1 less this, times the
+    /// threshold; not where the list `idealised` names `inter-chip`.
+    #[schemars(range(min = 0, max = 0.99))]
+    pub hysteresis: Option<f64>,
+}
+
+/// The threshold over the rms noise, TNR, that noise of `memory` v, s, crosses `rate` times per second:
+/// rate = exp(−TNR²/2)/(2π·v) \[Rice44\]. `None` where the rate is higher than any threshold has.
+pub fn threshold_over_noise(memory: f64, rate: f64) -> Option<f64> {
+    let share = 2.0 * PI * memory * rate;
+    (share <= 1.0).then(|| SQRT_2 * (-libm::log(share)).sqrt())
+}
+
 /// What tells the times of pulses on the sum of all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Comparator {
@@ -39,14 +63,12 @@ pub const FRACTION: f64 = 0.5;
 /// has been crossed even by a pulse that just reaches it.
 pub const DELAY: f64 = 1.0;
 
-/// The v of the noise, in responses: √3/π.
-const MEMORY: f64 = 1.732_050_807_568_877_2 / PI;
-
 /// By how much, on average, the signal about the peak of a pulse at the threshold is higher than at the
 /// peak itself, in detected photons: noise that rises there puts the maximum beside it,
 /// (noise·s/v)²/(2·threshold) to the first order.
 pub(super) fn bump(setting: &LinearSetting) -> f64 {
-    (setting.noise * RMS_OF_FWHM / MEMORY).powi(2) / (2.0 * setting.threshold)
+    let steep = setting.noise * RMS_OF_FWHM * setting.response / setting.memory;
+    steep.powi(2) / (2.0 * setting.threshold)
 }
 
 impl Comparator {
@@ -67,11 +89,11 @@ impl Comparator {
                 let ago = now - DELAY / RMS_OF_FWHM;
                 let pulse = |at: f64| libm::exp(-at * at / 2.0);
                 let slope = (-ago * pulse(ago) + FRACTION * now * pulse(now)) * amplitude / rms;
-                let common = libm::exp(-(DELAY / MEMORY).powi(2) / 2.0);
+                let common = libm::exp(-(DELAY * setting.response / setting.memory).powi(2) / 2.0);
                 let variance = 1.0 + FRACTION * FRACTION - 2.0 * FRACTION * common;
                 // The slope is as noisy as noise of that memory is steep, 1/v for each part. Of the ratio
                 // of a normal variable to 1 + x·g the variance is 1 + 3x² + 15x⁴ times as large.
-                let steepness = (1.0 + FRACTION * FRACTION).sqrt() / (MEMORY * setting.response);
+                let steepness = (1.0 + FRACTION * FRACTION).sqrt() / setting.memory;
                 let x = setting.noise * steepness / slope;
                 let by_slope = (1.0 + 3.0 * x.powi(2) + 15.0 * x.powi(4)).min(2.0);
                 setting.noise * (variance * by_slope).sqrt() / slope
@@ -81,8 +103,7 @@ impl Comparator {
                 // At the very peak there is no slope; noise then tells the moment to within its
                 // own memory.
                 let steep = setting.threshold * before / rms;
-                let memory = MEMORY * setting.response;
-                (setting.noise / steep.max(f64::MIN_POSITIVE)).min(memory)
+                (setting.noise / steep.max(f64::MIN_POSITIVE)).min(setting.memory)
             }
         }
     }
@@ -106,10 +127,18 @@ impl Comparator {
         let dip = libm::log((2.0 * amplitude / release).max(1.0));
         RMS_OF_FWHM * setting.response * (8.0 * dip).sqrt()
     }
+}
 
-    /// Standard deviation, s, of the Gaussian that white noise is smoothed with to have this memory:
-    /// v/√2.
-    pub fn smoothing(response: f64) -> f64 {
-        MEMORY * response / std::f64::consts::SQRT_2
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pfa 0.5 within 1 µs behind a matched filter of 5 ns, v = √3/π times as long: 20·log10 TNR = 9.776 dB.
+    #[test]
+    fn the_threshold_of_half_a_false_alarm_per_microsecond() {
+        let memory = 3_f64.sqrt() / PI * 5e-9;
+        let tnr = threshold_over_noise(memory, 0.5 / 1e-6).unwrap();
+        approx::assert_relative_eq!(20.0 * tnr.log10(), 9.776, max_relative = 1e-4);
+        assert_eq!(threshold_over_noise(memory, 1.0 / (2.0 * PI * memory) * 1.001), None);
     }
 }

@@ -1,15 +1,12 @@
-//! A linear detector: a photodiode with an amplifier and a threshold.
+//! A photodiode with an amplifier and a comparator.
 
 use macropulse_codec::statistics::{normal_tail, poisson};
-use schemars::JsonSchema;
-use serde::Deserialize;
 
-use super::table::MOST_COUNTS;
+use super::comparator::{bump, threshold_over_noise};
 use super::{
-    Amplifier, Awaited, Comparator, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, SLICES,
-    Sensitivity, Table, Timing, Typed, slices_above,
+    Awaited, Comparator, FirstEvent, FrontEnd, Lit, Model, Noise, SLICES, Sensitivity, slices_above,
 };
-use crate::design::{Error, Light};
+use crate::design::Light;
 
 /// Terms of a Poisson sum that are less than this share of all are left out.
 const NEGLIGIBLE: f64 = 1e-15;
@@ -17,58 +14,16 @@ const NEGLIGIBLE: f64 = 1e-15;
 /// From so many photons on, their number passes for a normal variable.
 const MANY: f64 = 1e4;
 
-/// The hysteresis of a sensor that says nothing of it.
-const HYSTERESIS: f64 = 0.5;
-
-/// `[detector.linear]` as typed.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct File {
-    /// Detections per photon.
-    #[schemars(range(min = 1e-6, max = 1))]
-    efficiency: f64,
-    /// Gain of the photodiode: 1 where it multiplies nothing.
-    #[schemars(range(min = 1, max = 1e6))]
-    gain: f64,
-    /// Ratio of the ionisation rates of the photodiode, which its excess noise follows from.
-    #[schemars(range(min = 0, max = 1))]
-    ionisation_ratio: f64,
-    /// Bandwidth at 3 dB, MHz.
-    #[schemars(range(min = 0.001, max = 1e9))]
-    bandwidth_mhz: f64,
-    /// Noise at the input of the amplifier, pA/√Hz.
-    #[schemars(range(min = 0, max = 1e6))]
-    amplifier_pa_rthz: f64,
-    /// Dark current that is multiplied, nA.
-    #[schemars(range(min = 0, max = 1e6))]
-    dark_current_na: f64,
-    /// Crossings by noise per second: sets the threshold.
-    #[schemars(range(min = 0.001, max = 1e12))]
-    false_alarm_hz: f64,
-    /// Timing jitter, ps rms, beside what the noise makes of the slope.
-    #[schemars(range(min = 0, max = 1e6))]
-    jitter_ps: f64,
-    /// Which moment of a pulse the comparator tells; not where the list `idealised` names
-    /// `inter-chip`.
-    timing: Option<Timing>,
-    /// The comparator is armed again where the signal has fallen below 1 less this, times the
-    /// threshold; not where the list `idealised` names `inter-chip`.
-    #[schemars(range(min = 0, max = 0.99))]
-    hysteresis: Option<f64>,
-}
-
-/// A photodiode with an amplifier and a threshold. Its noise, and with it the threshold, depends on
+/// A photodiode with an amplifier and a comparator. Its noise, and with it the threshold, depends on
 /// the sunlight it sees, too: [`LinearSetting`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Linear {
     /// Mean photons detected per mark at the reference target.
     pub sensitivity: Sensitivity,
     /// The photodiode and its amplifier.
-    pub amplifier: Amplifier,
+    pub front_end: FrontEnd,
     /// Crossings of the threshold by noise alone that are accepted, 1/s.
     pub false_alarm: f64,
-    /// The threshold over the rms noise that this takes.
-    pub threshold_over_noise: f64,
     /// Standard deviation of the timing of the converter's input alone, s.
     pub jitter: f64,
     /// What tells the time of a pulse on the summed signal; `None` where every mark is judged alone.
@@ -87,6 +42,8 @@ pub struct LinearSetting {
     pub excess: f64,
     /// Full width at half maximum of a mark behind the amplifier, s.
     pub response: f64,
+    /// Memory of the noise, s, as [`FrontEnd::memory`].
+    pub memory: f64,
     /// Crossings of the threshold by noise alone, 1/s.
     pub false_rate: f64,
     /// Standard deviation of the timing of the converter's input alone, s.
@@ -95,92 +52,22 @@ pub struct LinearSetting {
     pub comparator: Option<Comparator>,
 }
 
-impl Typed for File {
-    fn efficiency(&self) -> Option<f64> {
-        Some(self.efficiency)
-    }
-
-    fn idle(&self) -> Idle {
-        Idle::NONE
-    }
-
-    fn follows(&self) -> Follows {
-        Follows { bandwidth: true, neighbouring_chips: true }
-    }
-
-    fn is_single_stop(&self) -> bool {
-        false
-    }
-
-    fn check(&self, table: &Table) -> Result<Detector, Error> {
-        let Some(budget) = table.before.budget else {
-            return table.refuse(
-                "counts its noise in electrons, so the light must be counted as well: take \
-                 \"link-budget\" off the list `idealised`",
-            );
-        };
-        let amplifier = Amplifier {
-            gain: table.within("gain", self.gain, 1.0, 1e6)?,
-            ionisation: table.within("ionisation_ratio", self.ionisation_ratio, 0.0, 1.0)?,
-            bandwidth: table.within("bandwidth_mhz", self.bandwidth_mhz, 1e-3, 1e9)? * 1e6,
-            current_noise: table.within("amplifier_pa_rthz", self.amplifier_pa_rthz, 0.0, 1e6)?
-                * 1e-12,
-            dark_current: table.within("dark_current_na", self.dark_current_na, 0.0, 1e6)? * 1e-9,
-            pulse: table.before.light.pulse,
-        };
-        let rate = table.within("false_alarm_hz", self.false_alarm_hz, 1e-3, MOST_COUNTS)?;
-        let Some(tnr) = amplifier.threshold_for(rate) else {
-            let message = format!(
-                "is {rate:.3e}, but noise of this bandwidth crosses even its own mean only \
-                 {:.3e} times per second",
-                amplifier.highest_rate()
-            );
-            return table.refuse_key("false_alarm_hz", message);
-        };
-        Ok(Detector::Linear(Linear {
-            sensitivity: table.honest(budget),
-            amplifier,
-            false_alarm: rate,
-            threshold_over_noise: tnr,
-            jitter: table.jitter(self.jitter_ps)?,
-            comparator: self.comparator(table)?,
-        }))
-    }
-}
-
-impl File {
-    fn comparator(&self, table: &Table) -> Result<Option<Comparator>, Error> {
-        let keys = [("timing", self.timing.is_some()), ("hysteresis", self.hysteresis.is_some())];
-        if table.before.light.spread.is_none() {
-            return match keys.iter().find(|(_, is_typed)| *is_typed) {
-                None => Ok(None),
-                Some((key, _)) => table.refuse_key(
-                    key,
-                    "has no effect because of `idealised`: every mark is judged alone while \
-                     \"inter-chip\" is in this list: --with inter-chip sums their pulses"
-                        .to_owned(),
-                ),
-            };
-        }
-        Ok(Some(Comparator {
-            timing: self.timing.unwrap_or(Timing::ConstantFraction),
-            hysteresis: match self.hysteresis {
-                Some(typed) => table.within("hysteresis", typed, 0.0, 0.99)?,
-                None => HYSTERESIS,
-            },
-        }))
-    }
-}
-
 impl Linear {
+    /// The threshold over the rms noise, by which noise alone crosses it as often as is accepted.
+    fn threshold_over_noise(&self, memory: f64) -> f64 {
+        threshold_over_noise(memory, self.false_alarm).unwrap_or(0.0)
+    }
+
     /// The setting of a detector that sees `background` detections of steady light per second.
     pub fn setting(&self, background: f64) -> LinearSetting {
-        let noise = self.amplifier.noise_electrons(background);
+        let noise = self.front_end.noise(background);
+        let memory = self.front_end.memory(background);
         LinearSetting {
-            threshold: self.threshold_over_noise * noise,
+            threshold: self.threshold_over_noise(memory) * noise,
             noise,
-            excess: self.amplifier.excess(),
-            response: self.amplifier.response(),
+            excess: self.front_end.excess(),
+            response: self.front_end.response(),
+            memory,
             false_rate: self.false_alarm,
             jitter: self.jitter,
             comparator: self.comparator,
@@ -227,8 +114,7 @@ impl LinearSetting {
     /// ½·erfc((TNR − SNR)/√2) of textbooks.
     fn crossing(&self, photons: f64) -> f64 {
         let Self { noise, excess, .. } = *self;
-        let threshold =
-            self.threshold - self.comparator.map_or(0.0, |_| super::comparator::bump(self));
+        let threshold = self.threshold - self.comparator.map_or(0.0, |_| bump(self));
         let above = |count: f64, variance: f64| normal_tail((threshold - count) / variance.sqrt());
         if photons > MANY {
             return above(photons, photons * excess + noise * noise);
@@ -270,7 +156,7 @@ impl Model for Linear {
     }
 
     fn response(&self) -> f64 {
-        self.amplifier.response()
+        self.front_end.response()
     }
 
     fn memory_fs(&self) -> i64 {
@@ -314,8 +200,8 @@ impl Model for Linear {
 
     fn summary(&self) -> String {
         format!(
-            "linear; threshold {:.2} times the noise; {}; {:.0e} false alarms/s",
-            self.threshold_over_noise,
+            "comparator; threshold {:.2} times the noise; {}; {:.0e} false alarms/s",
+            self.threshold_over_noise(self.front_end.memory(0.0)),
             self.sensitivity.summary(),
             self.false_alarm
         )
@@ -337,6 +223,7 @@ mod tests {
             noise,
             excess,
             response: 1e-9,
+            memory: 0.5e-9,
             false_rate: 0.0,
             jitter: 0.0,
             comparator: None,

@@ -1,18 +1,18 @@
-//! The kinds of detector, a file for each: its keys and their limits, and the law by which it makes
-//! detection events of light, in closed form.
+//! The kinds of detector: their keys and their limits, and the law by which each makes detection events of
+//! light, in closed form.
 //!
 //! How events are drawn stands in [`detect`](crate::detect) and shares nothing with the closed
 //! forms but a detector's settings, so that the one can be held against the other.
 //!
 //! A new kind is a file here with the keys (`Typed`) and the answers ([`Model`]), an entry in each
-//! list of this page, and a file in [`detect`](crate::detect). Nothing else knows the kinds.
+//! list of this page, and a file in [`detect`](crate::detect).
 
-mod amplifier;
 mod check;
 mod comparator;
 mod front_end;
 mod geiger;
 mod linear;
+mod photodiode;
 mod photon_counting;
 mod sampled;
 mod single_stop;
@@ -22,14 +22,16 @@ use macropulse_codec::statistics::{normal_quantile, normal_tail};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-pub use amplifier::Amplifier;
 pub(in crate::design) use check::Efficiency;
+pub(in crate::design) use comparator::ComparatorFile;
 pub use comparator::{
     Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, Timing,
+    threshold_over_noise,
 };
 pub use front_end::FrontEnd;
 pub use geiger::{Arming, Geiger};
 pub use linear::{Linear, LinearSetting};
+pub(in crate::design) use photodiode::OF_SAMPLES;
 pub use photon_counting::PhotonCounting;
 pub use sampled::{BASELINE_BLOCK, Sampled};
 pub use single_stop::{PLENTY, SingleStop, SingleStopSetting};
@@ -37,18 +39,18 @@ pub(in crate::design) use table::{Before, SensitivityFile, Table};
 
 use super::{Error, Light};
 
-/// The list of all kinds: variant, file in this folder, and name in a sensor file. Every other list
-/// of them follows from this one.
+/// The list of all kinds, and that of the tables `[detector.NAME]` in which a sensor file describes one: file in
+/// this folder, and name. Every other list of them follows from these.
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $Kind:ident, $file:ident, $name:literal;)+) => {
-        /// Light to detection events.
+    (kinds { $($(#[$doc:meta])* $Kind:ident;)+ } tables { $($(#[$of:meta])* $file:ident, $name:literal;)+ }) => {
+        /// Light to detection events, or to samples.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Detector {
             $($(#[$doc])* $Kind($Kind),)+
         }
 
         impl Detector {
-            /// Names of all kinds: each is a table `[detector.NAME]` of a sensor file.
+            /// Names of all tables `[detector.NAME]`.
             pub const NAMES: &[&str] = &[$($name),+];
 
             /// What its kind answers.
@@ -63,7 +65,7 @@ macro_rules! kinds {
         #[derive(Debug, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub(in crate::design) struct DetectorFile {
-            $($(#[$doc])* #[serde(rename = $name)] $file: Option<$file::File>,)+
+            $($(#[$of])* #[serde(rename = $name)] $file: Option<$file::File>,)+
         }
 
         impl DetectorFile {
@@ -87,16 +89,28 @@ impl DetectorFile {
 }
 
 kinds! {
-    /// Every mark is a Bernoulli trial of its own.
-    PhotonCounting, photon_counting, "photon-counting";
-    /// Cells that are blind for a while after each count.
-    Geiger, geiger, "geiger";
-    /// An amplified current that crosses a threshold.
-    Linear, linear, "linear";
-    /// An amplified current that is sampled.
-    Sampled, sampled, "sampled";
-    /// One event per shot \[KP16 Fig. 7\].
-    SingleStop, single_stop, "single-stop";
+    kinds {
+        /// Every mark is a Bernoulli trial of its own.
+        PhotonCounting;
+        /// Cells that are blind for a while after each count.
+        Geiger;
+        /// An amplified current that crosses a threshold.
+        Linear;
+        /// An amplified current that is sampled.
+        Sampled;
+        /// One event per shot \[KP16 Fig. 7\].
+        SingleStop;
+    }
+    tables {
+        /// Every mark is a Bernoulli trial of its own.
+        photon_counting, "photon-counting";
+        /// Cells that are blind for a while after each count.
+        geiger, "geiger";
+        /// A photodiode and its amplifier, behind which a [comparator] or an [adc] stands.
+        photodiode, "photodiode";
+        /// One event per shot \[KP16 Fig. 7\].
+        single_stop, "single-stop";
+    }
 }
 
 /// The table of one kind in a sensor file.
@@ -122,9 +136,9 @@ pub(in crate::design) trait Typed {
     /// Whether it puts out no more than one event per shot.
     fn is_single_stop(&self) -> bool;
 
-    /// From sample to sample, ps, of a kind that is sampled: its tick.
-    fn sample_ps(&self) -> Option<f64> {
-        None
+    /// Whether it puts out a signal, for a comparator or an ADC.
+    fn has_signal(&self) -> bool {
+        false
     }
 
     /// The detector in SI units.

@@ -88,7 +88,7 @@ impl Typed for File {
         if table.before.emission.coding().codebook.max_weight() > 1 {
             return table.refuse(
                 "fires once per shot, but a coded shot has several marks: use \
-                 [detector.geiger], [detector.linear] or [detector.photon-counting], or leave \
+                 [detector.geiger], [detector.photodiode] or [detector.photon-counting], or leave \
                  [code] out",
             );
         }

@@ -3,9 +3,10 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::Sensitivity;
+use super::{ComparatorFile, Sensitivity};
 use crate::design::budget::Budget;
 use crate::design::limits::Check;
+use crate::design::readout::AdcFile;
 use crate::design::{Emission, Error, Light, Readout, Scan};
 
 /// The most dark counts, or declared background counts, per second.
@@ -33,6 +34,10 @@ pub(in crate::design) struct Before<'a> {
     pub emission: &'a Emission,
     pub readout: &'a Readout,
     pub budget: Option<&'a Budget>,
+    /// What compares the signal of a photodiode with a threshold.
+    pub comparator: Option<&'a ComparatorFile>,
+    /// What samples it.
+    pub adc: Option<&'a AdcFile>,
 }
 
 /// The table `[detector.NAME]`: tests values by their keys in it.

@@ -6,7 +6,7 @@ use crate::channel::{Error, Link, Operating};
 use crate::design::detector::Lit;
 use crate::design::{Budget, Design};
 use crate::environment::Environment;
-use crate::units::{SPEED_OF_LIGHT, s_from_fs};
+use crate::units::{range_from_tof, s_from_fs};
 
 /// What a pane reflects of light that falls on it square on, both faces together:
 /// 2·((n − 1)/(n + 1))², n = 1.5 (Fresnel).
@@ -59,7 +59,7 @@ impl<'a> Sized<'a> {
         let design = self.design;
         let tick = s_from_fs(design.clock.tick_fs);
         let width = design.detector.model().response().max(design.light.pulse).max(tick);
-        let depth = SPEED_OF_LIGHT / 2.0 * width * (PI / (4.0 * LN_2)).sqrt();
+        let depth = range_from_tof(width) * (PI / (4.0 * LN_2)).sqrt();
         let reflectance = PI * self.backscatter * depth;
         (reflectance > 0.0).then_some(())?;
         self.reach(reflectance)
@@ -146,6 +146,7 @@ pub fn rounded(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::tof_from_range;
     use approx::assert_relative_eq;
 
     fn environment(name: &str) -> Environment {
@@ -189,11 +190,11 @@ mod tests {
             let (mut sum, step) = (0.0, 1e-3);
             for slice in 1..100_000 {
                 let range = step * f64::from(slice);
-                let late = 2.0 * (reach - range) / SPEED_OF_LIGHT;
+                let late = tof_from_range(reach - range);
                 let share = (-4.0 * LN_2 * (late / model.response()).powi(2)).exp();
                 let white = budget.efficiency * budget.photons(energy, 1.0, range);
                 let air = PI * extinction / 18.8 * step * (-2.0 * extinction * range).exp();
-                sum += white * air * share * budget.field.share(2.0 * range / SPEED_OF_LIGHT);
+                sum += white * air * share * budget.field.share(tof_from_range(range));
             }
             assert_relative_eq!(sum, threshold, max_relative = 0.02);
         }
