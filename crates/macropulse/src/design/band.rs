@@ -61,7 +61,7 @@ impl Design {
     pub fn most_jitter_fs(&self) -> i64 {
         let most = MOST_SIGMA
             * (self.detector.model().jitter()
-                + self.light.spread_at(&self.detector).unwrap_or(0.0));
+                + self.detector.spread_of(&self.light).unwrap_or(0.0));
         (most * FS_PER_S as f64).ceil() as i64
     }
 

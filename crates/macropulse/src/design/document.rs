@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use toml::Table;
 
-use super::family::FAMILIES;
 use super::presets;
-use super::{Detector, Effect, Error, Pattern};
+use super::{Effect, Error};
 use crate::names::{line_column, offset_of_key, toml_value};
 use crate::{opened, told};
 
@@ -29,15 +28,9 @@ const IDEALISED: &str = "idealised";
 /// What a file that extends another does not take from it: a sentence about that one.
 const PROSE: &str = "summary";
 
-/// Where exactly one of several tables may stand: naming another kind than the parent's replaces
-/// the parent's table instead of adding to it. So with keys of which there may be one.
-pub(super) const ALTERNATIVES: [(&str, &[&str]); 5] = [
-    ("scan", Pattern::NAMES),
-    ("detector", Detector::NAMES),
-    ("family", FAMILIES),
-    ("spinning", &["blocks", "lasers", "calibration"]),
-    ("spinning", &["azimuth_step_deg", "cycle_us"]),
-];
+/// Keys of which a table has exactly one: the name of the table, and the keys. Naming another than the parent does
+/// replaces what the parent has there instead of adding to it.
+pub(super) type Alternatives = [(&'static str, &'static [&'static str])];
 
 /// Tables of which the stronger document's replaces the weaker one's other: what stands behind a photodiode.
 const BEHIND_A_PHOTODIODE: [&str; 2] = ["comparator", "adc"];
@@ -83,8 +76,9 @@ impl Chain {
         origin: &str,
         folder: &Path,
         overrides: &[(String, String)],
+        alternatives: &Alternatives,
     ) -> Result<Self, Error> {
-        Self::of(Document::parse(text, origin, folder)?, folder, overrides)
+        Self::of(Document::parse(text, origin, folder)?, folder, overrides, alternatives)
     }
 
     /// As [`Chain::read`], of a `table` that was not typed as text: its values have no line.
@@ -93,13 +87,19 @@ impl Chain {
         origin: &str,
         folder: &Path,
         overrides: &[(String, String)],
+        alternatives: &Alternatives,
     ) -> Result<Self, Error> {
         let (origin, table) = (origin.to_owned(), table.clone());
         let first = Document { origin, text: String::new(), table, folder: folder.to_owned() };
-        Self::of(first, folder, overrides)
+        Self::of(first, folder, overrides, alternatives)
     }
 
-    fn of(first: Document, folder: &Path, overrides: &[(String, String)]) -> Result<Self, Error> {
+    fn of(
+        first: Document,
+        folder: &Path,
+        overrides: &[(String, String)],
+        alternatives: &Alternatives,
+    ) -> Result<Self, Error> {
         let mut documents = Vec::new();
         let switches = |key: &str| [WITH, WITHOUT].contains(&key);
         let (switched, overrides): (Vec<_>, Vec<_>) =
@@ -136,15 +136,15 @@ impl Chain {
                     merged.contains_key(key) || !BEHIND_A_PHOTODIODE.contains(&key)
                 });
             }
-            fill_in(&mut merged, &table);
+            fill_in(&mut merged, &table, alternatives);
         }
         if let Some(parent) = documents[own].table.get("extends").and_then(toml::Value::as_str) {
             let said = format!("extends {parent}");
             merged.entry(PROSE).or_insert(said.into());
         }
         let defaults = Document::parse(presets::DEFAULTS, "built-in defaults", Path::new(""))?;
-        let fitting = only_for_what_is_there(&defaults.table, &merged);
-        fill_in(&mut merged, &fitting);
+        let fitting = only_for_what_is_there(&defaults.table, &merged, alternatives);
+        fill_in(&mut merged, &fitting, alternatives);
         merged.remove("extends");
         documents.push(defaults);
         let mut chain = Self { documents, merged, is_switched: !switched.is_empty() };
@@ -316,7 +316,7 @@ fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Err
 }
 
 /// Adds to `strong` what only `weak` has.
-fn fill_in(strong: &mut Table, weak: &Table) {
+fn fill_in(strong: &mut Table, weak: &Table, alternatives: &Alternatives) {
     for (key, value) in weak {
         match strong.get_mut(key) {
             None => {
@@ -325,7 +325,7 @@ fn fill_in(strong: &mut Table, weak: &Table) {
             Some(toml::Value::Table(inner)) => {
                 if let toml::Value::Table(below) = value {
                     let mut below = below.clone();
-                    for (_, kinds) in ALTERNATIVES.iter().filter(|(group, _)| group == key) {
+                    for (_, kinds) in alternatives.iter().filter(|(group, _)| group == key) {
                         // Of a family there is nothing but its kind, be it misspelt.
                         if key == "family" || kinds.iter().any(|kind| inner.contains_key(*kind)) {
                             below.retain(|kind, _| {
@@ -333,7 +333,7 @@ fn fill_in(strong: &mut Table, weak: &Table) {
                             });
                         }
                     }
-                    fill_in(inner, &below);
+                    fill_in(inner, &below, alternatives);
                 }
             }
             Some(_) => {}
@@ -342,14 +342,14 @@ fn fill_in(strong: &mut Table, weak: &Table) {
 }
 
 /// The defaults without the tables that the sensor does not have: no code, another kind of scan.
-fn only_for_what_is_there(defaults: &Table, sensor: &Table) -> Table {
+fn only_for_what_is_there(defaults: &Table, sensor: &Table, alternatives: &Alternatives) -> Table {
     let mut kept = defaults.clone();
     kept.retain(|key, _| match key {
         "code" => sensor.contains_key("code"),
         "safety" => ["optics", "safety"].iter().any(|key| sensor.contains_key(*key)),
         _ => true,
     });
-    for (group, kinds) in ALTERNATIVES {
+    for (group, kinds) in alternatives {
         if let Some(toml::Value::Table(inner)) = kept.get_mut(group) {
             let chosen = sensor.get(group).and_then(toml::Value::as_table);
             inner.retain(|key, _| {
@@ -428,9 +428,10 @@ fn place(documents: &[Document], path: &str) -> Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::ALTERNATIVES;
 
     fn chain(text: &str) -> Chain {
-        Chain::read(text, "mine.toml", Path::new(""), &[]).unwrap()
+        Chain::read(text, "mine.toml", Path::new(""), &[], &ALTERNATIVES).unwrap()
     }
 
     #[test]
@@ -458,7 +459,7 @@ mod tests {
         let change = |key: &str, effect: &str| (key.to_owned(), effect.to_owned());
         let set = [change(WITH, "footprint"), change(WITHOUT, "inter-chip")];
         let text = "extends = \"kim-park-2016-physical\"\nidealised = [\"footprint\"]";
-        let chain = Chain::read(text, "mine.toml", Path::new(""), &set).unwrap();
+        let chain = Chain::read(text, "mine.toml", Path::new(""), &set, &ALTERNATIVES).unwrap();
         let list = value_at(&chain.merged, "idealised").unwrap().as_array().unwrap();
         assert_eq!(
             list.iter().filter_map(|name| name.as_str()).collect::<Vec<_>>(),
@@ -490,7 +491,9 @@ mod tests {
     #[test]
     fn overrides_are_strongest() {
         let set = [("scan.max_range_m".to_owned(), "12".to_owned())];
-        let chain = Chain::read("extends = \"hdl-64e\"", "mine.toml", Path::new(""), &set).unwrap();
+        let chain =
+            Chain::read("extends = \"hdl-64e\"", "mine.toml", Path::new(""), &set, &ALTERNATIVES)
+                .unwrap();
         assert_eq!(value_at(&chain.merged, "scan.max_range_m").unwrap().as_integer(), Some(12));
     }
 
@@ -498,7 +501,13 @@ mod tests {
     fn a_key_of_ten_thousand_parts_is_refused() {
         let set = |parts: usize| {
             let key = vec!["a"; parts].join(".");
-            Chain::read("extends = \"hdl-64e\"", "m.toml", Path::new(""), &[(key, "1".to_owned())])
+            Chain::read(
+                "extends = \"hdl-64e\"",
+                "m.toml",
+                Path::new(""),
+                &[(key, "1".to_owned())],
+                &ALTERNATIVES,
+            )
         };
         assert!(set(DEEPEST).is_ok());
         let told = set(10_000).unwrap_err().to_string();
@@ -508,7 +517,8 @@ mod tests {
 
     #[test]
     fn circles_and_unknown_parents_are_refused() {
-        let unknown = Chain::read("extends = \"kim-prak-2016\"", "m.toml", Path::new(""), &[]);
+        let unknown =
+            Chain::read("extends = \"kim-prak-2016\"", "m.toml", Path::new(""), &[], &ALTERNATIVES);
         assert!(unknown.unwrap_err().to_string().contains("did you mean `kim-park-2016`"));
     }
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::limits::Check;
-use super::{Detector, Effect, Error};
+use super::{Effect, Error};
 use crate::units::RMS_OF_FWHM;
 
 /// `[light]` as typed.
@@ -65,15 +65,6 @@ pub struct Light {
     /// Its rms length, s, where its light is followed into neighbouring chips; `None` where it is
     /// taken to stay in its own.
     pub spread: Option<f64>,
-}
-
-impl Light {
-    /// The rms length, s, over which the photons of a micropulse are spread where `detector` sees
-    /// each by itself; `None` where they are taken to come at once, and for a detector behind an
-    /// amplifier, which sees the pulse as a whole.
-    pub fn spread_at(&self, detector: &Detector) -> Option<f64> {
-        self.spread.filter(|_| !matches!(detector, Detector::Linear(_) | Detector::Sampled(_)))
-    }
 }
 
 impl Check<'_> {

@@ -1,8 +1,7 @@
 //! What every section of a sensor file asks of its values.
 
-use super::band::TOO_FINE;
+use super::Error;
 use super::document::Chain;
-use super::{Error, Readout};
 
 /// A key without effect, the key of the setting that makes it so, and how.
 pub(super) struct Idle {
@@ -46,11 +45,6 @@ impl Check<'_> {
             return Ok(value);
         }
         self.refuse(path, format!("is {value}, but must lie between {least} and {most}"))
-    }
-
-    /// Ticks, or samples, of which 2²⁶ do not hold the echoes of a shot and of those in flight with it.
-    pub(super) fn too_fine<T>(&self, readout: &Readout) -> Result<T, Error> {
-        self.refuse(readout.tick_key(), TOO_FINE)
     }
 
     /// A duration that must be a whole, positive number of femtoseconds.

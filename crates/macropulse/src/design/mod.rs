@@ -54,6 +54,15 @@ pub use work::SHOTS_OF_BAND;
 use crate::digest::Digest;
 use macropulse_codec::decode::Receiver;
 
+/// Tables of a sensor file that have exactly one of several keys.
+const ALTERNATIVES: [(&str, &[&str]); 5] = [
+    ("scan", Pattern::NAMES),
+    ("detector", Detector::NAMES),
+    ("family", family::FAMILIES),
+    ("spinning", &["blocks", "lasers", "calibration"]),
+    ("spinning", &["azimuth_step_deg", "cycle_us"]),
+];
+
 /// A sensor, checked, in SI units.
 #[derive(Debug, Clone)]
 pub struct Design {
@@ -116,7 +125,7 @@ impl Design {
         folder: &Path,
         overrides: &[(String, String)],
     ) -> Result<Self, Error> {
-        check::design(&document::Chain::read(text, origin, folder, overrides)?)
+        check::design(&document::Chain::read(text, origin, folder, overrides, &ALTERNATIVES)?)
     }
 
     /// The sensor that `table` describes, as a sensor file does. `origin` stands in error messages
@@ -130,7 +139,7 @@ impl Design {
         folder: &Path,
         overrides: &[(String, String)],
     ) -> Result<Self, Error> {
-        check::design(&document::Chain::of_table(table, origin, folder, overrides)?)
+        check::design(&document::Chain::of_table(table, origin, folder, overrides, &ALTERNATIVES)?)
     }
 
     /// Whether shots carry a code.

@@ -4,6 +4,7 @@ use macropulse_codec::RecordKind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::band::TOO_FINE;
 use super::limits::Check;
 use super::{Error, Scan};
 use crate::units::fs_from_s;
@@ -156,6 +157,11 @@ impl Tdc {
 }
 
 impl Check<'_> {
+    /// Ticks, or samples, of which 2²⁶ do not hold the echoes of a shot and of those in flight with it.
+    pub(super) fn too_fine<T>(&self, readout: &Readout) -> Result<T, Error> {
+        self.refuse(readout.tick_key(), TOO_FINE)
+    }
+
     /// Clock and readout of a detector whose signal is sampled.
     pub(super) fn adc(&self, file: &AdcFile) -> Result<(Clock, Readout), Error> {
         let tick_fs = self.whole_fs("adc.sample_ps", file.sample_ps)?;

@@ -6,8 +6,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
 use super::check::SensorFile;
-use super::document::ALTERNATIVES;
-use super::{Effect, presets};
+use super::{ALTERNATIVES, Effect, presets};
 use crate::schema;
 
 /// The JSON Schema of a sensor file, by which editors complete and check it.

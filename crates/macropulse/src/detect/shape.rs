@@ -25,7 +25,7 @@ impl Shape {
     /// photon by itself. `None` for the others, of which a linear one follows what the pulse becomes
     /// behind its amplifier.
     pub fn of(design: &Design) -> Option<Self> {
-        let rms = design.light.spread_at(&design.detector)?;
+        let rms = design.detector.spread_of(&design.light)?;
         let width = FINEST * rms;
         let reach = (FARTHEST * rms / width).ceil() as i64;
         let below = |place: f64| normal_tail(-place * width / rms);

@@ -61,7 +61,7 @@ impl Place {
     /// Probability that a mark is found where it is looked for. Photons of a micropulse that
     /// reaches beyond its chip fall there or not each by itself; else its one event does.
     pub fn seen(&self, design: &Design, mark: &Lit) -> f64 {
-        match design.light.spread_at(&design.detector) {
+        match design.detector.spread_of(&design.light) {
             Some(_) => pd_of_share(design, mark, self.share),
             None => pd_of_share(design, mark, 1.0) * self.share,
         }
@@ -77,7 +77,7 @@ fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
 
 /// Ticks that a mark lights on average, each with the share of the light that falls into it.
 pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
-    let Some(spread) = design.light.spread_at(&design.detector) else {
+    let Some(spread) = design.detector.spread_of(&design.light) else {
         return pd_of_share(design, mark, 1.0);
     };
     let width = spread / s_from_fs(design.clock.tick_fs);

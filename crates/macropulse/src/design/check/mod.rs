@@ -1,4 +1,4 @@
-//! From typed keys to a checked `Design`: every limit is tested here, once.
+//! From typed keys to a checked `Design`.
 
 mod effectless;
 
@@ -190,7 +190,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
     // Without a detector the receiver has no timing, of which none of its limits depends.
-    let spread = detector.as_ref().and_then(|detector| light.spread_at(detector));
+    let spread = detector.as_ref().and_then(|detector| detector.spread_of(&light));
     let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let inputs = Inputs {
         detector: &file.detector,

@@ -10,7 +10,6 @@ use std::f64::consts::{PI, SQRT_2};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::LinearSetting;
 use crate::units::RMS_OF_FWHM;
 
 /// Which moment of a pulse a comparator tells.
@@ -54,6 +53,28 @@ pub struct Comparator {
     pub timing: Timing,
     /// It is armed again where the signal is below (1 − hysteresis)·threshold.
     pub hysteresis: f64,
+}
+
+/// What a photodiode with a comparator is set to under the light it sees. Amplitudes are in detected photons: in
+/// electrons before multiplication.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearSetting {
+    /// Amplitude that makes an event.
+    pub threshold: f64,
+    /// Noise without a mark, rms.
+    pub noise: f64,
+    /// Excess noise factor of the multiplication.
+    pub excess: f64,
+    /// Full width at half maximum of a mark behind the amplifier, s.
+    pub response: f64,
+    /// Memory of the noise, s, as [`FrontEnd::memory`](super::FrontEnd::memory).
+    pub memory: f64,
+    /// Crossings of the threshold by noise alone, 1/s.
+    pub false_rate: f64,
+    /// Standard deviation of the timing of the converter's input alone, s.
+    pub jitter: f64,
+    /// As [`Linear::comparator`](super::Linear::comparator).
+    pub comparator: Option<Comparator>,
 }
 
 /// The fraction of a constant-fraction discriminator.

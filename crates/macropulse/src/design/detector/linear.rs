@@ -4,7 +4,8 @@ use macropulse_codec::statistics::{normal_tail, poisson};
 
 use super::comparator::{bump, threshold_over_noise};
 use super::{
-    Awaited, Comparator, FirstEvent, FrontEnd, Lit, Model, Noise, SLICES, Sensitivity, slices_above,
+    Awaited, Comparator, FirstEvent, FrontEnd, LinearSetting, Lit, Model, Noise, SLICES,
+    Sensitivity, slices_above,
 };
 use crate::design::Light;
 
@@ -27,28 +28,6 @@ pub struct Linear {
     /// Standard deviation of the timing of the converter's input alone, s.
     pub jitter: f64,
     /// What tells the time of a pulse on the summed signal; `None` where every mark is judged alone.
-    pub comparator: Option<Comparator>,
-}
-
-/// What a linear detector is set to under the light it sees. Amplitudes are in detected photons: in
-/// electrons before multiplication.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearSetting {
-    /// Amplitude that makes an event.
-    pub threshold: f64,
-    /// Noise without a mark, rms.
-    pub noise: f64,
-    /// Excess noise factor of the multiplication.
-    pub excess: f64,
-    /// Full width at half maximum of a mark behind the amplifier, s.
-    pub response: f64,
-    /// Memory of the noise, s, as [`FrontEnd::memory`].
-    pub memory: f64,
-    /// Crossings of the threshold by noise alone, 1/s.
-    pub false_rate: f64,
-    /// Standard deviation of the timing of the converter's input alone, s.
-    pub jitter: f64,
-    /// As [`Linear::comparator`].
     pub comparator: Option<Comparator>,
 }
 

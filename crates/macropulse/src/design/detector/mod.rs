@@ -25,12 +25,12 @@ use serde::Deserialize;
 pub(in crate::design) use check::Efficiency;
 pub(in crate::design) use comparator::ComparatorFile;
 pub use comparator::{
-    Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, Timing,
+    Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, LinearSetting, Timing,
     threshold_over_noise,
 };
 pub use front_end::FrontEnd;
 pub use geiger::{Arming, Geiger};
-pub use linear::{Linear, LinearSetting};
+pub use linear::Linear;
 pub(in crate::design) use photodiode::OF_SAMPLES;
 pub use photon_counting::PhotonCounting;
 pub use sampled::{BASELINE_BLOCK, Sampled};
@@ -110,6 +110,15 @@ kinds! {
         photodiode, "photodiode";
         /// One event per shot \[KP16 Fig. 7\].
         single_stop, "single-stop";
+    }
+}
+
+impl Detector {
+    /// The rms length, s, over which the photons of a micropulse of `light` are spread where it sees each by
+    /// itself; `None` where they are taken to come at once, and for a photodiode, which sees the pulse as a
+    /// whole.
+    pub fn spread_of(&self, light: &Light) -> Option<f64> {
+        light.spread.filter(|_| !matches!(self, Self::Linear(_) | Self::Sampled(_)))
     }
 }
 

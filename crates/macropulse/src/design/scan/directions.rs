@@ -5,8 +5,6 @@ use std::sync::Arc;
 
 use macropulse_codec::ShotLog;
 
-use super::rosette::Prism;
-
 /// Where the shots of a scan are sent: unit vectors in the sensor frame (x forward, y left, z up),
 /// and the places in it at which the beams begin.
 ///
@@ -38,6 +36,17 @@ pub(super) struct Path {
     /// Rows, which take turns.
     pub rows: u64,
     pub way: Way,
+}
+
+/// A thin prism that turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prism {
+    /// Angle by which it deflects, rad.
+    pub deflection: f64,
+    /// Turns per second, positive from the left to the top.
+    pub turns_per_s: f64,
+    /// Where it deflects to at the beginning, rad from the left towards the top.
+    pub phase: f64,
 }
 
 /// What a path is.

@@ -2,7 +2,7 @@
 //!
 //! Each pattern is one file: its keys and their limits (`Typed`), and its answers to what the
 //! workbench asks of every pattern (`Model`). A new one is such a file and an entry in the list of
-//! this page. Nothing else knows which there are.
+//! this page. No other module of this crate names one.
 
 mod calibration;
 mod directions;

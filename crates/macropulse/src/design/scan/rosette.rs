@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::directions::{Directions, Path, Way};
+use super::directions::{Directions, Path, Prism, Way};
 use super::model::{Extent, Model, Moment};
 use super::table::cell;
 use super::{Pattern, Typed};
@@ -21,17 +21,6 @@ pub struct Rosette {
     pub shots: u32,
     /// Time between shots, s.
     step: f64,
-}
-
-/// A thin prism that turns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prism {
-    /// Angle by which it deflects, rad.
-    pub deflection: f64,
-    /// Turns per second, positive from the left to the top.
-    pub turns_per_s: f64,
-    /// Where it deflects to at the beginning, rad from the left towards the top.
-    pub phase: f64,
 }
 
 /// `[scan.rosette]` as typed.
