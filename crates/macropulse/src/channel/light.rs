@@ -1,13 +1,15 @@
-//! Light at the aperture of a sensor while it measures a band: what every source adds to and every
+//! Light that reaches the detectors of a sensor while it measures a band: what every source adds to and every
 //! detector sees.
 //!
-//! Light is pulse trains and background. A **pulse train** is what one shot of one lidar brings
+//! Light is pulse trains, background and responses. A **pulse train** is what one shot of one lidar brings
 //! along one way: the marks of a macropulse, or of a sub-macropulse, from a surface or straight
-//! from an interferer. The **background** is a rate λ(t): light without pulses, as sunlight. A
-//! detector is a function of both and is not told whose light it is.
+//! from an interferer. The **background** is a rate λ(t): light without pulses, as sunlight. A **response** is
+//! such a rate after each mark that the sensor sends. A detector is a function of all and is not told whose light
+//! it is.
 
 use macropulse_codec::code::Codebook;
 
+use super::Response;
 use crate::design::Design;
 
 /// What a lidar sends: how the marks of its pulse trains follow each other.
@@ -33,7 +35,7 @@ impl<'a> Transmitter<'a> {
     }
 }
 
-/// Light at the aperture, before any detector. Truth: the receiver knows nothing of it.
+/// Light that reaches the detectors, before any of it is detected. Truth: the receiver knows nothing of it.
 #[derive(Debug, Clone, Default)]
 pub struct Light<'a> {
     /// Whose light it is: the sensor itself first, then the interferers.
@@ -42,6 +44,8 @@ pub struct Light<'a> {
     pub trains: PulseTrains,
     /// What shines without pulses.
     pub background: Background,
+    /// What each mark of the sensor itself brings without pulses.
+    pub responses: Vec<Response>,
 }
 
 /// Pulse trains, as columns: one entry for what one shot sends along one way.
@@ -53,7 +57,7 @@ pub struct PulseTrains {
     pub channel: Vec<u16>,
     /// Absolute time at which the first chip of the macropulse arrives, or would, fs.
     pub arrives_fs: Vec<i64>,
-    /// Mean number of photons detected per mark; infinite for a detector that never misses.
+    /// Mean number of photons per mark; infinite for a detector that never misses.
     pub photons: Vec<f64>,
     /// Label of the macropulse.
     pub label: Vec<u16>,
@@ -158,7 +162,7 @@ impl Light<'_> {
 /// entry for a stretch of time in one channel. Stretches may overlap: their rates add up.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Background {
-    /// Detections per second in each channel, all the time.
+    /// Photons per second in each channel, all the time.
     pub steady: f64,
     /// Channel of a stretch.
     pub channel: Vec<u16>,
@@ -166,6 +170,6 @@ pub struct Background {
     pub from_fs: Vec<i64>,
     /// Absolute time at which it ends, fs.
     pub until_fs: Vec<i64>,
-    /// Detections per second meanwhile.
+    /// Photons per second meanwhile.
     pub per_s: Vec<f64>,
 }

@@ -13,6 +13,8 @@ pub const FILTER: f64 = 15e-9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Link {
     photons_at_one_metre: f64,
+    /// Detections per photon.
+    efficiency: f64,
     extinction: f64,
     field: Option<Field>,
 }
@@ -22,6 +24,7 @@ impl Link {
     pub fn of(design: &Design, environment: &Environment) -> Self {
         Self {
             photons_at_one_metre: at_one_metre(design),
+            efficiency: design.efficiency(),
             extinction: environment.extinction(design.light.wavelength),
             field: design.budget.as_ref().map(|b| b.field).filter(|f| f.co_scanned.is_some()),
         }
@@ -52,15 +55,15 @@ impl Link {
         let [own, its] = [ours, other].map(at_one_metre);
         let receivers = match (&ours.budget, &other.budget) {
             (Some(ours), Some(other)) => ours.receiver() / other.receiver(),
-            _ => 1.0,
+            _ => other.efficiency() / ours.efficiency(),
         };
         let its = its * receivers;
         let photons_at_one_metre = if own.is_infinite() || its.is_infinite() { own } else { its };
         let extinction = environment.extinction(other.light.wavelength);
-        Some(Self { photons_at_one_metre, extinction, field: None })
+        Some(Self { photons_at_one_metre, efficiency: ours.efficiency(), extinction, field: None })
     }
 
-    /// Mean photons detected per mark of light that has gone `way` metres through air, the last
+    /// Mean photons per mark of light that has gone `way` metres through air, the last
     /// `back` of them from a target of effective reflectance `reflectance`.
     pub fn photons_by(&self, (way, back): (f64, f64), reflectance: f64) -> f64 {
         if reflectance <= 0.0 || back <= 0.0 {
@@ -69,7 +72,7 @@ impl Link {
         dimmed(self.photons_at_one_metre * reflectance, self.transmission(way)) / (back * back)
     }
 
-    /// Adds to `photons` the mean photons detected per mark of what each ray of `hits` has met in a scene of
+    /// Adds to `photons` the mean photons per mark of what each ray of `hits` has met in a scene of
     /// materials with these `finishes`.
     pub(super) fn add_echoes(&self, finishes: &[Finish], hits: &Hits, photons: &mut Vec<f64>) {
         let from = photons.len();
@@ -81,13 +84,18 @@ impl Link {
         photons.iter_mut().zip(ranges).for_each(|(it, range)| *it = self.photons(*it, *range));
     }
 
-    /// Mean photons detected per mark of what ray `i` of `hits` has met in a scene of materials with these `finishes`.
+    /// Mean photons per mark of what ray `i` of `hits` has met in a scene of materials with these `finishes`.
     pub(super) fn echo(&self, finishes: &[Finish], hits: &Hits, i: usize) -> f64 {
         self.photons(reflectance(finishes, hits, i), hits.range[i])
     }
 
-    /// Mean photons detected per mark from a target of effective reflectance `reflectance` (which
-    /// includes the cosine) at `range` metres.
+    /// Mean photons per mark that are detected of a target, as [`Link::photons`].
+    pub fn detected(&self, reflectance: f64, range: f64) -> f64 {
+        self.photons(reflectance, range) * self.efficiency
+    }
+
+    /// Mean photons per mark that reach the detector from a target of effective reflectance `reflectance`
+    /// (which includes the cosine) at `range` metres.
     #[inline]
     pub fn photons(&self, reflectance: f64, range: f64) -> f64 {
         if reflectance <= 0.0 || range <= 0.0 {
@@ -113,10 +121,10 @@ fn reflectance(finishes: &[Finish], hits: &Hits, i: usize) -> f64 {
     finish.backscatter(f64::from(hits.cosine[i])) * f64::from(hits.weight[i])
 }
 
-/// Mean photons that a sensor detects per mark from white at one metre, in clear air.
+/// Mean photons that reach the detector of a sensor per mark from white at one metre, in clear air.
 fn at_one_metre(design: &Design) -> f64 {
     let sensitivity = design.detector.model().sensitivity();
-    sensitivity.photons * sensitivity.range.powi(2) / sensitivity.reflectance
+    sensitivity.photons / design.efficiency() * sensitivity.range.powi(2) / sensitivity.reflectance
 }
 
 #[cfg(test)]

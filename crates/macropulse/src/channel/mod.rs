@@ -9,7 +9,7 @@
 //!
 //! n = n₀ · (ρ_eff / ρ₀) · (R₀ / R)² · T² · w
 //!
-//! with ρ_eff the material's backscatter towards the sensor and w the share of the beam. A sensor
+//! are detected, and n over the efficiency of its detector reach it, with ρ_eff the material's backscatter towards the sensor and w the share of the beam. A sensor
 //! with a link budget has n₀ from it, for a white target at its rated range. Where its field of view
 //! is scanned with the beam, the share of the spot that is still in the field when the echo arrives
 //! is a factor too.
@@ -18,12 +18,14 @@ mod interferers;
 mod light;
 mod link;
 mod operating;
+mod response;
 mod speckle;
 
 pub use interferers::APERTURE_RADIUS;
 pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Transmitter};
 pub use link::{FILTER, Link};
 pub use operating::{Error, Idealised, Operating, idealised};
+pub use response::Response;
 pub use speckle::Speckle;
 
 use macropulse_codec::ShotLog;
@@ -53,7 +55,7 @@ pub fn light<'a>(seen: &Seen<'a>, log: &ShotLog, traced: &Traced) -> Light<'a> {
     let transmitter = |mount: &Mount<'a>| Transmitter::of(mount.design, mount.begins.stretch());
     let mut light = Light {
         transmitters: rig.mounts.iter().map(transmitter).collect(),
-        background: Background { steady: operating.background, ..Background::default() },
+        background: Background { steady: operating.sunlight, ..Background::default() },
         ..Light::default()
     };
     let finishes = scene.finishes(design.light.wavelength);
@@ -202,7 +204,7 @@ pub struct Echo {
     pub shot: usize,
     /// From its firing to the arrival of the same chip, fs.
     pub delay_fs: i64,
-    /// Mean photons detected per mark.
+    /// Mean photons per mark that are detected.
     pub photons: f64,
 }
 
@@ -221,6 +223,7 @@ pub fn light_of_echoes<'a>(
     for Echo { shot, delay_fs, photons } in echoes {
         way = if shot == before { way.wrapping_add(1) } else { 0 };
         before = shot;
+        let photons = photons / design.efficiency();
         light.trains.push(echo(log, shot, delay_fs, PulseTrain { photons, way, ..WHOLE }));
     }
     light

@@ -17,10 +17,12 @@ pub struct Error {
 /// A sensor at work in an environment: what follows from both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operating {
-    /// From a surface to detected photons, through the air.
+    /// From a surface to photons at the detector, through the air.
     pub link: Link,
-    /// Sunlight, detected counts per second in each detector channel: by optics and environment, or
-    /// as the sensor declares where it has no link budget.
+    /// Photons of sunlight per second that reach each detector channel: by optics and environment, or as the
+    /// sensor declares its counts where it has no link budget.
+    pub sunlight: f64,
+    /// Those that are detected, per second.
     pub background: f64,
     /// Detection events per second in each channel without the light of any lidar: dark and
     /// background counts; crossings of the threshold by noise.
@@ -77,7 +79,7 @@ impl Operating {
             message,
         };
         let detector = design.detector.model();
-        let background = match &design.budget {
+        let sunlight = match &design.budget {
             None => detector.declared_background(),
             Some(budget) => {
                 let irradiance = environment.irradiance(budget.wavelength).ok_or_else(|| {
@@ -88,9 +90,10 @@ impl Operating {
                         (budget.wavelength * 1e12).round() * 1e-3
                     ))
                 })?;
-                budget.background(irradiance, environment.albedo) * budget.efficiency
+                budget.background(irradiance, environment.albedo)
             }
         };
+        let background = sunlight * design.efficiency();
         if let Some(why) = detector.refusal(background) {
             return Err(refuse(why));
         }
@@ -98,7 +101,7 @@ impl Operating {
         if let Some(why) = design.too_many_counts(false_rate) {
             return Err(refuse(why));
         }
-        Ok(Self { link: Link::of(design, environment), background, false_rate })
+        Ok(Self { link: Link::of(design, environment), sunlight, background, false_rate })
     }
 }
 

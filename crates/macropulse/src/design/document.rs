@@ -349,7 +349,7 @@ fn only_for_what_is_there(defaults: &Table, sensor: &Table, alternatives: &Alter
         "safety" => ["optics", "safety"].iter().any(|key| sensor.contains_key(*key)),
         _ => true,
     });
-    for (group, kinds) in alternatives {
+    for &(group, kinds) in alternatives {
         if let Some(toml::Value::Table(inner)) = kept.get_mut(group) {
             let chosen = sensor.get(group).and_then(toml::Value::as_table);
             inner.retain(|key, _| {

@@ -114,6 +114,12 @@ impl Design {
         Self::from_toml(&text, &origin, &folder, overrides)
     }
 
+    /// Detections per photon that reaches the detector. A sensor that declares its sensitivity leaves this open:
+    /// 1, and the photons that reach its detector stand for those that it detects.
+    pub fn efficiency(&self) -> f64 {
+        self.budget.as_ref().map_or(1.0, |budget| budget.efficiency)
+    }
+
     /// The sensor written in `text`. `origin` stands in error messages for the file name,
     /// `folder` is where files named in `extends` are looked for.
     ///

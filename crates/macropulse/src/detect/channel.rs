@@ -32,6 +32,8 @@ pub(super) struct Channel<'a> {
     pub design: &'a Design,
     pub log: &'a ShotLog,
     pub light: &'a Light<'a>,
+    /// Detections per photon.
+    efficiency: f64,
     /// The pulse trains that it sees, in the order in which they begin to arrive: the time in the
     /// upper half of each number, 0 where it lies before the epoch, the index in the lower half.
     pub order: Cow<'a, [u64]>,
@@ -96,6 +98,7 @@ impl Arrangement {
             design,
             log,
             light,
+            efficiency: design.efficiency(),
             order: Cow::Borrowed(&self.order),
             shots: (0..log.len() as u32).collect(),
             spans: spans(design, &clock, log, 0..log.len() as u32),
@@ -112,6 +115,7 @@ impl Arrangement {
                 design,
                 log,
                 light,
+                efficiency: design.efficiency(),
                 order: Cow::Owned(trains.map(|train| train.1).collect()),
                 spans: spans(design, &clock, log, shots.iter().copied()),
                 shots,
@@ -151,6 +155,21 @@ fn spans(
 }
 
 impl Channel<'_> {
+    /// Mean photons that are detected of each mark of pulse train `index`.
+    pub fn detected(&self, index: usize) -> f64 {
+        self.light.trains.photons[index] * self.efficiency
+    }
+
+    /// Detections per second of light that is steady all the time.
+    pub fn steady(&self) -> f64 {
+        self.light.background.steady * self.efficiency
+    }
+
+    /// Detections per second of light that is steady for stretch `index` of time.
+    pub fn steady_in(&self, index: usize) -> f64 {
+        self.light.background.per_s[index] * self.efficiency
+    }
+
     /// When it begins and ceases to listen, in parts of a tick.
     pub fn whole_span(&self) -> RangeInclusive<i64> {
         let first = self.spans.first().map_or(0, |span| *span.start());

@@ -46,7 +46,7 @@ impl Cells {
 
     /// Counts per second of steady light and of the dark, on all cells of a channel.
     fn steady(&self, channel: &Channel) -> f64 {
-        self.geiger.dark + channel.light.background.steady
+        self.geiger.dark + channel.steady()
     }
 }
 
@@ -95,7 +95,7 @@ impl Cells {
             let index = *arrival as u32 as usize;
             let mut stream = chance.at(Stage::Photons, trains.address(index));
             let times = channel.arrivals(index, &mut arrivals).iter().copied();
-            self.fall(times, trains.photons[index], &mut stream, &mut photons);
+            self.fall(times, channel.detected(index), &mut stream, &mut photons);
         }
         photons
     }

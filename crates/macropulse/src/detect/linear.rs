@@ -100,9 +100,9 @@ pub(super) fn gather(channel: &Channel, within_fs: i64) -> Vec<Together> {
         };
         let count = rest.iter().take_while(|train| is_with(train)).count();
         let (one, others) = rest.split_at(count);
-        let photons: f64 = one.iter().map(|&train| trains.photons[train]).sum();
+        let photons: f64 = one.iter().map(|&train| channel.detected(train)).sum();
         let later = |&train: &usize| {
-            (begins(train) - begins(first)) as f64 * (trains.photons[train] / photons)
+            (begins(train) - begins(first)) as f64 * (channel.detected(train) / photons)
         };
         // A detector that never misses has no end of photons.
         let later: f64 = one.iter().map(later).sum();

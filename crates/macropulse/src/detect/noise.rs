@@ -134,6 +134,7 @@ pub(super) fn counts_in(
 pub(super) struct Stretch {
     pub from_fs: i64,
     pub until_fs: i64,
+    /// Detections per second.
     pub per_s: f64,
     /// Where its random numbers stand.
     pub address: Address,
@@ -145,15 +146,15 @@ pub(super) fn stretches(channel: &Channel) -> impl Iterator<Item = Stretch> {
     channel.stretches.iter().map(move |(_, i)| {
         let i = *i as usize;
         let (from_fs, until_fs) = (background.from_fs[i], background.until_fs[i]);
-        let per_s = background.per_s[i];
         // Stretches that begin at once differ in their end or in their rate.
-        let others = (until_fs as u64).rotate_left(21) ^ per_s.to_bits().rotate_left(42);
+        let rate = background.per_s[i].to_bits().rotate_left(42);
+        let others = (until_fs as u64).rotate_left(21) ^ rate;
         let address = Address {
             stage: Stage::Stretch,
             index: from_fs as u64 ^ others,
             part: u32::from(channel.number) << PART_BITS,
         };
-        Stretch { from_fs, until_fs, per_s, address }
+        Stretch { from_fs, until_fs, per_s: channel.steady_in(i), address }
     })
 }
 

@@ -41,6 +41,8 @@ pub(super) struct Counting {
     jitter: Option<Jitter>,
     /// Dark counts per second.
     dark: f64,
+    /// Detections per photon.
+    efficiency: f64,
     /// Length of a micropulse, s.
     pulse: f64,
 }
@@ -69,6 +71,7 @@ impl Counting {
             kept: 1.0 - counting.missed_marks,
             jitter: Jitter::new(counting.jitter * parts),
             dark: counting.dark,
+            efficiency: design.efficiency(),
             pulse: design.light.pulse,
         }
     }
@@ -83,7 +86,7 @@ impl Kind for Counting {
         for arrival in channel.order.iter() {
             self.add_train(Seen { channel, chance }, *arrival, &mut time, memory);
         }
-        let steady = self.dark + channel.light.background.steady;
+        let steady = self.dark + channel.steady();
         counts(steady, channel, chance, &mut memory.noise);
         if memory.noise.len() < time.len() / FEW {
             insert(&mut time, &memory.noise);
@@ -104,7 +107,7 @@ impl Kind for Counting {
     fn marks(&self, order: &[u64], light: &Light) -> Option<(&ExactWords, Vec<Macropulse>)> {
         let exact = self.exact.as_ref()?;
         let (trains, background) = (&light.trains, &light.background);
-        let is_certain = |photons: &f64| *photons >= PLAIN;
+        let is_certain = |photons: &f64| photons * self.efficiency >= PLAIN;
         let is_exact = background.steady <= 0.0
             && background.per_s.iter().all(|rate| *rate <= 0.0)
             && trains.transmitter.iter().all(|transmitter| *transmitter == 0)
@@ -147,7 +150,7 @@ impl Counting {
     ) {
         let (start, index) = ((arrival >> 32) as u32, arrival as u32 as usize);
         let (light, trains) = (channel.light, &channel.light.trains);
-        let photons = trains.photons[index];
+        let photons = channel.detected(index);
         // What is lost beside 1 is far below the 2⁻³² that is drawn with.
         let detected = if photons.is_infinite() { 1.0 } else { 1.0 - libm::exp(-photons) };
         let seen = Bernoulli::new(self.kept * detected);

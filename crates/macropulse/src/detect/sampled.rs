@@ -162,7 +162,7 @@ impl Sampler {
             let stretch = *stretch as usize;
             let [from, until] = [background.from_fs[stretch], background.until_fs[stretch]]
                 .map(|fs| fs.div_euclid(self.tick_fs));
-            let photons = background.per_s[stretch] * s_from_fs(self.tick_fs);
+            let photons = channel.steady_in(stretch) * s_from_fs(self.tick_fs);
             let last = signal.first + signal.level.len() as i64;
             for tick in from.max(signal.first)..until.min(last) {
                 let part = u32::from(*number) << PART_BITS;

@@ -198,7 +198,7 @@ fn flashes(channel: &Channel) -> Vec<Flash> {
         for marks in marks_fs.chunk_by(is_with) {
             flashes.push(Flash {
                 arrives_fs: marks[0] + (marks[marks.len() - 1] - marks[0]) / 2,
-                photons: trains.photons[index] * marks.len() as f64,
+                photons: channel.detected(index) * marks.len() as f64,
             });
         }
     }

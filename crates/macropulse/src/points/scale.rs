@@ -78,7 +78,7 @@ impl Scale {
     /// return lies at the sensor, which any surface would outshine.
     #[inline]
     pub(super) fn reflectance(&self, photons: f32, range: f64) -> f32 {
-        let white = self.link.photons(1.0, range);
+        let white = self.link.detected(1.0, range);
         if white.is_infinite() {
             return 1.0;
         }
@@ -166,9 +166,9 @@ mod tests {
     #[test]
     fn intensity_is_finite_where_white_would_bring_nothing() {
         let (_, blind) = scale("kim-park-2016-physical", &[("optics.field", "descanned")]);
-        assert_eq!(blind.link.photons(1.0, 7.0), 0.0);
+        assert_eq!(blind.link.detected(1.0, 7.0), 0.0);
         assert_eq!([0.0, 1.5].map(|photons| blind.reflectance(photons, 7.0)), [0.0, 1e6]);
-        let near = blind.link.photons(1.0, 3.0) as f32;
+        let near = blind.link.detected(1.0, 3.0) as f32;
         assert_relative_eq!(blind.reflectance(near, 3.0), 1.0, max_relative = 1e-6);
         assert_eq!([-0.1, 0.0].map(|range| blind.reflectance(1.5, range)), [0.0; 2]);
     }

@@ -233,7 +233,7 @@ impl<'a> Forecaster<'a> {
         }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
-        let detected = self.light * operating.link.photons(reflectance, range);
+        let detected = self.light * operating.link.detected(reflectance, range);
         let false_rate = self.background * operating.false_rate;
         let photon_rate = self.falling_of(detected) * mean_weight / channel_period;
         let falling = false_rate + photon_rate;
@@ -255,7 +255,7 @@ impl<'a> Forecaster<'a> {
         let at_the_lag = if macropulse <= channel_period { false_density } else { density };
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - at_the_lag);
 
-        let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
+        let efficiency = design.efficiency();
         let found = matched::Found { seen: mark_pd, density, false_density };
         let chances = match &design.receiver.method {
             Method::Matched(correlation, _) => {
@@ -337,11 +337,11 @@ impl<'a> Forecaster<'a> {
         told: &[usize],
     ) -> Forecast {
         let (design, mean_weight) = (self.design, self.mean_weight);
-        let detected = self.light * self.operating.link.photons(reflectance, range);
+        let detected = self.light * self.operating.link.detected(reflectance, range);
         let background = self.background * self.operating.background;
         let parts = (design, detector, settings);
         let chances = sampled::chances(parts, &self.points, background, detected, told);
-        let efficiency = design.budget.as_ref().map_or(1.0, |budget| budget.efficiency);
+        let efficiency = design.efficiency();
         let mark = Lit { photons: detected, background, falling: 0.0 };
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
         Forecast {

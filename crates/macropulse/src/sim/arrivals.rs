@@ -61,7 +61,7 @@ pub(super) fn arrivals(setup: &Setup, band: &Band, stretch: &Stretch) -> Arrival
         .map(|at| Arrival {
             transmitter: light.trains.transmitter[at],
             shot: light.trains.shot[at],
-            photons: light.trains.photons[at],
+            photons: light.trains.photons[at] * design.efficiency(),
             marks: light.arrivals_fs(at).map(after).filter(is_within).collect(),
         })
         .filter(|train| !train.marks.is_empty())
@@ -80,6 +80,7 @@ pub(super) fn arrivals(setup: &Setup, band: &Band, stretch: &Stretch) -> Arrival
     Arrivals {
         trains,
         events: events.filter(is_within).collect(),
-        background: sky.steady + bright.map(|at| sky.per_s[at] * share(at)).sum::<f64>(),
+        background: design.efficiency()
+            * (sky.steady + bright.map(|at| sky.per_s[at] * share(at)).sum::<f64>()),
     }
 }

@@ -72,9 +72,9 @@ impl Budget {
         PI * self.aperture.powi(2) / 4.0
     }
 
-    /// What the receiver makes of light at its aperture: area, transmission and efficiency, m².
+    /// What the optics make of light at the aperture: area times transmission, m².
     pub fn receiver(&self) -> f64 {
-        self.area() * self.transmission * self.efficiency
+        self.area() * self.transmission
     }
 
     /// Energy of one photon, J: h·c/λ.

@@ -23,7 +23,7 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-pub use directions::Directions;
+pub use directions::{Directions, Prism};
 pub use flash::Flash;
 pub use grid::Grid;
 pub use laser::Laser;
@@ -31,7 +31,7 @@ pub use model::Extent;
 pub(crate) use model::Model;
 pub use polygon::Polygon;
 pub use raster::{Mirror, Raster};
-pub use rosette::{Prism, Rosette};
+pub use rosette::Rosette;
 pub use spinning::{Firing, Spinning};
 pub use table::Table;
 

@@ -32,6 +32,8 @@ pub(super) struct Accumulator {
     burst: Burst,
     histogram: Histogram,
     bin_fs: i64,
+    /// Detections per photon.
+    efficiency: f64,
 }
 
 /// Pulses that come at the same time in each of some cycles.
@@ -51,20 +53,22 @@ impl Accumulator {
     pub fn new(geiger: &Geiger, (burst, histogram): (&Burst, Histogram), design: &Design) -> Self {
         let bin_fs = design.clock.tick_fs;
         let cells = Cells::new(geiger, burst.interval_fs, bin_fs, histogram.bins);
-        Self { geiger: *geiger, cells, burst: burst.clone(), histogram, bin_fs }
+        let efficiency = design.efficiency();
+        Self { geiger: *geiger, cells, burst: burst.clone(), histogram, bin_fs, efficiency }
     }
 
     /// The histograms of the owned shots of `log`, in their order.
     pub fn histograms(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Histograms {
         let mut counts = Vec::with_capacity(log.owned.len() * self.histogram.bins as usize);
         let order = by_channel(light);
+        let steady = self.geiger.dark + light.background.steady * self.efficiency;
+        let in_bin = steady * s_from_fs(self.bin_fs);
+        let unpulsed = self.unpulsed(light, in_bin);
         for shot in log.owned.clone() {
             let pulses = self.pulses(&order, light, (log.channel[shot], log.fired_at_fs[shot]));
-            let steady = self.geiger.dark + light.background.steady;
-            let in_bin = steady * s_from_fs(self.bin_fs);
             let mut stream = chance.at(Stage::Histogram, log.first + shot as u64);
             let segments = segments(&pulses, self.burst.pulses);
-            let lit = segments.map(|(cycles, pulses)| (cycles, self.rates(&pulses, in_bin)));
+            let lit = segments.map(|(cycles, pulses)| (cycles, self.rates(&pulses, &unpulsed)));
             self.cells.count(lit, in_bin, &mut stream, &mut counts);
         }
         Histograms {
@@ -104,7 +108,7 @@ impl Accumulator {
                     cycles: [first, first + repeats],
                     middle_fs: since.rem_euclid(interval) as f64,
                     rms_fs: libm::hypot(pulse, self.geiger.jitter) * FS_PER_S as f64,
-                    photons: trains.photons[train].min(PLENTY),
+                    photons: (trains.photons[train] * self.efficiency).min(PLENTY),
                 });
             }
         }
@@ -128,9 +132,19 @@ impl Accumulator {
         found
     }
 
-    /// Mean detections in each bin of a cycle with these `pulses` and `steady` ones in each bin.
-    fn rates(&self, pulses: &[Pulses], steady: f64) -> Vec<f64> {
-        let mut rates = vec![steady; self.cells.bins_of_cycle()];
+    /// Mean detections in each bin of a cycle without pulses: `steady` ones, and those of the responses of `light`,
+    /// as if the burst had begun long before.
+    fn unpulsed(&self, light: &Light, steady: f64) -> Vec<f64> {
+        let mut photons = vec![0.0; self.cells.bins_of_cycle()];
+        for response in light.responses.iter().filter(|response| response.step_fs > 0) {
+            response.add_to_cycle(&mut photons, (self.bin_fs, self.burst.interval_fs));
+        }
+        photons.iter().map(|photons| steady + photons * self.efficiency).collect()
+    }
+
+    /// Mean detections in each bin of a cycle with these `pulses` and what is `unpulsed`.
+    fn rates(&self, pulses: &[Pulses], unpulsed: &[f64]) -> Vec<f64> {
+        let mut rates = unpulsed.to_vec();
         for pulse in pulses {
             let bin = self.bin_fs as f64;
             let sigma = pulse.rms_fs.max(f64::MIN_POSITIVE);

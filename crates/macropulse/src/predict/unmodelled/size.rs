@@ -80,14 +80,14 @@ impl<'a> Sized<'a> {
 
     /// The light of white at the nearest range over what a mark has to bring.
     pub fn nearest_over_threshold(&self) -> Option<f64> {
-        Some(self.link.photons(1.0, self.nearest()) / self.needed?)
+        Some(self.link.detected(1.0, self.nearest()) / self.needed?)
     }
 
     /// The farthest range, m, at which a surface of such a `reflectance` that fills the beam brings
     /// what a mark has to bring; 0 where there is none.
     fn reach(&self, reflectance: f64) -> Option<f64> {
         let needed = self.needed?;
-        let is_dark = |range: f64| self.link.photons(reflectance, range) < needed;
+        let is_dark = |range: f64| self.link.detected(reflectance, range) < needed;
         Some(least(1e-6, FARTHEST, is_dark).unwrap_or(FARTHEST))
     }
 }
