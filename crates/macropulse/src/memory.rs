@@ -5,7 +5,7 @@
 //! `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Effect, Histogram, Readout};
+use crate::design::{Design, Effect, Readout};
 use crate::emit::bands;
 use crate::environment::Environment;
 use crate::scene::{PER_TRIANGLE, Scene};
@@ -134,10 +134,10 @@ fn band(design: &Design, operating: &Operating) -> u64 {
     let channels = f64::from(design.channels());
     let noise = (operating.false_rate * lasts).min(lasts / tick) * channels;
     let events = marks * PER_MARK_SEEN + noise * PER_NOISE;
-    let recorded = match design.readout {
+    let recorded = match &design.readout {
         Readout::Tdc(_) => events,
         Readout::Adc => events + lasts / tick * (channels * PER_SAMPLE + PER_SAMPLE_AT_WORK),
-        Readout::Histogram(Histogram { bins }) => band.shots as f64 * f64::from(bins) * PER_BIN,
+        Readout::Histogram(histogram) => band.shots as f64 * f64::from(histogram.bins) * PER_BIN,
     };
     (shots * per_shot + recorded) as u64
 }

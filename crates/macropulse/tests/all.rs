@@ -29,6 +29,7 @@ mod predict;
 mod products;
 mod readme;
 mod receivers;
+mod recorded_chip;
 mod rig;
 mod roundtrip;
 mod sampled;

@@ -53,6 +53,7 @@ pages! {
     own_code: "docs/guide/own-code.md",
     own_scanner: "docs/guide/own-scanner.md",
     python: "docs/guide/python.md",
+    real_chip: "docs/guide/real-chip.md",
     ros: "docs/guide/ros.md",
     sweep: "docs/guide/sweep.md",
 }

@@ -3,7 +3,7 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 13] = [
+const PRESETS: [(&str, &str); 15] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
@@ -17,6 +17,8 @@ const PRESETS: [(&str, &str); 13] = [
     ("vlp-16", include_str!("../../../../sensors/vlp-16.toml")),
     ("rosette-mid-40", include_str!("../../../../sensors/rosette-mid-40.toml")),
     ("peregrine", include_str!("../../../../sensors/peregrine.toml")),
+    ("spad-flash", include_str!("../../../../sensors/spad-flash.toml")),
+    ("tmf8820", include_str!("../../../../sensors/tmf8820.toml")),
 ];
 
 /// Names of the ready sensors.

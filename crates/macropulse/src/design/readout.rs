@@ -1,13 +1,16 @@
 //! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]` or `[histogram]`.
 
+use std::sync::Arc;
+
 use macropulse_codec::RecordKind;
+use macropulse_codec::decode::histogram::Pulse;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::band::TOO_FINE;
 use super::limits::Check;
 use super::{Error, Scan};
-use crate::units::fs_from_s;
+use crate::units::{FS_PER_S, fs_from_s};
 
 /// `[tdc]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -61,9 +64,9 @@ impl Readout {
     }
 
     /// The histogram of each shot, if counts go into one.
-    pub fn histogram(&self) -> Option<Histogram> {
+    pub fn histogram(&self) -> Option<&Histogram> {
         match self {
-            Self::Histogram(histogram) => Some(*histogram),
+            Self::Histogram(histogram) => Some(histogram),
             Self::Tdc(_) | Self::Adc => None,
         }
     }
@@ -93,10 +96,25 @@ impl Readout {
 }
 
 /// The histogram of a shot. Its bins are ticks of the sensor's clock; the first begins with each pulse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Histogram {
     /// Bins.
     pub bins: u32,
+    /// Counts of a pulse of the sensor, bin by bin, where they are measured.
+    pub pulse: Option<Arc<[f64]>>,
+}
+
+impl Histogram {
+    /// A pulse of the sensor as it is recorded: the one that was measured, sent in the middle of its highest bin, or a
+    /// Gaussian one of `rms` seconds.
+    pub fn pulse(&self, rms: f64) -> Pulse {
+        let Some(measured) = &self.pulse else {
+            return Pulse::Gaussian { rms_fs: rms * FS_PER_S as f64 };
+        };
+        let higher = |peak: usize, at: usize| if measured[at] > measured[peak] { at } else { peak };
+        let peak = (0..measured.len()).fold(0, higher);
+        Pulse::Measured { counts: measured.to_vec(), origin: peak as f64 + 0.5 }
+    }
 }
 
 /// A bank of time-to-digital converters.
@@ -133,6 +151,11 @@ pub(super) struct HistogramFile {
     /// Bins, the first of which begins when a pulse is sent.
     #[schemars(range(min = 1, max = 65536))]
     bins: u32,
+    /// A pulse of the sensor as it records it, light and detector together: counts of a reference path without
+    /// background, bin by bin. It is sent in the middle of its highest bin. In place of the Gaussian pulse of
+    /// `light.pulse_ps` and the jitter.
+    #[schemars(length(min = 1, max = 4096), inner(range(min = 0, max = 1e12)))]
+    pub pulse: Option<Vec<f64>>,
 }
 
 /// Converters start so many dead times before the first ticks of a band, as Geiger cells do.
@@ -173,7 +196,25 @@ impl Check<'_> {
         let tick_fs = self.whole_fs("histogram.bin_ps", file.bin_ps)?;
         let bins = self.count("histogram.bins", file.bins, 1, 65_536)?;
         let clock = Clock { tick_fs, period_fs: tick_fs };
-        Ok((clock, Readout::Histogram(Histogram { bins })))
+        let pulse = file.pulse.as_ref().map(|counts| self.measured(counts)).transpose()?;
+        Ok((clock, Readout::Histogram(Histogram { bins, pulse })))
+    }
+
+    /// A pulse that was measured.
+    fn measured(&self, counts: &[f64]) -> Result<Arc<[f64]>, Error> {
+        let key = "histogram.pulse";
+        let most = Pulse::MOST_BINS;
+        if !(1..=most).contains(&counts.len()) {
+            return self
+                .refuse(key, format!("has {} counts, but can have 1 to {most}", counts.len()));
+        }
+        for count in counts {
+            self.within(key, *count, 0.0, 1e12)?;
+        }
+        if counts.iter().all(|count| *count == 0.0) {
+            return self.refuse(key, "has no light: a count must be above 0");
+        }
+        Ok(counts.into())
     }
 
     /// Clock and readout of a detector whose events are timed.

@@ -6,9 +6,9 @@ use serde::Deserialize;
 use super::detector::{Arming, DetectorFile, Geiger, Sampled};
 use super::limits::Check;
 use super::{Clock, Coding, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
-use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::RecordKind;
-use macropulse_codec::decode::histogram::{PileUp, Pulse};
+use macropulse_codec::decode::histogram::PileUp;
 use macropulse_codec::decode::{
     self, Bitwise, Correlation, Effort, HistogramMethod, MOST_RETURNS, Method, Opening, Pick,
     Receiver, ReceiverKind,
@@ -188,7 +188,7 @@ impl Check<'_> {
             ReceiverKind::Matched => Method::Matched(correlation, file.effort),
             ReceiverKind::Balanced => Method::Balanced(correlation),
             ReceiverKind::Direct => Method::Direct,
-            ReceiverKind::Histogram => self.of_histograms(file, inputs, false_alarm)?,
+            ReceiverKind::Histogram => return self.of_histograms(file, inputs, false_alarm),
             ReceiverKind::Sampled => {
                 let Some(sampled) = sampled else { return Ok(None) };
                 let least = match file.least_marks {
@@ -211,13 +211,14 @@ impl Check<'_> {
         }))
     }
 
-    /// How it decodes histograms: of a pulse that the length of the light and the jitter spread.
+    /// How it decodes histograms; `None` without one.
     fn of_histograms(
         &self,
         file: &ReceiverFile,
         inputs: &Inputs,
         false_alarm: f64,
-    ) -> Result<Method, Error> {
+    ) -> Result<Option<Method>, Error> {
+        let Some(histogram) = inputs.readout.histogram() else { return Ok(None) };
         let cells = inputs.counting.map_or(1, |geiger| geiger.cells);
         let piles_up = inputs.counting.is_some_and(|geiger| geiger.arming == Arming::OncePerPulse);
         let pile_up = match (file.pile_up, piles_up) {
@@ -231,14 +232,14 @@ impl Check<'_> {
             (Some(PileUpFile::Coates) | None, true) => PileUp::Coates,
         };
         let share = |key, typed: Option<f64>| self.within(key, typed.unwrap_or(0.0), 0.0, 1.0);
-        Ok(Method::Histogram(HistogramMethod {
+        Ok(Some(Method::Histogram(HistogramMethod {
             pile_up,
             cells,
-            pulse: Pulse::Gaussian { rms_fs: inputs.pulse * FS_PER_S as f64 },
+            pulse: histogram.pulse(inputs.pulse),
             false_alarm,
             shape_error: share("receiver.shape_error", file.shape_error)?,
             least_share: share("receiver.least_share", file.least_share)?,
-        }))
+        })))
     }
 
     /// How many returns a shot may have at most, and which are kept of more.

@@ -4,8 +4,8 @@ use macropulse_codec::decode::{self, Returns};
 use macropulse_codec::files::{Digest, HistogramHeader, Limits, SampleHeader};
 use macropulse_codec::{Record, RecordKind, ShotLog};
 
+use super::Design;
 use super::detector::Detector;
-use super::{Design, Histogram};
 
 /// Shots of a scan whose places and times go into the digest.
 const SAMPLES: u64 = 256;
@@ -65,7 +65,7 @@ impl Design {
 
     /// What is said of its histograms before they come, their number left open; `None` of a sensor that records none.
     pub fn histogram_header(&self) -> Option<HistogramHeader> {
-        let Histogram { bins } = self.readout.histogram()?;
+        let bins = self.readout.histogram()?.bins;
         Some(HistogramHeader {
             bin_fs: self.clock.tick_fs,
             offset_fs: 0,

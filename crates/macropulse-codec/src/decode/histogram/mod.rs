@@ -15,14 +15,13 @@ mod pulse;
 mod search;
 
 pub use pile_up::{PileUp, coates};
-pub use pulse::Pulse;
+pub use pulse::{Kernel, Pulse, STEPS};
 
 use super::{Error, MOST_RETURNS, Pick, Receiver, Reject, Return, Returns, Strength};
 use crate::{Histograms, ShotLog, time};
 use chance::Chance;
 use model::{Light, Model};
 use pile_up::Exposed;
-use pulse::{Kernel, STEPS};
 use search::Search;
 
 /// Settings of a receiver of histograms.

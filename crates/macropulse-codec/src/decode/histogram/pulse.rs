@@ -3,8 +3,8 @@
 use crate::statistics::normal_tail;
 use crate::time;
 
-/// Steps of a bin at which the shape is tabulated.
-pub(super) const STEPS: usize = 16;
+/// Steps of a bin at which the shape of a pulse is tabulated.
+pub const STEPS: usize = 16;
 
 /// Standard deviations of a Gaussian pulse that are tabulated to both sides of its middle.
 const REACH: f64 = 5.0;
@@ -33,7 +33,7 @@ impl Pulse {
 
 /// The shares of a pulse in the bins that it meets.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Kernel {
+pub struct Kernel {
     /// The shares of a pulse that begins `k` steps after a bin does, for each k from 0 to [`STEPS`].
     shares: Vec<f64>,
     /// Bins that a pulse meets.

@@ -86,6 +86,9 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     );
     let is_counted = file.histogram.is_some();
     add(is_counted, &["tdc"], "histogram", "counts go into bins, and no converter times them");
+    let is_measured = file.histogram.as_ref().is_some_and(|histogram| histogram.pulse.is_some());
+    let jitter = ["detector.geiger.jitter_ps"];
+    add(is_measured, &jitter, "histogram.pulse", "the pulse that was measured has it in it");
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
     let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
     add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");

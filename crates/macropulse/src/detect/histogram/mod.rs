@@ -11,6 +11,7 @@
 
 mod draw;
 
+use macropulse_codec::decode::histogram::{Kernel, STEPS};
 use macropulse_codec::statistics::normal_tail;
 use macropulse_codec::{Histograms, ShotLog};
 
@@ -30,7 +31,9 @@ pub(super) struct Accumulator {
     geiger: Geiger,
     cells: Cells,
     burst: Burst,
-    histogram: Histogram,
+    bins: u32,
+    /// The pulse of the sensor where it is measured.
+    measured: Option<Kernel>,
     bin_fs: i64,
     /// Detections per photon.
     efficiency: f64,
@@ -38,28 +41,38 @@ pub(super) struct Accumulator {
 
 /// Pulses that come at the same time in each of some cycles.
 #[derive(Debug, Clone, Copy)]
-struct Pulses {
+struct Pulses<'a> {
     /// First cycle and the one behind the last.
     cycles: [i64; 2],
     /// Middle of the pulse, fs since the beginning of the cycle.
     middle_fs: f64,
-    /// rms length of the light and of the timing together, fs.
-    rms_fs: f64,
+    shape: Shape<'a>,
     /// Detected photons of each.
     photons: f64,
 }
 
+/// The shape of a pulse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Shape<'a> {
+    /// Of this rms length, light and timing together, fs.
+    Gaussian(f64),
+    /// As it was measured.
+    Measured(&'a Kernel),
+}
+
 impl Accumulator {
-    pub fn new(geiger: &Geiger, (burst, histogram): (&Burst, Histogram), design: &Design) -> Self {
+    pub fn new(geiger: &Geiger, (burst, histogram): (&Burst, &Histogram), design: &Design) -> Self {
         let bin_fs = design.clock.tick_fs;
         let cells = Cells::new(geiger, burst.interval_fs, bin_fs, histogram.bins);
-        let efficiency = design.efficiency();
-        Self { geiger: *geiger, cells, burst: burst.clone(), histogram, bin_fs, efficiency }
+        let measured =
+            histogram.pulse.as_ref().and_then(|_| Kernel::new(&histogram.pulse(0.0), bin_fs));
+        let (bins, efficiency) = (histogram.bins, design.efficiency());
+        Self { geiger: *geiger, cells, burst: burst.clone(), bins, measured, bin_fs, efficiency }
     }
 
     /// The histograms of the owned shots of `log`, in their order.
     pub fn histograms(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Histograms {
-        let mut counts = Vec::with_capacity(log.owned.len() * self.histogram.bins as usize);
+        let mut counts = Vec::with_capacity(log.owned.len() * self.bins as usize);
         let order = by_channel(light);
         let steady = self.geiger.dark + light.background.steady * self.efficiency;
         let in_bin = steady * s_from_fs(self.bin_fs);
@@ -74,7 +87,7 @@ impl Accumulator {
         Histograms {
             bin_fs: self.bin_fs,
             offset_fs: 0,
-            bins: self.histogram.bins,
+            bins: self.bins,
             cycles: vec![self.burst.pulses; log.owned.len()],
             counts,
         }
@@ -86,7 +99,7 @@ impl Accumulator {
         order: &[(u16, i64, usize)],
         light: &Light,
         (channel, fired_fs): (u16, i64),
-    ) -> Vec<Pulses> {
+    ) -> Vec<Pulses<'_>> {
         let mut found = Vec::new();
         let interval = self.burst.interval_fs;
         let lasts = interval * i64::from(self.burst.pulses);
@@ -107,7 +120,12 @@ impl Accumulator {
                 found.push(Pulses {
                     cycles: [first, first + repeats],
                     middle_fs: since.rem_euclid(interval) as f64,
-                    rms_fs: libm::hypot(pulse, self.geiger.jitter) * FS_PER_S as f64,
+                    shape: match &self.measured {
+                        Some(kernel) if transmitter == 0 => Shape::Measured(kernel),
+                        _ => Shape::Gaussian(
+                            libm::hypot(pulse, self.geiger.jitter) * FS_PER_S as f64,
+                        ),
+                    },
                     photons: (trains.photons[train] * self.efficiency).min(PLENTY),
                 });
             }
@@ -116,8 +134,9 @@ impl Accumulator {
         let spilled = found.clone();
         for pulse in spilled {
             // What reaches over the end of a cycle lies in the next one, and the other way round.
-            let (middle, reach) = (pulse.middle_fs, REACH * pulse.rms_fs);
-            for (cycles_on, over) in [(1, middle + reach > interval as f64), (-1, middle < reach)] {
+            let (middle, [before, behind]) = (pulse.middle_fs, self.reach(pulse.shape));
+            for (cycles_on, over) in [(1, middle + behind > interval as f64), (-1, middle < before)]
+            {
                 if over {
                     found.push(Pulses {
                         cycles: pulse.cycles.map(|cycle| cycle + cycles_on),
@@ -142,24 +161,50 @@ impl Accumulator {
         photons.iter().map(|photons| steady + photons * self.efficiency).collect()
     }
 
+    /// How far a pulse reaches before and behind its middle, fs.
+    fn reach(&self, shape: Shape) -> [f64; 2] {
+        let bin = self.bin_fs as f64;
+        match shape {
+            Shape::Gaussian(rms_fs) => [REACH * rms_fs; 2],
+            Shape::Measured(kernel) => {
+                [kernel.origin * bin, (kernel.length as f64 - kernel.origin) * bin]
+            }
+        }
+    }
+
     /// Mean detections in each bin of a cycle with these `pulses` and what is `unpulsed`.
     fn rates(&self, pulses: &[Pulses], unpulsed: &[f64]) -> Vec<f64> {
         let mut rates = unpulsed.to_vec();
         for pulse in pulses {
-            let bin = self.bin_fs as f64;
-            let sigma = pulse.rms_fs.max(f64::MIN_POSITIVE);
-            let first = ((pulse.middle_fs - REACH * sigma) / bin).floor().max(0.0) as usize;
-            let last = ((pulse.middle_fs + REACH * sigma) / bin).floor().max(-1.0) as i64;
-            let end = usize::try_from(last + 1).unwrap_or(0).min(rates.len());
-            let above = |edge: usize| normal_tail((edge as f64 * bin - pulse.middle_fs) / sigma);
-            let mut beyond = above(first);
-            for (rate, edge) in rates.iter_mut().take(end).skip(first).zip(first + 1..) {
-                let next = above(edge);
-                *rate += pulse.photons * (beyond - next);
-                beyond = next;
+            match pulse.shape {
+                Shape::Gaussian(rms_fs) => self.add_gaussian(pulse, rms_fs, &mut rates),
+                Shape::Measured(kernel) => {
+                    let begins = pulse.middle_fs / self.bin_fs as f64 - kernel.origin;
+                    let step = (begins * STEPS as f64).round() as i64;
+                    let (first, shares) = kernel.within(step, rates.len());
+                    for (rate, share) in rates.iter_mut().skip(first).zip(shares) {
+                        *rate += pulse.photons * share;
+                    }
+                }
             }
         }
         rates
+    }
+
+    /// Adds the detections of a Gaussian `pulse`.
+    fn add_gaussian(&self, pulse: &Pulses, rms_fs: f64, rates: &mut [f64]) {
+        let bin = self.bin_fs as f64;
+        let sigma = rms_fs.max(f64::MIN_POSITIVE);
+        let first = ((pulse.middle_fs - REACH * sigma) / bin).floor().max(0.0) as usize;
+        let last = ((pulse.middle_fs + REACH * sigma) / bin).floor().max(-1.0) as i64;
+        let end = usize::try_from(last + 1).unwrap_or(0).min(rates.len());
+        let above = |edge: usize| normal_tail((edge as f64 * bin - pulse.middle_fs) / sigma);
+        let mut beyond = above(first);
+        for (rate, edge) in rates.iter_mut().take(end).skip(first).zip(first + 1..) {
+            let next = above(edge);
+            *rate += pulse.photons * (beyond - next);
+            beyond = next;
+        }
     }
 }
 
@@ -173,7 +218,10 @@ fn by_channel(light: &Light) -> Vec<(u16, i64, usize)> {
 }
 
 /// Runs of cycles in which the same of these `pulses` come: how many cycles, and the pulses.
-fn segments(pulses: &[Pulses], cycles: u32) -> impl Iterator<Item = (u32, Vec<Pulses>)> {
+fn segments<'a>(
+    pulses: &[Pulses<'a>],
+    cycles: u32,
+) -> impl Iterator<Item = (u32, Vec<Pulses<'a>>)> {
     let mut edges: Vec<i64> = pulses.iter().flat_map(|pulse| pulse.cycles).collect();
     edges.extend([0, i64::from(cycles)]);
     edges.sort_unstable();
