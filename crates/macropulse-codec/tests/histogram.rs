@@ -111,7 +111,10 @@ fn coates_gives_the_photons_of_each_bin() {
     // Control: what is counted is not what came.
     assert!((mean(&raw) - 0.055).abs() > 100.0 * error(&raw));
     // Where the last cycle is counted, nothing more is known.
-    assert_eq!(coates(&[1, 1, 0, 5], 2), [std::f64::consts::LN_2, 0.0, 0.0, 0.0]);
+    assert_eq!(
+        coates(&[1, 1, 0, 5], 2),
+        [std::f64::consts::LN_2, std::f64::consts::LN_2, 0.0, 0.0]
+    );
 }
 
 /// Mean photons n of a rectangular pulse of length τ that stop a detector: ⟨t⟩/τ = 1/n − 1/(eⁿ − 1),

@@ -43,6 +43,8 @@ pub enum Stage {
     Speckle = 13,
     /// The counts of a histogram. Indexed by shot.
     Histogram = 14,
+    /// Histograms that a forecast draws. Indexed by nothing.
+    Forecast = 15,
 }
 
 /// The counter at which a run of random numbers begins.

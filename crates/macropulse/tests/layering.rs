@@ -175,7 +175,7 @@ const SIMULATOR: Layers = Layers {
         },
         Rule {
             module: "predict",
-            may_name: &["channel", "design", "environment", "units"],
+            may_name: &["channel", "design", "environment", "random", "units"],
             because: "an oracle that ran the simulation would agree with it whatever it did",
         },
         Rule {

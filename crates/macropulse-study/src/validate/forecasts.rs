@@ -8,6 +8,7 @@ use macropulse::environment::Environment;
 use macropulse::points::{Outcome, PointCloud};
 use macropulse::predict::{Forecast, Forecaster};
 use macropulse::scene::Scene;
+use macropulse::score::NEAR;
 use macropulse::sim::{Scans, Watch};
 
 use super::Error;
@@ -17,7 +18,7 @@ use super::Error;
 pub const SHOTS: u64 = 20_000;
 
 /// The sensors that are tried.
-pub const SENSORS: [&str; 10] = [
+pub const SENSORS: [&str; 12] = [
     "kim-park-2016",
     "kim-park-2016-fixed",
     "coded-32",
@@ -28,6 +29,8 @@ pub const SENSORS: [&str; 10] = [
     "hdl-64e",
     "vlp-16",
     "peregrine",
+    "spad-flash",
+    "spad-spinning",
 ];
 
 /// The ready environment around them.
@@ -55,6 +58,9 @@ const ASIDE_WITHIN: (f64, f64) = (0.002, 3.0);
 /// Points so many standard deviations from the truth, and not right either, lie on a sidelobe. Of normal
 /// errors one in 500 million is as large.
 const BESIDE: f64 = 6.0;
+
+/// So many standard deviations to both sides have nearly all returns.
+const WHOLE: f64 = 3.0;
 
 /// Standard deviations of fewer points are not compared: of 1000 they are known to 2 %.
 const FEWEST_POINTS: u64 = 1000;
@@ -104,11 +110,12 @@ impl Place {
         Some((forecast - found).abs() <= ASIDE_WITHIN.0.max(ASIDE_WITHIN.1 * deviation))
     }
 
-    /// Whether the precision is as forecast; `None` where it was not found.
+    /// Whether the precision is as forecast; `None` where it was not found, or is so large that returns are lost beyond
+    /// what counts as seen.
     pub fn precision_holds(&self) -> Option<bool> {
         let (forecast, found) = self.precision_m;
         let (forecast, found) = forecast.zip(found)?;
-        Some((forecast - found).abs() <= PRECISION_WITHIN * found)
+        (WHOLE * forecast < NEAR).then(|| (forecast - found).abs() <= PRECISION_WITHIN * found)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod devices;
 mod forecasts;
+mod histograms;
 mod page;
 mod paper;
 mod published;
@@ -86,6 +87,7 @@ pub fn published() -> Result<Vec<Figure>, Error> {
     all.extend(devices::scanners()?);
     all.extend(paper::paper()?);
     all.extend(simulated::simulated()?);
+    all.extend(histograms::histograms()?);
     Ok(all)
 }
 

@@ -17,9 +17,9 @@ fn of_forecasts(findings: &Findings) -> String {
          such a reflectance that one shot in ten, half of them, four in five, and nearly all \
          should be seen; at up to four places within a tick, a part of the shots at each. N is \
          {SHOTS} shots or a few more, as many as a scan has where that is less; seed {}. Seen \
-         are returns within 0.35 m. A forecast holds if the share is right within 0.02 or three \
-         standard deviations, the standard deviation of the range about the peak within 20 %, \
-         and the share of points on a sidelobe of their own macropulse within 0.2 % of them or \
+         are returns within 0.35 m; standard deviations three of which are more are not compared. \
+         A forecast holds if the share is right within 0.02 or three standard deviations, the \
+         standard deviation of the range about the peak within 20 %, and the share of points on a sidelobe of their own macropulse within 0.2 % of them or \
          three standard deviations. Those are farther than six forecast standard deviations \
          from the truth, and more than is called right. The matched receivers are thorough: \
          quick ones, as the ready sensors have them, find fewer where most shots are lost, as \

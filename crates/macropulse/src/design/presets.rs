@@ -3,7 +3,7 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 15] = [
+const PRESETS: [(&str, &str); 16] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
@@ -18,6 +18,7 @@ const PRESETS: [(&str, &str); 15] = [
     ("rosette-mid-40", include_str!("../../../../sensors/rosette-mid-40.toml")),
     ("peregrine", include_str!("../../../../sensors/peregrine.toml")),
     ("spad-flash", include_str!("../../../../sensors/spad-flash.toml")),
+    ("spad-spinning", include_str!("../../../../sensors/spad-spinning.toml")),
     ("tmf8820", include_str!("../../../../sensors/tmf8820.toml")),
 ];
 

@@ -12,7 +12,7 @@ use macropulse_codec::decode::{self, Method};
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
-use super::{balanced, matched, sampled};
+use super::{balanced, histogram, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
 use crate::design::{Design, Detector};
@@ -55,6 +55,8 @@ pub struct Forecaster<'a> {
     sidelobes: Option<Sidelobes>,
     /// The points of the sums over noise, of a receiver of samples; empty of the others.
     points: Arc<[sampled::Points]>,
+    /// Of a receiver of histograms.
+    counting: Option<histogram::Counting>,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the dark and background counts.
@@ -84,7 +86,8 @@ pub struct Forecast {
     pub density: f64,
     /// Ratio of the marks expected to the spread of what is there by chance, (p − d)·√N/√(d·(1 − d))
     /// of a shot with the mean number of marks; without a code, photons to their noise, infinite where the
-    /// sensor never misses.
+    /// sensor never misses; of a histogram √(2Λ), Λ the logarithm of the likelihood of its mean counts with an echo
+    /// over that without.
     pub snr: f64,
     /// Probability that a shot which is lit gives a return there.
     pub pd: f64,
@@ -127,6 +130,10 @@ impl<'a> Forecaster<'a> {
         let sidelobes = is_matched.then(|| Sidelobes::of(design));
         let sampling = design.receiver.method.sampling();
         let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
+        let counting = match &design.receiver.method {
+            Method::Histogram(method) => histogram::Counting::of(design, method),
+            _ => None,
+        };
         Ok(Self {
             design,
             operating,
@@ -135,6 +142,7 @@ impl<'a> Forecaster<'a> {
             mean_weight,
             sidelobes,
             points: points.into(),
+            counting,
             light,
             background,
         })
@@ -230,6 +238,9 @@ impl<'a> Forecaster<'a> {
         let (design, operating) = (self.design, &self.operating);
         if let Some(sampled) = self.sampled() {
             return self.of_samples(sampled, reflectance, range, told);
+        }
+        if let Some(counting) = &self.counting {
+            return self.of_histograms(counting, reflectance, range);
         }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
@@ -364,11 +375,49 @@ impl<'a> Forecaster<'a> {
         }
     }
 
+    /// What a receiver of histograms will measure of a target of `reflectance` at `range` metres: nothing of one
+    /// whose light comes after the last bin. `background` counts for sunlight and dark counts.
+    fn of_histograms(
+        &self,
+        counting: &histogram::Counting,
+        reflectance: f64,
+        range: f64,
+    ) -> Forecast {
+        let design = self.design;
+        let detected = self.light * self.operating.link.detected(reflectance, range);
+        let falling = self.background * self.operating.false_rate;
+        let chances = counting.chances(range, detected, falling);
+        let efficiency = design.efficiency();
+        let pulses = design.emission.mean_pulses();
+        let photons = (detected * pulses).max(f64::MIN_POSITIVE);
+        let rms = libm::hypot(design.light.pulse * RMS_OF_FWHM, design.detector.model().jitter());
+        Forecast {
+            range,
+            reflectance,
+            photons_per_shot: detected * pulses / efficiency,
+            detected_per_mark: detected,
+            mark_pd: -libm::expm1(-detected),
+            bank_loss: 0.0,
+            density: 0.0,
+            snr: chances.level,
+            pd: chances.pd,
+            false_per_shot: counting.false_alarm(),
+            precision: (chances.pd * FEWEST >= 1.0).then_some(chances.precision),
+            aside: None,
+            bound: range_from_tof(rms) / photons.sqrt(),
+        }
+    }
+
     /// The factor on the light that gives probability `pd` to a target of `reflectance` at `range`
     /// metres; `None` where 10⁹ times the light would not.
     pub fn light_needed(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
         let enough = |factor: f64| self.with_light(factor).forecast(reflectance, range).pd >= pd;
-        bisect(1e-9, 1e9, enough)
+        // Cells that count once a pulse are blinded by far too much of it.
+        let most = match self.counting {
+            None => 1e9,
+            Some(_) => (-9..=9).map(|power| 10_f64.powi(power)).find(|factor| enough(*factor))?,
+        };
+        bisect(1e-9, most, enough)
     }
 
     /// The factor on the background that still leaves probability `pd` to a target of
@@ -380,8 +429,8 @@ impl<'a> Forecaster<'a> {
         bisect(1e-6, 1e12, bears).map(|divisor| 1.0 / divisor)
     }
 
-    /// The farthest range, m, at which a target of `reflectance` is seen with probability `pd`;
-    /// `None` where it is not seen at the nearest.
+    /// The farthest range, m, at which a target of `reflectance` is seen with probability `pd`; `None` where it is
+    /// seen at none. Near the sensor a target may be too bright for cells that count once.
     pub fn farthest(&self, pd: f64, reflectance: f64) -> Option<f64> {
         let scan = &self.design.scan;
         // Nearer, a sampled channel is blind with the mark it has just sent.
@@ -391,11 +440,20 @@ impl<'a> Forecaster<'a> {
         let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
         let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
         match bisect(nearest, farthest, lost) {
-            Some(range) if range <= nearest => None,
+            Some(range) if range <= nearest => {
+                let place = |place: i32| {
+                    nearest * libm::pow(farthest / nearest, f64::from(place) / f64::from(PLACES))
+                };
+                let last = (0..PLACES).rev().find(|at| !lost(place(*at)))?;
+                bisect(place(last), place(last + 1), lost)
+            }
             found => Some(found.unwrap_or(farthest)),
         }
     }
 }
+
+/// Ranges that are tried for the farthest one at which a target is seen that is not seen at the nearest.
+const PLACES: i32 = 64;
 
 /// Brightnesses of an echo of so many speckle `cells`, M, in its mean, and the share of each, of the gamma
 /// distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).
@@ -418,6 +476,17 @@ fn brightnesses(cells: f64) -> Vec<(f64, f64)> {
 /// What of `design` where it is `operating` has no closed form, and what to do instead.
 fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, String)> {
     let method = &design.receiver.method;
+    if let (Method::Histogram(_), Detector::Geiger(geiger)) = (method, &design.detector) {
+        let interval_fs = design.emission.burst().map_or(i64::MAX, |burst| burst.interval_fs);
+        let what = if geiger.crosstalk > 0.0 {
+            "optical crosstalk between cells"
+        } else if geiger.dead_fs / interval_fs >= histogram::MOST_CYCLES {
+            "a dead time of many cycles"
+        } else {
+            return None;
+        };
+        return Some((what.to_owned(), "simulate it".to_owned()));
+    }
     if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
         let what = format!("the receiver `{}`", method.kind().name());
         let remedy = match method.kind().record() {

@@ -4,6 +4,7 @@ pub mod comparison;
 mod balanced;
 pub mod converters;
 mod forecast;
+mod histogram;
 pub mod interference;
 pub mod link;
 mod matched;

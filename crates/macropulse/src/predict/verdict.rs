@@ -117,6 +117,9 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
         None if night.design().receiver.method.sampling().is_some() => {
             "no amount of light would do: own light hides too many marks there".to_owned()
         }
+        None if night.design().readout.histogram().is_some() => {
+            "no amount of light would do: it comes after the last bin of the histogram".to_owned()
+        }
         None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
     };
     let light = match found.photons_per_shot.is_finite() {
@@ -182,10 +185,13 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
     Check {
         name: "sunlight",
         shortfall,
-        finding: format!(
-            "under the sun Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
-            forecast.pd, forecast.density
-        ),
+        finding: match day.design().readout.histogram() {
+            Some(_) => format!("under the sun Pd {:.3}", forecast.pd),
+            None => format!(
+                "under the sun Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
+                forecast.pd, forecast.density
+            ),
+        },
         remedy: "a narrower field or filter by that factor, or more light in fewer marks".into(),
     }
 }
@@ -193,6 +199,9 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
 fn converters(design: &Design, forecast: &Forecast) -> Check {
     let loss = forecast.bank_loss;
     let finding = match design.bank() {
+        None if design.readout.histogram().is_some() => {
+            "every pixel has a histogram of its own, which is never busy".to_owned()
+        }
         None => "every detector has an ADC of its own, which is never busy".to_owned(),
         Some(bank) => format!(
             "{:.2} % of detection events find all {} of a detector's bank busy",

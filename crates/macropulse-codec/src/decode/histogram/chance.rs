@@ -3,7 +3,7 @@
 use libm::{exp, log, log1p};
 
 use super::model::Model;
-use super::search::Search;
+use super::pulse::Kernel;
 use crate::statistics::normal_quantile;
 
 /// Halvings of the interval in which the likeliest share of a pulse lies.
@@ -82,20 +82,25 @@ impl Chance {
         Self { photons, evidence, share: if prefactor < 1.0 { prefactor } else { 1.0 } }
     }
 
+    /// The evidence in standard deviations of a normal variable, √(2Λ); 0 where there is none.
+    pub fn level(&self) -> f64 {
+        (2.0 * self.evidence).max(0.0).sqrt()
+    }
+
     /// Whole standard deviations beyond the threshold at which `false_alarm` returns of a histogram are
     /// false; `None` below it.
     ///
-    /// The filter of all lags of the gate rises through a level x as often as that of x·r/√(2π) lags a
+    /// The filter of all lags of the gate, `places` bins, rises through a level x as often as that of x·r/√(2π) lags a
     /// bin that are independent, r being the roughness of the pulse \[Rice44\]; here x = √(2Λ). No more
     /// than the two lags a bin that are looked at count.
-    pub fn margin(&self, search: &Search, false_alarm: f64) -> Option<u16> {
+    pub fn margin(&self, kernel: &Kernel, places: f64, false_alarm: f64) -> Option<u16> {
         // Evidence that is no number is none.
         if !(self.evidence > 0.0 && self.photons.is_finite()) {
             return None;
         }
-        let level = (2.0 * self.evidence).sqrt();
-        let rises = level * search.kernel.roughness / std::f64::consts::TAU.sqrt();
-        let lags = search.places() * rises.min(2.0);
+        let level = self.level();
+        let rises = level * kernel.roughness / std::f64::consts::TAU.sqrt();
+        let lags = places * rises.min(2.0);
         if log(lags * self.share) - self.evidence > log(false_alarm) {
             return None;
         }

@@ -9,20 +9,21 @@
 
 mod chance;
 mod check;
+mod decision;
 mod model;
 mod pile_up;
 mod pulse;
 mod search;
 
-pub use pile_up::{PileUp, coates};
+pub use decision::{Decision, Stretch};
+pub use pile_up::{Exposed, PileUp, coates};
 pub use pulse::{Kernel, Pulse, STEPS};
 
 use super::{Error, MOST_RETURNS, Pick, Receiver, Reject, Return, Returns, Strength};
 use crate::{Histograms, ShotLog, time};
 use chance::Chance;
 use model::{Light, Model};
-use pile_up::Exposed;
-use search::Search;
+use search::{Search, strongest};
 
 /// Settings of a receiver of histograms.
 #[derive(Debug, Clone, PartialEq)]
@@ -176,9 +177,13 @@ fn lights(receiver: &HistogramReceiver, search: &Search, exposed: &Exposed) -> V
         return Vec::new();
     };
     for _ in 0..MOST_RETURNS {
-        let Some(step) = search.strongest(&model) else { break };
+        let Some(step) = strongest(search.kernel, &model, search.steps()) else { break };
         let chance = Chance::of(&model, step);
-        let Some(margin) = chance.margin(search, receiver.method.false_alarm) else { break };
+        let Some(margin) =
+            chance.margin(search.kernel, search.places(), receiver.method.false_alarm)
+        else {
+            break;
+        };
         let lag = step as f64 / STEPS as f64;
         model.add(Light { step, lag, photons: chance.photons, margin });
     }

@@ -18,7 +18,8 @@ pub enum PileUp {
 ///
 /// > λ_i = −ln(1 − h_i/(M − Σ_{k<i} h_k)),
 ///
-/// h_i being the count of bin i and M the cycles. 0 from the bin on in which the last cycle is counted.
+/// h_i being the count of bin i and M the cycles. In the bin in which the last cycle is counted half a cycle is taken
+/// as left, as infinitely many photons are not; behind it all are 0.
 pub fn coates(counts: &[u32], cycles: u32) -> Vec<f64> {
     let exposed = Exposed::of(counts, cycles, PileUp::Coates);
     let rate = |(count, exposure): (&f64, &f64)| match *exposure > 0.0 {
@@ -31,8 +32,10 @@ pub fn coates(counts: &[u32], cycles: u32) -> Vec<f64> {
 /// Counts that are Poisson variables of mean λ·e: λ photons would be counted in all cycles if none hid
 /// another, and a share e of the cycles was still waiting for its photon.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Exposed {
+pub struct Exposed {
+    /// Of each bin.
     pub count: Vec<f64>,
+    /// Share e of each bin.
     pub exposure: Vec<f64>,
     /// True if every cycle had its count before the last bin.
     pub is_exhausted: bool,
@@ -43,8 +46,9 @@ impl Exposed {
     /// missing in the next, if each stops the detector.
     ///
     /// Given what came before, the count h of a bin is binomial: of S cycles left each has a photon with
-    /// probability 1 − e^(−λ/M). So −S·ln(1 − h/S) has the mean λ·S/M, and nearly its variance.
-    pub fn of(counts: &[u32], cycles: u32, pile_up: PileUp) -> Self {
+    /// probability 1 − e^(−λ/M). So −S·ln(1 − h/S) has the mean λ·S/M, and nearly its variance. Of h = S half a cycle
+    /// is taken as left: a pulse that all cycles count at once is the brightest of all.
+    pub(super) fn of(counts: &[u32], cycles: u32, pile_up: PileUp) -> Self {
         if pile_up == PileUp::None {
             let count = counts.iter().map(|count| f64::from(*count)).collect();
             return Self { count, exposure: vec![1.0; counts.len()], is_exhausted: false };
@@ -56,16 +60,12 @@ impl Exposed {
         };
         let mut left = cycles;
         for &count in counts {
-            exposed.is_exhausted |= count >= left;
             let all = f64::from(left);
-            if exposed.is_exhausted {
-                exposed.count.push(0.0);
-                exposed.exposure.push(0.0);
-            } else {
-                exposed.count.push(-all * log1p(-f64::from(count) / all));
-                exposed.exposure.push(all / f64::from(cycles));
-                left -= count;
-            }
+            let counted = f64::from(count).min(all - 0.5).max(0.0);
+            exposed.count.push(if left > 0 { -all * log1p(-counted / all) } else { 0.0 });
+            exposed.exposure.push(all / f64::from(cycles));
+            exposed.is_exhausted |= count >= left;
+            left = left.saturating_sub(count);
         }
         exposed
     }

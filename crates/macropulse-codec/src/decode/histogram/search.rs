@@ -6,7 +6,7 @@ use crate::Histograms;
 
 /// Steps from lag to lag that is looked at: between them half a bin, so that a pulse as short as a bin
 /// is not missed.
-const STRIDE: usize = STEPS / 2;
+pub(super) const STRIDE: usize = STEPS / 2;
 
 /// The lags that are looked at: those at which the peak of the pulse lies in the histogram. Light from
 /// beyond the gate is found too, so that its tail is not taken for a surface within.
@@ -42,43 +42,47 @@ impl<'a> Search<'a> {
     }
 
     /// The steps that are looked at.
-    fn steps(&self) -> impl Iterator<Item = i64> + use<> {
+    pub fn steps(&self) -> impl Iterator<Item = i64> + Clone + use<> {
         let first = -((self.kernel.peak * STEPS) as i64);
         (first..first + (self.bins * STEPS) as i64).step_by(STRIDE)
     }
+}
 
-    /// The step at which the matched filter of what `model` leaves over is highest, in its own standard
-    /// deviations:
-    ///
-    /// > z(s) = Σ p_i(s)·(n_i − λ_i)·e_i/v_i / √(Σ p_i(s)²·e_i²/v_i),
-    ///
-    /// n being counts, λ what is expected, v its variance, e the exposure and p the pulse. `None` if it is
-    /// nowhere above 0.
-    pub fn strongest(&self, model: &Model) -> Option<i64> {
-        let mut excess = Vec::with_capacity(self.bins);
-        let mut weight = Vec::with_capacity(self.bins);
-        for at in 0..self.bins {
-            let (exposure, variance) = (model.exposed.exposure[at], model.variance[at]);
-            let per = if variance > 0.0 { exposure / variance } else { 0.0 };
-            excess.push((model.exposed.count[at] - model.expected[at]) * per);
-            weight.push(per * exposure);
-        }
-        let (mut best, mut highest) = (None, 0.0);
-        for step in self.steps() {
-            let (first, shares) = self.kernel.within(step, self.bins);
-            let bins = first..first + shares.len();
-            let (mut sum, mut square) = (0.0, 0.0);
-            for ((share, excess), weight) in
-                shares.iter().zip(&excess[bins.clone()]).zip(&weight[bins])
-            {
-                sum += share * excess;
-                square += share * share * weight;
-            }
-            let score = if square > 0.0 { sum / square.sqrt() } else { 0.0 };
-            if score > highest {
-                (best, highest) = (Some(step), score);
-            }
-        }
-        best
+/// The one of `steps` at which the matched filter of what `model` leaves over is highest, in its own
+/// standard deviations:
+///
+/// > z(s) = Σ p_i(s)·(n_i − λ_i)·e_i/v_i / √(Σ p_i(s)²·e_i²/v_i),
+///
+/// n being counts, λ what is expected, v its variance, e the exposure and p the pulse. `None` if it is
+/// nowhere above 0.
+pub(super) fn strongest(
+    kernel: &Kernel,
+    model: &Model,
+    steps: impl Iterator<Item = i64>,
+) -> Option<i64> {
+    let bins = model.expected.len();
+    let mut excess = Vec::with_capacity(bins);
+    let mut weight = Vec::with_capacity(bins);
+    for at in 0..bins {
+        let (exposure, variance) = (model.exposed.exposure[at], model.variance[at]);
+        let per = if variance > 0.0 { exposure / variance } else { 0.0 };
+        excess.push((model.exposed.count[at] - model.expected[at]) * per);
+        weight.push(per * exposure);
     }
+    let (mut best, mut highest) = (None, 0.0);
+    for step in steps {
+        let (first, shares) = kernel.within(step, bins);
+        let bins = first..first + shares.len();
+        let (mut sum, mut square) = (0.0, 0.0);
+        for ((share, excess), weight) in shares.iter().zip(&excess[bins.clone()]).zip(&weight[bins])
+        {
+            sum += share * excess;
+            square += share * share * weight;
+        }
+        let score = if square > 0.0 { sum / square.sqrt() } else { 0.0 };
+        if score > highest {
+            (best, highest) = (Some(step), score);
+        }
+    }
+    best
 }
