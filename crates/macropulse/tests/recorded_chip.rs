@@ -1,6 +1,6 @@
 //! A real chip and its simulation: histograms of a TMF8820 \[LCSPC\], beside those of `tmf8820` that sees the same
 //! objects from the same poses. Runs where the recordings are; says that it was not tested elsewhere.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

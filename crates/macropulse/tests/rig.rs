@@ -339,15 +339,13 @@ fn a_rosette_shines_where_its_prisms_turn_it() {
 #[test]
 fn threads_change_nothing_among_lidars_on_the_move() {
     let design = Design::open("kim-park-2016-fixed", &[]).unwrap();
-    let text = format!(
-        "ground = {{ material = \"asphalt\" }}\n[[object]]\ncar = {{}}\nposition_m = [12, 2, 0]\n\
+    let text = "ground = { material = \"asphalt\" }\n[[object]]\ncar = {}\nposition_m = [12, 2, 0]\n\
          velocity_m_s = [-20, 0, 0]\n[sensor]\nposition_m = [0, 0, 2]\nvelocity_m_s = [10, 0, 0]\n\
          [[interferers]]\nsensor = \"kim-park-2016-fixed\"\nposition_m = [10, 1, 2]\n\
          velocity_m_s = [-15, 0.5, 0]\n[[interferers]]\nsensor = \"vlp-16\"\n\
-         path = [{{ time_s = 0, position_m = [8, 8, 2] }}, \
-         {{ time_s = 0.2, position_m = [8, -8, 2], yaw_deg = 90, roll_deg = 5 }}]\n"
-    );
-    let scene = scene(&text);
+         path = [{ time_s = 0, position_m = [8, 8, 2] }, \
+         { time_s = 0.2, position_m = [8, -8, 2], yaw_deg = 90, roll_deg = 5 }]\n";
+    let scene = scene(text);
     let part: Vec<_> = short_bands(&design, 0).skip(180).take(4).collect();
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -87,7 +87,7 @@ pub(super) struct BurstFile {
     #[schemars(range(min = 1, max = 16777216))]
     pulses: u32,
     /// Time from pulse to pulse, ns: a whole number of ticks.
-    #[schemars(range(min = 0.001, max = 1e9))]
+    #[schemars(range(min = 0.001, max = 1e6))]
     interval_ns: f64,
 }
 

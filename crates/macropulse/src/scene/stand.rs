@@ -1,5 +1,7 @@
 //! Where something stands and how it moves, as it is typed and what that means.
 
+use std::ops::RangeInclusive;
+
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -17,8 +19,9 @@ use crate::units::{fs_from_s, s_from_fs};
 /// Angles are no more than this, degrees: a hundred turns.
 const MOST_TURNED: f64 = 36_000.0;
 
-/// Times of a path are no farther from the beginning of the first scan, s: a run is no longer.
-const LONGEST_PATH: f64 = 9000.0;
+/// Times of a path, s from the beginning of the first scan: a run ends before the last one, and the time between the
+/// first and the last is a number of femtoseconds that 63 bits hold.
+const TIMES: RangeInclusive<f64> = -100.0..=9000.0;
 
 /// `[sensor]`, and each entry of `copies`.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -52,7 +55,7 @@ pub(super) struct Stand {
 #[serde(deny_unknown_fields)]
 pub(super) struct WaypointTyped {
     /// Seconds since the first scan began.
-    #[schemars(range(min = -9000, max = 9000))]
+    #[schemars(range(min = -100, max = 9000))]
     pub time_s: Spanned<f64>,
     /// Where it is then, m: x forward, y left, z up.
     pub position_m: Spanned<Triple>,
@@ -141,9 +144,9 @@ impl Source<'_> {
         for waypoint in waypoints {
             let WaypointTyped { time_s, position_m, .. } = waypoint.get_ref();
             let time = *time_s.get_ref();
-            if !(-LONGEST_PATH..=LONGEST_PATH).contains(&time) {
-                let message =
-                    format!("time_s is {time}; it must be from -{LONGEST_PATH} to {LONGEST_PATH}");
+            if !TIMES.contains(&time) {
+                let (first, last) = (TIMES.start(), TIMES.end());
+                let message = format!("time_s is {time}; it must be from {first} to {last}");
                 return Err(self.fault(time_s.span(), message));
             }
             let (time_fs, pose) = (fs_from_s(time), self.pose(&waypoint.get_ref().stand())?);

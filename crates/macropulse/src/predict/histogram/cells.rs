@@ -2,11 +2,13 @@
 
 use crate::design::detector::{Arming, Geiger};
 
-/// Cycles after which the cells are taken to have forgotten how they began, and so many dead times.
+/// Cycles after which the cells are taken to have forgotten how they began, and so many dead times and delays of an
+/// afterpulse; no more cycles than `MOST` in all.
 const SETTLED: usize = 4;
-const DEAD_TIMES: usize = 8;
+const DELAYS: usize = 8;
+const MOST: usize = 4096;
 
-/// Counts of a bin that changes by less from one cycle to the next are settled.
+/// Counts of a bin that change by less than this share from one cycle to the next are settled.
 const EXACT: f64 = 1e-9;
 
 /// Mean counts in each bin of a cycle, of all cells together, for the mean detections `rates` of cells that are always
@@ -32,7 +34,11 @@ pub(super) fn counts(geiger: &Geiger, rates: &[f64], bin_fs: i64) -> Vec<f64> {
     let mut due = vec![(0.0, 0.0); later];
     let mut counts = vec![0.0; bins];
     let mut time = 0;
-    for _ in 0..SETTLED + DEAD_TIMES * dead.div_ceil(bins) {
+    let remembered = match geiger.afterpulsing > 0.0 {
+        true => dead + (1.0 / per_bin) as usize,
+        false => dead,
+    };
+    for _ in 0..(SETTLED + DELAYS * remembered.div_ceil(bins)).min(MOST) {
         let mut change: f64 = 0.0;
         for (bin, (count, fire)) in counts.iter_mut().zip(&fire).enumerate() {
             let (again, owing) = std::mem::take(&mut due[time % later]);
@@ -52,7 +58,7 @@ pub(super) fn counts(geiger: &Geiger, rates: &[f64], bin_fs: i64) -> Vec<f64> {
                 then.0 += half;
                 then.1 += half * geiger.afterpulsing * libm::exp(-per_bin * wait as f64);
             }
-            change = change.max((counted - *count).abs());
+            change = change.max((counted - *count).abs() / counted.max(f64::MIN_POSITIVE));
             *count = counted;
             time += 1;
         }
