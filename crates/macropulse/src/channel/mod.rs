@@ -9,7 +9,8 @@
 //!
 //! n = n₀ · (ρ_eff / ρ₀) · (R₀ / R)² · T² · w
 //!
-//! are detected, and n over the efficiency of its detector reach it, with ρ_eff the material's backscatter towards the sensor and w the share of the beam. A sensor
+//! are detected, and n over the efficiency of its detector reach it. Here ρ_eff is the backscatter of the material
+//! towards the sensor, and w the share of the beam that meets it. A sensor
 //! with a link budget has n₀ from it, for a white target at its rated range. Where its field of view
 //! is scanned with the beam, the share of the spot that is still in the field when the echo arrives
 //! is a factor too.

@@ -1,7 +1,6 @@
 //! Light that comes back after each mark without pulses, spread over time, as fog sends it back.
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use macropulse_codec::ShotLog;
 
@@ -32,8 +31,9 @@ impl<'a> Light<'a> {
         light
     }
 
-    /// The steps in which marks of the shots of `log` are sent that `channel` listens to, and how many in each.
-    fn marks_in_steps(&self, log: &ShotLog, channel: u16, step_fs: i64) -> Marks {
+    /// The steps in which marks of the shots of `log` are sent that `channel` listens to, ascending, and how many
+    /// in each.
+    fn marks_in_steps(&self, log: &ShotLog, channel: u16, step_fs: i64) -> Vec<(i64, usize)> {
         let transmitter = &self.transmitters[0];
         let shots = (0..log.len()).filter(|shot| log.channel.get(*shot) == Some(&channel));
         let mut steps: Vec<i64> = shots
@@ -46,42 +46,24 @@ impl<'a> Light<'a> {
             })
             .collect();
         steps.sort_unstable();
-        Marks(steps.chunk_by(|one, next| one == next).map(|same| (same[0], same.len())).collect())
-    }
-}
-
-/// Steps, ascending, and marks in each.
-struct Marks(Vec<(i64, usize)>);
-
-impl Marks {
-    /// Runs of steps from one with marks to the last that a response of `length` steps reaches.
-    fn runs(&self, length: i64) -> Vec<Range<i64>> {
-        let mut runs: Vec<Range<i64>> = Vec::new();
-        for (step, _) in &self.0 {
-            match runs.last_mut() {
-                Some(last) if *step <= last.end => last.end = step + length,
-                _ => runs.push(*step..step + length),
-            }
-        }
-        runs
+        steps.chunk_by(|one, next| one == next).map(|same| (same[0], same.len())).collect()
     }
 }
 
 impl Response {
-    fn add_to(&self, background: &mut Background, channel: u16, marks: &Marks) {
-        let mut rest = marks.0.as_slice();
-        for run in marks.runs(self.photons.len() as i64) {
-            let mut photons = vec![0.0; (run.end - run.start) as usize];
-            let (within, behind) = rest.split_at(rest.partition_point(|(step, _)| *step < run.end));
-            rest = behind;
-            for (step, count) in within {
-                let from = (step - run.start) as usize;
+    /// Adds what `channel` gets of `marks`, by the steps in which they are sent, to the `background`.
+    fn add_to(&self, background: &mut Background, channel: u16, marks: &[(i64, usize)]) {
+        let length = self.photons.len();
+        for run in marks.chunk_by(|(one, _), (next, _)| next - one <= length as i64) {
+            let (first, last) = (run[0].0, run[run.len() - 1].0);
+            let mut photons = vec![0.0; (last - first) as usize + length];
+            for (step, count) in run {
+                let from = (step - first) as usize;
                 for (sum, part) in photons[from..].iter_mut().zip(&self.photons) {
                     *sum += *count as f64 * part;
                 }
             }
-            for (step, photons) in (run.start..).zip(photons).filter(|(_, photons)| *photons > 0.0)
-            {
+            for (step, photons) in (first..).zip(photons).filter(|(_, photons)| *photons > 0.0) {
                 background.channel.push(channel);
                 background.from_fs.push(step * self.step_fs);
                 background.until_fs.push((step + 1) * self.step_fs);

@@ -28,12 +28,9 @@ const IDEALISED: &str = "idealised";
 /// What a file that extends another does not take from it: a sentence about that one.
 const PROSE: &str = "summary";
 
-/// Keys of which a table has exactly one: the name of the table, and the keys. Naming another than the parent does
-/// replaces what the parent has there instead of adding to it.
+/// Keys that exclude each other: the name of their table, which is empty for the top of the file, and the keys.
+/// Naming another than the parent does replaces what the parent has there instead of adding to it.
 pub(super) type Alternatives = [(&'static str, &'static [&'static str])];
-
-/// Tables of which the stronger document's replaces the weaker one's other: what stands behind a photodiode.
-const BEHIND_A_PHOTODIODE: [&str; 2] = ["comparator", "adc"];
 
 /// One TOML text with its origin.
 #[derive(Debug, Clone)]
@@ -131,12 +128,7 @@ impl Chain {
             if number > own {
                 table.remove(PROSE);
             }
-            if BEHIND_A_PHOTODIODE.iter().any(|kind| merged.contains_key(*kind)) {
-                table.retain(|key, _| {
-                    merged.contains_key(key) || !BEHIND_A_PHOTODIODE.contains(&key)
-                });
-            }
-            fill_in(&mut merged, &table, alternatives);
+            fill_in(&mut merged, table, "", alternatives);
         }
         if let Some(parent) = documents[own].table.get("extends").and_then(toml::Value::as_str) {
             let said = format!("extends {parent}");
@@ -144,7 +136,7 @@ impl Chain {
         }
         let defaults = Document::parse(presets::DEFAULTS, "built-in defaults", Path::new(""))?;
         let fitting = only_for_what_is_there(&defaults.table, &merged, alternatives);
-        fill_in(&mut merged, &fitting, alternatives);
+        fill_in(&mut merged, fitting, "", alternatives);
         merged.remove("extends");
         documents.push(defaults);
         let mut chain = Self { documents, merged, is_switched: !switched.is_empty() };
@@ -315,28 +307,23 @@ fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Err
     Ok(Document { origin: SET.to_owned(), text: String::new(), table, folder: PathBuf::new() })
 }
 
-/// Adds to `strong` what only `weak` has.
-fn fill_in(strong: &mut Table, weak: &Table, alternatives: &Alternatives) {
+/// Adds to `strong`, the table called `name`, what only `weak` has.
+fn fill_in(strong: &mut Table, mut weak: Table, name: &str, alternatives: &Alternatives) {
+    for (_, kinds) in alternatives.iter().filter(|(table, _)| *table == name) {
+        // Of a family there is nothing but its kind, be it misspelt.
+        if name == "family" || kinds.iter().any(|kind| strong.contains_key(*kind)) {
+            weak.retain(|kind, _| strong.contains_key(kind) || !kinds.contains(&kind));
+        }
+    }
     for (key, value) in weak {
-        match strong.get_mut(key) {
-            None => {
-                strong.insert(key.clone(), value.clone());
+        match (strong.get_mut(&key), value) {
+            (None, value) => {
+                strong.insert(key, value);
             }
-            Some(toml::Value::Table(inner)) => {
-                if let toml::Value::Table(below) = value {
-                    let mut below = below.clone();
-                    for (_, kinds) in alternatives.iter().filter(|(group, _)| group == key) {
-                        // Of a family there is nothing but its kind, be it misspelt.
-                        if key == "family" || kinds.iter().any(|kind| inner.contains_key(*kind)) {
-                            below.retain(|kind, _| {
-                                inner.contains_key(kind) || !kinds.contains(&kind)
-                            });
-                        }
-                    }
-                    fill_in(inner, &below, alternatives);
-                }
+            (Some(toml::Value::Table(inner)), toml::Value::Table(below)) => {
+                fill_in(inner, below, &key, alternatives);
             }
-            Some(_) => {}
+            (Some(_), _) => {}
         }
     }
 }

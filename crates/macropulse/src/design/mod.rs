@@ -54,8 +54,10 @@ pub use work::SHOTS_OF_BAND;
 use crate::digest::Digest;
 use macropulse_codec::decode::Receiver;
 
-/// Tables of a sensor file that have exactly one of several keys.
-const ALTERNATIVES: [(&str, &[&str]); 5] = [
+/// Keys of a sensor file that exclude each other, by their table. A table that has a name has exactly one of them;
+/// the front end tells which one stands at the top of the file, if any.
+const ALTERNATIVES: [(&str, &[&str]); 6] = [
+    ("", &["comparator", "adc"]),
     ("scan", Pattern::NAMES),
     ("detector", Detector::NAMES),
     ("family", family::FAMILIES),

@@ -36,7 +36,8 @@ pub fn schema() -> Value {
 /// Of each group of keys that exclude each other in the table called `name`, and in those below it,
 /// there must be one.
 fn exactly_one(table: &mut Value, name: &str) {
-    let groups = ALTERNATIVES.iter().filter(|(group, _)| *group == name).map(|(_, kinds)| {
+    let named = ALTERNATIVES.iter().filter(|(group, _)| !group.is_empty() && *group == name);
+    let groups = named.map(|(_, kinds)| {
         let kinds: Vec<Value> = kinds.iter().map(|kind| json!({ "required": [kind] })).collect();
         json!({ "oneOf": kinds })
     });

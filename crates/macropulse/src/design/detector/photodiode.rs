@@ -115,10 +115,9 @@ impl Typed for File {
                            [adc], which samples";
             return Err(table.check.chain.lacks("comparator", message));
         };
-        let highest = threshold_over_noise(front_end.white_memory(), comparator.false_alarm_hz);
         let path = "comparator.false_alarm_hz";
         let false_alarm = table.check.within(path, comparator.false_alarm_hz, 1e-3, MOST_COUNTS)?;
-        if highest.is_none() {
+        if threshold_over_noise(front_end.white_memory(), false_alarm).is_none() {
             let message = format!(
                 "is {false_alarm:.3e}, but noise of this bandwidth crosses even its own mean only \
                  {:.3e} times per second",

@@ -34,6 +34,9 @@ pub(crate) struct Line {
 
 /// Shots that a search may look at.
 const EFFORT: usize = 120_000;
+/// Most beams beside one that an aperture may hold together with it. Where there are more, light hardly depends on
+/// the place.
+const FEW: usize = 64;
 /// Elevations that are tried at most.
 const MOST_PLACES: f64 = 4096.0;
 /// Phases of the columns that are tried at most.
@@ -89,6 +92,40 @@ impl Field for LineBeams<'_> {
         aims
     }
 
+    fn shared(&self) -> Vec<Aim> {
+        let Lines { step, in_turn, .. } = *self.lines;
+        let reach = 2.0 * self.reach();
+        // A turning head whose columns are alike is alike all around.
+        let columns = match self.energies.alike && in_turn == 1 {
+            true => self.scan.columns / 2..self.scan.columns / 2 + 1,
+            false => 0..self.scan.columns,
+        };
+        let mut aims = Vec::new();
+        for (number, row) in self.lines.rows.iter().enumerate() {
+            for column in columns.clone() {
+                let azimuth = row.first - step * f64::from(column);
+                let here = Aim { azimuth, elevation: row.elevation };
+                let mut beside = 0;
+                // Each pair once.
+                for other in number..self.rows_within(row.elevation, reach).end {
+                    let other = &self.lines.rows[other];
+                    for columns in self.columns_within(other, here, reach) {
+                        beside += columns.len();
+                        if beside > FEW {
+                            return Vec::new();
+                        }
+                        for column in columns {
+                            let azimuth = other.first - step * f64::from(column);
+                            let there = Aim { azimuth, elevation: other.elevation };
+                            aims.extend(self.shared_by(here, there));
+                        }
+                    }
+                }
+            }
+        }
+        aims
+    }
+
     /// Near the ends of lines that go to and fro, where the aperture sees the end of one and the beginning
     /// of the next at once; of a turning head whose columns differ, all.
     fn across(&self, gap: f64) -> Vec<f64> {
@@ -125,6 +162,19 @@ impl Field for LineBeams<'_> {
 }
 
 impl LineBeams<'_> {
+    /// Places on the way from one beam to another that both of them cross: half-way, and as near to either as the
+    /// other still crosses.
+    fn shared_by(&self, from: Aim, to: Aim) -> [Aim; 3] {
+        let across = (to.azimuth - from.azimuth) * libm::cos(from.elevation);
+        let apart = libm::hypot(across, to.elevation - from.elevation);
+        // A hair within the reach.
+        let nearest = 1.0 - (0.99 * self.reach() / apart.max(1e-12)).min(1.0);
+        [0.5, nearest, 1.0 - nearest].map(|part| Aim {
+            azimuth: from.azimuth + part * (to.azimuth - from.azimuth),
+            elevation: from.elevation + part * (to.elevation - from.elevation),
+        })
+    }
+
     /// Azimuths at which the columns stand otherwise in the aperture, about the middle of the field.
     fn phases(&self, gap: f64) -> Vec<f64> {
         let Lines { first, step, .. } = *self.lines;

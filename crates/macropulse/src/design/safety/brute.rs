@@ -12,8 +12,8 @@ use crate::design::Design;
 /// The energy that the search allows is at most this share above that of the worst place of a grid.
 const TOLERANCE: f64 = 0.02;
 /// Places of a grid at most, and shots that are looked at there.
-const PLACES: f64 = 150.0;
-const SHOTS: f64 = 2e5;
+const PLACES: f64 = 1200.0;
+const SHOTS: f64 = 1.5e6;
 
 /// A shot: where it goes, when, and how bright it is beside the mean one.
 struct Shot {
@@ -217,14 +217,20 @@ fn found(design: &Design, condition: Condition) -> [f64; 4] {
 }
 
 /// By how much more than the grid the search allows, at most; the largest of the rules.
+///
+/// No rule counts for more than one shot alone is allowed, as that decides then: two shots of which a thousandth
+/// crosses at the rim may have any energy.
 fn excess(design: &Design, conditions: &[Condition]) -> f64 {
     let mut most = f64::MIN;
     for &condition in conditions {
         let (ours, grid) = (found(design, condition), brute(design, condition, None));
+        let Design { scan, light, emission, .. } = design;
+        let class = Class1::at(light.wavelength).unwrap();
+        let sender = Sender { scan, light, emission, condition, count_groups: true };
+        let all = limits(&class, &exposure(&class, &sender));
+        let alone = all.iter().find(|limit| limit.rule == Rule::SingleShot).unwrap().energy;
         for (ours, grid) in ours.iter().zip(&grid) {
-            // A rule that the grid has no case of may have one between its places.
-            let over = if grid.is_finite() { ours / grid - 1.0 } else { 0.0 };
-            most = most.max(over);
+            most = most.max(ours.min(alone) / grid.min(alone) - 1.0);
         }
     }
     most
@@ -296,15 +302,20 @@ fn drawn(number: u64) -> Design {
     design.unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-/// N = 200 sensors of all patterns, seeds 0 to 199.
+/// N = 200 sensors of all patterns, seeds 2000 to 2199, and some of which a search that began at the places of a
+/// grid alone allowed too much: 1.06, 1.02 and 1.03 times as much.
 #[test]
 fn no_place_of_a_grid_allows_less_than_the_search() {
-    let over: Vec<(u64, f64)> = (0..200)
+    let over: Vec<(u64, f64)> = (2000..2200)
+        .chain([1, 498, 504])
         .map(|number| {
             let design = drawn(number);
             // Every other one behind a telescope.
             let conditions = conditions(&design);
-            let condition = &conditions[(number / 4 % 2) as usize..][..1];
+            let condition = match number {
+                2000.. => &conditions[(number / 4 % 2) as usize..][..1],
+                _ => &conditions[..],
+            };
             (number, excess(&design, condition))
         })
         .filter(|(_, over)| *over > TOLERANCE)

@@ -112,6 +112,11 @@ impl Field for Scattered<'_> {
         coarse_first(&places.iter().map(aim).collect::<Vec<_>>())
     }
 
+    /// None: places are tried at the beams already.
+    fn shared(&self) -> Vec<Aim> {
+        Vec::new()
+    }
+
     fn across(&self, _: f64) -> Vec<f64> {
         Vec::new()
     }

@@ -5,7 +5,9 @@
 //! looks for its worst time.
 //!
 //! 1. Places are tried an eighth of the aperture apart, coarse steps first.
-//! 2. The best ones of each rule are refined in steps that are halved.
+//! 2. Where few beams cross at once, places that any two of them share are tried as well: these may be too small for
+//!    a grid.
+//! 3. The best places of each rule are refined in steps that are halved.
 //!
 //! What is found is the light at a real place, so the search can only miss light: it may allow more than the
 //! worst place there is, by 2 % at most. `brute.rs` holds it against a grid.
@@ -43,6 +45,10 @@ pub(super) trait Field {
     /// seconds count as one.
     fn starts(&self, gap: f64, counted: f64) -> Vec<Aim>;
 
+    /// Places that two beams cross, for any two that can; none where so many beams cross an aperture that light
+    /// hardly depends on the place.
+    fn shared(&self) -> Vec<Aim>;
+
     /// Azimuths to try at the best elevations of these places; empty where they had all of interest.
     fn across(&self, gap: f64) -> Vec<f64>;
 
@@ -71,6 +77,18 @@ pub(super) fn worst(
             break;
         }
         search.at(aim);
+    }
+    let shared = coarse_first(&field.shared());
+    if !shared.is_empty() {
+        // Where few beams cross, a place takes little time: these have an effort of their own, and so has what follows.
+        search.spent = 0;
+        for aim in shared {
+            if search.spent > field.effort() {
+                break;
+            }
+            search.at(aim);
+        }
+        search.spent = 0;
     }
     let mut elevations: Vec<f64> = Vec::new();
     for (_, Aim { elevation, .. }) in (0..RULES).filter_map(|rule| search.best(rule)) {
