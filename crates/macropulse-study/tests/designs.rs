@@ -125,6 +125,27 @@ fn what_is_found_does_and_is_found_again() {
     assert_eq!(found(&far, folder.path(), 1).best, [None, None]);
 }
 
+/// Echoes of 16 by 64 pixels, 20 times a second, are back from 40 m a hundred times over before the next shot: one
+/// channel that waits does, and a code is told to gain nothing.
+#[test]
+fn an_easy_task_needs_no_code() {
+    let easy = [
+        ("rows = 30", "rows = 16"),
+        ("columns = 212", "columns = 64"),
+        ("scans_per_s = 800.0", "scans_per_s = 20.0"),
+        ("range_m = 150.0", "range_m = 40.0"),
+        ("clutter_m = 300.0", "clutter_m = 80.0"),
+        ("beams = [3, 5, 10, 15, 30]", "beams = [1]"),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let found = found(&easy, folder.path(), 1);
+    let [None, Some(waiting)] = &found.best else { panic!("{}", found.text()) };
+    assert_eq!(waiting.bill.channels, 1);
+    assert!(waiting.trial.counts.iter().all(|counts| counts.pd() > 0.99), "{}", found.text());
+    let text = found.text();
+    assert!(text.contains("none of the parts allowed: a code gains nothing: "), "{text}");
+}
+
 /// The next search into a folder takes the results of the last one away before it begins, and nothing else: a file
 /// that no search has written, or that was changed since, is refused and stays.
 #[test]

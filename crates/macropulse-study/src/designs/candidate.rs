@@ -27,6 +27,11 @@ const LATE: f64 = 20.0;
 /// is back.
 pub(super) const SCHEMES: [&str; 2] = ["coded", "waiting"];
 
+/// The scheme of a lidar whose shots have so many `marks`.
+pub(super) fn scheme(marks: u32) -> &'static str {
+    SCHEMES[usize::from(marks == 1)]
+}
+
 /// A lidar that may or may not do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -70,7 +75,7 @@ impl Candidate {
 
     /// `coded` or `waiting`.
     pub fn scheme(&self) -> &'static str {
-        SCHEMES[usize::from(self.waits())]
+        scheme(self.marks)
     }
 
     /// A name that tells it from the others of a search.

@@ -1,6 +1,6 @@
 //! What a search found, as text for people.
 
-use super::candidate::SCHEMES;
+use super::candidate::{SCHEMES, scheme};
 use super::frontier::{CHANNELS, Frontier};
 use super::scenery::Scenery;
 use super::trial::{Counts, Trial};
@@ -269,6 +269,16 @@ impl Found {
         lines.map(|line| format!("  {line}\n")).collect()
     }
 
+    /// Why no lidar of the scheme with this `name` does: the first reason where none is a lidar at all.
+    fn why_none(&self, name: &str) -> String {
+        let is_assessed = self.assessed.iter().any(|it| scheme(it.candidate.marks) == name);
+        let skipped = self.skipped.iter().find(|it| scheme(it.marks) == name);
+        match skipped.filter(|_| !is_assessed) {
+            Some(it) => format!("none of the parts allowed: {}", it.why),
+            None => "nothing does of the parts allowed".to_owned(),
+        }
+    }
+
     /// What the search comes to: a sentence for each answer.
     pub fn verdict(&self) -> Columns {
         let mut columns = Columns::default();
@@ -288,7 +298,7 @@ impl Found {
                             short(candidate.aperture * 1e3)
                         )
                     }
-                    None => "nothing does of the parts allowed".to_owned(),
+                    None => self.why_none(name),
                 },
             );
         }
