@@ -3,6 +3,7 @@
 pub mod histogram;
 
 mod balanced;
+mod belief;
 mod beyond;
 mod bitwise;
 mod check;

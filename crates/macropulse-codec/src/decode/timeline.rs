@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::kernels::{
-    Pattern, are_lit, dark_before, lay, light_up, lit_in, lit_in_all, lit_in_any, lit_in_each,
-    lit_in_row, look_ahead, put_out,
+    Pattern, are_lit, count_each, dark_before, lay, light_up, lit_in, lit_in_all, lit_in_any,
+    lit_in_each, lit_in_row, look_ahead, put_out,
 };
 
 /// A stretch of time in which every tick is one bit: lit or dark. Outside of it all is dark.
@@ -169,6 +169,21 @@ impl Timeline {
     /// Whether `tick` is lit.
     pub fn has(&self, tick: i64) -> bool {
         self.place(tick).is_some_and(|(word, bit)| self.words[word] & bit != 0)
+    }
+
+    /// How many ticks of `span` are lit.
+    pub fn count(&self, span: Range<i64>) -> u32 {
+        let first = (span.start - self.origin).max(0) as usize;
+        let last = (span.end - self.origin).clamp(0, 64 * self.words.len() as i64) as usize;
+        if first >= last {
+            return 0;
+        }
+        let words = &self.words[first / 64..last.div_ceil(64)];
+        let mut count = [0];
+        count_each(words, words.len(), &mut count);
+        let before = words[0] & !(u64::MAX << (first % 64));
+        let behind = words[words.len() - 1] & !(u64::MAX >> ((64 - last % 64) % 64));
+        count[0] - before.count_ones() - behind.count_ones()
     }
 
     /// Darkens `tick`.

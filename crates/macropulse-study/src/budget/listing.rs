@@ -164,7 +164,6 @@ impl Figures<'_> {
             self.environment.name
         );
         let method = &self.design.receiver.method;
-        let is_quick = matches!(method, Method::Matched(_, Effort::Quick));
         if let Some(aside) = self.there.aside.filter(|aside| aside.share >= RARELY) {
             text += &format!(
                 "  on a sidelobe {:.1e} of the returns at the rated range, {:.0} mm off (rms), apart from \
@@ -173,8 +172,15 @@ impl Figures<'_> {
                 aside.rms * 1e3
             );
         }
-        if is_quick && self.there.pd < LIKELY {
-            text += "  Pd is that of receiver.effort = \"thorough\": a quick one finds fewer so faint shots\n";
+        let otherwise = match method {
+            Method::Matched(_, Effort::Quick) => Some("a quick one finds fewer"),
+            Method::Matched(_, Effort::Exhaustive) => Some("an exhaustive one finds more"),
+            _ => None,
+        };
+        if let Some(otherwise) = otherwise.filter(|_| self.there.pd < LIKELY) {
+            text += &format!(
+                "  Pd is that of receiver.effort = \"thorough\": {otherwise} so faint shots\n"
+            );
         }
         text
     }

@@ -1,29 +1,39 @@
 //! Measurement: the time of a return, and its energy.
 
+use super::Detection;
 use super::cancel::NOWHERE;
 use super::sent::Sent;
-use super::{Band, Detection};
-use crate::decode::timing::{self, Known};
+use crate::decode::field::Field;
+use crate::decode::timing::{self, Histogram, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Window};
 
-impl Band<'_> {
-    /// What is measured of `shot` at `detection`.
-    pub(super) fn measured(&mut self, shot: usize, detection: Detection) -> Return {
-        let marks = self.sent.weight(shot);
-        let light = self.sent.light(shot, detection.lag);
-        let (peak, margin) = (detection.count as u16, detection.margin as u16);
+/// What returns are measured with.
+pub(super) struct Meter<'a> {
+    sent: &'a Sent<'a>,
+    pub photons: Photons,
+    histogram: Histogram,
+}
+
+impl<'a> Meter<'a> {
+    /// That of the shots `sent`, with the energies that are known.
+    pub fn new(sent: &'a Sent<'a>, photons: Photons) -> Self {
+        Self { sent, photons, histogram: Histogram::default() }
+    }
+
+    /// What is measured of `shot` at `detection`, in the light of `field`.
+    pub fn measured(&mut self, field: &Field, shot: usize, detection: Detection) -> Return {
         let sent = self.sent;
+        let marks = sent.weight(shot);
+        let light = sent.light(shot, detection.lag);
+        let (peak, margin) = (detection.count as u16, detection.margin as u16);
         let start = light.start + sent.epoch;
-        let late = self.late(shot, detection);
+        let late = self.late(field, shot, detection);
         let Energy { photons, saturated } = match detection.count == marks {
             true => self.photons.of_all(marks),
             false => {
-                let density = self.density_beside(shot, detection);
-                Energy::of(
-                    (detection.count, marks),
-                    density,
-                    timing::window(self.sent.correlation, self.sent.width, late),
-                )
+                let window = timing::window(sent.correlation, sent.width, late);
+                let density = field.density_without(&light, detection.count, marks * sent.width);
+                Energy::of((detection.count, marks), density, window)
             }
         };
         let tof = sent.receiver.tof(late)(sent.log.fired_at_fs[shot], start);
@@ -31,7 +41,7 @@ impl Band<'_> {
     }
 
     /// How late the marks of `shot` are, in ticks, if it is found at `detection`.
-    fn late(&mut self, shot: usize, detection: Detection) -> f64 {
+    fn late(&mut self, field: &Field, shot: usize, detection: Detection) -> f64 {
         let sent = self.sent;
         if sent.width == 1 {
             return MIDDLE;
@@ -40,10 +50,10 @@ impl Band<'_> {
         let lit_bits = sent.lit_bits(shot);
         let count = |place: i64, counts: &mut [u32]| {
             let start = light.start + place;
-            self.field.seen().lit_in_row(start, lit_bits, &bits.pattern, counts);
+            field.seen().lit_in_row(start, lit_bits, &bits.pattern, counts);
         };
         self.histogram.count(sent.width, sent.correlation.jitter(), count);
-        let beside = self.field.density_without(&light, detection.count, 0);
+        let beside = field.density_without(&light, detection.count, 0);
         let known = Known {
             sigma: sent.correlation.jitter(),
             marks: f64::from(sent.weight(shot)),

@@ -17,6 +17,8 @@
 //!
 //! A return is believed if chance would not reach its count of marks at any lag of the gate: [`chance`].
 //!
+//! An exhaustive receiver takes none of these steps. It counts every lag: [`reference`](self::reference).
+//!
 //! The shots go through these steps in blocks, so that the ticks at hand fit into a cache.
 
 mod acquire;
@@ -25,6 +27,7 @@ mod chance;
 mod look;
 mod measure;
 mod pace;
+mod reference;
 mod sent;
 #[cfg(test)]
 mod tests;
@@ -36,9 +39,9 @@ use std::ops::Range;
 
 use serde::Deserialize;
 
+use super::check::in_order;
 use super::field::{self, Field};
 use super::timeline::Timeline;
-use super::timing::Histogram;
 use super::{Correlation, Error, GATES_PER_BLOCK, Receiver, Returns};
 use crate::ShotLog;
 use crate::Ticks;
@@ -47,7 +50,7 @@ use crate::kernels::{Counts, NARROW};
 use acquire::{Leftover, Search};
 use cancel::Cancelled;
 use chance::Chance;
-use measure::Photons;
+use measure::{Meter, Photons};
 use pace::{Paced, Usual};
 use sent::{Sent, Words};
 
@@ -62,6 +65,9 @@ pub enum Effort {
     Quick,
     /// Searches for every shot that is not found otherwise; takes many times as long in noise.
     Thorough,
+    /// Counts every lag of every shot and believes by posterior odds alone, without the rules of the other two: the
+    /// reference that they are compared with. Takes about a millisecond a shot in noise.
+    Exhaustive,
 }
 
 /// Decodes one band.
@@ -78,6 +84,12 @@ pub(super) fn decode(
     let mut memory = MEMORY.take();
     let words = std::mem::take(&mut memory.words);
     let sent = Sent::new(receiver, (correlation, effort), sent, (ticks.epoch, words));
+    if effort == Effort::Exhaustive {
+        let returns = in_order(&ticks.tick, 0..ticks.tick.len())
+            .map(|()| reference::decode(&sent, &ticks.tick));
+        MEMORY.set(Memory { words: sent.words, ..memory });
+        return returns;
+    }
     let mut returns = Returns::with_capacity(sent.log.owned.len());
     let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.timelines)?;
     let memory = match cancelled {
@@ -188,8 +200,7 @@ struct Band<'a> {
     /// Where these are in the picture.
     in_picture: Vec<u32>,
     search: Search,
-    photons: Photons,
-    histogram: Histogram,
+    meter: Meter<'a>,
     /// Memory for the residual of a macropulse, for the marks found in each of its bits and in those about it,
     /// and for the places that others claim and its own.
     residual: Timeline,
@@ -260,8 +271,7 @@ impl<'a> Band<'a> {
             marks_of: None,
             in_picture: Vec::new(),
             search: memory.search,
-            photons: memory.photons,
-            histogram: Histogram::default(),
+            meter: Meter::new(sent, memory.photons),
             residual: Timeline::default(),
             found_in_bits: Vec::new(),
             words: WordsAbout::default(),
@@ -278,10 +288,11 @@ impl<'a> Band<'a> {
             first = shots;
         }
         while first < shots {
-            let block = first..self.end_of_block(first);
+            let block = first..self.sent.end_of_block(first);
             first = block.end;
             // What overlaps with the light of the last ones may not be known yet.
-            let end = if block.end == shots { shots } else { self.in_flight_before(block.end) };
+            let end =
+                if block.end == shots { shots } else { self.sent.in_flight_before(block.end) };
             let closed = settled..end.max(settled);
             settled = closed.end;
             if block.clone().chain(closed.clone()).any(|shot| self.is_open(shot)) {
@@ -304,7 +315,7 @@ impl<'a> Band<'a> {
             timelines: self.places,
             field: self.field.into_memory(),
             search: self.search,
-            photons: self.photons,
+            photons: self.meter.photons,
             chance: Some(self.chance),
         }
     }
@@ -315,13 +326,6 @@ impl<'a> Band<'a> {
         !self.field.come_together(self.fewest, &self.at_hand, light.end - light.start)
     }
 
-    /// The end of the block of shots that begins with `first`.
-    fn end_of_block(&self, first: usize) -> usize {
-        let gate = self.sent.arrival(first);
-        let end = self.sent.fired[first] + GATES_PER_BLOCK * (gate.end - gate.start);
-        self.sent.fired.partition_point(|fired| *fired < end).max(first + 1)
-    }
-
     /// The time that must be at hand for a block of shots: their light, and what it may overlap with.
     fn span(sent: &Sent, block: Range<usize>) -> Range<i64> {
         let last = sent.arrival(block.end - 1);
@@ -329,14 +333,6 @@ impl<'a> Band<'a> {
         // Shots that are settled with the block are as old as the light of its first one, and their
         // light is compared with bits a macropulse before it, and one behind it.
         first.start - (first.end - first.start) - sent.length()..last.end + sent.length()
-    }
-
-    /// The first shot of which light may still come when that of `shot` does.
-    fn in_flight_before(&self, shot: usize) -> usize {
-        let fired = &self.sent.fired;
-        let gate = self.sent.arrival(0);
-        let earliest = fired[shot.min(fired.len() - 1)] - (gate.end - gate.start);
-        fired.partition_point(|&fired| fired < earliest)
     }
 
     /// Whether light of `shot` may be found that was not yet.
@@ -355,7 +351,7 @@ impl<'a> Band<'a> {
         if matches!(self.open, Open::All) {
             return;
         }
-        for shot in self.in_flight_before(block.start)..block.end {
+        for shot in self.sent.in_flight_before(block.start)..block.end {
             if let Some(detection) = self.found[shot] {
                 self.cancel(shot, detection.lag);
             }

@@ -9,7 +9,7 @@ use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timing;
-use crate::decode::{Correlation, Effort, Pick, Receiver, window};
+use crate::decode::{Correlation, Effort, GATES_PER_BLOCK, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
 
 /// What was sent.
@@ -349,6 +349,21 @@ impl<'a> Sent<'a> {
         fired + reach.start..fired + reach.end - 1 + self.length() + i64::from(self.width)
     }
 
+    /// The end of the block of shots that begins with `first`.
+    pub fn end_of_block(&self, first: usize) -> usize {
+        let gate = self.arrival(first);
+        let end = self.fired[first] + GATES_PER_BLOCK * (gate.end - gate.start);
+        self.fired.partition_point(|fired| *fired < end).max(first + 1)
+    }
+
+    /// The first shot of which light may still come when that of `shot` does.
+    pub fn in_flight_before(&self, shot: usize) -> usize {
+        let fired = &self.fired;
+        let gate = self.arrival(0);
+        let earliest = fired[shot.min(fired.len() - 1)] - (gate.end - gate.start);
+        fired.partition_point(|&fired| fired < earliest)
+    }
+
     /// The shots of which light may begin in the `time` if it comes after one of the `lags`.
     pub fn that_begin_in(&self, time: &Range<i64>, lags: &Range<i64>) -> Range<usize> {
         let first = self.fired.partition_point(|fired| fired + lags.end < time.start);
@@ -360,6 +375,12 @@ impl<'a> Sent<'a> {
     pub fn light(&self, shot: usize, lag: i64) -> Range<i64> {
         let start = self.fired[shot] + lag;
         start..start + self.takes_up()
+    }
+
+    /// Whether light that begins so much later than other light overlaps with it, or with ticks that are cancelled
+    /// with it.
+    pub fn overlap(&self, apart: i64) -> bool {
+        apart.abs() < self.takes_up() + i64::from(self.width)
     }
 
     /// Ticks that the light of a shot takes up.

@@ -17,30 +17,31 @@ use crate::decode::{Correlation, Effort, Method, Receiver, Returns};
 use crate::{ShotLog, Ticks};
 
 /// A sensor of one tick a chip.
-struct Sensor {
-    book: Codebook,
+pub(super) struct Sensor {
+    pub(super) book: Codebook,
     /// Ticks from shot to shot.
-    period: u32,
+    pub(super) period: u32,
     /// Farthest lag.
-    gate: u32,
+    pub(super) gate: u32,
 }
 
 /// What light meets on its way: everything in one place, or each shot somewhere else.
 #[derive(Debug, Clone, Copy)]
-struct Weather {
+pub(super) struct Weather {
     /// Marks missed, of 100.
-    missed: u32,
+    pub(super) missed: u32,
     /// False ticks in 1000 places.
-    false_ticks: u32,
+    pub(super) false_ticks: u32,
     /// Marks that are a tick late, of 100.
-    late: u32,
+    pub(super) late: u32,
     /// Lags of neighbours differ by up to this.
-    roughness: u32,
+    pub(super) roughness: u32,
     /// Shots that meet a second surface behind the first, of 100.
-    panes: u32,
+    pub(super) panes: u32,
 }
 
-const CLEAR: Weather = Weather { missed: 0, false_ticks: 0, late: 0, roughness: 2, panes: 0 };
+pub(super) const CLEAR: Weather =
+    Weather { missed: 0, false_ticks: 0, late: 0, roughness: 2, panes: 0 };
 
 /// Lags from the first surface to the one behind it, at least.
 const BEHIND: u32 = 700;
@@ -54,7 +55,7 @@ fn codebook_of(family: Family) -> Codebook {
     Codebook::new(family, Some(payload), 16, Keying::OnOff).unwrap()
 }
 
-fn books() -> Vec<Codebook> {
+pub(super) fn books() -> Vec<Codebook> {
     let families = [
         Family::prime(11),
         Family::extended_prime(7),
@@ -70,32 +71,32 @@ fn books() -> Vec<Codebook> {
 
 impl Sensor {
     /// One of which about five shots are in flight, and where their macropulses overlap.
-    fn crowded(book: Codebook) -> Self {
+    pub(super) fn crowded(book: Codebook) -> Self {
         Self { book, period: 1100, gate: 5000 }
     }
 
-    fn receiver(&self, jitter_ticks: f64) -> Receiver {
+    pub(super) fn receiver(&self, jitter_ticks: f64) -> Receiver {
         self.set_to(Effort::Quick, self.correlation(jitter_ticks))
     }
 
-    fn set_to(&self, effort: Effort, correlation: Correlation) -> Receiver {
+    pub(super) fn set_to(&self, effort: Effort, correlation: Correlation) -> Receiver {
         let method = Method::Matched(correlation, effort);
         Receiver { gate_ticks: (50, self.gate), method, ..Receiver::matched(2500) }
     }
 
-    fn correlation(&self, jitter_ticks: f64) -> Correlation {
+    pub(super) fn correlation(&self, jitter_ticks: f64) -> Correlation {
         let (light_ticks, false_alarm) = (self.gate, 1e-2);
         Correlation { light_ticks, jitter_ticks, false_alarm, ..Correlation::default() }
     }
 
     /// What is sent, as the matched `receiver` knows it.
-    fn sent<'a>(&'a self, receiver: &'a Receiver, log: &'a ShotLog) -> Sent<'a> {
+    pub(super) fn sent<'a>(&'a self, receiver: &'a Receiver, log: &'a ShotLog) -> Sent<'a> {
         let Method::Matched(correlation, effort) = &receiver.method else { panic!() };
         let words = Words::default();
         Sent::new(receiver, (correlation, *effort), (&self.book, log), (0, words))
     }
 
-    fn log(&self, shots: u16) -> ShotLog {
+    pub(super) fn log(&self, shots: u16) -> ShotLog {
         let words = self.book.words() as u16;
         let fired = |shot| i64::from(shot) * i64::from(self.period) * 2500;
         ShotLog {
@@ -112,7 +113,12 @@ impl Sensor {
 
     /// The lags of the surfaces that each of so many shots meets, along a rough wall; one shot in eight
     /// meets nothing.
-    fn wall(&self, shots: usize, weather: Weather, chance: &mut ChaCha8Rng) -> Vec<Vec<u32>> {
+    pub(super) fn wall(
+        &self,
+        shots: usize,
+        weather: Weather,
+        chance: &mut ChaCha8Rng,
+    ) -> Vec<Vec<u32>> {
         let mut lag = self.gate * 2 / 5;
         let mut surfaces = |_| {
             let step = chance.next_u32() % (2 * weather.roughness + 1);
@@ -128,14 +134,19 @@ impl Sensor {
     }
 
     /// The ticks of the shots of `log`, and the lags of the surfaces that each has met.
-    fn ticks(&self, log: &ShotLog, weather: Weather, seed: u64) -> (Ticks, Vec<Vec<u32>>) {
+    pub(super) fn ticks(
+        &self,
+        log: &ShotLog,
+        weather: Weather,
+        seed: u64,
+    ) -> (Ticks, Vec<Vec<u32>>) {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let surfaces = self.wall(log.len(), weather, &mut chance);
         (self.ticks_of(log, &surfaces, weather, &mut chance), surfaces)
     }
 
     /// The ticks of shots that meet `surfaces`.
-    fn ticks_of(
+    pub(super) fn ticks_of(
         &self,
         log: &ShotLog,
         surfaces: &[Vec<u32>],
@@ -162,7 +173,7 @@ impl Sensor {
     }
 
     /// Every shot on a wall without gaps, and one in `panes` on one behind it as well; none for 0.
-    fn behind_glass(
+    pub(super) fn behind_glass(
         &self,
         log: &ShotLog,
         panes: usize,
@@ -179,7 +190,7 @@ impl Sensor {
         (self.ticks_of(log, &surfaces, weather, &mut chance), surfaces)
     }
 
-    fn decode(&self, receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Returns {
+    pub(super) fn decode(&self, receiver: &Receiver, log: &ShotLog, ticks: &Ticks) -> Returns {
         receiver.decode(&self.book, log, ticks).unwrap()
     }
 }
@@ -222,7 +233,7 @@ impl Crowd {
 }
 
 /// The lit chips of `shot`.
-fn marks_of<'a>(sent: &Sent<'a>, shot: usize) -> &'a [u16] {
+pub(super) fn marks_of<'a>(sent: &Sent<'a>, shot: usize) -> &'a [u16] {
     sent.codebook.marks(sent.log.label[shot], sent.log.word[shot])
 }
 

@@ -31,17 +31,17 @@ impl Band<'_> {
                 returns.reject(why);
                 continue;
             }
-            self.sent.measure_clear(&mut clear, &mut self.photons, returns);
+            self.sent.measure_clear(&mut clear, &mut self.meter.photons, returns);
             for surface in surfaces.drain(..) {
-                returns.push(self.measured(shot, surface));
+                returns.push(self.meter.measured(&self.field, shot, surface));
             }
         }
-        self.sent.measure_clear(&mut clear, &mut self.photons, returns);
+        self.sent.measure_clear(&mut clear, &mut self.meter.photons, returns);
         if self.further.is_empty() {
             return;
         }
         // Older light overlaps with nothing that is still to come.
-        let oldest = self.in_flight_before(shots.end);
+        let oldest = self.sent.in_flight_before(shots.end);
         self.further.retain(|(shot, _)| *shot >= oldest);
     }
 

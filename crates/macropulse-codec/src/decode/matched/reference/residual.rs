@@ -1,0 +1,266 @@
+//! The light at hand, as the returns that were taken leave it.
+
+use std::ops::Range;
+
+use super::Sent;
+use super::search::Peak;
+use crate::decode::belief::{Marks, Prior, Surroundings, evidence};
+use crate::decode::field::Field;
+use crate::decode::timeline::Timeline;
+use crate::kernels::{count_each, look_ahead};
+
+/// Ticks that no return explains, and places that returns claim.
+pub(super) struct Residual<'a> {
+    pub sent: &'a Sent<'a>,
+    /// The time at hand, in whole machine words.
+    extent: Range<i64>,
+    /// Ticks that no return explains.
+    left: Timeline,
+    /// Places at which a mark of a return, or a tick that it explains, counts as found.
+    claimed: Timeline,
+    /// Unclaimed places at which a mark counts as found by a tick that is left.
+    lit: Timeline,
+    /// Places that are lit or claimed.
+    open: Timeline,
+    /// Memory.
+    widened: Vec<u64>,
+}
+
+/// What is counted of one shot for all its lags together.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gate {
+    pub shot: usize,
+    /// Ticks that are left where its light may be.
+    pub ticks: u32,
+    /// Unclaimed places there.
+    places: f64,
+}
+
+/// A part of a [`Residual`], as it was.
+pub(super) struct Saved {
+    span: Range<i64>,
+    words: [Vec<u64>; 4],
+}
+
+impl<'a> Residual<'a> {
+    pub fn new(sent: &'a Sent<'a>) -> Self {
+        let dark = Timeline::default;
+        let (left, claimed, lit, open) = (dark(), dark(), dark(), dark());
+        Self { sent, extent: 0..0, left, claimed, lit, open, widened: Vec::new() }
+    }
+
+    /// Makes it all the light of `field`, of which nothing is explained.
+    pub fn restore(&mut self, field: &Field) {
+        self.extent = field.extent();
+        let Range { start, end } = self.extent;
+        self.timelines().into_iter().for_each(|timeline| timeline.clear_all(start, end - start));
+        let seen = field.seen().words(&self.extent);
+        self.left.words_mut(&self.extent).copy_from_slice(seen);
+        self.renew(&self.extent.clone());
+    }
+
+    fn timelines(&mut self) -> [&mut Timeline; 4] {
+        [&mut self.left, &mut self.claimed, &mut self.lit, &mut self.open]
+    }
+
+    /// Whole machine words at hand that hold `span`.
+    fn words_of(&self, span: &Range<i64>) -> Range<i64> {
+        let Range { start, end } = self.extent;
+        let first = (span.start.div_euclid(64) * 64).clamp(start, end);
+        first..((span.end + 63).div_euclid(64) * 64).clamp(first, end)
+    }
+
+    /// Finds anew what is lit where `span` has changed.
+    fn renew(&mut self, span: &Range<i64>) {
+        let width = i64::from(self.sent.width);
+        let places = self.words_of(&(span.start - width..span.end));
+        let ticks = self.words_of(&(places.start..places.end + width));
+        let left = self.left.words(&ticks);
+        self.widened.resize(left.len(), 0);
+        look_ahead(left, &mut self.widened, width as usize - 1);
+        let lit = self.lit.words_mut(&places).iter_mut().zip(self.open.words_mut(&places));
+        let claimed = self.claimed.words(&places).iter().zip(&self.widened);
+        for ((lit, open), (claimed, widened)) in lit.zip(claimed) {
+            *lit = widened & !claimed;
+            *open = widened | claimed;
+        }
+    }
+
+    /// The time of which all that light of `shot` at `lag` explains or claims is part.
+    pub fn touched(&self, shot: usize, lag: i64) -> Range<i64> {
+        let (light, farther) = (self.sent.light(shot, lag), self.sent.farther());
+        light.start - farther - i64::from(self.sent.width)..light.end + farther
+    }
+
+    /// Explains the ticks of `shot` at `lag`, and claims its places.
+    pub fn explain(&mut self, shot: usize, lag: i64) {
+        let (sent, start) = (self.sent, self.sent.fired[shot] + lag);
+        let (bits, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
+        let (farther, width) = (sent.farther(), i64::from(sent.width));
+        self.left.put_out(start - farther, lit_bits, &bits.cancelled);
+        self.claimed.light_up(start - farther - (width - 1), lit_bits, &bits.claimed);
+        self.renew(&self.touched(shot, lag));
+    }
+
+    /// What is in `span`.
+    pub fn save(&mut self, span: &Range<i64>) -> Saved {
+        let span = self.words_of(span);
+        Saved { words: self.timelines().map(|timeline| timeline.words(&span).to_vec()), span }
+    }
+
+    /// Puts back what was saved.
+    pub fn put_back(&mut self, saved: &Saved) {
+        for (timeline, words) in self.timelines().into_iter().zip(&saved.words) {
+            timeline.words_mut(&saved.span).copy_from_slice(words);
+        }
+    }
+
+    /// Where unclaimed marks count as found.
+    pub fn lit(&self) -> &Timeline {
+        &self.lit
+    }
+
+    /// Places that are lit or claimed.
+    pub fn open(&self) -> &Timeline {
+        &self.open
+    }
+
+    /// Fewest trials about the marks of `shot` where so many places are claimed: that is how many of its ticks count
+    /// at most.
+    pub fn fewest_trials(&self, shot: usize, claimed: u32) -> u32 {
+        let width = self.sent.width;
+        let taken = claimed + self.sent.weight(shot) * width;
+        (self.sent.takes_up() as u32).saturating_sub(taken) / width
+    }
+
+    /// Makes `sums` those of `span`.
+    pub fn sum_up(&self, span: &Range<i64>, sums: &mut Sums) {
+        let span = self.words_of(span);
+        sums.first = span.start;
+        for (sums, timeline) in [(&mut sums.left, &self.left), (&mut sums.taken, &self.claimed)] {
+            let words = timeline.words(&span);
+            sums.resize(words.len() + 1, 0);
+            sums[0] = 0;
+            count_each(words, 1, &mut sums[1..]);
+            (1..sums.len()).for_each(|at| sums[at] += sums[at - 1]);
+        }
+    }
+
+    /// All the light of `shot`.
+    pub fn gate(&self, shot: usize) -> Gate {
+        let span = self.sent.arrival(shot);
+        let free = span.end - span.start - i64::from(self.claimed.count(span.clone()));
+        Gate { shot, ticks: self.left.count(span), places: free as f64 }
+    }
+
+    /// The marks of a shot at `lag` that no return claims, and the light about them. `places` are the ticks from the
+    /// start of its macropulse to each mark, ascending.
+    ///
+    /// A tick is one piece of evidence: where it may be one of two marks it counts for one, the earliest. As all
+    /// marks are looked for in equally many ticks, no other choice gives more marks a tick. All other ticks are
+    /// surroundings.
+    pub fn look(&self, gate: &Gate, lag: i64, places: &[u32]) -> (Marks, Surroundings) {
+        let (sent, shot, light) = (self.sent, gate.shot, self.sent.light(gate.shot, lag));
+        let width = i64::from(sent.width);
+        let (bits, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
+        let count = |of: &Timeline| of.lit_in_all(light.start, lit_bits, &bits.pattern);
+        let of = sent.weight(shot) - count(&self.claimed);
+        let lit = match bits.shared {
+            0 => count(&self.lit),
+            _ => self.marks_with_ticks(light.start, places),
+        };
+        let marks = Marks { lit, of };
+        let beside = self.left.count(light.clone()).saturating_sub(marks.lit);
+        let taken = i64::from(self.claimed.count(light.clone())) + i64::from(marks.of) * width;
+        let places = (light.end - light.start - taken) as f64;
+        (marks, self.surroundings(beside, places, gate.without(marks.lit)))
+    }
+
+    /// Lit marks at `places` behind tick `start`, each with a tick of its own.
+    fn marks_with_ticks(&self, start: i64, places: &[u32]) -> u32 {
+        let (mut marks, mut free, width) = (0, start, i64::from(self.sent.width));
+        for place in places.iter().map(|place| start + i64::from(*place)) {
+            if self.lit.has(place)
+                && let Some(tick) = self.left.next_lit(place.max(free)..place + width)
+            {
+                marks += 1;
+                free = tick + 1;
+            }
+        }
+        marks
+    }
+
+    /// What speaks for light of a shot at `lag`.
+    pub fn peak(&self, gate: &Gate, lag: i64, places: &[u32], prior: &Prior) -> Peak {
+        let (marks, around) = self.look(gate, lag, places);
+        let evidence = evidence(marks, &around);
+        Peak { lag, marks, evidence, odds: evidence + prior.at(lag) }
+    }
+
+    /// `ticks` in `places`, of a shot with such a gate.
+    ///
+    /// A mark is looked for in some ticks in a row. So many places are one trial, which one tick lights.
+    pub fn surroundings(&self, ticks: u32, places: f64, gate: Gate) -> Surroundings {
+        let width = f64::from(self.sent.width);
+        let places = places.max(0.0) / width;
+        let density = (f64::from(gate.ticks) + 1.0) * width / gate.places.max(1.0);
+        Surroundings { lit: f64::from(ticks).min(places), places, density: density.min(0.5) }
+    }
+
+    /// Marks of the word of `shot` in each of the `bits`, so many ticks behind the start of its light at `lag`.
+    pub fn in_bits(&self, shot: usize, lag: i64, bits: &[u32]) -> Vec<Marks> {
+        let (start, word) = (self.sent.fired[shot] + lag, self.sent.word(shot).ticks());
+        let of_bit = |bit: &u32| {
+            let places = word.iter().map(|mark| start + i64::from(bit + mark));
+            places.filter(|place| !self.claimed.has(*place)).fold(Marks::default(), |sum, place| {
+                Marks { lit: sum.lit + u32::from(self.lit.has(place)), of: sum.of + 1 }
+            })
+        };
+        bits.iter().map(of_bit).collect()
+    }
+}
+
+/// Ticks that are left and places that are claimed before each machine word of a stretch.
+#[derive(Debug, Default)]
+pub(super) struct Sums {
+    first: i64,
+    left: Vec<u32>,
+    taken: Vec<u32>,
+}
+
+impl Sums {
+    /// Of some sums, from the word of one tick to that of another.
+    fn between(&self, sums: &[u32], from: i64, to: i64) -> u32 {
+        let last = sums.len() as i64 - 1;
+        let before = |word: i64| sums[word.clamp(0, last) as usize];
+        before(to).saturating_sub(before(from))
+    }
+
+    fn about(&self, sums: &[u32], span: &Range<i64>) -> u32 {
+        let word = |tick: i64| (tick - self.first).div_euclid(64);
+        self.between(sums, word(span.start), word(span.end + 63))
+    }
+
+    /// No fewer ticks than are left in `span`.
+    pub fn ticks(&self, span: &Range<i64>) -> u32 {
+        self.about(&self.left, span)
+    }
+
+    /// No more ticks than are left in `span`.
+    pub fn ticks_within(&self, span: &Range<i64>) -> u32 {
+        let word = |tick: i64| (tick - self.first).div_euclid(64);
+        self.between(&self.left, word(span.start + 63), word(span.end))
+    }
+
+    /// No fewer places than are claimed in `span`.
+    pub fn claimed(&self, span: &Range<i64>) -> u32 {
+        self.about(&self.taken, span)
+    }
+}
+
+impl Gate {
+    /// The same without so many ticks.
+    pub fn without(self, ticks: u32) -> Self {
+        Self { ticks: self.ticks.saturating_sub(ticks), ..self }
+    }
+}

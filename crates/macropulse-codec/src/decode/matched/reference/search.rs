@@ -1,0 +1,204 @@
+//! The best lag of a shot, of all lags.
+//!
+//! Every lag is counted: 512 of them at once, as [`Counts`] does. The evidence itself is worked out mark by mark,
+//! which takes a thousand times as long. So lags are passed by that have too few marks for it, whatever else there
+//! is about them. Two bounds say how many are too few, both for the least light that any lag of the block has about
+//! itself:
+//!
+//! * E(k, n) grows where n gets smaller, so E(k, k) bounds it for any number of claimed marks;
+//! * one more lit mark is evidence for light, so that with c claimed marks E(k, N − c) stays below E(k + c, N). Marks
+//!   that are lit or claimed are counted together.
+
+use std::ops::Range;
+
+use super::residual::{Gate, Residual, Sums};
+use crate::decode::belief::{Marks, Prior, evidence};
+use crate::decode::matched::track::below;
+use crate::kernels::{Counts, WIDE, and, is_dark, places_of, with_enough};
+
+/// Lags that are counted at once.
+const BLOCK: i64 = 64 * WIDE as i64;
+
+/// A lag of a shot and what speaks for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Peak {
+    pub lag: i64,
+    /// Its marks that no return claims.
+    pub marks: Marks,
+    /// Their evidence, in nats.
+    pub evidence: f64,
+    /// The logarithm of the posterior odds, evidence + ln prior.
+    pub odds: f64,
+}
+
+impl Peak {
+    /// The same with another prior.
+    pub fn with(self, prior: &Prior) -> Self {
+        Self { odds: self.evidence + prior.at(self.lag), ..self }
+    }
+
+    /// The one of `peaks` with the highest odds.
+    pub fn best(peaks: impl Iterator<Item = Self>) -> Option<Self> {
+        peaks.reduce(|one, other| if other.exceeds(&one) { other } else { one })
+    }
+
+    /// Whether it has higher odds than `other`, or as high ones and is nearer.
+    fn exceeds(&self, other: &Self) -> bool {
+        self.odds > other.odds || self.odds == other.odds && self.lag < other.lag
+    }
+}
+
+/// Memory kept from search to search.
+#[derive(Default)]
+pub(super) struct Search {
+    /// Ticks from the start of a macropulse to each of its marks.
+    places: Vec<u32>,
+    lit: Counts<WIDE>,
+    open: Counts<WIDE>,
+    sums: Sums,
+    /// Fewest marks, by what is asked for.
+    known: Vec<(Asked, Fewest)>,
+}
+
+/// What is asked of a block of lags: so many nats, in whole ones, with so many ticks at least about any lag.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Asked {
+    nats: i32,
+    ticks: u32,
+}
+
+/// Fewest marks that can give the evidence asked for.
+#[derive(Debug, Clone, Copy)]
+struct Fewest {
+    lit: u32,
+    lit_or_claimed: u32,
+}
+
+/// Lags of a shot that are asked about.
+#[derive(Debug, Clone)]
+pub(super) struct Question<'p> {
+    pub shot: usize,
+    pub lags: Range<i64>,
+    pub prior: &'p Prior,
+    /// The least odds that are of interest.
+    pub least: f64,
+}
+
+impl Search {
+    /// The lag with the highest posterior odds, of several the nearest, if it has the least odds asked for.
+    pub fn best(&mut self, residual: &Residual, question: &Question) -> Option<Peak> {
+        let mut best: Option<Peak> = None;
+        self.scan(residual, question, |peak| {
+            if best.is_none_or(|best| peak.exceeds(&best)) {
+                best = Some(peak);
+            }
+            peak.odds
+        });
+        best
+    }
+
+    /// All lags with the least odds asked for, in any order.
+    pub fn all(&mut self, residual: &Residual, question: &Question) -> Vec<Peak> {
+        let mut all = Vec::new();
+        self.scan(residual, question, |peak| {
+            all.push(peak);
+            question.least
+        });
+        all
+    }
+
+    /// Visits the lags with the least odds asked for. A visit tells which odds are of interest from then on.
+    fn scan(
+        &mut self,
+        residual: &Residual,
+        question: &Question,
+        mut visit: impl FnMut(Peak) -> f64,
+    ) {
+        let &Question { shot, ref lags, prior, mut least } = question;
+        let (sent, gate) = (residual.sent, residual.gate(shot));
+        let lags = lags.start.max(prior.lags().start)..lags.end.min(prior.lags().end);
+        places_of(sent.word(shot), sent.lit_bits(shot), &mut self.places);
+        if gate.ticks == 0 {
+            return;
+        }
+        let (first, last) = (sent.fired[shot] + lags.start, sent.fired[shot] + lags.end);
+        residual.sum_up(&(first..last + sent.takes_up()), &mut self.sums);
+        self.known.clear();
+        let farthest = self.places.last().copied().unwrap_or(0);
+        for first in lags.clone().step_by(BLOCK as usize) {
+            let end = (first + BLOCK).min(lags.end);
+            let (start, last) = (sent.fired[shot] + first, sent.fired[shot] + end - 1);
+            let span = start..last + sent.takes_up();
+            let of_any = self.sums.ticks(&span);
+            let trials = residual.fewest_trials(shot, self.sums.claimed(&span));
+            let of_all = self.sums.ticks_within(&(last..start + sent.takes_up())).min(trials);
+            let most = prior.most(&(first..end));
+            let mut fewest = self.fewest(residual, &gate, least - most, of_all);
+            if of_any < fewest.lit || fewest.lit as usize > self.places.len() {
+                continue;
+            }
+            let (lit, at) = residual.lit().at(start);
+            let mut hits = [0; WIDE];
+            with_enough::<WIDE>(lit, at as u32, (&self.places, farthest), fewest.lit, &mut hits);
+            hits = below(end - first, hits, true);
+            if is_dark(&hits) {
+                continue;
+            }
+            self.lit.count(lit, at as u32, sent.word(shot), sent.lit_bits(shot));
+            let (open, at) = residual.open().at(start);
+            self.open.count(open, at as u32, sent.word(shot), sent.lit_bits(shot));
+            loop {
+                hits = and(hits, self.lit.at_least(fewest.lit));
+                hits = and(hits, self.open.at_least(fewest.lit_or_claimed));
+                let Some((at, _)) = self.lit.highest(hits) else { break };
+                hits[at as usize / 64] &= !(1 << (at % 64));
+                let lag = first + i64::from(at);
+                let peak = residual.peak(&gate, lag, &self.places, prior);
+                if peak.odds >= least {
+                    let before = least;
+                    least = visit(peak);
+                    if least > before {
+                        fewest = self.fewest(residual, &gate, least - most, of_all);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Fewest marks of a shot for so many `nats` of evidence, with so many `ticks` at least in its light.
+    fn fewest(&mut self, residual: &Residual, gate: &Gate, nats: f64, ticks: u32) -> Fewest {
+        let kept = u32::BITS - 2;
+        let shift = kept.saturating_sub(ticks.leading_zeros());
+        let asked = Asked { nats: nats.floor() as i32, ticks: ticks >> shift << shift };
+        if let Some((_, fewest)) = self.known.iter().find(|(known, _)| *known == asked) {
+            return *fewest;
+        }
+        let sent = residual.sent;
+        let weight = sent.weight(gate.shot);
+        let length = sent.takes_up() as f64;
+        let of = |of: &dyn Fn(u32) -> u32| {
+            let is_enough = |lit: u32| {
+                let beside = asked.ticks.saturating_sub(lit);
+                let around = residual.surroundings(beside, length, gate.without(lit));
+                evidence(Marks { lit, of: of(lit) }, &around) >= f64::from(asked.nats)
+            };
+            let (mut low, mut high) = (1, weight + 1);
+            while low < high {
+                let middle = low.midpoint(high);
+                match is_enough(middle) {
+                    true => high = middle,
+                    false => low = middle + 1,
+                }
+            }
+            low
+        };
+        let fewest = Fewest { lit: of(&|lit| lit), lit_or_claimed: of(&|_| weight) };
+        self.known.push((asked, fewest));
+        fewest
+    }
+
+    /// Ticks from the start of the macropulse to each mark, of the shot that was asked about last.
+    pub fn places(&self) -> &[u32] {
+        &self.places
+    }
+}
