@@ -6,15 +6,19 @@ use crate::statistics::binomial_tail;
 /// L · P(Bin(N, d) ≥ k) ≤ α, where L is the number of `lags` tried, N the number of `marks`,
 /// d the `density` of lit places and α the false alarms accepted. N + 1 where no k will do.
 pub(super) fn least_marks(lags: f64, marks: u32, density: f64, false_alarm: f64) -> u32 {
-    let enough =
-        |least: u32| lags * binomial_tail(marks as usize, density, least as usize) <= false_alarm;
+    fewest(marks, |least| {
+        lags * binomial_tail(marks as usize, density, least as usize) <= false_alarm
+    })
+}
+
+/// The fewest of `marks` that are enough, where more are enough, too; one more than there are if none are.
+pub(super) fn fewest(marks: u32, mut is_enough: impl FnMut(u32) -> bool) -> u32 {
     let (mut low, mut high) = (1, marks + 1);
     while low < high {
-        let middle = low + (high - low) / 2;
-        if enough(middle) {
-            high = middle;
-        } else {
-            low = middle + 1;
+        let middle = low.midpoint(high);
+        match is_enough(middle) {
+            true => high = middle,
+            false => low = middle + 1,
         }
     }
     low

@@ -271,7 +271,7 @@ impl Found {
 
     /// Why no lidar of the scheme with this `name` does: the first reason where none is a lidar at all.
     fn why_none(&self, name: &str) -> String {
-        let is_assessed = self.assessed.iter().any(|it| scheme(it.candidate.marks) == name);
+        let is_assessed = self.assessed.iter().any(|it| it.candidate.scheme() == name);
         let skipped = self.skipped.iter().find(|it| scheme(it.marks) == name);
         match skipped.filter(|_| !is_assessed) {
             Some(it) => format!("none of the parts allowed: {}", it.why),

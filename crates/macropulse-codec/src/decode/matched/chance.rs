@@ -3,7 +3,7 @@
 use super::acquire::BLOCK;
 use super::sent::Sent;
 use super::{Band, Detection};
-use crate::decode::threshold::Thresholds;
+use crate::decode::threshold::{Thresholds, fewest};
 use crate::statistics::normal_quantile;
 
 /// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
@@ -99,19 +99,10 @@ impl Band<'_> {
     pub(super) fn least_in_gate(&mut self, shot: usize) -> u32 {
         let (ticks, share) = self.in_gate(shot);
         let weight = self.sent.weight(shot);
-        let mut is_enough = |count: u32| {
+        fewest(weight, |count| {
             let density = f64::from(ticks.saturating_sub(count) + 1) * share;
             self.chance.in_gate.least(weight, density.min(1.0)) <= count
-        };
-        let (mut low, mut high) = (1, weight + 1);
-        while low < high {
-            let middle = low.midpoint(high);
-            match is_enough(middle) {
-                true => high = middle,
-                false => low = middle + 1,
-            }
-        }
-        low
+        })
     }
 
     /// `detection`, if chance does not give it.

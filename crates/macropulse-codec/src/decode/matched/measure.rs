@@ -7,7 +7,7 @@ use crate::decode::field::Field;
 use crate::decode::timing::{self, Histogram, Known};
 use crate::decode::{Energy, MIDDLE, Reject, Return, Returns, Window};
 
-/// What returns are measured with.
+/// A meter of returns: it tells their time of flight and their energy.
 pub(super) struct Meter<'a> {
     sent: &'a Sent<'a>,
     pub photons: Photons,
@@ -15,12 +15,12 @@ pub(super) struct Meter<'a> {
 }
 
 impl<'a> Meter<'a> {
-    /// That of the shots `sent`, with the energies that are known.
+    /// A meter for the shots `sent`, which begins with the energies that are known.
     pub fn new(sent: &'a Sent<'a>, photons: Photons) -> Self {
         Self { sent, photons, histogram: Histogram::default() }
     }
 
-    /// What is measured of `shot` at `detection`, in the light of `field`.
+    /// Measures the return of `shot` at `detection`, in the light of `field`.
     pub fn measured(&mut self, field: &Field, shot: usize, detection: Detection) -> Return {
         let sent = self.sent;
         let marks = sent.weight(shot);

@@ -60,10 +60,11 @@ pub(super) struct Reference<'a> {
     beside: [Vec<Option<u32>>; DIRECTIONS],
     /// Shots that are judged; those before are settled.
     open: Range<usize>,
-    /// Of each shot: its returns, the fullest first; lags of its hypotheses; and whether one was refused for
-    /// its label.
+    /// The returns of each shot, the fullest first.
     found: Vec<Vec<Echo>>,
+    /// The lags of the hypotheses of each shot.
     proposed: Vec<Vec<i64>>,
+    /// The shots of which a hypothesis was refused for its label.
     is_mislabelled: Vec<bool>,
     /// Shots that are to be searched although no return has changed.
     is_due: Vec<bool>,
@@ -77,7 +78,7 @@ pub(super) struct Reference<'a> {
 #[derive(Debug, Clone, PartialEq)]
 struct Echo {
     lag: i64,
-    /// The lags of which it is one, until it is settled.
+    /// The lags among which it may still move, its own included; none once it is settled.
     peaks: Vec<Peak>,
 }
 
@@ -128,7 +129,7 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// Opens `shots`, of which nothing is known, and brings all their light to hand.
+    /// Begins with `shots`: forgets what was found of them, and brings all their light to hand.
     fn begin(&mut self, shots: Range<usize>) {
         let (sent, Range { start, end }) = (self.sent, shots.clone());
         self.field.cover(sent.arrival(start).start - sent.length()..sent.arrival(end - 1).end);
@@ -156,8 +157,8 @@ impl<'a> Reference<'a> {
         Prior::new(self.sent.reach(), &lags)
     }
 
-    /// The lags about `lag` of which one may be the best of `shot`, whatever its neighbours are: as far as the light
-    /// overlaps, and sidelobes reach.
+    /// The lags near `lag` that could be the best one of `shot` for some set of neighbours. It looks as far as light
+    /// of the shot overlaps with that at `lag`, which is as far as sidelobes reach.
     fn peaks_about(&mut self, shot: usize, lag: i64) -> Vec<Peak> {
         let (far, prior) = (self.sent.takes_up(), Prior::new(self.sent.reach(), &[]));
         let (lags, sway) = (lag - far..lag + far, prior.sway());
@@ -180,14 +181,14 @@ impl<'a> Reference<'a> {
         Some(Peak { lag: best.lag - alike, ..best })
     }
 
-    /// The best lag of `shot` about `lag`, if it is believed; and those of which it is one.
+    /// The best lag of `shot` near `lag`, if it is believed, with all the lags that it was chosen from.
     fn believed(&mut self, shot: usize, lag: i64, prior: &Prior) -> Option<(Peak, Vec<Peak>)> {
         let peaks = self.peaks_about(shot, lag);
         let best = self.best_of(&peaks, prior).filter(|best| best.odds >= self.threshold);
         Some((best?, peaks))
     }
 
-    /// Whether light of `shot` at `lag` has another label, even if the further hypotheses of the shot are returns.
+    /// True if light of `shot` at `lag` has another label, also where its further hypotheses are taken for returns.
     ///
     /// A second surface may light bits that the first one leaves dark, and the other way round. So neither can be told
     /// from light of another label before both are known: the label is contradicted if it is without the light of
@@ -224,7 +225,7 @@ impl<'a> Reference<'a> {
         belief::contradiction(&lit, &dark, &around, prior.expected(lag))
     }
 
-    /// Whether lags that are so far `apart` light the same marks in other bits.
+    /// True if two lags lie whole bits `apart`: light then falls on the same marks of other bits.
     fn is_whole_bits(&self, apart: i64) -> bool {
         let (bit, width) = (self.sent.bit_length(), i64::from(self.sent.width));
         !(width..=bit - width).contains(&apart.rem_euclid(bit))
@@ -243,7 +244,7 @@ impl<'a> Reference<'a> {
         let (gate, owned) = (self.sent.gate(), self.sent.log.owned.clone());
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
             let prior = self.prior(shot);
-            // Of two surfaces, lags of the one may be those of the other.
+            // A return of two may not move: it could take the lag of the other surface.
             let is_alone = self.found[shot].len() == 1;
             let best = |echo: &Echo| match is_alone {
                 true => self.best_of(&echo.peaks, &prior).map(|peak| peak.lag),

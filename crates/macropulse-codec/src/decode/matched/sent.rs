@@ -8,6 +8,7 @@ use super::chance::BY_CHANCE;
 use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
+use crate::decode::timeline::Timeline;
 use crate::decode::timing;
 use crate::decode::{Correlation, Effort, GATES_PER_BLOCK, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
@@ -381,6 +382,24 @@ impl<'a> Sent<'a> {
     /// with it.
     pub fn overlap(&self, apart: i64) -> bool {
         apart.abs() < self.takes_up() + i64::from(self.width)
+    }
+
+    /// Marks that are found `lit` at these `places` behind tick `start`, where each of the `ticks` counts for one of
+    /// them: the earliest that it may be. The places ascend.
+    pub fn marks_with_ticks(
+        &self,
+        lit: &Timeline,
+        ticks: &Timeline,
+        start: i64,
+        places: &[u32],
+    ) -> u32 {
+        let (mut count, mut free) = (0, start);
+        let places = places.iter().map(|place| start + i64::from(*place));
+        for first in places.filter(|place| lit.has(*place)) {
+            let tick = ticks.next_lit(first.max(free)..first + i64::from(self.width));
+            (count, free) = tick.map_or((count, free), |tick| (count + 1, tick + 1));
+        }
+        count
     }
 
     /// Ticks that the light of a shot takes up.

@@ -178,14 +178,7 @@ impl Band<'_> {
     /// earliest that it may be.
     fn marks_with_ticks(&self, shot: usize, lag: i64) -> u32 {
         let (sent, seen, lit) = (self.sent, self.field.seen(), self.field.lit());
-        let start = sent.fired[shot] + lag;
-        let (mut count, mut free) = (0, start);
-        let places = self.marks.iter().map(|mark| start + i64::from(*mark));
-        for first in places.filter(|place| lit.has(*place)) {
-            let tick = seen.next_lit(first.max(free)..first + i64::from(sent.width));
-            (count, free) = tick.map_or((count, free), |tick| (count + 1, tick + 1));
-        }
-        count
+        sent.marks_with_ticks(lit, seen, sent.fired[shot] + lag, &self.marks)
     }
 
     /// Why a `surface` of `shot` gives no return, if it does not.

@@ -205,15 +205,18 @@ fn brute(design: &Design, condition: Condition, only: Option<&[f64]>) -> [f64; 4
     least
 }
 
-fn found(design: &Design, condition: Condition) -> [f64; 4] {
+/// What the search allows: by each rule about several shots, and to one shot alone.
+fn found(design: &Design, condition: Condition) -> ([f64; 4], f64) {
     let Design { scan, light, emission, .. } = design;
     let class = Class1::at(light.wavelength).unwrap();
     let sender = Sender { scan, light, emission, condition, count_groups: true };
     let limits = limits(&class, &exposure(&class, &sender));
-    [Rule::Group, Rule::Scan, Rule::Repeated, Rule::Average].map(|rule| {
+    let of = |rule: Rule| {
         let limit = limits.iter().find(|limit| limit.rule == rule);
         limit.map_or(f64::INFINITY, |limit| limit.energy)
-    })
+    };
+    let rules = [Rule::Group, Rule::Scan, Rule::Repeated, Rule::Average].map(of);
+    (rules, of(Rule::SingleShot))
 }
 
 /// By how much more than the grid the search allows, at most; the largest of the rules.
@@ -223,12 +226,7 @@ fn found(design: &Design, condition: Condition) -> [f64; 4] {
 fn excess(design: &Design, conditions: &[Condition]) -> f64 {
     let mut most = f64::MIN;
     for &condition in conditions {
-        let (ours, grid) = (found(design, condition), brute(design, condition, None));
-        let Design { scan, light, emission, .. } = design;
-        let class = Class1::at(light.wavelength).unwrap();
-        let sender = Sender { scan, light, emission, condition, count_groups: true };
-        let all = limits(&class, &exposure(&class, &sender));
-        let alone = all.iter().find(|limit| limit.rule == Rule::SingleShot).unwrap().energy;
+        let ((ours, alone), grid) = (found(design, condition), brute(design, condition, None));
         for (ours, grid) in ours.iter().zip(&grid) {
             most = most.max(ours.min(alone) / grid.min(alone) - 1.0);
         }
@@ -361,11 +359,11 @@ fn the_worst_place_lies_between_two_lasers() {
     let set = set.map(|(key, value)| (key.to_owned(), value));
     let design = Design::open("vlp-16", &set).unwrap();
     let eye = Condition::bare_eye(0.1);
-    let group = found(&design, eye)[0];
+    let group = found(&design, eye).0[0];
     assert!((80e-9..87e-9).contains(&group), "{group}");
     let at_lasers = brute(&design, eye, Some(&lasers.map(f64::to_radians)))[0];
     assert!(at_lasers > 1.5 * group, "{at_lasers}");
     let real = Design::open("vlp-16", &[]).unwrap();
-    let group = found(&real, eye)[0];
+    let group = found(&real, eye).0[0];
     assert!(group < 85e-9 && group > 80e-9, "{group}");
 }

@@ -10,7 +10,8 @@
 //! 3. The best places of each rule are refined in steps that are halved.
 //!
 //! What is found is the light at a real place, so the search can only miss light: it may allow more than the
-//! worst place there is, by 2 % at most. `brute.rs` holds it against a grid.
+//! worst place there is. `brute.rs` holds it against a grid, to 2 %. One drawn sensor of 520 is known that it allows
+//! 5 % more.
 
 use super::exposure::Crossing;
 

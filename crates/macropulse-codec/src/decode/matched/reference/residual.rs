@@ -26,7 +26,7 @@ pub(super) struct Residual<'a> {
     widened: Vec<u64>,
 }
 
-/// What is counted of one shot for all its lags together.
+/// Ticks and places of one shot that are the same for all its lags.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gate {
     pub shot: usize,
@@ -49,7 +49,7 @@ impl<'a> Residual<'a> {
         Self { sent, extent: 0..0, left, claimed, lit, open, widened: Vec::new() }
     }
 
-    /// Makes it all the light of `field`, of which nothing is explained.
+    /// Starts again with all the light of `field`: no return explains any of it.
     pub fn restore(&mut self, field: &Field) {
         self.extent = field.extent();
         let Range { start, end } = self.extent;
@@ -167,27 +167,13 @@ impl<'a> Residual<'a> {
         let of = sent.weight(shot) - count(&self.claimed);
         let lit = match bits.shared {
             0 => count(&self.lit),
-            _ => self.marks_with_ticks(light.start, places),
+            _ => sent.marks_with_ticks(&self.lit, &self.left, light.start, places),
         };
         let marks = Marks { lit, of };
         let beside = self.left.count(light.clone()).saturating_sub(marks.lit);
         let taken = i64::from(self.claimed.count(light.clone())) + i64::from(marks.of) * width;
         let places = (light.end - light.start - taken) as f64;
         (marks, self.surroundings(beside, places, gate.without(marks.lit)))
-    }
-
-    /// Lit marks at `places` behind tick `start`, each with a tick of its own.
-    fn marks_with_ticks(&self, start: i64, places: &[u32]) -> u32 {
-        let (mut marks, mut free, width) = (0, start, i64::from(self.sent.width));
-        for place in places.iter().map(|place| start + i64::from(*place)) {
-            if self.lit.has(place)
-                && let Some(tick) = self.left.next_lit(place.max(free)..place + width)
-            {
-                marks += 1;
-                free = tick + 1;
-            }
-        }
-        marks
     }
 
     /// What speaks for light of a shot at `lag`.

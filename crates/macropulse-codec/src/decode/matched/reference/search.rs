@@ -14,6 +14,7 @@ use std::ops::Range;
 use super::residual::{Gate, Residual, Sums};
 use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::matched::track::below;
+use crate::decode::threshold::fewest;
 use crate::kernels::{Counts, WIDE, and, is_dark, places_of, with_enough};
 
 /// Lags that are counted at once.
@@ -177,20 +178,11 @@ impl Search {
         let weight = sent.weight(gate.shot);
         let length = sent.takes_up() as f64;
         let of = |of: &dyn Fn(u32) -> u32| {
-            let is_enough = |lit: u32| {
+            fewest(weight, |lit| {
                 let beside = asked.ticks.saturating_sub(lit);
                 let around = residual.surroundings(beside, length, gate.without(lit));
                 evidence(Marks { lit, of: of(lit) }, &around) >= f64::from(asked.nats)
-            };
-            let (mut low, mut high) = (1, weight + 1);
-            while low < high {
-                let middle = low.midpoint(high);
-                match is_enough(middle) {
-                    true => high = middle,
-                    false => low = middle + 1,
-                }
-            }
-            low
+            })
         };
         let fewest = Fewest { lit: of(&|lit| lit), lit_or_claimed: of(&|_| weight) };
         self.known.push((asked, fewest));
