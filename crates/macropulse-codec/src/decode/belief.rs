@@ -233,8 +233,9 @@ impl PartialOrd for Hypothesis {
 
 /// The light of some shots, as hypotheses are asked about it.
 pub(super) trait Light {
-    /// Takes all returns back.
-    fn restore(&mut self);
+    /// Takes back the verdicts on all hypotheses but those judged first, of which `kept` stay at most. Tells how many
+    /// do.
+    fn restore(&mut self, kept: usize) -> usize;
 
     /// Takes light of `hypothesis` for a return, if it is believed in what the returns taken so far leave.
     fn judge(&mut self, hypothesis: &Hypothesis);
@@ -245,25 +246,26 @@ pub(super) trait Light {
 
 /// Takes from `light` the returns of `hypotheses`, and of all that it proposes.
 ///
-/// Each round takes all returns back and judges all hypotheses, the fullest first. So the verdict on a hypothesis
-/// depends on fuller ones alone, and not on the order in which they came. Then `light` proposes more of what is left,
-/// until it has no new one.
+/// Each round judges all hypotheses, the fullest first. So the verdict on a hypothesis depends on fuller ones alone, and
+/// not on the order in which they came; what was judged before the first new one need not be judged again. Then `light`
+/// proposes more of what is left, until it has no new one.
 ///
-/// **It ends.** Every round but the last one adds a pair of shot and lag to the set of hypotheses, none leaves this
-/// set, and `light` has finitely many pairs. A return that is taken back stays a hypothesis: it is judged again, and
-/// never proposed again.
+/// **It ends.** Every round but the last one adds a pair of shot and lag to those that `light` has proposed. It proposes
+/// none of them twice, and there are finitely many. A return that is taken back stays a hypothesis: it is judged again.
 pub(super) fn settle(light: &mut impl Light, hypotheses: &mut Vec<Hypothesis>) {
+    let mut judged: Vec<Hypothesis> = Vec::new();
     loop {
         hypotheses.sort_unstable();
-        light.restore();
-        hypotheses.iter().for_each(|hypothesis| light.judge(hypothesis));
-        let known = hypotheses.len();
-        hypotheses.extend(light.propose());
-        hypotheses.sort_unstable();
         hypotheses.dedup_by_key(|hypothesis| (hypothesis.shot, hypothesis.lag));
-        if hypotheses.len() <= known {
+        let same = judged.iter().zip(&*hypotheses).take_while(|(one, other)| one == other);
+        let kept = light.restore(same.count());
+        hypotheses[kept..].iter().for_each(|hypothesis| light.judge(hypothesis));
+        judged.clone_from(hypotheses);
+        let proposals = light.propose();
+        if proposals.is_empty() {
             return;
         }
+        hypotheses.extend(proposals);
     }
 }
 

@@ -3,22 +3,25 @@
 //! The quick receiver looks where light is likely. This one counts all lags. It shows what the quick one passes by. It
 //! decides by [`belief`](crate::decode::belief) and nothing else:
 //!
-//! 1. Each shot proposes all lags that are believed in the light that returns do not explain: first the one with the
-//!    highest posterior odds, then the best one of what that leaves, and so on. [`search`] finds them.
+//! 1. What the quick receiver found are the first hypotheses. They save time: light that they explain is not searched
+//!    through.
 //! 2. All hypotheses are judged, the fullest first. Each sees the ticks and the places that fuller returns leave
 //!    ([`residual`]), and a prior made from fuller returns of the shots beside it.
 //! 3. A hypothesis stands for its sidelobes, too: it is judged at the best lag of those whose light overlaps with its
 //!    own. It is refused if its label is contradicted.
-//! 4. Steps 1 and 2 are repeated until no shot proposes anything new. A shot proposes light that its earlier hypotheses
-//!    do not explain, so that it ends, and so that a part of refused light is no return.
+//! 4. Each shot proposes the best of all its lags, if it is believed in light that neither returns nor earlier proposals
+//!    of the shot explain. [`search`] finds it. So a shot has done with its light after some proposals, and a part of
+//!    refused light is no return.
+//! 5. Steps 2 to 4 are repeated until no shot proposes anything. A shot is searched again if returns have changed where
+//!    its light may be.
 //!
 //! As soon as the returns about a shot are known, its lag is the best one by the prior of all of them, if it has a single
 //! return.
 //!
-//! The shots of a band are decoded in blocks. A block has the shots of two gates and all that were in flight before.
-//! A shot is settled when no later light overlaps with its own. What is settled stays, and claims light of the next
-//! block first. The end of a block can change a verdict only where a shot that overlaps with the settled one takes
-//! light of a shot behind the block, which is not known yet.
+//! The shots of a band are decoded in blocks. A block has the shots of [`GATES`] gates and all that were in flight before.
+//! A shot is searched and settled when no later light overlaps with its own. What is settled stays, and claims light of
+//! the next block first. The end of a block can change a verdict only where light of a shot behind it overlaps with that
+//! of a settled shot, and the quick receiver has not found it.
 
 mod residual;
 mod search;
@@ -34,13 +37,16 @@ use super::track::{BLOCK, below};
 use super::{Detection, last_beside};
 use crate::decode::belief::{self, Hypothesis, Light, Marks, Prior};
 use crate::decode::field::{self, Field};
-use crate::decode::{GATES_PER_BLOCK, Reject, Returns, Strength};
+use crate::decode::{Reject, Returns, Strength};
 use crate::kernels::{Counts, NARROW, or};
-use residual::Residual;
+use residual::{Residual, Saved};
 use search::{Peak, Question, Search};
 
 /// Hypotheses of a shot at most. It bounds the time that a hostile band takes.
 const MOST_HYPOTHESES: usize = 16;
+
+/// Gates of a block. The shots of the last one are judged again in the next block, and searched there.
+const GATES: i64 = 8;
 
 /// Shots between one and its neighbour in a direction at most.
 const FARTHEST: usize = 64;
@@ -60,18 +66,42 @@ pub(super) struct Reference<'a> {
     beside: [Vec<Option<u32>>; DIRECTIONS],
     /// Shots that are judged; those before are settled.
     open: Range<usize>,
+    /// Shots before this one are searched: all light that may overlap with theirs is at hand.
+    closed: usize,
     /// The returns of each shot, the fullest first.
     found: Vec<Vec<Echo>>,
-    /// The lags of the hypotheses of each shot.
+    /// The lags that each shot proposed.
     proposed: Vec<Vec<i64>>,
-    /// The shots of which a hypothesis was refused for its label.
-    is_mislabelled: Vec<bool>,
-    /// Shots that are to be searched although no return has changed.
+    /// The verdicts, in the order in which they were given.
+    verdicts: Vec<Verdict>,
+    /// Shots that are to be searched although no return has changed: those of which none was, and those that proposed
+    /// something when they were searched last.
     is_due: Vec<bool>,
     /// Returns when shots were searched last.
     known: BTreeSet<(usize, i64)>,
     counts: Counts<NARROW>,
     meter: Meter<'a>,
+}
+
+/// The verdict on a hypothesis.
+#[derive(Debug, Clone)]
+struct Verdict {
+    shot: usize,
+    /// The return it is, if it is believed.
+    echo: Option<Echo>,
+    /// How the label was judged.
+    label: Label,
+}
+
+/// How the label of a hypothesis was judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Label {
+    /// It fits, whatever else was proposed.
+    Fits,
+    /// It fits together with further light of the shot.
+    FitsWithFurther,
+    /// It is contradicted.
+    Contradicted,
 }
 
 /// A return that is believed.
@@ -82,18 +112,23 @@ struct Echo {
     peaks: Vec<Peak>,
 }
 
-/// The returns of the owned shots among those `sent`, out of sorted `ticks`.
-pub(super) fn decode(sent: &Sent, ticks: &[u32]) -> Returns {
+/// The returns of the owned shots among those `sent`, out of sorted `ticks`. Light is expected at the `likely` shots and
+/// lags.
+pub(super) fn decode(sent: &Sent, ticks: &[u32], likely: &[(usize, i64)]) -> Returns {
     let mut returns = Returns::with_capacity(sent.log.owned.len());
     let mut reference = Reference::new(sent, ticks);
+    let mut hypotheses: Vec<Hypothesis> = Vec::new();
     let (shots, mut first) = (sent.fired.len(), 0);
     while first < shots {
-        let block = first..sent.end_of_block(first);
+        let block = first..sent.end_of_block(first, GATES);
         first = block.end;
         let settled = reference.open.start;
         let closed = settled..if first == shots { shots } else { sent.in_flight_before(first) };
-        reference.begin(settled..block.end);
-        belief::settle(&mut reference, &mut Vec::new());
+        reference.begin(settled..block.end, closed.end);
+        hypotheses.retain(|hypothesis| hypothesis.shot >= settled);
+        let likely = likely.iter().filter(|(shot, _)| block.contains(shot));
+        hypotheses.extend(likely.map(|(shot, lag)| reference.hypothesis(*shot, *lag)));
+        belief::settle(&mut reference, &mut hypotheses);
         reference.measure(closed.clone(), &mut returns);
         reference.found[closed.clone()].iter_mut().flatten().for_each(|echo| echo.peaks.clear());
         reference.open.start = closed.end.max(settled);
@@ -105,7 +140,7 @@ impl<'a> Reference<'a> {
     fn new(sent: &'a Sent<'a>, ticks: &'a [u32]) -> Self {
         let shots = sent.fired.len();
         let arrival = sent.arrival(0);
-        let length = (GATES_PER_BLOCK + 2) * (arrival.end - arrival.start) + 3 * sent.length();
+        let length = (GATES + 2) * (arrival.end - arrival.start) + 3 * sent.length();
         let begin = arrival.start - sent.length();
         let memory = field::Memory::default();
         let (rows, columns) = (&sent.log.row, &sent.log.column);
@@ -119,9 +154,10 @@ impl<'a> Reference<'a> {
             threshold: belief::threshold(sent.correlation.false_alarm),
             beside: [left, right, above, below],
             open: 0..0,
+            closed: 0,
             found: vec![Vec::new(); shots],
             proposed: vec![Vec::new(); shots],
-            is_mislabelled: vec![false; shots],
+            verdicts: Vec::new(),
             is_due: vec![true; shots],
             known: BTreeSet::new(),
             counts: Counts::default(),
@@ -130,13 +166,13 @@ impl<'a> Reference<'a> {
     }
 
     /// Begins with `shots`: forgets what was found of them, and brings all their light to hand.
-    fn begin(&mut self, shots: Range<usize>) {
+    fn begin(&mut self, shots: Range<usize>, closed: usize) {
         let (sent, Range { start, end }) = (self.sent, shots.clone());
         self.field.cover(sent.arrival(start).start - sent.length()..sent.arrival(end - 1).end);
-        self.proposed[shots.clone()].iter_mut().for_each(Vec::clear);
         self.is_due[shots.clone()].fill(true);
+        self.verdicts.clear();
         self.known.clear();
-        self.open = shots;
+        (self.open, self.closed) = (shots, closed);
     }
 
     /// The prior of `shot`, by the returns taken so far: in each direction the lag of the nearest one and the line
@@ -162,11 +198,8 @@ impl<'a> Reference<'a> {
     fn peaks_about(&mut self, shot: usize, lag: i64) -> Vec<Peak> {
         let (far, prior) = (self.sent.takes_up(), Prior::new(self.sent.reach(), &[]));
         let (lags, sway) = (lag - far..lag + far, prior.sway());
-        let least = self.threshold - sway;
-        let mut question = Question { shot, lags, prior: &prior, least };
-        let Some(top) = self.search.best(&self.residual, &question) else { return Vec::new() };
-        question.least = least.max(top.odds - sway);
-        self.search.all(&self.residual, &question)
+        let question = Question { shot, lags, prior: &prior, least: self.threshold - sway };
+        self.search.near_best(&self.residual, &question, (lag, sway))
     }
 
     /// The best of `peaks` by the prior. Where lags side by side have the same marks, as a mark is looked for in several
@@ -188,31 +221,31 @@ impl<'a> Reference<'a> {
         Some((best?, peaks))
     }
 
-    /// True if light of `shot` at `lag` has another label, also where its further hypotheses are taken for returns.
+    /// How the label of `shot` at `lag` is judged.
     ///
     /// A second surface may light bits that the first one leaves dark, and the other way round. So neither can be told
     /// from light of another label before both are known: the label is contradicted if it is without the light of
-    /// the further ones, too. Light whole bits away does not count, as it lights the bits that another label would.
-    fn is_mislabelled(&mut self, shot: usize, lag: i64, prior: &Prior) -> bool {
+    /// further ones that the shot proposed, too. Light whole bits away does not count, as it lights the bits that
+    /// another label would.
+    fn label(&mut self, shot: usize, lag: i64, prior: &Prior) -> Label {
         if self.sent.bits_of_payload() == 1 || self.against(shot, lag, prior) <= 0.0 {
-            return false;
+            return Label::Fits;
         }
-        let saved = self.residual.save(&self.touched_by(shot));
-        self.residual.explain(shot, lag);
+        let mut saved = vec![self.try_out(shot, lag)];
         let mut further = Vec::new();
         for other in self.proposed[shot].clone() {
             if let Some((peak, _)) = self.believed(shot, other, prior)
                 && !self.is_whole_bits(peak.lag - lag)
             {
                 further.push(peak.lag);
-                self.residual.explain(shot, peak.lag);
+                saved.push(self.try_out(shot, peak.lag));
             }
         }
-        self.residual.put_back(&saved);
-        further.iter().for_each(|lag| self.residual.explain(shot, *lag));
+        self.put_back(saved);
+        let saved = further.iter().map(|lag| self.try_out(shot, *lag)).collect();
         let against = self.against(shot, lag, prior);
-        self.residual.put_back(&saved);
-        against > 0.0
+        self.put_back(saved);
+        if against > 0.0 { Label::Contradicted } else { Label::FitsWithFurther }
     }
 
     /// The contradiction of the label of `shot` at `lag`.
@@ -231,17 +264,23 @@ impl<'a> Reference<'a> {
         !(width..=bit - width).contains(&apart.rem_euclid(bit))
     }
 
-    /// All that light of `shot` can change.
-    fn touched_by(&self, shot: usize) -> Range<i64> {
-        let reach = self.sent.reach();
-        let [first, last] =
-            [reach.start, reach.end - 1].map(|lag| self.residual.touched(shot, lag));
-        first.start..last.end
+    /// Takes light of `shot` at `lag` for a return on trial. What it gives puts that back.
+    fn try_out(&mut self, shot: usize, lag: i64) -> Saved {
+        let saved = self.residual.save(&self.residual.touched(shot, lag));
+        self.residual.explain(shot, lag);
+        saved
+    }
+
+    /// Puts back what was tried out, the last first.
+    fn put_back(&mut self, saved: Vec<Saved>) {
+        saved.iter().rev().for_each(|saved| self.residual.put_back(saved));
     }
 
     /// Turns what was found of `shots` into returns.
     fn measure(&mut self, shots: Range<usize>, returns: &mut Returns) {
         let (gate, owned) = (self.sent.gate(), self.sent.log.owned.clone());
+        let refused = self.verdicts.iter().filter(|verdict| verdict.label == Label::Contradicted);
+        let is_mislabelled: BTreeSet<usize> = refused.map(|verdict| verdict.shot).collect();
         for shot in shots.start.max(owned.start)..shots.end.min(owned.end) {
             let prior = self.prior(shot);
             // A return of two may not move: it could take the lag of the other surface.
@@ -254,7 +293,7 @@ impl<'a> Reference<'a> {
             let is_empty = lags.is_empty();
             lags.retain(|lag| gate.contains(lag));
             if lags.is_empty() {
-                returns.reject(match (is_empty, self.is_mislabelled[shot]) {
+                returns.reject(match (is_empty, is_mislabelled.contains(&shot)) {
                     (false, _) => Reject::OutsideGate,
                     (true, true) => Reject::LabelMismatch,
                     (true, false) => Reject::NoPeak,
@@ -286,6 +325,11 @@ impl<'a> Reference<'a> {
         Detection { margin: count.saturating_sub(next), ..Detection::at(lag, count) }
     }
 
+    /// Light of `shot` at `lag`, as a hypothesis.
+    fn hypothesis(&self, shot: usize, lag: i64) -> Hypothesis {
+        Hypothesis { shot, lag, marks: self.marks(shot, lag) }
+    }
+
     /// The marks of `shot` at `lag` in all light.
     fn marks(&self, shot: usize, lag: i64) -> Marks {
         let (sent, start) = (self.sent, self.sent.fired[shot] + lag);
@@ -299,58 +343,61 @@ impl<'a> Reference<'a> {
         self.open.clone().flat_map(|shot| self.found[shot].iter().map(move |echo| (shot, echo.lag)))
     }
 
-    /// Lags of `shot` that are believed in light that neither returns nor its own hypotheses explain: the best one,
-    /// the best one of what that leaves, and so on.
-    fn propose_of(&mut self, shot: usize) -> Vec<Hypothesis> {
-        let (prior, reach) = (self.prior(shot), self.sent.reach());
-        let saved = self.residual.save(&self.touched_by(shot));
-        for lag in &self.proposed[shot] {
-            self.residual.explain(shot, *lag);
+    /// The best lag of `shot`, if it is believed in light that neither returns nor its own proposals explain.
+    fn propose_of(&mut self, shot: usize) -> Option<Hypothesis> {
+        let (prior, lags) = (self.prior(shot), self.sent.reach());
+        let known = self.proposed[shot].clone();
+        if known.len() == MOST_HYPOTHESES || self.sent.weight(shot) == 0 {
+            return None;
         }
-        let question = Question { shot, lags: reach, prior: &prior, least: self.threshold };
-        let mut peaks = self.search.all(&self.residual, &question);
-        let mut proposals = Vec::new();
-        while let Some(Peak { lag, .. }) = Peak::best(peaks.iter().copied())
-            && self.proposed[shot].len() < MOST_HYPOTHESES
-        {
-            self.residual.explain(shot, lag);
-            self.proposed[shot].push(lag);
-            proposals.push(Hypothesis { shot, lag, marks: self.marks(shot, lag) });
-            let (residual, places) = (&self.residual, self.search.places());
-            let gate = residual.gate(shot);
-            for peak in peaks.iter_mut().filter(|peak| self.sent.overlap(peak.lag - lag)) {
-                *peak = residual.peak(&gate, peak.lag, places, &prior);
-            }
-            peaks.retain(|peak| peak.odds >= self.threshold);
-        }
-        self.residual.put_back(&saved);
-        proposals
+        let saved = known.iter().map(|lag| self.try_out(shot, *lag)).collect();
+        let question = Question { shot, lags, prior: &prior, least: self.threshold };
+        let best = self.search.best(&self.residual, &question);
+        self.put_back(saved);
+        let Peak { lag, .. } = best?;
+        self.proposed[shot].push(lag);
+        Some(self.hypothesis(shot, lag))
     }
 }
 
 impl Light for Reference<'_> {
-    fn restore(&mut self) {
+    fn restore(&mut self, kept: usize) -> usize {
+        // A verdict on a label may depend on what its shot proposed since.
+        let stands =
+            |verdict: &&Verdict| verdict.label == Label::Fits || !self.is_due[verdict.shot];
+        let kept = self.verdicts.iter().take(kept).take_while(stands).count();
+        self.verdicts.truncate(kept);
         self.residual.restore(&self.field);
         let Range { start, end } = self.open;
         self.found[start..end].iter_mut().for_each(Vec::clear);
-        self.is_mislabelled[start..end].fill(false);
         for shot in self.sent.in_flight_before(start)..start {
             for echo in &self.found[shot] {
                 self.residual.explain(shot, echo.lag);
             }
         }
+        for Verdict { shot, echo, .. } in &self.verdicts {
+            if let Some(echo) = echo {
+                self.residual.explain(*shot, echo.lag);
+                self.found[*shot].push(echo.clone());
+            }
+        }
+        kept
     }
 
     fn judge(&mut self, hypothesis: &Hypothesis) {
         let Hypothesis { shot, lag, .. } = *hypothesis;
         let prior = self.prior(shot);
-        let Some((Peak { lag, .. }, peaks)) = self.believed(shot, lag, &prior) else { return };
-        if self.is_mislabelled(shot, lag, &prior) {
-            self.is_mislabelled[shot] = true;
-            return;
+        let mut verdict = Verdict { shot, echo: None, label: Label::Fits };
+        if let Some((Peak { lag, .. }, peaks)) = self.believed(shot, lag, &prior) {
+            verdict.label = self.label(shot, lag, &prior);
+            if verdict.label != Label::Contradicted {
+                let echo = Echo { lag, peaks };
+                self.residual.explain(shot, lag);
+                self.found[shot].push(echo.clone());
+                verdict.echo = Some(echo);
+            }
         }
-        self.residual.explain(shot, lag);
-        self.found[shot].push(Echo { lag, peaks });
+        self.verdicts.push(verdict);
     }
 
     fn propose(&mut self) -> Vec<Hypothesis> {
@@ -360,15 +407,13 @@ impl Light for Reference<'_> {
             changed.map(|(shot, lag)| self.residual.touched(*shot, *lag)).collect();
         self.known = now;
         let mut proposals = Vec::new();
-        for shot in self.open.clone() {
+        for shot in self.open.start..self.closed {
             let arrival = self.sent.arrival(shot);
             let is_near = |span: &Range<i64>| span.start < arrival.end && arrival.start < span.end;
-            let is_due = self.is_due[shot] || changed.iter().any(is_near);
-            self.is_due[shot] = false;
-            if is_due && self.sent.weight(shot) > 0 {
-                let some = self.propose_of(shot);
-                self.is_due[shot] = !some.is_empty();
-                proposals.extend(some);
+            if self.is_due[shot] || changed.iter().any(is_near) {
+                let proposal = self.propose_of(shot);
+                self.is_due[shot] = proposal.is_some();
+                proposals.extend(proposal);
             }
         }
         proposals

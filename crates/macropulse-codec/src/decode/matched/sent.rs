@@ -10,7 +10,7 @@ use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timeline::Timeline;
 use crate::decode::timing;
-use crate::decode::{Correlation, Effort, GATES_PER_BLOCK, Pick, Receiver, window};
+use crate::decode::{Correlation, Effort, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
 
 /// What was sent.
@@ -350,10 +350,10 @@ impl<'a> Sent<'a> {
         fired + reach.start..fired + reach.end - 1 + self.length() + i64::from(self.width)
     }
 
-    /// The end of the block of shots that begins with `first`.
-    pub fn end_of_block(&self, first: usize) -> usize {
+    /// The end of the block of shots that begins with `first` and lasts so many `gates`.
+    pub fn end_of_block(&self, first: usize, gates: i64) -> usize {
         let gate = self.arrival(first);
-        let end = self.fired[first] + GATES_PER_BLOCK * (gate.end - gate.start);
+        let end = self.fired[first] + gates * (gate.end - gate.start);
         self.fired.partition_point(|fired| *fired < end).max(first + 1)
     }
 
@@ -376,12 +376,6 @@ impl<'a> Sent<'a> {
     pub fn light(&self, shot: usize, lag: i64) -> Range<i64> {
         let start = self.fired[shot] + lag;
         start..start + self.takes_up()
-    }
-
-    /// Whether light that begins so much later than other light overlaps with it, or with ticks that are cancelled
-    /// with it.
-    pub fn overlap(&self, apart: i64) -> bool {
-        apart.abs() < self.takes_up() + i64::from(self.width)
     }
 
     /// Marks that are found `lit` at these `places` behind tick `start`, where each of the `ticks` counts for one of

@@ -22,9 +22,16 @@ pub(super) struct Residual<'a> {
     lit: Timeline,
     /// Places that are lit or claimed.
     open: Timeline,
+    /// Machine words of a cell.
+    cell: usize,
+    /// Ticks that are left in each cell, and places that are claimed there.
+    in_cells: [Vec<u32>; 2],
     /// Memory.
     widened: Vec<u64>,
 }
+
+/// Cells to a macropulse, about: in cells of 4 machine words at least.
+const CELLS: i64 = 32;
 
 /// Ticks and places of one shot that are the same for all its lags.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +53,9 @@ impl<'a> Residual<'a> {
     pub fn new(sent: &'a Sent<'a>) -> Self {
         let dark = Timeline::default;
         let (left, claimed, lit, open) = (dark(), dark(), dark(), dark());
-        Self { sent, extent: 0..0, left, claimed, lit, open, widened: Vec::new() }
+        let cell = (sent.takes_up() / CELLS / 64).clamp(1, 64) as usize;
+        let (in_cells, widened) = (Default::default(), Vec::new());
+        Self { sent, extent: 0..0, left, claimed, lit, open, cell, in_cells, widened }
     }
 
     /// Starts again with all the light of `field`: no return explains any of it.
@@ -56,6 +65,8 @@ impl<'a> Residual<'a> {
         self.timelines().into_iter().for_each(|timeline| timeline.clear_all(start, end - start));
         let seen = field.seen().words(&self.extent);
         self.left.words_mut(&self.extent).copy_from_slice(seen);
+        let cells = self.left.words(&self.extent).len().div_ceil(self.cell);
+        self.in_cells.iter_mut().for_each(|counts| counts.resize(cells, 0));
         self.renew(&self.extent.clone());
     }
 
@@ -83,6 +94,20 @@ impl<'a> Residual<'a> {
         for ((lit, open), (claimed, widened)) in lit.zip(claimed) {
             *lit = widened & !claimed;
             *open = widened | claimed;
+        }
+        self.count(&places);
+    }
+
+    /// Counts anew what is in the cells of `span`.
+    fn count(&mut self, span: &Range<i64>) {
+        let ticks = 64 * self.cell as i64;
+        let begin = self.extent.start;
+        let cell = |tick: i64| (tick - begin) / ticks;
+        let cells = cell(span.start)..cell(span.end + ticks - 1);
+        let whole = begin + cells.start * ticks..(begin + cells.end * ticks).min(self.extent.end);
+        let cells = cells.start as usize..cells.end as usize;
+        for (counts, of) in self.in_cells.iter_mut().zip([&self.left, &self.claimed]) {
+            count_each(of.words(&whole), self.cell, &mut counts[cells.clone()]);
         }
     }
 
@@ -113,6 +138,7 @@ impl<'a> Residual<'a> {
         for (timeline, words) in self.timelines().into_iter().zip(&saved.words) {
             timeline.words_mut(&saved.span).copy_from_slice(words);
         }
+        self.count(&saved.span);
     }
 
     /// Where unclaimed marks count as found.
@@ -135,14 +161,20 @@ impl<'a> Residual<'a> {
 
     /// Makes `sums` those of `span`.
     pub fn sum_up(&self, span: &Range<i64>, sums: &mut Sums) {
-        let span = self.words_of(span);
-        sums.first = span.start;
-        for (sums, timeline) in [(&mut sums.left, &self.left), (&mut sums.taken, &self.claimed)] {
-            let words = timeline.words(&span);
-            sums.resize(words.len() + 1, 0);
-            sums[0] = 0;
-            count_each(words, 1, &mut sums[1..]);
-            (1..sums.len()).for_each(|at| sums[at] += sums[at - 1]);
+        let ticks = 64 * self.cell as i64;
+        let all = self.in_cells[0].len() as i64;
+        let cell = |tick: i64| ((tick - self.extent.start).div_euclid(ticks)).clamp(0, all);
+        let cells = cell(span.start)..cell(span.end + ticks - 1);
+        (sums.first, sums.cell) = (self.extent.start + cells.start * ticks, ticks);
+        let cells = cells.start as usize..cells.end.max(cells.start) as usize;
+        for (sums, counts) in [&mut sums.left, &mut sums.taken].into_iter().zip(&self.in_cells) {
+            sums.clear();
+            sums.push(0);
+            let mut sum = 0;
+            sums.extend(counts[cells.clone()].iter().map(|count| {
+                sum += count;
+                sum
+            }));
         }
     }
 
@@ -206,25 +238,31 @@ impl<'a> Residual<'a> {
     }
 }
 
-/// Ticks that are left and places that are claimed before each machine word of a stretch.
+/// Ticks that are left and places that are claimed before each cell of a stretch.
 #[derive(Debug, Default)]
 pub(super) struct Sums {
     first: i64,
+    /// Ticks of a cell.
+    cell: i64,
     left: Vec<u32>,
     taken: Vec<u32>,
 }
 
 impl Sums {
-    /// Of some sums, from the word of one tick to that of another.
-    fn between(&self, sums: &[u32], from: i64, to: i64) -> u32 {
+    /// Of some sums, from one cell to another.
+    fn between(sums: &[u32], from: i64, to: i64) -> u32 {
         let last = sums.len() as i64 - 1;
-        let before = |word: i64| sums[word.clamp(0, last) as usize];
+        let before = |cell: i64| sums[cell.clamp(0, last) as usize];
         before(to).saturating_sub(before(from))
     }
 
+    /// The cell that `tick` is in.
+    fn cell_of(&self, tick: i64) -> i64 {
+        (tick - self.first).div_euclid(self.cell)
+    }
+
     fn about(&self, sums: &[u32], span: &Range<i64>) -> u32 {
-        let word = |tick: i64| (tick - self.first).div_euclid(64);
-        self.between(sums, word(span.start), word(span.end + 63))
+        Self::between(sums, self.cell_of(span.start), self.cell_of(span.end + self.cell - 1))
     }
 
     /// No fewer ticks than are left in `span`.
@@ -234,8 +272,8 @@ impl Sums {
 
     /// No more ticks than are left in `span`.
     pub fn ticks_within(&self, span: &Range<i64>) -> u32 {
-        let word = |tick: i64| (tick - self.first).div_euclid(64);
-        self.between(&self.left, word(span.start + 63), word(span.end))
+        let [from, to] = [span.start + self.cell - 1, span.end].map(|tick| self.cell_of(tick));
+        Self::between(&self.left, from, to.max(from))
     }
 
     /// No fewer places than are claimed in `span`.
@@ -245,6 +283,22 @@ impl Sums {
 }
 
 impl Gate {
+    /// A gate with no more ticks and no fewer places, of which there are few: three bits of each number count.
+    pub fn coarse(self) -> Self {
+        let shift = (u32::BITS - self.ticks.leading_zeros()).saturating_sub(3);
+        let step = libm::exp2((libm::floor(libm::log2(self.places.max(1.0))) - 2.0).max(0.0));
+        Self {
+            ticks: self.ticks >> shift << shift,
+            places: libm::ceil(self.places / step) * step,
+            ..self
+        }
+    }
+
+    /// What tells it from others.
+    pub fn key(&self) -> (u32, u64) {
+        (self.ticks, self.places.to_bits())
+    }
+
     /// The same without so many ticks.
     pub fn without(self, ticks: u32) -> Self {
         Self { ticks: self.ticks.saturating_sub(ticks), ..self }

@@ -9,6 +9,7 @@
 //! * one more lit mark is evidence for light, so that with c claimed marks E(k, N − c) stays below E(k + c, N). Marks
 //!   that are lit or claimed are counted together.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use super::residual::{Gate, Residual, Sums};
@@ -57,16 +58,22 @@ pub(super) struct Search {
     lit: Counts<WIDE>,
     open: Counts<WIDE>,
     sums: Sums,
-    /// Fewest marks, by what is asked for.
-    known: Vec<(Asked, Fewest)>,
+    /// Fewest marks, by what is asked for; and what was asked last.
+    known: HashMap<Asked, Fewest>,
+    last: Option<(Asked, Fewest)>,
 }
 
-/// What is asked of a block of lags: so many nats, in whole ones, with so many ticks at least about any lag.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What is asked of some lags: so many nats, in whole ones, with so many ticks at least about any lag, in such a gate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Asked {
     nats: i32,
     ticks: u32,
+    weight: u32,
+    gate: (u32, u64),
 }
+
+/// Thresholds that are remembered at most.
+const MOST_KNOWN: usize = 1 << 16;
 
 /// Fewest marks that can give the evidence asked for.
 #[derive(Debug, Clone, Copy)]
@@ -98,13 +105,26 @@ impl Search {
         best
     }
 
-    /// All lags with the least odds asked for, in any order.
-    pub fn all(&mut self, residual: &Residual, question: &Question) -> Vec<Peak> {
-        let mut all = Vec::new();
-        self.scan(residual, question, |peak| {
+    /// The lags that have odds within so many nats, `below`, of the highest, and the least odds asked for. They are found
+    /// soonest if `likely` is one of them.
+    pub fn near_best(
+        &mut self,
+        residual: &Residual,
+        question: &Question,
+        (likely, below): (i64, f64),
+    ) -> Vec<Peak> {
+        let Question { shot, prior, least, .. } = *question;
+        let sent = residual.sent;
+        places_of(sent.word(shot), sent.lit_bits(shot), &mut self.places);
+        let first = residual.peak(&residual.gate(shot), likely, &self.places, prior);
+        let mut least = least.max(first.odds - below);
+        let mut all: Vec<Peak> = Vec::new();
+        self.scan(residual, &Question { least, ..question.clone() }, |peak| {
             all.push(peak);
-            question.least
+            least = least.max(peak.odds - below);
+            least
         });
+        all.retain(|peak| peak.odds >= least);
         all
     }
 
@@ -124,68 +144,101 @@ impl Search {
         }
         let (first, last) = (sent.fired[shot] + lags.start, sent.fired[shot] + lags.end);
         residual.sum_up(&(first..last + sent.takes_up()), &mut self.sums);
-        self.known.clear();
+        let coarse = gate.coarse();
         let farthest = self.places.last().copied().unwrap_or(0);
-        for first in lags.clone().step_by(BLOCK as usize) {
-            let end = (first + BLOCK).min(lags.end);
-            let (start, last) = (sent.fired[shot] + first, sent.fired[shot] + end - 1);
-            let span = start..last + sent.takes_up();
-            let of_any = self.sums.ticks(&span);
-            let trials = residual.fewest_trials(shot, self.sums.claimed(&span));
-            let of_all = self.sums.ticks_within(&(last..start + sent.takes_up())).min(trials);
-            let most = prior.most(&(first..end));
-            let mut fewest = self.fewest(residual, &gate, least - most, of_all);
-            if of_any < fewest.lit || fewest.lit as usize > self.places.len() {
+        let in_group = (sent.takes_up() / 2 / BLOCK).max(1) * BLOCK;
+        for group in lags.clone().step_by(in_group as usize) {
+            let group = group..(group + in_group).min(lags.end);
+            if self.bound((residual, &coarse), &group, least - prior.most(&group)).is_none() {
                 continue;
             }
-            let (lit, at) = residual.lit().at(start);
-            let mut hits = [0; WIDE];
-            with_enough::<WIDE>(lit, at as u32, (&self.places, farthest), fewest.lit, &mut hits);
-            hits = below(end - first, hits, true);
-            if is_dark(&hits) {
-                continue;
-            }
-            self.lit.count(lit, at as u32, sent.word(shot), sent.lit_bits(shot));
-            let (open, at) = residual.open().at(start);
-            self.open.count(open, at as u32, sent.word(shot), sent.lit_bits(shot));
-            loop {
-                hits = and(hits, self.lit.at_least(fewest.lit));
-                hits = and(hits, self.open.at_least(fewest.lit_or_claimed));
-                let Some((at, _)) = self.lit.highest(hits) else { break };
-                hits[at as usize / 64] &= !(1 << (at % 64));
-                let lag = first + i64::from(at);
-                let peak = residual.peak(&gate, lag, &self.places, prior);
-                if peak.odds >= least {
-                    let before = least;
-                    least = visit(peak);
-                    if least > before {
-                        fewest = self.fewest(residual, &gate, least - most, of_all);
+            for first in group.clone().step_by(BLOCK as usize) {
+                let block = first..(first + BLOCK).min(group.end);
+                let start = sent.fired[shot] + first;
+                let most = prior.most(&block);
+                let bound = self.bound((residual, &coarse), &block, least - most);
+                let Some((mut fewest, of_all)) = bound else { continue };
+                let (lit, at) = residual.lit().at(start);
+                let mut hits = [0; WIDE];
+                with_enough::<WIDE>(
+                    lit,
+                    at as u32,
+                    (&self.places, farthest),
+                    fewest.lit,
+                    &mut hits,
+                );
+                hits = below(block.end - first, hits, true);
+                if is_dark(&hits) {
+                    continue;
+                }
+                self.lit.count(lit, at as u32, sent.word(shot), sent.lit_bits(shot));
+                let (open, at) = residual.open().at(start);
+                self.open.count(open, at as u32, sent.word(shot), sent.lit_bits(shot));
+                loop {
+                    hits = and(hits, self.lit.at_least(fewest.lit));
+                    hits = and(hits, self.open.at_least(fewest.lit_or_claimed));
+                    let Some((at, _)) = self.lit.highest(hits) else { break };
+                    hits[at as usize / 64] &= !(1 << (at % 64));
+                    let lag = first + i64::from(at);
+                    let peak = residual.peak(&gate, lag, &self.places, prior);
+                    if peak.odds >= least {
+                        let before = least;
+                        least = visit(peak);
+                        if least > before {
+                            fewest = self.fewest((residual, &coarse), least - most, of_all);
+                        }
                     }
                 }
             }
         }
     }
 
+    /// Fewest marks for so many `nats` of evidence at any of the `lags`, and the fewest ticks that count for any of them;
+    /// `None` where there cannot be as many.
+    fn bound(
+        &mut self,
+        (residual, gate): (&Residual, &Gate),
+        lags: &Range<i64>,
+        nats: f64,
+    ) -> Option<(Fewest, u32)> {
+        let (sent, shot) = (residual.sent, gate.shot);
+        let (start, last) = (sent.fired[shot] + lags.start, sent.fired[shot] + lags.end - 1);
+        let span = start..last + sent.takes_up();
+        let of_any = self.sums.ticks(&span);
+        let trials = residual.fewest_trials(shot, self.sums.claimed(&span));
+        let of_all = self.sums.ticks_within(&(last..start + sent.takes_up())).min(trials);
+        let fewest = self.fewest((residual, gate), nats, of_all);
+        let may_be = of_any >= fewest.lit && fewest.lit <= sent.weight(shot);
+        may_be.then_some((fewest, of_all))
+    }
+
     /// Fewest marks of a shot for so many `nats` of evidence, with so many `ticks` at least in its light.
-    fn fewest(&mut self, residual: &Residual, gate: &Gate, nats: f64, ticks: u32) -> Fewest {
+    fn fewest(&mut self, (residual, gate): (&Residual, &Gate), nats: f64, ticks: u32) -> Fewest {
         let kept = u32::BITS - 2;
         let shift = kept.saturating_sub(ticks.leading_zeros());
-        let asked = Asked { nats: nats.floor() as i32, ticks: ticks >> shift << shift };
-        if let Some((_, fewest)) = self.known.iter().find(|(known, _)| *known == asked) {
+        let weight = residual.sent.weight(gate.shot);
+        let (nats, ticks) = (nats.floor() as i32, ticks >> shift << shift);
+        let asked = Asked { nats, ticks, weight, gate: gate.key() };
+        if let Some((_, fewest)) = self.last.filter(|(last, _)| *last == asked) {
+            return fewest;
+        }
+        if let Some(fewest) = self.known.get(&asked) {
+            self.last = Some((asked, *fewest));
             return *fewest;
         }
-        let sent = residual.sent;
-        let weight = sent.weight(gate.shot);
-        let length = sent.takes_up() as f64;
+        let length = residual.sent.takes_up() as f64;
         let of = |of: &dyn Fn(u32) -> u32| {
             fewest(weight, |lit| {
-                let beside = asked.ticks.saturating_sub(lit);
+                let beside = ticks.saturating_sub(lit);
                 let around = residual.surroundings(beside, length, gate.without(lit));
-                evidence(Marks { lit, of: of(lit) }, &around) >= f64::from(asked.nats)
+                evidence(Marks { lit, of: of(lit) }, &around) >= f64::from(nats)
             })
         };
         let fewest = Fewest { lit: of(&|lit| lit), lit_or_claimed: of(&|_| weight) };
-        self.known.push((asked, fewest));
+        if self.known.len() == MOST_KNOWN {
+            self.known.clear();
+        }
+        self.known.insert(asked, fewest);
         fewest
     }
 

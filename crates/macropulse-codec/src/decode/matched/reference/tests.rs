@@ -203,10 +203,12 @@ impl<'a> Plain<'a> {
 }
 
 impl Light for Plain<'_> {
-    fn restore(&mut self) {
+    /// Keeps nothing: each round judges all.
+    fn restore(&mut self, _: usize) -> usize {
         self.left.clone_from(&self.seen);
         self.claimed.fill(false);
         self.found.iter_mut().for_each(Vec::clear);
+        0
     }
 
     fn judge(&mut self, hypothesis: &Hypothesis) {
@@ -247,16 +249,9 @@ impl Light for Plain<'_> {
             for lag in self.proposed[shot].clone() {
                 self.explain(shot, lag);
             }
-            let prior = self.prior(shot);
-            let odds = |plain: &Self, lag: i64| plain.odds(shot, lag, &prior);
-            let mut lags: Vec<(f64, Reverse<i64>)> =
-                self.sent.reach().map(|lag| (odds(self, lag), Reverse(lag))).collect();
-            lags.retain(|(odds, _)| *odds >= self.threshold);
-            let order = |one: &&(f64, Reverse<i64>), other: &&(f64, Reverse<i64>)| {
-                one.0.total_cmp(&other.0).then(one.1.cmp(&other.1))
-            };
-            while let Some(&(_, Reverse(lag))) = lags.iter().max_by(order)
-                && self.proposed[shot].len() < 16
+            let (prior, reach) = (self.prior(shot), self.sent.reach());
+            if self.proposed[shot].len() < 16
+                && let Some(lag) = self.best(shot, reach, &prior)
             {
                 let places = self.places(shot, lag);
                 let lit = places.iter().filter(|place| self.is_lit(&self.seen, **place)).count();
@@ -264,15 +259,6 @@ impl Light for Plain<'_> {
                 self.is_due[shot] = true;
                 self.proposed[shot].push(lag);
                 proposals.push(Hypothesis { shot, lag, marks });
-                self.explain(shot, lag);
-                // What is far from it is as it was.
-                let reach = self.sent.takes_up() + i64::from(self.sent.width);
-                for (known, Reverse(at)) in &mut lags {
-                    if (*at - lag).abs() < reach {
-                        *known = odds(self, *at);
-                    }
-                }
-                lags.retain(|(odds, _)| *odds >= self.threshold);
             }
             (self.left, self.claimed) = saved;
         }
@@ -319,9 +305,9 @@ proptest! {
         let (ticks, _) = sensor.ticks(&log, weather, seed);
         let receiver = sensor.set_to(Effort::Exhaustive, sensor.correlation(jitter));
         let sent = sensor.sent(&receiver, &log);
-        prop_assume!(sent.end_of_block(0) == 6);
+        prop_assume!(sent.end_of_block(0, GATES) == 6);
         let mut reference = Reference::new(&sent, &ticks.tick);
-        reference.begin(0..6);
+        reference.begin(0..6, 6);
         let mut plain = Plain::new(&sent, &ticks.tick);
         let (mut hypotheses, mut plainly) = (Vec::new(), Vec::new());
         belief::settle(&mut reference, &mut hypotheses);
@@ -363,7 +349,7 @@ fn chance_is_hardly_ever_believed() {
                 let (ticks, _) = sensor.ticks(&log, weather, seed);
                 let correlation = Correlation { false_alarm, ..sensor.correlation(jitter) };
                 let receiver = sensor.set_to(Effort::Exhaustive, correlation);
-                let found = decode(&sensor.sent(&receiver, &log), &ticks.tick);
+                let found = decode(&sensor.sent(&receiver, &log), &ticks.tick, &[]);
                 found.shot.iter().collect::<BTreeSet<_>>().len()
             });
             each.sum()
@@ -387,4 +373,37 @@ fn every_instruction_set_gives_the_same_returns() {
     let each = at_each_level(|| sensor.decode(&receiver, &log, &ticks));
     assert!(each[0].1.len() > 40);
     assert!(each.iter().all(|(_, returns)| *returns == each[0].1));
+}
+
+/// Hypotheses that come first change little: where all light is expected that there is, one shot in 50 is found otherwise
+/// at most. N = 1000 shots, four weathers, seed 5. Negative control: with a threshold for 10⁻⁹ more are.
+#[test]
+fn light_that_is_expected_is_found_as_without() {
+    let sensor = Sensor::crowded(books().remove(0));
+    let log = sensor.log(250);
+    let (mut otherwise, mut by_threshold) = (0, 0);
+    for (missed, false_ticks) in [(20, 3), (60, 1), (80, 1), (30, 40)] {
+        let weather = Weather { missed, false_ticks, late: 10, roughness: 10, panes: 10 };
+        let (ticks, surfaces) = sensor.ticks(&log, weather, 5);
+        let found = |false_alarm: f64, likely: &[(usize, i64)]| {
+            let correlation = Correlation { false_alarm, ..sensor.correlation(0.3) };
+            let receiver = sensor.set_to(Effort::Exhaustive, correlation);
+            let returns = decode(&sensor.sent(&receiver, &log), &ticks.tick, likely);
+            let ticks: Vec<f64> = returns.tof.iter().map(|tof| tof / 2.5e-12).collect();
+            let of_shot = move |shot| Some(ticks[returns.shot.binary_search(&shot).ok()?]);
+            (0..250).map(of_shot).collect::<Vec<_>>()
+        };
+        let is_other = |pair: &(Option<f64>, Option<f64>)| match pair {
+            (Some(one), Some(other)) => (one - other).abs() > 1.0,
+            (one, other) => one != other,
+        };
+        let others =
+            |one: Vec<_>, other: Vec<_>| one.into_iter().zip(other).filter(is_other).count();
+        let there = surfaces.iter().enumerate();
+        let there = there.filter_map(|(shot, lags)| Some((shot, i64::from(*lags.first()?))));
+        otherwise += others(found(1e-6, &[]), found(1e-6, &there.collect::<Vec<_>>()));
+        by_threshold += others(found(1e-6, &[]), found(1e-9, &[]));
+    }
+    assert!(otherwise <= 20, "{otherwise}");
+    assert!(by_threshold > 20, "{by_threshold}");
 }
