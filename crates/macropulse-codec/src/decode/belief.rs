@@ -18,6 +18,7 @@
 use std::cmp::Ordering;
 use std::f64::consts::LN_2;
 use std::ops::Range;
+use std::sync::LazyLock;
 
 use libm::{lgamma, log};
 
@@ -92,10 +93,29 @@ fn log_factor(marks: Marks, around: &Surroundings) -> f64 {
     let [k, n] = [marks.lit, marks.of].map(f64::from);
     let (t, m) = (around.lit, around.places);
     let dark = (m - t).max(0.0) + (around.density.recip() - 1.0).max(1.0);
-    let light = lgamma(k) + lgamma(n - k + 1.0) - lgamma(n + 1.0) - log(harmonic(n));
-    let beside = lgamma(t + 1.0) + lgamma(dark) - lgamma(t + dark + 1.0);
-    let chance = lgamma(k + t + 1.0) + lgamma(n - k + dark) - lgamma(n + t + dark + 1.0);
+    let light = log_gamma(k) + log_gamma(n - k + 1.0) - log_gamma(n + 1.0) - log(harmonic(n));
+    let beside = log_gamma(t + 1.0) + log_gamma(dark) - log_gamma(t + dark + 1.0);
+    let chance = log_gamma(k + t + 1.0) + log_gamma(n - k + dark) - log_gamma(n + t + dark + 1.0);
     light + beside - chance
+}
+
+/// Whole numbers below this one have their ln Γ in a table.
+const IN_TABLE: usize = 48;
+
+/// ln Γ(x) for x > 0, to 10⁻¹¹; from [`IN_TABLE`] on by Stirling's series.
+fn log_gamma(x: f64) -> f64 {
+    static OF_WHOLE: LazyLock<[f64; IN_TABLE]> =
+        LazyLock::new(|| std::array::from_fn(|whole| lgamma(whole as f64)));
+    if x >= IN_TABLE as f64 {
+        let (inverse, half_log_tau) = (x.recip(), 0.918_938_533_204_672_7);
+        let rest = inverse * (1.0 / 12.0 - inverse * inverse / 360.0);
+        return (x - 0.5) * log(x) - x + half_log_tau + rest;
+    }
+    let whole = x as usize;
+    match whole as f64 == x {
+        true => OF_WHOLE[whole],
+        false => lgamma(x),
+    }
 }
 
 /// The harmonic number Hₙ = 1 + ½ + … + 1/n of a whole `n`, to 10⁻¹¹; from 32 on by Euler and Maclaurin.
@@ -149,6 +169,14 @@ impl Prior {
     pub fn sway(&self) -> f64 {
         let all = (self.lags.end - self.lags.start).max(1) as f64;
         log(1.0 + all / harmonic(all))
+    }
+
+    /// The lags at which neighbours lead to expect light, ascending, each once.
+    pub fn expected_lags(&self) -> Vec<i64> {
+        let mut lags: Vec<i64> = self.peaks.iter().map(|(lag, _)| *lag).collect();
+        lags.sort_unstable();
+        lags.dedup();
+        lags
     }
 
     /// The lags that have a probability.

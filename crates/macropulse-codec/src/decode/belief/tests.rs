@@ -133,6 +133,14 @@ fn no_more_marks_than_chance_gives_are_no_evidence() {
 }
 
 #[test]
+fn the_logarithm_of_gamma_is_that_of_a_reference() {
+    for x in (1..4000).map(|step| 0.25 * f64::from(step)).chain([1e4, 1e6, 1e9]) {
+        let (found, reference) = (log_gamma(x), lgamma(x));
+        assert!((found - reference).abs() <= 1e-11 * (1.0 + reference.abs()), "{x}: {found}");
+    }
+}
+
+#[test]
 fn harmonic_numbers_are_sums() {
     let mut sum = 0.0;
     for n in 1..=2000 {

@@ -9,9 +9,9 @@
 //!    ([`residual`]), and a prior made from fuller returns of the shots beside it.
 //! 3. A hypothesis stands for its sidelobes, too: it is judged at the best lag of those whose light overlaps with its
 //!    own. It is refused if its label is contradicted.
-//! 4. Each shot proposes the best of all its lags, if it is believed in light that neither returns nor earlier proposals
-//!    of the shot explain. [`search`] finds it. So a shot has done with its light after some proposals, and a part of
-//!    refused light is no return.
+//! 4. Each shot proposes its best lag, if it is believed in light that neither returns nor earlier proposals of the shot
+//!    explain. [`search`] finds it: near the lags that neighbours lead to expect, and if no shot has one there, of all
+//!    lags. A shot has done with its light after some proposals, and a part of refused light is no return.
 //! 5. Steps 2 to 4 are repeated until no shot proposes anything. A shot is searched again if returns have changed where
 //!    its light may be.
 //!
@@ -48,6 +48,9 @@ const MOST_HYPOTHESES: usize = 16;
 /// Gates of a block. The shots of the last one are judged again in the next block, and searched there.
 const GATES: i64 = 8;
 
+/// Lags to both sides of an expected one in which light is looked for first: as many as are counted at once.
+const EXPECTED: i64 = search::BLOCK / 2;
+
 /// Shots between one and its neighbour in a direction at most.
 const FARTHEST: usize = 64;
 
@@ -74,9 +77,11 @@ pub(super) struct Reference<'a> {
     proposed: Vec<Vec<i64>>,
     /// The verdicts, in the order in which they were given.
     verdicts: Vec<Verdict>,
-    /// Shots that are to be searched although no return has changed: those of which none was, and those that proposed
-    /// something when they were searched last.
-    is_due: Vec<bool>,
+    /// Which shots are to be searched, near expected lags and in all of the gate: those of which returns have changed
+    /// about their light since they were, and those that proposed something then.
+    is_due: [Vec<bool>; 2],
+    /// Where light of each shot was expected when it was searched last.
+    expected: Vec<Vec<i64>>,
     /// Returns when shots were searched last.
     known: BTreeSet<(usize, i64)>,
     counts: Counts<NARROW>,
@@ -158,7 +163,8 @@ impl<'a> Reference<'a> {
             found: vec![Vec::new(); shots],
             proposed: vec![Vec::new(); shots],
             verdicts: Vec::new(),
-            is_due: vec![true; shots],
+            is_due: [vec![true; shots], vec![true; shots]],
+            expected: vec![Vec::new(); shots],
             known: BTreeSet::new(),
             counts: Counts::default(),
             meter: Meter::new(sent, Photons::default()),
@@ -169,7 +175,7 @@ impl<'a> Reference<'a> {
     fn begin(&mut self, shots: Range<usize>, closed: usize) {
         let (sent, Range { start, end }) = (self.sent, shots.clone());
         self.field.cover(sent.arrival(start).start - sent.length()..sent.arrival(end - 1).end);
-        self.is_due[shots.clone()].fill(true);
+        self.is_due.iter_mut().for_each(|due| due[shots.clone()].fill(true));
         self.verdicts.clear();
         self.known.clear();
         (self.open, self.closed) = (shots, closed);
@@ -343,20 +349,56 @@ impl<'a> Reference<'a> {
         self.open.clone().flat_map(|shot| self.found[shot].iter().map(move |echo| (shot, echo.lag)))
     }
 
-    /// The best lag of `shot`, if it is believed in light that neither returns nor its own proposals explain.
-    fn propose_of(&mut self, shot: usize) -> Option<Hypothesis> {
-        let (prior, lags) = (self.prior(shot), self.sent.reach());
+    /// The best of some `lags` of `shot`, if it is believed in light that neither returns nor its own proposals explain.
+    fn propose_of(
+        &mut self,
+        shot: usize,
+        lags: &[Range<i64>],
+        prior: &Prior,
+    ) -> Option<Hypothesis> {
         let known = self.proposed[shot].clone();
         if known.len() == MOST_HYPOTHESES || self.sent.weight(shot) == 0 {
             return None;
         }
         let saved = known.iter().map(|lag| self.try_out(shot, *lag)).collect();
-        let question = Question { shot, lags, prior: &prior, least: self.threshold };
-        let best = self.search.best(&self.residual, &question);
+        let (search, residual, least) = (&mut self.search, &self.residual, self.threshold);
+        let best = Peak::best(lags.iter().filter_map(|lags| {
+            let question = Question { shot, lags: lags.clone(), prior, least };
+            search.best(residual, &question)
+        }));
         self.put_back(saved);
         let Peak { lag, .. } = best?;
         self.proposed[shot].push(lag);
         Some(self.hypothesis(shot, lag))
+    }
+
+    /// Notes which shots are to be searched as returns have changed about their light.
+    fn note_changes(&mut self) {
+        let now: BTreeSet<(usize, i64)> = self.returns().collect();
+        let changed = self.known.symmetric_difference(&now);
+        let changed: Vec<Range<i64>> =
+            changed.map(|(shot, lag)| self.residual.touched(*shot, *lag)).collect();
+        self.known = now;
+        for shot in self.open.start..self.closed {
+            let arrival = self.sent.arrival(shot);
+            let is_near = |span: &Range<i64>| span.start < arrival.end && arrival.start < span.end;
+            if changed.iter().any(is_near) {
+                self.is_due.iter_mut().for_each(|due| due[shot] = true);
+            }
+        }
+    }
+
+    /// Where light of a shot is expected, as stretches of lags.
+    fn stretches(expected: &[i64]) -> Vec<Range<i64>> {
+        let mut stretches: Vec<Range<i64>> = Vec::new();
+        for lag in expected {
+            let stretch = lag - EXPECTED..lag + EXPECTED;
+            match stretches.last_mut() {
+                Some(last) if stretch.start <= last.end => last.end = stretch.end,
+                _ => stretches.push(stretch),
+            }
+        }
+        stretches
     }
 }
 
@@ -364,7 +406,7 @@ impl Light for Reference<'_> {
     fn restore(&mut self, kept: usize) -> usize {
         // A verdict on a label may depend on what its shot proposed since.
         let stands =
-            |verdict: &&Verdict| verdict.label == Label::Fits || !self.is_due[verdict.shot];
+            |verdict: &&Verdict| verdict.label == Label::Fits || !self.is_due[0][verdict.shot];
         let kept = self.verdicts.iter().take(kept).take_while(stands).count();
         self.verdicts.truncate(kept);
         self.residual.restore(&self.field);
@@ -400,20 +442,33 @@ impl Light for Reference<'_> {
         self.verdicts.push(verdict);
     }
 
+    /// Light where neighbours lead to expect it comes first, as what it explains need not be searched through.
     fn propose(&mut self) -> Vec<Hypothesis> {
-        let now: BTreeSet<(usize, i64)> = self.returns().collect();
-        let changed = self.known.symmetric_difference(&now);
-        let changed: Vec<Range<i64>> =
-            changed.map(|(shot, lag)| self.residual.touched(*shot, *lag)).collect();
-        self.known = now;
+        self.note_changes();
+        let reach = self.sent.reach();
         let mut proposals = Vec::new();
-        for shot in self.open.start..self.closed {
-            let arrival = self.sent.arrival(shot);
-            let is_near = |span: &Range<i64>| span.start < arrival.end && arrival.start < span.end;
-            if self.is_due[shot] || changed.iter().any(is_near) {
-                let proposal = self.propose_of(shot);
-                self.is_due[shot] = proposal.is_some();
-                proposals.extend(proposal);
+        for everywhere in [false, true] {
+            for shot in self.open.start..self.closed {
+                let prior = self.prior(shot);
+                let lags = match everywhere {
+                    true => vec![reach.clone()],
+                    false => {
+                        let expected = prior.expected_lags();
+                        let lags = Self::stretches(&expected);
+                        let before = std::mem::replace(&mut self.expected[shot], expected);
+                        self.is_due[0][shot] |= before != self.expected[shot];
+                        lags
+                    }
+                };
+                if std::mem::take(&mut self.is_due[usize::from(everywhere)][shot])
+                    && let Some(proposal) = self.propose_of(shot, &lags, &prior)
+                {
+                    self.is_due.iter_mut().for_each(|due| due[shot] = true);
+                    proposals.push(proposal);
+                }
+            }
+            if !proposals.is_empty() {
+                break;
             }
         }
         proposals

@@ -181,8 +181,23 @@ impl<'a> Residual<'a> {
     /// All the light of `shot`.
     pub fn gate(&self, shot: usize) -> Gate {
         let span = self.sent.arrival(shot);
-        let free = span.end - span.start - i64::from(self.claimed.count(span.clone()));
-        Gate { shot, ticks: self.left.count(span), places: free as f64 }
+        let [ticks, taken] = [(0, &self.left), (1, &self.claimed)]
+            .map(|(counts, of)| self.count_with_cells(&self.in_cells[counts], of, &span));
+        let free = span.end - span.start - i64::from(taken);
+        Gate { shot, ticks, places: free as f64 }
+    }
+
+    /// What is lit of a timeline in `span`, of which the `counts` of cells are known.
+    fn count_with_cells(&self, counts: &[u32], of: &Timeline, span: &Range<i64>) -> u32 {
+        let (begin, ticks) = (self.extent.start, 64 * self.cell as i64);
+        let first = (span.start - begin + ticks - 1).div_euclid(ticks).max(0) as usize;
+        let end = ((span.end - begin).div_euclid(ticks).max(0) as usize).min(counts.len());
+        if first >= end {
+            return of.count(span.clone());
+        }
+        let tick = |cell: usize| begin + cell as i64 * ticks;
+        let whole: u32 = counts[first..end].iter().sum();
+        whole + of.count(span.start..tick(first)) + of.count(tick(end)..span.end)
     }
 
     /// The marks of a shot at `lag` that no return claims, and the light about them. `places` are the ticks from the

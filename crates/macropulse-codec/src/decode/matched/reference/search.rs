@@ -16,10 +16,10 @@ use super::residual::{Gate, Residual, Sums};
 use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::matched::track::below;
 use crate::decode::threshold::fewest;
-use crate::kernels::{Counts, WIDE, and, is_dark, places_of, with_enough};
+use crate::kernels::{Counts, WIDE, and, is_dark, places_of};
 
 /// Lags that are counted at once.
-const BLOCK: i64 = 64 * WIDE as i64;
+pub(super) const BLOCK: i64 = 64 * WIDE as i64;
 
 /// A lag of a shot and what speaks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,7 +145,6 @@ impl Search {
         let (first, last) = (sent.fired[shot] + lags.start, sent.fired[shot] + lags.end);
         residual.sum_up(&(first..last + sent.takes_up()), &mut self.sums);
         let coarse = gate.coarse();
-        let farthest = self.places.last().copied().unwrap_or(0);
         let in_group = (sent.takes_up() / 2 / BLOCK).max(1) * BLOCK;
         for group in lags.clone().step_by(in_group as usize) {
             let group = group..(group + in_group).min(lags.end);
@@ -159,19 +158,12 @@ impl Search {
                 let bound = self.bound((residual, &coarse), &block, least - most);
                 let Some((mut fewest, of_all)) = bound else { continue };
                 let (lit, at) = residual.lit().at(start);
-                let mut hits = [0; WIDE];
-                with_enough::<WIDE>(
-                    lit,
-                    at as u32,
-                    (&self.places, farthest),
-                    fewest.lit,
-                    &mut hits,
-                );
-                hits = below(block.end - first, hits, true);
+                self.lit.count(lit, at as u32, sent.word(shot), sent.lit_bits(shot));
+                let mut hits = below(block.end - first, [u64::MAX; WIDE], true);
+                hits = and(hits, self.lit.at_least(fewest.lit));
                 if is_dark(&hits) {
                     continue;
                 }
-                self.lit.count(lit, at as u32, sent.word(shot), sent.lit_bits(shot));
                 let (open, at) = residual.open().at(start);
                 self.open.count(open, at as u32, sent.word(shot), sent.lit_bits(shot));
                 loop {
@@ -214,10 +206,15 @@ impl Search {
 
     /// Fewest marks of a shot for so many `nats` of evidence, with so many `ticks` at least in its light.
     fn fewest(&mut self, (residual, gate): (&Residual, &Gate), nats: f64, ticks: u32) -> Fewest {
-        let kept = u32::BITS - 2;
-        let shift = kept.saturating_sub(ticks.leading_zeros());
+        // The first bits of each number count: two of the ticks, four of the nats where these are many.
+        let first_bits = |number: u32, bits: u32| {
+            let shift = (u32::BITS - bits).saturating_sub(number.leading_zeros());
+            number >> shift << shift
+        };
         let weight = residual.sent.weight(gate.shot);
-        let (nats, ticks) = (nats.floor() as i32, ticks >> shift << shift);
+        let nats = nats.floor() as i32;
+        let nats = if nats > 0 { first_bits(nats as u32, 4) as i32 } else { nats };
+        let ticks = first_bits(ticks, 2);
         let asked = Asked { nats, ticks, weight, gate: gate.key() };
         if let Some((_, fewest)) = self.last.filter(|(last, _)| *last == asked) {
             return fewest;

@@ -28,7 +28,9 @@ struct Plain<'a> {
     claimed: Vec<bool>,
     found: Vec<Vec<i64>>,
     proposed: Vec<Vec<i64>>,
-    is_due: Vec<bool>,
+    /// Shots to search near expected lags, and in all of the gate.
+    is_due: [Vec<bool>; 2],
+    expected: Vec<BTreeSet<i64>>,
     known: BTreeSet<(usize, i64)>,
 }
 
@@ -40,8 +42,9 @@ impl<'a> Plain<'a> {
         let (claimed, left) = (vec![false; seen.len()], seen.clone());
         let (none, threshold) = (vec![vec![]; shots], -sent.correlation.false_alarm.ln());
         let (found, proposed, known) = (none.clone(), none, BTreeSet::new());
-        let is_due = vec![true; shots];
-        Self { sent, threshold, seen, left, claimed, found, proposed, is_due, known }
+        let (is_due, expected) =
+            ([vec![true; shots], vec![true; shots]], vec![BTreeSet::new(); shots]);
+        Self { sent, threshold, seen, left, claimed, found, proposed, is_due, expected, known }
     }
 
     fn count(of: &[bool], span: Range<i64>) -> u32 {
@@ -103,6 +106,11 @@ impl<'a> Plain<'a> {
     }
 
     fn prior(&self, shot: usize) -> Prior {
+        Prior::new(self.sent.reach(), &self.neighbours(shot))
+    }
+
+    /// Where neighbours lead to expect light of `shot`.
+    fn neighbours(&self, shot: usize) -> Vec<i64> {
         let (rows, columns) = (&self.sent.log.row, &self.sent.log.column);
         let mut lags = Vec::new();
         for [same, other] in [[rows, columns], [columns, rows]] {
@@ -132,7 +140,7 @@ impl<'a> Plain<'a> {
                 }
             }
         }
-        Prior::new(self.sent.reach(), &lags)
+        lags
     }
 
     /// The lag with the highest odds of those given, the nearest of several, if it is believed.
@@ -233,34 +241,57 @@ impl Light for Plain<'_> {
             .collect();
         self.known = now;
         let (width, length) = (i64::from(self.sent.width), self.sent.takes_up());
-        let mut proposals = Vec::new();
         for shot in 0..self.found.len() {
             let arrival = self.sent.arrival(shot);
             let is_near = |start: &i64| {
                 start - width / 2 - width < arrival.end
                     && arrival.start < start + length + width / 2
             };
-            let is_due = self.is_due[shot] || changed.iter().any(is_near);
-            self.is_due[shot] = false;
-            if !is_due || self.sent.weight(shot) == 0 {
-                continue;
+            if changed.iter().any(is_near) {
+                self.is_due.iter_mut().for_each(|due| due[shot] = true);
             }
-            let saved = (self.left.clone(), self.claimed.clone());
-            for lag in self.proposed[shot].clone() {
-                self.explain(shot, lag);
+        }
+        let mut proposals = Vec::new();
+        for stage in 0..2 {
+            for shot in 0..self.found.len() {
+                let (prior, reach) = (self.prior(shot), self.sent.reach());
+                let last = reach.end - 1;
+                let expected: BTreeSet<i64> = self
+                    .neighbours(shot)
+                    .iter()
+                    .map(|lag| (*lag).clamp(reach.start, last))
+                    .collect();
+                if stage == 0 && expected != self.expected[shot] {
+                    self.expected[shot].clone_from(&expected);
+                    self.is_due[0][shot] = true;
+                }
+                let is_due = std::mem::take(&mut self.is_due[stage][shot]);
+                if !is_due || self.sent.weight(shot) == 0 || self.proposed[shot].len() == 16 {
+                    continue;
+                }
+                let saved = (self.left.clone(), self.claimed.clone());
+                for lag in self.proposed[shot].clone() {
+                    self.explain(shot, lag);
+                }
+                let is_near = |lag: &i64| {
+                    stage == 1
+                        || expected.iter().any(|at| (at - EXPECTED..at + EXPECTED).contains(lag))
+                };
+                let best = self.best(shot, reach.filter(is_near), &prior);
+                (self.left, self.claimed) = saved;
+                if let Some(lag) = best {
+                    let places = self.places(shot, lag);
+                    let lit =
+                        places.iter().filter(|place| self.is_lit(&self.seen, **place)).count();
+                    let marks = Marks { lit: lit as u32, of: self.sent.weight(shot) };
+                    self.is_due.iter_mut().for_each(|due| due[shot] = true);
+                    self.proposed[shot].push(lag);
+                    proposals.push(Hypothesis { shot, lag, marks });
+                }
             }
-            let (prior, reach) = (self.prior(shot), self.sent.reach());
-            if self.proposed[shot].len() < 16
-                && let Some(lag) = self.best(shot, reach, &prior)
-            {
-                let places = self.places(shot, lag);
-                let lit = places.iter().filter(|place| self.is_lit(&self.seen, **place)).count();
-                let marks = Marks { lit: lit as u32, of: self.sent.weight(shot) };
-                self.is_due[shot] = true;
-                self.proposed[shot].push(lag);
-                proposals.push(Hypothesis { shot, lag, marks });
+            if !proposals.is_empty() {
+                break;
             }
-            (self.left, self.claimed) = saved;
         }
         proposals
     }
