@@ -27,7 +27,7 @@ const EULER: f64 = 0.577_215_664_901_532_9;
 
 /// Marks of a hypothesis that no fuller return claims.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Marks {
+pub struct Marks {
     /// Marks that are lit, k.
     pub lit: u32,
     /// All of them, n.
@@ -44,7 +44,7 @@ impl Marks {
 
 /// The light that no return explains and that chance may light marks with.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Surroundings {
+pub struct Surroundings {
     /// Lit places about the marks, t.
     pub lit: f64,
     /// All places about the marks, m.
@@ -81,7 +81,7 @@ impl Surroundings {
 /// max(1, d/d₀)·e⁻ˣ; a test sums it up. To put a mean density into E instead saves 1 to 2 nats and has no such bound.
 ///
 /// Light adds marks: no more lit ones than chance gives, k/n ≤ (t + 1)/(m + 1/d₀), are no evidence at all, −∞.
-pub(super) fn evidence(marks: Marks, around: &Surroundings) -> f64 {
+pub fn evidence(marks: Marks, around: &Surroundings) -> f64 {
     match f64::from(marks.lit) > f64::from(marks.of) * around.mean() {
         true => log_factor(marks, around),
         false => f64::NEG_INFINITY,
@@ -135,7 +135,7 @@ fn harmonic(n: f64) -> f64 {
 /// A peak has no width: each octave of distance is about as likely as the next. Without neighbours the prior is
 /// uniform. Neighbours must not depend on the light of the shot.
 #[derive(Debug, Clone)]
-pub(super) struct Prior {
+pub struct Prior {
     lags: Range<i64>,
     /// The uniform part.
     even: f64,
@@ -199,7 +199,7 @@ impl Prior {
 }
 
 /// The threshold ln(1/α) for `false_alarm` false returns accepted per shot.
-pub(super) fn threshold(false_alarm: f64) -> f64 {
+pub fn threshold(false_alarm: f64) -> f64 {
     -log(false_alarm)
 }
 

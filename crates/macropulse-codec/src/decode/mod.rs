@@ -1,9 +1,9 @@
 //! Ticks, samples or histograms to returns: the receiver. It sees these and the shot log, never the scene.
 
+pub mod belief;
 pub mod histogram;
 
 mod balanced;
-mod belief;
 mod beyond;
 mod bitwise;
 mod check;
@@ -31,6 +31,8 @@ pub use sampled::{
     CancelledEcho, Coupling, Light, MarkSeen, MarkState, Refusal, STEPS_OF_TICK, Sampled,
     SampledExplanation, Sampling, Tested,
 };
+
+use std::ops::Range;
 
 use serde::Deserialize;
 
@@ -282,6 +284,14 @@ impl Receiver {
     /// If a setting is outside its limits, or the code words are not understood or too long.
     pub fn check(&self, codebook: &Codebook) -> Result<(), Error> {
         check::settings(self, codebook)
+    }
+
+    /// The lags at which a receiver that correlates ticks looks for light of macropulses of `length` ticks: those of the
+    /// gate, and all beyond it from which light may come, a macropulse farther at least.
+    pub fn lags_of_light(&self, correlation: &Correlation, length: i64) -> Range<i64> {
+        let (nearest, farthest) = self.gate_ticks;
+        let end = i64::from(correlation.light_ticks).max(i64::from(farthest) + length) + 1;
+        (i64::from(nearest) - length).max(0)..end
     }
 
     /// For how many ticks from its earliest place on a mark is looked for.

@@ -172,15 +172,17 @@ impl Figures<'_> {
                 aside.rms * 1e3
             );
         }
-        let otherwise = match method {
-            Method::Matched(_, Effort::Quick) => Some("a quick one finds fewer"),
-            Method::Matched(_, Effort::Exhaustive) => Some("an exhaustive one finds more"),
+        let of_which = match method {
+            Method::Matched(_, Effort::Quick) => Some(
+                "that of receiver.effort = \"thorough\": a quick one finds fewer so faint shots",
+            ),
+            Method::Matched(_, Effort::Exhaustive) => {
+                Some("that of a target all around: where few shots meet it, fewer are found")
+            }
             _ => None,
         };
-        if let Some(otherwise) = otherwise.filter(|_| self.there.pd < LIKELY) {
-            text += &format!(
-                "  Pd is that of receiver.effort = \"thorough\": {otherwise} so faint shots\n"
-            );
+        if let Some(of_which) = of_which.filter(|_| self.there.pd < LIKELY) {
+            text += &format!("  Pd is {of_which}\n");
         }
         text
     }

@@ -7,12 +7,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use macropulse_codec::RecordKind;
-use macropulse_codec::decode::{self, Method};
+use macropulse_codec::decode::{self, Effort, Method};
 
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
-use super::{balanced, histogram, matched, sampled};
+use super::{balanced, belief, histogram, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
 use crate::design::{Design, Detector};
@@ -269,6 +269,10 @@ impl<'a> Forecaster<'a> {
         let efficiency = design.efficiency();
         let found = matched::Found { seen: mark_pd, density, false_density };
         let chances = match &design.receiver.method {
+            Method::Matched(correlation, Effort::Exhaustive) => {
+                let lag = (tof_from_range(range) / s_from_fs(design.clock.tick_fs)) as i64;
+                belief::chances(design, correlation, &self.weights, (&found, lag))
+            }
             Method::Matched(correlation, _) => {
                 matched::chances(design, correlation, &self.weights, &found)
             }

@@ -2,6 +2,7 @@
 
 pub mod comparison;
 mod balanced;
+mod belief;
 pub mod converters;
 mod forecast;
 mod histogram;

@@ -165,7 +165,7 @@ impl<'a> Sent<'a> {
     ) -> Self {
         let (codebook, log) = sent;
         let fired = receiver.fired_since(log, epoch);
-        let &Correlation { ticks_per_chip, light_ticks, jitter_ticks, .. } = correlation;
+        let &Correlation { ticks_per_chip, jitter_ticks, .. } = correlation;
         let width = window(jitter_ticks);
         let words = words.of(codebook, ticks_per_chip, width);
         let weight = |(label, word): (&u16, &u16)| {
@@ -176,11 +176,8 @@ impl<'a> Sent<'a> {
         let length = i64::from(codebook.chips()) * i64::from(ticks_per_chip);
         let bit_length = length / bits;
         let bits_about = (0..3 * bits).map(|bit| (bit * bit_length) as u32).collect();
-        let (nearest, farthest) = receiver.gate_ticks;
-        let end = i64::from(light_ticks).max(i64::from(farthest) + length) + 1;
-        let reach = (i64::from(nearest) - length).max(0)..end;
         Self {
-            reach,
+            reach: receiver.lags_of_light(correlation, length),
             receiver,
             correlation,
             effort,

@@ -1,0 +1,221 @@
+//! What the exhaustive receiver makes of ticks, in closed form.
+//!
+//! It believes in a shot if evidence and prior reach a threshold, [`belief`]. Of N marks k ~ Bin(N, p) are lit. All shots
+//! meet the same range. Two things depend on which other shots are found:
+//!
+//! * **Neighbours.** A return beside a shot makes its lag likelier. With F, the share of all shots that are fuller and
+//!   found, one of the M shots about is a neighbour with the probability 1 − (1 − F)^M.
+//! * **Light of other shots** in the gate is explained if they are fuller and found. The rest of it is chance, as noise is.
+//!
+//! So shots are gone through in the order of their fullness, as the receiver judges them.
+
+use std::collections::BTreeMap;
+
+use macropulse_codec::decode::Correlation;
+use macropulse_codec::decode::belief::{self, Marks, Prior, Surroundings};
+use macropulse_codec::statistics::{binomial, poisson};
+
+use super::matched::{Chances, Found, Place};
+use crate::design::Design;
+use crate::units::s_from_fs;
+
+/// Shots about one whose returns are known when it is judged: 64 before it and 64 behind it in its row.
+const ABOUT: i32 = 128;
+
+/// Share of all shots that are gone through at once, at most.
+const PART: f64 = 0.02;
+
+/// Shots of which fewer are as full do not count.
+const SELDOM: f64 = 1e-9;
+
+/// Fewest ticks of a lump: where all shots have as many marks, ticks are more even than Poisson's law has them.
+const SMALLEST_LUMP: f64 = 0.1;
+
+/// Numbers of ticks that stand for all that Poisson's law gives.
+const NODES: usize = 12;
+
+/// What the shots of a sensor meet, and the numbers that the rule of belief takes.
+struct Gate {
+    /// Ticks that the light of a shot takes up.
+    length: f64,
+    /// Places in which all light of a shot may be.
+    places: f64,
+    /// Ticks of a place.
+    ticks: f64,
+    /// False ticks per place, on average.
+    false_ticks: f64,
+    /// Other shots whose light is in a gate and in a macropulse, on average.
+    others: [f64; 2],
+    /// Evidence that a shot needs without a neighbour, and with one.
+    needed: [f64; 2],
+}
+
+/// Shots that are as full as each other.
+struct Level {
+    /// Their marks, and how many are lit.
+    marks: u32,
+    lit: u32,
+    /// Their share of all shots.
+    share: f64,
+}
+
+impl Level {
+    fn fullness(&self) -> f64 {
+        f64::from(self.lit) / f64::from(self.marks)
+    }
+}
+
+/// Ticks of a shot that no return explains.
+struct Hidden {
+    mean: f64,
+    /// Of their square.
+    mean_square: f64,
+}
+
+impl Hidden {
+    /// All ticks of the shots of all `levels`.
+    fn of(levels: &[Level]) -> Self {
+        let mut all = Self { mean: 0.0, mean_square: 0.0 };
+        levels.iter().for_each(|level| all.explain(level, -level.share));
+        all
+    }
+
+    /// Explains those of so large a `share` of the shots, which are of this `level`.
+    fn explain(&mut self, level: &Level, share: f64) {
+        let lit = f64::from(level.lit);
+        self.mean -= share * lit;
+        self.mean_square -= share * lit * lit;
+    }
+
+    fn variance(&self) -> f64 {
+        (self.mean_square - self.mean * self.mean).max(0.0)
+    }
+}
+
+/// What comes of shots that meet a range after `lag` ticks, by the marks of labels, of which so many have so many.
+pub(super) fn chances(
+    design: &Design,
+    correlation: &Correlation,
+    weights: &BTreeMap<usize, usize>,
+    (found, lag): (&Found, i64),
+) -> Chances {
+    let mut levels = Vec::new();
+    let labels: usize = weights.values().sum();
+    for (&marks, &count) in weights {
+        let of_label = count as f64 / labels as f64;
+        for (lit, chance) in (0..).zip(binomial(marks, found.seen)) {
+            let share = of_label * chance;
+            if lit > 0 && share > SELDOM {
+                levels.push(Level { marks: marks as u32, lit, share });
+            }
+        }
+    }
+    levels.sort_by(|one, other| other.fullness().total_cmp(&one.fullness()));
+    let gate = Gate::of(design, correlation, found, lag);
+    let mut hidden = Hidden::of(&levels);
+    let (mut pd, mut share_found): (f64, f64) = (0.0, 0.0);
+    for level in levels {
+        // As full ones are judged one after the other, too.
+        let parts = (level.share / PART).ceil();
+        for _ in 0..parts as u32 {
+            let [alone, beside] = gate.believed(&level, &hidden);
+            let neighbour = 1.0 - (1.0 - pd.min(1.0)).powi(ABOUT);
+            let believed = level.share / parts * (alone + (beside - alone) * neighbour);
+            pd += believed;
+            share_found += believed * level.fullness();
+            hidden.explain(&level, believed);
+        }
+    }
+    let found = if pd > 0.0 { share_found / pd } else { 0.0 };
+    Chances { pd: pd.min(1.0), false_per_shot: correlation.false_alarm, found }
+}
+
+impl Gate {
+    fn of(design: &Design, correlation: &Correlation, found: &Found, lag: i64) -> Self {
+        let Design { receiver, emission, scan, clock, .. } = design;
+        let chips = i64::from(emission.coding().codebook.chips());
+        let macropulse = chips * i64::from(correlation.ticks_per_chip);
+        let lags = receiver.lags_of_light(correlation, macropulse);
+        let ticks = Place::ticks(design);
+        let length = macropulse as f64 + ticks - 1.0;
+        let places = (lags.end - lags.start) as f64 + length;
+        let period = scan.shortest_period() / s_from_fs(clock.tick_fs);
+        let others = [places, length].map(|time| (time / period - 1.0).max(0.0));
+        let threshold = belief::threshold(correlation.false_alarm);
+        let needed = [&[][..], &[lag]]
+            .map(|beside: &[i64]| threshold - Prior::new(lags.clone(), beside).at(lag));
+        let false_ticks = -libm::log1p(-found.false_density.min(0.999)) / ticks;
+        Self { length, places, ticks, false_ticks, others, needed }
+    }
+
+    /// Probabilities that shots of a `level` are believed without a neighbour and with one, where of other shots so much
+    /// is `hidden`.
+    fn believed(&self, level: &Level, hidden: &Hidden) -> [f64; 2] {
+        let [in_gate, about] = self.others;
+        let ticks = |time: f64, shots: f64| {
+            let noise = time * self.false_ticks;
+            nodes(noise + shots * hidden.mean, noise + shots * hidden.variance())
+        };
+        let rest = ticks(self.places - self.length, in_gate - about);
+        let about = ticks(self.length, about);
+        let marks = Marks { lit: level.lit, of: level.marks };
+        let places = (self.length - f64::from(level.marks) * self.ticks).max(0.0) / self.ticks;
+        let mut believed = [0.0; 2];
+        for (lit, of_lit) in about {
+            for (rest, of_rest) in &rest {
+                let density = ((lit + rest + 1.0) * self.ticks / self.places).min(0.5);
+                let around = Surroundings { lit: lit.min(places), places, density };
+                let evidence = belief::evidence(marks, &around);
+                for (sum, needed) in believed.iter_mut().zip(self.needed) {
+                    *sum += if evidence >= needed { of_lit * of_rest } else { 0.0 };
+                }
+            }
+        }
+        believed
+    }
+}
+
+/// Numbers of ticks, ascending, and the probability of each, that stand for a distribution with this `mean` and
+/// `variance`: of lumps whose number follows Poisson's law, variance/mean ticks each.
+fn nodes(mean: f64, variance: f64) -> Vec<(f64, f64)> {
+    let lump = if mean > 0.0 { (variance / mean).max(SMALLEST_LUMP) } else { 1.0 };
+    let lumps = mean.max(0.0) / lump;
+    let wide = 5.0 * lumps.sqrt() + 5.0;
+    let (first, last) = ((lumps - wide).max(0.0) as u32, (lumps + wide) as u32);
+    let chance = |count: u32| match lumps > 0.0 {
+        true => poisson(lumps, count.into()),
+        false => f64::from(u8::from(count == 0)),
+    };
+    let all: Vec<(f64, f64)> = (first..=last).map(|count| (count.into(), chance(count))).collect();
+    let sum: f64 = all.iter().map(|(_, chance)| chance).sum();
+    let groups = all.chunks(all.len().div_ceil(NODES));
+    let group = |group: &[(f64, f64)]| {
+        let chance: f64 = group.iter().map(|(_, chance)| chance).sum();
+        let mean: f64 = group.iter().map(|(count, chance)| count * chance).sum();
+        (chance > 0.0).then(|| (lump * mean / chance, chance / sum))
+    };
+    groups.filter_map(group).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// The mean is kept, and the variance to 10 %, by no more nodes than there are.
+    #[test]
+    fn nodes_have_the_mean_and_the_variance_asked_for() {
+        for (mean, variance) in [(0.3, 0.3), (4.0, 4.0), (60.0, 60.0), (250.0, 800.0)] {
+            let nodes = nodes(mean, variance);
+            let sum = |of: &dyn Fn(f64) -> f64| -> f64 {
+                nodes.iter().map(|(ticks, chance)| of(*ticks) * chance).sum()
+            };
+            assert!(nodes.len() <= NODES);
+            assert_relative_eq!(sum(&|_| 1.0), 1.0, max_relative = 1e-9);
+            assert_relative_eq!(sum(&|ticks| ticks), mean, max_relative = 1e-6);
+            let found = sum(&|ticks| (ticks - mean).powi(2));
+            assert_relative_eq!(found, variance, max_relative = 0.1);
+        }
+        assert_eq!(nodes(0.0, 0.0), [(0.0, 1.0)]);
+    }
+}
