@@ -18,7 +18,7 @@
 //! As soon as the returns about a shot are known, its lag is the best one by the prior of all of them, if it has a single
 //! return.
 //!
-//! The shots of a band are decoded in blocks. A block has the shots of [`GATES`] gates and all that were in flight before.
+//! The shots of a band are decoded in blocks. A block has the shots of some gates and all that were in flight before.
 //! A shot is searched and settled when no later light overlaps with its own. What is settled stays, and claims light of
 //! the next block first. The end of a block can change a verdict only where light of a shot behind it overlaps with that
 //! of a settled shot, and the quick receiver has not found it.
@@ -45,8 +45,10 @@ use search::{Peak, Question, Search};
 /// Hypotheses of a shot at most. It bounds the time that a hostile band takes.
 const MOST_HYPOTHESES: usize = 16;
 
-/// Gates of a block. The shots of the last one are judged again in the next block, and searched there.
+/// Gates of a block, if they have no more ticks than [`BLOCK_TICKS`]; two at least. The shots of the last one are judged
+/// again in the next block, and searched there.
 const GATES: i64 = 8;
+const BLOCK_TICKS: i64 = 1 << 25;
 
 /// Lags to both sides of an expected one in which light is looked for first: as many as are counted at once.
 const EXPECTED: i64 = search::BLOCK / 2;
@@ -125,7 +127,7 @@ pub(super) fn decode(sent: &Sent, ticks: &[u32], likely: &[(usize, i64)]) -> Ret
     let mut hypotheses: Vec<Hypothesis> = Vec::new();
     let (shots, mut first) = (sent.fired.len(), 0);
     while first < shots {
-        let block = first..sent.end_of_block(first, GATES);
+        let block = first..sent.end_of_block(first, gates(sent));
         first = block.end;
         let settled = reference.open.start;
         let closed = settled..if first == shots { shots } else { sent.in_flight_before(first) };
@@ -145,7 +147,7 @@ impl<'a> Reference<'a> {
     fn new(sent: &'a Sent<'a>, ticks: &'a [u32]) -> Self {
         let shots = sent.fired.len();
         let arrival = sent.arrival(0);
-        let length = (GATES + 2) * (arrival.end - arrival.start) + 3 * sent.length();
+        let length = (gates(sent) + 2) * (arrival.end - arrival.start) + 3 * sent.length();
         let begin = arrival.start - sent.length();
         let memory = field::Memory::default();
         let (rows, columns) = (&sent.log.row, &sent.log.column);
@@ -473,6 +475,12 @@ impl Light for Reference<'_> {
         }
         proposals
     }
+}
+
+/// Gates of a block.
+fn gates(sent: &Sent) -> i64 {
+    let arrival = sent.arrival(0);
+    (BLOCK_TICKS / (arrival.end - arrival.start)).clamp(2, GATES)
 }
 
 /// The next shot behind each one, by those `before`.

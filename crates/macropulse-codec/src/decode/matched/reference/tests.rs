@@ -336,7 +336,7 @@ proptest! {
         let (ticks, _) = sensor.ticks(&log, weather, seed);
         let receiver = sensor.set_to(Effort::Exhaustive, sensor.correlation(jitter));
         let sent = sensor.sent(&receiver, &log);
-        prop_assume!(sent.end_of_block(0, GATES) == 6);
+        prop_assume!(sent.end_of_block(0, gates(&sent)) == 6);
         let mut reference = Reference::new(&sent, &ticks.tick);
         reference.begin(0..6, 6);
         let mut plain = Plain::new(&sent, &ticks.tick);
