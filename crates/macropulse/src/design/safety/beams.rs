@@ -126,6 +126,32 @@ impl Field for LineBeams<'_> {
         aims
     }
 
+    fn grazed(&self, aim: Aim, gap: f64) -> Vec<Aim> {
+        let (reach, mut aims) = (self.reach(), Vec::new());
+        let mut near = 0;
+        for number in self.rows_within(aim.elevation, reach + gap) {
+            let row = &self.lines.rows[number];
+            for column in self.columns_within(row, aim, reach + gap).into_iter().flatten() {
+                near += 1;
+                if near > FEW {
+                    return Vec::new();
+                }
+                let azimuth = row.first - self.lines.step * f64::from(column);
+                let aside = libm::remainder(azimuth - aim.azimuth, TAU);
+                let up = row.elevation - aim.elevation;
+                let apart = libm::hypot(aside * libm::cos(aim.elevation), up);
+                if apart > reach {
+                    // A hair within the reach.
+                    let part = 1.0 - 0.999 * reach / apart;
+                    let (azimuth, elevation) =
+                        (aim.azimuth + part * aside, aim.elevation + part * up);
+                    aims.push(Aim { azimuth, elevation });
+                }
+            }
+        }
+        aims
+    }
+
     /// Near the ends of lines that go to and fro, where the aperture sees the end of one and the beginning
     /// of the next at once; of a turning head whose columns differ, all.
     fn across(&self, gap: f64) -> Vec<f64> {

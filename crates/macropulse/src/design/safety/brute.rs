@@ -301,11 +301,11 @@ fn drawn(number: u64) -> Design {
 }
 
 /// N = 200 sensors of all patterns, seeds 2000 to 2199, and some of which a search that began at the places of a
-/// grid alone allowed too much: 1.06, 1.02 and 1.03 times as much.
+/// grid alone allowed too much: 1.06, 1.02, 1.03, and 1.05 times as much, the last one for a shot that just grazes.
 #[test]
 fn no_place_of_a_grid_allows_less_than_the_search() {
     let over: Vec<(u64, f64)> = (2000..2200)
-        .chain([1, 498, 504])
+        .chain([1, 498, 504, 237])
         .map(|number| {
             let design = drawn(number);
             // Every other one behind a telescope.

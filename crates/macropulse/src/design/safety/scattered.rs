@@ -117,6 +117,11 @@ impl Field for Scattered<'_> {
         Vec::new()
     }
 
+    /// None: places are tried close to each other.
+    fn grazed(&self, _: Aim, _: f64) -> Vec<Aim> {
+        Vec::new()
+    }
+
     fn across(&self, _: f64) -> Vec<f64> {
         Vec::new()
     }

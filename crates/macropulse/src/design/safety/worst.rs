@@ -8,10 +8,11 @@
 //! 2. Where few beams cross at once, places that any two of them share are tried as well: these may be too small for
 //!    a grid.
 //! 3. The best places of each rule are refined in steps that are halved.
+//! 4. From the best place of each rule those nearby are tried that one more beam grazes: it brings next to no light, but
+//!    counts as an exposure, which C5 takes account of.
 //!
 //! What is found is the light at a real place, so the search can only miss light: it may allow more than the
-//! worst place there is. `brute.rs` holds it against a grid, to 2 %. One drawn sensor of 520 is known that it allows
-//! 5 % more.
+//! worst place there is. `brute.rs` holds it against a grid, to 2 %.
 
 use super::exposure::Crossing;
 
@@ -49,6 +50,9 @@ pub(super) trait Field {
     /// Places that two beams cross, for any two that can; none where so many beams cross an aperture that light
     /// hardly depends on the place.
     fn shared(&self) -> Vec<Aim>;
+
+    /// Places `gap` from `aim` at most that one more beam just crosses; none where many beams cross.
+    fn grazed(&self, aim: Aim, gap: f64) -> Vec<Aim>;
 
     /// Azimuths to try at the best elevations of these places; empty where they had all of interest.
     fn across(&self, gap: f64) -> Vec<f64>;
@@ -108,6 +112,7 @@ pub(super) fn worst(
         for best in search.finalists(rule, pitch) {
             search.refine(rule, best, pitch);
         }
+        search.graze(rule, gap);
     }
     let mut aims: Vec<Aim> = Vec::new();
     for (_, aim) in (0..RULES).filter_map(|rule| search.best(rule)) {
@@ -170,6 +175,17 @@ impl Search<'_> {
             }
         }
         chosen
+    }
+
+    /// Goes from the best place of `rule` to ones that one more beam grazes, as long as less is allowed there.
+    fn graze(&mut self, rule: usize, gap: f64) {
+        while let Some((best, aim)) = self.best(rule) {
+            let places = self.field.grazed(aim, gap);
+            let less = places.into_iter().any(|aim| self.at(aim)[rule] < best);
+            if !less || self.spent > 2 * self.field.effort() {
+                return;
+            }
+        }
     }
 
     /// Goes from a place to neighbours at which `rule` allows less, in steps that are halved.
