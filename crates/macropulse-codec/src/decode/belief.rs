@@ -11,9 +11,9 @@
 //! inequality chance makes any lag of a shot believed with a probability of α at most.
 //!
 //! Hypotheses compete for light. A return claims the places of its marks, and what it claims is evidence for no
-//! less full hypothesis: [`settle`]. Light may carry another label than the shot: [`contradiction`].
+//! less full hypothesis: `settle`. Light may carry another label than the shot: `contradiction`.
 //!
-//! This module knows neither ticks nor code words. A receiver tells it through [`Light`] what it counted.
+//! This module knows neither ticks nor code words. A receiver tells it through `Light` what it counted.
 
 use std::cmp::Ordering;
 use std::f64::consts::LN_2;
