@@ -261,8 +261,7 @@ impl PartialOrd for Hypothesis {
 
 /// The light of some shots, as hypotheses are asked about it.
 pub(super) trait Light {
-    /// Takes back the verdicts on all hypotheses but those judged first, of which `kept` stay at most. Tells how many
-    /// do.
+    /// Takes back verdicts: only those on the `kept` hypotheses that were judged first may stay. Returns how many stay.
     fn restore(&mut self, kept: usize) -> usize;
 
     /// Takes light of `hypothesis` for a return, if it is believed in what the returns taken so far leave.

@@ -216,9 +216,9 @@ struct Toy {
     /// The marks of each pair of shot and lag.
     marks: Vec<u64>,
     found: BTreeSet<(usize, i64)>,
-    /// What was judged, in this order.
+    /// The hypotheses that were judged, in the order of their verdicts.
     judged: Vec<Hypothesis>,
-    /// Whether verdicts are kept.
+    /// True if verdicts stay from round to round.
     keeps: bool,
     proposed: BTreeSet<(usize, i64)>,
     chance: ChaCha8Rng,

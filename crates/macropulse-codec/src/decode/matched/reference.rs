@@ -50,7 +50,7 @@ const MOST_HYPOTHESES: usize = 16;
 const GATES: i64 = 8;
 const BLOCK_TICKS: i64 = 1 << 25;
 
-/// Lags to both sides of an expected one in which light is looked for first: as many as are counted at once.
+/// Light is looked for first so many lags to both sides of an expected one: in all, as many as are counted at once.
 const EXPECTED: i64 = search::BLOCK / 2;
 
 /// Shots between one and its neighbour in a direction at most.
@@ -79,10 +79,10 @@ pub(super) struct Reference<'a> {
     proposed: Vec<Vec<i64>>,
     /// The verdicts, in the order in which they were given.
     verdicts: Vec<Verdict>,
-    /// Which shots are to be searched, near expected lags and in all of the gate: those of which returns have changed
-    /// about their light since they were, and those that proposed something then.
+    /// True for the shots that are to be searched: near expected lags, and in all of the gate. A shot is due again if it
+    /// proposes something, and if returns change about its light.
     is_due: [Vec<bool>; 2],
-    /// Where light of each shot was expected when it was searched last.
+    /// The lags at which neighbours lead to expect light of each shot.
     expected: Vec<Vec<i64>>,
     /// Returns when shots were searched last.
     known: BTreeSet<(usize, i64)>,
@@ -374,7 +374,7 @@ impl<'a> Reference<'a> {
         Some(self.hypothesis(shot, lag))
     }
 
-    /// Notes which shots are to be searched as returns have changed about their light.
+    /// Notes which shots are due: returns have changed about their light, or light of theirs is expected elsewhere.
     fn note_changes(&mut self) {
         let now: BTreeSet<(usize, i64)> = self.returns().collect();
         let changed = self.known.symmetric_difference(&now);
@@ -387,10 +387,13 @@ impl<'a> Reference<'a> {
             if changed.iter().any(is_near) {
                 self.is_due.iter_mut().for_each(|due| due[shot] = true);
             }
+            let expected = self.prior(shot).expected_lags();
+            self.is_due[0][shot] |= expected != self.expected[shot];
+            self.expected[shot] = expected;
         }
     }
 
-    /// Where light of a shot is expected, as stretches of lags.
+    /// The stretches of lags about the `expected` ones.
     fn stretches(expected: &[i64]) -> Vec<Range<i64>> {
         let mut stretches: Vec<Range<i64>> = Vec::new();
         for lag in expected {
@@ -451,20 +454,15 @@ impl Light for Reference<'_> {
         let mut proposals = Vec::new();
         for everywhere in [false, true] {
             for shot in self.open.start..self.closed {
-                let prior = self.prior(shot);
+                if !std::mem::take(&mut self.is_due[usize::from(everywhere)][shot]) {
+                    continue;
+                }
                 let lags = match everywhere {
                     true => vec![reach.clone()],
-                    false => {
-                        let expected = prior.expected_lags();
-                        let lags = Self::stretches(&expected);
-                        let before = std::mem::replace(&mut self.expected[shot], expected);
-                        self.is_due[0][shot] |= before != self.expected[shot];
-                        lags
-                    }
+                    false => Self::stretches(&self.expected[shot]),
                 };
-                if std::mem::take(&mut self.is_due[usize::from(everywhere)][shot])
-                    && let Some(proposal) = self.propose_of(shot, &lags, &prior)
-                {
+                let prior = self.prior(shot);
+                if let Some(proposal) = self.propose_of(shot, &lags, &prior) {
                     self.is_due.iter_mut().for_each(|due| due[shot] = true);
                     proposals.push(proposal);
                 }

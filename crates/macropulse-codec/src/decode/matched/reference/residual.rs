@@ -30,7 +30,7 @@ pub(super) struct Residual<'a> {
     widened: Vec<u64>,
 }
 
-/// Cells to a macropulse, about: in cells of 4 machine words at least.
+/// A cell is about so small a part of a macropulse: 1 to 64 machine words.
 const CELLS: i64 = 32;
 
 /// Ticks and places of one shot that are the same for all its lags.
@@ -187,7 +187,7 @@ impl<'a> Residual<'a> {
         Gate { shot, ticks, places: free as f64 }
     }
 
-    /// What is lit of a timeline in `span`, of which the `counts` of cells are known.
+    /// Counts the lit bits of a timeline in `span`. The `counts` are those of whole cells.
     fn count_with_cells(&self, counts: &[u32], of: &Timeline, span: &Range<i64>) -> u32 {
         let (begin, ticks) = (self.extent.start, 64 * self.cell as i64);
         let first = (span.start - begin + ticks - 1).div_euclid(ticks).max(0) as usize;
@@ -264,7 +264,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Of some sums, from one cell to another.
+    /// The difference of the `sums` at two cells.
     fn between(sums: &[u32], from: i64, to: i64) -> u32 {
         let last = sums.len() as i64 - 1;
         let before = |cell: i64| sums[cell.clamp(0, last) as usize];
@@ -298,18 +298,17 @@ impl Sums {
 }
 
 impl Gate {
-    /// A gate with no more ticks and no fewer places, of which there are few: three bits of each number count.
+    /// A gate with no more ticks and no fewer places. Both are rounded to three bits, so that many gates have the same.
     pub fn coarse(self) -> Self {
-        let shift = (u32::BITS - self.ticks.leading_zeros()).saturating_sub(3);
         let step = libm::exp2((libm::floor(libm::log2(self.places.max(1.0))) - 2.0).max(0.0));
         Self {
-            ticks: self.ticks >> shift << shift,
+            ticks: first_bits(self.ticks, 3),
             places: libm::ceil(self.places / step) * step,
             ..self
         }
     }
 
-    /// What tells it from others.
+    /// Its ticks and places, as a key of a table.
     pub fn key(&self) -> (u32, u64) {
         (self.ticks, self.places.to_bits())
     }
@@ -318,4 +317,10 @@ impl Gate {
     pub fn without(self, ticks: u32) -> Self {
         Self { ticks: self.ticks.saturating_sub(ticks), ..self }
     }
+}
+
+/// The `number` rounded down to its first `bits`.
+pub(super) fn first_bits(number: u32, bits: u32) -> u32 {
+    let shift = (u32::BITS - bits).saturating_sub(number.leading_zeros());
+    number >> shift << shift
 }

@@ -2,8 +2,8 @@
 //!
 //! Every lag is counted: 512 of them at once, as [`Counts`] does. The evidence itself is worked out mark by mark,
 //! which takes a thousand times as long. So lags are passed by that have too few marks for it, whatever else there
-//! is about them. Two bounds say how many are too few, both for the least light that any lag of the block has about
-//! itself:
+//! is about them. Two bounds say how many are too few, both for the least light that any lag of a block has about
+//! itself. They are asked of groups of blocks first:
 //!
 //! * E(k, n) grows where n gets smaller, so E(k, k) bounds it for any number of claimed marks;
 //! * one more lit mark is evidence for light, so that with c claimed marks E(k, N − c) stays below E(k + c, N). Marks
@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::residual::{Gate, Residual, Sums};
+use super::residual::{Gate, Residual, Sums, first_bits};
 use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::matched::track::below;
 use crate::decode::threshold::fewest;
@@ -63,12 +63,16 @@ pub(super) struct Search {
     last: Option<(Asked, Fewest)>,
 }
 
-/// What is asked of some lags: so many nats, in whole ones, with so many ticks at least about any lag, in such a gate.
+/// A question about some lags of a shot: how many marks give the evidence?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Asked {
+    /// The evidence, in whole nats.
     nats: i32,
+    /// Fewest ticks about any of the lags.
     ticks: u32,
+    /// All marks of the shot.
     weight: u32,
+    /// The gate of the shot: [`Gate::key`].
     gate: (u32, u64),
 }
 
@@ -206,12 +210,8 @@ impl Search {
 
     /// Fewest marks of a shot for so many `nats` of evidence, with so many `ticks` at least in its light.
     fn fewest(&mut self, (residual, gate): (&Residual, &Gate), nats: f64, ticks: u32) -> Fewest {
-        // The first bits of each number count: two of the ticks, four of the nats where these are many.
-        let first_bits = |number: u32, bits: u32| {
-            let shift = (u32::BITS - bits).saturating_sub(number.leading_zeros());
-            number >> shift << shift
-        };
         let weight = residual.sent.weight(gate.shot);
+        // Coarse numbers, so that many questions are the same.
         let nats = nats.floor() as i32;
         let nats = if nats > 0 { first_bits(nats as u32, 4) as i32 } else { nats };
         let ticks = first_bits(ticks, 2);
