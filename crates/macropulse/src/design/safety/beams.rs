@@ -143,9 +143,7 @@ impl Field for LineBeams<'_> {
                 if apart > reach {
                     // A hair within the reach.
                     let part = 1.0 - 0.999 * reach / apart;
-                    let (azimuth, elevation) =
-                        (aim.azimuth + part * aside, aim.elevation + part * up);
-                    aims.push(Aim { azimuth, elevation });
+                    aims.push(aim.moved([part * aside, part * up]));
                 }
             }
         }
@@ -191,14 +189,11 @@ impl LineBeams<'_> {
     /// Places on the way from one beam to another that both of them cross: half-way, and as near to either as the
     /// other still crosses.
     fn shared_by(&self, from: Aim, to: Aim) -> [Aim; 3] {
-        let across = (to.azimuth - from.azimuth) * libm::cos(from.elevation);
-        let apart = libm::hypot(across, to.elevation - from.elevation);
+        let way = [to.azimuth - from.azimuth, to.elevation - from.elevation];
+        let apart = libm::hypot(way[0] * libm::cos(from.elevation), way[1]);
         // A hair within the reach.
         let nearest = 1.0 - (0.99 * self.reach() / apart.max(1e-12)).min(1.0);
-        [0.5, nearest, 1.0 - nearest].map(|part| Aim {
-            azimuth: from.azimuth + part * (to.azimuth - from.azimuth),
-            elevation: from.elevation + part * (to.elevation - from.elevation),
-        })
+        [0.5, nearest, 1.0 - nearest].map(|part| from.moved(way.map(|off| part * off)))
     }
 
     /// Azimuths at which the columns stand otherwise in the aperture, about the middle of the field.

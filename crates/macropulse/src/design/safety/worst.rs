@@ -12,7 +12,8 @@
 //!    counts as an exposure, which C5 takes account of.
 //!
 //! What is found is the light at a real place, so the search can only miss light: it may allow more than the
-//! worst place there is. `brute.rs` holds it against a grid, to 2 %.
+//! worst place there is. `brute.rs` holds it against a grid, to 2 %. One drawn sensor of 2000 is known that it allows
+//! 3 % more.
 
 use super::exposure::Crossing;
 
@@ -36,6 +37,13 @@ pub(super) const RULES: usize = 4;
 pub(super) struct Aim {
     pub azimuth: f64,
     pub elevation: f64,
+}
+
+impl Aim {
+    /// The aim so far `aside` and `up` of this one, rad.
+    pub fn moved(self, [aside, up]: [f64; 2]) -> Self {
+        Self { azimuth: self.azimuth + aside, elevation: self.elevation + up }
+    }
 }
 
 /// The beams of a scan.
@@ -199,10 +207,7 @@ impl Search<'_> {
                     if across != 0.0 && steps[0] <= 0.0 || self.spent > self.field.effort() {
                         continue;
                     }
-                    let aim = Aim {
-                        azimuth: from.azimuth + across * steps[0],
-                        elevation: from.elevation + up * steps[1],
-                    };
+                    let aim = from.moved([across * steps[0], up * steps[1]]);
                     let energy = self.at(aim)[rule];
                     if energy < best.0 {
                         best = (energy, aim);
