@@ -110,9 +110,9 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
     assert!(strays > 50, "{strays}");
 }
 
-/// H0: where half of the shots are seen, no more than one in 2500 takes light of another for its own. Of
-/// coded-360, thorough, at 105 m by night, a quarter of a scan, N > 70 000, seed 77; more than 50 come with
-/// α = 3e-4 (Poisson, mean 30). When all ticks of a return might be those of another there were 1.6 in
+/// H0: where half of the shots are seen, no more than one in 5000 takes light of another for its own. Of
+/// coded-360, thorough, at 105 m by night, a quarter of a scan, N > 70 000, seed 77; more than 30 come with
+/// α = 2e-4 (Poisson, mean 15). When all ticks of a return might be those of another there were 1.6 in
 /// 1000. Control: where every second false return is accepted there are more.
 #[test]
 fn the_light_of_one_shot_is_not_taken_for_that_of_two() {
@@ -130,7 +130,7 @@ fn the_light_of_one_shot_is_not_taken_for_that_of_two() {
     };
     let thorough = ("receiver.effort", "\"thorough\"");
     let found = strays_of(&[thorough]);
-    assert!(found <= 50, "{found}");
+    assert!(found <= 30, "{found}");
     let accepted = strays_of(&[thorough, ("receiver.false_alarm", "0.5")]);
-    assert!(accepted > 50, "the control has {accepted}");
+    assert!(accepted > 30, "the control has {accepted}");
 }

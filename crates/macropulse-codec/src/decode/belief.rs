@@ -93,29 +93,39 @@ fn log_factor(marks: Marks, around: &Surroundings) -> f64 {
     let [k, n] = [marks.lit, marks.of].map(f64::from);
     let (t, m) = (around.lit, around.places);
     let dark = (m - t).max(0.0) + (around.density.recip() - 1.0).max(1.0);
-    let light = log_gamma(k) + log_gamma(n - k + 1.0) - log_gamma(n + 1.0) - log(harmonic(n));
     let beside = log_gamma(t + 1.0) + log_gamma(dark) - log_gamma(t + dark + 1.0);
     let chance = log_gamma(k + t + 1.0) + log_gamma(n - k + dark) - log_gamma(n + t + dark + 1.0);
-    light + beside - chance
+    log_light(k, n) + beside - chance
 }
 
-/// Whole numbers below this one have their ln Γ in a table.
-const IN_TABLE: usize = 48;
+/// ln\[B(k, n − k + 1)/Hₙ\].
+fn log_light(k: f64, n: f64) -> f64 {
+    static OF_WHOLE: LazyLock<[f64; IN_TABLE]> =
+        LazyLock::new(|| std::array::from_fn(|whole| log(harmonic(whole as f64))));
+    let log_harmonic = OF_WHOLE.get(n as usize).copied().unwrap_or_else(|| log(harmonic(n)));
+    log_gamma(k) + log_gamma(n - k + 1.0) - log_gamma(n + 1.0) - log_harmonic
+}
 
-/// ln Γ(x) for x > 0, to 10⁻¹¹; from [`IN_TABLE`] on by Stirling's series.
+/// Whole numbers below this one have their ln Γ and ln H in a table.
+const IN_TABLE: usize = 1024;
+
+/// From here on ln Γ is that of Stirling's series.
+const STIRLING: f64 = 48.0;
+
+/// ln Γ(x) for x > 0, to 10⁻¹¹.
 fn log_gamma(x: f64) -> f64 {
     static OF_WHOLE: LazyLock<[f64; IN_TABLE]> =
         LazyLock::new(|| std::array::from_fn(|whole| lgamma(whole as f64)));
-    if x >= IN_TABLE as f64 {
-        let (inverse, half_log_tau) = (x.recip(), 0.918_938_533_204_672_7);
-        let rest = inverse * (1.0 / 12.0 - inverse * inverse / 360.0);
-        return (x - 0.5) * log(x) - x + half_log_tau + rest;
-    }
     let whole = x as usize;
-    match whole as f64 == x {
-        true => OF_WHOLE[whole],
-        false => lgamma(x),
+    if whole < IN_TABLE && whole as f64 == x {
+        return OF_WHOLE[whole];
     }
+    if x < STIRLING {
+        return lgamma(x);
+    }
+    let (inverse, half_log_tau) = (x.recip(), 0.918_938_533_204_672_7);
+    let rest = inverse * (1.0 / 12.0 - inverse * inverse / 360.0);
+    (x - 0.5) * log(x) - x + half_log_tau + rest
 }
 
 /// The harmonic number Hₙ = 1 + ½ + … + 1/n of a whole `n`, to 10⁻¹¹; from 32 on by Euler and Maclaurin.

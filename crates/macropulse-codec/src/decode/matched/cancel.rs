@@ -63,7 +63,7 @@ impl Cancelled {
     pub fn detections(&self, sent: &Sent) -> (Vec<Option<Detection>>, Vec<(usize, Detection)>) {
         let at = |shot: usize, lag: i64| {
             let (count, margin) = (sent.weight(shot), sent.complete_margin(shot));
-            Detection { lag, count, margin, stands_out: true, is_sure: true }
+            Detection { lag, count, margin, stands_out: true }
         };
         let lags = self.lags.iter().enumerate();
         (

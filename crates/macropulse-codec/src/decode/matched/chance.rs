@@ -4,7 +4,6 @@ use super::acquire::BLOCK;
 use super::sent::Sent;
 use super::{Band, Detection};
 use crate::decode::threshold::{Thresholds, fewest};
-use crate::statistics::normal_quantile;
 
 /// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
 pub(super) const BY_CHANCE: f64 = 1e-3;
@@ -26,16 +25,12 @@ const IN_VAIN: f64 = 0.01;
 pub(super) struct Chance {
     /// At any lag of a gate.
     pub in_gate: Thresholds,
-    /// In any bit of one macropulse.
-    pub in_bits: Thresholds,
     /// In a single place.
     pub once: Thresholds,
     /// At an end of a macropulse.
     pub at_end: Thresholds,
     /// At any place of a code word in the pictures that a block of lags is met by.
     pub in_words: Thresholds,
-    /// A normal variable exceeds it as rarely as false returns are accepted.
-    pub rare: f64,
 }
 
 impl Chance {
@@ -46,16 +41,14 @@ impl Chance {
         let bits = sent.bits_of_payload() as f64;
         let new = Self {
             in_gate: Thresholds::new(lags, false_alarm),
-            in_bits: Thresholds::new(bits, false_alarm),
             once: Thresholds::new(1.0, BY_CHANCE),
             at_end: Thresholds::new(1.0, AT_AN_END),
             // Eight lags are met by two bits of each code word.
             in_words: Thresholds::new(2.0 * BLOCK as f64 * bits, IN_VAIN),
-            rare: normal_quantile(1.0 - sent.accepted()),
         };
         // The rest follows from the same false alarms and bits.
         let is_as_new =
-            |known: &Self| known.in_gate.is_as(&new.in_gate) && known.in_bits.is_as(&new.in_bits);
+            |known: &Self| known.in_gate.is_as(&new.in_gate) && known.in_words.is_as(&new.in_words);
         known.filter(is_as_new).unwrap_or(new)
     }
 
@@ -86,12 +79,6 @@ impl Band<'_> {
     pub(super) fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
         let (ticks, share) = self.in_gate(shot);
         (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
-    }
-
-    /// Share of lit places around a shot found at `detection`, its own marks apart.
-    pub(super) fn density_beside(&self, shot: usize, detection: Detection) -> f64 {
-        let places = self.sent.weight(shot) * self.sent.width;
-        self.field.density_without(&self.sent.light(shot, detection.lag), detection.count, places)
     }
 
     /// The fewest marks of `shot` that chance does not reach in what they leave of the light of its

@@ -393,7 +393,7 @@ impl Band<'_> {
             let away = (found.lag - lag).rem_euclid(bit);
             (width..=bit - width).contains(&away)
                 && !self.is_known(shot, found.lag)
-                && self.is_even(shot, *found)
+                && !self.is_mislabelled(shot, *found)
         };
         let Some(found) = found.filter(is_own) else { return false };
         self.cancel(shot, found.lag);

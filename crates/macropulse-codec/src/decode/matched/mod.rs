@@ -12,8 +12,8 @@
 //! 3. [`acquire`]: the exact maximum over the gate, of shots that no neighbour predicts and of those
 //!    fainter than their neighbours; and, where light is left over, of further surfaces, if it fits no
 //!    other shot as well.
-//! 4. [`verify`]: returns that light of other returns accounts for are excluded, and those of which
-//!    a bit is lit that should be dark, or dark that should be lit.
+//! 4. [`verify`]: returns that light of other returns accounts for are excluded, and those whose label light of another one
+//!    explains better: [`label`](self::label).
 //!
 //! A return is believed if chance would not reach its count of marks at any lag of the gate: [`chance`].
 //!
@@ -25,6 +25,7 @@
 mod acquire;
 mod cancel;
 mod chance;
+mod label;
 mod look;
 mod measure;
 mod pace;
@@ -65,7 +66,7 @@ pub enum Effort {
     Quick,
     /// Searches for every shot that is not found otherwise; takes many times as long in noise.
     Thorough,
-    /// Counts every lag of every shot and believes by posterior odds alone, without the rules of the other two: the
+    /// Counts every lag of every shot and believes by posterior odds alone, without the thresholds of the other two: the
     /// reference that they are compared with. Takes ten to two hundred times as long as a quick one in noise.
     Exhaustive,
 }
@@ -144,15 +145,12 @@ struct Detection {
     /// Whether that is half of all marks, and half of that more than chance gives: chance finds most where
     /// macropulses overlap, but not as many.
     stands_out: bool,
-    /// Whether it stands out, and no fewer marks are found than of the shots before, as many in each
-    /// of its bits: light of other shots does not give that.
-    is_sure: bool,
 }
 
 impl Detection {
     /// So many marks at `lag`, of which no more is known.
     fn at(lag: i64, count: u32) -> Self {
-        Self { lag, count, margin: 0, stands_out: false, is_sure: false }
+        Self { lag, count, margin: 0, stands_out: false }
     }
 }
 
@@ -375,9 +373,7 @@ impl<'a> Band<'a> {
     /// Keeps `detection` and cancels its ticks.
     fn keep(&mut self, shot: usize, detection: Detection) {
         self.cancel(shot, detection.lag);
-        let is_sure =
-            detection.stands_out && self.is_usual(shot, detection) && self.is_even(shot, detection);
-        self.found[shot] = Some(Detection { is_sure, ..detection });
+        self.found[shot] = Some(detection);
         self.usual.learn(detection.count, self.sent.weight(shot));
     }
 

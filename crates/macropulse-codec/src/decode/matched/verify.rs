@@ -1,12 +1,10 @@
 //! Exclusion and verification: what becomes of a shot that was found.
 
-use std::cmp::Reverse;
 use std::ops::Range;
 
-use super::pace::usual;
 use super::track::{BLOCK, NEAREST_SIDE, WAYS, WIDEST_GAP, lit};
-use super::{Band, Detection, NEIGHBOURS, SURFACES};
-use crate::decode::field::Source;
+use super::{Band, Detection, SURFACES};
+use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::{Reject, Returns, Strength};
 use crate::kernels::parted;
 
@@ -85,26 +83,22 @@ impl Band<'_> {
         Ok(())
     }
 
-    /// Takes for the lag of `shot`, of several with as many marks, the one nearest to where its neighbours
-    /// let it be expected, and keeps the earliest where there are none.
+    /// Takes for the lag of `shot`, of several with about as many marks, the one with the highest posterior odds.
     ///
-    /// The marks of a word may be a comb, as those of the first prime sequence are. Shifted by a tooth,
-    /// only the last marks in every run of lit bits have nothing to fall upon; where these are missed
-    /// as many marks are found there, and nothing in the light of the shot tells which it is. Where a
-    /// tick may be one of two marks even more may be found, so here it counts for one. A neighbour may
-    /// be mistaken, too: the two that agree best count.
+    /// The marks of a word may be a comb, as those of the first prime sequence are. Shifted by a tooth, only the last
+    /// marks in every run of lit bits have nothing to fall upon. Where these are missed as many marks are found there, and
+    /// nothing but its neighbours tells which lag is that of the shot. Where a tick may be one of two marks even more may be
+    /// found, so here it counts for one.
     fn choose_of_equals(&mut self, shot: usize) {
         let weight = self.sent.weight(shot);
         let Some(found) = self.found[shot].filter(|found| found.count < weight) else { return };
-        let is_near = |lag: i64, other: i64| lag.abs_diff(other) < NEAREST_SIDE as u64;
         let twice = self.sent.bits(shot).shared * self.sent.lit_bits(shot).len() as u32;
-        let lines = [0, 2, 1, 3].into_iter().find_map(|way| self.expected(shot, 1, way));
-        let likely = lines.or_else(|| self.expected(shot, WIDEST_GAP, 1));
-        let is_alone = found.margin > twice;
-        if is_alone && likely.is_none_or(|likely| is_near(likely, found.lag)) {
+        let expected = self.expected_lags(shot);
+        let is_near = |lag: i64, other: i64| lag.abs_diff(other) < NEAREST_SIDE as u64;
+        let is_alone = found.margin > 1 + twice;
+        if is_alone && expected.iter().all(|lag| is_near(*lag, found.lag)) {
             return;
         }
-        let expected = self.expected_lags(shot);
         let mut middles = vec![found.lag];
         for lag in &expected {
             if !middles.iter().any(|middle| is_near(*middle, *lag)) {
@@ -112,42 +106,38 @@ impl Band<'_> {
             }
         }
         self.lay_out(shot);
-        // None with fewer has as many that each have a tick.
-        let least = match self.sent.width {
-            1 => found.count,
-            _ => self.marks_with_ticks(shot, found.lag),
-        };
-        let (reach, mut most) = (self.sent.reach(), found.count);
-        let mut lags = Vec::from_iter(is_alone.then_some(found.lag));
-        for middle in middles.into_iter().skip(lags.len()) {
-            let enough = least.max(most.saturating_sub(twice));
-            if !self.may_have(shot, middle, enough) {
+        let prior = Prior::new(self.sent.reach(), &expected);
+        let marks = |lit: u32| Marks { lit, of: weight };
+        let around = self.light_about(shot, found.lag, found.count);
+        let enough = found.count.saturating_sub(1 + twice).max(1);
+        let mut best = (f64::NEG_INFINITY, found.lag, found.count);
+        for middle in middles {
+            if !self.may_have(shot, middle, enough) || self.best_in_block(shot, middle).is_none() {
                 continue;
             }
-            let Some(best) = self.best_in_block(shot, middle) else { continue };
-            most = most.max(best.count);
-            let as_many = self.counts.at_least(enough.max(most.saturating_sub(twice)));
-            lags.extend(lit(as_many).map(|at| middle - BLOCK / 2 + at));
+            for at in lit(self.counts.at_least(enough)) {
+                let lag = middle - BLOCK / 2 + at;
+                if !prior.lags().contains(&lag) || lag != found.lag && self.is_found_at(shot, lag) {
+                    continue;
+                }
+                let count = self.marks_with_ticks(shot, lag);
+                let odds = evidence(marks(count), &around) + prior.at(lag);
+                if odds > best.0 || odds == best.0 && lag < best.1 {
+                    best = (odds, lag, count);
+                }
+            }
         }
-        if lags == [found.lag] {
-            return;
-        }
-        let away = |lag: i64| {
-            let mut away: Vec<u64> = expected.iter().map(|other| lag.abs_diff(*other)).collect();
-            away.sort_unstable();
-            away.iter().take(2).sum::<u64>()
-        };
-        let ranked = lags.into_iter().filter(|lag| reach.contains(lag));
-        let ranked =
-            ranked.map(|lag| (self.marks_with_ticks(shot, lag), Reverse((away(lag), lag))));
-        let Some((count, Reverse((_, mut lag)))) = ranked.max() else { return };
+        let (_, mut lag, count) = best;
         // Of those side by side, the first one.
-        while reach.contains(&(lag - 1)) && self.marks_with_ticks(shot, lag - 1) == count {
+        while self.sent.width > 1
+            && prior.lags().contains(&(lag - 1))
+            && self.marks_with_ticks(shot, lag - 1) == count
+        {
             lag -= 1;
         }
         if lag != found.lag {
             self.cancel(shot, lag);
-            self.found[shot] = Some(Detection { lag, count, is_sure: false, ..found });
+            self.found[shot] = Some(Detection { lag, count, ..found });
         }
     }
 
@@ -156,22 +146,6 @@ impl Band<'_> {
         let first = self.sent.fired[shot] + middle - BLOCK / 2;
         let (ticks, _) = self.field.ticks_about(&(first..first + BLOCK + self.sent.takes_up()));
         ticks >= self.sent.ticks_of(shot, marks)
-    }
-
-    /// The lags at which a doubtful `shot` is to be expected after those that are settled, and after one
-    /// behind it that is not as doubtful; after any where few are settled.
-    fn expected_lags(&self, shot: usize) -> Vec<i64> {
-        let found = |shot: usize| *self.found.get(shot)?;
-        let before = (0..shot).rev().take(WIDEST_GAP).filter_map(found);
-        let before: Vec<i64> = before.map(|found| found.lag).take(NEIGHBOURS).collect();
-        let most = if before.len() < NEIGHBOURS { NEIGHBOURS } else { 1 };
-        let behind = (shot + 1..).take(WIDEST_GAP).filter_map(found);
-        let behind = behind.filter(|found| found.margin > 0 || most > 1);
-        let behind: Vec<i64> = behind.map(|found| found.lag).take(most).collect();
-        let sides = before.first().zip(behind.first());
-        let middle = sides.map(|(before, behind)| i64::midpoint(*before, *behind));
-        let lines = [0, 2, 3].into_iter().filter_map(|way| self.expected(shot, 1, way));
-        lines.chain(middle).chain(before).chain(behind).collect()
     }
 
     /// Marks of `shot`, which are at hand, found at `lag`, where each tick counts for one of them: the
@@ -189,7 +163,7 @@ impl Band<'_> {
         if self.is_clear(shot, surface) {
             return None;
         }
-        if !surface.is_sure && !self.is_its_own(shot, surface) {
+        if !self.is_its_own(shot, surface) {
             return Some(Reject::NoPeak);
         }
         (!self.carries_its_label(shot, surface)).then_some(Reject::LabelMismatch)
@@ -316,38 +290,6 @@ impl Band<'_> {
         word - found < self.chance.once.least(word, left_out)
     }
 
-    /// Whether light of `shot` that seems to come from beyond the gate is rather that of a later shot
-    /// from within: one in the same word with as many marks there, or whole bits beside it, where a part of
-    /// its lit bits falls upon lit bits, and as large a share of all its marks but for chance.
-    pub(super) fn is_of_a_later_shot(&mut self, shot: usize, detection: Detection) -> bool {
-        let (sent, gate) = (self.sent, self.sent.gate());
-        if detection.lag < gate.end + sent.length() {
-            return false;
-        }
-        let share = f64::from(detection.count) / f64::from(sent.weight(shot));
-        let start = sent.fired[shot] + detection.lag;
-        let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
-        let about = start - bits * length..start + bits * length + 1;
-        let is_alike =
-            |other: &usize| *other > shot && sent.log.word[*other] == sent.log.word[shot];
-        let mut later = sent.that_begin_in(&about, &gate).filter(is_alike).peekable();
-        if later.peek().is_none() {
-            return false;
-        }
-        let mut words = std::mem::take(&mut self.words);
-        self.words_about(shot, start, &mut words.found);
-        let is_another = later.any(|other| {
-            let least = usual(share, sent.weight(other)).max(detection.count);
-            sent.in_bits(other, &words.found, &mut words.sums);
-            (-bits..).zip(&words.sums).any(|(away, count)| {
-                let lag = start + away * length - sent.fired[other];
-                away.abs() < bits && gate.contains(&lag) && *count >= least
-            })
-        });
-        self.words = words;
-        is_another
-    }
-
     /// The marks of the word of `shot` that are `found` where each bit would be from as many bits before
     /// tick `start` on as a payload has, to twice as many behind it.
     pub(super) fn words_about(&self, shot: usize, start: i64, found: &mut Vec<u32>) {
@@ -377,75 +319,16 @@ impl Band<'_> {
         primary.chain(further.copied())
     }
 
-    /// Whether no bit of `shot` is lit that should be dark, nor dark that should be lit.
-    ///
-    /// Only the residual counts, as other shots may well shine there; and so may another surface of this one,
-    /// which is looked for then.
+    /// Whether the label of `shot` is not contradicted, if need be with further surfaces of it, which are looked for then.
     fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
-        if self.sent.bits_of_payload() == 1 {
-            return true;
-        }
-        if !detection.is_sure && !self.is_even(shot, detection) {
-            return false;
-        }
         for _ in 0..SURFACES {
-            if !self.is_lit_where_dark(shot, detection) {
+            if !self.is_mislabelled(shot, detection) {
                 return true;
             }
             if !self.finds_another_surface(shot, detection.lag) {
                 return false;
             }
         }
-        !self.is_lit_where_dark(shot, detection)
+        !self.is_mislabelled(shot, detection)
     }
-
-    /// Whether a bit of `shot` that should be dark has half the marks of a lit one in the residual, and more
-    /// than chance gives it.
-    pub(super) fn is_lit_where_dark(&mut self, shot: usize, detection: Detection) -> bool {
-        let sent = self.sent;
-        let light = sent.light(shot, detection.lag);
-        let half = detection.count.div_ceil(2 * sent.lit_bits(shot).len() as u32);
-        if sent.width > 1 {
-            // To widen the residual takes longer than to see that too few ticks are left for any bit.
-            let together = self.field.stretch(sent.bit_length() + i64::from(sent.width));
-            if self.field.most_left(&light, together) < sent.ticks_in_bit(shot, half) {
-                return false;
-            }
-        }
-        let residual = self.field.lit_in(Source::Residual, &light, &mut self.residual);
-        let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
-        residual.lit_in_each(light.start, sent.dark_bits(shot), pattern, found);
-        let most = found.iter().copied().max().unwrap_or(0);
-        most >= half && {
-            let density = self.density_beside(shot, detection);
-            most >= self.chance.in_bits.least(sent.in_word(shot), density)
-        }
-    }
-
-    /// Whether as many marks are found in each lit bit of `shot` as in the others.
-    ///
-    /// Of W marks a share q is found in each of B lit bits; χ² = Σ(n − W·q)²/(W·q·(1 − q)) over the
-    /// counts n has B − 1 degrees of freedom, and chance does not exceed it: light of another label
-    /// lights some of the bits and leaves others dark.
-    pub(super) fn is_even(&mut self, shot: usize, detection: Detection) -> bool {
-        let sent = self.sent;
-        if detection.count == sent.weight(shot) {
-            return true;
-        }
-        let start = sent.fired[shot] + detection.lag;
-        let (in_word, lit) = (f64::from(sent.in_word(shot)), sent.lit_bits(shot).len() as f64);
-        let mean = f64::from(detection.count) / lit;
-        let (pattern, found) = (&sent.bits(shot).pattern, &mut self.found_in_bits);
-        self.field.lit().lit_in_each(start, sent.lit_bits(shot), pattern, found);
-        let square = |found: &u32| (f64::from(*found) - mean) * (f64::from(*found) - mean);
-        let squares: f64 = found.iter().map(square).sum();
-        squares <= chi_square(lit - 1.0, self.chance.rare) * mean * (1.0 - mean / in_word)
-    }
-}
-
-/// What χ² of so many `degrees` of freedom exceeds as rarely as a normal variable exceeds z, after
-/// Wilson and Hilferty: k·(1 − 2/(9k) + z·√(2/(9k)))³ \[WH31\].
-fn chi_square(degrees: f64, z: f64) -> f64 {
-    let part = 2.0 / (9.0 * degrees.max(1.0));
-    degrees.max(1.0) * (1.0 - part + z * part.sqrt()).powi(3)
 }
