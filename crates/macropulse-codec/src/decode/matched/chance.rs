@@ -3,6 +3,7 @@
 use super::acquire::BLOCK;
 use super::sent::Sent;
 use super::{Band, Detection};
+use crate::decode::belief::Surroundings;
 use crate::decode::threshold::{Thresholds, fewest};
 
 /// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
@@ -79,6 +80,19 @@ impl Band<'_> {
     pub(super) fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
         let (ticks, share) = self.in_gate(shot);
         (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
+    }
+
+    /// The light about `shot` at `lag` without so many of its own `marks`. Ticks that other returns explain count, too.
+    pub(super) fn light_about(&self, shot: usize, lag: i64, marks: u32) -> Surroundings {
+        let sent = self.sent;
+        let (ticks, length) = self.field.ticks_about(&sent.light(shot, lag));
+        let trials = length as f64 / f64::from(sent.width) - f64::from(sent.weight(shot));
+        let places = trials.max(1.0);
+        Surroundings {
+            lit: f64::from(ticks.saturating_sub(marks)).min(places),
+            places,
+            density: self.density_in_gate(shot, marks).min(0.5),
+        }
     }
 
     /// The fewest marks of `shot` that chance does not reach in what they leave of the light of its

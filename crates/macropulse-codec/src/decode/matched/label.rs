@@ -1,8 +1,9 @@
-//! The label of a return, and the prior of its lags, by the rule of [`belief`].
+//! The label of a return, judged by the rule of [`belief`].
 //!
-//! What decides is written in [`belief`]. Here its numbers are counted in the light at hand, with a shortcut: a label fits if
-//! each lit bit speaks for its being lit and has about as many marks as the others, and no dark bit has enough ticks to
-//! speak for its being lit.
+//! [`belief`] decides. This module counts the marks in each bit of a return, and the light about it.
+//!
+//! A shortcut comes first. The label fits if three things hold: each lit bit has more marks than speak for a dark one;
+//! the lit bits have about equally many; and too few ticks are left for any dark bit to be lit.
 
 use std::f64::consts::LN_2;
 
@@ -10,32 +11,12 @@ use libm::log;
 
 use super::track::WIDEST_GAP;
 use super::{Band, Detection, NEIGHBOURS};
-use crate::decode::belief::{self, Marks, Prior, Surroundings};
+use crate::decode::belief::{self, Marks, Prior};
 use crate::decode::field::Source;
 
 impl Band<'_> {
-    /// All light about `shot` at `lag` but so many of its marks.
-    pub(super) fn light_about(&self, shot: usize, lag: i64, marks: u32) -> Surroundings {
-        let sent = self.sent;
-        let (ticks, length) = self.field.ticks_about(&sent.light(shot, lag));
-        let trials = length as f64 / f64::from(sent.width) - f64::from(sent.weight(shot));
-        let places = trials.max(1.0);
-        Surroundings {
-            lit: f64::from(ticks.saturating_sub(marks)).min(places),
-            places,
-            density: self.density_in_gate(shot, marks).min(0.5),
-        }
-    }
-
-    /// Whether a surface of `shot` was found at exactly `lag`.
-    pub(super) fn is_found_at(&self, shot: usize, lag: i64) -> bool {
-        let further = self.further.iter().filter(|(other, _)| *other == shot);
-        let mut found = self.found[shot].iter().chain(further.map(|(_, found)| found));
-        found.any(|found| found.lag == lag)
-    }
-
-    /// The lags at which `shot` is to be expected: on the lines through its neighbours, midway between the next ones, and
-    /// at the lags of those before and the next one behind; of more behind where few are before.
+    /// The lags at which neighbours lead to expect `shot`: on the lines through them, midway between the nearest two, at
+    /// those of the shots before it, and at that of the next one. Where few shots before were found, more behind count.
     pub(super) fn expected_lags(&self, shot: usize) -> Vec<i64> {
         let lag = |shot: usize| Some(self.found.get(shot)?.as_ref()?.lag);
         let before = (0..shot).rev().take(WIDEST_GAP).filter_map(lag);
@@ -54,8 +35,8 @@ impl Band<'_> {
         Prior::new(self.sent.reach(), &self.expected_lags(shot))
     }
 
-    /// Whether light of `shot` that seems to come from beyond the gate is rather that of a later shot from within: light is
-    /// rather near than far. It is if that has the same macropulse, or if its label is contradicted.
+    /// Whether `detection` lies outside the gate, and its light is that of a later shot from within. It is if a later shot
+    /// has the same macropulse, as near light is likelier than far light, or if the label of `shot` is contradicted.
     pub(super) fn is_of_a_later_shot(&mut self, shot: usize, detection: Detection) -> bool {
         let (sent, gate) = (self.sent, self.sent.gate());
         if gate.contains(&detection.lag) {
@@ -71,8 +52,9 @@ impl Band<'_> {
         is_alike || self.is_mislabelled(shot, detection)
     }
 
-    /// Whether the label of `shot` at `detection` is contradicted. Lit bits are counted in all light, as others may
-    /// claim marks of some of them; dark ones in what no return explains.
+    /// Whether another label explains the light of `shot` at `detection` better than its own. Marks of lit bits are counted
+    /// in all light, as other returns may explain some of them. Marks of dark bits are counted in the light that no
+    /// return explains.
     pub(super) fn is_mislabelled(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         if sent.bits_of_payload() == 1 {
@@ -90,7 +72,7 @@ impl Band<'_> {
         let lit: Vec<Marks> = found.iter().map(marks).collect();
         let mean = share * f64::from(in_word);
         let squares: f64 = found.iter().map(|found| (f64::from(*found) - mean).powi(2)).sum();
-        // Half of χ² is about what another label gains that is free to leave out the emptier bits.
+        // A label that leaves out the emptier bits gains about half of χ², and is taken only if it gains ln 2 a bit.
         let most = 2.0 * LN_2 * (sent.bits_of_payload() - 1) as f64 * mean * (1.0 - share);
         let is_even = found.iter().all(|found| *found >= fewest) && squares <= most;
         // To widen what is left takes longer than to see that too few ticks are left for any bit.
@@ -111,8 +93,8 @@ impl Band<'_> {
     }
 }
 
-/// Fewest of so many `marks` of a bit that speak for its being lit, where a `share` of the marks of a lit bit is found
-/// and chance lights each with `density`: the likelihoods are the same with k marks where
+/// The fewest marks that make a bit likelier lit than dark. It has `marks` marks, n. A lit bit shows each of them with the
+/// probability q, `share`, a dark one with d, `density`. Both are equally likely with k marks for which
 ///
 /// > k·ln(q/d) + (n − k)·ln((1 − q)/(1 − d)) = 0.
 fn fewest_of_lit_bit(marks: u32, share: f64, density: f64) -> u32 {

@@ -177,6 +177,14 @@ impl Band<'_> {
         self.best_in_block(shot, highest?.1)
     }
 
+    /// The marks of the word of `shot` that are `found` where each bit would be from as many bits before
+    /// tick `start` on as a payload has, to twice as many behind it.
+    fn words_about(&self, shot: usize, start: i64, found: &mut Vec<u32>) {
+        let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
+        let (after, pattern) = (self.sent.bits_about(), &self.sent.bits(shot).pattern);
+        self.field.lit().lit_in_each(start - bits * length, after, pattern, found);
+    }
+
     /// The highest peak in the [`BLOCK`] around `middle`.
     pub(super) fn best_in_block(&mut self, shot: usize, middle: i64) -> Option<Detection> {
         self.best_of(shot, middle, [u64::MAX; NARROW])

@@ -83,12 +83,13 @@ impl Band<'_> {
         Ok(())
     }
 
-    /// Takes for the lag of `shot`, of several with about as many marks, the one with the highest posterior odds.
+    /// Moves `shot` to the likeliest lag: of those with as many marks, or one fewer, the one with the highest posterior
+    /// odds.
     ///
-    /// The marks of a word may be a comb, as those of the first prime sequence are. Shifted by a tooth, only the last
-    /// marks in every run of lit bits have nothing to fall upon. Where these are missed as many marks are found there, and
-    /// nothing but its neighbours tells which lag is that of the shot. Where a tick may be one of two marks even more may be
-    /// found, so here it counts for one.
+    /// Several lags may have as many marks. The marks of a word may be a comb, as those of the first prime sequence are.
+    /// Shifted by a tooth, a comb falls upon itself but for the last marks in every run of lit bits. If the detector missed
+    /// these, both lags have as many marks, and only the neighbours of the shot tell them apart. A tick that may be one of
+    /// two marks would favour the wrong lag, so it counts for one.
     fn choose_of_equals(&mut self, shot: usize) {
         let weight = self.sent.weight(shot);
         let Some(found) = self.found[shot].filter(|found| found.count < weight) else { return };
@@ -117,7 +118,10 @@ impl Band<'_> {
             }
             for at in lit(self.counts.at_least(enough)) {
                 let lag = middle - BLOCK / 2 + at;
-                if !prior.lags().contains(&lag) || lag != found.lag && self.is_found_at(shot, lag) {
+                let is_further = |(other, surface): &(usize, Detection)| {
+                    *other == shot && surface.lag == lag && lag != found.lag
+                };
+                if !prior.lags().contains(&lag) || self.further.iter().any(is_further) {
                     continue;
                 }
                 let count = self.marks_with_ticks(shot, lag);
@@ -290,14 +294,6 @@ impl Band<'_> {
         word - found < self.chance.once.least(word, left_out)
     }
 
-    /// The marks of the word of `shot` that are `found` where each bit would be from as many bits before
-    /// tick `start` on as a payload has, to twice as many behind it.
-    pub(super) fn words_about(&self, shot: usize, start: i64, found: &mut Vec<u32>) {
-        let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
-        let (after, pattern) = (self.sent.bits_about(), &self.sent.bits(shot).pattern);
-        self.field.lit().lit_in_each(start - bits * length, after, pattern, found);
-    }
-
     /// The returns found so far of which light overlaps with `light`.
     fn overlapping(
         &self,
@@ -319,7 +315,8 @@ impl Band<'_> {
         primary.chain(further.copied())
     }
 
-    /// Whether the label of `shot` is not contradicted, if need be with further surfaces of it, which are looked for then.
+    /// Whether the label of `shot` fits. Where it is contradicted, further surfaces of the shot are searched for, as their
+    /// light may be what contradicts it.
     fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
         for _ in 0..SURFACES {
             if !self.is_mislabelled(shot, detection) {

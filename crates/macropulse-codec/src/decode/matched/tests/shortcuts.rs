@@ -42,8 +42,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(2), ..ProptestConfig::with_cases(500) })]
 
-    /// A label is contradicted as where each place of each bit is asked for, whatever is not asked for the number of
-    /// ticks or the marks of its bits.
+    /// The verdict on a label is that of plain code, which asks for each place of each bit. 500 cases of four shots.
     fn a_label_is_doubted_as_mark_by_mark(
         book in 0..8_usize,
         missed in 0..80_u32,
@@ -73,7 +72,7 @@ proptest! {
                 .map(|bits| bits.iter().map(in_bit).collect::<Vec<Marks>>());
             let count = lit.iter().map(|bit| bit.lit).sum();
             let around = band.light_about(shot, lag, count);
-            // What is no light at all is not asked for its label.
+            // Such light is never believed, and its label never asked.
             if belief::evidence(Marks { lit: count, of: sent.weight(shot) }, &around) < 0.0 {
                 continue;
             }
