@@ -173,6 +173,17 @@ pub fn poisson(mean: f64, k: f64) -> f64 {
     exp(k * log(mean) - mean - lgamma(k + 1.0))
 }
 
+/// [`poisson`] for k from `first` to `last`, each from the one before it. It must not be too small a number at `first`.
+pub fn poisson_from(mean: f64, first: u32, last: u32) -> Vec<f64> {
+    let at_first = match mean > 0.0 {
+        true => poisson(mean, first.into()),
+        false => f64::from(u8::from(first == 0)),
+    };
+    let next = |(k, chance): &(u32, f64)| Some((k + 1, chance * mean / f64::from(k + 1)));
+    let all = std::iter::successors(Some((first, at_first)), next);
+    all.take_while(|(k, _)| *k <= last).map(|(_, chance)| chance).collect()
+}
+
 /// Erlang's B, a^c/c! / Σ_k a^k/k! \[Erl17\]: the share of calls that find all of `servers` busy
 /// where `offered` is the mean number of calls that come within the time one takes. It does not
 /// depend on how the times are distributed.
@@ -271,6 +282,8 @@ mod tests {
         for k in [0, 1, 4, 20] {
             let mass = reference.pmf(k);
             assert_relative_eq!(poisson(4.6, k as f64), mass, max_relative = 1e-9);
+            let of_many = poisson_from(4.6, 0, 20)[k as usize];
+            assert_relative_eq!(of_many, mass, max_relative = 1e-9);
         }
         for degrees in [1, 2, 5, 30, 199] {
             let reference = StudentsT::new(0.0, 1.0, f64::from(degrees)).unwrap();

@@ -81,7 +81,7 @@ fn a_wall_behind_a_pane_is_found_where_both_are_faint() {
 }
 
 /// N = 1696 shots without noise, and as many as declared, seed 20160913: no shot is refused for its label, and
-/// a quick receiver gives the ranges that a thorough one gives. Control: a receiver that believes nothing
+/// a quick receiver gives the ranges that a thorough one gives, without noise also an exhaustive one. Control: a receiver that believes nothing
 /// faint does not.
 #[test]
 fn light_of_another_surface_does_not_pass_for_another_label() {
@@ -107,6 +107,11 @@ fn light_of_another_surface_does_not_pass_for_another_label() {
         assert_eq!(quick.rejected(Reject::LabelMismatch), 0, "{keys:?}");
         assert!(quick.len() > 1000, "{keys:?}");
         assert!(ranges(&quick) == ranges(&found), "{keys:?}");
+        if !keys.is_empty() {
+            // Each surface of a shot is told from the other one, though they are as full.
+            let exhaustive = set(&design.receiver, |_, effort| *effort = Effort::Exhaustive);
+            assert!(ranges(&decode(&exhaustive)) == ranges(&quick));
+        }
         if keys.is_empty() {
             let blind = decode(&set(&thorough, |it, _| it.false_alarm = 1e-60));
             assert!(ranges(&blind) != ranges(&found));

@@ -147,6 +147,20 @@ fn in_dense_light_the_forecast_is_right_to_a_quarter() {
     assert!(forecaster.with_background(0.0).forecast(1.0, 90.5).pd > 0.99);
 }
 
+/// N = 1694 lit shots, seed 1: where every fifth place is lit by the sun the exhaustive receiver finds what is forecast for
+/// it to a tenth. Control: without its sunlight the forecast is far off.
+#[test]
+fn in_dense_light_an_exhaustive_receiver_finds_what_is_forecast_to_a_tenth() {
+    let set = [("optics.field", "\"in-flight\""), ("receiver.effort", "\"exhaustive\"")];
+    let design = sensor("kim-park-2016-physical", &set);
+    let (found, shots) = detected(&measure(&design, &room(90.49, 1.0, "clear-day"), 1, 1));
+    let forecaster = Forecaster::new(&design, &Environment::default()).unwrap();
+    let share = found as f64 / shots as f64;
+    let predicted = forecaster.forecast(1.0, 90.5).pd;
+    assert!((0.9..1.1).contains(&(share / predicted)), "{share}, predicted {predicted}");
+    assert!(forecaster.with_background(0.0).forecast(1.0, 90.5).pd > 0.99);
+}
+
 /// N > 5000 shots of each of three sensors on a wall all around by night, at reflectances of which the forecast is 0.1,
 /// 0.4, 0.7 and 0.95, seed 5: the exhaustive receiver finds as many, to 0.02 and 4 % of the light, on which it depends
 /// steeply. Control: so does not, in half of the cases, what is forecast for the other receivers.

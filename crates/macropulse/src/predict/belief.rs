@@ -4,7 +4,7 @@
 //! meet the same range. Two things depend on which other shots are found:
 //!
 //! * **Neighbours.** A return beside a shot makes its lag likelier. With F, the share of all shots that are fuller and
-//!   found, one of the M shots about is a neighbour with the probability 1 − (1 − F)^M.
+//!   found, one of the M shots that are asked is a neighbour with the probability 1 − (1 − F)^M.
 //! * **Light of other shots** in the gate is explained if they are fuller and found. The rest of it is chance, as noise is.
 //!
 //! So shots are gone through in the order of their fullness, as the receiver judges them.
@@ -13,14 +13,12 @@ use std::collections::BTreeMap;
 
 use macropulse_codec::decode::Correlation;
 use macropulse_codec::decode::belief::{self, Marks, Prior, Surroundings};
-use macropulse_codec::statistics::{binomial, poisson};
+use macropulse_codec::statistics::{binomial, poisson_from};
 
-use super::matched::{Chances, Found, Place};
+use super::best_lag::BestLag;
+use super::matched::{Chances, Place};
 use crate::design::Design;
 use crate::units::s_from_fs;
-
-/// Shots about one whose returns are known when it is judged: 64 before it and 64 behind it in its row.
-const ABOUT: i32 = 128;
 
 /// Share of all shots that are gone through at once, at most.
 const PART: f64 = 0.02;
@@ -30,6 +28,9 @@ const SELDOM: f64 = 1e-9;
 
 /// Fewest ticks of a lump: where all shots have as many marks, ticks are more even than Poisson's law has them.
 const SMALLEST_LUMP: f64 = 0.1;
+
+/// Of more lumps the number is normal.
+const MANY_LUMPS: f64 = 100.0;
 
 /// Numbers of ticks that stand for all that Poisson's law gives.
 const NODES: usize = 12;
@@ -42,8 +43,10 @@ struct Gate {
     places: f64,
     /// Ticks of a place.
     ticks: f64,
-    /// False ticks per place, on average.
+    /// Share of ticks that are false.
     false_ticks: f64,
+    /// Ticks of a mark of its own beside the one for which its place counts as lit, on average.
+    surplus: f64,
     /// Other shots whose light is in a gate and in a macropulse, on average.
     others: [f64; 2],
     /// Evidence that a shot needs without a neighbour, and with one.
@@ -92,18 +95,28 @@ impl Hidden {
     }
 }
 
-/// What comes of shots that meet a range after `lag` ticks, by the marks of labels, of which so many have so many.
-pub(super) fn chances(
-    design: &Design,
-    correlation: &Correlation,
-    weights: &BTreeMap<usize, usize>,
-    (found, lag): (&Found, i64),
-) -> Chances {
+/// Shots that meet the same range.
+pub(super) struct Shots<'a> {
+    /// How many labels have so many marks.
+    pub weights: &'a BTreeMap<usize, usize>,
+    /// Shots that may lead to expect light of one, on average.
+    pub neighbours: f64,
+    /// Ticks after which light comes.
+    pub lag: i64,
+    /// How often marks are seen there.
+    pub seen: BestLag,
+    /// Probability that a place is lit by what is no shot's light.
+    pub false_density: f64,
+}
+
+/// What comes of `shots`.
+pub(super) fn chances(design: &Design, correlation: &Correlation, shots: &Shots) -> Chances {
+    let weights = shots.weights;
     let mut levels = Vec::new();
     let labels: usize = weights.values().sum();
     for (&marks, &count) in weights {
         let of_label = count as f64 / labels as f64;
-        for (lit, chance) in (0..).zip(binomial(marks, found.seen)) {
+        for (lit, chance) in (0..).zip(binomial(marks, shots.seen.share(marks as f64))) {
             let share = of_label * chance;
             if lit > 0 && share > SELDOM {
                 levels.push(Level { marks: marks as u32, lit, share });
@@ -111,7 +124,7 @@ pub(super) fn chances(
         }
     }
     levels.sort_by(|one, other| other.fullness().total_cmp(&one.fullness()));
-    let gate = Gate::of(design, correlation, found, lag);
+    let gate = Gate::of(design, correlation, shots);
     let mut hidden = Hidden::of(&levels);
     let (mut pd, mut share_found): (f64, f64) = (0.0, 0.0);
     for level in levels {
@@ -119,7 +132,7 @@ pub(super) fn chances(
         let parts = (level.share / PART).ceil();
         for _ in 0..parts as u32 {
             let [alone, beside] = gate.believed(&level, &hidden);
-            let neighbour = 1.0 - (1.0 - pd.min(1.0)).powi(ABOUT);
+            let neighbour = 1.0 - libm::pow(1.0 - pd.min(1.0), shots.neighbours);
             let believed = level.share / parts * (alone + (beside - alone) * neighbour);
             pd += believed;
             share_found += believed * level.fullness();
@@ -131,7 +144,7 @@ pub(super) fn chances(
 }
 
 impl Gate {
-    fn of(design: &Design, correlation: &Correlation, found: &Found, lag: i64) -> Self {
+    fn of(design: &Design, correlation: &Correlation, shots: &Shots) -> Self {
         let Design { receiver, emission, scan, clock, .. } = design;
         let chips = i64::from(emission.coding().codebook.chips());
         let macropulse = chips * i64::from(correlation.ticks_per_chip);
@@ -142,36 +155,47 @@ impl Gate {
         let period = scan.shortest_period() / s_from_fs(clock.tick_fs);
         let others = [places, length].map(|time| (time / period - 1.0).max(0.0));
         let threshold = belief::threshold(correlation.false_alarm);
-        let needed = [&[][..], &[lag]]
-            .map(|beside: &[i64]| threshold - Prior::new(lags.clone(), beside).at(lag));
-        let false_ticks = -libm::log1p(-found.false_density.min(0.999)) / ticks;
-        Self { length, places, ticks, false_ticks, others, needed }
+        let needed = [&[][..], &[shots.lag]]
+            .map(|beside: &[i64]| threshold - Prior::new(lags.clone(), beside).at(shots.lag));
+        let lit = shots.false_density.min(0.999);
+        let false_ticks = -libm::expm1(libm::log1p(-lit) / ticks);
+        // With a tick of light in a share s of the places, and false ones in a share D of them, which d ticks a tick
+        // are, a place has s + (W − s)·d ticks and is lit with the probability s + D − s·D.
+        let of_light = (1.0 - (1.0 - shots.seen.share(1.0)) / (1.0 - lit)).max(0.0);
+        let surplus = of_light * (lit - false_ticks) + ticks * false_ticks - lit;
+        Self { length, places, ticks, false_ticks, surplus, others, needed }
     }
 
     /// Probabilities that shots of a `level` are believed without a neighbour and with one, where of other shots so much
     /// is `hidden`.
     fn believed(&self, level: &Level, hidden: &Hidden) -> [f64; 2] {
         let [in_gate, about] = self.others;
-        let ticks = |time: f64, shots: f64| {
-            let noise = time * self.false_ticks;
+        let ticks = |time: f64, own: f64, shots: f64| {
+            let noise = time * self.false_ticks + own * self.surplus;
             nodes(noise + shots * hidden.mean, noise + shots * hidden.variance())
         };
-        let rest = ticks(self.places - self.length, in_gate - about);
-        let about = ticks(self.length, about);
+        let rest = ticks(self.places - self.length, 0.0, in_gate - about);
+        // Its own marks take up places, too.
+        let free = (self.length - f64::from(level.marks) * self.ticks).max(0.0);
+        let (about, places) = (ticks(free, level.marks.into(), about), free / self.ticks);
         let marks = Marks { lit: level.lit, of: level.marks };
-        let places = (self.length - f64::from(level.marks) * self.ticks).max(0.0) / self.ticks;
-        let mut believed = [0.0; 2];
-        for (lit, of_lit) in about {
-            for (rest, of_rest) in &rest {
-                let density = ((lit + rest + 1.0) * self.ticks / self.places).min(0.5);
-                let around = Surroundings { lit: lit.min(places), places, density };
-                let evidence = belief::evidence(marks, &around);
-                for (sum, needed) in believed.iter_mut().zip(self.needed) {
-                    *sum += if evidence >= needed { of_lit * of_rest } else { 0.0 };
+        let evidence = |lit: f64, rest: f64| {
+            let density = ((lit + rest + 1.0) * self.ticks / self.places).min(0.5);
+            belief::evidence(marks, &Surroundings { lit: lit.min(places), places, density })
+        };
+        self.needed.map(|needed| {
+            // The more ticks there are, the less evidence.
+            let (mut few, mut of_few) =
+                (rest.len(), rest.iter().map(|(_, share)| share).sum::<f64>());
+            let believed = about.iter().map(|(lit, of_lit)| {
+                while few > 0 && evidence(*lit, rest[few - 1].0) < needed {
+                    few -= 1;
+                    of_few -= rest[few].1;
                 }
-            }
-        }
-        believed
+                if few > 0 { of_lit * of_few } else { 0.0 }
+            });
+            believed.sum()
+        })
     }
 }
 
@@ -180,13 +204,13 @@ impl Gate {
 fn nodes(mean: f64, variance: f64) -> Vec<(f64, f64)> {
     let lump = if mean > 0.0 { (variance / mean).max(SMALLEST_LUMP) } else { 1.0 };
     let lumps = mean.max(0.0) / lump;
+    if lumps > MANY_LUMPS {
+        return normal_nodes(lump * lumps, lump * lumps.sqrt());
+    }
     let wide = 5.0 * lumps.sqrt() + 5.0;
     let (first, last) = ((lumps - wide).max(0.0) as u32, (lumps + wide) as u32);
-    let chance = |count: u32| match lumps > 0.0 {
-        true => poisson(lumps, count.into()),
-        false => f64::from(u8::from(count == 0)),
-    };
-    let all: Vec<(f64, f64)> = (first..=last).map(|count| (count.into(), chance(count))).collect();
+    let all: Vec<(f64, f64)> =
+        (first..).map(f64::from).zip(poisson_from(lumps, first, last)).collect();
     let sum: f64 = all.iter().map(|(_, chance)| chance).sum();
     let groups = all.chunks(all.len().div_ceil(NODES));
     let group = |group: &[(f64, f64)]| {
@@ -197,6 +221,15 @@ fn nodes(mean: f64, variance: f64) -> Vec<(f64, f64)> {
     groups.filter_map(group).collect()
 }
 
+/// The same of a normal distribution: places over four deviations to both sides.
+fn normal_nodes(mean: f64, deviation: f64) -> Vec<(f64, f64)> {
+    let step = 8.0 / (NODES - 1) as f64;
+    let away = |node: usize| step * node as f64 - 4.0;
+    let weight = |node: usize| libm::exp(-0.5 * away(node).powi(2));
+    let sum: f64 = (0..NODES).map(weight).sum();
+    (0..NODES).map(|node| (mean + away(node) * deviation, weight(node) / sum)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,7 +238,7 @@ mod tests {
     /// The mean is kept, and the variance to 10 %, by no more nodes than there are.
     #[test]
     fn nodes_have_the_mean_and_the_variance_asked_for() {
-        for (mean, variance) in [(0.3, 0.3), (4.0, 4.0), (60.0, 60.0), (250.0, 800.0)] {
+        for (mean, variance) in [(0.3, 0.3), (4.0, 4.0), (60.0, 60.0), (250.0, 800.0), (5e4, 6e4)] {
             let nodes = nodes(mean, variance);
             let sum = |of: &dyn Fn(f64) -> f64| -> f64 {
                 nodes.iter().map(|(ticks, chance)| of(*ticks) * chance).sum()

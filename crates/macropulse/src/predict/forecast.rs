@@ -6,16 +6,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use macropulse_codec::RecordKind;
 use macropulse_codec::decode::{self, Effort, Method};
+use macropulse_codec::{RecordKind, ShotLog};
 
+use super::best_lag::{BestLag, Sight};
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, belief, histogram, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
-use crate::design::{Design, Detector};
+use crate::design::{Design, Detector, SHOTS_OF_BAND};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs, tof_from_range};
 
@@ -51,6 +52,8 @@ pub struct Forecaster<'a> {
     /// How many macropulses have so many marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
     mean_weight: f64,
+    /// Shots that may lead a matched receiver to expect light of one, on average.
+    neighbours: f64,
     /// Those of a matched receiver; the dark chips of a balanced one have none.
     sidelobes: Option<Sidelobes>,
     /// The points of the sums over noise, of a receiver of samples; empty of the others.
@@ -128,6 +131,7 @@ impl<'a> Forecaster<'a> {
         let (light, background) = (1.0, 1.0);
         let is_matched = matches!(design.receiver.method, Method::Matched(..));
         let sidelobes = is_matched.then(|| Sidelobes::of(design));
+        let neighbours = if is_matched { neighbours(design) } else { 0.0 };
         let sampling = design.receiver.method.sampling();
         let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
         let counting = match &design.receiver.method {
@@ -140,6 +144,7 @@ impl<'a> Forecaster<'a> {
             channel_period,
             weights,
             mean_weight,
+            neighbours,
             sidelobes,
             points: points.into(),
             counting,
@@ -270,8 +275,17 @@ impl<'a> Forecaster<'a> {
         let found = matched::Found { seen: mark_pd, density, false_density };
         let chances = match &design.receiver.method {
             Method::Matched(correlation, Effort::Exhaustive) => {
-                let lag = (tof_from_range(range) / s_from_fs(design.clock.tick_fs)) as i64;
-                belief::chances(design, correlation, &self.weights, (&found, lag))
+                let ticks = tof_from_range(range) / s_from_fs(design.clock.tick_fs);
+                let converted = 1.0 - loss;
+                let sight = Sight { late: ticks.fract(), density: at_the_lag, converted };
+                let shots = belief::Shots {
+                    weights: &self.weights,
+                    neighbours: self.neighbours,
+                    lag: ticks as i64,
+                    seen: BestLag::of(design, &mark, &sight),
+                    false_density,
+                };
+                belief::chances(design, correlation, &shots)
             }
             Method::Matched(correlation, _) => {
                 matched::chances(design, correlation, &self.weights, &found)
@@ -458,6 +472,22 @@ impl<'a> Forecaster<'a> {
 
 /// Ranges that are tried for the farthest one at which a target is seen that is not seen at the nearest.
 const PLACES: i32 = 64;
+
+/// Shots that may lead the matched receiver to expect light of one, on average.
+fn neighbours(design: &Design) -> f64 {
+    let pattern = design.scan.model();
+    let shots = design.shots_per_scan().min(SHOTS_OF_BAND);
+    let unknown = vec![0; shots as usize];
+    let mut log = ShotLog { label: unknown.clone(), word: unknown, ..ShotLog::default() };
+    log.fired_at_fs = vec![0; shots as usize];
+    for order in 0..shots {
+        let (row, column) = pattern.pixel(order);
+        log.row.push(row);
+        log.column.push(column);
+        log.channel.push(pattern.channel_of(order, row));
+    }
+    decode::neighbours(&log)
+}
 
 /// Brightnesses of an echo of so many speckle `cells`, M, in its mean, and the share of each, of the gamma
 /// distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).

@@ -69,7 +69,7 @@ impl Place {
 }
 
 /// Probability that the detector sees anything of a `share` of the photons of a mark.
-fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
+pub(super) fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
     // Light without end times nothing is nothing.
     let photons = if share > 0.0 { mark.photons * share } else { 0.0 };
     design.detector.model().mark_pd(&Lit { photons, ..*mark })
@@ -226,7 +226,7 @@ pub(super) struct Timing {
     /// rms length of a micropulse with the jitter, s.
     pub spread: f64,
     /// Standard deviation of an event, in ticks.
-    sigma: f64,
+    pub sigma: f64,
     /// Length of a tick, s.
     tick: f64,
     /// Whether the receiver knows of jitter that leaves the events in two ticks.

@@ -3,6 +3,7 @@
 pub mod comparison;
 mod balanced;
 mod belief;
+mod best_lag;
 pub mod converters;
 mod forecast;
 mod histogram;

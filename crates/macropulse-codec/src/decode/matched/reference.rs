@@ -8,7 +8,8 @@
 //! 2. All hypotheses are judged, the fullest first. Each sees the ticks and the places that fuller returns leave
 //!    ([`residual`]), and a prior made from fuller returns of the shots beside it.
 //! 3. A hypothesis stands for its sidelobes, too: it is judged at the best lag of those whose light overlaps with its
-//!    own. It is refused if its label is contradicted.
+//!    own. If that is another one, the hypothesis is judged again in what is left. It is refused if its label is
+//!    contradicted.
 //! 4. Each shot proposes its best lag, if it is believed in light that neither returns nor earlier proposals of the shot
 //!    explain. [`search`] finds it: near the lags that neighbours lead to expect, and if no shot has one there, of all
 //!    lags. A shot has done with its light after some proposals, and a part of refused light is no return.
@@ -34,7 +35,7 @@ use std::ops::Range;
 use super::measure::{Meter, Photons};
 use super::sent::Sent;
 use super::track::{BLOCK, below};
-use super::{Detection, last_beside};
+use super::{Detection, FARTHEST, last_beside};
 use crate::decode::belief::{self, Hypothesis, Light, Marks, Prior};
 use crate::decode::field::{self, Field};
 use crate::decode::{Reject, Returns, Strength};
@@ -45,6 +46,9 @@ use search::{Peak, Question, Search};
 /// Hypotheses of a shot at most. It bounds the time that a hostile band takes.
 const MOST_HYPOTHESES: usize = 16;
 
+/// Returns that one hypothesis may lead to: its own, and those that take its place.
+const MOST_OF_HYPOTHESIS: usize = 4;
+
 /// Gates of a block, if they have no more ticks than [`BLOCK_TICKS`]; two at least. The shots of the last one are judged
 /// again in the next block, and searched there.
 const GATES: i64 = 8;
@@ -52,9 +56,6 @@ const BLOCK_TICKS: i64 = 1 << 25;
 
 /// Light is looked for first so many lags to both sides of an expected one: in all, as many as are counted at once.
 const EXPECTED: i64 = search::BLOCK / 2;
-
-/// Shots between one and its neighbour in a direction at most.
-const FARTHEST: usize = 64;
 
 /// Directions in which a shot has neighbours.
 const DIRECTIONS: usize = 4;
@@ -94,14 +95,14 @@ pub(super) struct Reference<'a> {
 #[derive(Debug, Clone)]
 struct Verdict {
     shot: usize,
-    /// The return it is, if it is believed.
-    echo: Option<Echo>,
-    /// How the label was judged.
+    /// The returns that it led to.
+    echoes: Vec<Echo>,
+    /// How their labels were judged, the worst of them.
     label: Label,
 }
 
 /// How the label of a hypothesis was judged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Label {
     /// It fits, whatever else was proposed.
     Fits,
@@ -422,8 +423,8 @@ impl Light for Reference<'_> {
                 self.residual.explain(shot, echo.lag);
             }
         }
-        for Verdict { shot, echo, .. } in &self.verdicts {
-            if let Some(echo) = echo {
+        for Verdict { shot, echoes, .. } in &self.verdicts {
+            for echo in echoes {
                 self.residual.explain(*shot, echo.lag);
                 self.found[*shot].push(echo.clone());
             }
@@ -432,16 +433,23 @@ impl Light for Reference<'_> {
     }
 
     fn judge(&mut self, hypothesis: &Hypothesis) {
-        let Hypothesis { shot, lag, .. } = *hypothesis;
+        let shot = hypothesis.shot;
         let prior = self.prior(shot);
-        let mut verdict = Verdict { shot, echo: None, label: Label::Fits };
-        if let Some((Peak { lag, .. }, peaks)) = self.believed(shot, lag, &prior) {
-            verdict.label = self.label(shot, lag, &prior);
-            if verdict.label != Label::Contradicted {
-                let echo = Echo { lag, peaks };
-                self.residual.explain(shot, lag);
-                self.found[shot].push(echo.clone());
-                verdict.echo = Some(echo);
+        let mut verdict = Verdict { shot, echoes: Vec::new(), label: Label::Fits };
+        while verdict.echoes.len() < MOST_OF_HYPOTHESIS
+            && let Some((Peak { lag, .. }, peaks)) = self.believed(shot, hypothesis.lag, &prior)
+        {
+            let label = self.label(shot, lag, &prior);
+            verdict.label = verdict.label.max(label);
+            if label == Label::Contradicted {
+                break;
+            }
+            let echo = Echo { lag, peaks };
+            self.residual.explain(shot, lag);
+            self.found[shot].push(echo.clone());
+            verdict.echoes.push(echo);
+            if lag == hypothesis.lag {
+                break;
             }
         }
         self.verdicts.push(verdict);

@@ -222,12 +222,17 @@ impl Light for Plain<'_> {
     fn judge(&mut self, hypothesis: &Hypothesis) {
         let Hypothesis { shot, lag, .. } = *hypothesis;
         let prior = self.prior(shot);
-        let Some(lag) = self.best_about(shot, lag, &prior) else { return };
-        if self.is_mislabelled(shot, lag, &prior) {
-            return;
+        for _ in 0..MOST_OF_HYPOTHESIS {
+            let Some(best) = self.best_about(shot, lag, &prior) else { return };
+            if self.is_mislabelled(shot, best, &prior) {
+                return;
+            }
+            self.explain(shot, best);
+            self.found[shot].push(best);
+            if best == lag {
+                return;
+            }
         }
-        self.explain(shot, lag);
-        self.found[shot].push(lag);
     }
 
     fn propose(&mut self) -> Vec<Hypothesis> {
