@@ -81,8 +81,8 @@ fn a_wall_behind_a_pane_is_found_where_both_are_faint() {
 }
 
 /// N = 1696 shots without noise, and as many as declared, seed 20160913: no shot is refused for its label, and
-/// a quick receiver gives the ranges that a thorough one gives, without noise also an exhaustive one. Control: a receiver that believes nothing
-/// faint does not.
+/// a quick receiver gives the ranges that a thorough one gives. Without noise an exhaustive one gives them, too. Control:
+/// a receiver that believes nothing faint does not.
 #[test]
 fn light_of_another_surface_does_not_pass_for_another_label() {
     let perfect = [

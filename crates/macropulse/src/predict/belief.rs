@@ -11,13 +11,14 @@
 
 use std::collections::BTreeMap;
 
-use macropulse_codec::decode::Correlation;
+use macropulse_codec::ShotLog;
 use macropulse_codec::decode::belief::{self, Marks, Prior, Surroundings};
+use macropulse_codec::decode::{self, Correlation};
 use macropulse_codec::statistics::{binomial, poisson_from};
 
 use super::best_lag::BestLag;
 use super::matched::{Chances, Place};
-use crate::design::Design;
+use crate::design::{Design, SHOTS_OF_BAND};
 use crate::units::s_from_fs;
 
 /// Share of all shots that are gone through at once, at most.
@@ -107,6 +108,22 @@ pub(super) struct Shots<'a> {
     pub seen: BestLag,
     /// Probability that a place is lit by what is no shot's light.
     pub false_density: f64,
+}
+
+/// Shots that may lead the receiver to expect light of one, on average.
+pub(super) fn neighbours(design: &Design) -> f64 {
+    let pattern = design.scan.model();
+    let shots = design.shots_per_scan().min(SHOTS_OF_BAND);
+    let unknown = vec![0; shots as usize];
+    let mut log = ShotLog { label: unknown.clone(), word: unknown, ..ShotLog::default() };
+    log.fired_at_fs = vec![0; shots as usize];
+    for order in 0..shots {
+        let (row, column) = pattern.pixel(order);
+        log.row.push(row);
+        log.column.push(column);
+        log.channel.push(pattern.channel_of(order, row));
+    }
+    decode::neighbours(&log)
 }
 
 /// What comes of `shots`.
