@@ -9,7 +9,7 @@
 
 use macropulse_codec::statistics::{normal_tail, poisson_from};
 
-use super::matched::{Timing, pd_of_share};
+use super::matched::{Timing, seen_of_share};
 use crate::design::Design;
 use crate::design::detector::Lit;
 
@@ -35,7 +35,6 @@ impl BestLag {
     pub fn of(design: &Design, mark: &Lit, sight: &Sight) -> Self {
         let width = i64::from(design.receiver.window_ticks());
         let sigma = Timing::of(design, mark).sigma;
-        let is_apart = design.detector.spread_of(&design.light).is_some();
         let after = |tick: i64| match (tick as f64 - sight.late, sigma > 0.0) {
             (away, true) => normal_tail(away / sigma),
             (away, false) => f64::from(u8::from(away <= 0.0)),
@@ -43,11 +42,7 @@ impl BestLag {
         let light = |from: i64, to: i64| {
             // A receiver that looks at a single tick takes events for exact.
             let share = if width == 1 { 1.0 } else { after(from) - after(to) };
-            let seen = match is_apart {
-                true => pd_of_share(design, mark, share),
-                false => pd_of_share(design, mark, 1.0) * share,
-            };
-            seen * sight.converted
+            seen_of_share(design, mark, share) * sight.converted
         };
         Self::seen_by(width, light, libm::log1p(-sight.density.min(0.999_999)) / width as f64)
     }
@@ -61,13 +56,12 @@ impl BestLag {
         let lags = if width == 1 { 0..1 } else { 1 - 2 * width..width };
         let mut each: Vec<(f64, i64)> = lags.map(|lag| (within(lag, lag + width), lag)).collect();
         each.sort_by(|one, other| other.0.total_cmp(&one.0));
-        let both = |&(one, first): &(f64, i64), &(other, second): &(f64, i64)| match (first
-            - second)
-            .abs()
-            < width
-        {
-            true => one + other - within(first.min(second), first.max(second) + width),
-            false => one * other,
+        let both = |&(one, first): &(f64, i64), &(other, second): &(f64, i64)| {
+            let is_shared = (first - second).abs() < width;
+            match is_shared {
+                true => one + other - within(first.min(second), first.max(second) + width),
+                false => one * other,
+            }
         };
         let both = each.iter().map(|one| each.iter().map(|other| both(one, other)).collect());
         Self { both: both.collect(), seen: each.iter().map(|(seen, _)| *seen).collect() }

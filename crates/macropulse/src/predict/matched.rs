@@ -61,15 +61,20 @@ impl Place {
     /// Probability that a mark is found where it is looked for. Photons of a micropulse that
     /// reaches beyond its chip fall there or not each by itself; else its one event does.
     pub fn seen(&self, design: &Design, mark: &Lit) -> f64 {
-        match design.detector.spread_of(&design.light) {
-            Some(_) => pd_of_share(design, mark, self.share),
-            None => pd_of_share(design, mark, 1.0) * self.share,
-        }
+        seen_of_share(design, mark, self.share)
+    }
+}
+
+/// The same where a `share` of the light or of the events falls.
+pub(super) fn seen_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
+    match design.detector.spread_of(&design.light) {
+        Some(_) => pd_of_share(design, mark, share),
+        None => pd_of_share(design, mark, 1.0) * share,
     }
 }
 
 /// Probability that the detector sees anything of a `share` of the photons of a mark.
-pub(super) fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
+fn pd_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
     // Light without end times nothing is nothing.
     let photons = if share > 0.0 { mark.photons * share } else { 0.0 };
     design.detector.model().mark_pd(&Lit { photons, ..*mark })
