@@ -1,6 +1,6 @@
 //! What a quick receiver finds otherwise than a thorough one.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use macropulse::codec::decode::{Effort, Method, Returns};
 
@@ -55,7 +55,8 @@ impl Row {
         let (thorough, long) = decode(Effort::Thorough)?;
         let (quick, short) = decode(Effort::Quick)?;
         let pairs = quick.iter().zip(&thorough);
-        self.differ += pairs.map(|(quick, thorough)| differ(quick, thorough)).sum::<usize>();
+        let tick = sample.design.receiver.tick_fs as f64 * 1e-15;
+        self.differ += pairs.map(|(quick, thorough)| differ(tick, quick, thorough)).sum::<usize>();
         self.shots += sample.shots();
         self.took = [self.took[0] + long, self.took[1] + short];
         Ok(())
@@ -83,13 +84,24 @@ fn has_surfaces(scene: &str) -> bool {
     scene != "random"
 }
 
-/// Shots of which not the same ranges are returned.
-fn differ(one: &Returns, other: &Returns) -> usize {
-    let returned = |returns: &Returns| -> BTreeSet<(u32, u64)> {
-        returns.shot.iter().copied().zip(returns.tof.iter().map(|tof| tof.to_bits())).collect()
+/// Shots of which `one` and `other` give not as many ranges, or one that differs by a `tick` or more.
+fn differ(tick: f64, one: &Returns, other: &Returns) -> usize {
+    let of_shots = |returns: &Returns| {
+        let mut ranges: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+        for (shot, tof) in returns.shot.iter().zip(&returns.tof) {
+            ranges.entry(*shot).or_default().push(*tof);
+        }
+        ranges
     };
-    let (one, other) = (returned(one), returned(other));
-    one.symmetric_difference(&other).map(|(shot, _)| *shot).collect::<BTreeSet<u32>>().len()
+    let (one, other) = (of_shots(one), of_shots(other));
+    let is_near = |(one, other): (&f64, &f64)| (one - other).abs() < tick;
+    let is_same = |shot: &&u32| {
+        one.get(shot).zip(other.get(shot)).is_some_and(|(one, other)| {
+            one.len() == other.len() && one.iter().zip(other).all(is_near)
+        })
+    };
+    let shots: BTreeSet<&u32> = one.keys().chain(other.keys()).collect();
+    shots.iter().filter(|shot| !is_same(shot)).count()
 }
 
 impl Efforts {

@@ -28,7 +28,7 @@ fn the_paper_with_honest_light_has_the_numbers_of_its_budget() {
     assert_about(&budget, "cw_ael_mw", 1.0, 0.003);
     assert_about(&budget, "mark_by_mark_shortfall", 99.1, 0.01);
     assert_eq!(budget["closes"], false);
-    assert_eq!(budget["first_failure"]["what"], "light");
+    assert_eq!(budget["first_failure"]["what"], "sunlight");
     assert_eq!(budget["range_m"], 150.0);
 }
 

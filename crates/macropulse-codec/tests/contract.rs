@@ -402,7 +402,7 @@ prop_compose! {
         (any, odd, odd_threshold) in (any_receiver(), any_correlation(), any::<u16>()),
         kind in 0..KINDS.len(),
         effort in prop_oneof![
-            Just(Effort::Quick), Just(Effort::Thorough), Just(Effort::Exhaustive)
+            Just(Effort::Quick), Just(Effort::Thorough)
         ],
         wrong in 0..12_usize,
         ticks_per_chip in 1..4_u32,

@@ -107,23 +107,22 @@ fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
     let mut graded = 0;
     for name in ["clear-day", "night"] {
         let sky = Environment::named(name).unwrap();
-        for range in [10.0, 20.0, 50.0, 130.0, 150.0] {
+        for (range, white) in
+            [(10.0, 1.0), (20.0, 1.0), (50.0, 1.0), (150.0, 1.0), (150.0, 0.8), (150.0, 0.6)]
+        {
             let forecaster = Forecaster::new(&design, &sky).unwrap();
-            let predicted = forecaster.forecast(1.0, range).pd;
-            let room = room(range * 0.9999, 1.0, name);
+            let predicted = forecaster.forecast(white, range).pd;
+            let room = room(range * 0.9999, white, name);
             let (found, shots) = detected(&measure(&design, &room, 1, 1));
-            // At 150 m by night the forecast, 0.844, is too high: eight seeds find 0.8245 ± 0.003.
-            let share = found as f64 / shots as f64;
-            let is_near = range > 140.0 && (predicted - 0.05..predicted).contains(&share);
             assert!(
-                is_near || agrees(found, shots, predicted),
+                agrees(found, shots, predicted),
                 "{name}, {range} m: {found} of {shots}, predicted {predicted}"
             );
             if name == "clear-day" {
                 assert_eq!(found, 0, "{range} m: sunlight in every chip");
             }
             if (0.001..0.999).contains(&predicted) {
-                let brighter = forecaster.with_light(2.0).forecast(1.0, range).pd;
+                let brighter = forecaster.with_light(2.0).forecast(white, range).pd;
                 assert!(!agrees(found, shots, brighter), "{name}, {range} m: {brighter}");
                 graded += 1;
             }
@@ -132,49 +131,36 @@ fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
     assert!(graded >= 2, "{graded} cases can tell right from wrong");
 }
 
-/// Where every fifth place is lit by the sun, the share of shots found over what is forecast. N = 1694 lit shots, seed 1.
-/// Control: without its sunlight the forecast is far off.
-fn found_of_forecast_in_dense_light(effort: &str) -> f64 {
-    let set = [("optics.field", "\"in-flight\""), ("receiver.effort", effort)];
+/// N = 1694 lit shots, seed 1: where every fifth place is lit by the sun the forecast is right to a tenth, 0.282 where
+/// 0.270 is found. Control: without its sunlight it is far off.
+#[test]
+fn in_dense_light_the_forecast_is_right_to_a_tenth() {
+    let set = [("optics.field", "\"in-flight\""), ("receiver.effort", "\"thorough\"")];
     let design = sensor("kim-park-2016-physical", &set);
     let (found, shots) = detected(&measure(&design, &room(90.49, 1.0, "clear-day"), 1, 1));
     let forecaster = Forecaster::new(&design, &Environment::default()).unwrap();
+    let share = found as f64 / shots as f64;
+    let predicted = forecaster.forecast(1.0, 90.5).pd;
+    assert!((0.9..1.1).contains(&(share / predicted)), "{share}, predicted {predicted}");
     assert!(forecaster.with_background(0.0).forecast(1.0, 90.5).pd > 0.99);
-    found as f64 / shots as f64 / forecaster.forecast(1.0, 90.5).pd
-}
-
-/// The threshold of the thorough receiver follows the light that chance has put around a macropulse, which the forecast
-/// leaves out: 0.161 where 0.192 is found.
-#[test]
-fn in_dense_light_the_forecast_is_right_to_a_quarter() {
-    let ratio = found_of_forecast_in_dense_light("\"thorough\"");
-    assert!((0.8..1.25).contains(&ratio), "{ratio}");
-}
-
-#[test]
-fn in_dense_light_an_exhaustive_receiver_finds_what_is_forecast_to_a_tenth() {
-    let ratio = found_of_forecast_in_dense_light("\"exhaustive\"");
-    assert!((0.9..1.1).contains(&ratio), "{ratio}");
 }
 
 /// N > 5000 shots of each of three sensors on a wall all around by night, at reflectances of which the forecast is 0.1,
-/// 0.4, 0.7 and 0.95, seed 5: the exhaustive receiver finds as many, to 0.02 and 4 % of the light, on which it depends
-/// steeply. Control: so does not, in half of the cases, what is forecast for the other receivers.
+/// 0.4, 0.7 and 0.95, seed 5: the thorough receiver finds as many, to 0.02 and 4 % of the light, on which it depends
+/// steeply. Control: of a tenth more light it does not, in half of the cases.
 #[test]
-fn an_exhaustive_receiver_finds_what_is_forecast() {
+fn a_thorough_receiver_finds_what_is_forecast() {
     let night = Environment::named("night").unwrap();
-    let (mut off, mut others_off) = (Vec::new(), 0);
+    let (mut off, mut brighter_off) = (Vec::new(), 0);
     for (name, range, bands) in
         [("kim-park-2016", 120.0, 3), ("coded-360", 120.0, 6), ("coded-practical", 85.0, 3)]
     {
-        let [exhaustive, thorough] = ["\"exhaustive\"", "\"thorough\""]
-            .map(|effort| sensor(name, &[("receiver.effort", effort)]));
-        let [forecast, other] =
-            [&exhaustive, &thorough].map(|design| Forecaster::new(design, &night).unwrap());
+        let design = sensor(name, &[("receiver.effort", "\"thorough\"")]);
+        let forecast = Forecaster::new(&design, &night).unwrap();
         for wanted in [0.1, 0.4, 0.7, 0.95] {
             let reflectance = 0.01 * forecast.light_needed(wanted, 0.01, range).unwrap();
             let room = room(range, reflectance, "night");
-            let (found, shots) = detected(&measure(&exhaustive, &room, 5, bands));
+            let (found, shots) = detected(&measure(&design, &room, 5, bands));
             let share = found as f64 / shots as f64;
             let is_far = |forecaster: &Forecaster| {
                 let [less, more] = [0.96, 1.04]
@@ -185,11 +171,11 @@ fn an_exhaustive_receiver_finds_what_is_forecast() {
             if is_far(&forecast) {
                 off.push((name, wanted, share));
             }
-            others_off += usize::from(is_far(&other));
+            brighter_off += usize::from(is_far(&forecast.with_light(1.1)));
         }
     }
     assert!(off.is_empty(), "{off:?}");
-    assert!(others_off >= 6, "{others_off}");
+    assert!(brighter_off >= 6, "{brighter_off}");
 }
 
 /// The first band of a sensor, an echo of `photons` detected per mark from 20 m for every shot.
@@ -365,8 +351,8 @@ fn range_is_as_precise_as_predicted() {
     assert!((0.95..1.3).contains(&(measured / predicted)), "{measured}, {predicted}");
 }
 
-/// N = 1696 shots into the open, seed 1: the threshold is a bound, since the lags of a gate are
-/// not independent. Control: a receiver that accepts ten times as much breaks it.
+/// N = 1696 shots into the open, seed 1: what is accepted is a bound, far from what chance gives. Control: a receiver that
+/// accepts one false return in two shots breaks the bound of one that accepts one in 100 000.
 #[test]
 fn false_returns_stay_below_what_is_predicted() {
     let sky = "version = 1\n[[object]]\nshape.sphere.radius_m = 1\nposition_m = [-50, 0, 0]\n";
@@ -386,9 +372,9 @@ fn false_returns_stay_below_what_is_predicted() {
         let found = scan.score.count(Outcome::False);
         (found, scan.tally.shots, forecast.false_per_shot)
     };
-    let (found, shots, strict) = run("0.02");
+    let (found, shots, strict) = run("1e-5");
     assert!(found as f64 <= shots as f64 * strict || agrees(found, shots, strict));
-    let (found, shots, lax) = run("0.2");
+    let (found, shots, lax) = run("0.5");
     assert!(found as f64 <= shots as f64 * lax || agrees(found, shots, lax));
     assert!(found as f64 > shots as f64 * strict && !agrees(found, shots, strict));
 }

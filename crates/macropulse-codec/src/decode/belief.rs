@@ -20,7 +20,7 @@ use std::f64::consts::LN_2;
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use libm::{lgamma, log};
+use libm::{lgamma, log, log1p};
 
 /// Euler's constant γ.
 const EULER: f64 = 0.577_215_664_901_532_9;
@@ -86,6 +86,16 @@ pub fn evidence(marks: Marks, around: &Surroundings) -> f64 {
         true => log_factor(marks, around),
         false => f64::NEG_INFINITY,
     }
+}
+
+/// The evidence E(k, n, d) where chance lights places with a known `density`, d.
+pub(super) fn evidence_at(marks: Marks, density: f64) -> f64 {
+    let [lit, of] = [marks.lit, marks.of].map(f64::from);
+    if lit <= of * density {
+        return f64::NEG_INFINITY;
+    }
+    let dark = if lit < of { (of - lit) * log1p(-density) } else { 0.0 };
+    log_light(lit, of) - lit * log(density) - dark
 }
 
 /// The logarithm of the Bayes factor, be it for light or against it; at least one mark is lit.

@@ -6,8 +6,9 @@
 
 use std::ops::Range;
 
+use super::belief::{self, Prior};
 use super::check::check_lags;
-use super::threshold::least_marks;
+use super::threshold::fewest_with_evidence;
 use super::{Error, Method, Receiver, Reject};
 use crate::code::Codebook;
 use crate::shot_log::ShotLog;
@@ -41,7 +42,8 @@ pub struct Explanation {
     pub ticks: Vec<(i64, bool)>,
     /// Share of places in that time at which a mark would be found by chance.
     pub density: f64,
-    /// The fewest marks that chance does not reach at that density, where the receiver has a threshold.
+    /// The fewest marks that are believed at that density where no neighbour leads to expect light, if the receiver is a
+    /// matched one.
     pub threshold: Option<u32>,
     /// The lag with most marks, and how many.
     pub peak: Option<(i64, u16)>,
@@ -286,8 +288,9 @@ impl<'a> Bench<'a> {
     fn threshold(&self, density: f64) -> Option<u32> {
         let Method::Matched(correlation, _) = &self.receiver.method else { return None };
         let marks = self.marks.len() as u32;
-        let lags = (self.gate.end - self.gate.start) as f64;
-        (marks > 0).then(|| least_marks(lags, marks, density, correlation.false_alarm))
+        let needed = belief::threshold(correlation.false_alarm)
+            - Prior::new(self.gate.clone(), &[]).at(self.gate.start);
+        (marks > 0).then(|| fewest_with_evidence(marks, density, needed))
     }
 }
 

@@ -78,15 +78,6 @@ impl Picture {
 /// Of a cell in which ticks were cancelled since they were counted.
 const UNKNOWN: u32 = u32::MAX;
 
-/// Which ticks are looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Source {
-    /// All of them.
-    Seen,
-    /// Those that are not cancelled.
-    Residual,
-}
-
 /// Memory of a field, whatever is in it.
 pub(super) type Memory = ([Timeline; 3], Picture);
 
@@ -230,6 +221,11 @@ impl<'a> Field<'a> {
         self.residual.has(tick)
     }
 
+    /// How many ticks of `pattern` are not cancelled where it begins so many ticks `after` `start`, over all of these.
+    pub fn left_in_all(&self, start: i64, after: &[u32], pattern: &Pattern) -> u32 {
+        self.residual.lit_in_all(start, after, pattern)
+    }
+
     /// Cancels the ticks of `pattern`, begun so many ticks `after` `start`, for each of these, ascending.
     pub fn cancel(&mut self, start: i64, after: &[u32], pattern: &Pattern) {
         self.residual.put_out(start, after, pattern);
@@ -240,25 +236,21 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Where marks count as found in the `source`, for all of `span`; made in `memory` where need be.
-    pub fn lit_in<'b>(
+    /// Where marks count as found by ticks that are not cancelled, for all of `span`. It is made in `memory` if a mark is
+    /// looked for in several ticks.
+    pub fn lit_by_residual<'b>(
         &'b self,
-        source: Source,
         span: &Range<i64>,
         memory: &'b mut Timeline,
     ) -> &'b Timeline {
-        match source {
-            Source::Seen => self.lit(),
-            Source::Residual if self.width == 1 => &self.residual,
-            Source::Residual => {
-                let words =
-                    self.residual.words(&(span.start..span.end + i64::from(self.width) + 64));
-                let start = span.start.div_euclid(64) * 64;
-                let reach = self.width as usize - 1;
-                memory.look_ahead(start.max(self.residual.origin()), words, reach);
-                memory
-            }
+        if self.width == 1 {
+            return &self.residual;
         }
+        let words = self.residual.words(&(span.start..span.end + i64::from(self.width) + 64));
+        let start = span.start.div_euclid(64) * 64;
+        let reach = self.width as usize - 1;
+        memory.look_ahead(start.max(self.residual.origin()), words, reach);
+        memory
     }
 
     /// The cells that touch `span`.

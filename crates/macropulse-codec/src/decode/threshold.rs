@@ -1,5 +1,6 @@
 //! How many marks must be found together before a return is believed.
 
+use super::belief::{Marks, evidence_at};
 use crate::statistics::binomial_tail;
 
 /// The fewest marks that chance does not reach: the smallest k with
@@ -93,6 +94,49 @@ impl Thresholds {
         }
         least
     }
+}
+
+/// The fewest of some marks whose evidence against chance of a known density reaches a number of nats, remembered.
+#[derive(Debug, Clone)]
+pub(super) struct Fewest {
+    needed: f64,
+    /// By marks and step of density; 0 where not yet known.
+    known: Vec<Option<Box<[u32; STEPS]>>>,
+}
+
+impl Fewest {
+    /// For so much evidence, in nats.
+    pub fn new(needed: f64) -> Self {
+        Self { needed, known: Vec::new() }
+    }
+
+    /// Whether it gives what `other` gives.
+    pub fn is_as(&self, other: &Self) -> bool {
+        self.needed == other.needed
+    }
+
+    /// The fewest of `marks` at `density`, which is rounded down to an eighth of an octave; one more than there are if
+    /// none are enough.
+    pub fn least(&mut self, marks: u32, density: f64) -> u32 {
+        let step = (density.clamp(0.0, 1.0).to_bits() >> STEP_BITS).saturating_sub(FIRST_STEP);
+        let step = step.min(STEPS as u64 - 1);
+        if self.known.len() <= marks as usize {
+            self.known.resize(marks as usize + 1, None);
+        }
+        let known = self.known[marks as usize].get_or_insert_with(|| Box::new([0; STEPS]));
+        let least = &mut known[step as usize];
+        if *least == 0 {
+            let density = f64::from_bits((FIRST_STEP + step) << STEP_BITS);
+            *least = fewest_with_evidence(marks, density, self.needed);
+        }
+        *least
+    }
+}
+
+/// The fewest of `marks` whose evidence against chance of this `density` reaches so many nats; one more than there are if
+/// none do.
+pub(super) fn fewest_with_evidence(marks: u32, density: f64, needed: f64) -> u32 {
+    fewest(marks, |lit| evidence_at(Marks { lit, of: marks }, density) >= needed)
 }
 
 /// The highest density d at which `least` of `marks` are enough, L · P(Bin(N, d) ≥ k) ≤ α.

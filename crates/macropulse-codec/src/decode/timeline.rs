@@ -137,6 +137,12 @@ impl Timeline {
         put_out(&mut self.words, first, after, pattern);
     }
 
+    /// Darkens what is not lit in `other`, in a `span` of whole machine words that both have.
+    pub fn keep_lit_in(&mut self, other: &Self, span: &Range<i64>) {
+        let lit = other.words(span);
+        self.words_mut(span).iter_mut().zip(lit).for_each(|(word, lit)| *word &= lit);
+    }
+
     /// Whether all ticks of `pattern` are lit if it begins so many ticks `after` `tick`, for each of these,
     /// ascending.
     pub fn are_lit(&self, tick: i64, after: &[u32], pattern: &Pattern) -> bool {

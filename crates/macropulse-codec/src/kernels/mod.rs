@@ -34,6 +34,6 @@ pub(crate) use lay::{count_each, dark_before, lay, least_most_and_sum, lit_after
 pub(crate) use marks::{WordTicks, begin_with, places_of};
 pub(crate) use pattern::{
     Pattern, are_lit, light_up, lit_in, lit_in_all, lit_in_any, lit_in_each, lit_in_row,
-    look_ahead, parted, put_out,
+    look_ahead, put_out,
 };
 pub(crate) use waveform::{LAGS, filter, lower, standing_out};

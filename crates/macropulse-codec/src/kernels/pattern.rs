@@ -254,22 +254,6 @@ fn under(words: &mut [u64], first: usize, pattern: &Pattern, to_word: impl Fn(&m
 }
 
 on_every_level! {
-    /// How many bits are in neither of two rows, in `one` alone, and in both it and the `other`, and
-    /// how many of each are lit. What is in the `other` alone is not counted.
-    pub(crate) fn parted(one: &[u64], other: &[u64], lit: &[u64]) -> [[u32; 2]; 3] {
-        let mut counts = [[0_u64; 2]; 3];
-        for ((one, other), lit) in one.iter().zip(other).zip(lit) {
-            let parts = [!one & !other, one & !other, one & other];
-            for (counts, part) in counts.iter_mut().zip(parts) {
-                counts[0] += u64::from(part.count_ones());
-                counts[1] += u64::from((part & lit).count_ones());
-            }
-        }
-        counts.map(|counts| counts.map(|count| count as u32))
-    }
-}
-
-on_every_level! {
     /// Makes `ahead` what `words`, as many, are, with the `reach` bits before each one that is lit.
     pub(crate) fn look_ahead(words: &[u64], ahead: &mut [u64], reach: usize) {
         let Some((last, before)) = ahead.split_last_mut().filter(|_| reach > 0) else {
@@ -336,29 +320,6 @@ mod tests {
             });
             for (level, words) in seen {
                 prop_assert_eq!(&words, &expected, "{:?}", level);
-            }
-        }
-
-        #[test]
-        fn every_level_parts_two_rows(
-            rows in proptest::collection::vec(any::<(u64, u64, u64)>(), 0..40),
-        ) {
-            let row = |of: fn(&(u64, u64, u64)) -> u64| rows.iter().map(of).collect::<Vec<u64>>();
-            let (one, other, lit) = (row(|r| r.0), row(|r| r.1), row(|r| r.2));
-            let mut expected = [[0; 2]; 3];
-            for bit in 0..64 * rows.len() {
-                let is_in = |row: &[u64]| row[bit / 64] >> (bit % 64) & 1 == 1;
-                let part = match (is_in(&one), is_in(&other)) {
-                    (false, false) => 0,
-                    (true, false) => 1,
-                    (true, true) => 2,
-                    (false, true) => continue,
-                };
-                expected[part][0] += 1;
-                expected[part][1] += u32::from(is_in(&lit));
-            }
-            for (level, counts) in at_each_level(|| parted(&one, &other, &lit)) {
-                prop_assert_eq!(counts, expected, "{:?}", level);
             }
         }
 

@@ -1,7 +1,7 @@
 //! What a budget says, as text for people.
 
 use macropulse::channel::idealised as idealised_in;
-use macropulse::codec::decode::{Effort, Method};
+use macropulse::codec::decode::Method;
 use macropulse::design::safety::{ASSUMED, TELESCOPE};
 use macropulse::environment::Environment;
 
@@ -172,17 +172,9 @@ impl Figures<'_> {
                 aside.rms * 1e3
             );
         }
-        let of_which = match method {
-            Method::Matched(_, Effort::Quick) => Some(
-                "that of receiver.effort = \"thorough\": a quick one finds fewer so faint shots",
-            ),
-            Method::Matched(_, Effort::Exhaustive) => {
-                Some("that of a target all around: where few shots meet it, fewer are found")
-            }
-            _ => None,
-        };
-        if let Some(of_which) = of_which.filter(|_| self.there.pd < LIKELY) {
-            text += &format!("  Pd is {of_which}\n");
+        if matches!(method, Method::Matched(..)) && self.there.pd < LIKELY {
+            text += "  Pd is that of receiver.effort = \"thorough\" on a target all around; a quick receiver \
+                     finds\n  fewer so faint shots, and any finds fewer of a small target\n";
         }
         text
     }

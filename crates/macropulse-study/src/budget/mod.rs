@@ -122,8 +122,7 @@ impl<'a> Figures<'a> {
 mod tests {
     use super::*;
 
-    /// Text, JSON and page tell one verdict. Control: at 30 m, where the sensor has enough light,
-    /// it is not the light that fails.
+    /// Text, JSON and page tell one verdict. At 150 m, where the sensor has enough light, it is not the light that fails.
     #[test]
     fn every_telling_names_what_fails_first() {
         let design = Design::open("kim-park-2016-physical", &[]).unwrap();
@@ -138,8 +137,8 @@ mod tests {
             name
         };
         assert_eq!(usual(&design).range, 150.0);
-        assert_eq!(fails_at(150.0), "light");
-        assert_ne!(fails_at(30.0), "light");
+        assert_eq!(fails_at(150.0), "sunlight");
+        assert_eq!(fails_at(220.0), "light");
     }
 
     #[test]

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use macropulse_codec::decode::Correlation;
 use macropulse_codec::statistics::{binomial, hypergeometric_tail, normal_tail};
 
-use super::matched::{Chances, Found, Place, lags};
+use super::matched::{Chances, Found, Lone, Place, lags};
 use crate::design::Design;
 use crate::units::s_from_fs;
 
@@ -48,7 +48,7 @@ pub(super) fn chances(
         by_chance += share * of_nothing.sum::<f64>().min(1.0);
     }
     let found = if pd > 0.0 { share_found / pd } else { 0.0 };
-    Chances { pd, false_per_shot: by_chance, found }
+    Chances { pd, false_per_shot: by_chance, found, lone: Lone::default() }
 }
 
 /// So many lit dark chips are left out as are less likely than this.
@@ -228,7 +228,7 @@ mod tests {
     fn light_in_step_lies_in_few_phases() {
         let design = Design::open("bipolar-gold", &[]).unwrap();
         let correlation = design.receiver.method.correlation().unwrap();
-        let found = Found { seen: 0.4, density: 1e-3, false_density: 1e-6 };
+        let found = Found { seen: 0.4, false_density: 1e-6 };
         // Light in the middle of a tick is found where either of two begins; at its edge it is found where
         // the one before it begins, and half of it one earlier and one later.
         for (late, expected) in [(0.5, [0.4, 0.4, 0.0]), (0.0, [0.4, 0.2, 0.2])] {

@@ -1,4 +1,4 @@
-//! What the exhaustive receiver makes of ticks, in closed form.
+//! What the thorough matched receiver makes of ticks, in closed form.
 //!
 //! It believes in a shot if evidence and prior reach a threshold, [`belief`]. Of N marks k ~ Bin(N, p) are lit. All shots
 //! meet the same range. Two things depend on which other shots are found:
@@ -11,18 +11,21 @@
 
 use std::collections::BTreeMap;
 
-use macropulse_codec::ShotLog;
+use macropulse_codec::decode::Correlation;
 use macropulse_codec::decode::belief::{self, Marks, Prior, Surroundings};
-use macropulse_codec::decode::{self, Correlation};
 use macropulse_codec::statistics::{binomial, poisson_from};
 
 use super::best_lag::BestLag;
-use super::matched::{Chances, Place};
-use crate::design::{Design, SHOTS_OF_BAND};
+use super::matched::{Chances, Lone, Place};
+use crate::design::Design;
 use crate::units::s_from_fs;
 
 /// Share of all shots that are gone through at once, at most.
 const PART: f64 = 0.02;
+
+/// Share of all shots that are found at the edges of a scan, where there is no light of other shots, if any are. From there
+/// neighbours lead on, where light of other shots lets no shot be found without them.
+const AT_EDGES: f64 = 1e-2;
 
 /// Shots of which fewer are as full do not count.
 const SELDOM: f64 = 1e-9;
@@ -42,8 +45,9 @@ struct Gate {
     length: f64,
     /// Places in which all light of a shot may be.
     places: f64,
-    /// Ticks of a place.
+    /// Ticks of a place, and ticks about a mark that are not counted for surroundings.
     ticks: f64,
+    zone: f64,
     /// Share of ticks that are false.
     false_ticks: f64,
     /// Ticks of a mark of its own beside the one for which its place counts as lit, on average.
@@ -110,22 +114,6 @@ pub(super) struct Shots<'a> {
     pub false_density: f64,
 }
 
-/// Shots that may lead the receiver to expect light of one, on average.
-pub(super) fn neighbours(design: &Design) -> f64 {
-    let pattern = design.scan.model();
-    let shots = design.shots_per_scan().min(SHOTS_OF_BAND);
-    let unknown = vec![0; shots as usize];
-    let mut log = ShotLog { label: unknown.clone(), word: unknown, ..ShotLog::default() };
-    log.fired_at_fs = vec![0; shots as usize];
-    for order in 0..shots {
-        let (row, column) = pattern.pixel(order);
-        log.row.push(row);
-        log.column.push(column);
-        log.channel.push(pattern.channel_of(order, row));
-    }
-    decode::neighbours(&log)
-}
-
 /// What comes of `shots`.
 pub(super) fn chances(design: &Design, correlation: &Correlation, shots: &Shots) -> Chances {
     let weights = shots.weights;
@@ -144,20 +132,30 @@ pub(super) fn chances(design: &Design, correlation: &Correlation, shots: &Shots)
     let gate = Gate::of(design, correlation, shots);
     let mut hidden = Hidden::of(&levels);
     let (mut pd, mut share_found): (f64, f64) = (0.0, 0.0);
+    let (mut lone, mut lone_found) = (0.0, 0.0);
+    let nothing = Hidden { mean: 0.0, mean_square: 0.0 };
     for level in levels {
+        let [at_edge, _] = gate.believed(&level, &nothing);
+        let at_edges = if at_edge > 0.0 { AT_EDGES } else { 0.0 };
         // As full ones are judged one after the other, too.
         let parts = (level.share / PART).ceil();
         for _ in 0..parts as u32 {
             let [alone, beside] = gate.believed(&level, &hidden);
-            let neighbour = 1.0 - libm::pow(1.0 - pd.min(1.0), shots.neighbours);
+            let others = pd.clamp(at_edges, 1.0);
+            let neighbour = 1.0 - libm::pow(1.0 - others, shots.neighbours);
             let believed = level.share / parts * (alone + (beside - alone) * neighbour);
             pd += believed;
             share_found += believed * level.fullness();
+            let without = level.share / parts * alone * (1.0 - neighbour);
+            lone += without;
+            lone_found += without * level.fullness();
             hidden.explain(&level, believed);
         }
     }
-    let found = if pd > 0.0 { share_found / pd } else { 0.0 };
-    Chances { pd: pd.min(1.0), false_per_shot: correlation.false_alarm, found }
+    let of = |sum: f64, all: f64| if all > 0.0 { sum / all } else { 0.0 };
+    let lone = Lone { share: of(lone, pd), found: of(lone_found, lone) };
+    let (found, false_per_shot) = (of(share_found, pd), correlation.false_alarm);
+    Chances { pd: pd.min(1.0), false_per_shot, found, lone }
 }
 
 impl Gate {
@@ -172,15 +170,24 @@ impl Gate {
         let period = scan.shortest_period() / s_from_fs(clock.tick_fs);
         let others = [places, length].map(|time| (time / period - 1.0).max(0.0));
         let threshold = belief::threshold(correlation.false_alarm);
-        let needed = [&[][..], &[shots.lag]]
-            .map(|beside: &[i64]| threshold - Prior::new(lags.clone(), beside).at(shots.lag));
+        let prior = |beside: &[i64]| libm::exp(Prior::new(lags.clone(), beside).at(shots.lag));
+        let [alone, beside] = [prior(&[]), prior(&[shots.lag])];
+        // Neighbours have the same lag but for the tick.
+        let marks = shots.weights.iter().map(|(marks, count)| (marks * count) as f64).sum::<f64>()
+            / shots.weights.values().sum::<usize>() as f64;
+        let beside = 0.5 * alone + (beside - 0.5 * alone) * shots.seen.agreement(marks);
+        let needed = [alone, beside].map(|prior| threshold - libm::log(prior));
         let lit = shots.false_density.min(0.999);
         let false_ticks = -libm::expm1(libm::log1p(-lit) / ticks);
         // With a tick of light in a share s of the places, and false ones in a share D of them, which d ticks a tick
-        // are, a place has s + (W − s)·d ticks and is lit with the probability s + D − s·D.
+        // are, a place has s + (W − s)·d ticks and is lit with the probability s + D − s·D. Where each photon makes an
+        // event of its own, ticks about a mark do not count.
         let of_light = (1.0 - (1.0 - shots.seen.share(1.0)) / (1.0 - lit)).max(0.0);
-        let surplus = of_light * (lit - false_ticks) + ticks * false_ticks - lit;
-        Self { length, places, ticks, false_ticks, surplus, others, needed }
+        let (zone, surplus) = match correlation.photons_apart {
+            true => (ticks + 2.0 * (ticks / 2.0).floor(), 0.0),
+            false => (ticks, of_light * (lit - false_ticks) + ticks * false_ticks - lit),
+        };
+        Self { length, places, ticks, zone, false_ticks, surplus, others, needed }
     }
 
     /// Probabilities that shots of a `level` are believed without a neighbour and with one, where of other shots so much
@@ -193,7 +200,7 @@ impl Gate {
         };
         let rest = ticks(self.places - self.length, 0.0, in_gate - about);
         // Its own marks take up places, too.
-        let free = (self.length - f64::from(level.marks) * self.ticks).max(0.0);
+        let free = (self.length - f64::from(level.marks) * self.zone).max(0.0);
         let (about, places) = (ticks(free, level.marks.into(), about), free / self.ticks);
         let marks = Marks { lit: level.lit, of: level.marks };
         let evidence = |lit: f64, rest: f64| {

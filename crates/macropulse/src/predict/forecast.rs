@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use macropulse_codec::RecordKind;
-use macropulse_codec::decode::{self, Effort, Method};
+use macropulse_codec::decode::{self, Method};
+use macropulse_codec::{RecordKind, ShotLog};
 
 use super::best_lag::{BestLag, Sight};
 use super::converters::bank_loss;
@@ -16,7 +16,7 @@ use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, belief, histogram, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
-use crate::design::{Design, Detector};
+use crate::design::{Design, Detector, SHOTS_OF_BAND};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs, tof_from_range};
 
@@ -52,7 +52,7 @@ pub struct Forecaster<'a> {
     /// How many macropulses have so many marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
     mean_weight: f64,
-    /// Shots that may lead an exhaustive receiver to expect light of one, on average.
+    /// Shots that may lead a matched receiver to expect light of one, on average.
     neighbours: f64,
     /// Those of a matched receiver; the dark chips of a balanced one have none.
     sidelobes: Option<Sidelobes>,
@@ -131,9 +131,7 @@ impl<'a> Forecaster<'a> {
         let (light, background) = (1.0, 1.0);
         let is_matched = matches!(design.receiver.method, Method::Matched(..));
         let sidelobes = is_matched.then(|| Sidelobes::of(design));
-        let is_exhaustive =
-            matches!(design.receiver.method, Method::Matched(_, Effort::Exhaustive));
-        let neighbours = if is_exhaustive { belief::neighbours(design) } else { 0.0 };
+        let neighbours = if is_matched { neighbours(design) } else { 0.0 };
         let sampling = design.receiver.method.sampling();
         let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
         let counting = match &design.receiver.method {
@@ -274,9 +272,9 @@ impl<'a> Forecaster<'a> {
         let mark_pd = 1.0 - (1.0 - seen) * (1.0 - at_the_lag);
 
         let efficiency = design.efficiency();
-        let found = matched::Found { seen: mark_pd, density, false_density };
+        let found = matched::Found { seen: mark_pd, false_density };
         let chances = match &design.receiver.method {
-            Method::Matched(correlation, Effort::Exhaustive) => {
+            Method::Matched(correlation, _) => {
                 let ticks = tof_from_range(range) / s_from_fs(design.clock.tick_fs);
                 let converted = 1.0 - loss;
                 let sight = Sight { late: ticks.fract(), density: at_the_lag, converted };
@@ -288,9 +286,6 @@ impl<'a> Forecaster<'a> {
                     false_density,
                 };
                 belief::chances(design, correlation, &shots)
-            }
-            Method::Matched(correlation, _) => {
-                matched::chances(design, correlation, &self.weights, &found)
             }
             Method::Balanced(correlation) => {
                 let tof = tof_from_range(range);
@@ -311,12 +306,13 @@ impl<'a> Forecaster<'a> {
                 let since = since_opening(design, design.scan.max_range);
                 let nothing = Awaited { since, photons: 0.0, mark_pd: 0.0, ..awaited };
                 let false_per_shot = detector.first_event(&nothing).is_false;
-                matched::Chances { pd: echo.is_echo, false_per_shot, found: 1.0 }
+                let lone = matched::Lone::default();
+                matched::Chances { pd: echo.is_echo, false_per_shot, found: 1.0, lone }
             }
         };
         let spread = (density * (1.0 - density)).max(f64::MIN_POSITIVE).sqrt();
         let timing = matched::Timing::of(design, &mark);
-        let matched::Chances { pd, false_per_shot, found } = chances;
+        let matched::Chances { pd, false_per_shot, found, lone } = chances;
         let marks_seen = (mean_weight * found).max(1.0);
         let is_seen = pd * FEWEST >= 1.0;
         let photons = (detected * mean_weight).max(f64::MIN_POSITIVE);
@@ -343,7 +339,7 @@ impl<'a> Forecaster<'a> {
                 .sidelobes
                 .as_ref()
                 .filter(|_| is_seen)
-                .map(|sidelobes| sidelobes.aside(found, at_the_lag)),
+                .and_then(|sidelobes| sidelobes.aside(found, at_the_lag, lone)),
             bound: range_from_tof(timing.spread) / photons.sqrt(),
         }
     }
@@ -474,6 +470,22 @@ impl<'a> Forecaster<'a> {
 
 /// Ranges that are tried for the farthest one at which a target is seen that is not seen at the nearest.
 const PLACES: i32 = 64;
+
+/// Shots that may lead the matched receiver to expect light of one, on average.
+fn neighbours(design: &Design) -> f64 {
+    let pattern = design.scan.model();
+    let shots = design.shots_per_scan().min(SHOTS_OF_BAND);
+    let unknown = vec![0; shots as usize];
+    let mut log = ShotLog { label: unknown.clone(), word: unknown, ..ShotLog::default() };
+    log.fired_at_fs = vec![0; shots as usize];
+    for order in 0..shots {
+        let (row, column) = pattern.pixel(order);
+        log.row.push(row);
+        log.column.push(column);
+        log.channel.push(pattern.channel_of(order, row));
+    }
+    decode::neighbours(&log)
+}
 
 /// Brightnesses of an echo of so many speckle `cells`, M, in its mean, and the share of each, of the gamma
 /// distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).

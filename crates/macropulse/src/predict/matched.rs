@@ -1,16 +1,8 @@
-//! What the matched receiver makes of ticks, in closed form.
-//!
-//! It believes the best of L lags if chance would not light so many of its N marks at any: the
-//! least k with L·P(Bin(N, d) ≥ k) ≤ α. d is the share of places in the gate that other ticks light than
-//! these, and one more. Shots that meet the same range do not overlap.
+//! How a receiver that correlates ticks sees a mark, and how well it times it.
 
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use macropulse_codec::decode::Correlation;
-use macropulse_codec::statistics::{
-    binomial, binomial_tail, binomial_up_to, normal_quantile, normal_tail, poisson,
-};
+use macropulse_codec::statistics::{binomial, normal_quantile, normal_tail};
 
 use crate::design::Design;
 use crate::design::detector::Lit;
@@ -61,16 +53,15 @@ impl Place {
     /// Probability that a mark is found where it is looked for. Photons of a micropulse that
     /// reaches beyond its chip fall there or not each by itself; else its one event does.
     pub fn seen(&self, design: &Design, mark: &Lit) -> f64 {
-        seen_of_share(design, mark, self.share)
+        seen_of_share(design, mark)(self.share)
     }
 }
 
-/// The same where a `share` of the light or of the events falls.
-pub(super) fn seen_of_share(design: &Design, mark: &Lit, share: f64) -> f64 {
-    match design.detector.spread_of(&design.light) {
-        Some(_) => pd_of_share(design, mark, share),
-        None => pd_of_share(design, mark, 1.0) * share,
-    }
+/// The same, where some share of the light or of the events falls.
+pub(super) fn seen_of_share(design: &Design, mark: &Lit) -> impl Fn(f64) -> f64 {
+    let is_apart = design.detector.spread_of(&design.light).is_some();
+    let whole = pd_of_share(design, mark, 1.0);
+    move |share| if is_apart { pd_of_share(design, mark, share) } else { whole * share }
 }
 
 /// Probability that the detector sees anything of a `share` of the photons of a mark.
@@ -100,8 +91,6 @@ pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
 pub(super) struct Found {
     /// Probability that a mark of the shot is found.
     pub seen: f64,
-    /// Probability that a place is lit.
-    pub density: f64,
     /// Probability that it is lit by what is no shot's light.
     pub false_density: f64,
 }
@@ -114,116 +103,23 @@ pub(super) struct Chances {
     pub false_per_shot: f64,
     /// Share of their marks that is found of shots that give a return; 0 where none does.
     pub found: f64,
+    /// The returns that were believed before any neighbour was.
+    pub lone: Lone,
 }
 
-/// What comes of shots by the marks of labels, of which so many have so many.
-pub(super) fn chances(
-    design: &Design,
-    correlation: &Correlation,
-    weights: &BTreeMap<usize, usize>,
-    found: &Found,
-) -> Chances {
-    let gate = Gate::of(design, correlation);
-    let labels: usize = weights.values().sum();
-    let (mut pd, mut by_chance, mut share_found) = (0.0, 0.0, 0.0);
-    for (&marks, &count) in weights {
-        for (density, probability) in gate.around(marks, found) {
-            let least = gate.least_marks(marks, density);
-            let share = probability * count as f64 / labels as f64;
-            pd += share * binomial_tail(marks, found.seen, least);
-            // E(k/N; k ≥ m) = p·P(Bin(N − 1, p) ≥ m − 1).
-            let of_others = binomial_tail(marks - 1, found.seen, least.saturating_sub(1));
-            share_found += share * found.seen * of_others;
-            by_chance += share * (gate.lags * binomial_tail(marks, found.density, least)).min(1.0);
-        }
-    }
-    let found = if pd > 0.0 { share_found / pd } else { 0.0 };
-    Chances { pd, false_per_shot: by_chance, found }
+/// Returns that are believed without a neighbour.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Lone {
+    /// Their share of all returns.
+    pub share: f64,
+    /// Share of their marks that is found.
+    pub found: f64,
 }
 
 /// Places of the gate at which a macropulse may begin.
 pub(super) fn lags(design: &Design) -> f64 {
     let (nearest, farthest) = design.receiver.gate_ticks;
     f64::from(farthest - nearest) + 1.0
-}
-
-/// What the threshold depends on beside the light.
-struct Gate {
-    /// Places at which a macropulse may begin.
-    lags: f64,
-    /// What one event adds to the share of lit places where marks from within the gate may be.
-    event: f64,
-    /// Ticks of a place.
-    ticks: f64,
-    /// False returns accepted.
-    false_alarm: f64,
-}
-
-/// Where as large a share of the places is lit nothing is found.
-const MOST_LIT: f64 = 1.0 - 1e-6;
-
-/// Beyond so many events in a gate, on average, their number is taken for its mean.
-const MANY: f64 = 100.0;
-
-impl Gate {
-    fn of(design: &Design, correlation: &Correlation) -> Self {
-        let lags = lags(design);
-        let tick = s_from_fs(design.clock.tick_fs);
-        let macropulse = s_from_fs(design.emission.length_fs());
-        let ticks = Place::ticks(design);
-        Self {
-            lags,
-            event: ticks * tick / (lags * tick + macropulse),
-            ticks,
-            false_alarm: correlation.false_alarm,
-        }
-    }
-
-    /// The share of places of a gate that events light which are not of the very shot, with its
-    /// probability: those of no shot follow Poisson's law, each mark of another shot is found or not.
-    fn around(&self, marks: usize, found: &Found) -> Vec<(f64, f64)> {
-        // Ticks are counted, though several may light one place: t of t·(1 − (1 − d)^(1/t)) ticks each.
-        let of_tick = |density: f64| -libm::expm1(libm::log1p(-density.min(MOST_LIT)) / self.ticks);
-        let events = |density: f64| self.ticks * of_tick(density) / self.event;
-        let noise = events(found.false_density);
-        let of_shots = (events(found.density) - noise).max(0.0);
-        let of_others = (of_shots - marks as f64 * found.seen).max(0.0);
-        let mean = noise + of_others;
-        if mean > MANY {
-            return vec![(mean * self.event, 1.0)];
-        }
-        let most = (noise + 8.0 * noise.sqrt() + 8.0) as u32;
-        let of_noise: Vec<f64> = match noise > 0.0 {
-            true => (0..=most).map(|events| poisson(noise, events.into())).collect(),
-            false => vec![1.0],
-        };
-        let marks_of_others = (of_others / found.seen.max(f64::MIN_POSITIVE)).round() as usize;
-        let most = (of_others + 8.0 * of_others.sqrt() + 8.0) as usize;
-        let found_of_others = binomial_up_to(marks_of_others, found.seen, most);
-        let mut chances = vec![0.0; of_noise.len() + found_of_others.len()];
-        for (noise, chance) in of_noise.iter().enumerate() {
-            for (others, of_others) in found_of_others.iter().enumerate() {
-                chances[noise + others] += chance * of_others;
-            }
-        }
-        let density = |events: usize| events as f64 * self.event;
-        (0..chances.len()).map(|events| (density(events), chances[events])).collect()
-    }
-
-    /// The fewest of `marks` that are believed where other events light such a share of the places; one
-    /// more than there are if none will do.
-    fn least_marks(&self, marks: usize, others: f64) -> usize {
-        // One event more than there are.
-        let density = (others + self.event).min(1.0);
-        let is_common =
-            |least: usize| self.lags * binomial_tail(marks, density, least) > self.false_alarm;
-        let (mut common, mut rare) = (0, marks + 1);
-        while rare - common > 1 {
-            let middle = usize::midpoint(common, rare);
-            if is_common(middle) { common = middle } else { rare = middle }
-        }
-        rare
-    }
 }
 
 /// How well a mark is timed.
@@ -307,18 +203,6 @@ mod tests {
     use super::*;
     use crate::units::tof_from_range;
     use approx::assert_relative_eq;
-
-    #[test]
-    fn the_least_marks_are_rare_and_one_fewer_is_not() {
-        let gate = Gate { lags: 4e5, event: 0.0, ticks: 2.0, false_alarm: 1e-6 };
-        let least = gate.least_marks(180, 0.01);
-        assert!(4e5 * binomial_tail(180, 0.01, least) <= 1e-6);
-        assert!(4e5 * binomial_tail(180, 0.01, least - 1) > 1e-6);
-        assert_eq!(gate.least_marks(5, 0.5), 6);
-        // One event more than there are is counted.
-        let few = Gate { event: 1e-3, ..gate };
-        assert!(few.least_marks(180, 0.01) > least);
-    }
 
     #[test]
     fn rounding_alone_has_the_variance_of_a_twelfth() {

@@ -4,14 +4,22 @@
 //! those counts at the sidelobe as at the peak. At the peak the other d = N − A marks count, too, X of
 //! which are found, X ~ Bin(d, p); at the sidelobe what chance lights in as many places, Y ~ Bin(d, q).
 //! The sidelobe is taken where Y > X; where both are the same, neighbours decide.
+//!
+//! The returns that come first have no neighbours. Of two lags with as many marks they take the nearer one: the sidelobe
+//! on one side of the peak. They may mislead those about them, and how many is not known. So there is no forecast where
+//! more than a few of them lie on one.
 
 use macropulse_codec::statistics::binomial;
 
+use super::matched::Lone;
 use crate::design::Design;
 use crate::units::{range_from_tof, s_from_fs};
 
 /// Macropulses that stand for all: every so many-th of them.
 const SAMPLE: usize = 64;
+
+/// Share of the returns up to which those that come first may lie on a sidelobe.
+const MISLED: f64 = 0.01;
 
 /// Returns on a sidelobe.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,16 +69,17 @@ impl Sidelobes {
     }
 
     /// What is to be expected where a share `found` of the marks of returns is found, and chance lights a
-    /// share `density` of places.
-    pub fn aside(&self, found: f64, density: f64) -> Aside {
-        let (mut share, mut squares) = (0.0, 0.0);
+    /// share `density` of places. `None` where it depends on the `lone` ones.
+    pub fn aside(&self, found: f64, density: f64, lone: Lone) -> Option<Aside> {
+        let (mut share, mut squares, mut misled) = (0.0, 0.0, 0.0);
         for &(alone, count, square) in &self.own {
             let exceeds = exceeds(alone, found, density);
             share += count * exceeds;
             squares += square * exceeds;
+            misled += 0.5 * count * lone.share * as_many(alone, lone.found, density);
         }
         let rms = if share > 0.0 { (squares / share).sqrt() } else { 0.0 };
-        Aside { share: share.min(1.0), rms }
+        (misled < MISLED).then_some(Aside { share: share.min(1.0), rms })
     }
 }
 
@@ -86,6 +95,12 @@ fn exceeds(places: usize, found: f64, density: f64) -> f64 {
             fewer * stray
         })
         .sum()
+}
+
+/// P(Y = X) of the same.
+fn as_many(places: usize, found: f64, density: f64) -> f64 {
+    let chances = binomial(places, found.min(1.0)).into_iter().zip(binomial(places, density));
+    chances.map(|(chance, stray)| chance * stray).sum()
 }
 
 /// How many of the ascending `marks` fall upon others at each shift, from 0 on.
@@ -106,11 +121,13 @@ mod tests {
         assert_eq!(correlation(&[0, 3, 6]), [3, 0, 0, 2, 0, 0, 1]);
     }
 
-    /// Two coins against two, as counted by hand: 1 against 0 in 2/16, 2 against 0 or 1 in 3/16.
+    /// Two coins against two, as counted by hand: 1 against 0 in 2/16, 2 against 0 or 1 in 3/16, as many in 6/16.
     #[test]
     fn coins_exceed_coins_as_counted() {
         assert!((exceeds(2, 0.5, 0.5) - 5.0 / 16.0).abs() < 1e-12);
+        assert!((as_many(2, 0.5, 0.5) - 6.0 / 16.0).abs() < 1e-12);
         assert!(exceeds(2, 0.5, 0.0) < 1e-11);
+        assert!((as_many(2, 0.5, 0.0) - 0.25).abs() < 1e-12);
         assert!((exceeds(2, 0.0, 0.5) - 0.75).abs() < 1e-12);
     }
 }

@@ -279,14 +279,14 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_has_too_little_light_at_150_metres_and_too_much_sun_nearer() {
+    fn the_paper_has_too_much_sun_and_too_little_light_beyond_its_gate() {
         let design = physical(&[]);
         let [day, night] = skies(&design);
-        assert_eq!(failing(&checks(&day, &night, &WHITE)), ["light", "converters", "slant"]);
-        assert_eq!(failing(&checks(&night, &night, &WHITE)), ["light", "slant"]);
-        let nearer = Wanted { range: 130.0, ..WHITE };
-        assert_eq!(failing(&checks(&day, &night, &nearer)), ["sunlight", "converters", "slant"]);
-        assert_eq!(failing(&checks(&night, &night, &nearer)), ["slant"]);
+        assert_eq!(failing(&checks(&day, &night, &WHITE)), ["sunlight", "converters", "slant"]);
+        assert_eq!(failing(&checks(&night, &night, &WHITE)), ["slant"]);
+        let farther = Wanted { range: 220.0, ..WHITE };
+        assert_eq!(failing(&checks(&day, &night, &farther)), ["light", "converters", "slant"]);
+        assert_eq!(failing(&checks(&night, &night, &farther)), ["light", "slant"]);
     }
 
     /// 99 times too little light for a receiver that must see every micropulse.

@@ -16,7 +16,7 @@ use std::ops::Range;
 use super::Band;
 use super::sent::Sent;
 use super::track::below;
-use crate::decode::field::{Field, Source};
+use crate::decode::field::Field;
 use crate::decode::timeline::Timeline;
 use crate::kernels::{
     COARSE, Counts, SIXTEEN, WIDE, and, any_behind, coarse, in_pictures, is_dark,
@@ -71,8 +71,8 @@ struct Pictures {
     words: Vec<u64>,
     /// Machine words of each.
     stride: usize,
-    /// What they show: which ticks, and from which one on.
-    shown: Option<(Source, i64)>,
+    /// The first tick that they show.
+    shown: Option<i64>,
     /// Which segments are made.
     made: Vec<bool>,
 }
@@ -82,18 +82,13 @@ struct Pictures {
 const SEGMENT: i64 = 1 << 15;
 
 impl Pictures {
-    /// Makes those of `span`, where there are none yet. Those of the residual go on showing ticks that
+    /// Makes those of `span`, where there are none yet. They go on showing ticks that
     /// are cancelled later, which costs time and nothing else: less than to make them anew after so
     /// many macropulses as 8, 32, or 128.
-    fn show(
-        &mut self,
-        (field, source): (&Field, Source),
-        span: &Range<i64>,
-        memory: &mut Timeline,
-    ) {
+    fn show(&mut self, field: &Field, span: &Range<i64>, memory: &mut Timeline) {
         let extent = field.extent();
-        if self.shown != Some((source, extent.start)) {
-            self.shown = Some((source, extent.start));
+        if self.shown != Some(extent.start) {
+            self.shown = Some(extent.start);
             let segments = ((extent.end - extent.start) / SEGMENT + 1) as usize;
             self.made.clear();
             self.made.resize(segments, false);
@@ -109,7 +104,7 @@ impl Pictures {
             }
             let start = extent.start + segment * SEGMENT;
             let ticks = start..(start + SEGMENT + 64).min(extent.end);
-            let words = field.lit_in(source, &ticks, memory).words(&ticks);
+            let words = field.lit_by_residual(&ticks, memory).words(&ticks);
             let begin = (segment * SEGMENT / PER_WORD) as usize;
             for (shift, picture) in self.words.chunks_exact_mut(self.stride).enumerate() {
                 coarse(words, shift, &mut picture[begin..begin + (SEGMENT / PER_WORD) as usize]);
@@ -153,12 +148,11 @@ impl Search {
 }
 
 impl Band<'_> {
-    /// The lag with most marks of `shot` in the `source`, the earliest of several, of the `lags`
+    /// The lag with most marks of `shot` in the residual, the earliest of several, of the `lags`
     /// given, ascending; `None` where fewer than `least` are found anywhere. And how many they are.
     pub(super) fn maximum(
         &mut self,
         shot: usize,
-        source: Source,
         lags: &[Range<i64>],
         least: u32,
     ) -> Option<(i64, u32)> {
@@ -169,13 +163,10 @@ impl Band<'_> {
             return None;
         }
         let span = fired + from.start..fired + to.end + sent.length() + i64::from(sent.width);
-        let density = match source {
-            Source::Seen => self.density_in_gate(shot, 0),
-            Source::Residual => self.leftover().density(shot, &(from.start..to.end)),
-        };
+        let density = self.leftover().density(shot, &(from.start..to.end));
         self.lay_out(shot);
         let search = &mut self.search;
-        search.pictures.show((&self.field, source), &span, &mut search.lit);
+        search.pictures.show(&self.field, &span, &mut search.lit);
         let origin = self.field.extent().start;
         let stride = 64 * search.pictures.stride as u32;
         search.places.set(&self.marks, stride);
@@ -213,7 +204,7 @@ impl Band<'_> {
                 // A machine word of the picture stands for one block of lags.
                 for lane in (0..WIDE).filter(|lane| hits[*lane] != 0) {
                     let first = origin + COARSE as i64 * (block + 64 * lane as i64) - fired;
-                    let (lag, count) = self.exactly((shot, source), lags, first);
+                    let (lag, count) = self.exactly(shot, lags, first);
                     if count >= needed {
                         (best, needed) = (Some((lag, count)), count + 1);
                     }
@@ -223,18 +214,13 @@ impl Band<'_> {
         best
     }
 
-    /// The lag with most marks of a shot in the source, the earliest of several, of those `lags` that are in the
+    /// The lag with most marks of a shot in the residual, the earliest of several, of those `lags` that are in the
     /// block that begins with lag `first`.
-    fn exactly(
-        &mut self,
-        (shot, source): (usize, Source),
-        lags: &Range<i64>,
-        first: i64,
-    ) -> (i64, u32) {
+    fn exactly(&mut self, shot: usize, lags: &Range<i64>, first: i64) -> (i64, u32) {
         let start = self.sent.fired[shot] + first;
         let span = start..start + BLOCK + self.sent.length();
         let search = &mut self.search;
-        let (words, begin) = self.field.lit_in(source, &span, &mut search.lit).at(start);
+        let (words, begin) = self.field.lit_by_residual(&span, &mut search.lit).at(start);
         search.counted += BLOCK;
         search.counts.count(words, begin as u32, self.sent.word(shot), self.sent.lit_bits(shot));
         let allowed = below(lags.start - first, [u64::MAX; WIDE], false);
@@ -387,7 +373,7 @@ impl<'a> Leftover<'a> {
     /// need not.
     pub fn must_stand_out(&self, shot: usize, lags: &Range<i64>) -> bool {
         let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
-        blocks * i64::from(self.sent.weight(shot)) > SOON && !self.sent.is_thorough()
+        blocks * i64::from(self.sent.weight(shot)) > SOON
     }
 
     /// Whether no light stands out before the end of the `lags` of `shot`, so that [`Self::lags`] has none where

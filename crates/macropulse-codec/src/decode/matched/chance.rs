@@ -1,10 +1,10 @@
 //! What chance gives: how dense its light is, and how many marks it may light.
 
+use super::Band;
 use super::acquire::BLOCK;
 use super::sent::Sent;
-use super::{Band, Detection};
-use crate::decode::belief::Surroundings;
-use crate::decode::threshold::{Thresholds, fewest};
+use crate::decode::belief::{self, Prior, Surroundings};
+use crate::decode::threshold::{Fewest, Thresholds, fewest};
 
 /// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
 pub(super) const BY_CHANCE: f64 = 1e-3;
@@ -24,8 +24,9 @@ const IN_VAIN: f64 = 0.01;
 /// The fewest marks that chance does not reach, and what else it hardly ever does.
 #[derive(Debug)]
 pub(super) struct Chance {
-    /// At any lag of a gate.
-    pub in_gate: Thresholds,
+    /// At any lag of a gate, and at one where a neighbour leads to expect light.
+    pub in_gate: Fewest,
+    pub expected: Fewest,
     /// In a single place.
     pub once: Thresholds,
     /// At an end of a macropulse.
@@ -37,11 +38,14 @@ pub(super) struct Chance {
 impl Chance {
     /// For the shots `sent`. What is `known` from a band before is kept if it was asked in as many places.
     pub fn new(sent: &Sent, known: Option<Self>) -> Self {
-        let gate = sent.gate();
-        let (lags, false_alarm) = ((gate.end - gate.start) as f64, sent.correlation.false_alarm);
-        let bits = sent.bits_of_payload() as f64;
+        let (gate, bits) = (sent.gate(), sent.bits_of_payload() as f64);
+        let threshold = belief::threshold(sent.correlation.false_alarm);
+        let middle = i64::midpoint(gate.start, gate.end);
+        let needed = [&[][..], &[middle]]
+            .map(|beside: &[i64]| threshold - Prior::new(gate.clone(), beside).at(middle));
         let new = Self {
-            in_gate: Thresholds::new(lags, false_alarm),
+            in_gate: Fewest::new(needed[0]),
+            expected: Fewest::new(needed[1]),
             once: Thresholds::new(1.0, BY_CHANCE),
             at_end: Thresholds::new(1.0, AT_AN_END),
             // Eight lags are met by two bits of each code word.
@@ -61,7 +65,7 @@ impl Chance {
         let gate = sent.gate();
         let longest = gate.end - gate.start + sent.length() + 2 * cell;
         let density = f64::from(sent.width) / longest as f64;
-        sent.ticks_of_any(self.in_gate.least(weight, density)).max(1) as usize
+        sent.ticks_of_any(self.expected.least(weight, density)).max(1) as usize
     }
 }
 
@@ -79,7 +83,7 @@ impl Band<'_> {
     /// one more, so that few ticks do not tell that it is darker than can be known.
     pub(super) fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
         let (ticks, share) = self.in_gate(shot);
-        (f64::from(ticks.saturating_sub(count) + 1) * share).min(1.0)
+        (f64::from(ticks.saturating_sub(self.sent.ticks_at_most(shot, count)) + 1) * share).min(1.0)
     }
 
     /// The light about `shot` at `lag` without so many of its own `marks`. Ticks that other returns explain count, too.
@@ -101,50 +105,9 @@ impl Band<'_> {
         let (ticks, share) = self.in_gate(shot);
         let weight = self.sent.weight(shot);
         fewest(weight, |count| {
-            let density = f64::from(ticks.saturating_sub(count) + 1) * share;
+            let own = self.sent.ticks_at_most(shot, count);
+            let density = f64::from(ticks.saturating_sub(own) + 1) * share;
             self.chance.in_gate.least(weight, density.min(1.0)) <= count
         })
-    }
-
-    /// `detection`, if chance does not give it.
-    pub(super) fn told_from_chance(
-        &mut self,
-        shot: usize,
-        detection: Detection,
-    ) -> Option<Detection> {
-        let least = self.by_chance(shot, detection);
-        let stands_out = 2 * detection.count >= self.sent.weight(shot).max(4 * least);
-        (detection.count >= least).then_some(Detection { stands_out, ..detection })
-    }
-
-    /// The marks that chance does not reach where `detection` is, in the density of the gate or of that
-    /// around it, its own marks apart.
-    fn by_chance(&mut self, shot: usize, detection: Detection) -> u32 {
-        let weight = self.sent.weight(shot);
-        let density = self.density_about(shot, detection, detection.count);
-        let least = self.chance.in_gate.least(weight, density);
-        if least <= detection.count {
-            return least;
-        }
-        // A long pulse makes several ticks of a mark.
-        let (pattern, farther) = (&self.sent.bits(shot).cancelled, self.sent.farther());
-        let start = self.sent.fired[shot] + detection.lag - farther;
-        let own = self.field.seen().lit_in_all(start, self.sent.lit_bits(shot), pattern);
-        let density = self.density_about(shot, detection, own);
-        self.chance.in_gate.least(weight, density)
-    }
-
-    /// The density that chance has where `detection` is, `own` ticks apart: that of the gate or, if
-    /// that is so much more that chance would hardly make it so, that around it.
-    fn density_about(&self, shot: usize, detection: Detection, own: u32) -> f64 {
-        let sent = self.sent;
-        let (light, places) = (sent.light(shot, detection.lag), sent.weight(shot) * sent.width);
-        let gate = self.density_in_gate(shot, own);
-        let beside = self.field.density_without(&light, own, places);
-        let ticks = (light.end - light.start) as f64 / f64::from(sent.width);
-        match (beside - gate) * ticks > HARDLY_EVER * (gate * ticks + 1.0).sqrt() {
-            true => beside,
-            false => gate,
-        }
     }
 }

@@ -6,7 +6,6 @@ use std::ops::Range;
 use super::pace::usual;
 use super::track::{WAYS, WIDEST_GAP};
 use super::{Band, Detection, SURFACES};
-use crate::decode::field::Source;
 
 /// So many times as many are passed by where light is so dense that lag after lag of half of the gate
 /// must be counted: a search takes 290 µs then instead of 6. Of 37 268 shots of `car-50m` and 74 519 of `street`
@@ -22,29 +21,12 @@ enum Pass {
     Second,
 }
 
-/// Fewest of so many `marks` that are left over: a quarter may lie under ticks that are cancelled already. With a
-/// third 51 of the 407 040 shots of `street` as declared are found otherwise than by a thorough receiver.
+/// Fewest of so many `marks` that are left over: a quarter may lie under ticks that are cancelled already.
 fn left_over(marks: u32) -> u32 {
     marks - marks / 4
 }
 
-/// Fewest marks of another shot that make `count` marks of a faint one doubtful: two thirds of them, as chance may
-/// have added to those of the faint one. Of 190 514 shots of `coded-360` in `street` 9 are wrong, with as many marks
-/// instead 55, with half of them 11 and 291 fewer are right; with three quarters 6 points of `coded-practical` there are
-/// wrong or false instead of 1.
-fn fewest_of_another(count: u32) -> u32 {
-    count - count / 3
-}
-
 impl Band<'_> {
-    /// Finds what can be found of a block of shots.
-    pub(super) fn look_for(&mut self, block: Range<usize>) {
-        match self.sent.is_thorough() {
-            true => self.look_everywhere(block),
-            false => self.look_where_expected(block),
-        }
-    }
-
     /// Notes that none of a block of shots can be found.
     pub(super) fn pass_by(&mut self, block: Range<usize>) {
         self.look_along(block, |_, _, _| false);
@@ -68,7 +50,7 @@ impl Band<'_> {
 
     /// Tracks the shots of a block from both sides, and acquires those that are no fainter than the
     /// others but were not expected where they are.
-    fn look_where_expected(&mut self, block: Range<usize>) {
+    pub(super) fn look_for(&mut self, block: Range<usize>) {
         self.look_along(block.clone(), Self::track_or_acquire);
         for shot in block.clone().rev() {
             if self.is_sought(shot) {
@@ -126,32 +108,11 @@ impl Band<'_> {
         let found = iter::once(within).chain(beyond).find_map(|(part, is_even)| {
             let (lag, _) = usual.into_iter().chain([least]).find_map(|least| {
                 let lags = self.leftover().lags(shot, part.clone(), least, is_even);
-                self.maximum(shot, Source::Residual, &lags, least)
+                self.maximum(shot, &lags, least)
             })?;
             self.climb(shot, lag, 1)
         });
-        let found = found.filter(|found| self.stands_alone(shot, *found)).or(tracked);
-        found.and_then(|found| self.believed(shot, found))
-    }
-
-    /// Takes the maximum over the gate for each shot of a block, and cancels the light of those that no
-    /// fuller one accounts for.
-    fn look_everywhere(&mut self, block: Range<usize>) {
-        for shot in block.clone() {
-            if self.is_sought(shot) {
-                let least = self.least_in_gate(shot);
-                let found = self.maximum(shot, Source::Seen, &[self.sent.gate()], least);
-                let found = found.and_then(|(lag, _)| self.found_at(shot, lag));
-                self.found[shot] = found.and_then(|found| self.told_from_chance(shot, found));
-            }
-        }
-        for shot in block {
-            let Some(found) = self.found[shot] else { continue };
-            match self.is_its_own(shot, found) {
-                true => self.keep(shot, found),
-                false => self.found[shot] = None,
-            }
-        }
+        found.or(tracked).and_then(|found| self.believed(shot, found))
     }
 
     /// Looks for what is left over where all light is known that overlaps with that of `shots`: faint
@@ -237,7 +198,7 @@ impl Band<'_> {
         let reach = self.sent.reach();
         let left = self.leftover().density(shot, &reach);
         let least = self.chance.in_gate.least(self.sent.weight(shot), left).max(least);
-        self.maximum(shot, Source::Residual, lags, least)
+        self.maximum(shot, lags, least)
     }
 
     /// Looks for light of `shot` that is left over, and tells after which lag there is some.
@@ -285,48 +246,14 @@ impl Band<'_> {
             Some(_) => self.found_at(shot, lag),
         };
         let found = found.and_then(|found| self.another_surface(shot, found));
-        // Of the light of another shot, too, a part is found with the marks of this one: 417 of 289 198 shots with
-        // half of the words of `kim-park-2016-fixed` are wrong where this is not asked of a further surface, else 113.
-        let found = found.filter(|found| match known {
-            None => {
-                let rather = fewest_of_another(count);
-                self.stands_alone(shot, *found) || !self.is_contested(shot, *found, rather)
-            }
-            Some(_) => !self.is_contested(shot, *found, count + 1),
-        });
         Some(self.take_or_cancel(shot, found, (lag, count)))
     }
 
     /// Whether light of the shot to the left of `shot` stood out or was not found: what makes this one faint, as
-    /// a pane with a wall behind it, begins here. Of 407 040 shots of `street` as declared 60 are found otherwise than
-    /// by a thorough receiver where nothing is made of that, else 34.
+    /// a pane with a wall behind it, begins here.
     fn is_first_that_is_faint(&self, shot: usize) -> bool {
         let left = self.left[shot].and_then(|left| self.found[left as usize]);
         left.is_none_or(|left| left.stands_out)
-    }
-
-    /// Whether so many marks of another shot are left over anywhere where its light would overlap with that of
-    /// `shot` at `detection`, and may account for it: they do if both are in the same word, as then a part of
-    /// them is found for any label.
-    ///
-    /// If shots in the same word are asked as all others are, 365 of 289 198 shots with half of the words of
-    /// `kim-park-2016` are wrong instead of 116; if all are taken for as alike, twice as many of `street` as
-    /// declared are found otherwise than by a thorough receiver.
-    fn is_contested(&mut self, shot: usize, detection: Detection, marks: u32) -> bool {
-        let (sent, gate) = (self.sent, self.sent.gate());
-        let light = sent.light(shot, detection.lag);
-        let about = light.start - sent.length()..light.end;
-        sent.that_begin_in(&about, &gate).filter(|other| *other != shot).any(|other| {
-            let fired = sent.fired[other];
-            let lags = (about.start - fired).max(gate.start)..(about.end - fired).min(gate.end);
-            let lags = self.leftover().lags(other, lags, marks, true);
-            let most = self.maximum(other, Source::Residual, &lags, marks);
-            most.is_some_and(|(lag, count)| {
-                let supposed = (other, Detection::at(lag, count));
-                let is_alike = sent.log.word[other] == sent.log.word[shot];
-                is_alike || !self.is_its_own_beside(shot, detection, Some(supposed))
-            })
-        })
     }
 
     /// Takes the surface of `shot` that was `found`, or else cancels the marks that led to it, so that they are
@@ -383,15 +310,13 @@ impl Band<'_> {
         let least = left_over(self.least_in_gate(shot));
         let least = self.chance.in_gate.least(self.sent.weight(shot), left).max(least);
         let lags = self.leftover().lags(shot, gate, least, true);
-        let most = self.maximum(shot, Source::Residual, &lags, least);
+        let most = self.maximum(shot, &lags, least);
         let found = most.and_then(|(lag, _)| self.found_at(shot, lag));
         let found = found.and_then(|found| self.told_from_chance(shot, found));
         // Light of another label is whole bits away, and not as much in each bit. That it stands out is not asked:
         // light of a wall close behind a pane does not, where both are faint.
-        let (width, bit) = (i64::from(self.sent.width), self.sent.bit_length());
         let is_own = |found: &Detection| {
-            let away = (found.lag - lag).rem_euclid(bit);
-            (width..=bit - width).contains(&away)
+            !self.sent.is_whole_bits(found.lag - lag)
                 && !self.is_known(shot, found.lag)
                 && !self.is_mislabelled(shot, *found)
         };
@@ -476,24 +401,6 @@ impl Band<'_> {
     /// Whether as many marks were found as is usual, or so many that other light does not give them.
     fn is_bright(&self, shot: usize, detection: Detection) -> bool {
         detection.stands_out || self.is_usual(shot, detection)
-    }
-
-    /// Whether `detection` needs no other shot to be known to be believed: light of no other can arrive
-    /// then, or all its marks are there, or so many that chance does not give them where all light around
-    /// it is another shot's, its own marks too.
-    fn stands_alone(&mut self, shot: usize, detection: Detection) -> bool {
-        let weight = self.sent.weight(shot);
-        let light = self.sent.light(shot, detection.lag);
-        let arrives = |other: usize| {
-            let arrival = self.sent.arrival(other);
-            arrival.start < light.end && light.start < arrival.end
-        };
-        let beside = [shot.checked_sub(1), Some(shot + 1).filter(|&next| next < self.found.len())];
-        if !beside.into_iter().flatten().any(arrives) || detection.count == weight {
-            return true;
-        }
-        let around = self.field.density_without(&light, 0, 0);
-        detection.count >= self.chance.in_gate.least(weight, around)
     }
 
     /// `detection`, if neither chance nor light of other returns gives it.

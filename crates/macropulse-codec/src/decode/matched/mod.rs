@@ -1,33 +1,29 @@
 //! The matched receiver: the lag at which the whole known macropulse of a shot fits best.
 //!
-//! What it is to give is simple to say: for each shot the lag of its gate with most marks, the
-//! earliest of several, if chance does not give so many and no other return accounts for them. To
-//! try every lag with every mark takes tens of microseconds a shot; so the receiver cancels light
-//! that it has explained, as multi-user detectors do, and looks first where light is likely:
+//! A hypothesis is a shot and a lag, and the rule of [`belief`](super::belief) decides about it. To try every lag with every
+//! mark takes tens of microseconds a shot; so the receiver cancels light that it has explained, as multi-user detectors do,
+//! and looks first where light is likely:
 //!
 //! 1. [`cancel`]: macropulses of which every mark is there are taken off the stream of ticks one
 //!    after another: no lag can have more. In clear light this is all.
 //! 2. [`track`]: neighbouring pixels see neighbouring ranges. About them the exact maximum is taken;
-//!    it is believed at once if as large a share of the marks is found as of the shots before.
+//!    it is kept at once if as large a share of the marks is found as of the shots before.
 //! 3. [`acquire`]: the exact maximum over the gate, of shots that no neighbour predicts and of those
-//!    fainter than their neighbours; and, where light is left over, of further surfaces, if it fits no
-//!    other shot as well.
-//! 4. [`verify`]: returns that light of other returns accounts for are excluded, and those whose label light of another one
-//!    explains better: [`label`](self::label).
+//!    fainter than their neighbours; and, where light is left over, of further surfaces.
+//! 4. [`verify`]: each return is judged again, as the light of all others is known.
 //!
-//! A return is believed if chance would not reach its count of marks at any lag of the gate: [`chance`].
+//! What these steps find is believed by posterior odds, and so is its label: [`odds`].
 //!
-//! An exhaustive receiver takes what these steps find for hypotheses, and counts every lag:
-//! [`reference`](self::reference).
+//! A thorough receiver takes what they find for hypotheses, and counts every lag: [`reference`](self::reference).
 //!
 //! The shots go through these steps in blocks, so that the ticks at hand fit into a cache.
 
 mod acquire;
 mod cancel;
 mod chance;
-mod label;
 mod look;
 mod measure;
+mod odds;
 mod pace;
 mod reference;
 mod sent;
@@ -41,6 +37,7 @@ use std::ops::Range;
 
 use serde::Deserialize;
 
+use super::belief;
 use super::field::{self, Field};
 use super::timeline::Timeline;
 use super::{Correlation, Error, GATES_PER_BLOCK, Receiver, Returns};
@@ -64,11 +61,9 @@ pub enum Effort {
     /// passes by what lies evenly over everything: a target that is barely seen may be lost where
     /// it stands alone or fills the whole field.
     Quick,
-    /// Searches for every shot that is not found otherwise; takes many times as long in noise.
+    /// Counts every lag of every shot: the reference that the quick receiver is compared with. Takes many times as long in
+    /// noise.
     Thorough,
-    /// Counts every lag of every shot and believes by posterior odds alone, without the thresholds of the other two: the
-    /// reference that they are compared with. Takes ten to two hundred times as long as a quick one in noise.
-    Exhaustive,
 }
 
 /// Decodes one band.
@@ -84,18 +79,18 @@ pub(super) fn decode(
 ) -> Result<Returns, Error> {
     let mut memory = MEMORY.take();
     let words = std::mem::take(&mut memory.words);
-    let sent = Sent::new(receiver, (correlation, effort), sent, (ticks.epoch, words));
+    let sent = Sent::new(receiver, correlation, sent, (ticks.epoch, words));
     let mut returns = Returns::with_capacity(sent.log.owned.len());
     let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.timelines)?;
     let memory = match cancelled {
-        Some(cancelled) if cancelled.is_clear() && effort != Effort::Exhaustive => {
+        Some(cancelled) if cancelled.is_clear() && effort == Effort::Quick => {
             sent.settle_clear(&cancelled.lags, &mut memory.photons, &mut returns);
             memory
         }
         _ => {
             let mut band = Band::new(&sent, (&ticks.tick, cancelled), memory);
             band.decode(&mut returns);
-            if effort == Effort::Exhaustive {
+            if effort == Effort::Thorough {
                 returns = reference::decode(&sent, &ticks.tick, &band.lags());
             }
             band.into_memory()
@@ -126,7 +121,7 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     words: Words,
-    /// Of the light that overlaps while it is cancelled, then of [`Band::places`].
+    /// Of the light that overlaps while it is cancelled, then of [`Band::residual`] and [`Band::claimed`].
     timelines: [Timeline; 2],
     field: field::Memory,
     search: Search,
@@ -203,9 +198,11 @@ struct Band<'a> {
     /// Memory for the residual of a macropulse, for the marks found in each of its bits and in those about it,
     /// and for the places that others claim and its own.
     residual: Timeline,
+    claimed: Timeline,
     found_in_bits: Vec<u32>,
     words: WordsAbout,
-    places: [Timeline; 2],
+    /// The logarithm of the posterior odds from which on a detection is believed.
+    threshold: f64,
 }
 
 /// Marks of a word that are found in each bit about a macropulse, and their sums for the bits of a label.
@@ -249,6 +246,7 @@ impl<'a> Band<'a> {
             _ => chance.fewest_ticks(sent, field.cell()),
         };
         memory.search.forget();
+        let [residual, claimed] = memory.timelines;
         Self {
             field,
             open,
@@ -271,10 +269,11 @@ impl<'a> Band<'a> {
             in_picture: Vec::new(),
             search: memory.search,
             meter: Meter::new(sent, memory.photons),
-            residual: Timeline::default(),
+            residual,
+            claimed,
             found_in_bits: Vec::new(),
             words: WordsAbout::default(),
-            places: memory.timelines,
+            threshold: belief::threshold(sent.correlation.false_alarm),
             sent,
         }
     }
@@ -321,7 +320,7 @@ impl<'a> Band<'a> {
     fn into_memory(self) -> Memory {
         Memory {
             words: Words::default(),
-            timelines: self.places,
+            timelines: [self.residual, self.claimed],
             field: self.field.into_memory(),
             search: self.search,
             photons: self.meter.photons,

@@ -8,8 +8,7 @@ use super::chance::HARDLY_EVER;
 /// has 400 of 190 000 points less; it takes half as long in the dark with 10¹⁰ dark counts a second.
 ///
 /// Where no light stands out it is the square of the part, so that what can be in a few places only is searched
-/// for in nearly every shot. By the part itself whole rows of far ground are missed: 710 of the 407 040 shots
-/// of `car-50m` as declared are found otherwise than by a thorough receiver, instead of 142.
+/// for in nearly every shot. By the part itself whole rows of far ground are missed.
 pub(super) const LONGEST_PAUSE: f64 = 64.0;
 
 /// Shots of which one in so many is searched for, fewer and fewer as long as none is found.

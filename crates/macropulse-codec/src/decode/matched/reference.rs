@@ -1,4 +1,4 @@
-//! The exhaustive receiver: every lag of every shot is a hypothesis, and belief alone decides.
+//! The thorough receiver: every lag of every shot is a hypothesis, and belief alone decides.
 //!
 //! The quick receiver looks where light is likely. This one counts all lags. It shows what the quick one passes by. It
 //! decides by [`belief`](crate::decode::belief) and nothing else:
@@ -244,7 +244,7 @@ impl<'a> Reference<'a> {
         let mut further = Vec::new();
         for other in self.proposed[shot].clone() {
             if let Some((peak, _)) = self.believed(shot, other, prior)
-                && !self.is_whole_bits(peak.lag - lag)
+                && !self.sent.is_whole_bits(peak.lag - lag)
             {
                 further.push(peak.lag);
                 saved.push(self.try_out(shot, peak.lag));
@@ -265,12 +265,6 @@ impl<'a> Reference<'a> {
         let gate = residual.gate(shot);
         let (_, around) = residual.look(&gate, lag, self.search.places());
         belief::contradiction(&lit, &dark, &around, prior.expected(lag))
-    }
-
-    /// True if two lags lie whole bits `apart`: light then falls on the same marks of other bits.
-    fn is_whole_bits(&self, apart: i64) -> bool {
-        let (bit, width) = (self.sent.bit_length(), i64::from(self.sent.width));
-        !(width..=bit - width).contains(&apart.rem_euclid(bit))
     }
 
     /// Takes light of `shot` at `lag` for a return on trial. What it gives puts that back.

@@ -3,21 +3,19 @@
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use super::Detection;
 use super::chance::BY_CHANCE;
 use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
 use crate::decode::timeline::Timeline;
 use crate::decode::timing;
-use crate::decode::{Correlation, Effort, Pick, Receiver, window};
+use crate::decode::{Correlation, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
 
 /// What was sent.
 pub(super) struct Sent<'a> {
     pub receiver: &'a Receiver,
     pub correlation: &'a Correlation,
-    effort: Effort,
     pub codebook: &'a Codebook,
     pub log: &'a ShotLog,
     /// Absolute time of tick 0, in ticks.
@@ -159,7 +157,7 @@ pub(super) struct Bits {
 impl<'a> Sent<'a> {
     pub fn new(
         receiver: &'a Receiver,
-        (correlation, effort): (&'a Correlation, Effort),
+        correlation: &'a Correlation,
         sent: (&'a Codebook, &'a ShotLog),
         (epoch, words): (i64, Words),
     ) -> Self {
@@ -180,7 +178,6 @@ impl<'a> Sent<'a> {
             reach: receiver.lags_of_light(correlation, length),
             receiver,
             correlation,
-            effort,
             codebook,
             log,
             epoch,
@@ -317,6 +314,12 @@ impl<'a> Sent<'a> {
         self.bit_length
     }
 
+    /// True if two lags lie whole bits `apart`: light then falls on the same marks of other bits.
+    pub fn is_whole_bits(&self, apart: i64) -> bool {
+        let width = i64::from(self.width);
+        !(width..=self.bit_length - width).contains(&apart.rem_euclid(self.bit_length))
+    }
+
     /// Bits of a payload.
     pub fn bits_of_payload(&self) -> i64 {
         self.bits
@@ -420,28 +423,39 @@ impl<'a> Sent<'a> {
         marks.div_ceil(per_tick.unwrap_or(1).max(1))
     }
 
+    /// Ticks about a mark that its own light may light: those in which it is looked for. Where each photon makes an event
+    /// of its own, they are those that are cancelled with it.
+    pub fn zone(&self) -> u32 {
+        match self.correlation.photons_apart {
+            true => self.width + 2 * self.farther() as u32,
+            false => self.width,
+        }
+    }
+
+    /// Ticks that light of `shot` makes at most if so many `marks` of it are lit, k of N.
+    ///
+    /// A mark makes one tick. But where each photon makes an event of its own, and marks have n photons on average, a mark
+    /// stays dark with the probability e⁻ⁿ: k lit ones tell of N·n = N·ln(1/(1 − k/N)) photons. Three deviations are added.
+    pub fn ticks_at_most(&self, shot: usize, marks: u32) -> u32 {
+        if !self.correlation.photons_apart || marks == 0 {
+            return marks;
+        }
+        let weight = f64::from(self.weight(shot));
+        let dark = (1.0 - f64::from(marks) / weight).max(0.5 / weight);
+        let photons = -weight * libm::log(dark);
+        let most = (photons + 3.0 * photons.sqrt()) as u32 + 1;
+        most.max(marks).min(marks * self.zone())
+    }
+
     /// How often chance may be taken for light: as often as false returns are accepted, but hardly ever.
     pub fn accepted(&self) -> f64 {
         self.correlation.false_alarm.min(BY_CHANCE)
     }
 
-    /// Whether every shot is searched for in all of its gate.
-    pub fn is_thorough(&self) -> bool {
-        self.effort == Effort::Thorough
-    }
-
     /// Whether surfaces of a shot beside the strongest one are looked for wherever they may be: they are
     /// asked for, or light of one must not pass for that of a bit that should be dark.
     pub fn wants_further(&self) -> bool {
-        self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest || self.is_thorough()
-    }
-
-    /// Whether no smaller share of the marks was found of one shot than of another one.
-    pub fn is_as_full(&self, one: (usize, Detection), other: (usize, Detection)) -> bool {
-        let crossed = |(_, detection): (usize, Detection), (shot, _): (usize, Detection)| {
-            u64::from(detection.count) * u64::from(self.weight(shot))
-        };
-        crossed(one, other) >= crossed(other, one)
+        self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
     }
 }
 

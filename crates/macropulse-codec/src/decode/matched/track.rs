@@ -69,7 +69,14 @@ impl Band<'_> {
             tried[way] = lag;
             if least == 0 {
                 // Fewer are nowhere believed.
-                least = self.chance.in_gate.least(weight, self.density_in_gate(shot, weight));
+                let density = match gap {
+                    1 => self.density_in_gate(shot, weight),
+                    _ => {
+                        let gate = self.sent.gate();
+                        self.leftover().density(shot, &gate)
+                    }
+                };
+                least = self.chance.expected.least(weight, density);
             }
             let Some(peak) = self.climb(shot, lag, least) else { continue };
             let Some(peak) = self.told_from_chance(shot, peak) else { continue };

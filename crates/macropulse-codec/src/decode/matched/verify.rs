@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use super::track::{BLOCK, NEAREST_SIDE, WAYS, WIDEST_GAP, lit};
+use super::track::{BLOCK, NEAREST_SIDE, lit};
 use super::{Band, Detection, SURFACES};
 use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::{Reject, Returns, Strength};
-use crate::kernels::parted;
 
 impl Band<'_> {
     /// Turns what was found of `shots` into returns: of those found without a gap, as many in a row together.
@@ -154,7 +153,7 @@ impl Band<'_> {
 
     /// Marks of `shot`, which are at hand, found at `lag`, where each tick counts for one of them: the
     /// earliest that it may be.
-    fn marks_with_ticks(&self, shot: usize, lag: i64) -> u32 {
+    pub(super) fn marks_with_ticks(&self, shot: usize, lag: i64) -> u32 {
         let (sent, seen, lit) = (self.sent, self.field.seen(), self.field.lit());
         sent.marks_with_ticks(lit, seen, sent.fired[shot] + lag, &self.marks)
     }
@@ -182,106 +181,13 @@ impl Band<'_> {
             && !self.is_open(shot)
     }
 
-    /// Whether light of other returns, of other shots or another surface of this one, does not account
-    /// for `detection`.
-    ///
-    /// Returns that are as full or fuller claim places; where two claim each other's, the one stays that
-    /// is where its neighbours let it be expected, else the later shot, which is settled when the earlier
-    /// one is gone: light is rather near than far. Of the places that are claimed about the macropulse a
-    /// share c is lit, of the others a share d. If n of its N marks are claimed, chance finds each with
-    /// the mean probability (n·c + (N − n)·d) / N; it must not find as many at any lag of the gate. Of a
-    /// shot that stands out, with as many marks as usual, this is not asked.
-    ///
-    /// c is that of the places beside its own marks, or of all if that is more: of few marks of another
-    /// return, all that are found may be among its own.
-    pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
-        self.is_its_own_beside(shot, detection, None)
-    }
-
-    /// As [`Self::is_its_own`], if there were a `supposed` return of another shot as well.
-    pub(super) fn is_its_own_beside(
-        &mut self,
-        shot: usize,
-        detection: Detection,
-        supposed: Option<(usize, Detection)>,
-    ) -> bool {
-        let sent = self.sent;
-        let weight = sent.weight(shot);
-        let is_other = |found: &Detection| found.lag != detection.lag;
-        let of_shot = self.found[shot].is_some_and(|found| is_other(&found))
-            || self.further.iter().any(|(other, found)| *other == shot && is_other(found));
-        let is_asked = of_shot || supposed.is_some();
-        if !is_asked && detection.stands_out && self.is_usual(shot, detection) {
-            return true;
-        }
-        if !self.is_spread(shot, detection) {
-            return false;
-        }
-        let light = sent.light(shot, detection.lag);
-        let mut claiming = Vec::from_iter(supposed);
-        claiming.extend(self.overlapping(&light).filter(|found| {
-            let is_itself = found.0 == shot && found.1.lag == detection.lag;
-            !is_itself && self.claims(*found, (shot, detection))
-        }));
-        if claiming.is_empty() {
-            return true;
-        }
-        let stretch = light.start.div_euclid(64) * 64..light.end.div_euclid(64) * 64 + 64;
-        // Words of others may begin before it.
-        let before = (sent.bit_length() + 4 * i64::from(sent.width)).div_euclid(64) * 64 + 64;
-        let [claimed, own] = &mut self.places;
-        claimed.clear_all(stretch.start - before, stretch.end - stretch.start + before);
-        for (other, theirs) in claiming {
-            let bits = sent.bits(other);
-            let before = 2 * sent.farther() + i64::from(sent.width - 1);
-            let start = sent.fired[other] + theirs.lag - before;
-            claimed.light_up(start, sent.lit_bits(other), &bits.claimed);
-        }
-        // Where its own marks are found tells nothing of the free places.
-        own.clear_all(claimed.origin(), stretch.end - claimed.origin());
-        let pattern = &sent.bits(shot).cancelled;
-        let start = light.start - sent.farther();
-        own.light_up(start, sent.lit_bits(shot), pattern);
-        let lit = self.field.lit();
-        // Free places, claimed ones, and claimed ones of its own: all of them, and those lit.
-        let places = parted(claimed.words(&stretch), own.words(&stretch), lit.words(&stretch));
-        let lit_bits = sent.lit_bits(shot);
-        let taken = claimed.lit_in_all(light.start, lit_bits, &sent.bits(shot).pattern);
-        let free = weight - taken;
-        let share = |lit: u32, all: u32| f64::from(lit) / f64::from(all.max(1));
-        let [[all, lit], [all_claimed, lit_claimed], [all_shared, lit_shared]] = places;
-        let beside = share(lit_claimed, all_claimed);
-        let claimed = beside.max(share(lit_claimed + lit_shared, all_claimed + all_shared));
-        let by_chance = f64::from(free) * share(lit, all) + f64::from(taken) * claimed;
-        let gate = self.density_in_gate(shot, detection.count);
-        let density = gate.max(by_chance / f64::from(weight)).min(1.0);
-        detection.count >= self.chance.in_gate.least(weight, density)
-    }
-
-    /// Whether `theirs`, a return of another shot, may claim places of `ours`: one that is fuller, or as
-    /// full and not where it is less expected than ours.
-    fn claims(&self, theirs: (usize, Detection), ours: (usize, Detection)) -> bool {
-        let is_fuller = self.sent.is_as_full(theirs, ours);
-        let is_as_full = is_fuller && self.sent.is_as_full(ours, theirs);
-        is_fuller
-            && !(is_as_full
-                && self.is_expected(ours.0, ours.1.lag)
-                && !self.is_expected(theirs.0, theirs.1.lag))
-    }
-
-    /// Whether `shot` is to be expected about `lag` after any of its neighbours.
-    fn is_expected(&self, shot: usize, lag: i64) -> bool {
-        let is_near = |expected: i64| expected.abs_diff(lag) < NEAREST_SIDE as u64;
-        (0..WAYS).any(|way| self.expected(shot, WIDEST_GAP, way).is_some_and(is_near))
-    }
-
     /// Whether the marks found are spread over the code word. Light of another word meets the same one
     /// or two of its marks in every bit, and makes many marks of few.
     ///
     /// Where a share q is found in each of B bits, a mark of the word is found in none of them with
     /// probability (1 − q)ᴮ. It is not spread if chance leaves out as many of the W marks no more often than
     /// `BY_CHANCE`.
-    fn is_spread(&mut self, shot: usize, detection: Detection) -> bool {
+    pub(super) fn is_spread(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let bits = sent.lit_bits(shot).len();
         if bits < 2 {
@@ -295,7 +201,7 @@ impl Band<'_> {
     }
 
     /// The returns found so far of which light overlaps with `light`.
-    fn overlapping(
+    pub(super) fn overlapping(
         &self,
         light: &Range<i64>,
     ) -> impl Iterator<Item = (usize, Detection)> + use<'_> {

@@ -135,7 +135,7 @@ fn energy(found: &Light) -> Vec<Claim> {
             format!(
                 "at {:.2} nJ, 25 mm aperture and 0.7 optics: {:.1} photons a macropulse, {:.2} a \
                  micropulse. A receiver that matches whole macropulses has by night, simulated, Pd {:.3} at \
-                 {:.0} m and 0.9 at {:.0} m, by day, staring, with {:.0} photons of sunlight in \
+                 {:.0} m, by day, staring, with {:.0} photons of sunlight in \
                  every chip, Pd {:.3}. Mark by mark it would need {:.1} a \
                  micropulse. Declared by sensitivity instead",
                 found.energy * 1e9,
@@ -143,7 +143,6 @@ fn energy(found: &Light) -> Vec<Claim> {
                 found.photons_per_mark,
                 found.pd_by_night,
                 found.range,
-                found.range_by_night,
                 found.sunlight,
                 found.pd_by_day,
                 found.photons_declared

@@ -230,8 +230,6 @@ pub struct Light {
     pub pd_by_day: f64,
     /// The same by night.
     pub pd_by_night: f64,
-    /// Range at which nine of ten are seen by night.
-    pub range_by_night: f64,
 }
 
 impl Light {
@@ -261,10 +259,8 @@ impl Light {
         let irradiance = day.irradiance(wavelength).unwrap_or(f64::NAN);
         let limits = Class1::at(wavelength);
         let by_day = Forecaster::new(&honest, &day)?;
-        let seen_by_night = |range: f64| -> Result<f64, Error> {
-            let sensor = ("kim-park-2016-physical", &honest);
-            Ok(Wall::of(sensor, (range, 1.0), "night", (SHOTS, SEED))?.seen)
-        };
+        let sensor = ("kim-park-2016-physical", &honest);
+        let by_night = Wall::of(sensor, (range, 1.0), "night", (SHOTS, SEED))?;
         let mirror = [1.1e-3, 1.2e-3];
         let takes = |side: f64| libm::erf(std::f64::consts::SQRT_2 * side / beam);
         Ok(Self {
@@ -297,8 +293,7 @@ impl Light {
             sunlight: budget.background(irradiance, day.albedo)
                 * s_from_fs(design.emission.coding().chip_fs),
             pd_by_day: by_day.forecast(1.0, range).pd,
-            pd_by_night: seen_by_night(range)?,
-            range_by_night: farthest(range, |range| Ok(seen_by_night(range)? >= 0.9))?,
+            pd_by_night: by_night.seen,
         })
     }
 }
@@ -306,26 +301,8 @@ impl Light {
 /// Seed of what is simulated for numbers on paper.
 const SEED: u64 = 1;
 
-/// Shots at each wall by night, about: nine of ten are then known to 0.7 %. Most of the time goes into
-/// counting their dark counts.
+/// Shots at the wall by night, about: nine of ten are then known to 0.7 %.
 const SHOTS: u64 = 2_000;
-
-/// The farthest range up to `most` metres, to 1 % of it, at which `is_seen`; 0 if it is not seen at
-/// half of it.
-fn farthest(most: f64, is_seen: impl Fn(f64) -> Result<bool, Error>) -> Result<f64, Error> {
-    let (mut near, mut far) = (most / 2.0, most);
-    if is_seen(far)? {
-        return Ok(far);
-    }
-    if !is_seen(near)? {
-        return Ok(0.0);
-    }
-    while far - near > 0.01 * most {
-        let middle = (near + far) / 2.0;
-        if is_seen(middle)? { near = middle } else { far = middle }
-    }
-    Ok(near)
-}
 
 /// The HDL-64E, as it is here and as its makers count.
 #[derive(Debug, Clone)]

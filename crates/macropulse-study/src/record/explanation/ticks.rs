@@ -229,7 +229,10 @@ impl Ticks {
         );
         if let Some(threshold) = self.threshold_marks {
             let threshold = counted(threshold.into(), "mark");
-            columns.push("threshold", format!("{threshold} at this density, over all lags"));
+            columns.push(
+                "threshold",
+                format!("{threshold} at this density, where no neighbour leads to expect light"),
+            );
         }
         for (name, place) in [("peak", &self.peak), ("sidelobe", &self.sidelobe)] {
             let text = place.as_ref().map_or("none".to_owned(), |place| {

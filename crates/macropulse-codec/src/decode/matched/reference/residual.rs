@@ -151,12 +151,10 @@ impl<'a> Residual<'a> {
         &self.open
     }
 
-    /// Fewest trials about the marks of `shot` where so many places are claimed: that is how many of its ticks count
-    /// at most.
-    pub fn fewest_trials(&self, shot: usize, claimed: u32) -> u32 {
-        let width = self.sent.width;
-        let taken = claimed + self.sent.weight(shot) * width;
-        (self.sent.takes_up() as u32).saturating_sub(taken) / width
+    /// Fewest places that are neither about marks of `shot` nor among those that are claimed, which are so many.
+    pub fn fewest_places(&self, shot: usize, claimed: u32) -> u32 {
+        let taken = claimed + self.sent.weight(shot) * self.sent.zone();
+        (self.sent.takes_up() as u32).saturating_sub(taken)
     }
 
     /// Makes `sums` those of `span`.
@@ -205,10 +203,9 @@ impl<'a> Residual<'a> {
     ///
     /// A tick is one piece of evidence: where it may be one of two marks it counts for one, the earliest. As all
     /// marks are looked for in equally many ticks, no other choice gives more marks a tick. All other ticks are
-    /// surroundings.
+    /// surroundings, but where each photon makes an event of its own those about the marks tell nothing.
     pub fn look(&self, gate: &Gate, lag: i64, places: &[u32]) -> (Marks, Surroundings) {
         let (sent, shot, light) = (self.sent, gate.shot, self.sent.light(gate.shot, lag));
-        let width = i64::from(sent.width);
         let (bits, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
         let count = |of: &Timeline| of.lit_in_all(light.start, lit_bits, &bits.pattern);
         let of = sent.weight(shot) - count(&self.claimed);
@@ -216,11 +213,18 @@ impl<'a> Residual<'a> {
             0 => count(&self.lit),
             _ => sent.marks_with_ticks(&self.lit, &self.left, light.start, places),
         };
-        let marks = Marks { lit, of };
-        let beside = self.left.count(light.clone()).saturating_sub(marks.lit);
-        let taken = i64::from(self.claimed.count(light.clone())) + i64::from(marks.of) * width;
+        let most = sent.ticks_at_most(shot, lit);
+        let own = match sent.correlation.photons_apart {
+            true => {
+                let about = light.start - sent.farther();
+                self.left.lit_in_all(about, lit_bits, &bits.cancelled).min(most)
+            }
+            false => lit,
+        };
+        let beside = self.left.count(light.clone()).saturating_sub(own);
+        let taken = i64::from(self.claimed.count(light.clone()) + of * sent.zone());
         let places = (light.end - light.start - taken) as f64;
-        (marks, self.surroundings(beside, places, gate.without(marks.lit)))
+        (Marks { lit, of }, self.surroundings(beside, places, gate.without(own)))
     }
 
     /// What speaks for light of a shot at `lag`.

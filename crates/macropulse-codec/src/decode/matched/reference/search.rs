@@ -68,12 +68,21 @@ pub(super) struct Search {
 struct Asked {
     /// The evidence, in whole nats.
     nats: i32,
-    /// Fewest ticks about any of the lags.
-    ticks: u32,
+    /// The least light about any of the lags.
+    light: Light,
     /// All marks of the shot.
     weight: u32,
     /// The gate of the shot: [`Gate::key`].
     gate: (u32, u64),
+}
+
+/// The least light about any of some lags.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Light {
+    /// Fewest ticks that are left there.
+    ticks: u32,
+    /// Fewest places that are neither claimed nor about marks of the shot.
+    places: u32,
 }
 
 /// Thresholds that are remembered at most.
@@ -160,7 +169,7 @@ impl Search {
                 let start = sent.fired[shot] + first;
                 let most = prior.most(&block);
                 let bound = self.bound((residual, &coarse), &block, least - most);
-                let Some((mut fewest, of_all)) = bound else { continue };
+                let Some((mut fewest, light)) = bound else { continue };
                 let (lit, at) = residual.lit().at(start);
                 self.lit.count(lit, at as u32, sent.word(shot), sent.lit_bits(shot));
                 let mut hits = below(block.end - first, [u64::MAX; WIDE], true);
@@ -181,7 +190,7 @@ impl Search {
                         let before = least;
                         least = visit(peak);
                         if least > before {
-                            fewest = self.fewest((residual, &coarse), least - most, of_all);
+                            fewest = self.fewest((residual, &coarse), least - most, light);
                         }
                     }
                 }
@@ -189,33 +198,38 @@ impl Search {
         }
     }
 
-    /// Fewest marks for so many `nats` of evidence at any of the `lags`, and the fewest ticks that count for any of them;
-    /// `None` where there cannot be as many.
+    /// Fewest marks for so many `nats` of evidence at any of the `lags`, and the least light about any of them; `None`
+    /// where there cannot be as many.
     fn bound(
         &mut self,
         (residual, gate): (&Residual, &Gate),
         lags: &Range<i64>,
         nats: f64,
-    ) -> Option<(Fewest, u32)> {
+    ) -> Option<(Fewest, Light)> {
         let (sent, shot) = (residual.sent, gate.shot);
         let (start, last) = (sent.fired[shot] + lags.start, sent.fired[shot] + lags.end - 1);
         let span = start..last + sent.takes_up();
         let of_any = self.sums.ticks(&span);
-        let trials = residual.fewest_trials(shot, self.sums.claimed(&span));
-        let of_all = self.sums.ticks_within(&(last..start + sent.takes_up())).min(trials);
-        let fewest = self.fewest((residual, gate), nats, of_all);
+        let light = Light {
+            ticks: self.sums.ticks_within(&(last..start + sent.takes_up())),
+            places: residual.fewest_places(shot, self.sums.claimed(&span)),
+        };
+        let fewest = self.fewest((residual, gate), nats, light);
         let may_be = of_any >= fewest.lit && fewest.lit <= sent.weight(shot);
-        may_be.then_some((fewest, of_all))
+        may_be.then_some((fewest, light))
     }
 
-    /// Fewest marks of a shot for so many `nats` of evidence, with so many `ticks` at least in its light.
-    fn fewest(&mut self, (residual, gate): (&Residual, &Gate), nats: f64, ticks: u32) -> Fewest {
+    /// Fewest marks of a shot for so many `nats` of evidence in such `light` or more.
+    ///
+    /// The evidence grows with the places. But as no more of them are lit than there are, it falls with them where all
+    /// are lit.
+    fn fewest(&mut self, (residual, gate): (&Residual, &Gate), nats: f64, light: Light) -> Fewest {
         let weight = residual.sent.weight(gate.shot);
         // Coarse numbers, so that many questions are the same.
         let nats = nats.floor() as i32;
         let nats = if nats > 0 { first_bits(nats as u32, 4) as i32 } else { nats };
-        let ticks = first_bits(ticks, 2);
-        let asked = Asked { nats, ticks, weight, gate: gate.key() };
+        let [ticks, places] = [light.ticks, light.places].map(|number| first_bits(number, 2));
+        let asked = Asked { nats, light: Light { ticks, places }, weight, gate: gate.key() };
         if let Some((_, fewest)) = self.last.filter(|(last, _)| *last == asked) {
             return fewest;
         }
@@ -223,12 +237,16 @@ impl Search {
             self.last = Some((asked, *fewest));
             return *fewest;
         }
-        let length = residual.sent.takes_up() as f64;
+        let all = residual.sent.takes_up() as u32;
         let of = |of: &dyn Fn(u32) -> u32| {
             fewest(weight, |lit| {
-                let beside = ticks.saturating_sub(lit);
-                let around = residual.surroundings(beside, length, gate.without(lit));
-                evidence(Marks { lit, of: of(lit) }, &around) >= f64::from(nats)
+                let own = residual.sent.ticks_at_most(gate.shot, lit);
+                let beside = ticks.saturating_sub(own);
+                let marks = Marks { lit, of: of(lit) };
+                [all, places].into_iter().any(|places| {
+                    let around = residual.surroundings(beside, places.into(), gate.without(own));
+                    evidence(marks, &around) >= f64::from(nats)
+                })
             })
         };
         let fewest = Fewest { lit: of(&|lit| lit), lit_or_claimed: of(&|_| weight) };

@@ -1,4 +1,4 @@
-//! The exhaustive receiver against plain code: every lag of every shot, mark by mark.
+//! The thorough receiver against plain code: every lag of every shot, mark by mark.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -96,12 +96,27 @@ impl<'a> Plain<'a> {
             (*place..*place + width).filter(is_left).any(|tick| taken.insert(tick));
         }
         let lit = taken.len() as u32;
-        let beside = Self::count(&self.left, light.clone()).saturating_sub(lit);
+        let (mut own, mut zone) = (lit, width);
+        if self.sent.correlation.photons_apart {
+            // Bit by bit: of two bits side by side a tick may count twice.
+            let start = self.sent.fired[shot] + lag;
+            let of_bit = |bit: &u32| {
+                let places =
+                    self.sent.word(shot).ticks().iter().map(|mark| start + i64::from(bit + mark));
+                let zones = places.flat_map(|place| place - width / 2..place + width + width / 2);
+                let left = zones.filter(|tick| self.left[(tick + ROOM) as usize]);
+                left.collect::<BTreeSet<i64>>().len() as u32
+            };
+            let all = self.sent.lit_bits(shot).iter().map(of_bit).sum::<u32>();
+            own = all.min(self.sent.ticks_at_most(shot, lit));
+            zone = width + width / 2 * 2;
+        }
+        let beside = Self::count(&self.left, light.clone()).saturating_sub(own);
         let places = light.end
             - light.start
             - i64::from(Self::count(&self.claimed, light))
-            - free.len() as i64 * width;
-        let around = self.surroundings(shot, [beside, lit], places);
+            - free.len() as i64 * zone;
+        let around = self.surroundings(shot, [beside, own], places);
         (Marks { lit, of: free.len() as u32 }, around)
     }
 
@@ -151,14 +166,18 @@ impl<'a> Plain<'a> {
         best.filter(|(odds, _)| *odds >= self.threshold).map(|(_, Reverse(lag))| lag)
     }
 
-    /// The best lag of a block, the first of those side by side.
+    /// The best lag of a block, the first of those side by side that neighbours could make the best one.
     fn best_about(&self, shot: usize, middle: i64, prior: &Prior) -> Option<i64> {
         let far = self.sent.takes_up();
         let block = middle - far..middle + far;
         let mut lag = self.best(shot, block.clone(), prior)?;
+        let even = Prior::new(prior.lags().clone(), &[]);
+        let within = |lag: &i64| block.contains(lag) && prior.lags().contains(lag);
+        let each = block.clone().filter(within).map(|lag| self.odds(shot, lag, &even));
+        let least = each.fold(self.threshold, f64::max) - even.sway();
         while self.sent.width > 1
-            && block.contains(&(lag - 1))
-            && prior.lags().contains(&(lag - 1))
+            && within(&(lag - 1))
+            && self.odds(shot, lag - 1, &even) >= least
             && self.look(shot, lag - 1).0 == self.look(shot, lag).0
         {
             lag -= 1;
@@ -317,7 +336,7 @@ proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(80) })]
 
     /// Bounds and kernels change nothing: what is found is what plain code finds with every lag and every mark. All
-    /// families, with and without a payload, without jitter and with 1.5 ticks, with one surface and two. Negative
+    /// families, with and without a payload, without jitter and with 1.5 ticks, with photons apart and not, with one surface and two. Negative
     /// control: plain code that asks for 10 nats more finds less of all that was found.
     fn as_plain_code(
         book in 0..8_usize,
@@ -326,6 +345,7 @@ proptest! {
         false_ticks in prop_oneof![Just(0), 1..60_u32],
         late in 0..30_u32,
         jitter in prop_oneof![Just(0.0), Just(1.5)],
+        photons_apart in any::<bool>(),
         panes in prop_oneof![Just(0), Just(50_u32)],
         seed in 0..u64::MAX,
     ) {
@@ -339,7 +359,8 @@ proptest! {
         }
         let weather = Weather { missed, false_ticks, late, roughness: 20, panes };
         let (ticks, _) = sensor.ticks(&log, weather, seed);
-        let receiver = sensor.set_to(Effort::Exhaustive, sensor.correlation(jitter));
+        let correlation = Correlation { photons_apart, ..sensor.correlation(jitter) };
+        let receiver = sensor.set_to(Effort::Thorough, correlation);
         let sent = sensor.sent(&receiver, &log);
         prop_assume!(sent.end_of_block(0, gates(&sent)) == 6);
         let mut reference = Reference::new(&sent, &ticks.tick);
@@ -384,7 +405,7 @@ fn chance_is_hardly_ever_believed() {
                 let weather = Weather { missed: 100, false_ticks, ..CLEAR };
                 let (ticks, _) = sensor.ticks(&log, weather, seed);
                 let correlation = Correlation { false_alarm, ..sensor.correlation(jitter) };
-                let receiver = sensor.set_to(Effort::Exhaustive, correlation);
+                let receiver = sensor.set_to(Effort::Thorough, correlation);
                 let found = decode(&sensor.sent(&receiver, &log), &ticks.tick, &[]);
                 found.shot.iter().collect::<BTreeSet<_>>().len()
             });
@@ -405,7 +426,7 @@ fn every_instruction_set_gives_the_same_returns() {
     let log = sensor.log(64);
     let weather = Weather { missed: 40, false_ticks: 8, late: 20, roughness: 30, panes: 20 };
     let (ticks, _) = sensor.ticks(&log, weather, 1);
-    let receiver = sensor.set_to(Effort::Exhaustive, sensor.correlation(0.3));
+    let receiver = sensor.set_to(Effort::Thorough, sensor.correlation(0.3));
     let each = at_each_level(|| sensor.decode(&receiver, &log, &ticks));
     assert!(each[0].1.len() > 40);
     assert!(each.iter().all(|(_, returns)| *returns == each[0].1));
@@ -423,7 +444,7 @@ fn light_that_is_expected_is_found_as_without() {
         let (ticks, surfaces) = sensor.ticks(&log, weather, 5);
         let found = |false_alarm: f64, likely: &[(usize, i64)]| {
             let correlation = Correlation { false_alarm, ..sensor.correlation(0.3) };
-            let receiver = sensor.set_to(Effort::Exhaustive, correlation);
+            let receiver = sensor.set_to(Effort::Thorough, correlation);
             let returns = decode(&sensor.sent(&receiver, &log), &ticks.tick, likely);
             let ticks: Vec<f64> = returns.tof.iter().map(|tof| tof / 2.5e-12).collect();
             let of_shot = move |shot| Some(ticks[returns.shot.binary_search(&shot).ok()?]);

@@ -94,9 +94,9 @@ fn a_label_is_doubted_as_plainly() {
     assert!(doubted.iter().all(|count| *count > 200), "{doubted:?}");
 }
 
-/// A receiver that passes nothing by gives the same returns: N = 96 000 shots, seeds 1 to 1000, of which 19 in
-/// 20 marks are missed or more, with few false ticks or none. Negative control: one that asks for two
-/// ticks more than the fewest that are believed passes some by.
+/// A receiver that passes nothing by gives the same returns: N = 96 000 shots, seeds 1 to 1000. 92 to 97 of 100 marks are
+/// missed, and of the other ticks one in two or in four is kept. Negative control: one that asks for two ticks more than
+/// the fewest that are believed passes some by.
 #[test]
 fn shots_that_are_too_dark_to_be_found_are_passed_by() {
     let (mut passed, mut lost, mut all) = (0, 0, 0);
@@ -104,11 +104,11 @@ fn shots_that_are_too_dark_to_be_found_are_passed_by() {
         let book = books().remove(seed as usize % 7);
         let sensor = Sensor { period: 2500, ..Sensor::crowded(book) };
         let log = sensor.log(96);
-        let missed = 95 + seed as u32 % 6;
+        let missed = 92 + seed as u32 % 6;
         let weather = Weather { missed, ..CLEAR };
         let (mut ticks, _) = sensor.ticks(&log, weather, seed);
-        // Of those that are left all but one in four or in sixteen.
-        let kept = if seed % 2 == 0 { 4 } else { 16 };
+        // Of those that are left one in two or in four is kept.
+        let kept = if seed % 2 == 0 { 2 } else { 4 };
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         ticks.tick.retain(|_| chance.next_u32().is_multiple_of(kept));
         let receiver = sensor.receiver(if seed % 3 == 0 { 0.6 } else { 0.0 });

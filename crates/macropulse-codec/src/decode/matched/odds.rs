@@ -1,0 +1,264 @@
+//! Posterior odds: whether a detection is believed, and whether its label fits.
+//!
+//! [`belief`] decides. This module counts what it asks for: the marks of a detection that no fuller return claims, the
+//! marks in each bit, and the light about them that no return explains. Shortcuts come first, where they can tell.
+
+use std::f64::consts::LN_2;
+use std::ops::Range;
+
+use libm::log;
+
+use super::track::WIDEST_GAP;
+use super::{Band, Detection, NEIGHBOURS};
+use crate::decode::belief::{self, Hypothesis, Marks, Prior, Surroundings, evidence};
+
+impl Band<'_> {
+    /// `detection`, if it is believed where no other return claims any of its marks.
+    pub(super) fn told_from_chance(
+        &mut self,
+        shot: usize,
+        detection: Detection,
+    ) -> Option<Detection> {
+        let weight = self.sent.weight(shot);
+        let marks = self.marks_at(shot, detection);
+        if !self.is_believed(shot, detection, marks) {
+            return None;
+        }
+        let least = self.chance.in_gate.least(weight, self.density_in_gate(shot, detection.count));
+        let stands_out = 2 * detection.count >= weight.max(4 * least);
+        Some(Detection { stands_out, ..detection })
+    }
+
+    /// Whether `detection` is believed in the light that fuller returns leave it.
+    ///
+    /// Light of another word meets the same few marks in every bit, and a part of it may make up a whole return of few
+    /// bits. So its marks must be spread over the word, unless as many as usual are there and stand out.
+    pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
+        let is_bright = detection.stands_out && self.is_usual(shot, detection);
+        if !is_bright && !self.is_spread(shot, detection) {
+            return false;
+        }
+        let marks = self.unclaimed(shot, detection);
+        self.is_believed(shot, detection, marks)
+    }
+
+    /// Whether the posterior odds of `shot` at `detection` reach the threshold, with `marks` of it for evidence.
+    fn is_believed(&mut self, shot: usize, detection: Detection, marks: Marks) -> bool {
+        // No prior is less than half of a uniform one, and no evidence less than where all ticks are chance.
+        let reach = self.sent.reach();
+        let enough = self.threshold + log(2.0 * (reach.end - reach.start) as f64);
+        if evidence(marks, &self.light_about(shot, detection.lag, detection.count)) >= enough {
+            return true;
+        }
+        let evidence = evidence(marks, &self.unexplained_about(shot, detection.lag));
+        evidence >= enough
+            || evidence >= self.threshold
+                && evidence + self.prior(shot).at(detection.lag) >= self.threshold
+    }
+
+    /// The marks of `shot` at `detection`, claimed or not. A tick that may be one of two marks counts for one.
+    fn marks_at(&mut self, shot: usize, detection: Detection) -> Marks {
+        let of = self.sent.weight(shot);
+        if self.sent.bits(shot).shared == 0 {
+            return Marks { lit: detection.count, of };
+        }
+        self.lay_out(shot);
+        Marks { lit: self.marks_with_ticks(shot, detection.lag), of }
+    }
+
+    /// The marks of `shot` at `detection` that no fuller return claims.
+    fn unclaimed(&mut self, shot: usize, detection: Detection) -> Marks {
+        let all = self.marks_at(shot, detection);
+        if !self.claim_fuller(shot, detection) {
+            return all;
+        }
+        let (start, sent) = (self.sent.fired[shot] + detection.lag, self.sent);
+        let (lit_bits, pattern) = (sent.lit_bits(shot), &sent.bits(shot).pattern);
+        let taken = self.claimed.lit_in_all(start, lit_bits, pattern);
+        let light = sent.light(shot, detection.lag);
+        self.claimed.keep_lit_in(self.field.lit(), &whole_words(&light));
+        let explained = self.claimed.lit_in_all(start, lit_bits, pattern);
+        Marks { lit: all.lit.saturating_sub(explained), of: all.of - taken }
+    }
+
+    /// Has at hand the places that returns fuller than `detection` claim about it, if there are any.
+    fn claim_fuller(&mut self, shot: usize, detection: Detection) -> bool {
+        let (sent, light) = (self.sent, self.sent.light(shot, detection.lag));
+        let own = self.hypothesis(shot, detection);
+        let is_fuller = |found: &(usize, Detection)| self.hypothesis(found.0, found.1) < own;
+        let fuller: Vec<_> = self.overlapping(&light).filter(is_fuller).collect();
+        if fuller.is_empty() {
+            return false;
+        }
+        let stretch = whole_words(&light);
+        // Words of others may begin before it.
+        let before = (sent.bit_length() + 4 * i64::from(sent.width)).div_euclid(64) * 64 + 64;
+        self.claimed.clear_all(stretch.start - before, stretch.end - stretch.start + before);
+        for (other, theirs) in fuller {
+            let before = sent.farther() + i64::from(sent.width - 1);
+            let start = sent.fired[other] + theirs.lag - before;
+            self.claimed.light_up(start, sent.lit_bits(other), &sent.bits(other).claimed);
+        }
+        true
+    }
+
+    /// Light of `shot` at `detection`, as a hypothesis.
+    fn hypothesis(&self, shot: usize, detection: Detection) -> Hypothesis {
+        let marks = Marks { lit: detection.count, of: self.sent.weight(shot) };
+        Hypothesis { shot, lag: detection.lag, marks }
+    }
+
+    /// The light about `shot` at `lag` that no return explains, its own apart. An explained tick takes a place.
+    fn unexplained_about(&mut self, shot: usize, lag: i64) -> Surroundings {
+        let sent = self.sent;
+        let (light, gate) = (sent.light(shot, lag), sent.gate());
+        let (width, weight) = (f64::from(sent.width), f64::from(sent.weight(shot)));
+        let start = light.start - sent.farther();
+        let own = self.field.left_in_all(start, sent.lit_bits(shot), &sent.bits(shot).cancelled);
+        let (all, length) = self.field.ticks_about(&light);
+        let left: u32 = self.field.residual_cells(&light).0.iter().sum();
+        let zone = weight * (width + 2.0 * sent.farther() as f64);
+        let places = ((length as f64 - zone) / width - f64::from(all - left)).max(1.0);
+        let in_gate = (gate.end - gate.start + sent.length()) as f64;
+        let density =
+            self.leftover().density(shot, &gate) + width * (1.0 - f64::from(own)) / in_gate;
+        Surroundings {
+            lit: f64::from(left.saturating_sub(own)).min(places),
+            places,
+            density: density.clamp(width / in_gate, 0.5),
+        }
+    }
+
+    /// The lags at which neighbours lead to expect `shot`: on the lines through them, midway between the nearest two, at
+    /// those of the shots before it, and at that of the next one. Where few shots before were found, more behind count.
+    pub(super) fn expected_lags(&self, shot: usize) -> Vec<i64> {
+        let lag = |shot: usize| Some(self.found.get(shot)?.as_ref()?.lag);
+        let before = (0..shot).rev().take(WIDEST_GAP).filter_map(lag);
+        let before: Vec<i64> = before.take(NEIGHBOURS).collect();
+        let most = if before.len() < NEIGHBOURS { NEIGHBOURS } else { 1 };
+        let behind = (shot + 1..).take(WIDEST_GAP).filter_map(lag);
+        let behind: Vec<i64> = behind.take(most).collect();
+        let sides = before.first().zip(behind.first());
+        let middle = sides.map(|(before, behind)| i64::midpoint(*before, *behind));
+        let lines = [0, 2, 3].into_iter().filter_map(|way| self.expected(shot, 1, way));
+        lines.chain(middle).chain(before).chain(behind).collect()
+    }
+
+    /// The prior of the lags of `shot`.
+    pub(super) fn prior(&self, shot: usize) -> Prior {
+        Prior::new(self.sent.reach(), &self.expected_lags(shot))
+    }
+
+    /// Whether `detection` lies outside the gate, and its light is that of a later shot from within. It is if a later shot
+    /// has the same macropulse, as near light is likelier than far light, or if the label of `shot` is contradicted.
+    pub(super) fn is_of_a_later_shot(&mut self, shot: usize, detection: Detection) -> bool {
+        let (sent, gate) = (self.sent, self.sent.gate());
+        if gate.contains(&detection.lag) {
+            return false;
+        }
+        let (start, log) = (sent.fired[shot] + detection.lag, sent.log);
+        let macropulse = |shot: usize| (log.word[shot], log.label[shot]);
+        let mut others = sent.that_begin_in(&(start..start + 1), &gate);
+        let is_alike = others.any(|other| {
+            let from_within = gate.contains(&(start - sent.fired[other]));
+            other > shot && from_within && macropulse(other) == macropulse(shot)
+        });
+        is_alike || self.is_mislabelled(shot, detection)
+    }
+
+    /// Whether another label explains the light of `shot` at `detection` better than its own. Marks of lit bits are counted
+    /// in all light, as other returns may explain some of them. Marks of dark bits are counted in the light that no
+    /// return explains; but a return in the same word that is less full may be what makes them dark, and does not count.
+    pub(super) fn is_mislabelled(&mut self, shot: usize, detection: Detection) -> bool {
+        let sent = self.sent;
+        if sent.bits_of_payload() == 1 {
+            return false;
+        }
+        let light = sent.light(shot, detection.lag);
+        let (weight, in_word) = (sent.weight(shot), sent.in_word(shot));
+        let around = self.light_about(shot, detection.lag, detection.count);
+        let share = f64::from(detection.count) / f64::from(weight);
+        let fewest = fewest_of_lit_bit(in_word, share, around.lit / around.places);
+        let (pattern, lit_bits) = (&sent.bits(shot).pattern, sent.lit_bits(shot));
+        let marks = |lit: &u32| Marks { lit: *lit, of: in_word };
+        let mut found = std::mem::take(&mut self.found_in_bits);
+        self.field.lit().lit_in_each(light.start, lit_bits, pattern, &mut found);
+        let lit: Vec<Marks> = found.iter().map(marks).collect();
+        let mean = share * f64::from(in_word);
+        let squares: f64 = found.iter().map(|found| (f64::from(*found) - mean).powi(2)).sum();
+        // A label that leaves out the emptier bits gains about half of χ², and is taken only if it gains ln 2 a bit.
+        let most = 2.0 * LN_2 * (sent.bits_of_payload() - 1) as f64 * mean * (1.0 - share);
+        let is_even = found.iter().all(|found| *found >= fewest) && squares <= most;
+        self.find_in_dark_bits(shot, detection, fewest, &mut found);
+        let dark: Vec<Marks> = found.iter().map(marks).collect();
+        self.found_in_bits = found;
+        if is_even && dark.iter().all(|bit| bit.lit < fewest) {
+            return false;
+        }
+        let expected = self.prior(shot).expected(detection.lag);
+        belief::contradiction(&lit, &dark, &around, expected) > 0.0
+    }
+
+    /// Puts the marks of each dark bit of `shot` at `detection` into `found`: none where too few ticks are left for any
+    /// bit to have the `fewest` of a lit one.
+    fn find_in_dark_bits(
+        &mut self,
+        shot: usize,
+        detection: Detection,
+        fewest: u32,
+        found: &mut Vec<u32>,
+    ) {
+        let (sent, light) = (self.sent, self.sent.light(shot, detection.lag));
+        let (dark_bits, pattern) = (sent.dark_bits(shot), &sent.bits(shot).pattern);
+        if self.has_a_rival(shot, detection) {
+            let mut claimed = vec![0; dark_bits.len()];
+            if self.claim_fuller(shot, detection) {
+                self.claimed.keep_lit_in(self.field.lit(), &whole_words(&light));
+                self.claimed.lit_in_each(light.start, dark_bits, pattern, &mut claimed);
+            }
+            self.field.lit().lit_in_each(light.start, dark_bits, pattern, found);
+            found.iter_mut().zip(claimed).for_each(|(found, claimed)| *found -= claimed);
+            return;
+        }
+        found.clear();
+        found.resize(dark_bits.len(), 0);
+        // To widen what is left takes longer than to see that too few ticks are left.
+        let together = self.field.stretch(sent.bit_length() + i64::from(sent.width));
+        if self.field.most_left(&light, together) >= sent.ticks_in_bit(shot, fewest) {
+            let residual = self.field.lit_by_residual(&light, &mut self.residual);
+            residual.lit_in_each(light.start, dark_bits, pattern, found);
+        }
+    }
+
+    /// Whether a return of another shot in the same word lies whole bits from `detection`, and is less full.
+    fn has_a_rival(&self, shot: usize, detection: Detection) -> bool {
+        let (sent, own) = (self.sent, self.hypothesis(shot, detection));
+        let (start, word) = (sent.fired[shot] + detection.lag, &sent.log.word);
+        self.overlapping(&sent.light(shot, detection.lag)).any(|(other, theirs)| {
+            let apart = sent.fired[other] + theirs.lag - start;
+            other != shot
+                && word[other] == word[shot]
+                && sent.is_whole_bits(apart)
+                && own < self.hypothesis(other, theirs)
+        })
+    }
+}
+
+/// Whole machine words that hold `span`.
+fn whole_words(span: &Range<i64>) -> Range<i64> {
+    span.start.div_euclid(64) * 64..span.end.div_euclid(64) * 64 + 64
+}
+
+/// The fewest marks that make a bit likelier lit than dark. It has `marks` marks, n. A lit bit shows each of them with the
+/// probability q, `share`, a dark one with d, `density`. Both are equally likely with k marks for which
+///
+/// > k·ln(q/d) + (n − k)·ln((1 − q)/(1 − d)) = 0.
+fn fewest_of_lit_bit(marks: u32, share: f64, density: f64) -> u32 {
+    // Neither is known so well.
+    let (share, density) = (share.min(0.999), density + 1e-4);
+    if share <= density {
+        return marks;
+    }
+    let (seen, missed) = (log(share / density), log((1.0 - share) / (1.0 - density)));
+    (-missed * f64::from(marks) / (seen - missed)) as u32 + 1
+}
