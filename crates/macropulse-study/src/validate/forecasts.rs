@@ -45,8 +45,13 @@ const PHASES: usize = 4;
 /// Probabilities of detection at which a forecast is tried.
 const WANTED: [f64; 4] = [0.1, 0.5, 0.8, 0.95];
 
-/// A probability may be off by so much, or by so many standard deviations of what was found.
+/// A probability may be off by so much, by so many standard deviations of what was found, or by what it changes with
+/// [`LIGHT_WITHIN`].
 const PD_WITHIN: (f64, f64) = (0.02, 3.0);
+
+/// Where neighbours help each other, a little more light finds many more shots. A forecast may take the light for so
+/// large a share less or more, a tenth of a decibel.
+const LIGHT_WITHIN: f64 = 0.02;
 
 /// A precision may be off by such a share of what was found.
 const PRECISION_WITHIN: f64 = 0.2;
@@ -78,6 +83,8 @@ pub struct Place {
     pub shots: u64,
     /// Probability of detection, forecast and found.
     pub pd: [f64; 2],
+    /// The same, forecast for 2 % less light, and for 2 % more.
+    pub pd_between: [f64; 2],
     /// Standard deviation of the range, forecast and found, m; not found of few points.
     pub precision_m: (Option<f64>, Option<f64>),
     /// Share of the points on a sidelobe of their own macropulse, forecast and found; where there is such a
@@ -93,8 +100,10 @@ impl Place {
     /// Whether the probability is as forecast.
     pub fn pd_holds(&self) -> bool {
         let [forecast, found] = self.pd;
+        let [least, most] = self.pd_between;
         let deviation = (forecast * (1.0 - forecast) / self.shots.max(1) as f64).sqrt();
         (forecast - found).abs() <= PD_WITHIN.0.max(PD_WITHIN.1 * deviation)
+            || (least..=most).contains(&found)
     }
 
     /// Whether all that was found is as forecast.
@@ -148,9 +157,14 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
         let phases = PHASES.min(part.len());
         let step = design.derived().tick_range / phases as f64;
         let ranges: Vec<f64> = (0..phases).map(|phase| range + phase as f64 * step).collect();
-        let forecasts: Vec<Forecast> =
-            ranges.iter().map(|at| forecaster.forecast(reflectance, *at)).collect();
-        let forecast = Expected::of(&forecasts);
+        let with_light = |factor: f64| {
+            let forecaster = forecaster.with_light(factor);
+            let forecasts: Vec<Forecast> =
+                ranges.iter().map(|at| forecaster.forecast(reflectance, *at)).collect();
+            Expected::of(&forecasts)
+        };
+        let forecast = with_light(1.0);
+        let pd_between = [1.0 - LIGHT_WITHIN, 1.0 + LIGHT_WITHIN].map(|light| with_light(light).pd);
         let (mut counts, mut lit, mut errors) = ([0; Outcome::ALL.len()], 0, Vec::new());
         for (phase, at) in ranges.iter().enumerate() {
             let part: Vec<Band> = part.iter().skip(phase).step_by(phases).copied().collect();
@@ -167,8 +181,10 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
         let share = |count: u64| count as f64 / lit.max(1) as f64;
         // A normal error is no sidelobe.
         let beside = forecast.precision.map_or(f64::INFINITY, |sigma| BESIDE * sigma);
-        let beside =
-            if forecast.aside.is_some() { beside.max(design.right_within) } else { f64::INFINITY };
+        let beside = match design.receiver.method {
+            Method::Matched(..) => beside.max(design.right_within),
+            _ => f64::INFINITY,
+        };
         let peak: Vec<f64> = errors.iter().copied().filter(|error| error.abs() <= beside).collect();
         let aside = (errors.len() - peak.len()) as f64 / errors.len().max(1) as f64;
         places.push(Place {
@@ -177,6 +193,7 @@ pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Erro
             range_m: range,
             shots: lit,
             pd: [forecast.pd, share(of(Outcome::Right) + of(Outcome::Near))],
+            pd_between,
             precision_m: (forecast.precision, deviation(&peak)),
             aside: forecast.aside.map(|forecast| [forecast, aside]),
             points: errors.len(),

@@ -18,15 +18,16 @@ fn of_forecasts(findings: &Findings) -> String {
          should be seen; at up to four places within a tick, a part of the shots at each. N is \
          {SHOTS} shots or a few more, as many as a scan has where that is less; seed {}. Seen \
          are returns within 0.35 m; standard deviations three of which are more are not compared. \
-         A forecast holds if the share is right within 0.02 or three standard deviations, the \
-         standard deviation of the range about the peak within 20 %, and the share of points on a sidelobe of their own macropulse within 0.2 % of them or \
-         three standard deviations. Those are farther than six forecast standard deviations \
-         from the truth, and more than is called right. The matched receivers are thorough: \
-         quick ones, as the ready sensors have them, find fewer where most shots are lost, as \
-         they begin with those that stand alone. What forecasts leave out so far: peaks that \
-         have as many marks as a sidelobe where no neighbour tells them apart; and that pulses \
-         which only just cross a threshold are told later or earlier than others, and fall \
-         beside the places where they are looked for.",
+         A forecast holds if the share is right within 0.02, three standard deviations or 2 % of \
+         the light; the standard deviation of the range about the peak within 20 %; and the share \
+         of points on a sidelobe of their own macropulse within 0.2 % of them or three standard \
+         deviations. Those are farther than six forecast standard deviations from the truth, and \
+         more than is called right. The matched receivers are thorough: quick ones, as the ready \
+         sensors have them, look where light is likely, and find fewer where it is faint. What \
+         forecasts leave out so far: pulses which only just cross a threshold are told later or \
+         earlier than others, and fall beside the places where they are looked for. There is no \
+         forecast of sidelobes where the first points, which have no neighbours, may lie on one \
+         and mislead others.",
         findings.seed
     )
 }
@@ -83,7 +84,7 @@ fn cells(figure: &Figure) -> [String; 6] {
 
 const OF_FIGURES: [&str; 6] = ["figure", "source", "published", "ours", "may differ by", "verdict"];
 
-fn place_cells(place: &Place) -> [String; 13] {
+fn place_cells(place: &Place) -> [String; 14] {
     let millimetres = |metres: f64| format!("{:.2}", metres * 1e3);
     let share = |share: f64| format!("{share:.3}");
     let (precision, found) = place.precision_m;
@@ -95,6 +96,7 @@ fn place_cells(place: &Place) -> [String; 13] {
         format!("{:.2} % at {:.1} m", 100.0 * place.reflectance, place.range_m),
         place.shots.to_string(),
         share(place.pd[0]),
+        place.pd_between.map(share).join(" to "),
         share(place.pd[1]),
         said(place.pd_holds()).to_owned(),
         precision.map_or_else(|| "none".to_owned(), millimetres),
@@ -107,11 +109,12 @@ fn place_cells(place: &Place) -> [String; 13] {
     ]
 }
 
-const OF_PLACES: [&str; 13] = [
+const OF_PLACES: [&str; 14] = [
     "sensor",
     "wall",
     "N",
     "seen, forecast",
+    "with 2 % less and more light",
     "found",
     "verdict",
     "\u{3c3} of range, mm, forecast",
