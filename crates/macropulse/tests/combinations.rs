@@ -184,9 +184,7 @@ fn every_combination_is_what_the_table_says() {
             let band: Vec<_> = short_bands(&design, 0).take(1).collect();
             let scan = sim::scan_part(&design, &scene, 1, &band).unwrap();
             let found = scan.score.right_fraction();
-            if found < 0.8 {
-                eprintln!("BRIGHT {which} {found}");
-            }
+            assert!(found > 0.8, "{which}: {found}");
             let day = Environment::named("clear-day").unwrap();
             let forecast = Forecaster::new(&design, &day).unwrap().forecast(1.0, 10.0);
             assert!((0.8..=1.0).contains(&forecast.pd), "{which}: {}", forecast.pd);
@@ -232,9 +230,6 @@ fn the_forecast_holds_for_every_combination() {
                 scan.score.right_fraction()
             };
             let (expected, seen) = (forecast(reflectance), found(reflectance));
-            if true {
-                continue;
-            }
             match row[1] {
                 "uncoded" => {
                     assert!((seen - expected).abs() < 0.035, "{which}: {seen}, not {expected}");
