@@ -113,8 +113,7 @@ impl Band<'_> {
         let sent = self.sent;
         let (light, gate) = (sent.light(shot, lag), sent.gate());
         let (width, weight) = (f64::from(sent.width), f64::from(sent.weight(shot)));
-        let start = light.start - sent.farther();
-        let own = self.field.left_in_all(start, sent.lit_bits(shot), &sent.bits(shot).cancelled);
+        let own = self.left_of(shot, lag);
         let (all, length) = self.field.ticks_about(&light);
         let left: u32 = self.field.residual_cells(&light).0.iter().sum();
         let zone = weight * (width + 2.0 * sent.farther() as f64);
@@ -127,6 +126,19 @@ impl Band<'_> {
             places,
             density: density.clamp(width / in_gate, 0.5),
         }
+    }
+
+    /// Ticks of `shot` at `lag` that are not cancelled.
+    ///
+    /// Where each photon makes an event of its own a mark makes several ticks, and several lags have as many marks. `lag` is
+    /// the earliest of them: light may begin later, as much as a mark is looked for.
+    fn left_of(&self, shot: usize, lag: i64) -> u32 {
+        let sent = self.sent;
+        let start = sent.fired[shot] + lag - sent.farther();
+        let (lit_bits, pattern) = (sent.lit_bits(shot), &sent.bits(shot).cancelled);
+        let later = if sent.correlation.photons_apart { i64::from(sent.width) } else { 1 };
+        let left = |later| self.field.left_in_all(start + later, lit_bits, pattern);
+        (0..later).map(left).max().unwrap_or(0)
     }
 
     /// The lags at which neighbours lead to expect `shot`: on the lines through them, midway between the nearest two, at
