@@ -84,7 +84,7 @@ fn has_surfaces(scene: &str) -> bool {
     scene != "random"
 }
 
-/// Shots of which `one` and `other` give not as many ranges, or one that differs by a `tick` or more.
+/// How many shots are found otherwise: the number of their ranges differs, or a range by a `tick` or more.
 fn differ(tick: f64, one: &Returns, other: &Returns) -> usize {
     let of_shots = |returns: &Returns| {
         let mut ranges: BTreeMap<u32, Vec<f64>> = BTreeMap::new();

@@ -154,18 +154,13 @@ pub fn hypergeometric_tail((marked, others): (u32, u32), drawn: u32, least: u32)
 /// P(X = 0), P(X = 1) … P(X = n) of X ~ Bin(n, p), n being `trials`; `p` is held within
 /// \[1e-12, 1 − 1e-12\].
 pub fn binomial(trials: usize, p: f64) -> Vec<f64> {
-    binomial_up_to(trials, p, trials)
-}
-
-/// The same up to P(X = `most`).
-pub fn binomial_up_to(trials: usize, p: f64, most: usize) -> Vec<f64> {
     let p = p.clamp(1e-12, 1.0 - 1e-12);
     let all = lgamma(trials as f64 + 1.0);
     let term = |k: usize| {
         let (k, rest) = (k as f64, (trials - k) as f64);
         exp(all - lgamma(k + 1.0) - lgamma(rest + 1.0) + k * log(p) + rest * log1p(-p))
     };
-    (0..=trials.min(most)).map(term).collect()
+    (0..=trials).map(term).collect()
 }
 
 /// P(X = k) of a Poisson variable with the given `mean`, e^(−n)·n^k/k!.

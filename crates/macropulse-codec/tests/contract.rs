@@ -401,9 +401,7 @@ prop_compose! {
     fn nearly_sane()(
         (any, odd, odd_threshold) in (any_receiver(), any_correlation(), any::<u16>()),
         kind in 0..KINDS.len(),
-        effort in prop_oneof![
-            Just(Effort::Quick), Just(Effort::Thorough)
-        ],
+        effort in prop_oneof![Just(Effort::Quick), Just(Effort::Thorough)],
         wrong in 0..12_usize,
         ticks_per_chip in 1..4_u32,
         jitter_ticks in prop_oneof![Just(0.0), 0.1..20.0_f64],

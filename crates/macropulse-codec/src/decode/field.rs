@@ -221,7 +221,7 @@ impl<'a> Field<'a> {
         self.residual.has(tick)
     }
 
-    /// How many ticks of `pattern` are not cancelled where it begins so many ticks `after` `start`, over all of these.
+    /// How many ticks of `pattern` are not cancelled. It begins several times, so many ticks `after` `start`; all are counted.
     pub fn left_in_all(&self, start: i64, after: &[u32], pattern: &Pattern) -> u32 {
         self.residual.lit_in_all(start, after, pattern)
     }

@@ -11,20 +11,21 @@
 
 use std::collections::BTreeMap;
 
-use macropulse_codec::decode::Correlation;
+use macropulse_codec::ShotLog;
 use macropulse_codec::decode::belief::{self, Marks, Prior, Surroundings};
+use macropulse_codec::decode::{self, Correlation};
 use macropulse_codec::statistics::{binomial, poisson_from};
 
 use super::best_lag::BestLag;
 use super::matched::{Chances, Lone, Place};
-use crate::design::Design;
+use crate::design::{Design, SHOTS_OF_BAND};
 use crate::units::s_from_fs;
 
 /// Share of all shots that are gone through at once, at most.
 const PART: f64 = 0.02;
 
-/// Share of all shots that are found at the edges of a scan, where there is no light of other shots, if any are. From there
-/// neighbours lead on, where light of other shots lets no shot be found without them.
+/// Share of all shots that stand at the edges of a scan, where there is no light of other shots. If shots are found there,
+/// neighbours lead on to those that light of others would hide.
 const AT_EDGES: f64 = 1e-2;
 
 /// Shots of which fewer are as full do not count.
@@ -114,6 +115,22 @@ pub(super) struct Shots<'a> {
     pub false_density: f64,
 }
 
+/// Shots that may lead the matched receiver to expect light of one, on average.
+pub(super) fn neighbours(design: &Design) -> f64 {
+    let pattern = design.scan.model();
+    let shots = design.shots_per_scan().min(SHOTS_OF_BAND);
+    let unknown = vec![0; shots as usize];
+    let mut log = ShotLog { label: unknown.clone(), word: unknown, ..ShotLog::default() };
+    log.fired_at_fs = vec![0; shots as usize];
+    for order in 0..shots {
+        let (row, column) = pattern.pixel(order);
+        log.row.push(row);
+        log.column.push(column);
+        log.channel.push(pattern.channel_of(order, row));
+    }
+    decode::neighbours(&log)
+}
+
 /// What comes of `shots`.
 pub(super) fn chances(design: &Design, correlation: &Correlation, shots: &Shots) -> Chances {
     let weights = shots.weights;
@@ -135,8 +152,8 @@ pub(super) fn chances(design: &Design, correlation: &Correlation, shots: &Shots)
     let (mut lone, mut lone_found) = (0.0, 0.0);
     let nothing = Hidden { mean: 0.0, mean_square: 0.0 };
     for level in levels {
-        let [at_edge, _] = gate.believed(&level, &nothing);
-        let at_edges = if at_edge > 0.0 { AT_EDGES } else { 0.0 };
+        let is_first = pd < AT_EDGES && gate.believed(&level, &nothing)[0] > 0.0;
+        let at_edges = if is_first { AT_EDGES } else { 0.0 };
         // As full ones are judged one after the other, too.
         let parts = (level.share / PART).ceil();
         for _ in 0..parts as u32 {

@@ -61,13 +61,12 @@ impl BestLag {
         let lags = lags.step_by(step as usize);
         let mut each: Vec<(f64, i64)> = lags.map(|lag| (within(lag, lag + width), lag)).collect();
         each.sort_by(|one, other| other.0.total_cmp(&one.0));
-        let both = |&(one, first): &(f64, i64), &(other, second): &(f64, i64)| match (first
-            - second)
-            .abs()
-            < width
-        {
-            true => one + other - within(first.min(second), first.max(second) + width),
-            false => one * other,
+        let both = |&(one, first): &(f64, i64), &(other, second): &(f64, i64)| {
+            let is_shared = (first - second).abs() < width;
+            match is_shared {
+                true => one + other - within(first.min(second), first.max(second) + width),
+                false => one * other,
+            }
         };
         let both = each.iter().map(|one| each.iter().map(|other| both(one, other)).collect());
         let both = both.collect();

@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use macropulse_codec::RecordKind;
 use macropulse_codec::decode::{self, Method};
-use macropulse_codec::{RecordKind, ShotLog};
 
 use super::best_lag::{BestLag, Sight};
 use super::converters::bank_loss;
@@ -16,7 +16,7 @@ use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, belief, histogram, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
-use crate::design::{Design, Detector, SHOTS_OF_BAND};
+use crate::design::{Design, Detector};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs, tof_from_range};
 
@@ -131,7 +131,7 @@ impl<'a> Forecaster<'a> {
         let (light, background) = (1.0, 1.0);
         let is_matched = matches!(design.receiver.method, Method::Matched(..));
         let sidelobes = is_matched.then(|| Sidelobes::of(design));
-        let neighbours = if is_matched { neighbours(design) } else { 0.0 };
+        let neighbours = if is_matched { belief::neighbours(design) } else { 0.0 };
         let sampling = design.receiver.method.sampling();
         let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
         let counting = match &design.receiver.method {
@@ -470,22 +470,6 @@ impl<'a> Forecaster<'a> {
 
 /// Ranges that are tried for the farthest one at which a target is seen that is not seen at the nearest.
 const PLACES: i32 = 64;
-
-/// Shots that may lead the matched receiver to expect light of one, on average.
-fn neighbours(design: &Design) -> f64 {
-    let pattern = design.scan.model();
-    let shots = design.shots_per_scan().min(SHOTS_OF_BAND);
-    let unknown = vec![0; shots as usize];
-    let mut log = ShotLog { label: unknown.clone(), word: unknown, ..ShotLog::default() };
-    log.fired_at_fs = vec![0; shots as usize];
-    for order in 0..shots {
-        let (row, column) = pattern.pixel(order);
-        log.row.push(row);
-        log.column.push(column);
-        log.channel.push(pattern.channel_of(order, row));
-    }
-    decode::neighbours(&log)
-}
 
 /// Brightnesses of an echo of so many speckle `cells`, M, in its mean, and the share of each, of the gamma
 /// distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).

@@ -21,7 +21,7 @@ enum Pass {
     Second,
 }
 
-/// Fewest of so many `marks` that are left over: a quarter may lie under ticks that are cancelled already.
+/// The fewest of a surface's `marks` that must be left over. A quarter may lie under ticks that are cancelled already.
 fn left_over(marks: u32) -> u32 {
     marks - marks / 4
 }

@@ -12,7 +12,7 @@
 //!    fainter than their neighbours; and, where light is left over, of further surfaces.
 //! 4. [`verify`]: each return is judged again, as the light of all others is known.
 //!
-//! What these steps find is believed by posterior odds, and so is its label: [`odds`].
+//! Posterior odds decide whether what these steps find is believed, and whether its label fits: [`odds`].
 //!
 //! A thorough receiver takes what they find for hypotheses, and counts every lag: [`reference`](self::reference).
 //!
@@ -121,7 +121,7 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     words: Words,
-    /// Of the light that overlaps while it is cancelled, then of [`Band::residual`] and [`Band::claimed`].
+    /// While light is cancelled they hold light that overlaps; then they are [`Band::residual`] and [`Band::claimed`].
     timelines: [Timeline; 2],
     field: field::Memory,
     search: Search,
@@ -195,8 +195,8 @@ struct Band<'a> {
     in_picture: Vec<u32>,
     search: Search,
     meter: Meter<'a>,
-    /// Memory for the residual of a macropulse, for the marks found in each of its bits and in those about it,
-    /// and for the places that others claim and its own.
+    /// Memory: where marks count as found by ticks that are left, the places that fuller returns claim, and the marks
+    /// found in each bit of a macropulse and in those about it.
     residual: Timeline,
     claimed: Timeline,
     found_in_bits: Vec<u32>,

@@ -29,10 +29,10 @@ impl Band<'_> {
         Some(Detection { stands_out, ..detection })
     }
 
-    /// Whether `detection` is believed in the light that fuller returns leave it.
+    /// Whether `detection` is believed by the marks that no fuller return claims.
     ///
-    /// Light of another word meets the same few marks in every bit, and a part of it may make up a whole return of few
-    /// bits. So its marks must be spread over the word, unless as many as usual are there and stand out.
+    /// Its marks must be spread over the word, unless as many as usual are there and stand out. Light of another word is
+    /// not: it meets the same few marks in every bit, and a part of it may make up a whole return of few bits.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         let is_bright = detection.stands_out && self.is_usual(shot, detection);
         if !is_bright && !self.is_spread(shot, detection) {
@@ -112,12 +112,12 @@ impl Band<'_> {
     fn unexplained_about(&mut self, shot: usize, lag: i64) -> Surroundings {
         let sent = self.sent;
         let (light, gate) = (sent.light(shot, lag), sent.gate());
-        let (width, weight) = (f64::from(sent.width), f64::from(sent.weight(shot)));
+        let width = f64::from(sent.width);
         let own = self.left_of(shot, lag);
         let (all, length) = self.field.ticks_about(&light);
         let left: u32 = self.field.residual_cells(&light).0.iter().sum();
-        let zone = weight * (width + 2.0 * sent.farther() as f64);
-        let places = ((length as f64 - zone) / width - f64::from(all - left)).max(1.0);
+        let about_marks = f64::from(sent.weight(shot) * sent.cancelled());
+        let places = ((length as f64 - about_marks) / width - f64::from(all - left)).max(1.0);
         let in_gate = (gate.end - gate.start + sent.length()) as f64;
         let density =
             self.leftover().density(shot, &gate) + width * (1.0 - f64::from(own)) / in_gate;
@@ -161,8 +161,10 @@ impl Band<'_> {
         Prior::new(self.sent.reach(), &self.expected_lags(shot))
     }
 
-    /// Whether `detection` lies outside the gate, and its light is that of a later shot from within. It is if a later shot
-    /// has the same macropulse, as near light is likelier than far light, or if the label of `shot` is contradicted.
+    /// Whether `detection` lies outside the gate, and its light is that of a later shot from within.
+    ///
+    /// It is if a later shot has the same macropulse, as near light is likelier than far light; or if the label of `shot` is
+    /// contradicted.
     pub(super) fn is_of_a_later_shot(&mut self, shot: usize, detection: Detection) -> bool {
         let (sent, gate) = (self.sent, self.sent.gate());
         if gate.contains(&detection.lag) {
@@ -178,9 +180,11 @@ impl Band<'_> {
         is_alike || self.is_mislabelled(shot, detection)
     }
 
-    /// Whether another label explains the light of `shot` at `detection` better than its own. Marks of lit bits are counted
-    /// in all light, as other returns may explain some of them. Marks of dark bits are counted in the light that no
-    /// return explains; but a return in the same word that is less full may be what makes them dark, and does not count.
+    /// Whether another label explains the light of `shot` at `detection` better than its own.
+    ///
+    /// Marks of lit bits are counted in all light, as other returns may explain some of them. Marks of dark bits are
+    /// counted in the light that no return explains. But a return in the same word that is less full explains none: it may
+    /// be made of that very light.
     pub(super) fn is_mislabelled(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         if sent.bits_of_payload() == 1 {

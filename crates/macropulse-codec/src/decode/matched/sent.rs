@@ -226,7 +226,7 @@ impl<'a> Sent<'a> {
             let marks = self.word(shot).ticks();
             let pattern =
                 |width: u32| Pattern::new(marks.iter().map(|&mark| mark as usize), width as usize);
-            let cancelled = self.width + 2 * self.farther() as u32;
+            let cancelled = self.cancelled();
             let chips = self.width.div_ceil(scale.max(1));
             let (first, last) = (marks.first().copied(), marks.last().copied());
             let of_end = |is_at_end: &dyn Fn(u32) -> bool| {
@@ -258,6 +258,11 @@ impl<'a> Sent<'a> {
     /// marks are looked for.
     pub fn farther(&self) -> i64 {
         i64::from(self.width / 2)
+    }
+
+    /// Ticks that are cancelled with a mark.
+    pub fn cancelled(&self) -> u32 {
+        self.width + 2 * self.farther() as u32
     }
 
     /// Marks that the macropulse of `shot` has more, without a gap, than are met by itself, moved by less than a
@@ -427,7 +432,7 @@ impl<'a> Sent<'a> {
     /// of its own, they are those that are cancelled with it.
     pub fn zone(&self) -> u32 {
         match self.correlation.photons_apart {
-            true => self.width + 2 * self.farther() as u32,
+            true => self.cancelled(),
             false => self.width,
         }
     }

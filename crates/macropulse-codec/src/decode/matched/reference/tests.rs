@@ -336,8 +336,8 @@ proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(80) })]
 
     /// Bounds and kernels change nothing: what is found is what plain code finds with every lag and every mark. All
-    /// families, with and without a payload, without jitter and with 1.5 ticks, with photons apart and not, with one surface and two. Negative
-    /// control: plain code that asks for 10 nats more finds less of all that was found.
+    /// families, with and without a payload, without jitter and with 1.5 ticks, with photons apart and not, with one
+    /// surface and two. Negative control: plain code that asks for 10 nats more finds less of all that was found.
     fn as_plain_code(
         book in 0..8_usize,
         is_bare in 0..3_u32,
