@@ -294,13 +294,6 @@ impl<'a> Field<'a> {
         (&self.left[cells.clone()], at(cells.start))
     }
 
-    /// The most residual ticks in so many cells `together`, of those about `span`.
-    pub fn most_left(&mut self, span: &Range<i64>, together: usize) -> u32 {
-        let (left, _) = self.residual_cells(span);
-        let from = |first: usize| left[first..].iter().take(together).sum();
-        (0..left.len()).map(from).max().unwrap_or(0)
-    }
-
     /// All that is at hand.
     pub fn extent(&self) -> Range<i64> {
         self.seen.origin()..self.end()

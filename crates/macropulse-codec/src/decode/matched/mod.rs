@@ -79,9 +79,10 @@ pub(super) fn decode(
 ) -> Result<Returns, Error> {
     let mut memory = MEMORY.take();
     let words = std::mem::take(&mut memory.words);
+    let mut timelines = std::mem::take(&mut memory.timelines);
     let sent = Sent::new(receiver, correlation, sent, (ticks.epoch, words));
     let mut returns = Returns::with_capacity(sent.log.owned.len());
-    let cancelled = cancel::cancel(&sent, &ticks.tick, &mut memory.timelines)?;
+    let cancelled = cancel::cancel(&sent, &ticks.tick, &mut timelines)?;
     let memory = match cancelled {
         Some(cancelled) if cancelled.is_clear() && effort == Effort::Quick => {
             sent.settle_clear(&cancelled.lags, &mut memory.photons, &mut returns);
@@ -96,7 +97,7 @@ pub(super) fn decode(
             band.into_memory()
         }
     };
-    MEMORY.set(Memory { words: sent.words, ..memory });
+    MEMORY.set(Memory { words: sent.words, timelines, ..memory });
     Ok(returns)
 }
 
@@ -121,8 +122,9 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     words: Words,
-    /// While light is cancelled they hold light that overlaps; then they are [`Band::residual`] and [`Band::claimed`].
+    /// Of [`cancel`].
     timelines: [Timeline; 2],
+    claimed: Timeline,
     field: field::Memory,
     search: Search,
     chance: Option<Chance>,
@@ -195,9 +197,7 @@ struct Band<'a> {
     in_picture: Vec<u32>,
     search: Search,
     meter: Meter<'a>,
-    /// Memory: where marks count as found by ticks that are left, the places that fuller returns claim, and the marks
-    /// found in each bit of a macropulse and in those about it.
-    residual: Timeline,
+    /// Memory: the places that returns claim, and the marks found in each bit of a macropulse and in those about it.
     claimed: Timeline,
     found_in_bits: Vec<u32>,
     words: WordsAbout,
@@ -246,7 +246,6 @@ impl<'a> Band<'a> {
             _ => chance.fewest_ticks(sent, field.cell()),
         };
         memory.search.forget();
-        let [residual, claimed] = memory.timelines;
         Self {
             field,
             open,
@@ -269,8 +268,7 @@ impl<'a> Band<'a> {
             in_picture: Vec::new(),
             search: memory.search,
             meter: Meter::new(sent, memory.photons),
-            residual,
-            claimed,
+            claimed: memory.claimed,
             found_in_bits: Vec::new(),
             words: WordsAbout::default(),
             threshold: belief::threshold(sent.correlation.false_alarm),
@@ -320,7 +318,8 @@ impl<'a> Band<'a> {
     fn into_memory(self) -> Memory {
         Memory {
             words: Words::default(),
-            timelines: [self.residual, self.claimed],
+            timelines: Default::default(),
+            claimed: self.claimed,
             field: self.field.into_memory(),
             search: self.search,
             photons: self.meter.photons,

@@ -69,7 +69,9 @@ impl Band<'_> {
     /// The marks of `shot` at `detection` that no fuller return claims.
     fn unclaimed(&mut self, shot: usize, detection: Detection) -> Marks {
         let all = self.marks_at(shot, detection);
-        if !self.claim_fuller(shot, detection) {
+        let own = self.hypothesis(shot, detection);
+        if !self.claim(shot, detection, |band, other, theirs| band.hypothesis(other, theirs) < own)
+        {
             return all;
         }
         let (start, sent) = (self.sent.fired[shot] + detection.lag, self.sent);
@@ -81,20 +83,27 @@ impl Band<'_> {
         Marks { lit: all.lit.saturating_sub(explained), of: all.of - taken }
     }
 
-    /// Has at hand the places that returns fuller than `detection` claim about it, if there are any.
-    fn claim_fuller(&mut self, shot: usize, detection: Detection) -> bool {
+    /// Has at hand the places that returns about `detection` claim, if there are any: all but its own and those that a
+    /// `filter` leaves out.
+    fn claim(
+        &mut self,
+        shot: usize,
+        detection: Detection,
+        filter: impl Fn(&Self, usize, Detection) -> bool,
+    ) -> bool {
         let (sent, light) = (self.sent, self.sent.light(shot, detection.lag));
-        let own = self.hypothesis(shot, detection);
-        let is_fuller = |found: &(usize, Detection)| self.hypothesis(found.0, found.1) < own;
-        let fuller: Vec<_> = self.overlapping(&light).filter(is_fuller).collect();
-        if fuller.is_empty() {
+        let is_own =
+            |(other, found): &(usize, Detection)| (*other, found.lag) == (shot, detection.lag);
+        let others = self.overlapping(&light).filter(|found| !is_own(found));
+        let claims: Vec<_> = others.filter(|found| filter(self, found.0, found.1)).collect();
+        if claims.is_empty() {
             return false;
         }
         let stretch = whole_words(&light);
         // Words of others may begin before it.
         let before = (sent.bit_length() + 4 * i64::from(sent.width)).div_euclid(64) * 64 + 64;
         self.claimed.clear_all(stretch.start - before, stretch.end - stretch.start + before);
-        for (other, theirs) in fuller {
+        for (other, theirs) in claims {
             let before = sent.farther() + i64::from(sent.width - 1);
             let start = sent.fired[other] + theirs.lag - before;
             self.claimed.light_up(start, sent.lit_bits(other), &sent.bits(other).claimed);
@@ -205,58 +214,36 @@ impl Band<'_> {
         // A label that leaves out the emptier bits gains about half of χ², and is taken only if it gains ln 2 a bit.
         let most = 2.0 * LN_2 * (sent.bits_of_payload() - 1) as f64 * mean * (1.0 - share);
         let is_even = found.iter().all(|found| *found >= fewest) && squares <= most;
-        self.find_in_dark_bits(shot, detection, fewest, &mut found);
+        self.field.lit().lit_in_each(light.start, sent.dark_bits(shot), pattern, &mut found);
+        let is_clear = is_even && found.iter().all(|found| *found < fewest);
+        if !is_clear {
+            self.leave_out_explained(shot, detection, &mut found);
+        }
         let dark: Vec<Marks> = found.iter().map(marks).collect();
         self.found_in_bits = found;
-        if is_even && dark.iter().all(|bit| bit.lit < fewest) {
+        if is_clear || is_even && dark.iter().all(|bit| bit.lit < fewest) {
             return false;
         }
         let expected = self.prior(shot).expected(detection.lag);
         belief::contradiction(&lit, &dark, &around, expected) > 0.0
     }
 
-    /// Puts the marks of each dark bit of `shot` at `detection` into `found`: none where too few ticks are left for any
-    /// bit to have the `fewest` of a lit one.
-    fn find_in_dark_bits(
-        &mut self,
-        shot: usize,
-        detection: Detection,
-        fewest: u32,
-        found: &mut Vec<u32>,
-    ) {
-        let (sent, light) = (self.sent, self.sent.light(shot, detection.lag));
-        let (dark_bits, pattern) = (sent.dark_bits(shot), &sent.bits(shot).pattern);
-        if self.has_a_rival(shot, detection) {
-            let mut claimed = vec![0; dark_bits.len()];
-            if self.claim_fuller(shot, detection) {
-                self.claimed.keep_lit_in(self.field.lit(), &whole_words(&light));
-                self.claimed.lit_in_each(light.start, dark_bits, pattern, &mut claimed);
-            }
-            self.field.lit().lit_in_each(light.start, dark_bits, pattern, found);
-            found.iter_mut().zip(claimed).for_each(|(found, claimed)| *found -= claimed);
-            return;
-        }
-        found.clear();
-        found.resize(dark_bits.len(), 0);
-        // To widen what is left takes longer than to see that too few ticks are left.
-        let together = self.field.stretch(sent.bit_length() + i64::from(sent.width));
-        if self.field.most_left(&light, together) >= sent.ticks_in_bit(shot, fewest) {
-            let residual = self.field.lit_by_residual(&light, &mut self.residual);
-            residual.lit_in_each(light.start, dark_bits, pattern, found);
-        }
-    }
-
-    /// Whether a return of another shot in the same word lies whole bits from `detection`, and is less full.
-    fn has_a_rival(&self, shot: usize, detection: Detection) -> bool {
+    /// Takes from the marks `found` in each dark bit of `shot` at `detection` those that returns explain.
+    fn leave_out_explained(&mut self, shot: usize, detection: Detection, found: &mut [u32]) {
         let (sent, own) = (self.sent, self.hypothesis(shot, detection));
         let (start, word) = (sent.fired[shot] + detection.lag, &sent.log.word);
-        self.overlapping(&sent.light(shot, detection.lag)).any(|(other, theirs)| {
+        let explains = |band: &Self, other: usize, theirs: Detection| {
             let apart = sent.fired[other] + theirs.lag - start;
-            other != shot
-                && word[other] == word[shot]
-                && sent.is_whole_bits(apart)
-                && own < self.hypothesis(other, theirs)
-        })
+            let is_same = word[other] == word[shot] && sent.is_whole_bits(apart);
+            !is_same || band.hypothesis(other, theirs) < own
+        };
+        if self.claim(shot, detection, explains) {
+            let (light, mut claimed) = (sent.light(shot, detection.lag), Vec::new());
+            let (dark_bits, pattern) = (sent.dark_bits(shot), &sent.bits(shot).pattern);
+            self.claimed.keep_lit_in(self.field.lit(), &whole_words(&light));
+            self.claimed.lit_in_each(light.start, dark_bits, pattern, &mut claimed);
+            found.iter_mut().zip(claimed).for_each(|(found, claimed)| *found -= claimed);
+        }
     }
 }
 
