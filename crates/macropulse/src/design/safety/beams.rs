@@ -37,6 +37,8 @@ const EFFORT: usize = 120_000;
 /// Most beams beside one that an aperture may hold together with it. Where there are more, light hardly depends on
 /// the place.
 const FEW: usize = 64;
+/// Beams of which the places are tried that they share with others, at most: they are spread evenly over the scan.
+const MOST_SHARED: usize = 4096;
 /// Elevations that are tried at most.
 const MOST_PLACES: f64 = 4096.0;
 /// Phases of the columns that are tried at most.
@@ -100,25 +102,26 @@ impl Field for LineBeams<'_> {
             true => self.scan.columns / 2..self.scan.columns / 2 + 1,
             false => 0..self.scan.columns,
         };
+        let (width, rows) = (columns.len(), self.lines.rows.len());
         let mut aims = Vec::new();
-        for (number, row) in self.lines.rows.iter().enumerate() {
-            for column in columns.clone() {
-                let azimuth = row.first - step * f64::from(column);
-                let here = Aim { azimuth, elevation: row.elevation };
-                let mut beside = 0;
-                // Each pair once.
-                for other in number..self.rows_within(row.elevation, reach).end {
-                    let other = &self.lines.rows[other];
-                    for columns in self.columns_within(other, here, reach) {
-                        beside += columns.len();
-                        if beside > FEW {
-                            return Vec::new();
-                        }
-                        for column in columns {
-                            let azimuth = other.first - step * f64::from(column);
-                            let there = Aim { azimuth, elevation: other.elevation };
-                            aims.extend(self.shared_by(here, there));
-                        }
+        for beam in (0..rows * width).step_by((rows * width).div_ceil(MOST_SHARED).max(1)) {
+            let (number, column) = (beam / width, columns.start + (beam % width) as u32);
+            let row = &self.lines.rows[number];
+            let azimuth = row.first - step * f64::from(column);
+            let here = Aim { azimuth, elevation: row.elevation };
+            let mut beside = 0;
+            // Each pair once.
+            for other in number..self.rows_within(row.elevation, reach).end {
+                let other = &self.lines.rows[other];
+                for columns in self.columns_within(other, here, reach) {
+                    beside += columns.len();
+                    if beside > FEW {
+                        return Vec::new();
+                    }
+                    for column in columns {
+                        let azimuth = other.first - step * f64::from(column);
+                        let there = Aim { azimuth, elevation: other.elevation };
+                        aims.extend(self.shared_by(here, there));
                     }
                 }
             }

@@ -230,7 +230,8 @@ impl<'a> Train<'a> {
 
     /// Shares and energies of a run.
     fn sum(&self, [first, end]: [usize; 2]) -> [f64; 2] {
-        [0, 1].map(|part| self.sums[end][part] - self.sums[first][part])
+        let ([before, energy_before], [all, energy]) = (self.sums[first], self.sums[end]);
+        [all - before, energy - energy_before]
     }
 
     /// Seconds from the first light of a run to the last.

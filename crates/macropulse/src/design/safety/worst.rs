@@ -5,8 +5,7 @@
 //! looks for its worst time.
 //!
 //! 1. Places are tried an eighth of the aperture apart, coarse steps first.
-//! 2. Where few beams cross at once, places that any two of them share are tried as well: these may be too small for
-//!    a grid.
+//! 2. Where few beams cross at once, places that two of them share are tried as well: these may be too small for a grid.
 //! 3. The best places of each rule are refined in steps that are halved.
 //! 4. From each of these, places nearby are tried that one more beam grazes: it brings next to no light, but counts as
 //!    an exposure, which C5 takes account of.
@@ -54,8 +53,8 @@ pub(super) trait Field {
     /// seconds count as one.
     fn starts(&self, gap: f64, counted: f64) -> Vec<Aim>;
 
-    /// Places that two beams cross, for any two that can; none where so many beams cross an aperture that light
-    /// hardly depends on the place.
+    /// Places that two beams cross, for beams spread evenly over the scan and any others; none where so many beams cross
+    /// an aperture that light hardly depends on the place.
     fn shared(&self) -> Vec<Aim>;
 
     /// Places `gap` from `aim` at most that one more beam just crosses; none where many beams cross.
