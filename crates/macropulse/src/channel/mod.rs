@@ -160,7 +160,7 @@ fn add_columns(trains: &mut PulseTrains, log: &ShotLog, shots: &[u32], delay_fs:
 }
 
 /// Adds the echoes of the sub-macropulses of all shots, which have met `each`, the one sent first
-/// first; ordered by shot.
+/// first; ordered by shot. One without marks has no echo.
 fn echoes_of_sub_macropulses(
     trains: &mut PulseTrains,
     (design, (link, finishes)): (&Design, (&Link, &[Finish])),
@@ -190,8 +190,11 @@ fn echoes_of_sub_macropulses(
                 let chip = u32::from(sub) * codebook.chips() / u32::from(SUB_MACROPULSES);
                 marks.partition_point(|mark| u32::from(*mark) < chip) as u16
             };
-            let delay_fs = tof_fs_from_ranges(&hits.range[i..=i])[0];
             let marks = [begins(sub), begins(sub + 1)];
+            if marks[0] == marks[1] {
+                continue;
+            }
+            let delay_fs = tof_fs_from_ranges(&hits.range[i..=i])[0];
             let train = PulseTrain { photons, marks, way: way as u16, ..WHOLE };
             trains.push(echo(log, shot, delay_fs, train));
         }

@@ -41,6 +41,9 @@ const TOGETHER: f64 = 1.0 / 8.0;
 const SLICE: f64 = 0.5;
 const SLICES: i32 = 6;
 
+/// Samples that are looked at together for one at the limit.
+const CHUNK: usize = 256;
+
 /// What a photon becomes is followed to where it is less than this share of a step of the converter.
 const NEGLIGIBLE: f64 = 1.0 / 16.0;
 
@@ -52,8 +55,8 @@ pub(super) struct Sampler {
     /// Where light moves it.
     baseline: Option<Baseline>,
     tick_fs: i64,
-    /// rms length of what a photon becomes, in ticks.
-    rms: f64,
+    /// What a photon becomes.
+    photon: Gaussian,
     /// Its height for a single one.
     height: f64,
     /// Share of the light in each slice of a pulse.
@@ -80,7 +83,7 @@ impl Sampler {
             colour,
             baseline: Baseline::of(sampled),
             tick_fs,
-            rms: in_ticks(front_end.photon_rms()),
+            photon: Gaussian::new(in_ticks(front_end.photon_rms())),
             height: front_end.photon_height(),
             shares: (-SLICES..=SLICES).map(|slice| share(slice) / total).collect(),
             before: before.ceil() as i64,
@@ -111,11 +114,14 @@ impl Sampler {
             self.colour.add((chance, part), signal.first, &mut signal.level);
             samples.channel.push(channel.number);
             self.limit(&mut signal.level, &mut signal.codes);
-            if let Some(baseline) = &self.baseline {
-                baseline.take_from(&mut signal.level[self.before as usize..], known);
-            }
             let skipped = (span.start - signal.first) as usize;
-            self.convert(&signal.level[skipped..], &mut samples.code);
+            match &self.baseline {
+                Some(baseline) => {
+                    baseline.take_from(&mut signal.level[self.before as usize..], known);
+                    self.convert(&signal.level[skipped..], &mut samples.code);
+                }
+                None => samples.code.extend_from_slice(&signal.codes[skipped..]),
+            }
         }
         samples
     }
@@ -144,13 +150,14 @@ impl Sampler {
     fn add_stray(&self, channel: &Channel, signal: &mut Signal) {
         let codebook = &channel.design.emission.coding().codebook;
         let front_end = &self.sampled.front_end;
-        let (rms, height) = (front_end.mark_rms() / s_from_fs(self.tick_fs), self.sampled.stray);
+        let pulse = Gaussian::new(front_end.mark_rms() / s_from_fs(self.tick_fs));
         for shot in channel.shots.iter().map(|shot| *shot as usize) {
             let (label, word) = (channel.log.label[shot], channel.log.word[shot]);
             for mark in codebook.marks(label, word) {
                 let at_fs = channel.log.fired_at_fs[shot]
                     + i64::from(*mark) * channel.design.emission.coding().chip_fs;
-                signal.add(self.in_ticks(at_fs), (height, rms), NEGLIGIBLE * self.sampled.step);
+                let negligible = NEGLIGIBLE * self.sampled.step;
+                signal.add(self.in_ticks(at_fs), (self.sampled.stray, &pulse), negligible);
             }
         }
     }
@@ -186,7 +193,7 @@ impl Sampler {
 
     fn add_charge(&self, signal: &mut Signal, at_fs: i64, charge: f64) {
         if charge > 0.0 {
-            let pulse = (charge * self.height, self.rms);
+            let pulse = (charge * self.height, &self.photon);
             signal.add(self.in_ticks(at_fs), pulse, NEGLIGIBLE * self.sampled.step);
         }
     }
@@ -198,19 +205,29 @@ impl Sampler {
     }
 
     /// Holds the signal at the limit where it is more than the converter has codes for, and behind that until
-    /// the amplifier has recovered. The `codes` serve as memory.
+    /// the amplifier has recovered. Its `codes` are put in place of what was there.
     fn limit(&self, level: &mut [f32], codes: &mut Vec<i16>) {
         let (recovery, limit) = (self.sampled.held_ticks(), self.sampled.limit() as f32);
         let highest = self.sampled.codes.1;
         codes.clear();
+        self.convert(&[limit], codes);
+        let code_of_limit = codes[0];
+        codes.clear();
         self.convert(level, codes);
         let mut held = 0;
-        for (level, code) in level.iter_mut().zip(codes) {
-            let is_held = held > 0;
-            let is_clipped = *code == highest;
-            held = if is_clipped { recovery } else { held.saturating_sub(1) };
-            if is_clipped || is_held {
-                *level = limit;
+        for (level, codes) in level.chunks_mut(CHUNK).zip(codes.chunks_mut(CHUNK)) {
+            // Without an exit, so that it is quick.
+            let is_clear = !codes.iter().fold(false, |any, code| any | (*code == highest));
+            if is_clear && held == 0 {
+                continue;
+            }
+            for (level, code) in level.iter_mut().zip(codes) {
+                let is_held = held > 0;
+                let is_clipped = *code == highest;
+                held = if is_clipped { recovery } else { held.saturating_sub(1) };
+                if is_clipped || is_held {
+                    (*level, *code) = (limit, code_of_limit);
+                }
             }
         }
     }
@@ -224,13 +241,28 @@ impl Sampler {
     }
 }
 
+/// The shape of a pulse.
+#[derive(Debug)]
+struct Gaussian {
+    /// rms length, ticks.
+    rms: f64,
+    /// From tick to tick it grows by a ratio that shrinks by this one.
+    shrinks: f64,
+}
+
+impl Gaussian {
+    fn new(rms: f64) -> Self {
+        Self { rms, shrinks: libm::exp(-(rms * rms).recip()) }
+    }
+}
+
 /// The signal of one channel in ticks, in detected photons.
 #[derive(Debug, Default)]
 struct Signal {
     /// The absolute tick of the first one.
     first: i64,
     level: Vec<f32>,
-    /// Memory for its codes before it is held at the limit.
+    /// Its codes.
     codes: Vec<i16>,
 }
 
@@ -241,9 +273,14 @@ impl Signal {
         self.level.resize((span.end - span.start).max(0) as usize, 0.0);
     }
 
-    /// Adds a Gaussian of `height` and rms length `rms` ticks about `tick` and `part` of a tick, to where
-    /// it is `negligible`.
-    fn add(&mut self, (tick, part): (i64, f64), (height, rms): (f64, f64), negligible: f64) {
+    /// Adds a `pulse` of this `height` about `tick` and `part` of a tick, to where it is `negligible`.
+    fn add(
+        &mut self,
+        (tick, part): (i64, f64),
+        (height, pulse): (f64, &Gaussian),
+        negligible: f64,
+    ) {
+        let Gaussian { rms, shrinks } = *pulse;
         let over = (height / negligible).max(1.0);
         let reach = ((2.0 * libm::log(over)).sqrt() * rms) as i64 + 1;
         let (from, to) = (tick - reach - self.first, tick + reach + 1 - self.first);
@@ -251,12 +288,11 @@ impl Signal {
         if to < 0 {
             return;
         }
-        // From tick to tick a Gaussian grows by a ratio that shrinks by a constant one. What lies before
-        // the span is worked out, too: the rest is then the same to the last bit, wherever a span begins.
+        // What lies before the span is worked out, too: the rest is then the same to the last bit, wherever a
+        // span begins.
         let at = ((from + self.first - tick) as f64 - part) / rms;
         let mut value = height * libm::exp(-at * at / 2.0);
         let mut grows = libm::exp(-(at + 0.5 / rms) / rms);
-        let shrinks = libm::exp(-(rms * rms).recip());
         for place in from..=to {
             if let Ok(place) = usize::try_from(place) {
                 self.level[place] += value as f32;
