@@ -69,8 +69,10 @@ fn dark() -> Scene {
 }
 
 /// Some stretches of a scan, one in so many.
-fn scan(sensor: &str, keys: &[(String, String)], (scene, every): (&Scene, usize)) -> Score {
-    let design = Design::open(sensor, keys).unwrap();
+fn scan(sensor: &str, keys: &[(&str, &str)], (scene, every): (&Scene, usize)) -> Score {
+    let keys: Vec<(String, String)> =
+        keys.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+    let design = Design::open(sensor, &keys).unwrap();
     let part: Vec<Band> = short_bands(&design, 0).step_by(every).collect();
     sim::scan_part(&design, scene, 77, &part).unwrap().score
 }
@@ -123,8 +125,7 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
         ("code.family", words),
         ("code.word.modulus", "20"),
         ("without", "inter-chip"),
-    ]
-    .map(|(key, value)| (key.to_owned(), value.to_owned()));
+    ];
     let [strays, _] = strays(&scan("coded-practical", &accepted, (&fence(30.0, (848, 43.2)), 24)));
     assert!(strays > 50, "{strays}");
 }
@@ -134,11 +135,8 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
 /// a gate of 150 m; more than 39 come with α = 1e-4 (Poisson, mean 20). Control: without labels there are more.
 #[test]
 fn posts_behind_the_gate_are_not_seen_in_front_of_it() {
-    let strays_of = |keys: &[(&str, &str)]| {
-        let keys: Vec<(String, String)> =
-            keys.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
-        strays(&scan("kim-park-2016-fixed", &keys, (&posts(171.85), 1)))
-    };
+    let scene = posts(171.85);
+    let strays_of = |keys: &[(&str, &str)]| strays(&scan("kim-park-2016-fixed", keys, (&scene, 1)));
     let [found, shots] = strays_of(&[]);
     assert_eq!(shots, 407_040);
     assert!(found <= 39, "{found}");
@@ -155,9 +153,7 @@ fn the_light_of_one_shot_is_not_taken_for_that_of_two() {
                  diffuse = 0.0221\n[[object]]\nshape.sphere.radius_m = 105.0\nmaterial = \"paint\"\n";
     let room = Scene::from_toml(night, "room", Path::new("")).unwrap();
     let strays_of = |keys: &[(&str, &str)]| {
-        let keys: Vec<(String, String)> =
-            keys.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
-        let score = scan("coded-360", &keys, (&room, 4));
+        let score = scan("coded-360", keys, (&room, 4));
         let [strays, shots] = strays(&score);
         let right = score.count(Outcome::Right);
         assert!(shots > 70_000 && right > shots * 2 / 5, "{right} right of {shots}");

@@ -221,7 +221,7 @@ impl<'a> Field<'a> {
         self.residual.has(tick)
     }
 
-    /// How many ticks of `pattern` are not cancelled. It begins several times, so many ticks `after` `start`; all are counted.
+    /// The ticks of `pattern` that are not cancelled, summed over all of its beginnings: each is so many ticks `after` `start`.
     pub fn left_in_all(&self, start: i64, after: &[u32], pattern: &Pattern) -> u32 {
         self.residual.lit_in_all(start, after, pattern)
     }

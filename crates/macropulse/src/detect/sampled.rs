@@ -55,7 +55,7 @@ pub(super) struct Sampler {
     /// Where light moves it.
     baseline: Option<Baseline>,
     tick_fs: i64,
-    /// What a photon becomes.
+    /// The pulse that the amplifier makes of a photon.
     photon: Gaussian,
     /// Its height for a single one.
     height: f64,

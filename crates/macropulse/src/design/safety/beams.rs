@@ -37,7 +37,7 @@ const EFFORT: usize = 120_000;
 /// Most beams beside one that an aperture may hold together with it. Where there are more, light hardly depends on
 /// the place.
 const FEW: usize = 64;
-/// Beams of which the places are tried that they share with others, at most: they are spread evenly over the scan.
+/// The most beams that are paired with others to find places that two beams share. They are spread evenly over the scan.
 const MOST_SHARED: usize = 4096;
 /// Elevations that are tried at most.
 const MOST_PLACES: f64 = 4096.0;

@@ -53,8 +53,8 @@ pub(super) trait Field {
     /// seconds count as one.
     fn starts(&self, gap: f64, counted: f64) -> Vec<Aim>;
 
-    /// Places that two beams cross, for beams spread evenly over the scan and any others; none where so many beams cross
-    /// an aperture that light hardly depends on the place.
+    /// Places that two beams cross. One of the two is of some beams spread evenly over the scan, the other is any. There is
+    /// no such place where so many beams cross an aperture that light hardly depends on the place.
     fn shared(&self) -> Vec<Aim>;
 
     /// Places `gap` from `aim` at most that one more beam just crosses; none where many beams cross.
