@@ -1,15 +1,16 @@
 //! Why a shot was decided as it was.
 //!
 //! The verdict is the receiver's: the band is decoded again, by the same code, with that shot as the
-//! last one that is owned, and what came of those before it is taken off. What is shown beside it, how many marks are found at every lag and which
-//! light other shots account for, is counted from the ticks in the plainest way, mark by mark.
+//! last one that is owned, and what came of those before it is taken off. Beside it stands how many marks are found at
+//! every lag, and for which light other shots account: both are counted from the ticks in the plainest way, mark by mark.
+//! Odds are those of the thorough receiver.
 
 use std::ops::Range;
 
-use super::belief::{self, Prior};
+use super::belief::{Hypothesis, Marks};
 use super::check::check_lags;
-use super::threshold::fewest_with_evidence;
-use super::{Error, Method, Receiver, Reject};
+use super::matched::{self, Odds, Question};
+use super::{Error, Method, Receiver, Reject, Returns};
 use crate::code::Codebook;
 use crate::shot_log::ShotLog;
 use crate::ticks::Ticks;
@@ -42,14 +43,13 @@ pub struct Explanation {
     pub ticks: Vec<(i64, bool)>,
     /// Share of places in that time at which a mark would be found by chance.
     pub density: f64,
-    /// The fewest marks that are believed at that density where no neighbour leads to expect light, if the receiver is a
-    /// matched one.
-    pub threshold: Option<u32>,
+    /// What the rule of belief says of it, if the receiver is a matched one and the shot has marks. Lags are those of `found`.
+    pub odds: Option<Odds>,
     /// The lag with most marks, and how many.
     pub peak: Option<(i64, u16)>,
     /// The best lag that is not at the peak, more than the width of a mark away from it.
     pub sidelobe: Option<(i64, u16)>,
-    /// What the receiver together.
+    /// What the receiver decided.
     pub verdict: Verdict,
     /// Other shots whose light is in this shot's time.
     pub others: Vec<OtherLight>,
@@ -127,6 +127,7 @@ impl Receiver {
         }
         let free = |at: usize| !claimed[at];
         let left = bench.counts(&bench.lit_by(free));
+        let odds = bench.odds(ticks, (&all, &verdict), peak);
         let is_beside = |at: usize| {
             peak.is_some_and(|(lag, _)| (bench.lag(at) - lag).abs() > width.max(bench.step))
         };
@@ -139,7 +140,7 @@ impl Receiver {
             width: bench.width,
             ticks: bench.seen.iter().copied().zip(claimed).collect(),
             density,
-            threshold: bench.threshold(density),
+            odds,
             sidelobe,
             peak,
             found,
@@ -153,7 +154,7 @@ impl Receiver {
 
 impl Verdict {
     /// That of `shot`, from what came of the shots `before` it and of those and it `together`.
-    pub(super) fn of(shot: usize, before: &super::Returns, together: &super::Returns) -> Self {
+    pub(super) fn of(shot: usize, before: &Returns, together: &Returns) -> Self {
         let accepted = |at: usize| Accepted {
             tof: together.tof[at],
             peak: together.peak[at],
@@ -215,6 +216,11 @@ impl<'a> Bench<'a> {
         Self { receiver, codebook, log, shot, fired, marks, gate, step, width, seen }
     }
 
+    /// How many lags are counted.
+    fn lags(&self) -> usize {
+        ((self.gate.end - self.gate.start) / self.step.max(1)) as usize
+    }
+
     /// The lag of place `at` of a list of counts.
     fn lag(&self, at: usize) -> i64 {
         self.gate.start + at as i64 * self.step
@@ -243,13 +249,56 @@ impl<'a> Bench<'a> {
 
     /// Marks found at each lag.
     fn counts(&self, lit: &[bool]) -> Vec<u16> {
-        let lags = ((self.gate.end - self.gate.start) / self.step.max(1)) as usize;
         let count = |at: usize| {
             let from = (at as i64 * self.step) as usize;
             let found = |mark: &&u32| lit.get(from + **mark as usize).is_some_and(|lit| *lit);
             self.marks.iter().filter(found).count() as u16
         };
-        (0..lags).map(count).collect()
+        (0..self.lags()).map(count).collect()
+    }
+
+    /// What the rule of belief says of the shot, if the receiver asks it.
+    fn odds(
+        &self,
+        ticks: &Ticks,
+        (all, verdict): (&Returns, &Verdict),
+        peak: Option<(i64, u16)>,
+    ) -> Option<Odds> {
+        let Method::Matched(correlation, _) = &self.receiver.method else { return None };
+        let (early, _) = self.window();
+        let (epoch, channel) = (ticks.epoch, self.log.channel[self.shot]);
+        let (shots, log) =
+            self.log.each_channel().into_iter().find(|(_, log)| log.channel[0] == channel)?;
+        let is_of_channel = |at: &usize| ticks.channel.get(*at).is_none_or(|of| *of == channel);
+        let tick = (0..ticks.len()).filter(is_of_channel).map(|at| ticks.tick[at]).collect();
+        let ticks = Ticks { epoch, tick, ..Ticks::default() };
+        let hypothesis = |shot: usize, lag: i64, lit: u16, of: u16| {
+            let marks = Marks { lit: lit.into(), of: of.into() };
+            Some(Hypothesis { shot: shots.binary_search(&shot).ok()?, lag: lag - early, marks })
+        };
+        let lag = |shot: usize, tof: f64| {
+            let arrives_fs = self.log.fired_at_fs[shot] + time::fs_from_s(tof);
+            arrives_fs.div_euclid(self.receiver.tick_fs) - self.receiver.fired(self.log, shot)
+        };
+        let others = all.each().filter(|one| one.shot != self.shot);
+        let others = others
+            .filter_map(|one| hypothesis(one.shot, lag(one.shot, one.tof), one.peak, one.marks));
+        let fullest = verdict.returns.iter().max_by_key(|one| one.peak);
+        let of = self.marks.len() as u16;
+        let own = match (fullest, peak) {
+            (Some(one), _) => hypothesis(self.shot, lag(self.shot, one.tof), one.peak, of),
+            (None, Some((lag, lit))) => hypothesis(self.shot, lag, lit, of),
+            (None, None) => None,
+        }?;
+        let lags = (0..self.lags()).map(|at| self.lag(at) - early).collect();
+        let question =
+            Question { own, others: others.collect(), lags, is_accepted: fullest.is_some() };
+        let sent = (self.codebook, &log);
+        let mut odds = matched::odds(self.receiver, correlation, sent, &ticks, &question)?;
+        odds.best.lag += early;
+        odds.reach = odds.reach.start + early..odds.reach.end + early;
+        odds.expected.iter_mut().for_each(|lag| *lag += early);
+        Some(odds)
     }
 
     /// Marks the ticks that `other`, found after `tof` seconds, accounts for; `None` where its light is
@@ -282,15 +331,6 @@ impl<'a> Bench<'a> {
             light.shared += u32::from(near > 0 && is_shared);
         }
         (light.marks > 0).then_some(light)
-    }
-
-    /// The marks that chance does not reach, of a receiver that derives them.
-    fn threshold(&self, density: f64) -> Option<u32> {
-        let Method::Matched(correlation, _) = &self.receiver.method else { return None };
-        let marks = self.marks.len() as u32;
-        let needed = belief::threshold(correlation.false_alarm)
-            - Prior::new(self.gate.clone(), &[]).at(self.gate.start);
-        (marks > 0).then(|| fewest_with_evidence(marks, density, needed))
     }
 }
 

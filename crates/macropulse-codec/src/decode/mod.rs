@@ -24,7 +24,7 @@ pub use bitwise::{Bitwise, Opening};
 pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
 pub use histogram::HistogramMethod;
-pub use matched::{Effort, neighbours};
+pub use matched::{Effort, Odds, Weighed, neighbours};
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 pub use sampled::{

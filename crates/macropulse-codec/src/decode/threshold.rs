@@ -135,7 +135,7 @@ impl Fewest {
 
 /// The fewest of `marks` whose evidence against chance of this `density` reaches so many nats; one more than there are if
 /// none do.
-pub(super) fn fewest_with_evidence(marks: u32, density: f64, needed: f64) -> u32 {
+fn fewest_with_evidence(marks: u32, density: f64, needed: f64) -> u32 {
     fewest(marks, |lit| evidence_at(Marks { lit, of: marks }, density) >= needed)
 }
 

@@ -21,8 +21,10 @@
 mod acquire;
 mod cancel;
 mod chance;
+mod explain;
 mod look;
 mod measure;
+mod neighbours;
 mod odds;
 mod pace;
 mod reference;
@@ -49,8 +51,13 @@ use acquire::{Leftover, Search};
 use cancel::Cancelled;
 use chance::Chance;
 use measure::{Meter, Photons};
+use neighbours::last_beside;
 use pace::{Paced, Usual};
 use sent::{Sent, Words};
+
+pub use explain::{Odds, Weighed};
+pub(super) use explain::{Question, odds};
+pub use neighbours::neighbours;
 
 /// How much the matched receiver does for faint light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -407,40 +414,4 @@ fn in_gates(sent: &Sent, ticks: &[u32]) -> Vec<u32> {
         (last - first) as u32
     };
     (0..sent.fired.len()).map(count).collect()
-}
-
-/// Shots between one and its neighbour in a direction at most.
-const FARTHEST: usize = 64;
-
-/// How many shots may lead a matched receiver to expect light of one, on average: those of its channel, in its row and in
-/// its column, no farther than it asks.
-pub fn neighbours(log: &ShotLog) -> f64 {
-    let each = log.each_channel().into_iter().flat_map(|(_, log)| {
-        [last_beside(&log.row, &log.column), last_beside(&log.column, &log.row)]
-    });
-    // Each pair counts for both.
-    let pairs: usize = each.map(|before| pairs_within(&before)).sum();
-    2.0 * pairs as f64 / log.len().max(1) as f64
-}
-
-/// Pairs of shots in a direction, not farther than [`FARTHEST`] apart, by the shot `before` each one.
-fn pairs_within(before: &[Option<u32>]) -> usize {
-    let mut behind = vec![0; before.len()];
-    for (shot, before) in before.iter().enumerate() {
-        behind[shot] = before.map_or(0, |before| behind[before as usize] + 1);
-    }
-    behind.into_iter().map(|behind: usize| behind.min(FARTHEST)).sum()
-}
-
-/// For each shot, the last one before it that is the `same` in one coordinate and not in the `other`.
-fn last_beside(same: &[u16], other: &[u16]) -> Vec<Option<u32>> {
-    let places = same.iter().max().map_or(0, |&place| usize::from(place) + 1);
-    let mut last: Vec<Option<u32>> = vec![None; places];
-    let mut beside = Vec::with_capacity(same.len());
-    for shot in 0..same.len() {
-        let here = &mut last[usize::from(same[shot])];
-        beside.push(here.filter(|&before| other[before as usize] != other[shot]));
-        *here = Some(shot as u32);
-    }
-    beside
 }

@@ -24,18 +24,19 @@
 //! the next block first. The end of a block can change a verdict only where light of a shot behind it overlaps with that
 //! of a settled shot, and the quick receiver has not found it.
 
-mod residual;
-mod search;
+pub(super) mod residual;
+pub(super) mod search;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::Detection;
 use super::measure::{Meter, Photons};
+use super::neighbours::Neighbours;
 use super::sent::Sent;
 use super::track::{BLOCK, below};
-use super::{Detection, FARTHEST, last_beside};
 use crate::decode::belief::{self, Hypothesis, Light, Marks, Prior};
 use crate::decode::field::{self, Field};
 use crate::decode::{Reject, Returns, Strength};
@@ -57,9 +58,6 @@ const BLOCK_TICKS: i64 = 1 << 25;
 /// Light is looked for first so many lags to both sides of an expected one: in all, as many as are counted at once.
 const EXPECTED: i64 = search::BLOCK / 2;
 
-/// Directions in which a shot has neighbours.
-const DIRECTIONS: usize = 4;
-
 /// A band, and what is known of it.
 pub(super) struct Reference<'a> {
     sent: &'a Sent<'a>,
@@ -68,8 +66,7 @@ pub(super) struct Reference<'a> {
     search: Search,
     /// The logarithm of the posterior odds from which on a hypothesis is believed.
     threshold: f64,
-    /// The next shot in each direction: to both sides of its row and its column.
-    beside: [Vec<Option<u32>>; DIRECTIONS],
+    neighbours: Neighbours,
     /// Shots that are judged; those before are settled.
     open: Range<usize>,
     /// Shots before this one are searched: all light that may overlap with theirs is at hand.
@@ -151,16 +148,13 @@ impl<'a> Reference<'a> {
         let length = (gates(sent) + 2) * (arrival.end - arrival.start) + 3 * sent.length();
         let begin = arrival.start - sent.length();
         let memory = field::Memory::default();
-        let (rows, columns) = (&sent.log.row, &sent.log.column);
-        let [left, above] = [last_beside(rows, columns), last_beside(columns, rows)];
-        let [right, below] = [&left, &above].map(|before| reversed(before));
         Self {
             sent,
             field: Field::new(ticks, sent.width, (begin, length), sent.length(), memory),
             residual: Residual::new(sent),
             search: Search::default(),
             threshold: belief::threshold(sent.correlation.false_alarm),
-            beside: [left, right, above, below],
+            neighbours: Neighbours::of(sent.log),
             open: 0..0,
             closed: 0,
             found: vec![Vec::new(); shots],
@@ -184,22 +178,10 @@ impl<'a> Reference<'a> {
         (self.open, self.closed) = (shots, closed);
     }
 
-    /// The prior of `shot`, by the returns taken so far: in each direction the lag of the nearest one and the line
-    /// through the nearest two lead to expect one of its own.
+    /// The prior of `shot`, by the returns taken so far.
     fn prior(&self, shot: usize) -> Prior {
-        let mut lags = Vec::with_capacity(2 * DIRECTIONS);
-        for beside in &self.beside {
-            let next = |at: &usize| beside[*at].map(|next| next as usize);
-            let way = std::iter::successors(Some(shot), next).enumerate().skip(1).take(FARTHEST);
-            let found =
-                way.filter_map(|(away, at)| Some((away as i64, self.found[at].first()?.lag)));
-            let two: Vec<(i64, i64)> = found.take(2).collect();
-            lags.extend(two.first().map(|(_, lag)| lag));
-            if let [(near, lag), (far, other)] = two[..] {
-                lags.push(lag + (lag - other) * near / (far - near));
-            }
-        }
-        Prior::new(self.sent.reach(), &lags)
+        let lag = |other: usize| Some(self.found[other].first()?.lag);
+        Prior::new(self.sent.reach(), &self.neighbours.expected_lags(shot, lag))
     }
 
     /// The lags near `lag` that could be the best one of `shot` for some set of neighbours. It looks as far as light
@@ -259,12 +241,8 @@ impl<'a> Reference<'a> {
 
     /// The contradiction of the label of `shot` at `lag`.
     fn against(&self, shot: usize, lag: i64, prior: &Prior) -> f64 {
-        let (sent, residual) = (self.sent, &self.residual);
-        let in_bits = |bits: &[u32]| residual.in_bits(shot, lag, bits);
-        let (lit, dark) = (in_bits(sent.lit_bits(shot)), in_bits(sent.dark_bits(shot)));
-        let gate = residual.gate(shot);
-        let (_, around) = residual.look(&gate, lag, self.search.places());
-        belief::contradiction(&lit, &dark, &around, prior.expected(lag))
+        let gate = self.residual.gate(shot);
+        self.residual.contradiction(&gate, lag, self.search.places(), prior)
     }
 
     /// Takes light of `shot` at `lag` for a return on trial. What it gives puts that back.
@@ -481,15 +459,4 @@ impl Light for Reference<'_> {
 fn gates(sent: &Sent) -> i64 {
     let arrival = sent.arrival(0);
     (BLOCK_TICKS / (arrival.end - arrival.start)).clamp(2, GATES)
-}
-
-/// The next shot behind each one, by those `before`.
-fn reversed(before: &[Option<u32>]) -> Vec<Option<u32>> {
-    let mut behind = vec![None; before.len()];
-    for (shot, before) in (0..).zip(before) {
-        if let Some(before) = before {
-            behind[*before as usize] = Some(shot);
-        }
-    }
-    behind
 }

@@ -36,6 +36,11 @@ impl Scale {
         self.first_range_m + steps * self.step_m
     }
 
+    /// The lag of an entry.
+    pub fn lag(&self, place: usize) -> i64 {
+        self.first_lag_ticks + place as i64 * self.step_ticks
+    }
+
     fn range_at(&self, place: usize) -> f64 {
         self.first_range_m + place as f64 * self.step_m
     }
@@ -66,6 +71,8 @@ pub(super) struct Words {
     pub axis: &'static str,
     pub all: &'static str,
     pub left: &'static str,
+    /// Whether the lowest of several lags is drawn of the second curve.
+    pub is_left_lowest: bool,
 }
 
 impl Curve<'_> {
@@ -95,14 +102,17 @@ impl Curve<'_> {
         chart.size = [904.0, 320.0];
         chart.legend = true;
         let together = places.len().div_ceil(PLACES).max(1);
-        for (label, counts, hue) in
-            [(self.words.all, &self.found, Hue::Grey), (self.words.left, &self.left, Hue::Blue)]
+        let Words { all, left, is_left_lowest, .. } = *self.words;
+        for (label, counts, hue, is_lowest) in
+            [(all, &self.found, Hue::Grey, false), (left, &self.left, Hue::Blue, is_left_lowest)]
         {
             let counts = counts.get(places.clone()).unwrap_or_default().chunks(together);
             let highest = counts.enumerate().filter_map(|(part, counts)| {
                 let told = counts.iter().enumerate().filter(|(_, count)| count.is_finite());
                 // The last one of equal counts.
-                let (at, count) = told.max_by(|one, other| one.1.total_cmp(other.1))?;
+                let height = |count: &f64| if is_lowest { -count } else { *count };
+                let (at, count) =
+                    told.max_by(|one, other| height(one.1).total_cmp(&height(other.1)))?;
                 let place = places.start + part * together + at;
                 Some([self.scale.range_at(place), count.max(0.0)])
             });

@@ -5,6 +5,7 @@
 mod curve;
 mod histograms;
 mod light;
+mod odds;
 mod samples;
 mod ticks;
 

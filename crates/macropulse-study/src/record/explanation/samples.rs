@@ -16,6 +16,7 @@ const WORDS: Words = Words {
     axis: "Standard deviations of noise",
     all: "all light",
     left: "without that of other shots",
+    is_left_lowest: false,
 };
 
 /// The samples in the time of a shot, and how far the sum of its marks is above noise in them.

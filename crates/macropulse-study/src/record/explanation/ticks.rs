@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::curve::{Curve, Scale, Words};
 use super::light::Light;
+use super::odds::Odds;
 use super::{Decision, MOST_OTHERS, Record, Shot};
 use crate::text::{Columns, counted, grouped, short};
 use crate::view::{Axis, Chart, Hue, Series, Style};
@@ -19,6 +20,7 @@ const WORDS: Words = Words {
     axis: "Marks",
     all: "all ticks",
     left: "without those of other shots",
+    is_left_lowest: false,
 };
 
 /// The ticks in the time of a shot, and how many marks are found in them.
@@ -30,7 +32,8 @@ pub(super) struct Ticks {
     ticks_of_others: usize,
     /// Share of the places at which a mark is found by chance.
     density: f64,
-    threshold_marks: Option<u32>,
+    /// Null of other receivers than the matched one.
+    odds: Option<Odds>,
     peak: Option<Place>,
     sidelobe: Option<Place>,
     others: Vec<OtherShot>,
@@ -71,6 +74,8 @@ pub(super) struct Correlation {
     pub scale: Scale,
     marks: Vec<u16>,
     marks_without_others: Vec<u16>,
+    /// To hundredths; null of other receivers than the matched one.
+    evidence_nats: Option<Vec<f32>>,
 }
 
 /// Explains shot number `at` of a band out of its `ticks`.
@@ -83,7 +88,8 @@ pub(super) fn decision<'a>(
     let tick_fs = design.clock.tick_fs;
     // A tick stands for its middle.
     let shot = Shot { log, at, fired_tick: told.fired_tick, tick_fs, within_tick_fs: tick_fs / 2 };
-    let why = Reasons { told: &told, shot: &shot }.text();
+    let odds = told.odds.as_ref().map(|odds| Odds::new(odds, &shot));
+    let why = Reasons { told: &told, shot: &shot, odds: odds.as_ref() }.text();
     let place =
         |(lag, marks): (i64, u16)| Place { lag_ticks: lag, range_m: shot.range(lag), marks };
     let others = told.others.iter().map(|other| {
@@ -92,12 +98,13 @@ pub(super) fn decision<'a>(
         OtherShot { row, column, begins_ticks: begins, marks, shared }
     });
     let (ticks, is_of_others): (Vec<i64>, Vec<bool>) = told.ticks.iter().copied().unzip();
+    let rounded = |nats: &f32| (nats * 100.0).round() / 100.0;
     let record = Ticks {
         window_ticks: told.width,
         ticks_in_time: ticks.len(),
         ticks_of_others: is_of_others.iter().filter(|claimed| **claimed).count(),
         density: told.density,
-        threshold_marks: told.threshold,
+        odds,
         peak: told.peak.map(place),
         sidelobe: told.sidelobe.map(place),
         others: others.collect(),
@@ -108,6 +115,7 @@ pub(super) fn decision<'a>(
                 scale: Scale::new(told.gate.start, told.step, &shot),
                 marks: told.found,
                 marks_without_others: told.left,
+                evidence_nats: told.odds.map(|odds| odds.evidence.iter().map(rounded).collect()),
             },
         }),
     };
@@ -126,6 +134,7 @@ pub(super) fn decision<'a>(
 struct Reasons<'a> {
     told: &'a Explanation,
     shot: &'a Shot<'a>,
+    odds: Option<&'a Odds>,
 }
 
 impl Reasons<'_> {
@@ -176,7 +185,7 @@ impl Reasons<'_> {
 
     /// Why no lag was believed.
     fn no_peak(&self) -> String {
-        let Explanation { marks, peak, threshold, left, gate, step, .. } = self.told;
+        let Explanation { marks, peak, left, gate, step, .. } = self.told;
         if marks.is_empty() {
             return "The macropulse of this shot has no mark: it is dark, and cannot be found."
                 .to_owned();
@@ -185,21 +194,16 @@ impl Reasons<'_> {
             return "No tick lies where light of this shot could come.".to_owned();
         };
         let best = self.best("Most marks");
-        match threshold {
-            Some(threshold) if u32::from(count) < *threshold => format!(
-                "{best}; in this density of ticks chance could give that many somewhere in the gate, \
-                 and {threshold} would be needed."
-            ),
-            _ => {
-                let place = usize::try_from((lag - gate.start) / step).unwrap_or(0);
-                let left = left.get(place).copied().unwrap_or(0);
-                format!(
-                    "{best}; but light of other shots accounts for {} of them, and with the {left} \
-                     that are left the receiver did not believe it.",
-                    count.saturating_sub(left)
-                )
-            }
+        if let Some(odds) = self.odds {
+            return format!("{best}; {}.", odds.refusal());
         }
+        let place = usize::try_from((lag - gate.start) / step).unwrap_or(0);
+        let left = left.get(place).copied().unwrap_or(0);
+        format!(
+            "{best}; but light of other shots accounts for {} of them, and with the {left} that are \
+             left the receiver did not believe it.",
+            count.saturating_sub(left)
+        )
     }
 
     /// "Most marks, 40 of 174, are found at 31.2 m".
@@ -227,18 +231,14 @@ impl Ticks {
                 short((self.density * 1e4).round() / 1e2)
             ),
         );
-        if let Some(threshold) = self.threshold_marks {
-            let threshold = counted(threshold.into(), "mark");
-            columns.push(
-                "threshold",
-                format!("{threshold} at this density, where no neighbour leads to expect light"),
-            );
-        }
         for (name, place) in [("peak", &self.peak), ("sidelobe", &self.sidelobe)] {
             let text = place.as_ref().map_or("none".to_owned(), |place| {
                 format!("{} of {marks} marks at {} m", place.marks, short(place.range_m))
             });
             columns.push(name, text);
+        }
+        if let Some(odds) = &self.odds {
+            odds.push(marks, columns);
         }
         let mut others: Vec<&OtherShot> = self.others.iter().collect();
         others.sort_by_key(|other| Reverse((other.shared, other.marks)));
@@ -282,10 +282,12 @@ impl Ticks {
             found: counts(&whole.correlation.marks),
             left: counts(&whole.correlation.marks_without_others),
             most: sent.len().max(1) as f64,
-            threshold: self.threshold_marks.map(f64::from),
+            threshold: None,
             peak: self.peak.as_ref().map(|peak| (peak.lag_ticks, said(peak))),
         };
-        let curves = curve.charts().into_iter().map(|chart| (chart, ""));
+        let weighed = self.odds.iter().zip(&whole.correlation.evidence_nats);
+        let weighed = weighed.flat_map(|(odds, evidence)| odds.charts(curve.scale, evidence));
+        let curves = curve.charts().into_iter().chain(weighed).map(|chart| (chart, ""));
         Some(arrivals.into_iter().chain(curves).collect())
     }
 
@@ -352,13 +354,19 @@ pub(super) mod tests {
     pub fn record() -> Value {
         json!({
             "window_ticks": 2, "ticks_in_time": 6, "ticks_of_others": 2, "density": 0.25,
-            "threshold_marks": 3, "peak": { "lag_ticks": 41, "range_m": 30.5, "marks": 4 },
+            "odds": {
+                "lag_ticks": 41, "range_m": 30.5, "unclaimed_marks": 4, "lit_marks": 4,
+                "evidence_nats": 9.5, "prior_nats": -1.1, "threshold_nats": 6.9,
+                "label_contradiction_nats": null, "reach_ticks": [40, 52], "expected": [{ "lag_ticks": 40, "range_m": 30.1 }],
+            },
+            "peak": { "lag_ticks": 41, "range_m": 30.5, "marks": 4 },
             "sidelobe": null, "others": [],
             "ticks": [41, 46, 47, 50, 61, 900],
             "is_of_others": [false, false, true, false, false, true],
             "correlation": {
                 "first_lag_ticks": 40, "step_ticks": 1, "first_range_m": 30.1, "step_m": 0.4,
                 "marks": [1, 4, 2], "marks_without_others": [1, 3, 0],
+                "evidence_nats": [0.0, 9.5, 1.0],
             },
         })
     }
@@ -375,9 +383,9 @@ pub(super) mod tests {
     fn a_pixel_has_its_ticks_and_its_correlation() {
         let html = html(&explanation(record(), Value::Null));
         assert!(html.contains("id=\"pixel-3-10\"") && html.contains("4 of 4 at 30.500 m"));
-        assert!(html.contains("threshold 3") && html.contains("Four of four."));
+        assert!(html.contains("9.5 at 30.500 m") && html.contains("Four of four."));
         let charts = html.matches("<metadata>").count();
-        assert_eq!(charts, 3);
+        assert_eq!(charts, 5);
     }
 
     #[test]

@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use super::Sent;
 use super::search::Peak;
-use crate::decode::belief::{Marks, Prior, Surroundings, evidence};
+use crate::decode::belief::{self, Marks, Prior, Surroundings, evidence};
 use crate::decode::field::Field;
 use crate::decode::timeline::Timeline;
 use crate::kernels::{count_each, look_ahead};
 
 /// Ticks that no return explains, and places that returns claim.
-pub(super) struct Residual<'a> {
+pub(in crate::decode::matched) struct Residual<'a> {
     pub sent: &'a Sent<'a>,
     /// The time at hand, in whole machine words.
     extent: Range<i64>,
@@ -35,7 +35,7 @@ const CELLS: i64 = 32;
 
 /// Ticks and places of one shot that are the same for all its lags.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Gate {
+pub(in crate::decode::matched) struct Gate {
     pub shot: usize,
     /// Ticks that are left where its light may be.
     pub ticks: u32,
@@ -44,7 +44,7 @@ pub(super) struct Gate {
 }
 
 /// A part of a [`Residual`], as it was.
-pub(super) struct Saved {
+pub(in crate::decode::matched) struct Saved {
     span: Range<i64>,
     words: [Vec<u64>; 4],
 }
@@ -244,8 +244,17 @@ impl<'a> Residual<'a> {
         Surroundings { lit: f64::from(ticks).min(places), places, density: density.min(0.5) }
     }
 
+    /// The [contradiction](belief::contradiction) of the label of a shot at `lag`.
+    pub fn contradiction(&self, gate: &Gate, lag: i64, places: &[u32], prior: &Prior) -> f64 {
+        let (sent, shot) = (self.sent, gate.shot);
+        let in_bits = |bits: &[u32]| self.in_bits(shot, lag, bits);
+        let (lit, dark) = (in_bits(sent.lit_bits(shot)), in_bits(sent.dark_bits(shot)));
+        let (_, around) = self.look(gate, lag, places);
+        belief::contradiction(&lit, &dark, &around, prior.expected(lag))
+    }
+
     /// Marks of the word of `shot` in each of the `bits`, so many ticks behind the start of its light at `lag`.
-    pub fn in_bits(&self, shot: usize, lag: i64, bits: &[u32]) -> Vec<Marks> {
+    fn in_bits(&self, shot: usize, lag: i64, bits: &[u32]) -> Vec<Marks> {
         let (start, word) = (self.sent.fired[shot] + lag, self.sent.word(shot).ticks());
         let of_bit = |bit: &u32| {
             let places = word.iter().map(|mark| start + i64::from(bit + mark));
@@ -259,7 +268,7 @@ impl<'a> Residual<'a> {
 
 /// Ticks that are left and places that are claimed before each cell of a stretch.
 #[derive(Debug, Default)]
-pub(super) struct Sums {
+pub(in crate::decode::matched) struct Sums {
     first: i64,
     /// Ticks of a cell.
     cell: i64,

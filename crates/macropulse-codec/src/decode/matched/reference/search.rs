@@ -23,7 +23,7 @@ pub(super) const BLOCK: i64 = 64 * WIDE as i64;
 
 /// A lag of a shot and what speaks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Peak {
+pub(in crate::decode::matched) struct Peak {
     pub lag: i64,
     /// Its marks that no return claims.
     pub marks: Marks,

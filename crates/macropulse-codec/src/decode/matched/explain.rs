@@ -1,0 +1,120 @@
+//! What the rule of belief says of every lag of one shot.
+
+use std::ops::Range;
+
+use super::neighbours::Neighbours;
+use super::reference::residual::Residual;
+use super::reference::search::Peak;
+use super::sent::{Sent, Words};
+use crate::code::Codebook;
+use crate::decode::belief::{self, Hypothesis, Marks, Prior};
+use crate::decode::field::{self, Field};
+use crate::decode::{Correlation, Receiver};
+use crate::kernels::places_of;
+use crate::{ShotLog, Ticks};
+
+/// What the [rule of belief](belief) says of a shot, where the returns of all other shots are known. Returns that are
+/// fuller than its best lag claim their light. All numbers are in nats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Odds {
+    /// Evidence for light at each lag, ascending as asked for; 0 where there is none.
+    pub evidence: Vec<f32>,
+    /// The lags that have a prior probability: those of the gate, and beyond it all from which light may come.
+    pub reach: Range<i64>,
+    /// The lags at which neighbours lead to expect light. With `reach` they make the [prior](belief::Prior).
+    pub expected: Vec<i64>,
+    /// The best lag.
+    pub best: Weighed,
+}
+
+/// What is weighed at one lag.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weighed {
+    /// Ticks from firing to its light.
+    pub lag: i64,
+    /// Its marks that no fuller return claims, and how many of them are lit.
+    pub marks: Marks,
+    /// Evidence of these marks; −∞ where chance gives as many.
+    pub evidence: f64,
+    /// ln π.
+    pub prior: f64,
+    /// ln(1/α), which evidence and prior must reach together.
+    pub threshold: f64,
+    /// By how much another label explains the light better than that of the shot. Above 0 it is refused. `None` of a shot
+    /// that carries no label.
+    pub contradiction: Option<f64>,
+}
+
+/// What is asked about a shot.
+pub(in crate::decode) struct Question {
+    /// The light that others compete with: that of the shot, at the lag that was accepted or has most marks.
+    pub own: Hypothesis,
+    /// Returns of other shots.
+    pub others: Vec<Hypothesis>,
+    /// The lags to weigh, ascending.
+    pub lags: Vec<i64>,
+    /// Whether `own` was accepted, so that no other lag is the best one.
+    pub is_accepted: bool,
+}
+
+/// What the rule of belief says of a shot, by all `ticks` of its channel. `None` where there is no mark or no lag.
+pub(in crate::decode) fn odds(
+    receiver: &Receiver,
+    correlation: &Correlation,
+    (codebook, log): (&Codebook, &ShotLog),
+    ticks: &Ticks,
+    question: &Question,
+) -> Option<Odds> {
+    let sent = &Sent::new(receiver, correlation, (codebook, log), (ticks.epoch, Words::default()));
+    let (shot, own) = (question.own.shot, question.own);
+    let width = i64::from(sent.width) - 1;
+    if sent.weight(shot) == 0 {
+        return None;
+    }
+    // Light that overlaps with that of the shot is at hand as a whole.
+    let (arrival, beside) = (sent.arrival(shot), 2 * sent.takes_up());
+    let span = arrival.start - beside..arrival.end + beside;
+    let extent = (span.start, span.end - span.start);
+    let mut field =
+        Field::new(&ticks.tick, sent.width, extent, sent.length(), field::Memory::default());
+    field.cover(span.clone());
+    let mut residual = Residual::new(sent);
+    residual.restore(&field);
+    for other in question.others.iter().filter(|other| **other < own) {
+        let touched = residual.touched(other.shot, other.lag);
+        if touched.start >= span.start && touched.end <= span.end {
+            residual.explain(other.shot, other.lag);
+        }
+    }
+    let lag_of = |shot: usize| {
+        let of_shot = question.others.iter().filter(|other| other.shot == shot);
+        Some(of_shot.min()?.lag)
+    };
+    let expected = Neighbours::of(log).expected_lags(shot, lag_of);
+    let prior = Prior::new(sent.reach(), &expected);
+    let mut places = Vec::new();
+    places_of(sent.word(shot), sent.lit_bits(shot), &mut places);
+    let (gate, threshold) = (residual.gate(shot), belief::threshold(correlation.false_alarm));
+    let peak = |lag: i64| residual.peak(&gate, lag, &places, &prior);
+    let evidence = question.lags.iter().map(|lag| peak(*lag).evidence.max(0.0) as f32).collect();
+    let best = match question.is_accepted {
+        // Its time is known to some ticks.
+        true => Peak::best((own.lag - width..=own.lag + width).map(peak)),
+        false => Peak::best(question.lags.iter().map(|lag| peak(*lag))),
+    }?;
+    let has_label = sent.bits_of_payload() > 1;
+    let contradiction = has_label.then(|| residual.contradiction(&gate, best.lag, &places, &prior));
+    Some(Odds {
+        evidence,
+        reach: sent.reach(),
+        expected,
+        best: Weighed {
+            lag: best.lag,
+            marks: best.marks,
+            evidence: best.evidence,
+            prior: prior.at(best.lag),
+            threshold,
+            contradiction,
+        },
+    })
+}
