@@ -126,7 +126,7 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
         ("code.word.modulus", "20"),
         ("without", "inter-chip"),
     ];
-    let [strays, _] = strays(&scan("coded-practical", &accepted, (&fence(30.0, (848, 43.2)), 24)));
+    let [strays, _] = strays(&scan("coded-practical", &accepted, (&fence(30.0, (848, 43.2)), 12)));
     assert!(strays > 50, "{strays}");
 }
 

@@ -20,10 +20,17 @@ use std::f64::consts::LN_2;
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use libm::{lgamma, log, log1p};
+use libm::{exp, lgamma, log, log1p};
 
 /// Euler's constant γ.
 const EULER: f64 = 0.577_215_664_901_532_9;
+
+/// The prior probability that light shows every mark.
+///
+/// Bright light does, and without this a whole word of few marks is hardly more evidence than one with gaps. Chosen on two
+/// scenes that no goal uses, `crossing` and `car-70m` with seed 11: ⅛ loses 40 % of what `coded-practical` finds of `car-70m`
+/// with crosstalk from chip to chip left out, ½ makes `kim-park-2016` miss 1.4 % more there.
+const BRIGHT: f64 = 0.25;
 
 /// Marks of a hypothesis that no fuller return claims.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,21 +70,25 @@ impl Surroundings {
 /// Evidence for light at the `marks`, in nats: the logarithm of a Bayes factor.
 ///
 /// *Chance* lights a place with the density d, be it a mark or not. d is not known: it has the distribution
-/// Beta(1, 1/d₀ − 1), whose mean is d₀. *Light* shows each mark with a probability q, log-uniform on (0, 1), and
-/// leaves the other places to chance. With k of n marks and t of m other places lit, the probabilities of one such
-/// outcome are, with b = 1/d₀ − 1,
+/// Beta(1, 1/d₀ − 1), whose mean is d₀. *Light* leaves the other places to chance. It is bright with the probability
+/// w = ¼, and then shows every mark; else it shows each mark with a probability q, log-uniform on (0, 1). It shows
+/// two marks at least, if there are as many: one alone has no distance to another that could tell the word.
+///
+/// With k of n marks and t of m other places lit, the probabilities of one such outcome are, with b = 1/d₀ − 1,
 ///
 /// > chance: B(k + t + 1, n + m − k − t + b) / B(1, b)
 /// >
-/// > light: B(k, n − k + 1)/Hₙ · B(t + 1, m − t + b) / B(1, b)
+/// > light: S(k, n) · B(t + 1, m − t + b) / B(1, b)
+/// >
+/// > S(k, n) = (1 − w)·B(k, n − k + 1)/(Hₙ − 1), and w more if k = n; S(1, 1) = 1
 ///
-/// where Hₙ = 1 + ½ + … + 1/n makes the first factor sum to 1 over all outcomes with k ≥ 1. The evidence is the
-/// logarithm of their quotient. In the limit of a known density, m → ∞ with t/m = d, it becomes
+/// where Hₙ = 1 + ½ + … + 1/n makes S sum to 1 over all outcomes with k ≥ 2. The evidence is the logarithm of their
+/// quotient. In the limit of a known density, m → ∞ with t/m = d, it becomes
 ///
-/// > E(k, n, d) = ln\[B(k, n − k + 1)/Hₙ\] − k·ln d − (n − k)·ln(1 − d).
+/// > E(k, n, d) = ln S(k, n) − k·ln d − (n − k)·ln(1 − d).
 ///
 /// Both hypotheses are distributions over (k, t), so the mean of exp(evidence) under chance is exactly 1. This is a
-/// mean over d, too. At a given density up to thrice the expected one the tail P(evidence ≥ x) stays below
+/// mean over d, too. At a given density up to twice the expected one the tail P(evidence ≥ x) stays below
 /// max(1, d/d₀)·e⁻ˣ; a test sums it up. To put a mean density into E instead saves 1 to 2 nats and has no such bound.
 ///
 /// Light adds marks: no more lit ones than chance gives, k/n ≤ (t + 1)/(m + 1/d₀), are no evidence at all, −∞.
@@ -98,7 +109,7 @@ pub(super) fn evidence_at(marks: Marks, density: f64) -> f64 {
     log_light(lit, of) - lit * log(density) - dark
 }
 
-/// The logarithm of the Bayes factor, be it for light or against it; at least one mark is lit.
+/// The logarithm of the Bayes factor, be it for light or against it.
 fn log_factor(marks: Marks, around: &Surroundings) -> f64 {
     let [k, n] = [marks.lit, marks.of].map(f64::from);
     let (t, m) = (around.lit, around.places);
@@ -108,12 +119,20 @@ fn log_factor(marks: Marks, around: &Surroundings) -> f64 {
     log_light(k, n) + beside - chance
 }
 
-/// ln\[B(k, n − k + 1)/Hₙ\].
+/// ln S(k, n), see [`evidence`].
 fn log_light(k: f64, n: f64) -> f64 {
     static OF_WHOLE: LazyLock<[f64; IN_TABLE]> =
-        LazyLock::new(|| std::array::from_fn(|whole| log(harmonic(whole as f64))));
-    let log_harmonic = OF_WHOLE.get(n as usize).copied().unwrap_or_else(|| log(harmonic(n)));
-    log_gamma(k) + log_gamma(n - k + 1.0) - log_gamma(n + 1.0) - log_harmonic
+        LazyLock::new(|| std::array::from_fn(|whole| log(harmonic(whole as f64) - 1.0)));
+    if n < 2.0 {
+        return 0.0;
+    }
+    if k < 2.0 {
+        return f64::NEG_INFINITY;
+    }
+    let log_sum = OF_WHOLE.get(n as usize).copied().unwrap_or_else(|| log(harmonic(n) - 1.0));
+    let one_way = log_gamma(k) + log_gamma(n - k + 1.0) - log_gamma(n + 1.0);
+    let faint = one_way - log_sum + log(1.0 - BRIGHT);
+    if k < n { faint } else { log(BRIGHT + exp(faint)) }
 }
 
 /// Whole numbers below this one have their ln Γ and ln H in a table.

@@ -417,6 +417,7 @@ pub(super) mod tests {
     fn a_pixel_without_a_peak_has_its_correlation_alone() {
         let mut record = record();
         record["peak"] = Value::Null;
+        record["odds"] = Value::Null;
         let told = explanation(record.clone(), light());
         assert_eq!(arrivals(&told)[0][0], 41.0);
         assert_eq!(told.picture().charts.len(), 2);
