@@ -46,7 +46,7 @@ pub(super) struct File {
     #[schemars(range(min = 0, max = 1))]
     ionisation_ratio: f64,
     /// Electrical bandwidth at 3 dB, MHz.
-    #[schemars(range(min = 0.001, max = 1e9))]
+    #[schemars(range(min = 0.001, max = 1e6))]
     bandwidth_mhz: f64,
     /// White noise at the input of the amplifier, pA/√Hz.
     #[schemars(range(min = 0, max = 1e6))]
@@ -155,7 +155,7 @@ impl File {
         Ok(FrontEnd {
             gain: table.within("gain", self.gain, 1.0, 1e6)?,
             ionisation: within("ionisation_ratio", self.ionisation_ratio, 1.0)?,
-            bandwidth: table.within("bandwidth_mhz", self.bandwidth_mhz, 1e-3, 1e9)? * 1e6,
+            bandwidth: table.within("bandwidth_mhz", self.bandwidth_mhz, 1e-3, 1e6)? * 1e6,
             current_noise: within("amplifier_pa_rthz", self.amplifier_pa_rthz, 1e6)? * 1e-12,
             voltage_noise: within("voltage_noise_nv_rthz", self.voltage_noise_nv_rthz, 1e6)? * 1e-9,
             capacitance: within("capacitance_pf", self.capacitance_pf, 1e6)? * 1e-12,
