@@ -133,7 +133,7 @@ fn reach(
         let slower = (period / (2.0 * tof_from_range(clutter_m))).min(1.0);
         let scans_per_s = slower * required.wanted.scans_per_s;
         let alone = with(Wanted { range_m, clutter_m, scans_per_s, ..required.wanted });
-        let design = candidate.design(&alone)?;
+        let design = candidate.unlimited(&alone)?;
         let forecaster = Forecaster::new(&design, &required.environment)?;
         let brighter = forecaster.with_light(allowed / candidate.energy);
         Ok(brighter.forecast(reflectance, range_m).pd >= required.wanted.pd)

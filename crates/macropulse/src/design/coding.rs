@@ -77,7 +77,7 @@ pub(super) struct WordFile {
 }
 
 /// How shots are told apart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Coding {
     /// Marks of every label and word.
     pub codebook: Codebook,

@@ -8,7 +8,7 @@ use super::{Clock, Coding, Error};
 use crate::units::fs_from_s;
 
 /// What a shot sends.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Emission {
     /// One macropulse: the pulses ("marks") of a code word, a single one where shots are not coded.
     Marks(Coding),
@@ -17,7 +17,7 @@ pub enum Emission {
 }
 
 /// Equal pulses at a fixed interval.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Burst {
     /// The pulse, as a code word of one mark.
     pub pulse: Coding,

@@ -3,7 +3,7 @@
 mod check;
 
 use std::f64::consts::PI;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 pub(in crate::design) use check::{BudgetFile, OpticsFile, Parts, SafetyFile};
 
@@ -35,7 +35,7 @@ pub struct Budget {
 }
 
 /// Where an eye is that looks into the beams, and what counts there.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Eye {
     /// How far away it is, m.
     distance: f64,
@@ -103,9 +103,43 @@ impl Budget {
     }
 }
 
+/// What class 1 allows to the sensors that were opened last, the last one at the end.
+///
+/// A sweep opens a sensor once for each of its values, most of which are of no matter to an eye, and to find the worst
+/// place of an eye takes longer than all else that is checked.
+static KNOWN: Mutex<Vec<Known>> = Mutex::new(Vec::new());
+
+/// Sensors in [`KNOWN`] at most.
+const MOST_KNOWN: usize = 16;
+
+/// What class 1 allows to a sensor.
+struct Known {
+    sensor: (Eye, Scan, Light, Emission),
+    limits: Vec<Limit>,
+}
+
 impl Eye {
     /// What class 1 allows to a shot before the bare eye, and before one behind a telescope.
     fn limits(self, scan: &Scan, light: &Light, emission: &Emission) -> Vec<Limit> {
+        let all = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_same = |known: &&Known| {
+            let (eye, its_scan, its_light, its_emission) = &known.sensor;
+            (*eye, its_scan, its_light, its_emission) == (self, scan, light, emission)
+        };
+        if let Some(known) = all().iter().find(is_same) {
+            return known.limits.clone();
+        }
+        let limits = self.limits_anew(scan, light, emission);
+        let mut all = all();
+        if all.len() == MOST_KNOWN {
+            all.remove(0);
+        }
+        let sensor = (self, scan.clone(), light.clone(), emission.clone());
+        all.push(Known { sensor, limits: limits.clone() });
+        limits
+    }
+
+    fn limits_anew(self, scan: &Scan, light: &Light, emission: &Emission) -> Vec<Limit> {
         let Some(class) = Class1::at(light.wavelength) else { return Vec::new() };
         let Self { distance, count_groups } = self;
         let all = [Condition::bare_eye(distance), class.telescope()].map(|condition| {
