@@ -102,6 +102,8 @@ pub(in crate::decode) fn odds(
         true => Peak::best((own.lag - width..=own.lag + width).map(peak)),
         false => Peak::best(question.lags.iter().map(|lag| peak(*lag))),
     }?;
+    // Where no lag has evidence, the one with most marks is shown.
+    let best = if best.odds.is_finite() { best } else { peak(own.lag) };
     let has_label = sent.bits_of_payload() > 1;
     let contradiction = has_label.then(|| residual.contradiction(&gate, best.lag, &places, &prior));
     Some(Odds {

@@ -25,7 +25,7 @@ pub(super) struct Odds {
     /// Marks that no fuller return claims, and how many of them are lit.
     unclaimed_marks: u32,
     lit_marks: u32,
-    /// Null where chance gives as many marks.
+    /// Null where there is one mark, or no more than chance gives.
     evidence_nats: Option<f32>,
     prior_nats: f64,
     threshold_nats: f64,
@@ -75,7 +75,9 @@ impl Odds {
                     nats(evidence.into()),
                     nats(self.prior_nats)
                 ),
-                _ => format!("none at {at} m, where chance gives as many marks"),
+                _ => {
+                    format!("none at {at} m: evidence takes two marks, and more than chance gives")
+                }
             },
         );
         let mut expected: Vec<String> =
@@ -120,7 +122,7 @@ impl Odds {
     pub fn refusal(&self) -> String {
         let (at, threshold) = (short(self.range_m), self.threshold_nats);
         match self.odds() {
-            None => "chance gives as many anywhere".to_owned(),
+            None => "evidence takes two marks, and more than chance gives".to_owned(),
             Some(odds) if odds < threshold => format!(
                 "the best odds, at {at} m, are {} nats, and {} are needed",
                 nats(odds),
