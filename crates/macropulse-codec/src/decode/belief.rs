@@ -72,7 +72,7 @@ impl Surroundings {
 /// *Chance* lights a place with the density d, be it a mark or not. d is not known: it has the distribution
 /// Beta(1, 1/d₀ − 1), whose mean is d₀. *Light* leaves the other places to chance. It is bright with the probability
 /// w = ¼, and then shows every mark; else it shows each mark with a probability q, log-uniform on (0, 1). It shows
-/// two marks at least, if there are as many: one alone has no distance to another that could tell the word.
+/// at least two marks of a word that has two: a single mark has no distance to another, which would tell the word.
 ///
 /// With k of n marks and t of m other places lit, the probabilities of one such outcome are, with b = 1/d₀ − 1,
 ///

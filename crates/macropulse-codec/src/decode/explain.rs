@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::belief::{Hypothesis, Marks};
 use super::check::check_lags;
 use super::matched::{self, Odds, Question};
-use super::{Error, Method, Receiver, Reject, Returns};
+use super::{Error, Method, Receiver, Reject, Returns, of_channel};
 use crate::code::Codebook;
 use crate::shot_log::ShotLog;
 use crate::ticks::Ticks;
@@ -43,13 +43,13 @@ pub struct Explanation {
     pub ticks: Vec<(i64, bool)>,
     /// Share of places in that time at which a mark would be found by chance.
     pub density: f64,
-    /// What the rule of belief says of it, if the receiver is a matched one and the shot has marks. Lags are those of `found`.
+    /// Odds of the lags of `found`; `None` if the receiver is no matched one, or nothing can be found of the shot.
     pub odds: Option<Odds>,
     /// The lag with most marks, and how many.
     pub peak: Option<(i64, u16)>,
     /// The best lag that is not at the peak, more than the width of a mark away from it.
     pub sidelobe: Option<(i64, u16)>,
-    /// What the receiver decided.
+    /// The decision of the receiver.
     pub verdict: Verdict,
     /// Other shots whose light is in this shot's time.
     pub others: Vec<OtherLight>,
@@ -257,7 +257,13 @@ impl<'a> Bench<'a> {
         (0..self.lags()).map(count).collect()
     }
 
-    /// What the rule of belief says of the shot, if the receiver asks it.
+    /// The absolute tick in which light of `shot` arrives after `tof` seconds.
+    fn arrives(&self, shot: usize, tof: f64) -> i64 {
+        let arrives_fs = self.log.fired_at_fs[shot] + time::fs_from_s(tof);
+        arrives_fs.div_euclid(self.receiver.tick_fs)
+    }
+
+    /// The odds of the shot at each lag; `None` of a receiver that is no matched one.
     fn odds(
         &self,
         ticks: &Ticks,
@@ -266,20 +272,16 @@ impl<'a> Bench<'a> {
     ) -> Option<Odds> {
         let Method::Matched(correlation, _) = &self.receiver.method else { return None };
         let (early, _) = self.window();
-        let (epoch, channel) = (ticks.epoch, self.log.channel[self.shot]);
+        let channel = self.log.channel[self.shot];
         let (shots, log) =
             self.log.each_channel().into_iter().find(|(_, log)| log.channel[0] == channel)?;
-        let is_of_channel = |at: &usize| ticks.channel.get(*at).is_none_or(|of| *of == channel);
-        let tick = (0..ticks.len()).filter(is_of_channel).map(|at| ticks.tick[at]).collect();
-        let ticks = Ticks { epoch, tick, ..Ticks::default() };
+        let ticks = of_channel(ticks, channel);
         let hypothesis = |shot: usize, lag: i64, lit: u16, of: u16| {
             let marks = Marks { lit: lit.into(), of: of.into() };
             Some(Hypothesis { shot: shots.binary_search(&shot).ok()?, lag: lag - early, marks })
         };
-        let lag = |shot: usize, tof: f64| {
-            let arrives_fs = self.log.fired_at_fs[shot] + time::fs_from_s(tof);
-            arrives_fs.div_euclid(self.receiver.tick_fs) - self.receiver.fired(self.log, shot)
-        };
+        let lag =
+            |shot: usize, tof: f64| self.arrives(shot, tof) - self.receiver.fired(self.log, shot);
         let others = all.each().filter(|one| one.shot != self.shot);
         let others = others
             .filter_map(|one| hypothesis(one.shot, lag(one.shot, one.tof), one.peak, one.marks));
@@ -314,8 +316,7 @@ impl<'a> Bench<'a> {
         if self.log.channel[other] != self.log.channel[self.shot] {
             return None;
         }
-        let arrives_fs = self.log.fired_at_fs[other] + time::fs_from_s(tof);
-        let begins = arrives_fs.div_euclid(self.receiver.tick_fs) - self.fired;
+        let begins = self.arrives(other, tof) - self.fired;
         let (early, late) = self.window();
         let own: Vec<i64> = peak
             .map(|(lag, _)| self.marks.iter().map(|mark| lag + i64::from(*mark)).collect())

@@ -385,16 +385,8 @@ impl Receiver {
         let mut found: Vec<Return> = Vec::new();
         let mut returns = Returns::default();
         for (shots, log) in log.each_channel() {
-            let channel = log.channel[0];
-            let from = ticks.channel.partition_point(|other| *other < channel);
-            let to = ticks.channel.partition_point(|other| *other <= channel);
-            let seen = Ticks {
-                epoch: ticks.epoch,
-                tick: ticks.tick[from..to].to_vec(),
-                channel: Vec::new(),
-                amplitude: ticks.amplitude.get(from..to).map(<[f32]>::to_vec).unwrap_or_default(),
-            };
-            let of_channel = self.decode_ticks(codebook, &log, &seen)?;
+            let of_channel =
+                self.decode_ticks(codebook, &log, &of_channel(ticks, log.channel[0]))?;
             found.extend(of_channel.each().map(|one| Return { shot: shots[one.shot], ..one }));
             returns.add_rejects(&of_channel);
         }
@@ -433,6 +425,21 @@ impl Receiver {
     fn tof(&self, late: f64) -> impl Fn(i64, i64) -> f64 + use<> {
         let (tick_fs, late) = (self.tick_fs, late * time::s_from_fs(self.tick_fs));
         move |fired_at_fs, tick| time::s_from_fs(tick * tick_fs - fired_at_fs) + late
+    }
+}
+
+/// The ticks of one `channel`; all where no tick has a channel.
+fn of_channel(ticks: &Ticks, channel: u16) -> Ticks {
+    if ticks.channel.is_empty() {
+        return ticks.clone();
+    }
+    let from = ticks.channel.partition_point(|other| *other < channel);
+    let to = ticks.channel.partition_point(|other| *other <= channel);
+    Ticks {
+        epoch: ticks.epoch,
+        tick: ticks.tick[from..to].to_vec(),
+        channel: Vec::new(),
+        amplitude: ticks.amplitude.get(from..to).map(<[f32]>::to_vec).unwrap_or_default(),
     }
 }
 

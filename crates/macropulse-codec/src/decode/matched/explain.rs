@@ -1,4 +1,4 @@
-//! What the rule of belief says of every lag of one shot.
+//! The odds of one shot at every lag, by the rule of belief.
 
 use std::ops::Range;
 
@@ -13,8 +13,9 @@ use crate::decode::{Correlation, Receiver};
 use crate::kernels::places_of;
 use crate::{ShotLog, Ticks};
 
-/// What the [rule of belief](belief) says of a shot, where the returns of all other shots are known. Returns that are
-/// fuller than its best lag claim their light. All numbers are in nats.
+/// The odds of one shot at many lags, by the [rule of belief](belief), in nats.
+///
+/// The returns of all other shots are known. Those that are fuller than the shot claim the places of their marks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Odds {
     /// Evidence for light at each lag, ascending as asked for; 0 where there is none.
@@ -27,14 +28,14 @@ pub struct Odds {
     pub best: Weighed,
 }
 
-/// What is weighed at one lag.
+/// Evidence, prior and label of a shot at one lag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weighed {
     /// Ticks from firing to its light.
     pub lag: i64,
     /// Its marks that no fuller return claims, and how many of them are lit.
     pub marks: Marks,
-    /// Evidence of these marks; −∞ where chance gives as many.
+    /// Evidence of these marks; −∞ for a single mark, and for no more marks than chance gives.
     pub evidence: f64,
     /// ln π.
     pub prior: f64,
@@ -45,19 +46,19 @@ pub struct Weighed {
     pub contradiction: Option<f64>,
 }
 
-/// What is asked about a shot.
+/// A shot, and the light that competes with its own.
 pub(in crate::decode) struct Question {
-    /// The light that others compete with: that of the shot, at the lag that was accepted or has most marks.
+    /// The light of the shot, at the lag that was accepted or else has most marks.
     pub own: Hypothesis,
     /// Returns of other shots.
     pub others: Vec<Hypothesis>,
     /// The lags to weigh, ascending.
     pub lags: Vec<i64>,
-    /// Whether `own` was accepted, so that no other lag is the best one.
+    /// Whether `own` was accepted. Then the best lag is its own.
     pub is_accepted: bool,
 }
 
-/// What the rule of belief says of a shot, by all `ticks` of its channel. `None` where there is no mark or no lag.
+/// The odds of a shot, by all `ticks` of its channel. `None` if it has no mark, or there is no lag.
 pub(in crate::decode) fn odds(
     receiver: &Receiver,
     correlation: &Correlation,
@@ -96,13 +97,14 @@ pub(in crate::decode) fn odds(
     places_of(sent.word(shot), sent.lit_bits(shot), &mut places);
     let (gate, threshold) = (residual.gate(shot), belief::threshold(correlation.false_alarm));
     let peak = |lag: i64| residual.peak(&gate, lag, &places, &prior);
-    let evidence = question.lags.iter().map(|lag| peak(*lag).evidence.max(0.0) as f32).collect();
+    let peaks: Vec<Peak> = question.lags.iter().copied().map(peak).collect();
+    let evidence = peaks.iter().map(|peak| peak.evidence.max(0.0) as f32).collect();
     let best = match question.is_accepted {
         // Its time is known to some ticks.
         true => Peak::best((own.lag - width..=own.lag + width).map(peak)),
-        false => Peak::best(question.lags.iter().map(|lag| peak(*lag))),
+        false => Peak::best(peaks.into_iter()),
     }?;
-    // Where no lag has evidence, the one with most marks is shown.
+    // If no lag has evidence, the best one is that with most marks.
     let best = if best.odds.is_finite() { best } else { peak(own.lag) };
     let has_label = sent.bits_of_payload() > 1;
     let contradiction = has_label.then(|| residual.contradiction(&gate, best.lag, &places, &prior));

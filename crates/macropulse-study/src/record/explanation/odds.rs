@@ -80,9 +80,9 @@ impl Odds {
                 }
             },
         );
-        let mut expected: Vec<String> =
-            self.expected.iter().map(|expected| short(expected.range_m)).collect();
-        expected.sort_by(|one, other| one.len().cmp(&other.len()).then(one.cmp(other)));
+        let mut ranges: Vec<f64> = self.expected.iter().map(|expected| expected.range_m).collect();
+        ranges.sort_by(f64::total_cmp);
+        let mut expected: Vec<String> = ranges.into_iter().map(short).collect();
         expected.dedup();
         columns.push(
             "prior",

@@ -357,7 +357,8 @@ pub(super) mod tests {
             "odds": {
                 "lag_ticks": 41, "range_m": 30.5, "unclaimed_marks": 4, "lit_marks": 4,
                 "evidence_nats": 9.5, "prior_nats": -1.1, "threshold_nats": 6.9,
-                "label_contradiction_nats": null, "reach_ticks": [40, 52], "expected": [{ "lag_ticks": 40, "range_m": 30.1 }],
+                "label_contradiction_nats": null, "reach_ticks": [40, 52],
+                "expected": [{ "lag_ticks": 40, "range_m": 30.1 }],
             },
             "peak": { "lag_ticks": 41, "range_m": 30.5, "marks": 4 },
             "sidelobe": null, "others": [],
