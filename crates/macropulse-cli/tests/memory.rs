@@ -25,13 +25,18 @@ fn memory(desk: &Desk, sensor: &str, scene: &str) -> (f64, f64) {
     desk.put("s.toml", &text);
     let said = desk.json(&format!("check s.toml --json -j {THREADS} --memory-limit 1TB"));
     let estimated = said["memory"]["total_bytes"].as_f64().unwrap();
+    let line = format!("simulate {sensor} {scene} -q -o out --memory-limit 1TB -j {THREADS}");
+    (estimated, taken(desk, &line))
+}
+
+/// The most memory that a run of the program takes, bytes.
+fn taken(desk: &Desk, line: &str) -> f64 {
     let mut command = Command::new("python3");
     command.args(["-c", MEASURE, env!("CARGO_BIN_EXE_macropulse")]).current_dir(desk.path());
-    command.args(["simulate", sensor, scene, "-q", "-o", "out", "--memory-limit", "1TB"]);
-    let ran = command.args(["-j", &THREADS.to_string()]).output().unwrap();
-    assert!(ran.status.success(), "{sensor}: {}", String::from_utf8_lossy(&ran.stderr));
-    let taken: f64 = String::from_utf8(ran.stdout).unwrap().trim().parse().unwrap();
-    (estimated, taken * 1024.0)
+    let ran = command.args(line.split_whitespace()).output().unwrap();
+    assert!(ran.status.success(), "{line}: {}", String::from_utf8_lossy(&ran.stderr));
+    let kibibytes: f64 = String::from_utf8(ran.stdout).unwrap().trim().parse().unwrap();
+    kibibytes * 1024.0
 }
 
 #[test]
@@ -167,12 +172,95 @@ fn a_cloud_is_not_read_beyond_the_limit() {
     assert!(std::fs::metadata(desk.path().join("same.laz")).unwrap().len() < 100_000);
     for name in ["same.laz", "same.npy", "same.xyz"] {
         for line in [format!("convert {name} -o out.ply"), format!("view {name} -o out.html")] {
-            let ran = desk.run(&format!("{line} --memory-limit 80MB"));
+            let ran = desk.run(&format!("{line} --memory-limit 60MB"));
             assert_eq!(ran.code, Some(2), "{line}: {}", ran.err);
             assert!(ran.err.contains("points take about"), "{line}: {}", ran.err);
             assert!(ran.err.contains("allow more memory (--memory-limit)"), "{}", ran.err);
         }
-        let ran = desk.run(&format!("convert {name} -o {name}.ply --memory-limit 120MB"));
+        let ran = desk.run(&format!("convert {name} -o {name}.ply --memory-limit 80MB"));
         assert_eq!(ran.code, Some(0), "{}", ran.err);
+    }
+}
+
+/// What a file holds beside the points takes no memory: the files here are larger than the limit.
+#[test]
+fn a_cloud_is_read_a_part_at_a_time() {
+    const POINTS: usize = 100_000;
+    const BESIDE: usize = 1000;
+    let desk = Desk::new();
+    let point = [1.0_f32, 2.0, 2.0].map(f32::to_le_bytes).concat();
+    let beside = vec![b'7'; BESIDE];
+    let pcd = format!(
+        "VERSION 0.7\nFIELDS x y z more\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 {BESIDE}\n\
+         WIDTH {POINTS}\nHEIGHT 1\nDATA binary\n"
+    );
+    let points = [&point[..], &beside].concat().repeat(POINTS);
+    std::fs::write(desk.path().join("a.pcd"), [pcd.as_bytes(), &points].concat()).unwrap();
+    let ply = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {POINTS}\nproperty float x\n\
+         property float y\nproperty float z\nproperty list ushort uchar more\nend_header\n"
+    );
+    let count = (BESIDE as u16).to_le_bytes();
+    let points = [&point[..], &count, &beside].concat().repeat(POINTS);
+    std::fs::write(desk.path().join("a.ply"), [ply.as_bytes(), &points].concat()).unwrap();
+    let text = "7".repeat(BESIDE);
+    desk.put("a.csv", &format!("x,y,z,more\n{}", format!("1,2,2,{text}\n").repeat(POINTS)));
+    desk.put("a.xyz", &format!("x y z more\n{}", format!("1 2 2 {text}\n").repeat(POINTS)));
+    for name in ["a.pcd", "a.ply", "a.csv", "a.xyz"] {
+        let line = format!("convert {name} -o {name}.npy -q --memory-limit 60MB");
+        let taken = taken(&desk, &line);
+        assert!(taken < 60e6, "{name}: {:.1} MB", taken * 1e-6);
+    }
+}
+
+/// Points with every attribute take no more than they are counted for.
+#[test]
+fn points_take_what_is_left_for_them() {
+    use macropulse::formats::{Format, Names, write_cloud};
+    use macropulse::points::{Outcome, PointCloud, Surfaces, Truth};
+
+    const POINTS: usize = 500_000;
+    let desk = Desk::new();
+    let metres = || (0..POINTS).map(|at| 3.0 + at as f32 * 1e-4).collect::<Vec<f32>>();
+    let numbers = || (0..POINTS).map(|at| at as u16 % 100).collect::<Vec<u16>>();
+    let ones = || vec![1_u8; POINTS];
+    let returns = Surfaces {
+        range: metres(),
+        object: numbers(),
+        material: numbers(),
+        cosine: vec![0.5; POINTS],
+        outcome: vec![Outcome::Right; POINTS],
+    };
+    let cloud = PointCloud {
+        row: numbers(),
+        column: numbers(),
+        x: metres(),
+        y: metres(),
+        z: metres(),
+        range: metres(),
+        intensity: metres(),
+        time_ns: (0..POINTS).map(|at| at as f64 * 0.1).collect(),
+        peak: numbers(),
+        marks: numbers(),
+        margin: numbers(),
+        return_number: ones(),
+        number_of_returns: ones(),
+        truth: Truth { returns, ..Truth::default() },
+        ..PointCloud::default()
+    };
+    for (format, name) in [(Format::Npy, "all.npy"), (Format::Csv, "all.csv")] {
+        write_cloud(format, &cloud, &Names::default(), &desk.path().join(name)).unwrap();
+    }
+    let left = 30e6 + 130.0 * POINTS as f64;
+    for (from, to) in [
+        ("all.npy", "all.las"),
+        ("all.npy", "all.e57"),
+        ("all.csv", "csv.npy"),
+        ("all.las", "las.laz"),
+        ("all.e57", "e57.html"),
+    ] {
+        let verb = if to.ends_with("html") { "view" } else { "convert" };
+        let taken = taken(&desk, &format!("{verb} {from} -o {to} -q"));
+        assert!(taken < left, "{from} to {to}: {:.1} of {:.1} MB", taken * 1e-6, left * 1e-6);
     }
 }

@@ -1,18 +1,14 @@
 //! Clouds from files, whatever their format.
 
 use super::about::About;
+use super::cloud_file::CloudFile;
 use super::mcap::Messages;
 use super::{
     CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57_reader, kitti, las_reader, npy,
     pcd_reader, ply_reader, ptx_reader,
 };
-use crate::opened;
 use crate::points::PointCloud;
-use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-
-/// Most bytes of a file with one cloud, which is read at once.
-const MOST_BYTES: u64 = 8 << 30;
 
 /// How the clouds of a file are read.
 #[derive(Debug, Clone, Default)]
@@ -177,58 +173,32 @@ impl Iterator for Clouds {
 }
 
 impl Source {
-    /// What is read at once, in a format without messages.
+    /// The clouds of a file in a format without messages.
     fn of_file(path: &Path, kind: FileKind, room: CloudRoom) -> Result<Self, Error> {
-        let read = || whole(path, kind).map_err(|cause| Error::read(path, cause));
+        let mut file = CloudFile::open(path).map_err(|cause| Error::read(path, cause))?;
         let invalid = |fault| Error::invalid(path, kind.name(), fault);
-        let size = std::fs::metadata(path).map_err(|cause| Error::read(path, cause))?.len();
-        let room = room.beside(size).map_err(invalid)?;
         let format = match kind {
             FileKind::Written(format) => format,
             FileKind::Ptx => {
-                let scans = ptx_reader::PtxScans::open(read()?, room).map_err(invalid)?;
+                let scans = ptx_reader::PtxScans::open(file, room).map_err(invalid)?;
                 return Ok(Self::Scans(Box::new(scans)));
             }
         };
         let parsed = match format {
-            Format::Pcd => pcd_reader::parse(&read()?, room),
-            Format::Ply => ply_reader::parse(&read()?, room),
-            Format::Las | Format::Laz => las_reader::parse(read()?, room),
+            Format::Pcd => pcd_reader::parse(&mut file, room),
+            Format::Ply => ply_reader::parse(&mut file, room),
+            Format::Las | Format::Laz => las_reader::parse(file, room),
             Format::E57 => {
-                let scans = e57_reader::E57Scans::open(read()?, room).map_err(invalid)?;
+                let scans = e57_reader::E57Scans::open(file, room).map_err(invalid)?;
                 return Ok(Self::Scans(Box::new(scans)));
             }
-            Format::Npy => npy::parse(&read()?, room),
-            Format::Csv => csv_reader::parse(&read()?, room),
-            Format::Kitti => kitti::parse(&read()?, kitti::Floats::of_name(path), room),
+            Format::Npy => npy::parse(&mut file, room),
+            Format::Csv => csv_reader::parse(&mut file, room),
+            Format::Kitti => kitti::parse(&mut file, kitti::Floats::of_name(path), room),
             _ => return Err(Error::unreadable(path)),
         };
         let (cloud, about) = parsed.map_err(invalid)?;
         Ok(Self::One { cloud: Some(Box::new(cloud)), about: Box::new(about) })
-    }
-}
-
-/// Bytes of a file by which it is told whether it may be of its format.
-const BEGINNING: usize = 4096;
-
-/// All bytes of the file at `path`; or its beginning, if that is none of a file of this kind.
-fn whole(path: &Path, kind: FileKind) -> io::Result<Vec<u8>> {
-    let mut begins = Vec::with_capacity(BEGINNING);
-    opened::file(path, MOST_BYTES)?.take(BEGINNING as u64).read_to_end(&mut begins)?;
-    if may_begin(&begins, kind) { opened::bytes(path, MOST_BYTES) } else { Ok(begins) }
-}
-
-/// Whether a file of this kind may begin so.
-fn may_begin(bytes: &[u8], kind: FileKind) -> bool {
-    let FileKind::Written(format) = kind else { return !bytes.starts_with(b"\0") };
-    match format {
-        Format::Las | Format::Laz => bytes.starts_with(b"LASF"),
-        Format::E57 => bytes.starts_with(b"ASTM-E57"),
-        Format::Npy => bytes.starts_with(b"\x93NUMPY"),
-        Format::Ply => bytes.starts_with(b"ply"),
-        // Text at first.
-        Format::Pcd | Format::Csv => !bytes.starts_with(b"\0"),
-        _ => true,
     }
 }
 
@@ -246,7 +216,7 @@ pub fn read_cloud(path: &Path) -> Result<PointCloud, Error> {
 /// # Errors
 /// [`Error::Read`] if the file cannot be read, [`Error::Invalid`] if it is no such PCD file.
 pub fn read_pcd(path: &Path) -> Result<PointCloud, Error> {
-    let bytes = opened::bytes(path, MOST_BYTES).map_err(|cause| Error::read(path, cause))?;
-    let parsed = pcd_reader::parse(&bytes, CloudRoom::default());
+    let mut file = CloudFile::open(path).map_err(|cause| Error::read(path, cause))?;
+    let parsed = pcd_reader::parse(&mut file, CloudRoom::default());
     parsed.map(|(cloud, _)| cloud).map_err(|fault| Error::invalid(path, Format::Pcd.name(), fault))
 }

@@ -3,11 +3,13 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
+use super::cloud_file::{CloudFile, LONGEST_LINE};
 use super::csv::unquoted;
 use super::headings::Meaning;
 use super::table::{Digits, Gathered, Record, check_coordinates};
 use crate::points::{NO_OBJECT, Outcome, PointCloud};
 use ::csv::{ReaderBuilder, StringRecord};
+use std::io::Read;
 
 /// What the columns hold where no line names them. Further columns are not known.
 const WITHOUT_HEADINGS: [Attribute; 4] =
@@ -23,16 +25,19 @@ const MOST_COLUMNS: usize = 4096;
 /// before the first point. A first line with one whole number, the count of points, is passed over.
 /// Columns whose headings we do not know are skipped, and an empty cell is no value. Objects and
 /// materials may be names or numbers; names are numbered in the order in which they come.
-pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "it is not text in UTF-8")?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let sheet = Sheet::of(text).ok_or("it is empty; its first line names the columns")?;
+pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
+    let sheet = Sheet::of(file)?.ok_or("it is empty; its first line names the columns")?;
     let points = match sheet.separator {
-        Separator::Spaces => sheet.spaced(room),
-        Separator::One(byte) => sheet.separated(byte, room),
+        Separator::Spaces => sheet.spaced(file, room),
+        Separator::One(byte) => sheet.separated(byte, file, room),
     }?;
     let Points { gathered, mut about, .. } = points;
     Ok((gathered.cloud(&mut about)?, about))
+}
+
+/// The text of a line.
+fn text(line: &[u8]) -> Result<&str, String> {
+    std::str::from_utf8(line).map_err(|_| "it is not text in UTF-8".to_owned())
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -66,18 +71,24 @@ impl Separator {
 }
 
 /// Where the points or their headings begin.
-struct Sheet<'a> {
-    text: &'a str,
+struct Sheet {
     /// Lines before that.
     before: usize,
     separator: Separator,
     has_headings: bool,
 }
 
-impl<'a> Sheet<'a> {
-    fn of(text: &'a str) -> Option<Self> {
-        let mut rest = text;
-        for (before, line) in text.lines().enumerate() {
+impl Sheet {
+    /// Reads up to where the points or their headings begin.
+    fn of(file: &mut CloudFile) -> Result<Option<Self>, String> {
+        for before in 0.. {
+            let begin = file.at();
+            let Some(line) = file.line()? else { break };
+            let all = text(line)?;
+            let line = match before {
+                0 => all.trim_start_matches('\u{feff}'),
+                _ => all,
+            };
             let comment = line.strip_prefix('#').or_else(|| line.strip_prefix("//"));
             let bare = comment.unwrap_or(line).trim();
             let separator = Separator::of(bare);
@@ -90,41 +101,62 @@ impl<'a> Sheet<'a> {
             };
             if begins {
                 let has_headings = !cells().all(is_number);
-                let text =
-                    if comment.is_some() { rest.trim_start_matches(['#', '/']) } else { rest };
-                return Some(Self { text, before, separator, has_headings });
+                let first = line.trim_start_matches(['#', '/']);
+                let passed = all.len() - if comment.is_some() { first.len() } else { line.len() };
+                file.go_to(begin + passed as u64)?;
+                return Ok(Some(Self { before, separator, has_headings }));
             }
-            rest = rest.split_once('\n').map_or("", |(_, behind)| behind);
         }
-        None
+        Ok(None)
     }
 
     /// Points whose cells are apart by spaces, and stand in no quotes.
-    fn spaced(&self, room: CloudRoom) -> Result<Points, String> {
-        let mut lines = self.text.lines().enumerate().filter(|(at, line)| {
+    fn spaced(&self, file: &mut CloudFile, room: CloudRoom) -> Result<Points, String> {
+        let first = file.line()?.unwrap_or_default().to_vec();
+        let cells = || text(&first).map(str::split_whitespace);
+        let mut points = Points::new(cells()?, self, room)?;
+        if !self.has_headings {
+            points.take(cells()?).map_err(|fault| format!("line {}: {fault}", self.before + 1))?;
+        }
+        for number in self.before + 2.. {
+            let Some(line) = file.line()? else { break };
+            let line = text(line)?;
             let is_comment = line.starts_with('#') || line.starts_with("//");
-            *at == 0 || !(is_comment || line.trim().is_empty())
-        });
-        let first = lines.clone().next().map_or("", |(_, line)| line);
-        let mut points = Points::new(first.split_whitespace(), self, room)?;
-        for (at, line) in lines.by_ref().skip(usize::from(self.has_headings)) {
-            let taken = points.take(line.split_whitespace());
-            taken.map_err(|fault| format!("line {}: {fault}", self.before + at + 1))?;
+            if !is_comment && !line.trim().is_empty() {
+                let taken = points.take(line.split_whitespace());
+                taken.map_err(|fault| format!("line {number}: {fault}"))?;
+            }
         }
         Ok(points)
     }
 
     /// Points whose cells are apart by a sign, and may stand in quotes.
-    fn separated(&self, separator: u8, room: CloudRoom) -> Result<Points, String> {
+    fn separated(
+        &self,
+        separator: u8,
+        file: &mut CloudFile,
+        room: CloudRoom,
+    ) -> Result<Points, String> {
         let mut reader = ReaderBuilder::new()
             .delimiter(separator)
             .has_headers(false)
             .flexible(true)
             .comment(Some(b'#'))
-            .from_reader(self.text.as_bytes());
+            .from_reader(file.take(LONGEST_LINE));
         let mut record = StringRecord::new();
         let mut next = |record: &mut StringRecord| {
-            reader.read_record(record).map_err(|_| "it is not text in UTF-8".to_owned())
+            // A quote that is not closed would take in all that follows.
+            reader.get_mut().set_limit(LONGEST_LINE);
+            let read = reader.read_record(record);
+            let is_there = read.map_err(|_| "it is not text in UTF-8")?;
+            let limited = reader.get_ref();
+            if limited.limit() == 0 && limited.get_ref().rest() > 0 {
+                return Err(format!(
+                    "line {}: a quote is not closed, or a point takes more than {LONGEST_LINE} bytes",
+                    self.before as u64 + record.position().map_or(0, ::csv::Position::line)
+                ));
+            }
+            Ok(is_there)
         };
         next(&mut record)?;
         let mut points = Points::new(record.iter(), self, room)?;
@@ -260,7 +292,7 @@ mod tests {
     use super::*;
 
     fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-        super::parse(bytes, CloudRoom::default())
+        super::parse(&mut CloudFile::of_bytes(bytes), CloudRoom::default())
     }
 
     #[test]

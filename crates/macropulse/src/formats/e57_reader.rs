@@ -3,6 +3,7 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
+use super::cloud_file::CloudFile;
 use super::clouds::Scans;
 use super::e57::{GPS_BEHIND_S, NAMESPACE, name};
 use super::left_out::NoPoint;
@@ -11,11 +12,10 @@ use crate::points::{PointCloud, Viewpoint};
 use ::e57::{
     E57Reader, PointCloud as Scan, Record, RecordDataType, RecordName, RecordValue, Transform,
 };
-use std::io::Cursor;
 
 /// The clouds of an E57 file, one for each of its scans, in the frame of the scanner.
 pub(super) struct E57Scans {
-    reader: E57Reader<Cursor<Vec<u8>>>,
+    reader: E57Reader<CloudFile>,
     /// Bytes of the file.
     size: u64,
     scans: Vec<Scan>,
@@ -25,9 +25,9 @@ pub(super) struct E57Scans {
 
 impl E57Scans {
     /// Reads what the file says of its scans.
-    pub fn open(bytes: Vec<u8>, room: CloudRoom) -> Result<Self, String> {
-        let size = bytes.len() as u64;
-        let reader = E57Reader::new(Cursor::new(bytes)).map_err(|why| told(&why))?;
+    pub fn open(file: CloudFile, room: CloudRoom) -> Result<Self, String> {
+        let size = file.length();
+        let reader = E57Reader::new(file).map_err(|why| told(&why))?;
         let scans = reader.pointclouds();
         if scans.is_empty() {
             return Err("it has no scan".to_owned());
@@ -70,7 +70,7 @@ fn told(error: &::e57::Error) -> String {
 }
 
 fn read(
-    reader: &mut E57Reader<Cursor<Vec<u8>>>,
+    reader: &mut E57Reader<CloudFile>,
     scan: &Scan,
     about: &mut About,
 ) -> Result<PointCloud, String> {
@@ -278,6 +278,7 @@ mod tests {
     use super::super::{Names, sample_cloud};
     use super::*;
     use ::e57::{DateTime, E57Writer, Quaternion, RawValues, Translation};
+    use std::io::Cursor;
 
     #[test]
     fn records_that_the_file_cannot_hold_are_refused() {
@@ -297,7 +298,7 @@ mod tests {
     }
 
     fn first(bytes: Vec<u8>) -> Result<PointCloud, String> {
-        E57Scans::open(bytes, CloudRoom::default())?.advance().unwrap()
+        E57Scans::open(CloudFile::of_bytes(&bytes), CloudRoom::default())?.advance().unwrap()
     }
 
     /// The records of a scan, and the values of its points.
@@ -347,7 +348,7 @@ mod tests {
                 vec![[877_455_581, 1, 2].map(RecordValue::ScaledInteger).to_vec()],
             ),
         ]);
-        let mut scans = E57Scans::open(bytes, CloudRoom::default()).unwrap();
+        let mut scans = E57Scans::open(CloudFile::of_bytes(&bytes), CloudRoom::default()).unwrap();
         assert_eq!(scans.count(), 2);
         let one = scans.advance().unwrap().unwrap();
         assert_eq!((one.position(0), one.returns()), (far, 2));
@@ -379,7 +380,9 @@ mod tests {
             values
         };
         let points = vec![point(1.0, 0, 0), point(0.0, 2, 0), point(3.0, 1, 0), point(4.0, 0, 1)];
-        let mut scans = E57Scans::open(file(&[(records, points)]), CloudRoom::default()).unwrap();
+        let mut scans =
+            E57Scans::open(CloudFile::of_bytes(&file(&[(records, points)])), CloudRoom::default())
+                .unwrap();
         let read = scans.advance().unwrap().unwrap();
         assert_eq!(read.x, [1.0, 4.0]);
         assert!(read.intensity[0] == 0.5 && read.intensity[1].is_nan());
@@ -411,7 +414,7 @@ mod tests {
         let cloud = sample_cloud();
         let objects = ["car <red> & more".to_owned()];
         let bytes = encode(&cloud, &Names { objects: &objects, materials: &[] }).unwrap();
-        let mut scans = E57Scans::open(bytes, CloudRoom::default()).unwrap();
+        let mut scans = E57Scans::open(CloudFile::of_bytes(&bytes), CloudRoom::default()).unwrap();
         let read = scans.advance().unwrap().unwrap();
         assert!(scans.advance().is_none() && scans.about().left_out.is_empty());
         assert_eq!((read.scan, read.rows, read.columns, read.pick), (3, 2, 3, cloud.pick));

@@ -4,6 +4,7 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::{Attribute, Value, returns};
+use super::cloud_file::CloudFile;
 use super::number::Kind;
 use super::table::{self, Layout};
 use crate::points::PointCloud;
@@ -60,20 +61,34 @@ impl Floats {
         }
     }
 
+    /// Bytes of a point.
+    fn stride(self) -> usize {
+        self.attributes().len() * Kind::F4.size()
+    }
+
     /// Whether the bytes look like points of this number of floats: coordinates on Earth, no negative
     /// intensity, and rings that are small whole numbers.
-    fn fit(self, bytes: &[u8]) -> bool {
-        let stride = self.attributes().len() * Kind::F4.size();
-        let is_point = |point: &[u8]| {
+    fn fit(self, file: &mut CloudFile) -> Result<bool, String> {
+        if !file.length().is_multiple_of(self.stride() as u64) {
+            return Ok(false);
+        }
+        file.go_to(0)?;
+        let mut point = vec![0; self.stride()];
+        while file.fill(&mut point)? {
             let numbers = point.chunks_exact(Kind::F4.size()).map(|bytes| Kind::F4.read(bytes));
-            self.attributes().iter().zip(numbers).all(|(attribute, number)| match attribute {
-                // A point that has none is NaN.
-                Attribute::Intensity => number.is_nan() || number >= 0.0,
-                Attribute::Ring => number.fract() == 0.0 && (0.0..MOST_RINGS).contains(&number),
-                _ => number.is_nan() || number.abs() < FARTHEST_M,
-            })
-        };
-        bytes.len().is_multiple_of(stride) && bytes.chunks_exact(stride).all(is_point)
+            let fits = self.attributes().iter().zip(numbers).all(|(attribute, number)| {
+                match attribute {
+                    // A point that has none is NaN.
+                    Attribute::Intensity => number.is_nan() || number >= 0.0,
+                    Attribute::Ring => number.fract() == 0.0 && (0.0..MOST_RINGS).contains(&number),
+                    _ => number.is_nan() || number.abs() < FARTHEST_M,
+                }
+            });
+            if !fits {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -86,7 +101,7 @@ const MOST_RINGS: f64 = 1024.0;
 /// The cloud of a file whose name stands for this number of floats. If its points look like the other
 /// number alone, they are read as that.
 pub(super) fn parse(
-    bytes: &[u8],
+    file: &mut CloudFile,
     by_name: Floats,
     room: CloudRoom,
 ) -> Result<(PointCloud, About), String> {
@@ -94,22 +109,27 @@ pub(super) fn parse(
         Floats::Four => Floats::Five,
         Floats::Five => Floats::Four,
     };
-    let floats = [by_name, other].into_iter().find(|floats| floats.fit(bytes));
-    let floats = floats.ok_or_else(|| {
-        let length = bytes.len();
-        format!(
-            "its {length} bytes are neither points of four floats (x, y, z, intensity) nor of five \
-             (and the ring): was it cut short, or does it hold other numbers? Name a file of four \
-             floats `.bin`, one of five `.pcd.bin`, and save other numbers as .npy or .csv"
-        )
-    })?;
+    let floats = match by_name.fit(file)? {
+        true => by_name,
+        false if other.fit(file)? => other,
+        false => {
+            let length = file.length();
+            return Err(format!(
+                "its {length} bytes are neither points of four floats (x, y, z, intensity) nor of \
+                 five (and the ring): was it cut short, or does it hold other numbers? Name a file \
+                 of four floats `.bin`, one of five `.pcd.bin`, and save other numbers as .npy or \
+                 .csv"
+            ));
+        }
+    };
     let mut layout = Layout::default();
     for attribute in floats.attributes() {
         layout.push(attribute.name(), Kind::F4, 1)?;
     }
     let mut about = About { is_of_driver: true, ..About::within(room) };
-    let points = bytes.len() / layout.stride;
-    let cloud = table::list(&mut about, &layout, bytes, points)?;
+    let points = file.length() / layout.stride as u64;
+    file.go_to(0)?;
+    let cloud = table::list(&mut about, &layout, points as usize, &mut |record| file.fill(record))?;
     Ok((cloud, about))
 }
 
@@ -119,7 +139,7 @@ mod tests {
     use super::*;
 
     fn parse(bytes: &[u8], by_name: Floats) -> Result<(PointCloud, About), String> {
-        super::parse(bytes, by_name, CloudRoom::default())
+        super::parse(&mut CloudFile::of_bytes(bytes), by_name, CloudRoom::default())
     }
 
     fn floats(numbers: &[f32]) -> Vec<u8> {

@@ -3,6 +3,7 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
+use super::cloud_file::CloudFile;
 use super::contained::contained;
 use super::headings::Meaning;
 use super::las::{DESCRIPTION, EXTRA_BYTES, KINDS, TEXT, WHITE, extra_name};
@@ -11,8 +12,6 @@ use super::number::Kind;
 use super::table::{Digits, Gathered, Record};
 use crate::points::PointCloud;
 use las::{Header, Point, Reader};
-use std::io::Cursor;
-use std::ops::Range;
 
 /// Bytes of points read at a time: what the header says of their number is not believed, and each may
 /// have 65 535 bytes.
@@ -26,18 +25,20 @@ struct Extra {
 }
 
 /// The cloud of a LAS or LAZ file, and what it says beside it.
-pub(super) fn parse(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), String> {
-    check_sizes(&bytes)?;
-    contained(|| parse_checked(bytes, room))?
+pub(super) fn parse(mut file: CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
+    check_sizes(&mut file)?;
+    contained(|| parse_checked(file, room))?
 }
 
 /// The same, of a file that holds what its header promises.
-fn parse_checked(bytes: Vec<u8>, room: CloudRoom) -> Result<(PointCloud, About), String> {
+fn parse_checked(mut file: CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
     let damaged = |_| "its header is damaged".to_owned();
-    let header = Header::new(Cursor::new(&bytes)).map_err(damaged)?;
+    file.go_to(0)?;
+    let header = Header::new(&mut file).map_err(damaged)?;
     check_compression(&header)?;
-    check_layers(&bytes, &header)?;
-    let mut reader = Reader::new(Cursor::new(bytes)).map_err(damaged)?;
+    check_layers(&mut file, &header)?;
+    file.go_to(0)?;
+    let mut reader = Reader::new(file).map_err(damaged)?;
     let mut about = About { room, ..about(reader.header())? };
     let extra = extra(reader.header(), &mut about.left_out);
     let mut gathered = Gathered::new(&about, &attributes(&extra), Digits::Double)?;
@@ -163,57 +164,63 @@ fn reference_system(header: &Header) -> Option<String> {
     Some(code.map_or_else(|| "of GeoTIFF keys".to_owned(), |code| format!("EPSG:{code}")))
 }
 
+/// The number at byte `at`, if the file reaches as far.
+fn number(file: &mut CloudFile, at: u64, kind: Kind) -> Result<Option<u64>, String> {
+    let mut bytes = [0; 8];
+    let bytes = &mut bytes[..kind.size()];
+    let is_there = at <= file.length() && file.fill_from(at, bytes)?;
+    Ok(is_there.then(|| kind.read(bytes) as u64))
+}
+
 /// Refuses sizes in the header that reach beyond the file, before any memory is spent on them.
-fn check_sizes(bytes: &[u8]) -> Result<(), String> {
-    let number = |range: Range<usize>, kind: Kind| bytes.get(range).map(|part| kind.read(part));
-    let length = bytes.len() as f64;
-    if !bytes.starts_with(b"LASF") {
+fn check_sizes(file: &mut CloudFile) -> Result<(), String> {
+    let mut begins = [0; 4];
+    if !file.fill_from(0, &mut begins)? || begins != *b"LASF" {
         return Err("it does not begin with LASF".to_owned());
     }
-    let points = number(96..100, Kind::U4).ok_or("it ends within its header")?;
-    if points > length {
+    let length = file.length();
+    let mut number = |at: u64, kind: Kind| number(file, at, kind);
+    let ends = "it ends within its header";
+    let points = number(96, Kind::U4)?.ok_or(ends)?;
+    let Some(room) = length.checked_sub(points) else {
         return Err(format!("its points would begin at byte {points}; the file was cut short"));
-    }
-    let is_compressed = bytes.get(104).is_some_and(|format| format & 0xc0 != 0);
-    let is_large = bytes.get(25).is_some_and(|minor| *minor >= 4);
-    let record = number(105..107, Kind::U2).unwrap_or(0.0);
-    let count = match is_large {
-        true => number(247..255, Kind::U8).ok_or("it ends within its header")?,
-        false => number(107..111, Kind::U4).ok_or("it ends within its header")?,
     };
-    if !is_compressed && points + count * record > length {
-        let whole = ((length - points) / record.max(1.0)).floor();
+    let is_compressed = number(104, Kind::U1)?.is_some_and(|format| format & 0xc0 != 0);
+    let is_large = number(25, Kind::U1)?.is_some_and(|minor| minor >= 4);
+    let record = number(105, Kind::U2)?.unwrap_or(0);
+    let count = match is_large {
+        true => number(247, Kind::U8)?.ok_or(ends)?,
+        false => number(107, Kind::U4)?.ok_or(ends)?,
+    };
+    if !is_compressed && count.saturating_mul(record) > room {
+        let whole = room / record.max(1);
         return Err(format!("it ends after {whole} of {count} points; the file was cut short"));
     }
     if is_large {
-        check_extended(bytes)?;
+        check_extended(file)?;
     }
     Ok(())
 }
 
 /// Refuses layers of compressed points that reach beyond the file: the library takes memory for each
 /// before it reads it.
-fn check_layers(bytes: &[u8], header: &Header) -> Result<(), String> {
+fn check_layers(file: &mut CloudFile, header: &Header) -> Result<(), String> {
     let fault = || "its compressed points are damaged".to_owned();
-    let number = |at: u64, kind: Kind| {
-        let at = usize::try_from(at).ok()?;
-        bytes.get(at..).filter(|rest| rest.len() >= kind.size()).map(|rest| kind.read(rest) as u64)
-    };
     let Ok(vlr) = header.laz_vlr() else { return Ok(()) };
     // What is compressed must be the points of the header: of longer ones there were more layers.
     if vlr.items_size() != u64::from(header.point_format().len()) {
         return Err(fault());
     }
-    let begin = number(96, Kind::U4).ok_or_else(fault)?;
-    let table = number(begin, Kind::U8).ok_or_else(fault)?;
+    let begin = number(file, 96, Kind::U4)?.ok_or_else(fault)?;
+    let table = number(file, begin, Kind::U8)?.ok_or_else(fault)?;
     // Where the file was written as a stream, the place of the table is at the end.
-    let end = bytes.len() as u64;
+    let end = file.length();
     let table = if table > begin && table < end {
         table
     } else {
-        number(end.saturating_sub(8), Kind::U8).ok_or_else(fault)?
+        number(file, end.saturating_sub(8), Kind::U8)?.ok_or_else(fault)?
     };
-    let chunks = number(table.saturating_add(4), Kind::U4).ok_or_else(fault)?;
+    let chunks = number(file, table.saturating_add(4), Kind::U4)?.ok_or_else(fault)?;
     if table <= begin || chunks > end {
         return Err(fault());
     }
@@ -223,15 +230,16 @@ fn check_layers(bytes: &[u8], header: &Header) -> Result<(), String> {
     }
     let colours = u64::from(format.has_color) + u64::from(format.has_nir);
     let layers = 9 + colours + u64::from(format.extra_bytes) + u64::from(format.has_waveform);
-    let mut source = Cursor::new(bytes);
-    source.set_position(begin);
-    let table = laz::laszip::ChunkTable::read_from(&mut source, &vlr).map_err(|_| fault())?;
+    file.go_to(begin)?;
+    let table = laz::laszip::ChunkTable::read_from(&mut *file, &vlr).map_err(|_| fault())?;
     let mut at = begin + 8;
     for chunk in 0..table.len() {
         // The first point as it is, then how many there are, then the sizes of the layers.
         let sizes = at + u64::from(format.len()) + 4;
-        let layers = (0..layers).map(|layer| number(sizes + 4 * layer, Kind::U4));
-        let size: u64 = layers.map(Option::unwrap_or_default).sum();
+        let mut size = 0_u64;
+        for layer in 0..layers {
+            size += number(file, sizes + 4 * layer, Kind::U4)?.unwrap_or_default();
+        }
         if size > end {
             return Err(fault());
         }
@@ -241,24 +249,16 @@ fn check_layers(bytes: &[u8], header: &Header) -> Result<(), String> {
 }
 
 /// Refuses extended records that reach beyond the file.
-fn check_extended(bytes: &[u8]) -> Result<(), String> {
+fn check_extended(file: &mut CloudFile) -> Result<(), String> {
     let fault = || "a record behind its points reaches beyond the file".to_owned();
-    let number = |at: usize, kind: Kind| {
-        let bytes = bytes.get(at..).ok_or_else(fault)?;
-        Ok::<_, String>(kind.read(bytes))
-    };
+    let mut number = |at: u64, kind: Kind| number(file, at, kind)?.ok_or_else(fault);
     let count = number(243, Kind::U4)?;
     let mut at = number(235, Kind::U8)?;
-    let mut seen = 0.0;
-    while seen < count {
-        let end = at + 60.0;
-        if end > bytes.len() as f64 {
-            return Err(fault());
-        }
-        at = end + number(at as usize + 20, Kind::U8)?;
-        seen += 1.0;
+    for _ in 0..count {
+        let length = number(at.saturating_add(20), Kind::U8)?;
+        at = at.saturating_add(60).saturating_add(length);
     }
-    if at > bytes.len() as f64 && count > 0.0 { Err(fault()) } else { Ok(()) }
+    if at > file.length() && count > 0 { Err(fault()) } else { Ok(()) }
 }
 
 fn about(header: &Header) -> Result<About, String> {
@@ -351,9 +351,10 @@ mod tests {
     use super::super::las as writer;
     use super::super::{Names, sample_cloud};
     use super::*;
+    use std::io::Cursor;
 
     fn parse(bytes: Vec<u8>) -> Result<(PointCloud, About), String> {
-        super::parse(bytes, CloudRoom::default())
+        super::parse(CloudFile::of_bytes(&bytes), CloudRoom::default())
     }
 
     fn written(compress: bool) -> Vec<u8> {

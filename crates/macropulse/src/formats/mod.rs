@@ -6,6 +6,7 @@
 mod about;
 mod atomic;
 mod attributes;
+mod cloud_file;
 mod clouds;
 mod contained;
 mod csv;

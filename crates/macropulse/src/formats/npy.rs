@@ -2,11 +2,11 @@
 
 use super::about::About;
 use super::attributes::{Attribute, returns};
+use super::cloud_file::{CloudFile, LONGEST_HEADER};
 use super::number::Kind;
 use super::table::{self, Layout};
 use super::{CloudRoom, interleave};
 use crate::points::PointCloud;
-use std::borrow::Cow;
 use std::io::{self, Write};
 use std::iter::repeat_n;
 
@@ -64,28 +64,61 @@ fn write_header(descr: &str, shape: &str, out: &mut dyn Write) -> io::Result<()>
 
 /// The cloud of an array: of a structured one with fields x, y and z, or of a plain one with a line per
 /// point, of which the columns are x, y, z and intensity.
-pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
-    let rest = bytes.strip_prefix(MAGIC).ok_or("it does not begin as NumPy files do")?;
-    let (header, body) = match *rest {
-        [1, _, a, b, ..] => rest[4..].split_at_checked(usize::from(u16::from_le_bytes([a, b]))),
-        [2 | 3, _, a, b, c, d, ..] => {
-            rest[6..].split_at_checked(u32::from_le_bytes([a, b, c, d]) as usize)
-        }
-        [version, ..] => return Err(format!("its version is {version}; 1 to 3 are read")),
-        [] => None,
-    }
-    .ok_or("it ends within its header")?;
-    let header = std::str::from_utf8(header).map_err(|_| "its header is not text")?;
+pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
+    let header = header(file)?;
     let mut about = About::within(room);
-    let (fields, points) = fields(header)?;
+    let (fields, points) = fields(&header)?;
     room.check(points as u64)?;
     let mut layout = Layout::default();
     for Stored { name, kind, .. } in &fields {
         layout.push(name, *kind, 1)?;
     }
-    let body = little_endian_records(header, &fields, points, body);
-    let cloud = table::list(&mut about, &layout, &body, points)?;
+    let sizes: Vec<usize> = fields.iter().map(|field| field.kind.size()).collect();
+    let by_columns = match is_by_columns(&header, &fields) {
+        true => Some(by_columns(file, &sizes, points, room)?),
+        false => None,
+    };
+    // A number of the other order is turned round; one of single bytes is as it was.
+    let turned = fields.iter().zip(&sizes).flat_map(|(field, size)| match field.is_big_endian {
+        true => repeat_n(*size, 1),
+        false => repeat_n(1, *size),
+    });
+    let turned: Vec<usize> = turned.collect();
+    let mut columns = by_columns.as_deref().map(table::records);
+    let cloud = table::list(&mut about, &layout, points, &mut |record| {
+        let is_there = match &mut columns {
+            Some(next) => next(record)?,
+            None => file.fill(record)?,
+        };
+        interleave::turn_round(record, &turned);
+        Ok(is_there)
+    })?;
     Ok((cloud, about))
+}
+
+/// The text of the header.
+fn header(file: &mut CloudFile) -> Result<String, String> {
+    let ends = "it ends within its header";
+    let mut next = |bytes: &mut [u8]| file.fill(bytes)?.then_some(()).ok_or(ends.to_owned());
+    let mut magic = [0; MAGIC.len()];
+    if next(&mut magic).is_err() || magic != MAGIC {
+        return Err("it does not begin as NumPy files do".to_owned());
+    }
+    let mut version = [0; 2];
+    next(&mut version)?;
+    let mut length = [0; 4];
+    let bytes = match version[0] {
+        1 => 2,
+        2 | 3 => 4,
+        version => return Err(format!("its version is {version}; 1 to 3 are read")),
+    };
+    next(&mut length[..bytes])?;
+    let length = u64::from(u32::from_le_bytes(length));
+    if length > LONGEST_HEADER {
+        return Err(format!("its header is longer than {LONGEST_HEADER} bytes"));
+    }
+    let header = file.bytes(length)?.ok_or(ends)?;
+    String::from_utf8(header).map_err(|_| "its header is not text".to_owned())
 }
 
 /// A field of a point as it is stored.
@@ -144,37 +177,32 @@ fn fields(header: &str) -> Result<(Vec<Stored<'_>>, usize), String> {
 /// Columns of a plain array; the last two are no attribute. More are rather an image.
 const PLAIN: [&str; 6] = ["x", "y", "z", "intensity", "column 5", "column 6"];
 
-/// The numbers of each point in the order of its fields, the lowest byte first.
-fn little_endian_records<'a>(
-    header: &str,
-    fields: &[Stored],
-    points: usize,
-    body: &'a [u8],
-) -> Cow<'a, [u8]> {
-    let sizes: Vec<usize> = fields.iter().map(|field| field.kind.size()).collect();
-    let mut records = Cow::Borrowed(body);
-    let is_by_columns = header
-        .split_once("'fortran_order':")
-        .is_some_and(|(_, rest)| rest.trim_start().starts_with("True"));
-    let size = points.checked_mul(sizes.iter().sum());
-    // Of a list of structures the order is the same either way.
+/// Whether the numbers of the first column come first, then those of the second. In a list of structures
+/// the order is the same either way.
+fn is_by_columns(header: &str, fields: &[Stored]) -> bool {
+    let order = header.split_once("'fortran_order':");
+    let is_by_columns = order.is_some_and(|(_, rest)| rest.trim_start().starts_with("True"));
     let is_plain =
         fields.iter().all(|field| field.kind == fields[0].kind) && !header.contains("'descr': [");
-    if let Some(columns) = size.filter(|_| is_by_columns && is_plain).and_then(|s| body.get(..s)) {
-        records = Cow::Owned(interleave::columns(columns, &sizes, points));
-    }
-    if fields.iter().any(|field| field.is_big_endian) {
-        let each = fields.iter().zip(&sizes);
-        // A number of the other order is one of single bytes.
-        let widths: Vec<usize> = each
-            .flat_map(|(field, size)| match field.is_big_endian {
-                true => repeat_n(*size, 1),
-                false => repeat_n(1, *size),
-            })
-            .collect();
-        interleave::turn_round(records.to_mut(), &widths);
-    }
-    records
+    is_by_columns && is_plain
+}
+
+/// The records of points whose numbers, of these sizes, are stored column by column.
+fn by_columns(
+    file: &mut CloudFile,
+    sizes: &[usize],
+    points: usize,
+    room: CloudRoom,
+) -> Result<Vec<u8>, String> {
+    let stride: usize = sizes.iter().sum();
+    let size = points.saturating_mul(stride) as u64;
+    // What is read, and the same point by point.
+    room.check_beside(size.saturating_mul(2), points as u64)?;
+    let whole = file.rest() / stride.max(1) as u64;
+    let columns = file.bytes(size)?.ok_or_else(|| {
+        format!("it ends after {whole} of {points} points; the file was cut short")
+    })?;
+    Ok(interleave::columns(&columns, sizes, points))
 }
 
 /// The sides of an array.
@@ -191,7 +219,7 @@ mod tests {
     use super::*;
 
     fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-        super::parse(bytes, CloudRoom::default())
+        super::parse(&mut CloudFile::of_bytes(bytes), CloudRoom::default())
     }
     use crate::points::Truth;
 

@@ -3,12 +3,12 @@
 
 use super::about::{About, viewpoint};
 use super::attributes::Attribute;
+use super::cloud_file::CloudFile;
 use super::headings::Meaning;
 use super::number::Kind;
 use super::table::{self, Layout};
 use super::{CloudRoom, interleave, lzf};
 use crate::points::PointCloud;
-use std::borrow::Cow;
 use std::iter::repeat_n;
 
 /// How the points are stored.
@@ -43,8 +43,8 @@ struct Field<'a> {
 ///
 /// An organised file has an image, with a pixel for each of its points. A list has the image of which
 /// its header tells; a list of another program has no image: no rows, no columns.
-pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
-    let (mut header, data, body) = parse_header(bytes)?;
+pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
+    let (mut header, data) = parse_header(file)?;
     header.about.room = room;
     let [rows, columns] = header.shape()?;
     let points = rows.checked_mul(columns).ok_or("WIDTH × HEIGHT is beyond all bounds")?;
@@ -53,28 +53,42 @@ pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About)
     }
     room.check(points as u64)?;
     let fields = header.fields()?;
-    let (layout, body) = match data {
-        Data::Binary => (layout(&fields)?, Cow::Borrowed(body)),
-        Data::Compressed => (layout(&fields)?, Cow::Owned(unpacked(&fields, body, points)?)),
-        Data::Text => text(&fields, body, points)?,
+    let (layout, words_of) = match data {
+        Data::Text => layout_of_text(&fields),
+        Data::Binary | Data::Compressed => (layout(&fields)?, Vec::new()),
+    };
+    let unpacked = match data {
+        Data::Compressed => unpacked(&fields, file, points, room)?,
+        Data::Binary | Data::Text => Vec::new(),
+    };
+    let mut read = 0;
+    let mut unpacked = table::records(&unpacked);
+    let next: table::Next = &mut |record| match data {
+        Data::Binary => file.fill(record),
+        Data::Compressed => unpacked(record),
+        Data::Text => {
+            let Some(line) = file.line_of_words()? else { return Ok(false) };
+            let line = std::str::from_utf8(line).map_err(|_| "its points are not text")?;
+            numbers(line, &words_of, record).map_err(|fault| format!("point {read}{fault}"))?;
+            read += 1;
+            Ok(true)
+        }
     };
     let is_list = header.about.list.is_some() || rows == 1 && !layout.has(Attribute::Column);
     let cloud = match is_list {
-        true => table::list(&mut header.about, &layout, &body, points),
-        false => table::image(&mut header.about, &layout, &body, [rows, columns]),
+        true => table::list(&mut header.about, &layout, points, next),
+        false => table::image(&mut header.about, &layout, [rows, columns], next),
     };
     Ok((cloud?, header.about))
 }
 
-/// The header, how the points are stored, and the bytes after it.
-fn parse_header(bytes: &[u8]) -> Result<(Header, Data, &[u8]), String> {
+/// The header, and how the points behind it are stored.
+fn parse_header(file: &mut CloudFile) -> Result<(Header, Data), String> {
     let mut header = Header::default();
-    let mut rest = bytes;
-    while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
-        let line = std::str::from_utf8(&rest[..end])
+    while let Some(line) = file.header_line()? {
+        let line = std::str::from_utf8(line)
             .map_err(|_| "its header is not text; PCD files begin with `# .PCD` or `VERSION`")?
             .trim();
-        rest = &rest[end + 1..];
         if let Some(comment) = line.strip_prefix("# ") {
             header.about.take(comment)?;
         }
@@ -105,7 +119,7 @@ fn parse_header(bytes: &[u8]) -> Result<(Header, Data, &[u8]), String> {
                         ));
                     }
                 };
-                return Ok((header, data, rest));
+                return Ok((header, data));
             }
             "VIEWPOINT" => header.about.viewpoint = viewpoint(values)?,
             "VERSION" | "" => {}
@@ -167,15 +181,19 @@ fn layout(fields: &[Field]) -> Result<Layout, String> {
 
 /// The points of a compressed body, point by point. They are packed field by field, behind the sizes
 /// of all of it packed and unpacked.
-fn unpacked(fields: &[Field], body: &[u8], points: usize) -> Result<Vec<u8>, String> {
+fn unpacked(
+    fields: &[Field],
+    file: &mut CloudFile,
+    points: usize,
+    room: CloudRoom,
+) -> Result<Vec<u8>, String> {
     let cut_short = "it ends within its compressed points; the file was cut short";
-    let size = |at: usize| {
-        let bytes =
-            body.get(at..at + 4).and_then(|bytes| bytes.try_into().ok()).ok_or(cut_short)?;
-        Ok::<_, &str>(u32::from_le_bytes(bytes) as usize)
+    let mut size = || {
+        let mut bytes = [0; 4];
+        let is_there = file.fill(&mut bytes)?;
+        is_there.then_some(u32::from_le_bytes(bytes)).ok_or_else(|| cut_short.to_owned())
     };
-    let (packed, size) = (size(0)?, size(4)?);
-    let packed = body.get(8..).and_then(|rest| rest.get(..packed)).ok_or(cut_short)?;
+    let (packed, size) = (size()?, size()? as usize);
     let width = |field: &Field| field.kind.size().checked_mul(field.count);
     let widths: Option<Vec<usize>> = fields.iter().map(width).collect();
     let widths = widths.ok_or("a point is beyond all bounds")?;
@@ -187,19 +205,17 @@ fn unpacked(fields: &[Field], body: &[u8], points: usize) -> Result<Vec<u8>, Str
              not; the file is damaged"
         ));
     }
-    let columns = lzf::unpack(packed, size).ok_or("its compressed points are damaged")?;
+    // What is packed, and what comes of it field by field and point by point.
+    room.check_beside(u64::from(packed) + 2 * size as u64, points as u64)?;
+    let packed = file.bytes(packed.into())?.ok_or(cut_short)?;
+    let columns = lzf::unpack(&packed, size).ok_or("its compressed points are damaged")?;
     Ok(interleave::columns(&columns, &widths, points))
 }
 
-/// Points that are lines of text, as binary ones of the fields that we know.
-fn text(
-    fields: &[Field],
-    body: &[u8],
-    points: usize,
-) -> Result<(Layout, Cow<'static, [u8]>), String> {
-    let text = std::str::from_utf8(body).map_err(|_| "its points are not text")?;
+/// Where our attributes are in points made of the words of a line; and of each field whether its words
+/// are kept, and how many they are.
+fn layout_of_text(fields: &[Field]) -> (Layout, Vec<(bool, usize)>) {
     let mut layout = Layout::of_text();
-    // Whether the words of a field are kept, and how many they are.
     let mut words_of = Vec::new();
     for Field { name, kind, count } in fields {
         let meaning = Meaning::of_heading(name, Some(*kind)).filter(|_| *count == 1);
@@ -207,24 +223,22 @@ fn text(
         words_of.push((is_kept, *count));
         layout.stride += if is_kept { Kind::F8.size() } else { 0 };
     }
-    let mut bytes = Vec::new();
-    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    for at in 0..points {
-        let line = lines.next().ok_or_else(|| {
-            format!("it ends after {at} of {points} points; the file was cut short")
-        })?;
-        let mut words = line.split_whitespace();
-        let each = words_of.iter().flat_map(|(is_kept, count)| repeat_n(*is_kept, *count));
-        for is_kept in each {
-            let word = words.next().ok_or_else(|| format!("point {at} lacks numbers"))?;
-            if is_kept {
-                let number: f64 =
-                    word.parse().map_err(|_| format!("point {at}: `{word}` is no number"))?;
-                bytes.extend(number.to_le_bytes());
-            }
+    (layout, words_of)
+}
+
+/// Fills a record with the numbers of a line that are kept.
+fn numbers(line: &str, words_of: &[(bool, usize)], record: &mut [u8]) -> Result<(), String> {
+    let mut words = line.split_whitespace();
+    let mut kept = record.chunks_exact_mut(Kind::F8.size());
+    let each = words_of.iter().flat_map(|(is_kept, count)| repeat_n(*is_kept, *count));
+    for is_kept in each {
+        let word = words.next().ok_or(" lacks numbers")?;
+        if is_kept && let Some(bytes) = kept.next() {
+            let number: f64 = word.parse().map_err(|_| format!(": `{word}` is no number"))?;
+            bytes.copy_from_slice(&number.to_le_bytes());
         }
     }
-    Ok((layout, Cow::Owned(bytes)))
+    Ok(())
 }
 
 #[cfg(test)]
@@ -233,7 +247,7 @@ mod tests {
     use crate::points::Viewpoint;
 
     fn read(file: &[u8]) -> Result<PointCloud, String> {
-        parse(file, CloudRoom::default()).map(|(cloud, _)| cloud)
+        parse(&mut CloudFile::of_bytes(file), CloudRoom::default()).map(|(cloud, _)| cloud)
     }
 
     fn foreign(fields: &str, points: usize) -> Vec<u8> {

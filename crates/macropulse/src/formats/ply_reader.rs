@@ -1,12 +1,12 @@
 //! Reads PLY files: ours, and those of others, stored as text or binary in either byte order.
 
+use super::CloudRoom;
 use super::about::About;
+use super::cloud_file::CloudFile;
 use super::headings::Meaning;
 use super::number::Kind;
 use super::table::{self, Digits, Gathered, Layout, Record};
-use super::{CloudRoom, interleave};
 use crate::points::PointCloud;
-use std::borrow::Cow;
 
 /// How the points are stored.
 #[derive(Clone, Copy, PartialEq)]
@@ -14,6 +14,17 @@ enum Stored {
     Text,
     LittleEndian,
     BigEndian,
+}
+
+impl Stored {
+    /// Fills `number` with the next one of the file, the lowest byte first, and tells whether there is one.
+    fn fill(self, file: &mut CloudFile, number: &mut [u8]) -> Result<bool, String> {
+        let is_there = file.fill(number)?;
+        if self == Self::BigEndian {
+            number.reverse();
+        }
+        Ok(is_there)
+    }
 }
 
 /// Of what an element is made.
@@ -46,38 +57,42 @@ struct Header {
 }
 
 /// The cloud of a PLY file, and what it says beside it.
-pub(super) fn parse(bytes: &[u8], room: CloudRoom) -> Result<(PointCloud, About), String> {
-    let (mut header, body) = parse_header(bytes)?;
+pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
+    let mut header = parse_header(file)?;
     let mut about = About { room, ..std::mem::take(&mut header.about) };
     let vertices = header.vertices.as_ref().ok_or("it has no element `vertex`")?;
     room.check(vertices.count as u64)?;
     let cloud = match header.stored {
-        Some(Stored::Text) => text((&header, vertices), body, &mut about),
+        Some(Stored::Text) => text(&header, vertices, file, &mut about),
         Some(order) => {
-            let records = records(&header, vertices, body, order)?;
-            table::list(&mut about, &header.layout, &records, vertices.count)
+            for element in &header.before {
+                if !element.skip_all(file, order)? {
+                    return Err("it ends before its points; the file was cut short".to_owned());
+                }
+            }
+            table::list(&mut about, &header.layout, vertices.count, &mut |record| {
+                vertices.fill(file, order, record)
+            })
         }
         None => Err("its header has no line `format`".to_owned()),
     };
     Ok((cloud?, about))
 }
 
-/// The header, and the bytes after it.
-fn parse_header(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
+/// The header.
+fn parse_header(file: &mut CloudFile) -> Result<Header, String> {
     let mut header = Header::default();
-    let mut rest = bytes;
     let mut number = 0;
-    while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
-        let line = std::str::from_utf8(&rest[..end])
+    while let Some(line) = file.header_line()? {
+        let line = std::str::from_utf8(line)
             .map_err(|_| "its header is not text; PLY files begin with `ply`")?
             .trim_end();
-        rest = &rest[end + 1..];
         number += 1;
         if number == 1 && line != "ply" {
             break;
         }
         if line == "end_header" {
-            return Ok((header, rest));
+            return Ok(header);
         }
         header.take(line).map_err(|fault| format!("line {number}: {fault}"))?;
     }
@@ -153,109 +168,87 @@ fn kind_of(name: &str) -> Result<Kind, String> {
     })
 }
 
-/// The single numbers of all points, with the lowest byte first.
-fn records<'a>(
-    header: &Header,
-    vertices: &Element,
-    body: &'a [u8],
-    order: Stored,
-) -> Result<Cow<'a, [u8]>, String> {
-    let mut rest = body;
-    for element in &header.before {
-        rest = element
-            .behind(rest, order, &mut |_| ())
-            .ok_or("it ends before its points; the file was cut short")?;
-    }
-    let numbers = match vertices.size() {
-        Some(_) => Cow::Borrowed(rest),
-        None => {
-            let mut numbers = Vec::new();
-            // Points that are missing at the end are told of by the table.
-            vertices.behind(rest, order, &mut |number| numbers.extend(number));
-            Cow::Owned(numbers)
-        }
-    };
-    if order == Stored::LittleEndian {
-        return Ok(numbers);
-    }
-    let width = |property: &Property| match property {
-        Property::Number(kind) => Some(kind.size()),
-        Property::List(..) => None,
-    };
-    let widths: Vec<usize> = vertices.properties.iter().filter_map(width).collect();
-    let length = header.layout.stride.saturating_mul(vertices.count).min(numbers.len());
-    let mut numbers = numbers[..length].to_vec();
-    interleave::turn_round(&mut numbers, &widths);
-    Ok(Cow::Owned(numbers))
-}
-
 impl Element {
-    /// Bytes of one such element, if all have as many.
-    fn size(&self) -> Option<usize> {
-        let size = |property: &Property| match property {
-            Property::Number(kind) => Some(kind.size()),
-            Property::List(..) => None,
-        };
-        self.properties.iter().map(size).sum()
+    /// Passes over all of these elements, and tells whether they are whole.
+    fn skip_all(&self, file: &mut CloudFile, order: Stored) -> Result<bool, String> {
+        let mut numbers = 0;
+        let mut has_lists = false;
+        for property in &self.properties {
+            match property {
+                Property::Number(kind) => numbers += kind.size(),
+                Property::List(..) => has_lists = true,
+            }
+        }
+        if !has_lists {
+            return file.skip((numbers as u64).saturating_mul(self.count as u64));
+        }
+        let mut record = vec![0; numbers];
+        for _ in 0..self.count {
+            if !self.fill(file, order, &mut record)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
-    /// What stands behind all of these elements, if they are whole. `keep` is given each single number.
-    fn behind<'a>(
-        &self,
-        mut rest: &'a [u8],
-        order: Stored,
-        keep: &mut dyn FnMut(&[u8]),
-    ) -> Option<&'a [u8]> {
-        if let Some(size) = self.size() {
-            return rest.get(size.checked_mul(self.count)?..);
-        }
-        for _ in 0..self.count {
-            for property in &self.properties {
-                match property {
-                    Property::Number(kind) => {
-                        let (number, behind) = rest.split_at_checked(kind.size())?;
-                        keep(number);
-                        rest = behind;
+    /// Fills a record with the single numbers of the next element, the lowest byte first, and tells whether
+    /// the element is whole.
+    fn fill(&self, file: &mut CloudFile, order: Stored, record: &mut [u8]) -> Result<bool, String> {
+        let mut rest = record;
+        for property in &self.properties {
+            match property {
+                Property::Number(kind) => {
+                    let whole = std::mem::take(&mut rest);
+                    let Some((number, behind)) = whole.split_at_mut_checked(kind.size()) else {
+                        return Ok(false);
+                    };
+                    if !order.fill(file, number)? {
+                        return Ok(false);
                     }
-                    Property::List(count, item) => {
-                        let (number, behind) = rest.split_at_checked(count.size())?;
-                        let mut number = number.to_vec();
-                        if order == Stored::BigEndian {
-                            number.reverse();
-                        }
-                        let items = count.read(&number) as usize;
-                        rest = behind.get(items.checked_mul(item.size())?..)?;
+                    rest = behind;
+                }
+                Property::List(count, item) => {
+                    let mut number = [0; 8];
+                    let number = &mut number[..count.size()];
+                    if !order.fill(file, number)? {
+                        return Ok(false);
+                    }
+                    let items = count.read(number) as u64;
+                    if !file.skip(items.saturating_mul(item.size() as u64))? {
+                        return Ok(false);
                     }
                 }
             }
         }
-        Some(rest)
+        Ok(true)
     }
 }
 
 /// Points that are lines of text.
 fn text(
-    (header, vertices): (&Header, &Element),
-    body: &[u8],
+    header: &Header,
+    vertices: &Element,
+    file: &mut CloudFile,
     about: &mut About,
 ) -> Result<PointCloud, String> {
-    let text = std::str::from_utf8(body).map_err(|_| "its points are not text")?;
     let meanings = || header.meanings.iter();
     let attributes: Vec<_> = meanings().flatten().map(|meaning| meaning.attribute).collect();
     table::check_coordinates(&attributes)?;
     let mut gathered = Gathered::new(about, &attributes, Digits::AsWritten)?;
-    let mut lines = text.lines();
     for element in &header.before {
-        // An element is a line.
-        if let Some(last) = element.count.checked_sub(1) {
-            lines.nth(last);
+        for _ in 0..element.count {
+            // An element is a line.
+            if file.line()?.is_none() {
+                break;
+            }
         }
     }
     let points = vertices.count;
     for at in 0..points {
-        let line = lines.next().ok_or_else(|| {
+        let line = file.line()?.ok_or_else(|| {
             format!("it ends after {at} of {points} points; the file was cut short")
         })?;
+        let line = std::str::from_utf8(line).map_err(|_| "its points are not text")?;
         let mut words = line.split_whitespace();
         let mut number = || {
             let word = words.next().ok_or_else(|| format!("point {at} lacks numbers"))?;
@@ -291,7 +284,7 @@ mod tests {
     use super::*;
 
     fn parse(bytes: &[u8]) -> Result<(PointCloud, About), String> {
-        super::parse(bytes, CloudRoom::default())
+        super::parse(&mut CloudFile::of_bytes(bytes), CloudRoom::default())
     }
 
     #[test]

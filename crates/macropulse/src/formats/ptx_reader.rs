@@ -10,6 +10,7 @@ use glam::{DMat3, DQuat};
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
+use super::cloud_file::CloudFile;
 use super::clouds::Scans;
 use super::table::{Digits, Gathered, Record};
 use crate::points::{PointCloud, Viewpoint};
@@ -23,40 +24,41 @@ const SKEW: f64 = 1e-3;
 
 /// The clouds of a PTX file, one for each of its scans, in the frame of the scanner.
 pub(super) struct PtxScans {
-    text: String,
-    /// Where the next scan begins, and the lines before it.
-    at: usize,
-    before: usize,
+    lines: Lines,
     count: usize,
     next: usize,
+    is_over: bool,
     about: About,
 }
 
 impl PtxScans {
     /// Finds the scans of the file.
-    pub fn open(bytes: Vec<u8>, room: CloudRoom) -> Result<Self, String> {
-        let text = String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8")?;
-        let count = count(&text);
+    pub fn open(file: CloudFile, room: CloudRoom) -> Result<Self, String> {
+        let mut lines = Lines { file, number: 0 };
+        let count = count(&mut lines)?;
+        lines.file.go_to(0)?;
+        lines.number = 0;
         let about = About { is_of_driver: true, ..About::within(room) };
-        Ok(Self { text, at: 0, before: 0, count, next: 0, about })
+        Ok(Self { lines, count, next: 0, is_over: false, about })
     }
 
-    /// The cloud of the scan that begins here, and where the next one does.
+    /// The cloud of the scan that begins here.
     fn read(&mut self) -> Result<PointCloud, String> {
-        let mut lines = Lines { text: &self.text, at: self.at, number: self.before };
-        let Header { columns, rows, viewpoint } = Header::of(&mut lines)?;
+        let lines = &mut self.lines;
+        let Header { columns, rows, viewpoint } = Header::of(lines)?;
         let points = columns.checked_mul(rows).ok_or("columns × rows is beyond all bounds")?;
         let About { left_out, room, .. } = std::mem::take(&mut self.about);
         let about = About { is_of_driver: true, left_out, viewpoint, ..About::within(room) };
         self.about = about;
         let mut gathered: Option<Gathered> = None;
         for at in 0..points {
-            let Some(line) = lines.next() else {
+            let number = lines.number + 1;
+            let Some(line) = lines.next()? else {
                 return Err(format!(
                     "it ends after {at} of {points} points; the file was cut short"
                 ));
             };
-            let place = |fault: &str| format!("line {}: {fault}", lines.number);
+            let place = |fault: &str| format!("line {number}: {fault}");
             let numbers = line.split_ascii_whitespace().map(str::parse::<f64>);
             let numbers: Vec<f64> = numbers.collect::<Result<_, _>>().map_err(|_| {
                 place("a point is x y z, an intensity, and a colour if there is one: numbers alone")
@@ -74,7 +76,6 @@ impl PtxScans {
             }
             gathered.add(record);
         }
-        (self.at, self.before) = (lines.at, lines.number);
         match gathered {
             Some(gathered) => gathered.cloud(&mut self.about),
             None => self.about.begin(0, 0)?.cloud(&mut self.about),
@@ -111,7 +112,7 @@ impl Scans for PtxScans {
 
     fn advance(&mut self) -> Option<Result<PointCloud, String>> {
         let is_first = self.next == 0;
-        if !is_first && (self.at >= self.text.len() || self.text[self.at..].trim().is_empty()) {
+        if self.is_over || !is_first && self.lines.file.is_blank().unwrap_or(false) {
             return None;
         }
         self.next += 1;
@@ -119,47 +120,47 @@ impl Scans for PtxScans {
             0 | 1 => fault,
             all => format!("scan {} of {all}: {fault}", self.next),
         });
-        if read.is_err() {
-            // Nobody knows where the next one begins.
-            self.at = self.text.len();
-        }
+        // Behind a fault nobody knows where the next one begins.
+        self.is_over = read.is_err();
         Some(read)
     }
 }
 
-/// How many scans begin in `text`, of which the last may be cut short.
-fn count(text: &str) -> usize {
-    let mut lines = Lines { text, at: 0, number: 0 };
+/// How many scans begin in a file, of which the last may be cut short.
+fn count(lines: &mut Lines) -> Result<usize, String> {
     let mut scans = 0;
-    while !text[lines.at..].trim_start().is_empty() {
-        let mut size = || lines.next()?.trim().parse::<usize>().ok();
-        let Some((columns, rows)) = size().zip(size()) else { break };
+    while !lines.file.is_blank()? {
+        let mut size = || {
+            let line = lines.next()?;
+            Ok::<_, String>(line.and_then(|line| line.trim().parse::<usize>().ok()))
+        };
+        let (Some(columns), Some(rows)) = (size()?, size()?) else { break };
         scans += 1;
         let points = columns.saturating_mul(rows);
-        let behind = points.saturating_add(PLACES + MATRIX);
-        if lines.nth(behind - 1).is_none() {
-            break;
+        for _ in 0..points.saturating_add(PLACES + MATRIX) {
+            if lines.next()?.is_none() {
+                return Ok(scans);
+            }
         }
     }
-    scans
+    Ok(scans)
 }
 
-/// The lines of a text from a place on.
-struct Lines<'a> {
-    text: &'a str,
-    at: usize,
-    /// Lines before that place.
+/// The lines of a file.
+struct Lines {
+    file: CloudFile,
+    /// Lines that were read.
     number: usize,
 }
 
-impl<'a> Iterator for Lines<'a> {
-    type Item = &'a str;
-
-    fn next(&mut self) -> Option<&'a str> {
-        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
-        let line = rest.split_inclusive('\n').next()?;
-        (self.at, self.number) = (self.at + line.len(), self.number + 1);
-        Some(line)
+impl Lines {
+    /// The next line; `None` at the end of the file.
+    fn next(&mut self) -> Result<Option<&str>, String> {
+        let line = self.file.line()?;
+        self.number += usize::from(line.is_some());
+        let text =
+            line.map(|line| std::str::from_utf8(line).map_err(|_| "it is not text in UTF-8"));
+        Ok(text.transpose()?)
     }
 }
 
@@ -188,15 +189,14 @@ impl Header {
 
 /// The number on the next line.
 fn size(lines: &mut Lines, what: &str) -> Result<usize, String> {
-    let text = lines.next().unwrap_or_default().trim();
-    text.parse().map_err(|_| {
-        format!("line {}: `{}` is no number of {what}", lines.number.max(1), shortened(text))
-    })
+    let number = lines.number + 1;
+    let text = lines.next()?.unwrap_or_default().trim();
+    text.parse().map_err(|_| format!("line {number}: `{}` is no number of {what}", shortened(text)))
 }
 
 /// The numbers on the next line.
 fn numbers<const N: usize>(lines: &mut Lines, what: &str) -> Result<[f64; N], String> {
-    let line = lines.next().unwrap_or_default();
+    let line = lines.next()?.unwrap_or_default();
     let numbers = line.split_ascii_whitespace().map(str::parse::<f64>);
     let numbers: Option<Vec<f64>> = numbers.collect::<Result<_, _>>().ok();
     numbers
@@ -255,7 +255,8 @@ mod tests {
     ];
 
     fn all(text: &str) -> Vec<Result<PointCloud, String>> {
-        let mut scans = PtxScans::open(text.into(), CloudRoom::default()).unwrap();
+        let mut scans =
+            PtxScans::open(CloudFile::of_bytes(text.as_ref()), CloudRoom::default()).unwrap();
         std::iter::from_fn(|| scans.advance()).collect()
     }
 
@@ -282,7 +283,8 @@ mod tests {
         let coloured = coloured.replace("3\n3\n", "1\n1\n");
         let coloured: String = coloured.split_inclusive('\n').take(11).collect();
         let text = format!("{SAMPLE}{coloured}\n\n");
-        let mut scans = PtxScans::open(text.into(), CloudRoom::default()).unwrap();
+        let mut scans =
+            PtxScans::open(CloudFile::of_bytes(text.as_ref()), CloudRoom::default()).unwrap();
         assert_eq!(scans.count(), 2);
         let clouds: Vec<_> = std::iter::from_fn(|| scans.advance()).map(Result::unwrap).collect();
         assert_eq!(clouds.iter().map(PointCloud::returns).collect::<Vec<_>>(), [6, 1]);

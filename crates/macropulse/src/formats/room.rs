@@ -4,7 +4,7 @@ use crate::machine;
 
 /// Bytes of a point while a cloud is read and written: `tests/memory.rs` of the program holds what
 /// conversions take against it.
-const PER_POINT: u64 = 200;
+const PER_POINT: u64 = 130;
 
 /// The program and its threads, bytes.
 const PROGRAM: u64 = 30_000_000;
@@ -38,35 +38,29 @@ impl CloudRoom {
         self.bytes
     }
 
-    /// The room beside a file of this size, bytes.
-    ///
-    /// # Errors
-    /// A sentence, if the file does not fit.
-    pub(super) fn beside(self, file: u64) -> Result<Self, String> {
-        match self.bytes.checked_sub(file) {
-            Some(bytes) => Ok(Self { bytes }),
-            None => Err(self.refusal("it takes", file)),
-        }
-    }
-
     /// Refuses this number of points if they do not fit.
     ///
     /// # Errors
     /// A sentence, if they do not.
     pub(super) fn check(self, points: u64) -> Result<(), String> {
-        let needed = points.saturating_mul(PER_POINT);
+        self.check_beside(0, points)
+    }
+
+    /// Refuses this number of points if they do not fit beside other `bytes`.
+    ///
+    /// # Errors
+    /// A sentence, if they do not.
+    pub(super) fn check_beside(self, bytes: u64, points: u64) -> Result<(), String> {
+        let needed = points.saturating_mul(PER_POINT).saturating_add(bytes);
         if needed <= self.bytes {
             return Ok(());
         }
-        Err(self.refusal(&format!("its {points} points take"), needed))
-    }
-
-    fn refusal(self, what: &str, needed: u64) -> String {
-        format!(
-            "{what} about {} of memory, and {} are left: allow more memory (--memory-limit)",
+        Err(format!(
+            "its {points} points take about {} of memory, and {} are left: allow more memory \
+             (--memory-limit)",
             megabytes(needed),
             megabytes(self.bytes)
-        )
+        ))
     }
 }
 
@@ -81,12 +75,12 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused() {
         let room = CloudRoom::of_bytes(PROGRAM + 1_000_000);
-        room.check(5000).unwrap();
-        let told = room.check(5001).unwrap_err();
-        assert!(told.starts_with("its 5001 points take about 2 MB of memory, and 1 MB are left"));
-        assert_eq!(room.beside(400_000).unwrap().check(3000), Ok(()));
-        assert!(room.beside(400_000).unwrap().check(3001).is_err());
-        assert!(room.beside(1_000_001).unwrap_err().starts_with("it takes about 2 MB"));
+        room.check(7692).unwrap();
+        let told = room.check(7693).unwrap_err();
+        assert!(told.starts_with("its 7693 points take about 2 MB of memory, and 1 MB are left"));
+        assert_eq!(room.check_beside(350_000, 5000), Ok(()));
+        assert!(room.check_beside(350_000, 5001).is_err());
+        assert!(room.check_beside(u64::MAX, 1).is_err());
         assert!(CloudRoom::of_bytes(5).check(1).is_err());
         assert!(CloudRoom { bytes: u64::MAX }.check(u64::MAX / PER_POINT).is_ok());
     }

@@ -16,6 +16,9 @@ const MOST_PIXELS: usize = 1 << 25;
 /// Rows and columns that 16 bits can number.
 const MOST_ROWS: usize = 1 << 16;
 
+/// Bytes of the longest record that is read.
+const LONGEST_RECORD: usize = 1 << 20;
+
 /// Where one of our attributes lies in a record.
 #[derive(Debug, Clone, Copy)]
 struct Field {
@@ -110,6 +113,31 @@ impl Layout {
         }
     }
 
+    /// Takes in `points` records, which `next` fills one after the other.
+    fn each(
+        &self,
+        points: usize,
+        next: Next,
+        mut take: impl FnMut(usize, Record) -> Result<(), String>,
+    ) -> Result<(), String> {
+        if self.stride > LONGEST_RECORD {
+            return Err(format!(
+                "a point takes {} bytes; up to {LONGEST_RECORD} are read",
+                self.stride
+            ));
+        }
+        let mut bytes = vec![0; self.stride];
+        for at in 0..points {
+            if !next(&mut bytes)? {
+                return Err(format!(
+                    "it ends after {at} of {points} points; the file was cut short"
+                ));
+            }
+            take(at, self.record(&bytes, at)?)?;
+        }
+        Ok(())
+    }
+
     fn record(&self, bytes: &[u8], at: usize) -> Result<Record, String> {
         let mut record = Record::default();
         for Field { meaning, kind, offset } in &self.fields {
@@ -129,22 +157,26 @@ pub(super) fn check_coordinates(attributes: &[Attribute]) -> Result<(), String> 
     }
 }
 
-/// The cloud of a list of `points` records.
+/// Fills a record with the next one of a file, and tells whether there is one.
+pub(super) type Next<'a> = &'a mut dyn FnMut(&mut [u8]) -> Result<bool, String>;
+
+/// The cloud of a list of `points` records, which `next` gives.
 ///
 /// # Errors
 /// What is wrong with the records, or that there are too few.
 pub(super) fn list(
     about: &mut About,
     layout: &Layout,
-    body: &[u8],
     points: usize,
+    next: Next,
 ) -> Result<PointCloud, String> {
-    let body = records(layout, body, points)?;
+    layout.check()?;
     let mut gathered = Gathered::new(about, &layout.attributes(), layout.digits())?;
     gathered.expect(points as u64)?;
-    for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
-        gathered.add(layout.record(bytes, at)?);
-    }
+    layout.each(points, next, |_, record| {
+        gathered.add(record);
+        Ok(())
+    })?;
     layout.unknown.iter().for_each(|name| about.left_out.field(name));
     gathered.cloud(about)
 }
@@ -157,11 +189,11 @@ pub(super) fn list(
 pub(super) fn image(
     about: &mut About,
     layout: &Layout,
-    body: &[u8],
     [rows, columns]: [usize; 2],
+    next: Next,
 ) -> Result<PointCloud, String> {
     let points = rows.checked_mul(columns).ok_or("WIDTH × HEIGHT is beyond all bounds")?;
-    let body = records(layout, body, points)?;
+    layout.check()?;
     if rows.max(columns) > MOST_ROWS {
         return Err(format!("it has {rows} × {columns} pixels; 65536 rows and columns are read"));
     }
@@ -174,24 +206,24 @@ pub(super) fn image(
     let list = List { rows, columns, most: 1, pick: Default::default() };
     let mut gathered = Gathered::of_image(about, (&attributes, layout.digits()), list);
     gathered.expect(points as u64)?;
-    for (at, bytes) in body.chunks_exact(layout.stride).enumerate() {
-        let mut record = layout.record(bytes, at)?;
+    layout.each(points, next, |at, mut record| {
         record.set(at, Attribute::Row, (at / columns) as f64)?;
         record.set(at, Attribute::Column, (at % columns) as f64)?;
         gathered.add_pixel(record);
-    }
+        Ok(())
+    })?;
     layout.unknown.iter().for_each(|name| about.left_out.field(name));
     Ok(gathered.finished(about))
 }
 
-/// The bytes of `points` whole records.
-fn records<'a>(layout: &Layout, body: &'a [u8], points: usize) -> Result<&'a [u8], String> {
-    layout.check()?;
-    let needed = points.checked_mul(layout.stride).ok_or("the points are beyond all bounds")?;
-    body.get(..needed).ok_or_else(|| {
-        let whole = body.len() / layout.stride;
-        format!("it ends after {whole} of {points} points; the file was cut short")
-    })
+/// Gives the records that lie one behind the other in `bytes`.
+pub(super) fn records(mut bytes: &[u8]) -> impl FnMut(&mut [u8]) -> Result<bool, String> {
+    move |record| {
+        let Some((next, behind)) = bytes.split_at_checked(record.len()) else { return Ok(false) };
+        record.copy_from_slice(next);
+        bytes = behind;
+        Ok(true)
+    }
 }
 
 /// One point of a file: a return, or a pixel without one. An attribute that is not set is NaN, or 0

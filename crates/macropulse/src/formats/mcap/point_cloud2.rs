@@ -115,9 +115,9 @@ pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, St
     let is_ours = about.list.is_some() || fields.iter().any(|field| field.name == "time_ns");
     about.is_of_driver = !is_ours;
     let mut cloud = if height == 1 {
-        table::list(about, &layout, &body, width)?
+        table::list(about, &layout, width, &mut table::records(&body))?
     } else {
-        let cloud = table::image(about, &layout, &body, [height, width])?;
+        let cloud = table::image(about, &layout, [height, width], &mut table::records(&body))?;
         PointCloud { pick: about.list.map_or(cloud.pick, |list| list.pick), ..cloud }
     };
     if height == 1 && is_of_velodyne(&fields) {
