@@ -13,9 +13,6 @@ const BLOCK: usize = 1024;
 /// Lags that are passed by together where none stands out.
 const PASSED: usize = 64;
 
-/// Lags that are looked at in one go.
-const LANES: usize = 16;
-
 /// Filters `codes`, with as much more as the `rest` says unless that is empty, with `taps`, of an odd number:
 /// entry n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\], r being half of their number, with 0 for
 /// codes beyond the ends and in the `dark` ranges, which ascend and do not overlap.
@@ -82,14 +79,8 @@ on_every_level! {
     pub(crate) fn standing_out(least: &[f32], bound: f32, found: &mut Vec<usize>) {
         let stands_out = |least: &f32| (*least >= bound) & (*least < f32::INFINITY);
         for (block, least) in least.chunks(PASSED).enumerate() {
-            let mut some = [0_u32; LANES];
-            let mut lanes = least.chunks_exact(LANES);
-            for least in lanes.by_ref() {
-                for (some, least) in some.iter_mut().zip(least) {
-                    *some |= u32::from(stands_out(least));
-                }
-            }
-            if some != [0; LANES] || lanes.remainder().iter().any(stands_out) {
+            let some = least.iter().fold(0, |some, least| some | u32::from(stands_out(least)));
+            if some != 0 {
                 let places = (0..least.len()).filter(|at| stands_out(&least[*at]));
                 found.extend(places.map(|at| block * PASSED + at));
             }

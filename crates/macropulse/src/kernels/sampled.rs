@@ -2,8 +2,8 @@
 
 use macropulse_codec::on_every_level;
 
-/// Samples that are smoothed side by side.
-const LANES: usize = 64;
+/// Weights that are applied together, so that a level is stored once for all of them.
+const TOGETHER: usize = 4;
 
 on_every_level! {
     /// Puts a·g + c·(g² − 1), of which a and c are the `mixture`, into `mixed` for the normal number g of each two
@@ -21,36 +21,33 @@ on_every_level! {
 on_every_level! {
     /// Adds to each of `level` the sum of the values of `white` from its place on, each times its weight.
     pub(crate) fn smoothed(white: &[f32], weights: &[f32], level: &mut [f32]) {
-        for (level, first) in level.chunks_mut(LANES).zip((0..).step_by(LANES)) {
-            let here = level.len();
-            let mut sums = [0.0; LANES];
-            sums[..here].copy_from_slice(level);
-            let white = &white[first..];
-            for (at, weight) in weights.iter().enumerate() {
-                match white[at..].first_chunk::<LANES>() {
-                    Some(white) => {
-                        for lane in 0..LANES {
-                            sums[lane] += weight * white[lane];
-                        }
-                    }
-                    None => {
-                        for (sum, white) in sums.iter_mut().zip(&white[at..]) {
-                            *sum += weight * white;
-                        }
-                    }
-                }
+        let (together, rest) = weights.as_chunks::<TOGETHER>();
+        let count = level.len();
+        for (weights, first) in together.iter().zip((0..).step_by(TOGETHER)) {
+            let [a, b, c, d] = weights;
+            let [at_a, at_b, at_c, at_d] = [0, 1, 2, 3].map(|at| &white[first + at..][..count]);
+            for at in 0..count {
+                level[at] = level[at] + a * at_a[at] + b * at_b[at] + c * at_c[at] + d * at_d[at];
             }
-            level.copy_from_slice(&sums[..here]);
+        }
+        for (weight, first) in rest.iter().zip(together.len() * TOGETHER..) {
+            for (level, white) in level.iter_mut().zip(&white[first..]) {
+                *level += weight * white;
+            }
         }
     }
 }
+
+/// 3·2²²: a number far smaller than this, added to it, is rounded to a whole one, halves to the even one, which is
+/// then in the lowest bits of the sum.
+const WHOLE: f32 = 12_582_912.0;
 
 on_every_level! {
     /// The nearest codes to signals of so many photons, `steps` to each.
     pub(crate) fn rounded(level: &[f32], steps: f32, between: [f32; 2], codes: &mut [i16]) {
         let [low, high] = between;
         for (code, level) in codes.iter_mut().zip(level) {
-            *code = (level * steps).clamp(low, high).round_ties_even() as i16;
+            *code = ((level * steps).clamp(low, high) + WHOLE).to_bits() as i16;
         }
     }
 }

@@ -140,8 +140,10 @@ pub(super) fn word(
         *left = left.checked_sub(taken.len() as u64 * marks.len() as u64)?;
         let fits = |place: &usize| {
             distances.clear();
-            distances.extend(marks.iter().map(|mark| place.abs_diff(*mark)));
-            distances.iter().all(|distance| *distance >= gap && !taken[*distance]) && {
+            let all = marks.iter().map(|mark| place.abs_diff(*mark));
+            let free = all.take_while(|distance| *distance >= gap && !taken[*distance]);
+            distances.extend(free);
+            distances.len() == marks.len() && {
                 distances.sort_unstable();
                 distances.windows(2).all(|pair| pair[1] - pair[0] >= apart)
             }
