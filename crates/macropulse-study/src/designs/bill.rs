@@ -80,7 +80,7 @@ impl Bill {
             duty: it.facets.map_or(1.0 / required.burst, |facets| required.duty(facets)),
             polygon: it
                 .facets
-                .zip(required.tip_speed(it))
+                .zip(it.tip_speed(required))
                 .map(|(facets, speed)| (required.polygon(it.aperture, facets).diameter, speed)),
             energy: it.energy,
             of_class_1: allowed.map_or(f64::NAN, |allowed| it.energy / allowed),

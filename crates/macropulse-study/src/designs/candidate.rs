@@ -1,16 +1,14 @@
 //! One lidar of all that could be built, as a sensor.
 
-use std::path::{Path, PathBuf};
-
 use macropulse::codec::code::Separated;
-use macropulse::design::{Design, Detector, Effect, Pattern};
+use macropulse::design::{Design, Detector, Effect};
 use toml::{Table, Value};
 
 use super::Error;
+use super::keys::{idealise, number, put};
 use super::parts::Part;
 use super::polygon::POLYGON;
 use super::requirements::Requirements;
-use super::words::{WORDS, family};
 
 /// Steps of the converter to a standard deviation of the noise: the rounding then adds 1.3 % to its variance.
 const STEPS: f64 = 2.5;
@@ -22,6 +20,9 @@ const FALSE_SHARE: f64 = 0.03;
 
 /// How long a lidar that waits may be blanked, ns: to 3 m. The nearest targets of a trial stand at 4 m.
 const LATE: f64 = 20.0;
+
+/// Words of a code: with ten of them no two shots in flight that are nearer than ten have the same one.
+pub(super) const WORDS: u32 = 10;
 
 /// What a lidar does between its shots: as a code lets it, no more than its mirror asks, or until every echo
 /// is back.
@@ -219,6 +220,40 @@ impl Candidate {
             self.part.wavelength_nm
         )
     }
+
+    /// Speed of the corners of its polygon, m/s; `None` if it has none.
+    pub(super) fn tip_speed(&self, required: &Requirements) -> Option<f64> {
+        let lines = required.lines(f64::from(self.beams));
+        Some(required.polygon(self.aperture, self.facets?).tip_speed(lines))
+    }
+
+    /// By what factor its polygon is too fast or too large; `None` if it is neither.
+    pub(super) fn beyond_mirror(&self, required: &Requirements) -> Option<f64> {
+        let diameter = required.polygon(self.aperture, self.facets?).diameter;
+        let over = |value: f64, most: f64| value / most * (1.0 - 1e-9);
+        let most = required.parts.tip_m_per_s;
+        let fast =
+            most.zip(self.tip_speed(required)).map_or(0.0, |(most, speed)| over(speed, most));
+        let large = over(diameter, required.parts.polygon_mm * 1e-3);
+        Some(fast.max(large)).filter(|factor| *factor > 1.0)
+    }
+}
+
+/// Such words as the family of a sensor file.
+fn family(words: &Separated) -> Value {
+    let &Separated { length, weight, words, gap, apart, later, seed } = words;
+    let keys = [
+        ("length", length),
+        ("weight", weight),
+        ("words", words),
+        ("gap", gap),
+        ("apart", apart),
+        ("later", later),
+    ];
+    let keys = keys.map(|(key, value)| (key.to_owned(), Value::from(value)));
+    let mut table = Table::from_iter(keys);
+    table.insert("seed".to_owned(), (seed as i64).into());
+    Table::from_iter([("separated".to_owned(), table.into())]).into()
 }
 
 impl Requirements {
@@ -233,57 +268,4 @@ impl Requirements {
         let pixels = f64::from(wanted.rows) * f64::from(wanted.columns);
         f64::from(beams) / (pixels * wanted.scans_per_s)
     }
-}
-
-/// The sensor called `name_or_file`, seen from `folder`, all its keys written out; where files lie that it names;
-/// and the shortest over the mean time between shots of its channels. Refuses what is no raster with a sampled
-/// detector.
-pub(super) fn template(name_or_file: &str, folder: &Path) -> Result<(Table, PathBuf, f64), String> {
-    let beside = folder.join(name_or_file);
-    let file = if beside.is_file() { beside } else { PathBuf::from(name_or_file) };
-    let design = Design::open(&file, &[]).map_err(|error| error.to_string())?;
-    if !matches!(design.scan.pattern, Pattern::Raster(_))
-        || !matches!(design.detector, Detector::Sampled(_))
-        || !design.is_coded()
-    {
-        return Err(format!(
-            "{name_or_file} is not a raster with a code and an [adc]; coded-32 is one"
-        ));
-    }
-    let table = design.text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-    let scan = &design.scan;
-    let mean = scan.period() * f64::from(design.channels()) / scan.shots() as f64;
-    let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
-    Ok((table, folder, scan.shortest_period() / mean))
-}
-
-/// Puts `value` at the dotted `path`, tables made on the way.
-pub(super) fn put(table: &mut Table, path: &str, value: Value) {
-    match path.split_once('.') {
-        None => {
-            table.insert(path.to_owned(), value);
-        }
-        Some((outer, inner)) => {
-            let below = table.entry(outer).or_insert_with(|| Table::new().into());
-            if let Some(below) = below.as_table_mut() {
-                put(below, inner, value);
-            }
-        }
-    }
-}
-
-/// Leaves an `effect` out.
-fn idealise(table: &mut Table, effect: Effect) {
-    let list = table.entry("idealised").or_insert_with(|| Value::Array(Vec::new()));
-    let name = Value::from(effect.name());
-    if let Some(list) = list.as_array_mut().filter(|list| !list.contains(&name)) {
-        list.push(name);
-    }
-}
-
-pub(super) fn number(table: &Table, path: &str) -> Option<f64> {
-    let mut keys = path.split('.');
-    let first = table.get(keys.next()?)?;
-    let value = keys.try_fold(first, |value, key| value.get(key))?;
-    value.as_float().or(value.as_integer().map(|value| value as f64))
 }

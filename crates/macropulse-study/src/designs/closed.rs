@@ -136,7 +136,7 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     } else if needed > 1.0 {
         Some((Limit::Light, needed))
     } else {
-        required.beyond_mirror(&candidate).map(|factor| (Limit::Mirror, factor))
+        candidate.beyond_mirror(required).map(|factor| (Limit::Mirror, factor))
     };
     Ok(Assessed { candidate, period, pd: forecast.pd, precision: forecast.precision, limit })
 }

@@ -117,7 +117,7 @@ fn candidate(required: &Requirements, it: &Candidate) -> Value {
         "channels": it.beams,
         "facets": it.facets,
         "aperture_mm": it.aperture * 1e3,
-        "tip_m_per_s": required.tip_speed(it),
+        "tip_m_per_s": it.tip_speed(required),
         "energy_nj": it.energy * 1e9,
         "pulse_ps": it.pulse * 1e12,
         "bandwidth_mhz": it.bandwidth * 1e-6,

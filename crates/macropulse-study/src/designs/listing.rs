@@ -137,7 +137,7 @@ impl Found {
                 it.facets.map_or("-".to_owned(), |facets| facets.to_string()),
                 one.period * 1e9,
                 it.aperture * 1e3,
-                corners(self.required.tip_speed(it)),
+                corners(it.tip_speed(&self.required)),
                 it.energy * 1e9,
                 it.pulse * 1e12,
                 it.bandwidth * 1e-6,

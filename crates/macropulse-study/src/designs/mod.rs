@@ -9,6 +9,7 @@ mod files;
 mod frontier;
 mod in_flight;
 mod json;
+mod keys;
 mod listing;
 mod mirrors;
 mod page;

@@ -2,7 +2,7 @@
 
 use macropulse::design::Polygon;
 
-use super::candidate::{Candidate, number};
+use super::keys::number;
 use super::requirements::Requirements;
 
 /// Where a sensor says what polygon leads its beams, if it has one.
@@ -70,22 +70,6 @@ impl Requirements {
     /// Lines that each of so many beams draws in a second.
     pub(super) fn lines(&self, beams: f64) -> f64 {
         f64::from(self.wanted.rows) / beams * self.wanted.scans_per_s
-    }
-
-    /// Speed of the corners of its polygon, m/s.
-    pub(super) fn tip_speed(&self, candidate: &Candidate) -> Option<f64> {
-        let lines = self.lines(f64::from(candidate.beams));
-        Some(self.polygon(candidate.aperture, candidate.facets?).tip_speed(lines))
-    }
-
-    /// By what factor its polygon is too fast or too large; `None` if it is neither.
-    pub(super) fn beyond_mirror(&self, candidate: &Candidate) -> Option<f64> {
-        let polygon = self.polygon(candidate.aperture, candidate.facets?);
-        let over = |value: f64, most: f64| value / most * (1.0 - 1e-9);
-        let speed = polygon.tip_speed(self.lines(f64::from(candidate.beams)));
-        let fast = self.parts.tip_m_per_s.map_or(0.0, |most| over(speed, most));
-        let large = over(polygon.diameter, self.parts.polygon_mm * 1e-3);
-        Some(fast.max(large)).filter(|factor| *factor > 1.0)
     }
 
     /// The largest aperture, m, that is allowed and that a polygon holds which is neither too fast nor too large, with

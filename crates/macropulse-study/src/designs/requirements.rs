@@ -249,7 +249,7 @@ impl Requirements {
         let environment = file.environment.as_deref().unwrap_or("clear-day");
         let environment = Environment::named(environment)
             .map_err(|error| refused("environment", &error.to_string()))?;
-        let (template, folder, burst) = super::candidate::template(&parts.sensor, folder)
+        let (template, folder, burst) = super::keys::template(&parts.sensor, folder)
             .map_err(|message| refused("parts.sensor", &message))?;
         let required = Self {
             name: file.name,

@@ -6,14 +6,11 @@ use macropulse::predict::verdict::slant;
 use macropulse::predict::{Blind, OwnLight};
 use macropulse::units::tof_from_range;
 use rayon::prelude::*;
-use toml::{Table, Value};
 
 use super::Error;
-use super::candidate::{Candidate, number};
+use super::candidate::{Candidate, WORDS};
+use super::keys::number;
 use super::requirements::Requirements;
-
-/// Words of a code: with ten of them no two shots in flight that are nearer than ten have the same one.
-pub(super) const WORDS: u32 = 10;
 
 /// Words may last such a share of the time between shots of a channel, or the shortest there are, if these last
 /// longer. The mirror moves on during a word, and where it meets two surfaces that are not equally far some points
@@ -32,23 +29,6 @@ const MOST_LATER: u32 = 4;
 /// Distances between marks differ by so many lengths (full width at half maximum) of a mark behind its
 /// amplifier: two marks that meet two others by less than that look like the same.
 const APART: f64 = 2.0;
-
-/// Such words as the family of a sensor file.
-pub(super) fn family(words: &Separated) -> Value {
-    let &Separated { length, weight, words, gap, apart, later, seed } = words;
-    let keys = [
-        ("length", length),
-        ("weight", weight),
-        ("words", words),
-        ("gap", gap),
-        ("apart", apart),
-        ("later", later),
-    ];
-    let keys = keys.map(|(key, value)| (key.to_owned(), Value::from(value)));
-    let mut table = Table::from_iter(keys);
-    table.insert("seed".to_owned(), (seed as i64).into());
-    Table::from_iter([("separated".to_owned(), table.into())]).into()
-}
 
 /// Echoes that are lost because too few of their marks are told; the fewer at the worst range the better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

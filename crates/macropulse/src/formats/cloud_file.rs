@@ -1,6 +1,8 @@
 //! Files of points, read a part at a time.
 
+use super::about::About;
 use crate::opened;
+use crate::points::PointCloud;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -24,6 +26,18 @@ pub(super) struct CloudFile {
 trait Inner: Read + Seek + Send + Sync {}
 
 impl<T: Read + Seek + Send + Sync> Inner for T {}
+
+/// A file of scans, each of which is a cloud.
+pub(super) trait Scans {
+    /// How many scans there are.
+    fn count(&self) -> usize;
+
+    /// What the file says beside the clouds that were read.
+    fn about(&self) -> &About;
+
+    /// The cloud of the next scan.
+    fn advance(&mut self) -> Option<Result<PointCloud, String>>;
+}
 
 impl CloudFile {
     /// The file at `path`.

@@ -1,7 +1,7 @@
 //! Clouds from files, whatever their format.
 
 use super::about::About;
-use super::cloud_file::CloudFile;
+use super::cloud_file::{CloudFile, Scans};
 use super::mcap::Messages;
 use super::{
     CloudRoom, Error, Format, LeftOut, Names, csv_reader, e57_reader, kitti, las_reader, npy,
@@ -33,18 +33,6 @@ enum Source {
     One { cloud: Option<Box<PointCloud>>, about: Box<About> },
     Scans(Box<dyn Scans + Send>),
     Messages(Box<Messages>),
-}
-
-/// A file of scans, each of which is a cloud.
-pub(super) trait Scans {
-    /// How many scans there are.
-    fn count(&self) -> usize;
-
-    /// What the file says beside the clouds that were read.
-    fn about(&self) -> &About;
-
-    /// The cloud of the next scan.
-    fn advance(&mut self) -> Option<Result<PointCloud, String>>;
 }
 
 /// What a file is read as.

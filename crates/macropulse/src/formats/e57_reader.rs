@@ -3,8 +3,7 @@
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
-use super::cloud_file::CloudFile;
-use super::clouds::Scans;
+use super::cloud_file::{CloudFile, Scans};
 use super::e57::{GPS_BEHIND_S, NAMESPACE, name};
 use super::left_out::NoPoint;
 use super::table::{Digits, Gathered, Record as Point, check_coordinates};

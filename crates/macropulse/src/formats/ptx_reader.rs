@@ -10,8 +10,7 @@ use glam::{DMat3, DQuat};
 use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
-use super::cloud_file::CloudFile;
-use super::clouds::Scans;
+use super::cloud_file::{CloudFile, Scans};
 use super::table::{Digits, Gathered, Record};
 use crate::points::{PointCloud, Viewpoint};
 

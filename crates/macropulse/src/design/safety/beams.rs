@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use super::crossing::Energies;
+use super::energies::Energies;
 use super::exposure::Crossing;
 use super::share::Share;
 use super::worst::{Aim, Field, coarse_first};

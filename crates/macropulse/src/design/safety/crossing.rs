@@ -4,12 +4,13 @@ use std::f64::consts::FRAC_PI_4;
 
 use super::beams::{LineBeams, Lines};
 use super::class1::{Class1, Condition, Opening};
+use super::energies::Energies;
 use super::exposure::{Crossing, Crossings, Exposure, allowed};
 use super::scattered::Scattered;
 use super::share::Share;
 use super::worst::worst;
 use crate::design::budget::solid_angle;
-use crate::design::{Coding, Emission, Light, Scan};
+use crate::design::{Emission, Light, Scan};
 use crate::units::s_from_fs;
 
 /// What is sent in a scan, as eye safety counts it.
@@ -108,49 +109,5 @@ impl Sender<'_> {
         let pixels = f64::from(self.scan.rows) * f64::from(self.scan.columns);
         let energy = share * f64::from(self.scan.rows) * energies.sum();
         Crossing { time: 0.0, share: share * pixels, energy }
-    }
-}
-
-/// The energy of a shot by its column, in energies of a mean shot, every mark having the same: that
-/// of the brightest word of its label.
-pub(super) struct Energies {
-    by_column: Vec<f64>,
-    /// Whether all columns are alike.
-    pub alike: bool,
-}
-
-impl Energies {
-    fn of(scan: &Scan, coding: &Coding) -> Self {
-        let book = &coding.codebook;
-        let words = coding.first_word..coding.first_word + coding.word_modulus;
-        let marks = |label: u16| {
-            words.clone().map(|word| book.marks(label, word as u16).len()).max().unwrap_or(0)
-        };
-        let mut last = (0, marks(0));
-        let by_column = (0..scan.columns).map(|column| {
-            let label = coding.label_of(column as u16);
-            if label != last.0 {
-                last = (label, marks(label));
-            }
-            last.1 as f64 / book.mean_weight()
-        });
-        Self::new(by_column.collect())
-    }
-
-    pub(super) fn new(by_column: Vec<f64>) -> Self {
-        let alike = by_column.windows(2).all(|pair| pair[0] == pair[1]);
-        Self { by_column, alike }
-    }
-
-    pub(super) fn at(&self, column: u32) -> f64 {
-        self.by_column.get(column as usize).copied().unwrap_or(0.0)
-    }
-
-    fn most(&self) -> f64 {
-        self.by_column.iter().copied().fold(0.0, f64::max)
-    }
-
-    fn sum(&self) -> f64 {
-        self.by_column.iter().sum()
     }
 }

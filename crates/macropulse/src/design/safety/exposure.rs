@@ -1,10 +1,12 @@
 //! What class 1 allows to the shots that cross an eye.
 
 use super::class1::{Class1, LONGEST};
-use super::worst::RULES;
 
 /// Exposures beyond [`LONGEST`] are judged up to this time, s, and then by their mean power.
 const LAST: f64 = 100.0;
+
+/// Rules that depend on the place.
+pub(super) const RULES: usize = 4;
 
 /// Places at which a run of shots is cut at each end, to find the part that is allowed least.
 const CUTS: usize = 128;

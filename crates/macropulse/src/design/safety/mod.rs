@@ -8,6 +8,7 @@
 mod beams;
 mod class1;
 mod crossing;
+mod energies;
 mod exposure;
 mod scattered;
 mod share;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::f64::consts::PI;
 
-use super::crossing::Energies;
+use super::energies::Energies;
 use super::exposure::Crossing;
 use super::share::Share;
 use super::worst::{Aim, Field, coarse_first};

@@ -13,7 +13,7 @@
 //! What is found is the light at a real place, so the search can only miss light: it may allow more than the
 //! worst place there is. `brute.rs` holds it against a grid, to 2 %.
 
-use super::exposure::Crossing;
+use super::exposure::{Crossing, RULES};
 
 /// Places tried along the width of the light that passes an aperture, to begin with.
 const STEPS: f64 = 8.0;
@@ -27,8 +27,6 @@ const MOVES: u32 = 3;
 const SIDES: [f64; 8] = [0.0, 1.0, 1.0, 1.0, 0.0, -1.0, -1.0, -1.0];
 /// Places that are tried in any case.
 const LEAST: usize = 3;
-/// Rules that depend on the place.
-pub(super) const RULES: usize = 4;
 
 /// Where the middle of an aperture is, rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
