@@ -4,6 +4,7 @@
 mod common;
 
 mod bad_mesh;
+mod browser;
 mod budget;
 mod check;
 mod codes;

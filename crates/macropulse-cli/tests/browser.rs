@@ -1,6 +1,5 @@
 //! The pages that Macropulse writes, opened and used in a browser: `browser/`, run by pytest.
 
-#![allow(missing_docs)]
 #![allow(clippy::unwrap_used)]
 
 use std::io::Write;

@@ -114,7 +114,9 @@ fn a_newcomer_has_a_cloud_after_ten_lines() {
 fn the_package_passes_its_tests() {
     let interpreter = python(&here().join("tests/requirements.txt")).unwrap();
     let site = installed(&interpreter);
-    println!("{}", passed(&interpreter, site, &["tests", "--ignore", "tests/cluster"]));
+    let side_by_side = ["-n", "2", "--dist", "worksteal"];
+    let tests = ["tests", "--ignore", "tests/cluster"];
+    println!("{}", passed(&interpreter, site, &[&side_by_side[..], &tests].concat()));
 }
 
 /// Ray is large, and not made for every Python: where it cannot be installed this says so, loudly, and
