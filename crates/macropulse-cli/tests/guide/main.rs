@@ -8,6 +8,7 @@
 mod desk;
 mod figures;
 mod page;
+mod prose;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -78,6 +79,28 @@ fn every_page_is_tried() {
     let mut tried: Vec<_> = PAGES.to_vec();
     tried.sort_unstable();
     assert_eq!(tried, there);
+}
+
+/// Pages that are not in plain English throughout. Commands write parts of some.
+const NOT_PLAIN: &[&str] = &[
+    "docs/formats.md",
+    "docs/hardening.md",
+    "docs/paper.md",
+    "docs/performance.md",
+    "docs/physics.md",
+    "docs/references.md",
+    "docs/validation.md",
+];
+
+#[test]
+fn pages_are_in_plain_english() {
+    let mut faults = Vec::new();
+    let more = ["ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md"];
+    for page in PAGES.iter().chain(&more).filter(|page| !NOT_PLAIN.contains(page)) {
+        let text = fs::read_to_string(root().join(page)).unwrap();
+        faults.extend(prose::faults(&text).iter().map(|fault| format!("{page}: {fault}")));
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
 }
 
 /// The table of constants on the page about decoding has the values of the code.
