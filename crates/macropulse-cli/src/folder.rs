@@ -191,16 +191,17 @@ impl Folder {
         let path = path.to_owned();
         let folder =
             Self { path, outputs, made: vec![], kept: false, is_of_one: false, lock: None };
-        let ancestors = folder.path.ancestors();
-        let there = ancestors.map(or_here).find(|folder| folder.exists());
-        prove_writable(there.unwrap_or(Path::new(".")))
+        let mut ancestors = folder.path.ancestors().map(or_here);
+        let there = ancestors.find(|folder| folder.exists()).unwrap_or(Path::new("."));
+        // A run may be killed while it proves that its folder can be made.
+        clear_unfinished(there);
+        prove_writable(there)
             .and_then(|()| match fs::metadata(&folder.path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
                 _ => Ok(()),
             })
             .map_err(|error| folder.not_writable(&error))?;
         folder.outputs.check(&folder.path)?;
-        clear_unfinished(&folder.path);
         Ok(folder)
     }
 

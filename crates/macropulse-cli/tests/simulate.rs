@@ -207,6 +207,10 @@ fn what_a_killed_run_has_left_is_gone_after_the_next() {
     }
     assert_eq!(desk.run(&format!("{START} --format csv -o out -q")).code, Some(0));
     assert!(!is_left(), "{:?}", desk.files());
+    // It may have been killed before its folder was made.
+    desk.put(".macropulse-AbCdEf.part", "");
+    assert_eq!(desk.run(&format!("{START} --format csv -o new -q")).code, Some(0));
+    assert!(!is_left(), "{:?}", desk.files());
 }
 
 /// Where an image is asked for and there is none, that is said.
