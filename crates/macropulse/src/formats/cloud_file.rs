@@ -257,6 +257,14 @@ mod tests {
     }
 
     #[test]
+    fn a_header_without_an_end_is_refused() {
+        let mut file = CloudFile::of_bytes(&b"a comment of a header\n".repeat(1 << 20));
+        let told = std::iter::repeat_with(|| file.header_line().err()).find_map(|told| told);
+        assert_eq!(told.unwrap(), "its header is longer than 16777216 bytes");
+        assert!(file.at() < LONGEST_HEADER + LONGEST_LINE);
+    }
+
+    #[test]
     fn a_place_is_kept_over_buffers() {
         let bytes: Vec<u8> = (0..100_000_u32).map(|at| (at % 251) as u8).collect();
         let mut file = CloudFile::of_bytes(&bytes);

@@ -388,5 +388,11 @@ mod tests {
         assert_eq!(read(huge.as_bytes()).unwrap_err(), "WIDTH × HEIGHT is beyond all bounds");
         let huge = format!("{XYZ_RGB}\nWIDTH {}\nHEIGHT 1\nDATA ascii\n1 2 3 4\n", usize::MAX);
         assert!(read(huge.as_bytes()).unwrap_err().contains("points take about"));
+        let long = XYZ_RGB.replace("1 1 1 1", "1 1 1 300000");
+        let long = format!("{long}\nWIDTH 1\nHEIGHT 1\nDATA binary\n");
+        assert_eq!(
+            read(long.as_bytes()).unwrap_err(),
+            "a point takes 1200012 bytes; up to 1048576 are read"
+        );
     }
 }
