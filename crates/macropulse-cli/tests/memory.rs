@@ -182,7 +182,7 @@ fn a_cloud_is_not_read_beyond_the_limit() {
     }
 }
 
-/// What a file holds beside the points takes no memory: the files here are larger than the limit.
+/// Fields that are not read take no memory: the files here are larger than the limit.
 #[test]
 fn a_cloud_is_read_a_part_at_a_time() {
     const POINTS: usize = 100_000;

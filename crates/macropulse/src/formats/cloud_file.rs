@@ -3,7 +3,6 @@
 use super::about::About;
 use crate::opened;
 use crate::points::PointCloud;
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -13,7 +12,7 @@ pub(super) const LONGEST_LINE: u64 = 1 << 20;
 /// Bytes of the longest header that is read.
 pub(super) const LONGEST_HEADER: u64 = 1 << 24;
 
-/// A file of points, of which a part at a time is in memory.
+/// A file of points that is read a part at a time.
 pub(super) struct CloudFile {
     bytes: BufReader<Box<dyn Inner>>,
     length: u64,
@@ -22,17 +21,17 @@ pub(super) struct CloudFile {
     line: Vec<u8>,
 }
 
-/// What a file reads from.
+/// The source of the bytes: a file, in tests also memory.
 trait Inner: Read + Seek + Send + Sync {}
 
 impl<T: Read + Seek + Send + Sync> Inner for T {}
 
-/// A file of scans, each of which is a cloud.
+/// The scans of a file. Each scan is a cloud.
 pub(super) trait Scans {
     /// How many scans there are.
     fn count(&self) -> usize;
 
-    /// What the file says beside the clouds that were read.
+    /// The metadata of the file, as far as it was read.
     fn about(&self) -> &About;
 
     /// The cloud of the next scan.
@@ -45,7 +44,7 @@ impl CloudFile {
     /// # Errors
     /// As [`opened::file`].
     pub fn open(path: &Path) -> io::Result<Self> {
-        let file: File = opened::file(path, u64::MAX)?;
+        let file = opened::file(path, u64::MAX)?;
         let length = file.metadata()?.len();
         Ok(Self::new(file, length))
     }
@@ -118,7 +117,7 @@ impl CloudFile {
         }
     }
 
-    /// Fills `bytes` with the next ones of the file, and tells whether there are as many.
+    /// Fills `bytes` from the file; `false` if the file ends before.
     ///
     /// # Errors
     /// If they cannot be read.
@@ -147,7 +146,7 @@ impl CloudFile {
         self.fill(bytes)
     }
 
-    /// All of `length` bytes, where there are as many.
+    /// The next `length` bytes; `None` if the file ends before.
     ///
     /// # Errors
     /// If they cannot be read.
@@ -159,16 +158,15 @@ impl CloudFile {
         Ok(self.fill(&mut bytes)?.then_some(bytes))
     }
 
-    /// Passes over bytes, and tells whether there are as many.
+    /// Skips bytes; `false` if the file ends before.
     ///
     /// # Errors
     /// If the file cannot be read.
     pub fn skip(&mut self, bytes: u64) -> Result<bool, String> {
-        let Some(relative) = i64::try_from(bytes).ok().filter(|_| bytes <= self.rest()) else {
+        if bytes > self.rest() {
             return Ok(false);
-        };
-        self.bytes.seek_relative(relative).map_err(unreadable)?;
-        self.at += bytes;
+        }
+        self.go_to(self.at + bytes)?;
         Ok(true)
     }
 

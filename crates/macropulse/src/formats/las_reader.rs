@@ -9,7 +9,7 @@ use super::headings::Meaning;
 use super::las::{DESCRIPTION, EXTRA_BYTES, KINDS, TEXT, WHITE, extra_name};
 use super::left_out::{LeftOut, NoPoint};
 use super::number::Kind;
-use super::table::{Digits, Gathered, Record};
+use super::table::{Digits, Gathered, Record, cut_short};
 use crate::points::PointCloud;
 use las::{Header, Point, Reader};
 
@@ -194,7 +194,7 @@ fn check_sizes(file: &mut CloudFile) -> Result<(), String> {
     };
     if !is_compressed && count.saturating_mul(record) > room {
         let whole = room / record.max(1);
-        return Err(format!("it ends after {whole} of {count} points; the file was cut short"));
+        return Err(cut_short(whole, count));
     }
     if is_large {
         check_extended(file)?;

@@ -8,7 +8,6 @@ use super::table::{self, Layout};
 use super::{CloudRoom, interleave};
 use crate::points::PointCloud;
 use std::io::{self, Write};
-use std::iter::repeat_n;
 
 /// What every file begins with, before the version.
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -78,19 +77,20 @@ pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud
         true => Some(by_columns(file, &sizes, points, room)?),
         false => None,
     };
-    // A number of the other order is turned round; one of single bytes is as it was.
-    let turned = fields.iter().zip(&sizes).flat_map(|(field, size)| match field.is_big_endian {
-        true => repeat_n(*size, 1),
-        false => repeat_n(1, *size),
+    let ends = sizes.iter().scan(0, |end, size| {
+        *end += size;
+        Some(*end)
     });
-    let turned: Vec<usize> = turned.collect();
+    let numbers = fields.iter().zip(&sizes).zip(ends);
+    let big_endian = numbers.filter(|((field, _), _)| field.is_big_endian);
+    let big_endian: Vec<_> = big_endian.map(|((_, size), end)| end - size..end).collect();
     let mut columns = by_columns.as_deref().map(table::records);
     let cloud = table::list(&mut about, &layout, points, &mut |record| {
         let is_there = match &mut columns {
             Some(next) => next(record)?,
             None => file.fill(record)?,
         };
-        interleave::turn_round(record, &turned);
+        big_endian.iter().for_each(|number| record[number.clone()].reverse());
         Ok(is_there)
     })?;
     Ok((cloud, about))
@@ -199,9 +199,7 @@ fn by_columns(
     // What is read, and the same point by point.
     room.check_beside(size.saturating_mul(2), points as u64)?;
     let whole = file.rest() / stride.max(1) as u64;
-    let columns = file.bytes(size)?.ok_or_else(|| {
-        format!("it ends after {whole} of {points} points; the file was cut short")
-    })?;
+    let columns = file.bytes(size)?.ok_or_else(|| table::cut_short(whole, points as u64))?;
     Ok(interleave::columns(&columns, sizes, points))
 }
 

@@ -245,9 +245,7 @@ fn text(
     }
     let points = vertices.count;
     for at in 0..points {
-        let line = file.line()?.ok_or_else(|| {
-            format!("it ends after {at} of {points} points; the file was cut short")
-        })?;
+        let line = file.line()?.ok_or_else(|| table::cut_short(at as u64, points as u64))?;
         let line = std::str::from_utf8(line).map_err(|_| "its points are not text")?;
         let mut words = line.split_whitespace();
         let mut number = || {

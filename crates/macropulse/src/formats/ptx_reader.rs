@@ -11,7 +11,7 @@ use super::CloudRoom;
 use super::about::About;
 use super::attributes::Attribute;
 use super::cloud_file::{CloudFile, Scans};
-use super::table::{Digits, Gathered, Record};
+use super::table::{Digits, Gathered, Record, cut_short};
 use crate::points::{PointCloud, Viewpoint};
 
 /// Lines between the numbers of columns and rows and the points: the place of the scanner, and the matrix.
@@ -53,9 +53,7 @@ impl PtxScans {
         for at in 0..points {
             let number = lines.number + 1;
             let Some(line) = lines.next()? else {
-                return Err(format!(
-                    "it ends after {at} of {points} points; the file was cut short"
-                ));
+                return Err(cut_short(at as u64, points as u64));
             };
             let place = |fault: &str| format!("line {number}: {fault}");
             let numbers = line.split_ascii_whitespace().map(str::parse::<f64>);

@@ -129,9 +129,7 @@ impl Layout {
         let mut bytes = vec![0; self.stride];
         for at in 0..points {
             if !next(&mut bytes)? {
-                return Err(format!(
-                    "it ends after {at} of {points} points; the file was cut short"
-                ));
+                return Err(cut_short(at as u64, points as u64));
             }
             take(at, self.record(&bytes, at)?)?;
         }
@@ -146,6 +144,11 @@ impl Layout {
         }
         Ok(record)
     }
+}
+
+/// The sentence about a file that ends after this many of its points.
+pub(super) fn cut_short(whole: u64, points: u64) -> String {
+    format!("it ends after {whole} of {points} points; the file was cut short")
 }
 
 /// Refuses a file that lacks a coordinate.

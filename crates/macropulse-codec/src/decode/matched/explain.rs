@@ -54,7 +54,7 @@ pub(in crate::decode) struct Question {
     pub others: Vec<Hypothesis>,
     /// The lags to weigh, ascending.
     pub lags: Vec<i64>,
-    /// Whether `own` was accepted. Then the best lag is its own.
+    /// `own` was accepted, so its lag is the best one.
     pub is_accepted: bool,
 }
 

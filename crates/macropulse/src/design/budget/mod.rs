@@ -103,16 +103,16 @@ impl Budget {
     }
 }
 
-/// What class 1 allows to the sensors that were opened last, the last one at the end.
+/// Class 1 limits of the sensors that were opened last, the newest at the end.
 ///
-/// A sweep opens a sensor once for each of its values, most of which are of no matter to an eye, and to find the worst
-/// place of an eye takes longer than all else that is checked.
+/// A sweep opens a sensor once for each of its values, and most of these do not change the limits. The search for the
+/// worst place of an eye takes longer than all other checks.
 static KNOWN: Mutex<Vec<Known>> = Mutex::new(Vec::new());
 
 /// Sensors in [`KNOWN`] at most.
 const MOST_KNOWN: usize = 16;
 
-/// What class 1 allows to a sensor.
+/// A sensor and its class 1 limits.
 struct Known {
     sensor: (Eye, Scan, Light, Emission),
     limits: Vec<Limit>,

@@ -1,4 +1,4 @@
-//! How bright the shots of a scan are beside each other.
+//! Relative energies of the shots of a scan.
 
 use crate::design::{Coding, Scan};
 
@@ -6,7 +6,7 @@ use crate::design::{Coding, Scan};
 /// of the brightest word of its label.
 pub(super) struct Energies {
     by_column: Vec<f64>,
-    /// Whether all columns are alike.
+    /// All columns have the same energy.
     pub alike: bool,
 }
 
