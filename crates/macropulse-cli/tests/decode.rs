@@ -22,6 +22,7 @@ fn again(
     let (record, ending) = match sensor {
         _ if sensor.contains(MINI) => ("samples", "mpw"),
         _ if sensor.contains(FLASH) => ("histograms", "mph"),
+        _ if sensor.contains(CAMERA) => ("taps", "mpa"),
         _ => ("ticks", "mpt"),
     };
     let formats = "--format pcd,csv,png";
@@ -96,6 +97,41 @@ fn histograms_decode_to_the_points_of_the_simulation() {
     let told = fs::read_to_string(desk.path().join("e/explain-000000-11-8.txt")).unwrap();
     assert!(told.contains("A return was accepted at") && told.contains("2 000 pulses"), "{told}");
     desk.refused("simulate flash.toml street --format ticks -o b", &["flash records histograms"]);
+}
+
+/// A sensor of modulated light.
+const CAMERA: &str = "itof-camera";
+
+#[test]
+fn taps_decode_to_the_points_of_the_simulation() {
+    let desk = Desk::new();
+    let small = "--set scan.flash.rows=12 --set scan.flash.columns=16";
+    let (simulated, _) = again(
+        &desk,
+        &format!("--sensor {CAMERA} {small}"),
+        "--scene wall --set scene:object.wall.position_m.x=3 --environment night",
+        2,
+    );
+    assert_eq!(simulated["counts"]["taps"], 2 * 12 * 16 * 8, "{simulated}");
+    let line = format!(
+        "decode --sensor {CAMERA} {small} --set modulation.phases=3 out/shots-000000.mps \
+         out/taps-000000.mpa -o b --format none"
+    );
+    desk.refused(&line, &["8 taps of a shot, where the sensor has 6"]);
+    let line = format!(
+        "simulate {CAMERA} {small} wall --set scene:object.wall.position_m.x=3 --environment night \
+         --explain 6,8 --format none -o e"
+    );
+    let ran = desk.run(&line);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let told = fs::read_to_string(desk.path().join("e/explain-000000-6-8.txt")).unwrap();
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("explains the phases of 2 of 2 modulation frequencies best."), "{told}");
+    assert!(told.contains("or more by whole intervals of 1.2491 m; codes "), "{told}");
+    desk.refused(
+        &format!("simulate {CAMERA} wall --format ticks -o b"),
+        &["itof-camera records taps"],
+    );
 }
 
 /// The line of the pixel that was explained, in a table of points.

@@ -2,14 +2,14 @@
 //!
 //! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word laid out on
 //! chips. A receiver is given the **ticks** at which its converters saw light, the **samples** of the
-//! signal or **histograms** of photons, and the **shot log** of what was sent when, and finds the delay
+//! signal, **histograms** of photons or **taps** of modulated light, and the **shot log** of what was sent when, and finds the delay
 //! of every shot. Nothing here knows a scene, light, a file system or a thread pool.
 //!
 //! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
-//! * [`ShotLog`], and [`Ticks`], [`Samples`] or [`Histograms`]: what a receiver is given, as columns; [`Cut`]: how
+//! * [`ShotLog`], and [`Ticks`], [`Samples`], [`Histograms`] or [`Taps`]: what a receiver is given, as columns; [`Cut`]: how
 //!   they are cut out of a stream.
-//! * [`files`]: shot logs and ticks as text and as bytes, samples and histograms as bytes.
-//! * [`decode`]: the receivers, from ticks, samples or histograms to returns.
+//! * [`files`]: shot logs and ticks as text and as bytes, the other records as bytes.
+//! * [`decode`]: the receivers, from records to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
 //! * [`level`]: which instructions the wide loops use; [`steps`]: two of these loops by themselves.
 
@@ -29,6 +29,7 @@ mod kernels;
 mod record;
 mod samples;
 mod shot_log;
+mod taps;
 mod ticks;
 
 pub use cut::Cut;
@@ -37,4 +38,5 @@ pub use kernels::level;
 pub use record::{Given, Record, RecordKind};
 pub use samples::Samples;
 pub use shot_log::ShotLog;
+pub use taps::Taps;
 pub use ticks::{Tick, Ticks};

@@ -179,6 +179,38 @@ pub fn poisson_from(mean: f64, first: u32, last: u32) -> Vec<f64> {
     all.take_while(|(k, _)| *k <= last).map(|(_, chance)| chance).collect()
 }
 
+/// The probability that the power of so many `phasors` together is above `threshold`, where the `signal` in them has
+/// such a power. Powers are in units of the mean of one phasor of noise alone, whose two parts are normal.
+///
+/// Given the number k of a Poisson variable of the mean `signal`, the power is a gamma variable of `phasors` + k: the
+/// generalised Marcum function Q(√(2·signal), √(2·threshold)) \[Kay93\].
+pub fn power_tail(phasors: u32, signal: f64, threshold: f64) -> f64 {
+    if threshold <= 0.0 {
+        return 1.0;
+    }
+    // Beyond, less than 1e-15 of a Poisson variable lies.
+    let reach = |mean: f64| 10.0 * mean.sqrt() + 40.0;
+    if signal - reach(signal) > threshold + reach(threshold) {
+        return 1.0;
+    }
+    let first = (signal - reach(signal)).max(0.0).floor();
+    let last = signal + reach(signal);
+    // The tail of a gamma variable of n is the probability that a Poisson variable of the mean `threshold` is below n.
+    let mut below: f64 = (0..phasors + first as u32).map(|j| poisson(threshold, j.into())).sum();
+    let mut sum = 0.0;
+    let mut k = first;
+    while k <= last {
+        let weight = match signal > 0.0 {
+            true => poisson(signal, k),
+            false => f64::from(u8::from(k == 0.0)),
+        };
+        sum += weight * below.min(1.0);
+        below += poisson(threshold, f64::from(phasors) + k);
+        k += 1.0;
+    }
+    sum.min(1.0)
+}
+
 /// Erlang's B, a^c/c! / Σ_k a^k/k! \[Erl17\]: the share of calls that find all of `servers` busy
 /// where `offered` is the mean number of calls that come within the time one takes. It does not
 /// depend on how the times are distributed.
@@ -337,6 +369,27 @@ mod tests {
         }
         assert_eq!(normal_order(7.0, 3.0), normal_order(3.0, 3.0));
         assert!([1e9, f64::INFINITY].iter().all(|count| normal_order(1.0, *count).0.is_finite()));
+    }
+
+    /// Q₁(√18, √27.63) is 0.182; a diffuse echo, whose power is itself exponential, has 10^(−6/10) = 0.251 for the mean
+    /// signal 9 and one false alarm in a million. Without a signal the tail is (1 + x)·e^(−x) for two phasors.
+    #[test]
+    fn the_power_of_phasors_has_the_published_tails() {
+        let threshold = -log(1e-6);
+        assert_relative_eq!(power_tail(1, 0.0, threshold), 1e-6, max_relative = 1e-9);
+        assert_relative_eq!(power_tail(2, 0.0, 5.0), 6.0 * exp(-5.0), max_relative = 1e-12);
+        assert_relative_eq!(power_tail(1, 9.0, threshold), 0.182, max_relative = 5e-3);
+        let steps = 4000;
+        let diffuse: f64 = (0..steps)
+            .map(|step| {
+                power_tail(1, -9.0 * log((f64::from(step) + 0.5) / f64::from(steps)), threshold)
+            })
+            .sum();
+        assert_relative_eq!(diffuse / f64::from(steps), 0.251, max_relative = 3e-3);
+        // Pd 0.9 needs 20.81; far above and below the threshold nothing is left to chance.
+        assert_relative_eq!(power_tail(1, 20.81, threshold), 0.9, max_relative = 1e-3);
+        assert_eq!((power_tail(3, 1e5, 20.0), power_tail(1, 1.0, 0.0)), (1.0, 1.0));
+        assert!(power_tail(1, 1.0, 500.0) < 1e-100);
     }
 
     #[test]

@@ -12,3 +12,4 @@ mod readme;
 mod recorded_histograms;
 mod sample_files;
 mod sampled;
+mod tap_files;

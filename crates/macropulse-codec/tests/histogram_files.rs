@@ -77,10 +77,10 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
     for (bytes, words) in [
         (
             good[..good.len() - 3].to_vec(),
-            &["byte 172", "9 bytes into a record of 12", "truncated"][..],
+            &["byte 156", "25 bytes into a record of 28", "truncated"][..],
         ),
         (good[..second].to_vec(), &["after 1 of 2 histograms", "truncated"]),
-        (good[..second + 16].to_vec(), &["before the counts of shot 6", "truncated"]),
+        (good[..second + 16].to_vec(), &["16 bytes into a record of 28", "truncated"]),
         (good[..100].to_vec(), &["100 bytes into a record of 128"]),
         (Vec::new(), &["is empty"]),
         (b"# macropulse histograms 1".to_vec(), &["is text", "binary form alone"]),

@@ -71,6 +71,7 @@ targets! {
     ticks, recorded::ticks, 4096;
     samples, recorded::samples, 8192;
     histograms, recorded::histograms, 4096;
+    taps, recorded::taps, 4096;
     stream, recorded::stream, 4096;
     receiver, receivers::decode, 2048;
 }

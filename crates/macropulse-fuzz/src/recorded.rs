@@ -2,7 +2,7 @@
 
 use macropulse::codec::files::{
     Error, HistogramHeader, HistogramReader, Limits, SampleHeader, SampleReader, ShotReader,
-    Stream, TickReader,
+    Stream, TapHeader, TapReader, TickReader,
 };
 use macropulse::codec::{Cut, Given};
 
@@ -98,5 +98,19 @@ pub fn histograms(bytes: &[u8]) {
         while let Some(histogram) = told(reader.next_histogram()).flatten() {
             assert_eq!(histogram.counts.len(), HISTOGRAMS.bins as usize);
         }
+    }
+}
+
+/// What the taps of the sensor begin with.
+const TAPS: TapHeader = TapHeader { taps: 8, digest: None, count: None };
+
+/// Reads `bytes` as taps, and cuts those of three shots out of them.
+pub fn taps(bytes: &[u8]) {
+    let Some(shots) = told(ShotReader::new(SHOTS, LIMITS)) else { return };
+    let Some(taps) = told(TapReader::new(bytes, &TAPS)) else { return };
+    let mut stream = Stream::of_taps(CUT, shots, taps);
+    while let Some((log, given)) = told(stream.next_band(|first| first + 2)).flatten() {
+        let Given::Taps(taps) = given else { break };
+        assert_eq!(taps.codes.len(), TAPS.taps as usize * log.len());
     }
 }

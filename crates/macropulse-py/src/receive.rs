@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use macropulse::channel::Operating;
-use macropulse::codec::{Given, Histograms, RecordKind, Samples, ShotLog, Ticks};
+use macropulse::codec::{Given, Histograms, RecordKind, Samples, ShotLog, Taps, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
 use macropulse::points::{Piece, PointCloud, Scale, Truth};
@@ -32,6 +32,7 @@ const SHOTS: [&str; 8] =
 const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
 const SAMPLES: [&str; 3] = ["epoch", "channel", "code"];
 const HISTOGRAMS: [&str; 4] = ["bin_fs", "offset_fs", "cycles", "counts"];
+const TAPS: [&str; 1] = ["codes"];
 
 /// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`, or samples.
 #[pyclass(frozen, module = "macropulse")]
@@ -70,6 +71,7 @@ impl Records {
             Given::Ticks(ticks) => told_of_ticks(py, ticks)?,
             Given::Samples(samples) => told_of_samples(py, samples)?,
             Given::Histograms(histograms) => told_of_histograms(py, histograms)?,
+            Given::Taps(taps) => told_of_taps(py, taps)?,
         };
         Ok(Some((told_of_shots(py, log)?, given)))
     }
@@ -166,8 +168,16 @@ fn told_of_histograms(py: Python<'_>, histograms: Histograms) -> PyResult<Bound<
     Ok(told)
 }
 
-/// Decodes ticks, samples or histograms, from a simulation or from hardware, with no scene: out of arrays, or out of files as
-/// `macropulse decode` does.
+fn told_of_taps(py: Python<'_>, taps: Taps) -> PyResult<Bound<'_, PyDict>> {
+    let told = PyDict::new(py);
+    let each = taps.taps.max(1) as usize;
+    let shape = [taps.codes.len() / each, each];
+    told.set_item("codes", PyArray1::from_vec(py, taps.codes).reshape(shape)?)?;
+    Ok(told)
+}
+
+/// Decodes ticks, samples, histograms or taps, from a simulation or from hardware, with no scene: out of arrays, or out
+/// of files as `macropulse decode` does.
 ///
 /// Args:
 ///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
@@ -221,6 +231,7 @@ pub fn decode(
         RecordKind::Samples => Given::Samples(samples_of(&design, ticks)?),
         RecordKind::Ticks => Given::Ticks(ticks_of(&design, ticks)?),
         RecordKind::Histograms => Given::Histograms(histograms_of(&design, ticks)?),
+        RecordKind::Taps => Given::Taps(taps_of(&design, ticks)?),
     };
     if given.is_empty() {
         let recorded = design.records().name();
@@ -281,7 +292,7 @@ fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBu
     match (shots.extract(), ticks.extract()) {
         (Ok(shots), Ok(ticks)) => Ok([shots, ticks]),
         _ => Err(wrong(
-            "shots and ticks, samples or histograms: give two dictionaries of columns, or the paths of two files",
+            "shots and ticks, samples, histograms or taps: give two dictionaries of columns, or the paths of two files",
         )),
     }
 }
@@ -504,19 +515,45 @@ fn quietly<'py, T>(
     outcome
 }
 
-fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histograms> {
-    check_keys(given, "histograms", &HISTOGRAMS)?;
-    let Some(counts) = given.get_item("counts")? else {
-        return Err(wrong("histograms: there is no column `counts`"));
+/// The column `key` of a dictionary, which has a row for each shot and a column for each `item`: how many of both, and
+/// its entries behind each other.
+fn by_shot<T: Number>(
+    given: &Bound<'_, PyDict>,
+    (what, key, item): (&str, &str, &str),
+) -> PyResult<([usize; 2], Vec<T>)> {
+    let Some(table) = given.get_item(key)? else {
+        return Err(wrong(format!("{what}: there is no column `{key}`")));
     };
-    let typed = given.py().import("numpy")?.call_method1("asarray", (&counts,))?;
+    let typed = given.py().import("numpy")?.call_method1("asarray", (&table,))?;
     let shape: Vec<usize> = typed.getattr("shape")?.extract()?;
-    let [rows, bins] = shape[..] else {
+    let [rows, columns] = shape[..] else {
         return Err(wrong(format!(
-            "histograms: `counts` has {} dimensions; give it a row for each shot and a column for each bin",
+            "{what}: `{key}` has {} dimensions; give it a row for each shot and a column for each {item}",
             shape.len()
         )));
     };
+    let flat = PyDict::new(given.py());
+    flat.set_item(key, typed.call_method0("ravel")?)?;
+    Ok(([rows, columns], column(&flat, (what, key), None)?))
+}
+
+/// The taps that a dictionary holds.
+fn taps_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Taps> {
+    check_keys(given, "taps", &TAPS)?;
+    let ([_, taps], codes) = by_shot(given, ("taps", "codes", "tap"))?;
+    let wanted = design.tap_header().map_or(0, |header| header.taps);
+    if taps != wanted as usize {
+        let name = &design.name;
+        return Err(wrong(format!(
+            "taps: `codes` has {taps} columns, and {name} has {wanted} taps"
+        )));
+    }
+    Ok(Taps { taps: wanted, codes })
+}
+
+fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histograms> {
+    check_keys(given, "histograms", &HISTOGRAMS)?;
+    let ([rows, bins], counts) = by_shot(given, ("histograms", "counts", "bin"))?;
     let tick_fs = design.clock.tick_fs;
     let bin_fs: i64 =
         entry(given, ("histograms", "bin_fs", "a whole number, of femtoseconds"), || tick_fs)?;
@@ -526,8 +563,6 @@ fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histogr
             design.name
         )));
     }
-    let flat = PyDict::new(given.py());
-    flat.set_item("counts", typed.call_method0("ravel")?)?;
     let pulses = design.emission.burst().map_or(1, |burst| burst.pulses);
     Ok(Histograms {
         bin_fs,
@@ -538,6 +573,6 @@ fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histogr
         )?,
         bins: bins as u32,
         cycles: column(given, ("histograms", "cycles"), Some(vec![pulses; rows]))?,
-        counts: column(&flat, ("histograms", "counts"), None)?,
+        counts,
     })
 }

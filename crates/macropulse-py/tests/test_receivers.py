@@ -112,6 +112,28 @@ def test_histograms_decode_to_the_points_of_the_simulation(tmp_path):
     assert "did you mean `counts`" in told(count=counts)
 
 
+def test_taps_decode_to_the_points_of_the_simulation():
+    sensor = mp.Sensor("itof-camera", {"scan.flash.rows": 6, "scan.flash.columns": 8})
+    scene = mp.Scene("wall", {"object.wall.position_m.x": 3.0, "environment": "night"})
+    whole = mp.simulate(sensor, scene, seed=5)
+    [(shots, taps)] = mp.record(sensor, scene, seed=5)
+    codes = taps["codes"]
+    assert sorted(taps) == ["codes"] and codes.dtype == np.uint16 and codes.shape == (48, 8)
+    decoded = mp.decode(sensor, shots, taps, environment="night")
+    for column in ("x", "range", "intensity", "row", "column", "margin", "photons"):
+        np.testing.assert_array_equal(getattr(decoded, column), getattr(whole, column))
+    assert len(whole) > 20
+
+    def told(**changed):
+        with pytest.raises(mp.Error) as raised:
+            mp.decode(sensor, shots, {**taps, **changed})
+        return str(raised.value)
+
+    assert "1 dimensions; give it a row for each shot and a column for each tap" in told(codes=codes.ravel())
+    assert "`codes` has 7 columns, and itof-camera has 8 taps" in told(codes=codes[:, 1:])
+    assert "did you mean `codes`" in told(code=codes)
+
+
 def test_ticks_that_were_made_by_hand():
     """A single echo, laid out mark by mark here: its range is known."""
     sensor = mp.Sensor("kim-park-2016-fixed")

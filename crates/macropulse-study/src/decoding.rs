@@ -8,7 +8,8 @@ use std::path::Path;
 
 use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::files::{
-    self, Digest, HistogramReader, SampleReader, ShotHeader, ShotReader, Stream, TickReader, What,
+    self, Digest, HistogramReader, SampleReader, ShotHeader, ShotReader, Stream, TapReader,
+    TickReader, What,
 };
 use macropulse::codec::{Given, RecordKind, ShotLog};
 use macropulse::design::Design;
@@ -126,7 +127,7 @@ impl Band {
     }
 }
 
-/// Shots and ticks, samples or histograms that are decoded, scan after scan, in the memory of one.
+/// Shots and their record that are decoded, scan after scan, in the memory of one.
 pub struct Decoding {
     stream: Stream<Box<dyn Read + Send>, Box<dyn Read + Send>>,
     names: Names,
@@ -152,23 +153,23 @@ impl Decoding {
         let shots = ShotReader::new(shots.bytes, design.limits()).map_err(invalid)?;
         let ShotHeader { position, turn, digest: of_shots, .. } = *shots.header();
         let (cut, channels) = (design.cut(), design.channels());
-        let (stream, of_record) = match (design.sample_header(), design.histogram_header()) {
-            (Some(wanted), _) => {
-                let samples = SampleReader::new(record.bytes, &wanted).map_err(invalid)?;
-                let digest = samples.header().digest;
-                (Stream::of_samples(cut, shots, samples), digest)
-            }
-            (None, Some(wanted)) => {
-                let histograms = HistogramReader::new(record.bytes, &wanted).map_err(invalid)?;
-                let digest = histograms.header().digest;
-                (Stream::of_histograms(cut, shots, histograms), digest)
-            }
-            (None, None) => {
-                let tick_fs = design.clock.tick_fs;
-                let ticks = TickReader::new(record.bytes, tick_fs, channels).map_err(invalid)?;
-                let digest = ticks.header().digest;
-                (Stream::new(cut, shots, ticks, channels > 1), digest)
-            }
+        let (stream, of_record) = if let Some(wanted) = design.sample_header() {
+            let samples = SampleReader::new(record.bytes, &wanted).map_err(invalid)?;
+            let digest = samples.header().digest;
+            (Stream::of_samples(cut, shots, samples), digest)
+        } else if let Some(wanted) = design.histogram_header() {
+            let histograms = HistogramReader::new(record.bytes, &wanted).map_err(invalid)?;
+            let digest = histograms.header().digest;
+            (Stream::of_histograms(cut, shots, histograms), digest)
+        } else if let Some(wanted) = design.tap_header() {
+            let taps = TapReader::new(record.bytes, &wanted).map_err(invalid)?;
+            let digest = taps.header().digest;
+            (Stream::of_taps(cut, shots, taps), digest)
+        } else {
+            let tick_fs = design.clock.tick_fs;
+            let ticks = TickReader::new(record.bytes, tick_fs, channels).map_err(invalid)?;
+            let digest = ticks.header().digest;
+            (Stream::new(cut, shots, ticks, channels > 1), digest)
         };
         let wanted = design.recorded_digest();
         for (digest, name) in [of_shots, of_record].iter().zip(&names.0) {

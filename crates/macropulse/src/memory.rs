@@ -5,7 +5,7 @@
 //! `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Effect, Readout};
+use crate::design::{Design, Effect, Modulation, Readout};
 use crate::emit::bands;
 use crate::environment::Environment;
 use crate::scene::{PER_TRIANGLE, Scene};
@@ -49,6 +49,9 @@ const PER_SAMPLE_AT_WORK: f64 = 40.0;
 
 /// Of a bin of a histogram: its count, and the same once more where it is written.
 const PER_BIN: f64 = 8.0;
+
+/// Of a tap: its code, and the same once more where it is written.
+const PER_TAP: f64 = 4.0;
 
 /// The memory of a run, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -138,6 +141,10 @@ fn band(design: &Design, operating: &Operating) -> u64 {
         Readout::Tdc(_) => events,
         Readout::Adc => events + lasts / tick * (channels * PER_SAMPLE + PER_SAMPLE_AT_WORK),
         Readout::Histogram(histogram) => band.shots as f64 * f64::from(histogram.bins) * PER_BIN,
+        Readout::Taps => {
+            let taps = design.emission.modulation().map_or(0, Modulation::taps);
+            band.shots as f64 * f64::from(taps) * PER_TAP
+        }
     };
     (shots * per_shot + recorded) as u64
 }

@@ -45,6 +45,8 @@ pub enum Stage {
     Histogram = 14,
     /// Histograms that a forecast draws. Indexed by nothing.
     Forecast = 15,
+    /// The taps of a shot. Indexed by shot.
+    LockIn = 16,
 }
 
 /// The counter at which a run of random numbers begins.

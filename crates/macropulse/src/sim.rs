@@ -403,6 +403,8 @@ pub struct Tally {
     pub samples: u64,
     /// Counts in the histograms that reached it.
     pub counts: u64,
+    /// Taps that reached it.
+    pub taps: u64,
     /// Detection events that fell into the tick of another one.
     pub merged: u64,
     /// Detection events that found every converter busy.
@@ -436,6 +438,7 @@ impl Tally {
             (&mut self.ticks, other.ticks),
             (&mut self.samples, other.samples),
             (&mut self.counts, other.counts),
+            (&mut self.taps, other.taps),
             (&mut self.merged, other.merged),
             (&mut self.lost, other.lost),
             (&mut self.returns, other.returns),
@@ -466,6 +469,10 @@ impl Tally {
             _ if self.counts > 0 => Some(
                 "the receiver found none of the echoes in the histograms: too little light for the \
                  background",
+            ),
+            _ if self.taps > 0 => Some(
+                "the receiver found none of the echoes in the taps: too little light for the noise, or so much \
+                 that the taps are full",
             ),
             _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")

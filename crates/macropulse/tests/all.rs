@@ -23,6 +23,7 @@ mod limits;
 mod make_car;
 mod marks;
 mod meshes;
+mod modulated;
 mod motion;
 mod paths;
 mod predict;

@@ -62,9 +62,10 @@ fn section() -> &'static str {
     section.split("\n### ").next().unwrap()
 }
 
-/// What the first column of the table names: the detectors, and what stands behind a photodiode.
+/// What the first column of the table names: the detectors of pulses, and what stands behind a photodiode.
 fn detectors() -> Vec<&'static str> {
-    let others = Detector::NAMES.iter().copied().filter(|name| *name != "photodiode");
+    let others =
+        Detector::NAMES.iter().copied().filter(|name| !["photodiode", "lock-in"].contains(name));
     others.chain(["comparator", "adc"]).collect()
 }
 

@@ -44,9 +44,10 @@ const CODEC: Layers = Layers {
         Rule { module: "ticks", may_name: &[], because: "ticks are columns" },
         Rule { module: "samples", may_name: &[], because: "samples are columns" },
         Rule { module: "histograms", may_name: &[], because: "histograms are columns" },
+        Rule { module: "taps", may_name: &[], because: "taps are columns" },
         Rule {
             module: "record",
-            may_name: &["histograms", "samples", "ticks"],
+            may_name: &["histograms", "samples", "taps", "ticks"],
             because: "a record is one of them",
         },
         Rule {
@@ -56,7 +57,7 @@ const CODEC: Layers = Layers {
         },
         Rule {
             module: "files",
-            may_name: &["cut", "histograms", "record", "samples", "shot_log", "ticks"],
+            may_name: &["cut", "histograms", "record", "samples", "shot_log", "taps", "ticks"],
             because: "files hold shots and what was recorded of them, whoever made them and whatever decodes them",
         },
         Rule {
@@ -69,6 +70,7 @@ const CODEC: Layers = Layers {
                 "samples",
                 "shot_log",
                 "statistics",
+                "taps",
                 "ticks",
                 "time",
             ],
@@ -411,6 +413,7 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
         "Given" | "Record" | "RecordKind" => "record".to_owned(),
         "Samples" => "samples".to_owned(),
         "Histograms" => "histograms".to_owned(),
+        "Taps" => "taps".to_owned(),
         "Cut" => "cut".to_owned(),
         _ => name.to_owned(),
     };

@@ -8,6 +8,7 @@ use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
 use macropulse::predict::deepest_baseline;
 use macropulse::predict::unmodelled::{self, LeftOut};
+use macropulse::units::s_from_fs;
 use macropulse_study::record::{defaults, not_modelled, surroundings};
 use serde_json::{Map, Value, json};
 
@@ -185,6 +186,9 @@ fn ranges(design: &Design, derived: &Derived) -> Columns {
     columns.push(
         "unambiguous",
         match derived.unambiguous_range {
+            Some(range) if design.emission.modulation().is_some() => {
+                format!("{} m, where the phases of all modulation frequencies repeat", short(range))
+            }
             Some(range) => format!("{} m, where a code word comes again", short(range)),
             None => "by the detector alone: shots carry no code".to_owned(),
         },
@@ -216,6 +220,13 @@ fn light(design: &Design, derived: &Derived) -> Columns {
             false => format!("{count} with {fewest} to {most} by word"),
         });
         columns.push("", format!("labels by marks: {}", labels.collect::<Vec<_>>().join(", ")));
+    } else if let Some(modulation) = design.emission.modulation() {
+        let mhz: Vec<String> = modulation.hz.iter().map(|hz| short(hz * 1e-6)).collect();
+        let exposure = short(s_from_fs(modulation.exposure_fs) * 1e6);
+        let length = short(derived.macropulse * 1e3);
+        columns.push("shot", format!("modulated with {} MHz, in {length} ms", mhz.join(", ")));
+        let taps = counted(u64::from(modulation.phases), "tap");
+        columns.push("", format!("{taps} of each frequency, {exposure} us long"));
     } else {
         let pulse = short(design.light.pulse * 1e12);
         columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));

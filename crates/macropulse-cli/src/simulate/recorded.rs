@@ -1,4 +1,4 @@
-//! Shots and their record, ticks, samples or histograms, beside the points: what `decode` needs to find them again.
+//! Shots and their record, ticks, samples, histograms or taps, beside the points: what `decode` needs to find them again.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use macropulse::codec;
 use macropulse::codec::files::{
     Form, HistogramHeader, HistogramWriter, SampleHeader, SampleWriter, Shot, ShotHeader,
-    ShotWriter, TickHeader, TickWriter,
+    ShotWriter, TapHeader, TapWriter, TickHeader, TickWriter,
 };
 use macropulse::design::Design;
 use macropulse::emit::{logs, scan_begins_fs, shots_of_scan};
@@ -27,6 +27,8 @@ pub enum Kept {
     Samples,
     /// Histograms; they and the shots in their binary form.
     Histograms,
+    /// Taps; they and the shots in their binary form.
+    Taps,
 }
 
 impl Kept {
@@ -34,7 +36,7 @@ impl Kept {
     pub fn form(self) -> Form {
         match self {
             Self::Ticks(form) => form,
-            Self::Samples | Self::Histograms => Form::Binary,
+            Self::Samples | Self::Histograms | Self::Taps => Form::Binary,
         }
     }
 
@@ -45,6 +47,7 @@ impl Kept {
             Self::Ticks(Form::Text) => [("shots", "csv"), ("ticks", "csv")],
             Self::Samples => [("shots", "mps"), ("samples", "mpw")],
             Self::Histograms => [("shots", "mps"), ("histograms", "mph")],
+            Self::Taps => [("shots", "mps"), ("taps", "mpa")],
         };
         [shots, record].map(|(name, ending)| format!("{name}-{scan:06}.{ending}"))
     }
@@ -115,10 +118,11 @@ enum Header {
     Ticks(TickHeader, Form),
     Samples(SampleHeader),
     Histograms(HistogramHeader),
+    Taps(TapHeader),
 }
 
 impl Header {
-    /// Writes it, with `count` ticks, blocks of samples or histograms to come.
+    /// Writes it, with `count` ticks, blocks of samples, histograms or shots with taps to come.
     fn write(&mut self, out: &mut WholeFile, count: u64) -> io::Result<()> {
         match self {
             Self::Ticks(header, form) => {
@@ -133,11 +137,15 @@ impl Header {
                 header.count = Some(count);
                 HistogramWriter::new(out, header).map(|_| ())
             }
+            Self::Taps(header) => {
+                header.count = Some(count);
+                TapWriter::new(out, header).map(|_| ())
+            }
         }
     }
 
     /// Appends what was recorded before the absolute tick `end` to `bytes`, and gives the number of ticks,
-    /// blocks of samples, or histograms.
+    /// blocks of samples, histograms, or shots with taps.
     fn append(&self, record: &Record, end: i64, bytes: &mut Vec<u8>) -> io::Result<u64> {
         match (self, record.given) {
             (Self::Ticks(header, form), codec::Record::Ticks(ticks)) => {
@@ -154,6 +162,11 @@ impl Header {
                 let first = record.log.first + record.log.owned.start as u64;
                 HistogramWriter::behind(bytes).write(histograms, first)?;
                 Ok(histograms.len() as u64)
+            }
+            (Self::Taps(header), codec::Record::Taps(taps)) => {
+                let first = record.log.first + record.log.owned.start as u64;
+                TapWriter::behind(bytes).write(taps, first)?;
+                Ok((taps.codes.len() / header.taps.max(1) as usize) as u64)
             }
             // A sensor gives what it is asked for, or it is not asked.
             _ => Ok(0),
@@ -196,7 +209,8 @@ impl<'a> RecordFiles<'a> {
         let design = recorded.design;
         let samples = design.sample_header().map(Header::Samples);
         let histograms = design.histogram_header().map(Header::Histograms);
-        let mut header = samples.or(histograms).unwrap_or_else(|| {
+        let taps = design.tap_header().map(Header::Taps);
+        let mut header = samples.or(histograms).or(taps).unwrap_or_else(|| {
             Header::Ticks(recorded.header(scans.measure(), 0), recorded.kept.form())
         });
         header.write(&mut file, 0).map_err(|cause| file.failed(cause))?;

@@ -94,6 +94,7 @@ impl Run<'_> {
         let recorded = match self.design.records() {
             RecordKind::Samples => counted(tally.samples, "sample"),
             RecordKind::Histograms => counted(tally.counts, "count"),
+            RecordKind::Taps => counted(tally.taps, "tap"),
             RecordKind::Ticks => {
                 format!(
                     "{}, {}",

@@ -50,6 +50,7 @@ pages! {
     golden_model: "docs/guide/golden-model.md",
     histograms: "docs/guide/histograms.md",
     interference: "docs/guide/interference.md",
+    modulated_light: "docs/guide/modulated-light.md",
     never_waiting: "docs/guide/never-waiting.md",
     own_code: "docs/guide/own-code.md",
     own_scanner: "docs/guide/own-scanner.md",

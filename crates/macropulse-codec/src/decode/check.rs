@@ -33,7 +33,7 @@ pub(super) fn check(
     match record {
         Record::Ticks(ticks) => of_ticks(receiver, ticks)?,
         Record::Samples(samples) => of_samples(samples)?,
-        Record::Histograms(_) => {}
+        Record::Histograms(_) | Record::Taps(_) => {}
     }
     in_codebook(log, codebook)?;
     in_time(receiver, (codebook, log), record)
@@ -72,7 +72,7 @@ pub(super) fn settings(receiver: &Receiver, codebook: &Codebook) -> Result<(), E
 }
 
 /// Refuses the value of a setting that does not hold.
-fn require(
+pub(super) fn require(
     holds: bool,
     setting: &'static str,
     value: &dyn ToString,
@@ -231,7 +231,7 @@ fn in_time(
     let (epoch, is_dark) = match record {
         Record::Ticks(ticks) => (ticks.epoch, ticks.tick.is_empty()),
         Record::Samples(samples) => (samples.epoch, samples.is_empty()),
-        Record::Histograms(_) => (0, true),
+        Record::Histograms(_) | Record::Taps(_) => (0, true),
     };
     let ends = [log.fired_at_fs.first(), log.fired_at_fs.last()];
     for (shot, fired_at_fs) in [0, log.len().wrapping_sub(1)].into_iter().zip(ends) {
@@ -247,9 +247,8 @@ fn in_time(
         if !is_dark && !(-COUNTED..=COUNTED).contains(&after) {
             let ticks = i64::try_from(after).unwrap_or(if after < 0 { i64::MIN } else { i64::MAX });
             return Err(match record {
-                Record::Ticks(_) => Error::FarFromTicks { shot, ticks },
                 Record::Samples(_) => Error::FarFromSamples { shot, ticks },
-                Record::Histograms(_) => Error::FarFromTicks { shot, ticks },
+                _ => Error::FarFromTicks { shot, ticks },
             });
         }
     }

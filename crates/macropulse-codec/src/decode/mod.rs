@@ -1,7 +1,8 @@
-//! Ticks, samples or histograms to returns: the receiver. It sees these and the shot log, never the scene.
+//! Ticks, samples, histograms or taps to returns: the receiver. It sees these and the shot log, never the scene.
 
 pub mod belief;
 pub mod histogram;
+pub mod phase;
 
 mod balanced;
 mod beyond;
@@ -25,6 +26,7 @@ pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
 pub use histogram::HistogramMethod;
 pub use matched::{Effort, Odds, Weighed, neighbours};
+pub use phase::PhaseMethod;
 pub use pick::{MOST_RETURNS, Pick, Strength};
 pub use returns::{Reject, Returns};
 pub use sampled::{
@@ -73,6 +75,8 @@ pub enum Method {
     Sampled(Sampled),
     /// Finds pulses in histograms of counts.
     Histogram(HistogramMethod),
+    /// Measures the phase of modulated light.
+    Phase(PhaseMethod),
 }
 
 /// Settings of a receiver that correlates ticks with known macropulses.
@@ -178,6 +182,8 @@ kinds! {
     Sampled, Self::Sampled(_) => "sampled", MOST_RETURNS;
     /// For bursts of pulses that are counted in a histogram: the pulses that stand out of its background.
     Histogram, Self::Histogram(_) => "histogram", MOST_RETURNS;
+    /// For modulated light: the phase of each modulation frequency, and the range that has all of them.
+    Phase, Self::Phase(_) => "phase", 1;
 }
 
 impl ReceiverKind {
@@ -186,6 +192,7 @@ impl ReceiverKind {
         match self {
             Self::Sampled => RecordKind::Samples,
             Self::Histogram => RecordKind::Histograms,
+            Self::Phase => RecordKind::Taps,
             _ => RecordKind::Ticks,
         }
     }
@@ -216,7 +223,7 @@ impl Method {
     /// Ticks per chip of the code words; `None` without a code.
     pub fn ticks_per_chip(&self) -> Option<u32> {
         match self {
-            Self::Direct | Self::Histogram(_) => None,
+            Self::Direct | Self::Histogram(_) | Self::Phase(_) => None,
             Self::Bitwise(settings) => Some(settings.ticks_per_chip),
             Self::Matched(settings, _) | Self::Balanced(settings) => Some(settings.ticks_per_chip),
             Self::Sampled(settings) => Some(settings.ticks_per_chip),
@@ -245,9 +252,15 @@ impl Method {
         match self {
             Self::Sampled(settings) => Some(settings.false_alarm),
             Self::Histogram(settings) => Some(settings.false_alarm),
+            Self::Phase(settings) => Some(settings.false_alarm),
             _ => self.correlation().map(|correlation| correlation.false_alarm),
         }
     }
+}
+
+/// The refusal of a record that `method` does not decode.
+fn wrong(method: &Method, given: RecordKind) -> Error {
+    Error::Record { wants: method.record().name(), given: given.name() }
 }
 
 /// The shots that are fired while light passes the gate so many times are decoded together: so many
@@ -299,8 +312,8 @@ impl Receiver {
         window(self.method.jitter_ticks())
     }
 
-    /// The returns of the owned shots of `log`, out of all the ticks, samples or histograms of its band, the
-    /// `record`, ordered by shot, those of one shot by range.
+    /// The returns of the owned shots of `log`, out of the `record` of its band: all its ticks, samples,
+    /// histograms or taps; ordered by shot, those of one shot by range.
     ///
     /// The record must cover the whole time in which light of an owned shot can arrive. Guard shots
     /// are decoded too, as their light overlaps, and dropped. Each channel is decoded by itself;
@@ -321,21 +334,21 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let record = record.into();
         check::check(self, (codebook, log), record)?;
-        match record {
-            Record::Ticks(ticks) => self.decode_ticks(codebook, log, ticks),
-            Record::Samples(samples) => match &self.method {
-                Method::Sampled(_) if samples.is_empty() => Ok(self.nothing_of(log.owned.len())),
-                Method::Sampled(settings) => {
-                    Ok(sampled::decode(self, settings, (codebook, log), samples))
-                }
-                method => Err(Error::Record { wants: method.record().name(), given: "samples" }),
-            },
-            Record::Histograms(histograms) => match &self.method {
-                Method::Histogram(settings) => {
-                    histogram::decode_band(self, settings, log, histograms)
-                }
-                method => Err(Error::Record { wants: method.record().name(), given: "histograms" }),
-            },
+        match (record, &self.method) {
+            (Record::Ticks(ticks), _) => self.decode_ticks(codebook, log, ticks),
+            (Record::Samples(samples), Method::Sampled(_)) if samples.is_empty() => {
+                Ok(self.nothing_of(log.owned.len()))
+            }
+            (Record::Samples(samples), Method::Sampled(settings)) => {
+                Ok(sampled::decode(self, settings, (codebook, log), samples))
+            }
+            (Record::Histograms(histograms), Method::Histogram(settings)) => {
+                histogram::decode_band(self, settings, log, histograms)
+            }
+            (Record::Taps(taps), Method::Phase(settings)) => {
+                phase::decode_band(self, settings, log, taps)
+            }
+            (record, method) => Err(wrong(method, record.kind())),
         }
     }
 
@@ -348,8 +361,8 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let sent = (codebook, log);
         Ok(match &self.method {
-            Method::Sampled(_) | Method::Histogram(_) => {
-                return Err(Error::Record { wants: self.method.record().name(), given: "ticks" });
+            method @ (Method::Sampled(_) | Method::Histogram(_) | Method::Phase(_)) => {
+                return Err(wrong(method, RecordKind::Ticks));
             }
             _ if ticks.tick.is_empty() || log.is_empty() => {
                 check::in_order(&ticks.tick, 0..ticks.tick.len())?;
@@ -394,6 +407,13 @@ impl Receiver {
         found.sort_by_key(|one| one.shot);
         found.into_iter().for_each(|one| returns.push(one));
         Ok(returns)
+    }
+
+    /// The range gate, fs: from the beginning of its first tick to the end of its last one.
+    fn gate_fs(&self) -> (i64, i64) {
+        let (nearest, farthest) = self.gate_ticks;
+        let fs = |ticks: u32| i64::from(ticks).saturating_mul(self.tick_fs);
+        (fs(nearest), fs(farthest.saturating_add(1)))
     }
 
     /// The absolute tick in which `shot` was fired.

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::Range;
 
-use super::{Error, Histogram, HistogramReader, SampleBlock, SampleReader, TickReader};
+use super::{Error, Histogram, HistogramReader, SampleBlock, SampleReader, TapReader, TickReader};
 use crate::ticks::{Tick, Ticks};
-use crate::{Given, Histograms, Samples};
+use crate::{Given, Histograms, Samples, Taps};
 
 /// Ticks of a band at most: 400 MB of them.
 const MOST_TICKS: usize = 1 << 24;
@@ -14,7 +14,7 @@ const MOST_TICKS: usize = 1 << 24;
 /// Samples of a band at most: 512 MB of them.
 const MOST_SAMPLES: usize = 1 << 28;
 
-/// Counts of a band at most: 512 MB of them.
+/// Counts or taps of a band at most: 512 MB of them.
 const MOST_COUNTS: usize = 1 << 27;
 
 /// A record under way.
@@ -22,12 +22,13 @@ const MOST_COUNTS: usize = 1 << 27;
 pub(super) enum AtHand<R> {
     Ticks(TicksAtHand<R>),
     Samples(SamplesAtHand<R>),
-    Histograms(HistogramsAtHand<R>),
+    Histograms(EachShot<HistogramReader<R>, Histogram>),
+    Taps(EachShot<TapReader<R>, Vec<u16>>),
 }
 
 impl<R: Read> AtHand<R> {
     /// The record of the shots with the ids `owned`: that of the absolute ticks of `span`, which lie behind
-    /// those asked for before, times of ticks being counted from `epoch` on; or the histograms of these shots.
+    /// those asked for before, times of ticks being counted from `epoch` on; or the histograms or taps of these shots.
     pub fn of(
         &mut self,
         owned: &Range<u64>,
@@ -36,9 +37,15 @@ impl<R: Read> AtHand<R> {
     ) -> Result<Given, Error> {
         match self {
             Self::Histograms(histograms) => Ok(Given::Histograms(histograms.of(owned)?)),
+            Self::Taps(taps) => Ok(Given::Taps(taps.of(owned)?)),
             Self::Ticks(ticks) => Ok(Given::Ticks(ticks.of(span, epoch)?)),
             Self::Samples(samples) => Ok(Given::Samples(samples.of(span)?)),
         }
+    }
+
+    /// Whether it has a record for each shot, and no other.
+    pub fn is_by_shot(&self) -> bool {
+        matches!(self, Self::Histograms(_) | Self::Taps(_))
     }
 
     /// Reads to the end, so that what is wrong there is not passed over.
@@ -47,29 +54,51 @@ impl<R: Read> AtHand<R> {
             Self::Ticks(ticks) => while ticks.reader.next_tick()?.is_some() {},
             Self::Samples(samples) => while samples.reader.next_block()?.is_some() {},
             Self::Histograms(histograms) => while histograms.reader.next_histogram()?.is_some() {},
+            Self::Taps(taps) => while taps.reader.next_shot()?.is_some() {},
         }
         Ok(())
     }
 }
 
-/// Histograms under way.
+/// What a file has of each shot, under way.
 #[derive(Debug)]
-pub(super) struct HistogramsAtHand<R> {
-    reader: HistogramReader<R>,
-    /// The one behind those that were asked for.
-    next: Option<Histogram>,
+pub(super) struct EachShot<R, T> {
+    reader: R,
+    /// The one behind those that were asked for, with its shot.
+    next: Option<(u64, T)>,
 }
 
-impl<R: Read> HistogramsAtHand<R> {
-    pub fn new(reader: HistogramReader<R>) -> Self {
+impl<R, T> EachShot<R, T> {
+    pub fn new(reader: R) -> Self {
         Self { reader, next: None }
     }
 
-    /// Those of the shots `owned`: empty of a shot without one.
+    /// Gives to `keep` what `read` finds of the shots `owned`, with the place of the shot among them.
+    fn each(
+        &mut self,
+        owned: &Range<u64>,
+        read: impl Fn(&mut R) -> Result<Option<(u64, T)>, Error>,
+        mut keep: impl FnMut(usize, T),
+    ) -> Result<(), Error> {
+        loop {
+            if self.next.is_none() {
+                self.next = read(&mut self.reader)?;
+            }
+            let Some((shot, one)) = self.next.take_if(|(shot, _)| *shot < owned.end) else {
+                return Ok(());
+            };
+            if let Some(at) = shot.checked_sub(owned.start) {
+                keep(at as usize, one);
+            }
+        }
+    }
+}
+
+impl<R: Read> EachShot<HistogramReader<R>, Histogram> {
+    /// The histograms of the shots `owned`: empty of a shot without one.
     fn of(&mut self, owned: &Range<u64>) -> Result<Histograms, Error> {
         let header = *self.reader.header();
-        let shots = (owned.end - owned.start) as usize;
-        let bins = header.bins as usize;
+        let (shots, bins) = ((owned.end - owned.start) as usize, header.bins as usize);
         if shots.saturating_mul(bins) > MOST_COUNTS {
             return self.reader.refuse(format!(
                 "more than {MOST_COUNTS} bins belong to shots that are decoded together"
@@ -82,19 +111,32 @@ impl<R: Read> HistogramsAtHand<R> {
             cycles: vec![0; shots],
             counts: vec![0; shots * bins],
         };
-        loop {
-            if self.next.is_none() {
-                self.next = self.reader.next_histogram()?;
-            }
-            let Some(one) = self.next.take_if(|one| one.shot < owned.end) else {
-                return Ok(found);
-            };
-            if let Some(at) = one.shot.checked_sub(owned.start) {
-                let at = at as usize;
-                found.cycles[at] = one.cycles;
-                found.counts[at * bins..(at + 1) * bins].copy_from_slice(&one.counts);
-            }
+        let read = |reader: &mut HistogramReader<R>| {
+            Ok(reader.next_histogram()?.map(|one| (one.shot, one)))
+        };
+        self.each(owned, read, |at, one| {
+            found.cycles[at] = one.cycles;
+            found.counts[at * bins..(at + 1) * bins].copy_from_slice(&one.counts);
+        })?;
+        Ok(found)
+    }
+}
+
+impl<R: Read> EachShot<TapReader<R>, Vec<u16>> {
+    /// The taps of the shots `owned`: codes of 0 of a shot without any.
+    fn of(&mut self, owned: &Range<u64>) -> Result<Taps, Error> {
+        let taps = self.reader.header().taps;
+        let (shots, each) = ((owned.end - owned.start) as usize, taps as usize);
+        if shots.saturating_mul(each) > MOST_COUNTS {
+            return self.reader.refuse(format!(
+                "more than {MOST_COUNTS} taps belong to shots that are decoded together"
+            ));
         }
+        let mut found = Taps { taps, codes: vec![0; shots * each] };
+        self.each(owned, TapReader::next_shot, |at, codes| {
+            found.codes[at * each..(at + 1) * each].copy_from_slice(&codes);
+        })?;
+        Ok(found)
     }
 }
 

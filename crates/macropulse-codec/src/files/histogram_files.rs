@@ -1,10 +1,10 @@
 //! Histograms: the counts of each shot, shot by shot.
 //!
-//! A record is one histogram with the number of its shot. Records stand in the order of their shots,
-//! so that a file is read in the memory of one histogram.
+//! A record is one histogram with the number of its shot.
 
 use std::io::{self, Read, Write};
 
+use super::by_shot::ByShot;
 use super::head::{self, HEADER};
 use super::source::{Source, number};
 use super::{Digest, Error, Form, LONGEST_FS, What};
@@ -50,11 +50,8 @@ pub struct Histogram {
 /// Reads histograms one by one.
 #[derive(Debug)]
 pub struct HistogramReader<R> {
-    source: Source<R>,
+    records: ByShot<R>,
     header: HistogramHeader,
-    read: u64,
-    last: Option<u64>,
-    bytes: Vec<u8>,
 }
 
 impl<R: Read> HistogramReader<R> {
@@ -73,8 +70,9 @@ impl<R: Read> HistogramReader<R> {
         if let Some(why) = impossible(&header).or_else(|| unlike(&header, wanted)) {
             return source.refuse(why);
         }
-        let bytes = vec![0; COUNT * header.bins as usize];
-        Ok(Self { source, header, read: 0, last: None, bytes })
+        let length = RECORD + COUNT * header.bins as usize;
+        let records = ByShot::new(source, header.count, length, ["the histogram", "histograms"]);
+        Ok(Self { records, header })
     }
 
     /// What is said before the histograms.
@@ -84,7 +82,7 @@ impl<R: Read> HistogramReader<R> {
 
     /// An error about what was read last.
     pub(super) fn refuse<T>(&self, message: impl Into<String>) -> Result<T, Error> {
-        self.source.refuse(message)
+        self.records.refuse(message)
     }
 
     /// The next histogram; `None` behind the last one.
@@ -92,42 +90,15 @@ impl<R: Read> HistogramReader<R> {
     /// # Errors
     /// If it cannot be read, does not come after those before it, or if the file ends too early.
     pub fn next_histogram(&mut self) -> Result<Option<Histogram>, Error> {
-        let mut record = [0; RECORD];
-        if !self.source.record(&mut record)? {
-            return match self.header.count {
-                Some(count) if self.read < count => self.source.refuse(format!(
-                    "the file ends after {} of {count} histograms: it is truncated",
-                    self.read
-                )),
-                _ => Ok(None),
-            };
+        let Some((shot, bytes)) = self.records.next()? else { return Ok(None) };
+        let (cycles, blank) = (number!(bytes, 8, u32), number!(bytes, 12, u32));
+        let counts = bytes[RECORD..].chunks_exact(COUNT).map(|count| number!(count, 0, u32));
+        let histogram = Histogram { shot, cycles, counts: counts.collect() };
+        match blank {
+            0 => Ok(Some(histogram)),
+            _ => self
+                .refuse("a histogram has four bytes of 0 behind its cycles: is the file damaged?"),
         }
-        if let Some(count) = self.header.count.filter(|count| self.read >= *count) {
-            return self
-                .source
-                .refuse(format!("the header says that there are {count} histograms only"));
-        }
-        let (shot, cycles) = (number!(record, 0, u64), number!(record, 8, u32));
-        if number!(record, 12, u32) != 0 {
-            return self
-                .source
-                .refuse("a histogram has four bytes of 0 behind its cycles: is the file damaged?");
-        }
-        if let Some(last) = self.last.filter(|last| shot <= *last) {
-            return self.source.refuse(format!(
-                "the histogram of shot {shot} comes after that of shot {last}: sort them by shot, and \
-                 give each shot once"
-            ));
-        }
-        if !self.source.record(&mut self.bytes)? {
-            return self.source.refuse(format!(
-                "the file ends before the counts of shot {shot}: it is truncated"
-            ));
-        }
-        let counts = self.bytes.chunks_exact(COUNT).map(|count| number!(count, 0, u32)).collect();
-        self.last = Some(shot);
-        self.read += 1;
-        Ok(Some(Histogram { shot, cycles, counts }))
     }
 }
 

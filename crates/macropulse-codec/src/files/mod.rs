@@ -1,22 +1,23 @@
-//! Shot logs, ticks, samples and histograms as files and streams: the seam at which recorded hardware takes the place
-//! of a simulation.
+//! Shot logs, ticks, samples, histograms and taps as files and streams: the seam at which recorded hardware takes the
+//! place of a simulation.
 //!
 //! Shots and ticks have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
 //! line that says what they are, and **binary**, little-endian records under a header. A reader
-//! tells them apart by their first byte. Samples and histograms are binary. `docs/formats.md` has them byte by byte.
+//! tells them apart by their first byte. Samples, histograms and taps are binary. `docs/formats.md` has them byte by byte.
 //!
 //! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
-//! record, and keep none. [`Stream`] reads shots and ticks, samples or histograms, at once and cuts them into bands
-//! to be decoded.
+//! record, and keep none. [`Stream`] reads shots and their record at once and cuts them into bands to be decoded.
 //! What is wrong is told with the line or the byte where it stands.
 
 mod at_hand;
+mod by_shot;
 mod head;
 mod histogram_files;
 mod sample_files;
 mod shots;
 mod source;
 mod stream;
+mod tap_files;
 mod tick_files;
 
 use std::fmt;
@@ -26,6 +27,7 @@ pub use histogram_files::{Histogram, HistogramHeader, HistogramReader, Histogram
 pub use sample_files::{SampleBlock, SampleHeader, SampleReader, SampleWriter};
 pub use shots::{Limits, Shot, ShotHeader, ShotReader, ShotWriter};
 pub use stream::Stream;
+pub use tap_files::{TapHeader, TapReader, TapWriter};
 pub use tick_files::{TickHeader, TickReader, TickWriter};
 
 /// The version of all these files that is written, and the only one that is read.
@@ -95,6 +97,8 @@ pub enum What {
     Samples,
     /// The histograms.
     Histograms,
+    /// The taps.
+    Taps,
 }
 
 /// Why a file cannot be read.

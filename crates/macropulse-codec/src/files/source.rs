@@ -43,7 +43,7 @@ impl<R: Read> Source<R> {
         let source = Self { bytes, form, what, place, passed: 0, line: Vec::new() };
         match first {
             Some(b'#' | b'M') => Ok(source),
-            Some(_) if matches!(what, What::Samples | What::Histograms) => {
+            Some(_) if !matches!(what, What::Shots | What::Ticks) => {
                 let name = source.name();
                 source.refuse(format!("this is no file of Macropulse's {name}"))
             }
@@ -62,6 +62,7 @@ impl<R: Read> Source<R> {
             What::Ticks => "ticks",
             What::Samples => "samples",
             What::Histograms => "histograms",
+            What::Taps => "taps",
         }
     }
 

@@ -4,8 +4,8 @@
 use std::io::Read;
 use std::ops::Range;
 
-use super::at_hand::{AtHand, HistogramsAtHand, SamplesAtHand, TicksAtHand};
-use super::{Error, HistogramReader, SampleReader, Shot, ShotReader, TickReader};
+use super::at_hand::{AtHand, EachShot, SamplesAtHand, TicksAtHand};
+use super::{Error, HistogramReader, SampleReader, Shot, ShotReader, TapReader, TickReader};
 use crate::Given;
 use crate::cut::Cut;
 use crate::shot_log::ShotLog;
@@ -13,7 +13,7 @@ use crate::shot_log::ShotLog;
 /// Shots of a band at most, guard shots included.
 const MOST_SHOTS: usize = 1 << 20;
 
-/// A shot log and ticks, samples or histograms under way; of both no more is kept than belongs to one band.
+/// A shot log and its record under way; of both no more is kept than belongs to one band.
 #[derive(Debug)]
 pub struct Stream<S, R> {
     cut: Cut,
@@ -41,7 +41,12 @@ impl<S: Read, R: Read> Stream<S, R> {
 
     /// The bands of `shots` and `histograms`, which are of a sensor that is `cut` so.
     pub fn of_histograms(cut: Cut, shots: ShotReader<S>, histograms: HistogramReader<R>) -> Self {
-        Self::of(cut, shots, AtHand::Histograms(HistogramsAtHand::new(histograms)))
+        Self::of(cut, shots, AtHand::Histograms(EachShot::new(histograms)))
+    }
+
+    /// The bands of `shots` and `taps`, which are of a sensor that is `cut` so.
+    pub fn of_taps(cut: Cut, shots: ShotReader<S>, taps: TapReader<R>) -> Self {
+        Self::of(cut, shots, AtHand::Taps(EachShot::new(taps)))
     }
 
     fn of(cut: Cut, shots: ShotReader<S>, record: AtHand<R>) -> Self {
@@ -95,7 +100,7 @@ impl<S: Read, R: Read> Stream<S, R> {
         let is_guard = |shot: &Shot| shot.fired_fs <= *fired_fs.end();
         let ids = owned.clone();
         let log = self.log(self.at_hand.partition_point(is_guard), owned);
-        if let AtHand::Histograms(_) = self.record {
+        if self.record.is_by_shot() {
             let given = self.record.of(&ids, &(0..0), 0)?;
             return Ok(Some((log.part(log.owned.clone()), given)));
         }

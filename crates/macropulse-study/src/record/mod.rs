@@ -217,6 +217,7 @@ pub fn manifest(run: &Run) -> Manifest {
         RecordKind::Samples => &[("samples", tally.samples)][..],
         RecordKind::Ticks => &[("detections", tally.detections), ("ticks", tally.ticks)],
         RecordKind::Histograms => &[("counts", tally.counts)],
+        RecordKind::Taps => &[("taps", tally.taps)],
     };
     for (name, count) in recorded.iter().chain(&[("returns", tally.returns)]) {
         manifest.counts.push(*name, *count);

@@ -18,7 +18,7 @@ use super::Error;
 pub const SHOTS: u64 = 20_000;
 
 /// The sensors that are tried.
-pub const SENSORS: [&str; 12] = [
+pub const SENSORS: [&str; 14] = [
     "kim-park-2016",
     "kim-park-2016-fixed",
     "coded-32",
@@ -31,6 +31,8 @@ pub const SENSORS: [&str; 12] = [
     "peregrine",
     "spad-flash",
     "spad-spinning",
+    "itof-camera",
+    "amcw-scanner",
 ];
 
 /// The ready environment around them.

@@ -3,7 +3,7 @@
 use super::Link;
 use crate::design::Design;
 use crate::environment::Environment;
-use crate::scene::Scene;
+use crate::scene::{Interferer, Scene};
 
 /// A sensor cannot be simulated in an environment: why, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,6 +62,18 @@ impl Operating {
                     "light of other lidars is received by scan patterns of rows and columns alone: \
                           take [[interferers]] out of the scene, or choose another sensor"
                         .to_owned(),
+            });
+        }
+        let is_modulated = |one: &&Interferer| one.design.emission.modulation().is_some();
+        if let Some(modulated) = scene.interferers.iter().find(is_modulated) {
+            return Err(Error {
+                sensor: design.name.clone(),
+                environment: scene.name.clone(),
+                message: format!(
+                    "light of modulated lidars as `{}` is not followed to other sensors: take it out of \
+                     [[interferers]]",
+                    modulated.design.name
+                ),
             });
         }
         Self::of(design, &scene.environment)

@@ -53,7 +53,11 @@ impl Speckle {
     /// whose line width is not said, that of its pulses.
     pub fn of(design: &Design) -> Option<Self> {
         let budget = design.budget.as_ref().filter(|_| design.light.divergence > 0.0)?;
-        let pulse = TIME_BANDWIDTH / design.light.pulse;
+        // Light that is modulated has no pulse, and the line of its laser is narrow beside that of one.
+        let pulse = match design.light.pulse {
+            0.0 => 0.0,
+            pulse => TIME_BANDWIDTH / pulse,
+        };
         let width = libm::hypot(design.light.linewidth.unwrap_or(0.0), pulse);
         Some(Self {
             wavelength: design.light.wavelength,

@@ -26,8 +26,8 @@ pub struct Derived {
     pub marks_per_scan: u64,
     /// Macropulses in the air on average at a point of a detector's time line, if all return.
     pub mean_overlap: f64,
-    /// Range at which another shot of the same detector has the same code word, m; `None` for
-    /// uncoded shots.
+    /// Range at which another shot of the same detector has the same code word, or all phases of modulated light
+    /// repeat, m; `None` for single pulses.
     pub unambiguous_range: Option<f64>,
     /// Range covered by one tick, m.
     pub tick_range: f64,
@@ -63,9 +63,12 @@ impl Derived {
             ),
             marks_per_scan: (mean * shots as f64).round() as u64,
             mean_overlap: macropulse / channel_period,
-            unambiguous_range: design
-                .is_coded()
-                .then(|| range_from_tof(word_period(design, channel_period))),
+            unambiguous_range: match design.emission.modulation() {
+                Some(modulation) => Some(range_from_tof(modulation.common_period())),
+                None => {
+                    design.is_coded().then(|| range_from_tof(word_period(design, channel_period)))
+                }
+            },
             tick_range: range_from_tof(s_from_fs(design.clock.tick_fs)),
             idle_listening_rate: at_once / (gate * shots as f64),
             reference_photons: design.detector.model().sensitivity().photons,

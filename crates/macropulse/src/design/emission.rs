@@ -1,10 +1,10 @@
-//! What a shot sends: a macropulse, or a burst of equal pulses, `[burst]`.
+//! What a shot sends: a macropulse, a burst of equal pulses, `[burst]`, or modulated light.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::limits::Check;
-use super::{Clock, Coding, Error};
+use super::{Clock, Coding, Error, Modulation};
 use crate::units::fs_from_s;
 
 /// What a shot sends.
@@ -14,6 +14,8 @@ pub enum Emission {
     Marks(Coding),
     /// A single pulse again and again.
     Burst(Burst),
+    /// Light whose power is modulated.
+    Modulated(Modulation),
 }
 
 /// Equal pulses at a fixed interval.
@@ -28,19 +30,28 @@ pub struct Burst {
 }
 
 impl Emission {
-    /// The code words, or the single pulse, that are sent once or repeatedly.
+    /// The code words, or the single pulse, that are sent once or repeatedly; of modulated light its beginning.
     pub fn coding(&self) -> &Coding {
         match self {
             Self::Marks(coding) => coding,
             Self::Burst(burst) => &burst.pulse,
+            Self::Modulated(modulation) => &modulation.shot,
         }
     }
 
     /// The burst, if it is one.
     pub fn burst(&self) -> Option<&Burst> {
         match self {
-            Self::Marks(_) => None,
             Self::Burst(burst) => Some(burst),
+            Self::Marks(_) | Self::Modulated(_) => None,
+        }
+    }
+
+    /// The modulation, if its light is modulated.
+    pub fn modulation(&self) -> Option<&Modulation> {
+        match self {
+            Self::Modulated(modulation) => Some(modulation),
+            Self::Marks(_) | Self::Burst(_) => None,
         }
     }
 
@@ -51,6 +62,9 @@ impl Emission {
 
     /// Time from the beginning of a shot's first chip to the end of its last one, fs.
     pub fn length_fs(&self) -> i64 {
+        if let Self::Modulated(modulation) = self {
+            return modulation.length_fs();
+        }
         let coding = self.coding();
         let word = i64::from(coding.codebook.chips()) * coding.chip_fs;
         let repeated =
@@ -63,19 +77,28 @@ impl Emission {
         self.coding().chip_fs
     }
 
-    /// Pulses of a shot, the mean over its labels and words.
+    /// Pulses of a shot, the mean over its labels and words; 1 of modulated light.
     pub fn mean_pulses(&self) -> f64 {
         let repeats = self.burst().map_or(1, |burst| burst.pulses);
         self.coding().codebook.mean_weight() * f64::from(repeats)
     }
 
+    /// Parts of a shot that are sent one by one, the mean over its labels and words: pulses, or exposures.
+    pub fn mean_parts(&self) -> f64 {
+        self.modulation().map_or_else(|| self.mean_pulses(), |it| f64::from(it.taps()))
+    }
+
     /// The largest share of a shot's energy that is sent within `seconds`, taking all of its marks
     /// together: 1 of a macropulse.
     pub fn share_within(&self, seconds: f64) -> f64 {
-        self.burst().map_or(1.0, |burst| {
-            let within = fs_from_s(seconds) / burst.interval_fs + 1;
-            (within as f64 / f64::from(burst.pulses)).min(1.0)
-        })
+        match self {
+            Self::Marks(_) => 1.0,
+            Self::Burst(burst) => {
+                let within = fs_from_s(seconds) / burst.interval_fs + 1;
+                (within as f64 / f64::from(burst.pulses)).min(1.0)
+            }
+            Self::Modulated(modulation) => modulation.share_within(seconds),
+        }
     }
 }
 

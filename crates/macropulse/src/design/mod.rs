@@ -20,6 +20,7 @@ mod emission;
 mod family;
 mod light;
 mod limits;
+mod modulation;
 mod presets;
 mod readout;
 mod receiver;
@@ -42,6 +43,7 @@ pub use effect::Effect;
 pub use emission::{Burst, Emission};
 pub use family::family_from_toml;
 pub use light::Light;
+pub use modulation::{Modulation, Wave};
 pub use presets::{names as preset_names, text as preset_text};
 pub use readout::{Clock, Histogram, Readout, Tdc};
 pub use scan::{

@@ -3,7 +3,7 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 16] = [
+const PRESETS: [(&str, &str); 19] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
@@ -20,6 +20,9 @@ const PRESETS: [(&str, &str); 16] = [
     ("spad-flash", include_str!("../../../../sensors/spad-flash.toml")),
     ("spad-spinning", include_str!("../../../../sensors/spad-spinning.toml")),
     ("tmf8820", include_str!("../../../../sensors/tmf8820.toml")),
+    ("itof-camera", include_str!("../../../../sensors/itof-camera.toml")),
+    ("kinect-v2", include_str!("../../../../sensors/kinect-v2.toml")),
+    ("amcw-scanner", include_str!("../../../../sensors/amcw-scanner.toml")),
 ];
 
 /// Names of the ready sensors.

@@ -1,4 +1,5 @@
-//! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]` or `[histogram]`.
+//! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]`, `[histogram]`, or the taps of modulated
+//! light.
 
 use std::sync::Arc;
 
@@ -52,6 +53,8 @@ pub enum Readout {
     Adc,
     /// Counters for each detector, one for each bin of time since a pulse was sent: histograms.
     Histogram(Histogram),
+    /// A converter for each detector that reads its taps.
+    Taps,
 }
 
 impl Readout {
@@ -59,7 +62,7 @@ impl Readout {
     pub fn tdc(&self) -> Option<&Tdc> {
         match self {
             Self::Tdc(tdc) => Some(tdc),
-            Self::Adc | Self::Histogram(_) => None,
+            Self::Adc | Self::Histogram(_) | Self::Taps => None,
         }
     }
 
@@ -67,7 +70,7 @@ impl Readout {
     pub fn histogram(&self) -> Option<&Histogram> {
         match self {
             Self::Histogram(histogram) => Some(histogram),
-            Self::Tdc(_) | Self::Adc => None,
+            Self::Tdc(_) | Self::Adc | Self::Taps => None,
         }
     }
 
@@ -77,6 +80,7 @@ impl Readout {
             Self::Tdc(_) => RecordKind::Ticks,
             Self::Adc => RecordKind::Samples,
             Self::Histogram(_) => RecordKind::Histograms,
+            Self::Taps => RecordKind::Taps,
         }
     }
 
@@ -86,6 +90,7 @@ impl Readout {
             Self::Tdc(_) => "tdc.resolution_ps",
             Self::Adc => "adc.sample_ps",
             Self::Histogram(_) => "histogram.bin_ps",
+            Self::Taps => "modulation",
         }
     }
 
@@ -158,6 +163,9 @@ pub(super) struct HistogramFile {
     pub pulse: Option<Vec<f64>>,
 }
 
+/// Tick of the clock of a sensor of modulated light, fs: no time is measured by it, and its range gate ends to 1.5 mm.
+const TICK_OF_TAPS_FS: i64 = 10_000;
+
 /// Converters start so many dead times before the first ticks of a band, as Geiger cells do.
 const DEAD_TIMES: i64 = 4;
 
@@ -189,6 +197,11 @@ impl Check<'_> {
     pub(super) fn adc(&self, file: &AdcFile) -> Result<(Clock, Readout), Error> {
         let tick_fs = self.whole_fs("adc.sample_ps", file.sample_ps)?;
         Ok((Clock { tick_fs, period_fs: tick_fs }, Readout::Adc))
+    }
+
+    /// Clock and readout of a detector whose taps are read.
+    pub(super) fn of_taps(&self) -> (Clock, Readout) {
+        (Clock { tick_fs: TICK_OF_TAPS_FS, period_fs: TICK_OF_TAPS_FS }, Readout::Taps)
     }
 
     /// Clock and readout of a detector whose counts go into a histogram.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::detector::{Arming, DetectorFile, Geiger, Sampled};
+use super::detector::{Arming, DetectorFile, Geiger, LockIn, Sampled};
 use super::limits::Check;
 use super::{Clock, Coding, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
 use crate::units::{fs_from_s, tof_from_range};
@@ -26,7 +26,7 @@ pub(super) struct ReceiverFile {
     pub kind: ReceiverKind,
     /// How much the receiver `matched` does for faint light.
     effort: Effort,
-    /// False returns accepted per shot (matched, balanced, sampled, histogram).
+    /// False returns accepted per shot (matched, balanced, sampled, histogram, phase).
     #[schemars(range(min = 1e-30, max = 0.5))]
     false_alarm: f64,
     /// Marks that make a bit a 1 (literal, blind).
@@ -61,6 +61,9 @@ pub(super) struct ReceiverFile {
     /// is not given.
     #[schemars(range(min = 0, max = 1))]
     least_share: Option<f64>,
+    /// Whether the error that harmonics of the modulation make of a phase is corrected (phase); true if it is not
+    /// given.
+    correct_harmonics: Option<bool>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -73,19 +76,19 @@ enum PileUpFile {
 }
 
 /// The keys that only some kinds of receivers have: which, whose, and why no others.
-pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 5] = {
-    use ReceiverKind::{Balanced, Blind, Histogram, Literal, Matched, Sampled};
+pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 6] = {
+    use ReceiverKind::{Balanced, Blind, Histogram, Literal, Matched, Phase, Sampled};
     let of_samples = &["receiver.least_marks", "receiver.blank_ns", "receiver.recovery_ns"];
     let of_counts = &["receiver.pile_up", "receiver.shape_error", "receiver.least_share"];
-    let deciding =
-        "only `matched`, `balanced`, `sampled` and `histogram` derive their threshold from it";
+    let deciding = "only `matched`, `balanced`, `sampled`, `histogram` and `phase` derive their threshold from it";
     let bitwise = "only `literal` and `blind` decide bit by bit";
     [
         (&["receiver.bit_threshold"], &[Literal, Blind], bitwise),
-        (&["receiver.false_alarm"], &[Matched, Balanced, Sampled, Histogram], deciding),
+        (&["receiver.false_alarm"], &[Matched, Balanced, Sampled, Histogram, Phase], deciding),
         (of_samples, &[Sampled], "only `sampled` is given samples"),
         (of_counts, &[Histogram], "only `histogram` is given counts"),
         (&["receiver.effort"], &[Matched], "only `matched` searches"),
+        (&["receiver.correct_harmonics"], &[Phase], "only `phase` is given taps"),
     ]
 };
 
@@ -104,12 +107,14 @@ pub(super) struct Inputs<'a> {
     pub sampled: Option<&'a Sampled>,
     /// The detector, where it counts photons in cells.
     pub counting: Option<&'a Geiger>,
+    /// The detector, where its taps are read.
+    pub lock_in: Option<&'a LockIn>,
     /// rms length of a pulse of light with the jitter, s.
     pub pulse: f64,
 }
 
 impl Check<'_> {
-    /// The receiver; `None` without the sampled detector that it has to know.
+    /// The receiver; `None` without the detector that it has to know.
     pub(super) fn receiver(
         &self,
         file: &ReceiverFile,
@@ -121,8 +126,8 @@ impl Check<'_> {
         if kind.record() != readout.records() {
             return self.refuse(
                 "receiver.kind",
-                "`sampled` is for an [adc], `histogram` for a [histogram], the other receivers for events \
-                 that a [tdc] times",
+                "`sampled` is for an [adc], `histogram` for a [histogram], `phase` for a [modulation], the other \
+                 receivers for events that a [tdc] times",
             );
         }
         let is_coded = coding.label.is_some();
@@ -189,6 +194,12 @@ impl Check<'_> {
             ReceiverKind::Balanced => Method::Balanced(correlation),
             ReceiverKind::Direct => Method::Direct,
             ReceiverKind::Histogram => return self.of_histograms(file, inputs, false_alarm),
+            ReceiverKind::Phase => {
+                let corrects = file.correct_harmonics.unwrap_or(true);
+                return Ok(inputs
+                    .lock_in
+                    .map(|it| Method::Phase(it.method(corrects, false_alarm))));
+            }
             ReceiverKind::Sampled => {
                 let Some(sampled) = sampled else { return Ok(None) };
                 let least = match file.least_marks {

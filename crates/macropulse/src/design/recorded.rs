@@ -1,7 +1,7 @@
 //! What recorded shots, ticks and samples are held against before they are decoded.
 
 use macropulse_codec::decode::{self, Returns};
-use macropulse_codec::files::{Digest, HistogramHeader, Limits, SampleHeader};
+use macropulse_codec::files::{Digest, HistogramHeader, Limits, SampleHeader, TapHeader};
 use macropulse_codec::{Record, RecordKind, ShotLog};
 
 use super::Design;
@@ -29,11 +29,11 @@ impl Design {
     }
 
     /// The part of the `log` of a band that its receiver is given with the record: the shots all of whose light is in
-    /// it. A histogram is that of its own shot, so that no others are.
+    /// it. A histogram, or taps, are those of their own shot, so that no others are.
     pub fn known(&self, log: &ShotLog) -> ShotLog {
         match self.records() {
             RecordKind::Ticks | RecordKind::Samples => self.cut().known(log),
-            RecordKind::Histograms => log.part(log.owned.clone()),
+            RecordKind::Histograms | RecordKind::Taps => log.part(log.owned.clone()),
         }
     }
 
@@ -75,6 +75,12 @@ impl Design {
         })
     }
 
+    /// What is said of its taps before they come, their number left open; `None` of a sensor that records none.
+    pub fn tap_header(&self) -> Option<TapHeader> {
+        let taps = self.emission.modulation()?.taps();
+        Some(TapHeader { taps, digest: Some(self.recorded_digest()), count: None })
+    }
+
     /// The hash of all that is sent and how it is timed: the codebook chip by chip, the lengths of
     /// chips and ticks, which pixel is sent what, and when. What the receiver is set to, its gate
     /// included, is not in it: the same record may be decoded in many ways.
@@ -110,6 +116,11 @@ impl Design {
         let (pattern, shots) = (scan.model(), self.shots_per_scan());
         if let Some(burst) = self.emission.burst() {
             numbers(&[burst.pulses.into(), burst.interval_fs as u64]);
+        }
+        if let Some(modulation) = self.emission.modulation() {
+            numbers(&[modulation.phases.into(), modulation.exposure_fs as u64]);
+            numbers(&[modulation.gap_fs as u64, modulation.wave as u64]);
+            modulation.hz.iter().for_each(|hz| numbers(&[hz.to_bits()]));
         }
         for sample in 0..SAMPLES.min(shots) {
             let order = sample * shots / SAMPLES.min(shots);

@@ -12,6 +12,7 @@ mod geiger;
 mod histogram;
 mod jitter;
 mod linear;
+mod lock_in;
 mod marks;
 mod noise;
 mod photon_counting;
@@ -26,13 +27,14 @@ use std::ops::Range;
 
 pub use marks::{Marks, Response};
 
-use macropulse_codec::{Histograms, Samples, ShotLog};
+use macropulse_codec::{Histograms, Samples, ShotLog, Taps};
 
 use channel::{Arrangement, Channel};
 use clock::Clock;
 use geiger::Cells;
 use histogram::Accumulator;
 use linear::Thresholding;
+use lock_in::Demodulator;
 use marks::ExactWords;
 use photon_counting::Counting;
 use sampled::Sampler;
@@ -76,6 +78,8 @@ enum Work {
     Samples(Box<Sampler>),
     /// Histograms of counts.
     Histograms(Box<Accumulator>),
+    /// Taps.
+    Taps(Box<Demodulator>),
 }
 
 /// A kind of detector at work.
@@ -123,6 +127,10 @@ impl<'a> Detectors<'a> {
                     None => Box::new(Thresholding::new(setting, design)),
                 }
             }
+            Detector::LockIn(lock_in) => {
+                let work = Box::new(Demodulator::new(lock_in, design));
+                return Self { design, chance, shape: None, work: Work::Taps(work) };
+            }
             Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
             Detector::Sampled(sampled) => {
                 let sampler = Box::new(Sampler::new(sampled, design, sunlight));
@@ -155,7 +163,7 @@ impl<'a> Detectors<'a> {
     /// fired; `None` of detectors that are not sampled.
     pub fn samples(&self, log: &ShotLog, light: &Light, span: &Range<i64>) -> Option<Samples> {
         match &self.work {
-            Work::Events(_) | Work::Histograms(_) => None,
+            Work::Events(_) | Work::Histograms(_) | Work::Taps(_) => None,
             Work::Samples(sampler) => {
                 let light = &light.with_responses(log);
                 Some(sampler.samples((self.design, &self.chance), (log, light), span))
@@ -166,8 +174,16 @@ impl<'a> Detectors<'a> {
     /// The histograms of the owned shots of `log`; `None` of detectors whose counts go into none.
     pub fn histograms(&self, log: &ShotLog, light: &Light) -> Option<Histograms> {
         match &self.work {
-            Work::Events(_) | Work::Samples(_) => None,
             Work::Histograms(work) => Some(work.histograms(&self.chance, log, light)),
+            _ => None,
+        }
+    }
+
+    /// The taps of the owned shots of `log`; `None` of detectors that have none.
+    pub fn taps(&self, log: &ShotLog, light: &Light) -> Option<Taps> {
+        match &self.work {
+            Work::Taps(work) => Some(work.taps(&self.chance, log, light)),
+            _ => None,
         }
     }
 

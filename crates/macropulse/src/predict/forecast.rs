@@ -13,10 +13,10 @@ use super::best_lag::{BestLag, Sight};
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
-use super::{balanced, belief, histogram, matched, sampled};
+use super::{balanced, belief, histogram, matched, phase, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
-use crate::design::{Design, Detector};
+use crate::design::{Design, Detector, Wave};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs, tof_from_range};
 
@@ -60,6 +60,8 @@ pub struct Forecaster<'a> {
     points: Arc<[sampled::Points]>,
     /// Of a receiver of histograms.
     counting: Option<histogram::Counting>,
+    /// Of a receiver of taps.
+    phases: Option<phase::Phases>,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the dark and background counts.
@@ -138,6 +140,10 @@ impl<'a> Forecaster<'a> {
             Method::Histogram(method) => histogram::Counting::of(design, method),
             _ => None,
         };
+        let phases = match &design.receiver.method {
+            Method::Phase(method) => phase::Phases::of(design, method),
+            _ => None,
+        };
         Ok(Self {
             design,
             operating,
@@ -148,6 +154,7 @@ impl<'a> Forecaster<'a> {
             sidelobes,
             points: points.into(),
             counting,
+            phases,
             light,
             background,
         })
@@ -246,6 +253,9 @@ impl<'a> Forecaster<'a> {
         }
         if let Some(counting) = &self.counting {
             return self.of_histograms(counting, reflectance, range);
+        }
+        if let Some(phases) = &self.phases {
+            return self.of_taps(phases, reflectance, range);
         }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
@@ -424,14 +434,37 @@ impl<'a> Forecaster<'a> {
         }
     }
 
+    /// What a receiver of taps will measure of a target of `reflectance` at `range` metres. `background` counts for
+    /// sunlight and dark current.
+    fn of_taps(&self, phases: &phase::Phases, reflectance: f64, range: f64) -> Forecast {
+        let detected = self.light * self.operating.link.detected(reflectance, range);
+        let falling = self.background * self.operating.false_rate;
+        let chances = phases.chances(range, detected, falling);
+        Forecast {
+            range,
+            reflectance,
+            photons_per_shot: detected / self.design.efficiency(),
+            detected_per_mark: detected,
+            mark_pd: -libm::expm1(-detected),
+            bank_loss: 0.0,
+            density: 0.0,
+            snr: chances.snr,
+            pd: chances.pd,
+            false_per_shot: phases.false_alarm(),
+            precision: (chances.pd * FEWEST >= 1.0).then_some(chances.precision),
+            aside: None,
+            bound: chances.bound,
+        }
+    }
+
     /// The factor on the light that gives probability `pd` to a target of `reflectance` at `range`
     /// metres; `None` where 10⁹ times the light would not.
     pub fn light_needed(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
         let enough = |factor: f64| self.with_light(factor).forecast(reflectance, range).pd >= pd;
-        // Cells that count once a pulse are blinded by far too much of it.
-        let most = match self.counting {
-            None => 1e9,
-            Some(_) => (-9..=9).map(|power| 10_f64.powi(power)).find(|factor| enough(*factor))?,
+        // Cells that count once a pulse are blinded by far too much of it, and taps are full.
+        let most = match self.counting.is_some() || self.phases.is_some() {
+            false => 1e9,
+            true => (-9..=9).map(|power| 10_f64.powi(power)).find(|factor| enough(*factor))?,
         };
         bisect(1e-9, most, enough)
     }
@@ -503,11 +536,18 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
         };
         return Some((what.to_owned(), "simulate it".to_owned()));
     }
+    if let (Method::Phase(_), Some(modulation)) = (method, design.emission.modulation()) {
+        let knows = |method: &Method| matches!(method, Method::Phase(it) if it.tones.iter().any(|tone| tone.contrasts.len() > 1));
+        return (modulation.wave == Wave::Square && !knows(method)).then(|| {
+            let remedy = "simulate it, or leave out correct_harmonics";
+            ("harmonics that are not corrected".to_owned(), remedy.to_owned())
+        });
+    }
     if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
         let what = format!("the receiver `{}`", method.kind().name());
         let remedy = match method.kind().record() {
             RecordKind::Ticks => "simulate it, or --set receiver.kind='\"matched\"'",
-            RecordKind::Samples | RecordKind::Histograms => "simulate it",
+            _ => "simulate it",
         };
         return Some((what, remedy.to_owned()));
     }

@@ -12,6 +12,7 @@ pub mod link;
 mod matched;
 pub mod multiple_access;
 mod own_light;
+mod phase;
 pub mod ranging;
 mod sampled;
 mod sidelobes;

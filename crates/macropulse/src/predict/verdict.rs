@@ -120,6 +120,9 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
         None if night.design().readout.histogram().is_some() => {
             "no amount of light would do: it comes after the last bin of the histogram".to_owned()
         }
+        None if night.design().emission.modulation().is_some() => {
+            "no amount of light would do: the taps are full, or several intervals have the same phases".to_owned()
+        }
         None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
     };
     let light = match found.photons_per_shot.is_finite() {
@@ -185,9 +188,9 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
     Check {
         name: "sunlight",
         shortfall,
-        finding: match day.design().readout.histogram() {
-            Some(_) => format!("under the sun Pd {:.3}", forecast.pd),
-            None => format!(
+        finding: match day.design().records().is_by_shot() {
+            true => format!("under the sun Pd {:.3}", forecast.pd),
+            false => format!(
                 "under the sun Pd {:.3}; a place where a mark is looked for is lit with probability {:.3}",
                 forecast.pd, forecast.density
             ),
@@ -201,6 +204,9 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
     let finding = match design.bank() {
         None if design.readout.histogram().is_some() => {
             "every pixel has a histogram of its own, which is never busy".to_owned()
+        }
+        None if design.emission.modulation().is_some() => {
+            "every pixel has taps of its own, which are never busy".to_owned()
         }
         None => "every detector has an ADC of its own, which is never busy".to_owned(),
         Some(bank) => format!(
@@ -218,9 +224,9 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
 }
 
 /// Whether chips, or marks behind the detector, are told apart on a surface at `range` metres that is slanted by
-/// 45°; `None` of a beam that is a line.
+/// 45°; `None` of a beam that is a line, and of modulated light.
 pub fn slant(design: &Design, range: f64) -> Option<Check> {
-    if design.light.divergence == 0.0 {
+    if design.light.divergence == 0.0 || design.emission.modulation().is_some() {
         return None;
     }
     let spot = libm::hypot(design.light.beam_diameter, design.light.divergence * range);

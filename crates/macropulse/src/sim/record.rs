@@ -51,6 +51,10 @@ pub(super) fn recorded(
         tally.detections = tally.counts;
         return Recorded { given: stages.done(DETECT, Given::Histograms(histograms)), tally };
     }
+    if let Some(taps) = detectors.taps(log, light) {
+        tally.taps = taps.codes.len() as u64;
+        return Recorded { given: stages.done(DETECT, Given::Taps(taps)), tally };
+    }
     let span = band.ticks(design).0;
     if let Some(samples) = detectors.samples(log, light, &span) {
         tally.samples = samples.code.len() as u64;

@@ -145,10 +145,8 @@ pub(super) fn decode_band(
     log: &ShotLog,
     histograms: &Histograms,
 ) -> Result<Returns, Error> {
-    let (nearest, farthest) = receiver.gate_ticks;
-    let fs = |ticks: u32| i64::from(ticks).saturating_mul(receiver.tick_fs);
     let receiver = HistogramReceiver {
-        gate_fs: (fs(nearest), fs(farthest.saturating_add(1))),
+        gate_fs: receiver.gate_fs(),
         returns: receiver.returns,
         pick: receiver.pick,
         method: method.clone(),

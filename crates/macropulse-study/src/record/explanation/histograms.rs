@@ -1,7 +1,6 @@
 //! The explanation of a shot whose counts are a histogram.
 
-use macropulse::codec::decode::Reject;
-use macropulse::codec::decode::{self, Accepted, Verdict};
+use macropulse::codec::decode::{self, Verdict};
 use macropulse::codec::{Histograms, ShotLog};
 use macropulse::design::Design;
 use macropulse::units::range_from_tof;
@@ -35,18 +34,7 @@ pub(super) fn decision<'a>(
     let counts = histograms.of(at).to_vec();
     let cycles = histograms.cycles.get(at).copied().unwrap_or(0);
     let alone = Histograms { cycles: vec![cycles], counts: counts.clone(), ..*histograms };
-    let mut log_alone = log.part(at..at + 1);
-    log_alone.owned = 0..1;
-    let found = design.receive(&log_alone, &alone)?;
-    let returns = (0..found.shot.len()).map(|place| Accepted {
-        tof: found.tof[place],
-        peak: found.peak[place],
-        marks: found.marks[place],
-        margin: found.margin[place],
-        photons: found.photons[place],
-    });
-    let rejects = Reject::ALL.into_iter().zip(found.rejects).filter(|(_, count)| *count > 0);
-    let verdict = Verdict { returns: returns.collect(), rejects: rejects.collect() };
+    let verdict = super::alone(design, log, at, &alone)?;
     let tick_fs = design.clock.tick_fs;
     let fired_tick = log.fired_at_fs[at].div_euclid(tick_fs);
     let shot = Shot { log, at, fired_tick, tick_fs, within_tick_fs: 0 };

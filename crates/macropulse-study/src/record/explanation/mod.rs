@@ -7,13 +7,14 @@ mod histograms;
 mod light;
 mod odds;
 mod samples;
+mod taps;
 mod ticks;
 
 use std::ops::Range;
 use std::path::Path;
 
-use macropulse::codec::decode::{self, Verdict};
-use macropulse::codec::{Given, ShotLog};
+use macropulse::codec::decode::{self, Accepted, Reject, Verdict};
+use macropulse::codec::{self, Given, ShotLog};
 use macropulse::design::Design;
 use macropulse::formats::{versioned, write_atomically};
 use macropulse::sim::{Arrivals, Stretch};
@@ -25,6 +26,7 @@ use self::curve::Scale;
 use self::histograms::Counts;
 use self::light::Light;
 use self::samples::Samples;
+use self::taps::Phasors;
 use self::ticks::Ticks;
 use super::Error;
 use crate::text::{Columns, counted, grouped, short};
@@ -81,6 +83,7 @@ enum Record {
     Ticks(Ticks),
     Samples(Samples),
     Histograms(Counts),
+    Taps(Phasors),
 }
 
 impl Record {
@@ -90,6 +93,7 @@ impl Record {
             Self::Ticks(ticks) => ticks.push(marks, columns),
             Self::Samples(samples) => samples.push(columns),
             Self::Histograms(counts) => counts.push(columns),
+            Self::Taps(phasors) => phasors.push(columns),
         }
     }
 
@@ -99,6 +103,7 @@ impl Record {
             Self::Ticks(ticks) => ticks.whole.as_ref().map(|whole| &whole.correlation.scale),
             Self::Samples(samples) => samples.whole.as_ref().map(|whole| &whole.correlation.scale),
             Self::Histograms(counts) => Some(&counts.scale),
+            Self::Taps(phasors) => Some(&phasors.scale),
         }
     }
 
@@ -108,6 +113,7 @@ impl Record {
             Self::Ticks(ticks) => ticks.whole = None,
             Self::Samples(samples) => samples.whole = None,
             Self::Histograms(counts) => counts.counts = None,
+            Self::Taps(_) => {}
         }
     }
 }
@@ -152,6 +158,27 @@ struct Decision<'a> {
     record: Record,
 }
 
+/// What the receiver of `design` makes of the `record` of shot number `at` of `log` alone.
+fn alone<'a>(
+    design: &Design,
+    log: &ShotLog,
+    at: usize,
+    record: impl Into<codec::Record<'a>>,
+) -> Result<Verdict, decode::Error> {
+    let mut log = log.part(at..at + 1);
+    log.owned = 0..1;
+    let found = design.receive(&log, record)?;
+    let returns = (0..found.shot.len()).map(|place| Accepted {
+        tof: found.tof[place],
+        peak: found.peak[place],
+        marks: found.marks[place],
+        margin: found.margin[place],
+        photons: found.photons[place],
+    });
+    let rejects = Reject::ALL.into_iter().zip(found.rejects).filter(|(_, count)| *count > 0);
+    Ok(Verdict { returns: returns.collect(), rejects: rejects.collect() })
+}
+
 impl PixelExplanation {
     /// Explains shot number `shot` of a band out of its record. `arrivals` gives the light
     /// of a stretch of time, from the shot, or where its gate opens, to the end of the last
@@ -169,6 +196,7 @@ impl PixelExplanation {
             Given::Ticks(ticks) => ticks::decision(design, (log, ticks), shot)?,
             Given::Samples(samples) => samples::decision(design, (log, samples), shot)?,
             Given::Histograms(counts) => histograms::decision(design, (log, counts), shot)?,
+            Given::Taps(taps) => taps::decision(design, (log, taps), shot)?,
         };
         let lasts = marks.last().map_or(0, |last| last + width);
         let light = arrivals(&Stretch {
@@ -232,6 +260,7 @@ impl PixelExplanation {
             Record::Ticks(_) => ("ticks", true),
             Record::Samples(_) => ("samples", false),
             Record::Histograms(_) => ("histograms", false),
+            Record::Taps(_) => ("taps", false),
         };
         columns.push(
             "light",
@@ -266,6 +295,7 @@ impl PixelExplanation {
             Record::Ticks(ticks) => ticks.charts(&self.marks_ticks, self.light.as_ref()),
             Record::Samples(samples) => samples.charts(),
             Record::Histograms(counts) => counts.charts(&self.returns),
+            Record::Taps(phasors) => phasors.charts(&self.returns),
         }
     }
 

@@ -89,6 +89,17 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     let is_measured = file.histogram.as_ref().is_some_and(|histogram| histogram.pulse.is_some());
     let jitter = ["detector.geiger.jitter_ps"];
     add(is_measured, &jitter, "histogram.pulse", "the pulse that was measured has it in it");
+    if let Some(modulation) = &file.modulation {
+        let no_pulse = ["tdc", "light.pulse_ps"];
+        add(
+            true,
+            &no_pulse,
+            "modulation",
+            "modulated light has no pulses, and no event of it is timed",
+        );
+        let wiggle = ["receiver.correct_harmonics"];
+        add(modulation.is_sine(), &wiggle, "modulation.wave", "a sine has no harmonics");
+    }
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
     let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
     add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");

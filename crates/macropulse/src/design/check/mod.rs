@@ -14,10 +14,11 @@ use super::document::Chain;
 use super::emission::BurstFile;
 use super::light::LightFile;
 use super::limits::Check;
+use super::modulation::ModulationFile;
 use super::readout::{AdcFile, HistogramFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::{Clock, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
+use super::{Clock, Coding, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
 use crate::names::nearest;
 use crate::schema::{self, Fault, Misfit};
 use crate::units::{RMS_OF_FWHM, fs_from_s, range_from_tof, s_from_fs, tof_from_range};
@@ -45,7 +46,9 @@ pub(in crate::design) struct SensorFile {
     pub code: Option<CodeFile>,
     /// Pulses that a shot without a code repeats; leave the table out for single ones.
     pub burst: Option<BurstFile>,
-    /// From light to detection events, or to a signal: one kind of detector.
+    /// Modulation of the light of a shot without pulses; leave the table out for pulses.
+    pub modulation: Option<ModulationFile>,
+    /// From light to detection events, to a signal or to taps: one kind of detector.
     pub detector: DetectorFile,
     /// From the signal of a photodiode to detection events.
     pub comparator: Option<ComparatorFile>,
@@ -59,7 +62,7 @@ pub(in crate::design) struct SensorFile {
     pub adc: Option<AdcFile>,
     /// From counts to histograms; leave the table out where detection events are timed or sampled.
     pub histogram: Option<HistogramFile>,
-    /// From ticks, samples or histograms to returns.
+    /// From ticks, samples, histograms or taps to returns.
     pub receiver: ReceiverFile,
 }
 
@@ -140,6 +143,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let scan = faults.keep(check.scan(&file.scan, moves));
     let adc = file.adc();
     let timing = faults.keep(match (&file.histogram, adc) {
+        _ if file.modulation.is_some() => Ok(check.of_taps()),
         (Some(histogram), _) => check.histogram(histogram),
         (None, Some(adc)) => check.adc(adc),
         (None, None) => check.tdc(&file.tdc),
@@ -159,7 +163,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let light = effects.as_ref().and_then(|effects| {
         faults.0.extend(check.without_effect(file, effects));
         faults.0.extend(check.not_followed(&file.detector, effects));
-        faults.keep(check.light(&file.light, off))
+        faults.keep(check.light(&file.light, file.modulation.is_some(), off))
     });
     let right_within = match file.receiver.right_within_m {
         Some(typed) => {
@@ -206,6 +210,10 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
         }),
         counting: detector.as_ref().and_then(|detector| match detector {
             Detector::Geiger(geiger) => Some(geiger),
+            _ => None,
+        }),
+        lock_in: detector.as_ref().and_then(|detector| match detector {
+            Detector::LockIn(lock_in) => Some(lock_in),
             _ => None,
         }),
         pulse: libm::hypot(jitter, light.pulse * RMS_OF_FWHM),
@@ -323,11 +331,40 @@ impl Check<'_> {
     /// What a shot sends.
     fn emission(&self, file: &SensorFile, scan: &Scan, clock: Clock) -> Result<Emission, Error> {
         let coding = self.coding(file.code.as_ref(), scan, clock)?;
+        if let Some(modulation) = &file.modulation {
+            return self.modulated(file, modulation, coding, scan);
+        }
         let Some(burst) = &file.burst else { return Ok(Emission::Marks(coding)) };
         if file.code.is_some() {
             return self.refuse("burst", "repeats single pulses: leave out [code], or [burst]");
         }
         Ok(Emission::Burst(self.burst(burst, coding, clock)?))
+    }
+
+    /// The same where its light has a `modulation`, which goes with no pulses and with a pixel that follows it.
+    fn modulated(
+        &self,
+        file: &SensorFile,
+        modulation: &ModulationFile,
+        shot: Coding,
+        scan: &Scan,
+    ) -> Result<Emission, Error> {
+        for (key, is_there) in [
+            ("code", file.code.is_some()),
+            ("burst", file.burst.is_some()),
+            ("histogram", file.histogram.is_some()),
+        ] {
+            if is_there {
+                let message =
+                    "is of pulses, and the light of a [modulation] has none: leave one of them out";
+                return self.refuse(key, message);
+            }
+        }
+        if file.detector.only().is_none_or(|only| only.name != "lock-in") {
+            return self.refuse("detector", "must be `lock-in` where light has a [modulation]");
+        }
+        let modulation = self.modulation(modulation, shot, scan.light_range)?;
+        Ok(Emission::Modulated(modulation))
     }
 
     /// Whether bursts and histograms go together: who repeats pulses adds up their counts, in bins that lie within
@@ -370,12 +407,12 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Whether the beam stands while a burst is sent, as it is simulated: where it `moves`, that has to be idealised.
+    /// Whether the beam stands while a shot is sent, as it is simulated: where it `moves`, that has to be idealised.
     fn stands(&self, emission: &Emission, scan: &Scan, moves: bool) -> Result<(), Error> {
-        if emission.burst().is_none() || !moves || scan.is_one_flash() {
+        if matches!(emission, Emission::Marks(_)) || !moves || scan.is_one_flash() {
             return Ok(());
         }
-        let message = "the beam is not followed while it sends a [burst]: put \"mirror-motion\" on this \
+        let message = "the beam is not followed while it sends a [burst] or a [modulation]: put \"mirror-motion\" on this \
                        list, or --without mirror-motion";
         self.refuse("idealised", message)
     }
@@ -453,6 +490,18 @@ impl Check<'_> {
                 return self.refuse("burst", message);
             }
         }
+        if let Some(modulation) = design.emission.modulation() {
+            let lasts = s_from_fs(modulation.length_fs());
+            if lasts > derived.channel_period {
+                let message = format!(
+                    "lasts {:.3} µs, longer than the {:.3} µs between two shots of a detector: fewer taps, \
+                     shorter exposures, or a slower scan",
+                    lasts * 1e6,
+                    derived.channel_period * 1e6
+                );
+                return self.refuse("modulation", message);
+            }
+        }
         if design.is_coded() && derived.macropulse > derived.channel_period {
             let of = match design.channels() {
                 1 => "of a pixel",
@@ -477,8 +526,12 @@ impl Check<'_> {
         if let Some(range) = derived.unambiguous_range
             && range < design.scan.max_range
         {
+            let repeats = match design.emission.modulation() {
+                Some(_) => "the phases of all modulation frequencies repeat",
+                None => "a code word returns",
+            };
             design.warnings.push(format!(
-                "a code word returns after {range:.1} m, within the range gate of {:.1} m",
+                "{repeats} after {range:.1} m, within the range gate of {:.1} m",
                 design.scan.max_range
             ));
         }

@@ -12,6 +12,7 @@ mod comparator;
 mod front_end;
 mod geiger;
 mod linear;
+mod lock_in;
 mod photodiode;
 mod photon_counting;
 mod sampled;
@@ -31,6 +32,7 @@ pub use comparator::{
 pub use front_end::FrontEnd;
 pub use geiger::{Arming, Geiger};
 pub use linear::Linear;
+pub use lock_in::LockIn;
 pub(in crate::design) use photodiode::OF_SAMPLES;
 pub use photon_counting::PhotonCounting;
 pub use sampled::{BASELINE_BLOCK, Sampled};
@@ -43,8 +45,8 @@ use super::{Error, Light};
 /// this folder, and name. Every other list of them follows from these.
 macro_rules! kinds {
     (kinds { $($(#[$doc:meta])* $Kind:ident;)+ } tables { $($(#[$of:meta])* $file:ident, $name:literal;)+ }) => {
-        /// Light to detection events, or to samples.
-        #[derive(Debug, Clone, Copy, PartialEq)]
+        /// Light to detection events, to samples or to taps.
+        #[derive(Debug, Clone, PartialEq)]
         pub enum Detector {
             $($(#[$doc])* $Kind($Kind),)+
         }
@@ -100,6 +102,8 @@ kinds! {
         Sampled;
         /// One event per shot \[KP16 Fig. 7\].
         SingleStop;
+        /// Taps that collect light in step with its modulation.
+        LockIn;
     }
     tables {
         /// Every mark is a Bernoulli trial of its own.
@@ -110,6 +114,8 @@ kinds! {
         photodiode, "photodiode";
         /// One event per shot \[KP16 Fig. 7\].
         single_stop, "single-stop";
+        /// Taps that collect light in step with its modulation; with [modulation].
+        lock_in, "lock-in";
     }
 }
 

@@ -49,9 +49,9 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
         distance,
         scan_period: scan.period(),
         shot: light.pulse.max(s_from_fs(emission.length_fs())),
-        mark: light.pulse,
+        mark: emission.modulation().map_or(light.pulse, |it| s_from_fs(it.exposure_fs)),
         brightest_shot: passed * energies.most(),
-        brightest_mark: passed / emission.mean_pulses(),
+        brightest_mark: passed / emission.mean_parts(),
         count_groups: sender.count_groups,
         counted_as_one: emission.share_within(class.counted_as_one()),
         places: Vec::new(),
@@ -67,7 +67,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
                 // A flash has no shot alone.
                 if exposure.places.is_empty() {
                     exposure.brightest_shot = flash.energy;
-                    exposure.brightest_mark = flash.share / emission.mean_pulses();
+                    exposure.brightest_mark = flash.share / emission.mean_parts();
                 }
                 vec![vec![flash]]
             }

@@ -98,7 +98,19 @@ impl Unmodelled {
     /// from what the sensor file says, or falls under an effect that is idealised.
     fn size(self, design: &Design, environment: &Environment, seen: &Sized) -> Option<String> {
         let budget = design.budget.as_ref();
+        let is_modulated = design.emission.modulation().is_some();
         match self {
+            // Full taps are simulated, and no mark has a threshold.
+            Self::Saturation if is_modulated => None,
+            Self::AirReturn if is_modulated => (!environment.is_off(Surrounding::Atmosphere))
+                .then(|| "its phasor would add to that of every echo".to_owned()),
+            Self::Crosstalk if is_modulated => Some(
+                "light that is scattered in the lens would add to the phasors of all pixels"
+                    .to_owned(),
+            ),
+            Self::MirrorImages if is_modulated => {
+                Some("the phasor of an image would add to that of the pane".to_owned())
+            }
             Self::AirReturn => {
                 let reach = match seen.air_reach()? {
                     reach if reach < design.scan.min_range => {

@@ -1,0 +1,154 @@
+//! Light to taps: pixels that collect it in step with its modulation.
+//!
+//! Each exposure of a shot is a tap. Light of the shot itself reaches it along all paths at once; a path brings the
+//! charge N/T·(1 + c·cos(2πfτ − θ)) of N detected photons in T taps, τ its time of flight, f and θ frequency and phase
+//! of the tap (or a triangle instead of the cosine). Steady light adds the same to every tap, and pulses of other
+//! lidars what the gain of the tap is when they arrive. The electrons of a tap are a Poisson variable.
+
+use std::f64::consts::TAU;
+
+use macropulse_codec::{ShotLog, Taps};
+use rand_distr::{Distribution, Poisson, StandardNormal};
+
+use crate::channel::Light;
+use crate::design::detector::LockIn;
+use crate::design::{Design, Modulation};
+use crate::random::{Chance, Stage};
+use crate::units::s_from_fs;
+
+/// Pixels that collect light in step with its modulation, at work.
+#[derive(Debug)]
+pub(super) struct Demodulator {
+    lock_in: LockIn,
+    /// Detections per photon.
+    efficiency: f64,
+}
+
+impl Demodulator {
+    pub fn new(lock_in: &LockIn, design: &Design) -> Self {
+        Self { lock_in: lock_in.clone(), efficiency: design.efficiency() }
+    }
+
+    /// The taps of the owned shots of `log`, in their order.
+    pub fn taps(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Taps {
+        let (own, others) = sorted(light);
+        let taps = self.lock_in.modulation.taps();
+        let steady = self.lock_in.dark + light.background.steady * self.efficiency;
+        let of_each = steady * s_from_fs(self.lock_in.modulation.exposure_fs);
+        let of_responses = self.of_responses(light);
+        let mut codes = Vec::with_capacity(log.owned.len() * taps as usize);
+        let mut means = Vec::with_capacity(taps as usize);
+        for shot in log.owned.clone() {
+            let (channel, fired_fs) = (log.channel[shot], log.fired_at_fs[shot]);
+            let number = log.first + shot as u64;
+            means.clear();
+            means.extend(of_responses.iter().map(|electrons| of_each + electrons));
+            let from = own.partition_point(|(of, _)| *of < number);
+            for &(_, train) in own[from..].iter().take_while(|(of, _)| *of == number) {
+                let tof_fs = light.trains.arrives_fs[train] - fired_fs;
+                self.add_path(&mut means, light.trains.photons[train], s_from_fs(tof_fs));
+            }
+            self.add_pulses(&mut means, (channel, fired_fs), (&others, light));
+            self.add_stretches(&mut means, (channel, fired_fs), light);
+            let mut stream = chance.at(Stage::LockIn, number);
+            codes.extend(means.iter().map(|mean| {
+                let drawn = Poisson::new(*mean).map_or(0.0, |law| law.sample(&mut stream));
+                let noise: f64 = StandardNormal.sample(&mut stream);
+                let electrons = drawn + self.lock_in.read_noise * noise;
+                let code = self.lock_in.dark_code + electrons / self.lock_in.electrons_per_code();
+                // Rounds, and cuts off what a code cannot say.
+                (code.round() as u16).min(self.lock_in.full_scale)
+            }));
+        }
+        Taps { taps, codes }
+    }
+
+    /// The frequency, Hz, the contrast and the phase, rad, of each tap.
+    fn each_tap(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        let LockIn { modulation, contrast, .. } = &self.lock_in;
+        let phases = modulation.phases;
+        let tones = modulation.hz.iter().zip(contrast);
+        tones.flat_map(move |(hz, contrast)| {
+            (0..phases).map(move |tap| (*hz, *contrast, TAU * f64::from(tap) / f64::from(phases)))
+        })
+    }
+
+    /// Adds the electrons of a path along which so many photons of the whole shot come.
+    fn add_path(&self, means: &mut [f64], photons: f64, tof: f64) {
+        let each = photons * self.efficiency / f64::from(self.lock_in.modulation.taps());
+        for (mean, (hz, contrast, phase)) in means.iter_mut().zip(self.each_tap()) {
+            *mean += each * self.lock_in.modulation.wave.share(contrast, TAU * hz * tof - phase);
+        }
+    }
+
+    /// Electrons in each tap of what the light brings without pulses after it was sent.
+    fn of_responses(&self, light: &Light) -> Vec<f64> {
+        let mut means = vec![0.0; self.lock_in.modulation.taps() as usize];
+        for response in &light.responses {
+            for (step, photons) in response.photons.iter().enumerate() {
+                let tof = (step as f64 + 0.5) * s_from_fs(response.step_fs);
+                self.add_path(&mut means, *photons, tof);
+            }
+        }
+        means
+    }
+
+    /// Adds the pulses of other lidars that arrive while a tap of the shot fired at `fired_fs` collects light.
+    fn add_pulses(
+        &self,
+        means: &mut [f64],
+        (channel, fired_fs): (u16, i64),
+        (others, light): (&[(u16, i64, usize)], &Light),
+    ) {
+        let Modulation { exposure_fs, gap_fs, wave, .. } = *self.lock_in.modulation;
+        let end_fs = fired_fs + self.lock_in.modulation.length_fs();
+        let from = others.partition_point(|(of, at, _)| (*of, *at) < (channel, fired_fs));
+        let seen = others[from..].iter().take_while(|(of, at, _)| (*of, *at) < (channel, end_fs));
+        for &(_, arrives_fs, train) in seen {
+            let since = arrives_fs - fired_fs;
+            let tap = (since / (exposure_fs + gap_fs)) as usize;
+            let within = since - self.lock_in.modulation.begins_fs(tap as u32);
+            let Some((hz, contrast, phase)) = self.each_tap().nth(tap) else { continue };
+            if within >= exposure_fs {
+                continue;
+            }
+            let photons = light.trains.photons[train] * self.efficiency;
+            means[tap] += photons * wave.share(contrast, TAU * hz * s_from_fs(within) - phase);
+        }
+    }
+
+    /// Adds steady light of stretches of time.
+    fn add_stretches(&self, means: &mut [f64], (channel, fired_fs): (u16, i64), light: &Light) {
+        let background = &light.background;
+        let end_fs = fired_fs + self.lock_in.modulation.length_fs();
+        for (at, per_s) in background.per_s.iter().enumerate() {
+            let (from, until) = (background.from_fs[at], background.until_fs[at]);
+            if background.channel[at] != channel || until <= fired_fs || from >= end_fs {
+                continue;
+            }
+            for (tap, mean) in (0..).zip(means.iter_mut()) {
+                let begins = fired_fs + self.lock_in.modulation.begins_fs(tap);
+                let both =
+                    until.min(begins + self.lock_in.modulation.exposure_fs) - from.max(begins);
+                *mean += per_s * self.efficiency * s_from_fs(both.max(0));
+            }
+        }
+    }
+}
+
+/// Pulse trains of the sensor itself by the number of their shot, and the pulses of others by channel and arrival.
+#[expect(clippy::type_complexity, reason = "two lists of keys and places")]
+fn sorted(light: &Light) -> (Vec<(u64, usize)>, Vec<(u16, i64, usize)>) {
+    let trains = &light.trains;
+    let is_own = |train: &usize| trains.transmitter[*train] == 0;
+    let mut own: Vec<_> =
+        (0..trains.len()).filter(is_own).map(|train| (trains.shot[train], train)).collect();
+    own.sort_unstable();
+    let mut others = Vec::new();
+    for train in (0..trains.len()).filter(|train| !is_own(train)) {
+        let channel = trains.channel[train];
+        others.extend(light.arrivals_fs(train).map(|arrives| (channel, arrives, train)));
+    }
+    others.sort_unstable();
+    (own, others)
+}

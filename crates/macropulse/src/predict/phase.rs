@@ -1,0 +1,160 @@
+//! What a receiver of taps finds of a target that modulated light meets.
+//!
+//! The phasor of a modulation frequency is a mean phasor with normal noise in both parts. Its power over that of noise
+//! decides whether there is a return; it also is half the inverse of the variance of the phase. A frequency with a full
+//! tap is left out, so that each set of frequencies that may be left has a forecast of its own.
+
+use std::f64::consts::TAU;
+
+use macropulse_codec::decode::PhaseMethod;
+use macropulse_codec::decode::phase::{rivals, threshold};
+use macropulse_codec::statistics::{normal_tail, power_tail};
+
+use crate::design::detector::LockIn;
+use crate::design::{Design, Detector};
+use crate::units::{range_from_tof, s_from_fs, tof_from_range};
+
+/// A sensor of modulated light, and its receiver.
+#[derive(Debug, Clone)]
+pub(super) struct Phases {
+    lock_in: LockIn,
+    false_alarm: f64,
+    gate_fs: (i64, i64),
+}
+
+/// What is to be expected.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Chances {
+    /// Probability of a return in the right interval.
+    pub pd: f64,
+    /// Amplitude over noise, √(2·power).
+    pub snr: f64,
+    /// Standard deviation of the range in the right interval, m.
+    pub precision: f64,
+    /// The least standard deviation that any estimate could have from these photons, m.
+    pub bound: f64,
+}
+
+/// A modulation frequency in this light.
+struct Seen {
+    hz: f64,
+    /// Power of its phasor, in units of its mean under noise.
+    power: f64,
+    /// Probability that none of its taps is full.
+    is_whole: f64,
+}
+
+/// Phasors that are accepted.
+struct Accepted {
+    /// Their share of all.
+    share: f64,
+    /// Their amplitude over that of all. The angle of a phasor with the mean amplitude a that happens to be r long has
+    /// the variance 1/(a·r), in units of its noise.
+    brighter: f64,
+}
+
+impl Phases {
+    /// Of a sensor of modulated light; `None` of others.
+    pub fn of(design: &Design, method: &PhaseMethod) -> Option<Self> {
+        let Detector::LockIn(lock_in) = &design.detector else { return None };
+        let (nearest, farthest) = design.receiver.gate_ticks;
+        let fs = |ticks: u32| i64::from(ticks) * design.clock.tick_fs;
+        Some(Self {
+            lock_in: lock_in.clone(),
+            false_alarm: method.false_alarm,
+            gate_fs: (fs(nearest), fs(farthest + 1)),
+        })
+    }
+
+    /// False returns of a shot that meets nothing.
+    pub fn false_alarm(&self) -> f64 {
+        self.false_alarm
+    }
+
+    /// What is found at `range` metres of so many detected photons of a shot, under `falling` electrons a second that
+    /// come evenly.
+    pub fn chances(&self, range: f64, photons: f64, falling: f64) -> Chances {
+        let tof = tof_from_range(range);
+        let seen: Vec<Seen> = self.each(tof, photons, falling).collect();
+        let (mut pd, mut square) = (0.0, 0.0);
+        // Each set of frequencies that none of a full tap is left of.
+        for set in 1_u32..1 << seen.len() {
+            let is_in = |at: usize| set >> at & 1 == 1;
+            let chance = |(at, tone): (usize, &Seen)| match is_in(at) {
+                true => tone.is_whole,
+                false => 1.0 - tone.is_whole,
+            };
+            let share: f64 = seen.iter().enumerate().map(chance).product();
+            if share <= 0.0 {
+                continue;
+            }
+            let used = seen.iter().enumerate().filter(|(at, _)| is_in(*at)).map(|(_, tone)| tone);
+            let used: Vec<&Seen> = used.collect();
+            let power: f64 = used.iter().map(|tone| tone.power).sum();
+            let Accepted { share: above, brighter } = self.accepted(used.len() as u32, power);
+            let here = share * above * self.right_interval(&used, brighter, tof);
+            let each = used.iter().map(|tone| (TAU * tone.hz).powi(2) * 2.0 * tone.power);
+            let information = brighter * each.sum::<f64>();
+            pd += here;
+            square += here / information.max(f64::MIN_POSITIVE);
+        }
+        let precision = range_from_tof((square / pd.max(f64::MIN_POSITIVE)).sqrt());
+        let power: f64 = seen.iter().map(|tone| tone.power).sum();
+        let bound = range_from_tof(self.information(photons).powf(-0.5));
+        Chances { pd: pd.min(1.0), snr: (2.0 * power).sqrt(), precision, bound }
+    }
+
+    /// What each frequency makes of this light.
+    fn each(&self, tof: f64, photons: f64, falling: f64) -> impl Iterator<Item = Seen> + '_ {
+        let LockIn { modulation, contrast, full_well, .. } = &self.lock_in;
+        let of_tap = photons / f64::from(modulation.taps());
+        let steady = falling * s_from_fs(modulation.exposure_fs);
+        let taps = f64::from(modulation.phases);
+        modulation.hz.iter().zip(contrast).map(move |(&hz, &contrast)| {
+            // z is K/2·Q·c long, and the power of its noise is K·v.
+            let noise = self.lock_in.variance(of_tap + steady);
+            let power = taps * (of_tap * contrast).powi(2) / (4.0 * noise);
+            let not_full = (0..modulation.phases).map(|tap| {
+                let phase = TAU * (hz * tof - f64::from(tap) / taps);
+                let mean = steady + of_tap * modulation.wave.share(contrast, phase);
+                let room = full_well - 0.5 * self.lock_in.electrons_per_code() - mean;
+                normal_tail(-room / self.lock_in.variance(mean).sqrt())
+            });
+            Seen { hz, power, is_whole: not_full.product() }
+        })
+    }
+
+    /// What is accepted of phasors with this mean `power`, in units of that of noise.
+    ///
+    /// The power M of F phasors is a gamma variable of F + k, k a Poisson variable of the mean P. With T(F) for the
+    /// probability that it is above the threshold the mean of what is above is (F·T(F + 1) + P·T(F + 2))/T(F).
+    fn accepted(&self, phasors: u32, power: f64) -> Accepted {
+        let threshold = threshold(phasors as usize, self.false_alarm);
+        let above = |more: u32| power_tail(phasors + more, power, threshold);
+        let (share, noise) = (above(0), f64::from(phasors));
+        let mean = (noise * above(1) + power * above(2)) / share.max(f64::MIN_POSITIVE);
+        Accepted { share, brighter: (mean / (noise + power)).sqrt().max(1.0) }
+    }
+
+    /// Probability that no other interval explains the phases better: each other one does so with Q(D/2), D being how
+    /// far it is from the right one, in standard deviations.
+    fn right_interval(&self, used: &[&Seen], brighter: f64, tof: f64) -> f64 {
+        let variance = |tone: &&Seen| 0.5 / (brighter * tone.power).max(f64::MIN_POSITIVE);
+        let tones: Vec<(f64, f64)> = used.iter().map(|tone| (tone.hz, variance(tone))).collect();
+        let right = rivals(&tones, tof, self.gate_fs)
+            .into_iter()
+            .map(|apart| 1.0 - normal_tail(apart / 2.0));
+        right.product()
+    }
+
+    /// Information about the time of flight in so many photons without noise of a detector, 1/s²: of a tone with N of
+    /// them and the contrast c it is (2πf)²·N·(1 − √(1 − c²)).
+    fn information(&self, photons: f64) -> f64 {
+        let LockIn { modulation, contrast, .. } = &self.lock_in;
+        let of_tone = photons / modulation.hz.len() as f64;
+        let each = modulation.hz.iter().zip(contrast).map(|(hz, contrast)| {
+            (TAU * hz).powi(2) * of_tone * (1.0 - (1.0 - contrast * contrast).sqrt())
+        });
+        each.sum()
+    }
+}
