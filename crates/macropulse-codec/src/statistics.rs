@@ -190,20 +190,17 @@ pub fn power_tail(phasors: u32, signal: f64, threshold: f64) -> f64 {
     }
     // Beyond, less than 1e-15 of a Poisson variable lies.
     let reach = |mean: f64| 10.0 * mean.sqrt() + 40.0;
-    if signal - reach(signal) > threshold + reach(threshold) {
+    if signal.is_infinite() || signal - reach(signal) > threshold + reach(threshold) {
         return 1.0;
     }
     let first = (signal - reach(signal)).max(0.0).floor();
-    let last = signal + reach(signal);
+    let last = if signal > 0.0 { signal + reach(signal) } else { 0.0 };
     // The tail of a gamma variable of n is the probability that a Poisson variable of the mean `threshold` is below n.
     let mut below: f64 = (0..phasors + first as u32).map(|j| poisson(threshold, j.into())).sum();
     let mut sum = 0.0;
     let mut k = first;
     while k <= last {
-        let weight = match signal > 0.0 {
-            true => poisson(signal, k),
-            false => f64::from(u8::from(k == 0.0)),
-        };
+        let weight = if signal > 0.0 { poisson(signal, k) } else { 1.0 };
         sum += weight * below.min(1.0);
         below += poisson(threshold, f64::from(phasors) + k);
         k += 1.0;
@@ -389,6 +386,7 @@ mod tests {
         // Pd 0.9 needs 20.81; far above and below the threshold nothing is left to chance.
         assert_relative_eq!(power_tail(1, 20.81, threshold), 0.9, max_relative = 1e-3);
         assert_eq!((power_tail(3, 1e5, 20.0), power_tail(1, 1.0, 0.0)), (1.0, 1.0));
+        assert_eq!(power_tail(2, f64::INFINITY, 20.0), 1.0);
         assert!(power_tail(1, 1.0, 500.0) < 1e-100);
     }
 

@@ -410,7 +410,7 @@ impl Receiver {
     }
 
     /// The range gate, fs: from the beginning of its first tick to the end of its last one.
-    fn gate_fs(&self) -> (i64, i64) {
+    pub fn gate_fs(&self) -> (i64, i64) {
         let (nearest, farthest) = self.gate_ticks;
         let fs = |ticks: u32| i64::from(ticks).saturating_mul(self.tick_fs);
         (fs(nearest), fs(farthest.saturating_add(1)))

@@ -60,7 +60,7 @@ impl<R: Read> AtHand<R> {
     }
 }
 
-/// What a file has of each shot, under way.
+/// A file under way that has a record of each shot.
 #[derive(Debug)]
 pub(super) struct EachShot<R, T> {
     reader: R,

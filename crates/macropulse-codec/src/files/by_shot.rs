@@ -14,7 +14,7 @@ pub(super) struct ByShot<R> {
     read: u64,
     last: Option<u64>,
     bytes: Vec<u8>,
-    /// What the file holds of each shot, with its article and in the plural.
+    /// The name of a record, with its article, and the plural of what is counted.
     names: [&'static str; 2],
 }
 

@@ -19,7 +19,7 @@ const MOST_TAPS: u32 = 1024;
 /// Bytes of a code.
 const CODE: usize = size_of::<u16>();
 
-/// What is said of taps before they come.
+/// The header of a file of taps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TapHeader {
     /// Taps of a shot, 1 to 1024.

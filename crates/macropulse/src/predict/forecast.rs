@@ -536,9 +536,9 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
         };
         return Some((what.to_owned(), "simulate it".to_owned()));
     }
-    if let (Method::Phase(_), Some(modulation)) = (method, design.emission.modulation()) {
-        let knows = |method: &Method| matches!(method, Method::Phase(it) if it.tones.iter().any(|tone| tone.contrasts.len() > 1));
-        return (modulation.wave == Wave::Square && !knows(method)).then(|| {
+    if let (Method::Phase(settings), Some(modulation)) = (method, design.emission.modulation()) {
+        let is_corrected = settings.tones.iter().all(|tone| tone.contrasts.len() > 1);
+        return (modulation.wave == Wave::Square && !is_corrected).then(|| {
             let remedy = "simulate it, or leave out correct_harmonics";
             ("harmonics that are not corrected".to_owned(), remedy.to_owned())
         });

@@ -19,6 +19,8 @@ use crate::units::{range_from_tof, s_from_fs, tof_from_range};
 pub(super) struct Phases {
     lock_in: LockIn,
     false_alarm: f64,
+    /// Power that is asked of so many phasors together.
+    thresholds: Vec<f64>,
     gate_fs: (i64, i64),
 }
 
@@ -57,12 +59,14 @@ impl Phases {
     /// Of a sensor of modulated light; `None` of others.
     pub fn of(design: &Design, method: &PhaseMethod) -> Option<Self> {
         let Detector::LockIn(lock_in) = &design.detector else { return None };
-        let (nearest, farthest) = design.receiver.gate_ticks;
-        let fs = |ticks: u32| i64::from(ticks) * design.clock.tick_fs;
+        let thresholds = (0..=lock_in.contrast.len())
+            .map(|phasors| threshold(phasors, method.false_alarm))
+            .collect();
         Some(Self {
             lock_in: lock_in.clone(),
             false_alarm: method.false_alarm,
-            gate_fs: (fs(nearest), fs(farthest + 1)),
+            thresholds,
+            gate_fs: design.receiver.gate_fs(),
         })
     }
 
@@ -77,7 +81,7 @@ impl Phases {
         let tof = tof_from_range(range);
         let seen: Vec<Seen> = self.each(tof, photons, falling).collect();
         let (mut pd, mut square) = (0.0, 0.0);
-        // Each set of frequencies that none of a full tap is left of.
+        // Each set of frequencies whose taps are not full, while those of the others are.
         for set in 1_u32..1 << seen.len() {
             let is_in = |at: usize| set >> at & 1 == 1;
             let chance = |(at, tone): (usize, &Seen)| match is_in(at) {
@@ -129,7 +133,7 @@ impl Phases {
     /// The power M of F phasors is a gamma variable of F + k, k a Poisson variable of the mean P. With T(F) for the
     /// probability that it is above the threshold the mean of what is above is (F·T(F + 1) + P·T(F + 2))/T(F).
     fn accepted(&self, phasors: u32, power: f64) -> Accepted {
-        let threshold = threshold(phasors as usize, self.false_alarm);
+        let threshold = self.thresholds[phasors as usize];
         let above = |more: u32| power_tail(phasors + more, power, threshold);
         let (share, noise) = (above(0), f64::from(phasors));
         let mean = (noise * above(1) + power * above(2)) / share.max(f64::MIN_POSITIVE);

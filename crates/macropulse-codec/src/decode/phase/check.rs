@@ -1,4 +1,4 @@
-//! What a receiver of taps must be given.
+//! The limits of the settings of a receiver of taps, and of its record.
 
 use super::super::Error;
 use super::super::check::{of_log, require};

@@ -133,7 +133,7 @@ pub(super) fn decode_band(
     decode(&PhaseReceiver { gate_fs: receiver.gate_fs(), method: method.clone() }, log, taps)
 }
 
-/// What the taps of a modulation frequency tell of the light.
+/// Phase and amplitude of the light, as the taps of one modulation frequency show them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// Phase of the light, rad, −π to π.
@@ -144,7 +144,7 @@ pub struct Measured {
     pub electrons: f64,
 }
 
-/// What the `codes` of a shot tell, an entry for each modulation frequency; `None` for one with a full tap.
+/// Phase and amplitude of each modulation frequency by the `codes` of a shot; `None` for one with a full tap.
 ///
 /// # Errors
 /// If a setting is outside its limits, or the shot has another number of codes.
@@ -175,8 +175,8 @@ fn electrons(method: &PhaseMethod, phasors: &[Phasor]) -> f64 {
     used * all / of_used * method.electrons_per_code
 }
 
-/// The power of so many phasors together that noise alone exceeds with the probability `false_alarm`, each in units of
-/// its mean under noise.
+/// The power, in units of the mean of one phasor of noise, that this number of phasors of noise together exceed with the
+/// probability `false_alarm`.
 pub fn threshold(phasors: usize, false_alarm: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1e3);
     // To the last bit of the result.

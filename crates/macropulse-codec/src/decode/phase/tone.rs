@@ -53,7 +53,7 @@ impl Tone {
     }
 }
 
-/// What the taps of one modulation frequency tell of the light.
+/// The phasor of one modulation frequency: phase and amplitude of its light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Phasor<'a> {
     pub tone: &'a Tone,

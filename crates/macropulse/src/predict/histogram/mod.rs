@@ -74,8 +74,7 @@ impl Counting {
             return None;
         };
         let bin_fs = design.clock.tick_fs;
-        let (nearest, farthest) = design.receiver.gate_ticks;
-        let gate_fs = (i64::from(nearest) * bin_fs, (i64::from(farthest) + 1) * bin_fs);
+        let gate_fs = design.receiver.gate_fs();
         Some(Self {
             geiger: *geiger,
             decision: Decision::new(method, (bin_fs, histogram.bins), gate_fs)?,
